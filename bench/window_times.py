@@ -4,6 +4,8 @@
 Prints the time from the start until the window and until data are on the screen; from a key, and from a drag of the mouse,
 until the screen changes, at moments spread over the refinement; from Ctrl+Q until the program ends; and its peak memory. The
 screen is polled about every millisecond through Xlib: a screenshot by another program would take longer than what is measured.
+Of each time the part is printed, too, that the window's own thread waited for a core (Linux's schedstat): other work on the
+machine adds to it, and a machine with nothing else to do has little of it.
 
     bench/window_times.py CACHE [--inputs 40] [--backend cpu] [--program build/release/tools/curvisplat]
     bench/window_times.py GRID SOLUTION              # while it converts: until the preview, and input until the whole is there
@@ -70,15 +72,22 @@ class Display:
         self.test.XTestFakeButtonEvent(self.display, 1, down, ctypes.c_ulong(0))
         self.x.XSync(self.display, 0)
 
-    def seconds_until_changed(self, box, act):
+    def until_changed(self, box, act, process=None):
+        """Seconds, and those of them that the main thread of `process` waited for a core."""
         before = self.pixels(box)
+        waited = waited_for_a_core(process)
         start = time.monotonic()
         act()
         while self.pixels(box) == before:
             time.sleep(0.001)
-            if time.monotonic() - start > 20:
+            if time.monotonic() - start > 60:
                 sys.exit("the window does not answer")
-        return time.monotonic() - start
+        return time.monotonic() - start, waited_for_a_core(process) - waited
+
+
+def waited_for_a_core(process):
+    """Seconds that the main thread was ready to run and did not."""
+    return int(open(f"/proc/{process.pid}/task/{process.pid}/schedstat").read().split()[1]) / 1e9 if process else 0
 
 
 def place_of(widget, places):
@@ -98,11 +107,16 @@ def coloured(pixels):
     return sum(max(p) - min(p) > 12 for p in zip(pixels[0::16], pixels[1::16], pixels[2::16])) > 100
 
 
-def spread(name, seconds):
-    ordered = sorted(seconds)
-    of = lambda part: 1000 * ordered[min(len(ordered) - 1, int(part * len(ordered)))]
-    print(f"{name}: {len(ordered)} samples, 50 % within {of(0.5):.0f} ms, 95 % within {of(0.95):.0f} ms, "
-          f"all within {1000 * ordered[-1]:.0f} ms")
+def spread(name, times):
+    """`times`: seconds, and those of waiting for a core."""
+    if not times:
+        return print(f"{name}: it was over before there was one")
+    def line(seconds):
+        ordered = sorted(seconds)
+        of = lambda part: 1000 * ordered[min(len(ordered) - 1, int(part * len(ordered)))]
+        return f"50 % within {of(0.5):.0f} ms, 95 % within {of(0.95):.0f} ms, all within {1000 * ordered[-1]:.0f} ms"
+    print(f"{name}: {len(times)} samples, {line([seconds for seconds, _ in times])}")
+    print(f"    without waiting for a core: {line([max(0, seconds - waited) for seconds, waited in times])}")
 
 
 def click(display, widget, places):
@@ -118,12 +132,12 @@ def is_there(widget, places):
     return places.exists() and any(line.split(maxsplit=4)[4:] == [widget] for line in places.read_text().splitlines())
 
 
-def measure_keys(display, chance, panel, goes_on):
+def measure_keys(display, chance, panel, goes_on, window):
     """Keys, as long as something goes on."""
     keys = []
     while goes_on() and len(keys) < 500:
         time.sleep(chance.uniform(0.05, 0.4))
-        keys.append(display.seconds_until_changed(panel, lambda: display.key("h")))
+        keys.append(display.until_changed(panel, lambda: display.key("h"), window))
     if len(keys) % 2:
         display.key("h")  # the panels are there again
         time.sleep(0.5)
@@ -175,23 +189,23 @@ def main():
                 if is_there("opening", places):
                     print("that is a preview")
                     goes_on = lambda: is_there("opening", places)
-                    spread("keys while it converts", measure_keys(display, chance, panel, goes_on))
+                    spread("keys while it converts", measure_keys(display, chance, panel, goes_on, window))
                 print(f"the whole is there after {time.monotonic() - start:.1f} s")
-                display.seconds_until_changed(panel, lambda: display.key("h"))
-                display.seconds_until_changed(panel, lambda: display.key("h"))
+                for _ in range(2):
+                    display.until_changed(panel, lambda: display.key("h"))
             if words.add_scalar:
                 click(display, "scalar", places)
                 click(display, "further scalar " + words.add_scalar, places)
                 place_of("opening", places)
                 display.move(*middle)
                 spread("keys while a scalar is added",
-                       measure_keys(display, chance, panel, lambda: is_there("opening", places)))
+                       measure_keys(display, chance, panel, lambda: is_there("opening", places), window))
 
             keys, drags = [], []
             display.move(*middle)
             for _ in range(words.inputs):
                 time.sleep(chance.uniform(0.05, 0.8))
-                keys.append(display.seconds_until_changed(panel, lambda: display.key("h")))
+                keys.append(display.until_changed(panel, lambda: display.key("h"), window))
             for _ in range(words.inputs):
                 time.sleep(chance.uniform(0.05, 0.8))
                 display.move(*middle)
@@ -199,7 +213,7 @@ def main():
                 display.move(middle[0] + width // 80, middle[1] + height // 160)  # so that the next movement comes during a drag
                 time.sleep(chance.uniform(0.02, 0.3))
                 there = middle[0] + width // 30, middle[1] + height // 50
-                drags.append(display.seconds_until_changed(picture, lambda: display.move(*there)))
+                drags.append(display.until_changed(picture, lambda: display.move(*there), window))
                 display.button(0)
             spread("keys", keys)
             spread("movements", drags)

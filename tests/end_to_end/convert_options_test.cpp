@@ -114,6 +114,9 @@ void expectForecastHolds(const std::vector<std::string>& conversion, const Tempo
     bytes += entry.file_size();
   const auto found = nlohmann::json::parse(readTextFile(folder / "dry.json"))["dry_run"];
   EXPECT_NEAR(found["cache_bytes"].get<double>() / static_cast<double>(bytes), 1, 0.05) << forecast.out;
+  const auto peak =
+      nlohmann::json::parse(readTextFile(folder / "real.json"))["peak_memory_bytes"].get<double>();
+  EXPECT_NEAR(found["memory_bytes"].get<double>() / peak, 1, 0.3) << forecast.out;
 }
 
 TEST_F(ConvertOptionsTest, ADryRunPredictsCostsAndLeavesNothing) {

@@ -180,6 +180,28 @@ TEST_F(WindowOpening, ViewOpensAGrid) {
   expectDraws(command, picture);
 }
 
+/// A desktop drops files in any order, and a dialog sorts them by name.
+TEST_F(WindowOpening, TheGridNeedNotComeFirst) {
+  openWith({"a.fun", "a.xyz"});
+  placeOf("curve");
+  saveAndCopy();
+  const auto command = close().at(0);
+  EXPECT_EQ(std::vector<std::string>(command.begin(), command.begin() + 3),
+            (std::vector<std::string>{"render", "a.xyz", "a.fun"}));
+}
+
+TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {
+  openWith({});
+  click("open");
+  click("file a.fun");
+  act({"keydown", "ctrl"});
+  click("file a.xyz");
+  act({"keyup", "ctrl"});
+  click("file accept");
+  placeOf("curve");
+  close();
+}
+
 TEST_F(WindowOpening, WithoutAFileItAsksForOneAndRemembersIt) {
   openWith({});
   click("open");

@@ -33,13 +33,13 @@ class WindowPanels : public WindowTest {
     click("menu " + menu);
     click("item " + item);
   }
-  /// Unfolds the list of markers, below others that make room. Each click is for a frame of its own.
+  /// Unfolds the list of markers, below others that make room.
   void openMarkers() {
-    for (const char* section : {"Colours and opacities", "Picture", "Markers"}) {
-      save();
-      click(section);
-    }
-    save();
+    click("Colours and opacities");
+    EXPECT_TRUE(gone("curve"));
+    click("Picture");
+    EXPECT_TRUE(gone("scalar bar"));
+    click("Markers");
   }
   static bool gone(const std::string& begin) {
     return eventually([&] { return !hasWidget(begin); });
@@ -77,11 +77,12 @@ TEST_F(WindowPanels, AClickKeepsAMarkerWhichIsRenamedUndoneAndRemoved) {
   widget("sign of marker 1");
   openMarkers();
   click("marker 1");
-  save();  // the field has heard the click
+  widget("editing marker 1");
   press("ctrl+a");
   save();  // Dear ImGui takes letters before keys of the same frame
   act({"type", "nose"});
   press("Return");
+  EXPECT_TRUE(gone("editing marker 1"));  // with Control of the next key, Dear ImGui would drop the letters
   close();
   const auto state = fs::directory_iterator("config/curvisplat/views")->path();
   std::ifstream file(state);

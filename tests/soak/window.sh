@@ -47,7 +47,7 @@ commands() { wc -l < view.log; }
 more_commands() { [ "$(commands)" -gt "$1" ]; }
 # at NAME [ACROSS [DOWN]]: a place in that widget, in percent of its size; waits for it.
 at() {
-  until_ 100 grep -qsE "^[0-9 -]+ $1\$" widgets || fail "there is no widget $1" >&2
+  until_ 1200 grep -qsE "^[0-9 -]+ $1\$" widgets || fail "there is no widget $1" >&2
   awk -v name="$1" -v across="${2:-50}" -v down="${3:-50}" '{
     x = $1; y = $2; w = $3; h = $4
     for (n = 0; n < 4; ++n) sub(/^[^ ]+ /, "")
@@ -59,10 +59,11 @@ asked() {
   local before place
   before=$(commands)
   place=$(at picture)
-  for ((again = 0; again < 60; ++again)); do
+  # One key, and as long as a busy machine takes to answer it. Only the first of all may come before the window hears.
+  for ((again = 0; again < 3; ++again)); do
     # shellcheck disable=SC2086
     do_ mousemove $place key ctrl+c
-    if until_ 20 more_commands "$before"; then
+    if until_ $((again == 0 && before == 0 ? 100 : 1200)) more_commands "$before"; then
       until_ 100 more_commands $((before + again)) || true  # an answer for every key, lest the next is taken for one
       tail -n 1 view.log
       return
@@ -79,7 +80,7 @@ saved() {
   for ((again = 0; again < 4; ++again)); do
     # shellcheck disable=SC2086
     do_ mousemove $place key ctrl+s
-    if until_ 300 test -s "$name"; then
+    if until_ 1200 test -s "$name"; then
       asked > "$1.command"  # by then the picture is written
       cp "$name" "$1.png"
       return

@@ -4,6 +4,7 @@
 
 #include <condition_variable>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <mutex>
 
@@ -148,6 +149,32 @@ TEST_F(FrameLoopTest, TooLittleMemoryEndsTheRequestOnly) {
   request.options.memory_bytes = 512 << 20;
   loop.request(request);
   EXPECT_TRUE(all(loop).back().is_final);
+}
+
+/// What `render --keep-going` draws.
+TEST_F(FrameLoopTest, CoarserDataIsDrawnWhereABrickIsDamaged) {
+  const std::filesystem::path copy = *folder_ / "leaf.splats";
+  std::filesystem::copy(*folder_ / "scene.splats", copy);
+  const CacheReader reader(copy);
+  {
+    std::fstream file(reader.geometryPath(), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(reader.bricks().back().geometry.offset));
+    file.put('\x55').put('\x5a').put('\xa5');
+  }
+  FrameLoop loop(reader, Backend::kCpu, waker());
+  FrameRequest request = requestOf();
+  request.options.lod_pixels = 0;
+  for (int n = 0; n < 2; ++n) {  // the second knows already
+    loop.request(request);
+    const std::vector<ShownFrame> frames = all(loop);
+    ASSERT_TRUE(!frames.empty() && frames.back().is_final);
+    ASSERT_EQ(frames.back().statistics.bricks_unreadable.size(), 1u);
+    FrameRenderer renderer(reader, 0, request.scalars.opacity.function, Backend::kCpu);
+    FrameStatistics statistics;
+    FrameOptions options = request.options;
+    options.keep_going = true;
+    EXPECT_EQ(frames.back().image.rgba, renderer.render(request.camera, options, statistics).rgba);
+  }
 }
 
 TEST_F(FrameLoopTest, ADamagedCacheEndsTheLoop) {

@@ -2,7 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <new>
+
+#include "stream/base/error.h"
+#include "stream/base/interrupted.h"
 #include "tools/viewer/history.h"
+#include "tools/viewer/reports.h"
 #include "tools/viewer/window_commands.h"
 
 namespace curvisplat {
@@ -21,12 +27,33 @@ TEST(Toasts, GoAwayInTheOrderOfTheirEnds) {
 
 TEST(Toasts, TheSameTextIsOne) {
   Toasts toasts;
-  toasts.add("saved", 0);
-  toasts.add("saved", 3);
+  EXPECT_TRUE(toasts.add("saved", 0));
+  EXPECT_FALSE(toasts.add("saved", 3));
   ASSERT_EQ(toasts.shown(3).size(), 1u);
   EXPECT_GT(toasts.shown(3)[0].ends_s, 7);
   toasts.remove(0);
   EXPECT_TRUE(toasts.shown(3).empty());
+}
+
+TEST(Toasts, TheSameTextIsNewAgainOnceItHasGone) {
+  Toasts toasts;
+  EXPECT_TRUE(toasts.add("saved", 0));
+  EXPECT_TRUE(toasts.add("saved", 100));
+}
+
+TEST(Reports, AnErrorIsSaidAndWorkGoesOn) {
+  Toasts toasts;
+  Reports reports(toasts, [] { return 1.0; });
+  EXPECT_TRUE(reports.attempt([] {}));
+  EXPECT_FALSE(reports.attempt([] { throw Error("a.splats: is gone"); }));
+  EXPECT_FALSE(reports.attempt([] { throw std::filesystem::filesystem_error("of two\nlines", {}); }));
+  EXPECT_FALSE(reports.attempt([] { throw std::bad_alloc(); }));
+  ASSERT_EQ(toasts.shown(1).size(), 3u);
+  EXPECT_EQ(toasts.shown(1)[0].text, "a.splats: is gone");
+  EXPECT_EQ(toasts.shown(1)[1].text.find('\n'), std::string::npos);
+  EXPECT_NE(toasts.shown(1)[2].text.find("out of memory"), std::string::npos);
+  for (const Toast& toast : toasts.shown(1)) EXPECT_TRUE(toast.is_error);
+  EXPECT_THROW(reports.attempt([] { throw Interrupted(0, "interrupted"); }), Interrupted);
 }
 
 TEST(History, GoesBackAndForth) {

@@ -16,6 +16,7 @@
 #include "stream/base/byte_text.h"
 #include "stream/base/count_text.h"
 #include "stream/base/free_space.h"
+#include "stream/base/process_usage.h"
 #include "stream/cache/faces_file.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -139,6 +140,12 @@ Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, c
   return forecast;
 }
 
+/// Where the sample was the whole grid, this process has taken what the conversion will. The plan of memory knows only what
+/// grows with the grid, and what is bounded by --memory.
+void useOwnPeak(Forecast& forecast, const GridDescription& whole, const GridDescription& sample) {
+  if (nodesOf(whole) == nodesOf(sample)) forecast.memory_bytes = ProcessUsage::now().peak_memory_bytes;
+}
+
 Forecast forecastOfMesh(const GridDescription& mesh, const ConvertOptions& options) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   Forecast forecast;
@@ -177,6 +184,7 @@ void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
   Forecast forecast = forecastOf(report, whole, scale, options);
   forecast.sampling_seconds = secondsOf(progress);
   forecast.seconds = scale.volume * forecast.sampling_seconds;
+  useOwnPeak(forecast, whole, sample->description());
   finish(forecast, options, arguments);
 }
 
@@ -226,6 +234,7 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   forecast.cache_bytes += times(further_bytes, further);
   forecast.seconds = first_s + further * further_s;
   forecast.sampling_seconds = secondsOf(progress);
+  useOwnPeak(forecast, whole, part);
   finish(forecast, options.convert, arguments);
 }
 

@@ -17,6 +17,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/options/further_scalars.h"
+#include "tools/options/grid_first.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/step_arguments.h"
@@ -77,7 +78,16 @@ ConversionServices conversionServices() {
     kept.preview = [&](const KeptPreview& preview) {
       events.preview({preview.cache, preview.whole, whatOf(preview), preview.folder});
     };
-    return keptCacheOf(files, progress, kept);
+    try {
+      return keptCacheOf(files, progress, kept);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error&) {
+      const auto ordered = gridFirst(files);
+      if (!ordered) throw;
+      events.reorder(*ordered);
+      return keptCacheOf(*ordered, progress, kept);
+    }
   };
   services.sources_of = sourcesOf;
   services.further_scalars = [](const std::filesystem::path& cache, const Paths& files) {

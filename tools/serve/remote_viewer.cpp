@@ -139,6 +139,7 @@ class RemoteViewer::Work {
       frames_.reset();  // frees its memory before the next one allocates
       frames_ = std::make_unique<FrameLoop>(reader, limits_.backend, [this] { viewer_.wake(); });
       cache_ = view.cache;
+      damaged_said_ = 0;
       asked_.clear();
     }
     picked_.reset();  // it was of another picture
@@ -163,9 +164,18 @@ class RemoteViewer::Work {
       return;
     }
     if (!frame) return;
+    reportDamage(frame->statistics.bricks_unreadable);
     while (!asked_.empty() && asked_.front().request < frame->request) asked_.pop_front();
     if (asked_.empty() || asked_.front().request != frame->request) return;
     send(asked_.front(), *frame);
+  }
+
+  /// When there is more of it than was said.
+  void reportDamage(const std::vector<BrickFailure>& damaged) {
+    if (damaged.size() <= damaged_said_) return;
+    damaged_said_ = damaged.size();
+    report(Error("{} bricks cannot be read; coarser data is drawn there, or none: {}", damaged.size(),
+                 damaged.front().reason));
   }
 
   void send(const Asked& asked, const ShownFrame& frame) {
@@ -204,6 +214,7 @@ class RemoteViewer::Work {
   std::deque<Asked> asked_;
   LineQuality line_;
   uint32_t pictures_ = 0;
+  size_t damaged_said_ = 0;            // bricks of the cache, of which the viewer was told
   std::unique_ptr<FrameLoop> frames_;  // the last: its thread calls wake()
 };
 

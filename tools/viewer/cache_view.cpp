@@ -47,16 +47,16 @@ std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& 
 
 }  // namespace
 
-CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Toasts& toasts,
-                     FileDialog& dialog, const WindowLayout& layout)
-    : cache_(std::move(cache)),
+CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options, Window& window,
+                     Reports& reports, FileDialog& dialog, std::shared_future<void> after)
+    : cache_(prepared.cache.atStep(prepared.cache.step())),
       target_s_(options.target_s),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
-      toasts_(toasts),
+      reports_(reports),
       dialog_(dialog),
-      state_(openingState(options, pixelsOf(layout.picture, window))),
+      state_(firstState(prepared, options)),
       first_function_(state_.function),
       first_state_(toJson(state_)),
       history_(options.carried ? options.carried->history : History(state_)),
@@ -67,75 +67,52 @@ CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& wi
       overlay_(window.gl()),
       views_(savedViewsOf(whole())),
       further_(options.conversion, cache_.cachePath(), sourcesFor(cache_, options), Window::wake),
-      probe_(cache_) {
-  frames_.emplace(cache_, backend_, Window::wake);
+      probe_(cache_),
+      chooser_(cache_, Window::wake) {
+  frames_.emplace(cache_, backend_, Window::wake, std::move(after));
   playback_.goTo(cache_.step());
   navigation_.setBounds(state_.scale * manifest().lower, state_.scale * manifest().upper);
 }
 
-ViewState CacheView::openingState(const ViewerOptions& options, ImageSize picture) {
-  if (options.carried) {
-    ViewState state = options.carried->state;
-    if (options.scalar && *options.scalar != state.variable)
-      chooseVariable(state, cache_, *options.scalar);
-    else if (state.function.isAutomatic())
-      state.function = automaticFunction(cache_, state.variable);
-    return state;
-  }
-  ViewState state = firstViewOf(cache_, options.scalar.value_or(""), picture);
-  if (options.state) {
-    state = viewStateFromJson(readTextFile(*options.state), *options.state, manifest());
-  } else if (const auto remembered = rememberedStateOf(whole()); remembered && fs::exists(*remembered)) {
-    try {
-      ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, manifest());
-      loadSurfaces(found);
-      state = std::move(found);
-    } catch (const Error& error) {
-      printMessage("warning: {}; using the initial view", error.what());
-    }
-  }
-  if (options.scalar && *options.scalar != state.variable) chooseVariable(state, cache_, *options.scalar);
-  if (options.memory_bytes) state.memory_bytes = *options.memory_bytes;
-  if (options.scene) takeScene(*options.scene, options, state);
-  loadSurfaces(state);
+void CacheView::releasePictures() {
+  picture_.release();
+  overlay_.release();
+}
+
+void CacheView::takePictureOf(CacheView& before) {
+  picture_.swap(before.picture_);
+  overlay_.swap(before.overlay_);
+  shown_strip_ = before.shown_strip_;
+}
+
+/// As the view before has it now. Reads only where the user has chosen another scalar since the view was prepared.
+ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOptions& options) const {
+  if (!options.carried) return prepared.state;
+  ViewState state = options.carried->state;
+  if (options.scalar && *options.scalar != state.variable) chooseVariable(state, manifest(), *options.scalar);
+  if (!state.function.isAutomatic()) return state;
+  state.function =
+      state.variable == prepared.scalar ? prepared.automatic : automaticFunction(cache_, state.variable);
   return state;
 }
 
-/// Surfaces and slices of the command line take the place of those of the state.
-void CacheView::takeScene(const SurfaceScene& scene, const ViewerOptions& options, ViewState& state) const {
-  state.surfaces.clear();
-  for (size_t n = 0; n < scene.surfaces.size(); ++n)
-    state.surfaces.push_back(
-        {fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour, scene.surfaces[n].mesh});
-  state.faces.clear();
-  for (size_t n = 0; n < scene.grid_surfaces.size(); ++n)
-    state.faces.push_back({options.face_names.at(n), scene.grid_surfaces[n]});
-  state.faces_by = options.faces_by;
-  state.isovalues = scene.isovalues;
-  state.iso_opacity = scene.iso_opacity;
-  state.slices = scene.slices;
-  state.slice_opacity = scene.slice_opacity;
-  state.volume = scene.volume;
-}
-
-void CacheView::say(const std::string& text, bool is_error) {
-  toasts_.add(text, clockSeconds(), is_error);
-}
-
 void CacheView::draw(const WindowLayout& layout) {
-  takeFrame();
+  reports_.attempt([&] { takeFrame(); });
+  reports_.attempt([&] { takeFunction(); });
   react(layout);
   const ImageSize size = pixelsOf(layout.picture, window_);
   if (size.width > 0) {
     const bool moving = navigation_.isMoving() || dragging_ || playback_.isPlaying();
-    if (changed_ || moving != was_moving_ || !same(size, picture_size_)) {
+    // A button that is pressed and has not moved anything asks for nothing: a click for a value is answered at once.
+    if (changed_ || (was_moving_ && !moving) || !same(size, picture_size_)) {
       picture_size_ = size;
       data_size_ = dataSizeOf(state_, manifest(), size);
-      ask(moving);
+      reports_.attempt([&] { ask(moving); });
     }
     showPicture(layout);
     savePictureIfFinal();
-    if (std::exchange(copy_requested_, false)) copyCommand(std::exchange(copies_movie_, false));
+    if (!chooser_.busy() && std::exchange(copy_requested_, false))
+      copyCommand(std::exchange(copies_movie_, false));
     probe(layout);
     showPlanesAndMarkers(layout);
     keepHistory();
@@ -149,22 +126,40 @@ void CacheView::takeFrame() {
     if (std::optional<ShownFrame> frame = frames_->take()) {
       picture_.set(frame->bytes, frame->image.size);
       shown_ = std::move(frame);
-      frame_error_.clear();
       annotate();
+      reportDamage();
     }
     if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
-  } catch (const UsageError& error) {
-    reportFrame(error);
-  } catch (const Error& error) {
-    reportFrame(error);
+  } catch (const UsageError&) {  // of this request only
+    giveUpSaving();
+    throw;
+  } catch (...) {
+    giveUpSaving();
     frames_failed_ = true;
+    throw;
   }
 }
 
-/// An error of a picture, such as a disk that is gone: the window and what it shows stay.
-void CacheView::reportFrame(const Error& error) {
-  if (std::exchange(frame_error_, error.what()) != error.what()) printMessage("warning: {}", error.what());
-  say(error.what(), true);
+/// What is to be saved will not come.
+void CacheView::giveUpSaving() {
+  if (std::exchange(save_to_, std::nullopt)) say("The picture was not saved, because it could not be drawn.");
+}
+
+/// Of each damaged brick once.
+void CacheView::reportDamage() {
+  const BrickFailure* first = nullptr;
+  for (const BrickFailure& failure : shown_->statistics.bricks_unreadable)
+    if (damaged_.insert(failure.brick).second && !first) first = &failure;
+  if (!first) return;
+  const size_t number = damaged_.size();
+  reports_.report(fmt::format("{} of {} bricks cannot be read; coarser data is drawn there, or none: {}",
+                              number, cache_.bricks().size(), first->reason));
+}
+
+std::string CacheView::lacks() const {
+  const size_t number = shown_ ? shown_->statistics.bricks_unreadable.size() : 0;
+  if (number == 0) return {};
+  return fmt::format(", without {} damaged brick{}", number, number == 1 ? "" : "s");
 }
 
 /// The loop has ended with an error: what is asked now is tried by a new one, whose requests are counted anew.
@@ -201,15 +196,21 @@ void CacheView::drawPanels(const WindowLayout& layout) {
   facts.playback = &playback_;
   facts.views = views_;
   facts.place = layout.panels;
-  FurtherScalars further = further_.known();
-  further.is_busy = adds_scalar_;
+  const FurtherScalars further = furtherScalars();
   facts.further = &further;
   const PanelActions actions = panels_.draw(state_, facts);
+  reports_.attempt([&] { apply(actions); });
+}
+
+void CacheView::apply(const PanelActions& actions) {
   if (actions.step) changed_ |= playback_.goTo(*actions.step);
   dragging_ = actions.dragging;
   changed_ |= actions.changed;
   if (actions.function_changed) ++function_version_;
   for (const Command command : actions.commands) run(command);
+  if (actions.scalar) chooseScalar(*actions.scalar);
+  if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
+  if (actions.automatic_function) run(Command::kResetFunction);
   if (actions.looks_for_scalars) further_.look();
   if (actions.add_scalar) wanted_scalar_ = actions.add_scalar;
   if (actions.load_function) dialog_.open(FileDialog::Purpose::kLoadFunction);
@@ -221,10 +222,13 @@ void CacheView::drawPanels(const WindowLayout& layout) {
     fs::remove(savedViewOf(whole(), *actions.remove_view), ignored);
     views_ = savedViewsOf(whole());
   }
-  if (!actions.error.empty()) say(actions.error, true);
+  if (!actions.error.empty()) reports_.report(actions.error);
 }
 
 void CacheView::ask(bool moving) {
+  was_moving_ = moving;
+  changed_ = false;  // what cannot be drawn is not tried again before it changes
+  rests_ = false;
   const ShownFunctions functions(state_, manifest());
   FrameRequest request{functions.scalars(cache_, state_), function_version_, state_.camera,
                        state_.frameOptions(data_size_)};
@@ -234,9 +238,6 @@ void CacheView::ask(bool moving) {
   if (frames_failed_) restartFrames();
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
   request_ = frames_->request(std::move(request));
-  was_moving_ = moving;
-  changed_ = false;
-  rests_ = false;
   values_.reset();
 }
 
@@ -247,7 +248,7 @@ void CacheView::run(Command command) {
   };
   switch (command) {
     case Command::kSavePicture:
-      save_to_ = fs::path();
+      saveTo({});
       return;
     case Command::kSavePictureAs:
       return dialog_.open(FileDialog::Purpose::kSavePicture, cache_.cachePath().stem().string() + ".png");
@@ -261,10 +262,7 @@ void CacheView::run(Command command) {
     case Command::kRedo:
       return restore(history_.redo());
     case Command::kResetFunction:
-      state_.function = automaticFunction(cache_, state_.variable);
-      ++function_version_;
-      changed_ = true;
-      return;
+      return chooser_.ask({FunctionChooser::For::kSameScalar, state_.variable});
     case Command::kSaveView:
       return saveView(fmt::format("view {}", views_.size() + 1));
     case Command::kLight:
@@ -351,8 +349,8 @@ bool CacheView::isChecked(Command command) const {
 
 double CacheView::wait() const {
   if (playback_.isPlaying() && isShown() && playback_.wait(clockSeconds()) <= 0) return 0;
-  const bool short_wait =
-      navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() || probe_.busy();
+  const bool short_wait = navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() ||
+                          probe_.busy() || chooser_.busy();
   return short_wait ? kMovingWaitSeconds : kIdleWaitSeconds;
 }
 
@@ -365,6 +363,7 @@ void CacheView::keepHistory() {
 
 void CacheView::restore(const ViewState* state) {
   if (!state) return;
+  chooser_.drop();
   state_ = *state;
   ++function_version_;
   changed_ = true;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/file_dialog.h"
 #include "tools/viewer/frame_loop.h"
+#include "tools/viewer/function_chooser.h"
 #include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/history.h"
 #include "tools/viewer/menus.h"
@@ -20,7 +23,8 @@
 #include "tools/viewer/plane_handles.h"
 #include "tools/viewer/playback.h"
 #include "tools/viewer/point_probe.h"
-#include "tools/viewer/toasts.h"
+#include "tools/viewer/prepared_view.h"
+#include "tools/viewer/reports.h"
 #include "tools/viewer/viewer_options.h"
 #include "tools/viewer/window.h"
 
@@ -40,15 +44,26 @@ struct CarriedView {
 
 class CacheView {
  public:
-  /// `options.state`, `scalar` and `scene` are of this cache. Throws Error as reading the cache or the state does.
-  CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Toasts& toasts,
-            FileDialog& dialog, const WindowLayout& layout);
+  /// `prepared` is for `options`. Draws nothing before `after` is ready, if that is valid. Throws Error as opening the
+  /// cache does.
+  CacheView(const PreparedView& prepared, const ViewerOptions& options, Window& window, Reports& reports,
+            FileDialog& dialog, std::shared_future<void> after = {});
 
+  /// Shows the picture of the view that this one replaces until its own first one comes.
+  void takePictureOf(CacheView& before);
+  /// Gives up what is OpenGL's. Then nothing but the destructor may be called, and that on any thread: it waits for what is
+  /// being read and drawn.
+  void releasePictures();
   /// Draws one frame with the effects of all input so far.
   void draw(const WindowLayout& layout);
   /// Applies a command that is not the window's own.
   void run(Command command);
   void choose(const MenuChoice& choice);
+  /// Where the function is chosen from the data, with the function, as soon as that is found.
+  void chooseScalar(const std::string& name);
+  void showScalar(const std::string& name);
+  /// An empty name: the opacities are of the same scalar.
+  void chooseOpacityScalar(const std::string& name);
   void take(const FileDialog::Chosen& chosen);
   void addTo(MenuFacts& facts);
   bool isEnabled(Command command) const;
@@ -69,13 +84,17 @@ class CacheView {
   const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
 
  private:
-  ViewState openingState(const ViewerOptions& options, ImageSize picture);
-  void takeScene(const SurfaceScene& scene, const ViewerOptions& options, ViewState& state) const;
+  ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
   void takeFrame();
-  void reportFrame(const Error& error);
+  void takeFunction();
+  void reportDamage();
+  /// A picture, once it is final; the empty name: the next number.
+  void saveTo(const std::filesystem::path& file);
+  void giveUpSaving();
   void restartFrames();
   void react(const WindowLayout& layout);
   void drawPanels(const WindowLayout& layout);
+  void apply(const PanelActions& actions);
   void ask(bool moving);
   void annotate();
   void showPicture(const WindowLayout& layout);
@@ -90,13 +109,16 @@ class CacheView {
   void saveView(const std::string& name);
   void loadView(const std::string& name);
   std::vector<std::string> otherScalars() const;
+  FurtherScalars furtherScalars();
   /// The cache that is shown, or the one that it is a preview of: what states and views are kept for.
   const std::filesystem::path& whole() const { return preview_ ? preview_->whole : cache_.cachePath(); }
   bool isUntouchedPreview() const { return preview_ && toJson(state_) == first_state_; }
   std::optional<glm::dvec2> placeOf(const glm::dvec3& point, const WindowLayout& layout) const;
   bool isShown() const { return shown_ && shown_->request == request_; }
-  bool isFinal() const { return isShown() && shown_->is_final; }
-  void say(const std::string& text, bool is_error = false);
+  bool isFinal() const { return isShown() && shown_->is_final && !chooser_.busy(); }
+  void say(const std::string& text) { reports_.say(text); }
+  /// What the picture that is shown lacks, for a sentence: ", without 3 damaged bricks"; empty if nothing.
+  std::string lacks() const;
   const Manifest& manifest() const { return cache_.manifest(); }
 
   const CacheReader cache_;
@@ -104,7 +126,7 @@ class CacheView {
   const std::optional<Preview> preview_;
   const std::vector<std::filesystem::path> grid_files_;  // that were opened, if the cache is kept for them
   Window& window_;
-  Toasts& toasts_;
+  Reports& reports_;
   FileDialog& dialog_;
   ViewState state_;
   const EditedFunction first_function_;
@@ -117,7 +139,7 @@ class CacheView {
   const Backend backend_;
   std::optional<FrameLoop> frames_;
   bool frames_failed_ = false;  // the loop has ended
-  std::string frame_error_;     // the last that was said, until a picture comes
+  std::set<uint32_t> damaged_;  // bricks, of which the user has been told
   PictureTexture picture_, overlay_;
   std::vector<std::string> views_;
   FurtherScalarList further_;
@@ -135,6 +157,7 @@ class CacheView {
 
   std::optional<ShownValues> values_;
   PointProbe probe_;
+  FunctionChooser chooser_;
   uint64_t values_asked_for_ = 0;  // request
   double pointed_since_s_ = 0;
   glm::dvec2 pointed_{-1.0};

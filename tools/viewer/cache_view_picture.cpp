@@ -113,7 +113,13 @@ void CacheView::probe(const WindowLayout& layout) {
         probed_.clear();
     }
   }
-  const auto answer = probe_.take();
+  std::optional<PointProbe::Answer> answer;
+  try {
+    answer = probe_.take();
+  } catch (const Error& error) {
+    probed_ = fmt::format("the value here cannot be read: {}", error.what());
+    if (std::exchange(marker_question_, std::nullopt)) reports_.report(error);
+  }
   if (!answer) return;
   const VariableInfo& variable = manifest().variables[answer->question.variable];
   const bool for_marker = marker_question_ && *marker_question_ == answer->question;
@@ -152,13 +158,19 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   nameArea("status " + text, place.x, place.y, place.width, place.height);
   const std::string state =
       (preview_ ? fmt::format("preview of {}, ", preview_->what) : "") +
-      stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_->busy(), ""});
+      (chooser_.busy() ? "choosing colours, " : "") +
+      stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_->busy(), ""}) + lacks();
   ImGui::SameLine(static_cast<float>(place.width) - ImGui::CalcTextSize(state.c_str()).x -
                   2 * ImGui::GetStyle().FramePadding.x);
   ImGui::TextDisabled("%s", state.c_str());
   nameWidget("state " + state);
   ImGui::End();
   ImGui::PopStyleVar(2);
+}
+
+void CacheView::saveTo(const fs::path& file) {
+  save_to_ = file;
+  changed_ |= frames_failed_;  // tries again
 }
 
 void CacheView::savePictureIfFinal() {
@@ -173,9 +185,9 @@ void CacheView::savePictureIfFinal() {
         sceneOf(state_, manifest(), functions, shown_->camera, shown_->options, picture_size_);
     writeImage(annotated(shown_->image, state_.annotations, scene), file);
     say("saved " + fs::absolute(file).string() +
-        (preview_ ? fmt::format(", of the preview ({})", preview_->what) : ""));
+        (preview_ ? fmt::format(", of the preview ({})", preview_->what) : "") + lacks());
   } catch (const Error& error) {
-    say(error.what(), true);
+    reports_.report(error);
   }
 }
 
@@ -195,14 +207,15 @@ void CacheView::copyCommand(bool turns) {
     keep(state_.function, "colours", options.function_file);
     if (state_.opacity_by) keep(state_.opacity_by->function, "opacities", options.opacity_file);
     const std::string command = renderCommand(state_, options) +
-                                (playback_.steps() > 1 ? fmt::format(" --step {}", playback_.step()) : "");
+                                (playback_.steps() > 1 ? fmt::format(" --step {}", playback_.step()) : "") +
+                                (lacks().empty() ? "" : " --keep-going");
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);
     say(fmt::format("copied the command for {}; paste it into a terminal",
                     turns ? "a movie" : "this picture"));
   } catch (const Error& error) {
-    say(error.what(), true);
+    reports_.report(error);
   }
 }
 
@@ -211,6 +224,7 @@ void CacheView::take(const FileDialog::Chosen& chosen) {
   try {
     switch (chosen.purpose) {
       case FileDialog::Purpose::kLoadFunction:
+        chooser_.drop();
         state_.function = EditedFunction(readParaViewPreset(file), state_.function.opacityUnit());
         ++function_version_;
         changed_ = true;
@@ -220,13 +234,12 @@ void CacheView::take(const FileDialog::Chosen& chosen) {
         return say(
             fmt::format("saved {}; draw with it: render --tf {}", file.string(), shortPath(file).string()));
       case FileDialog::Purpose::kSavePicture:
-        save_to_ = file;
-        return;
+        return saveTo(file);
       case FileDialog::Purpose::kOpenData:
         return;
     }
   } catch (const Error& error) {
-    say(error.what(), true);
+    reports_.report(error);
   }
 }
 
@@ -236,7 +249,7 @@ void CacheView::saveView(const std::string& name) {
     views_ = savedViewsOf(whole());
     say(fmt::format("saved the view \"{}\": View, Saved views", name));
   } catch (const Error& error) {
-    say(error.what(), true);
+    reports_.report(error);
   }
 }
 
@@ -250,7 +263,7 @@ void CacheView::loadView(const std::string& name) {
     loadSurfaces(state);
     restore(&state);
   } catch (const Error& error) {
-    say(error.what(), true);
+    reports_.report(error);
   }
 }
 
@@ -267,22 +280,66 @@ void CacheView::addTo(MenuFacts& facts) {
   facts.opacity_scalars = otherScalars();
   facts.opacity_scalar = state_.opacity_by ? state_.opacity_by->variable : facts.opacity_scalars.front();
   facts.views = views_;
-  facts.further = further_.known();
-  facts.further.is_busy = adds_scalar_;
+  facts.further = furtherScalars();
+}
+
+FurtherScalars CacheView::furtherScalars() {
+  FurtherScalars further = further_.known();
+  further.is_busy = adds_scalar_;
+  if (cache_.series().steps.size() > 1)
+    further.note = "for more, convert the series again with --scalar NAME";
+  else if (preview_)
+    further.note = "more when the whole is there";
+  return further;
 }
 
 void CacheView::choose(const MenuChoice& choice) {
   if (choice.view) loadView(*choice.view);
   if (choice.looks_for_scalars) further_.look();
   if (choice.add_scalar) wanted_scalar_ = choice.add_scalar;
-  if (choice.scalar && *choice.scalar != state_.variable) {
-    chooseVariable(state_, cache_, *choice.scalar);
-    if (state_.opacity_by && state_.opacity_by->variable == *choice.scalar) state_.opacity_by.reset();
-  }
+  if (choice.scalar && *choice.scalar != state_.variable) chooseScalar(*choice.scalar);
   if (choice.opacity_scalar)
-    chooseOpacityScalar(state_, cache_,
-                        *choice.opacity_scalar == otherScalars().front() ? "" : *choice.opacity_scalar);
-  if (!choice.scalar && !choice.opacity_scalar) return;
+    chooseOpacityScalar(*choice.opacity_scalar == otherScalars().front() ? "" : *choice.opacity_scalar);
+}
+
+void CacheView::chooseScalar(const std::string& name) {
+  if (state_.function.isAutomatic()) return chooser_.ask({FunctionChooser::For::kScalar, name});
+  showScalar(name);
+}
+
+void CacheView::showScalar(const std::string& name) {
+  chooseVariable(state_, manifest(), name);
+  if (state_.opacity_by && state_.opacity_by->variable == name) state_.opacity_by.reset();
+  ++function_version_;
+  changed_ = true;
+}
+
+void CacheView::chooseOpacityScalar(const std::string& name) {
+  if (!name.empty() && name != state_.variable) return chooser_.ask({FunctionChooser::For::kOpacities, name});
+  state_.opacity_by.reset();
+  ++function_version_;
+  changed_ = true;
+}
+
+/// What the chooser has found. What the user has edited meanwhile stays.
+void CacheView::takeFunction() {
+  const auto found = chooser_.take();
+  if (!found) return;
+  const auto& [question, function] = *found;
+  switch (question.what) {
+    case FunctionChooser::For::kScalar: {
+      const bool is_automatic = state_.function.isAutomatic();
+      showScalar(question.scalar);
+      if (is_automatic) state_.function = function;
+      return;
+    }
+    case FunctionChooser::For::kOpacities:
+      if (question.scalar != state_.variable) state_.opacity_by = OpacityScalar{question.scalar, function};
+      break;
+    case FunctionChooser::For::kSameScalar:
+      if (question.scalar == state_.variable) state_.function = function;
+      break;
+  }
   ++function_version_;
   changed_ = true;
 }

@@ -13,17 +13,22 @@
 
 namespace curvisplat {
 
+struct PreparedView;
+
 /// A coarse cache that is shown while the whole one is made.
 struct Preview {
   std::filesystem::path cache, whole;
-  std::string what;                    // "every 4th index plane"
-  std::shared_ptr<const void> folder;  // what keeps `cache` there while this is held
+  std::string what;                                    // "every 4th index plane"
+  std::shared_ptr<const void> folder;                  // what keeps `cache` there while this is held
+  std::shared_ptr<const PreparedView> view = nullptr;  // for the first time it is shown
 };
 
 /// Whom a conversion tells what it has.
 struct OpeningEvents {
   std::function<void(const std::string&)> say;
   std::function<void(Preview)> preview;
+  /// The files, the grid first: they were given in another order, as a desktop drops them or a dialog sorts them.
+  std::function<void(const std::vector<std::filesystem::path>&)> reorder;
 };
 
 /// A scalar of a cache's sources that the cache lacks.

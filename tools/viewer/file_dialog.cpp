@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <sstream>
 #include <system_error>
 
@@ -74,14 +75,16 @@ std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std
 void FileDialog::open(Purpose purpose, const std::string& name) {
   purpose_ = purpose;
   opens_ = true;
-  name_ = name;
   std::error_code ignored;
   enter(folder_.empty() ? fs::current_path(ignored) : folder_);
+  take({});
+  name_ = name;
 }
 
 void FileDialog::enter(const fs::path& folder) {
   error_.clear();
   overwrites_.clear();
+  if (!lookOf(*purpose_).saves) take({});
   try {
     entries_ = entriesOf(folder, lookOf(*purpose_).endings);
     folder_ = folder;
@@ -123,7 +126,10 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   const bool cancels = ImGui::Button("cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape));
   nameWidget("file cancel");
   ImGui::SameLine();
-  ImGui::TextUnformatted(error_.c_str());
+  if (error_.empty() && *purpose_ == Purpose::kOpenData)
+    ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
+  else
+    ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
   if (accepts) chosen = accept();
   if (cancels || chosen) {
@@ -142,7 +148,7 @@ void FileDialog::drawEntries(bool& accepts) {
   for (const FolderEntry& entry : entries_) {
     const std::string shown = entry.is_folder ? entry.name + "/" : entry.name;
     const bool chosen =
-        ImGui::Selectable(shown.c_str(), name_ == entry.name,
+        ImGui::Selectable(shown.c_str(), isTaken(entry.name),
                           ImGuiSelectableFlags_AllowDoubleClick | ImGuiSelectableFlags_DontClosePopups);
     nameWidget("file " + entry.name);
     if (!entry.is_folder && entry.bytes > 0) {
@@ -156,14 +162,29 @@ void FileDialog::drawEntries(bool& accepts) {
       if (twice) entered = folder_ / entry.name;
       continue;
     }
-    if (ImGui::GetIO().KeyCtrl && *purpose_ == Purpose::kOpenData && !name_.empty() && !twice)
-      name_ += " " + entry.name;
-    else
-      name_ = entry.name;
+    std::vector<std::string> names{entry.name};
+    if (ImGui::GetIO().KeyCtrl && *purpose_ == Purpose::kOpenData && !twice) {
+      names = taken_;
+      if (std::erase(names, entry.name) == 0) names.push_back(entry.name);
+    }
+    take(std::move(names));
     accepts |= twice;
   }
   ImGui::EndChild();
   if (entered) enter(*entered);
+}
+
+void FileDialog::take(std::vector<std::string> names) {
+  taken_ = std::move(names);
+  name_.clear();
+  for (const std::string& name : taken_) name_ += (name_.empty() ? "" : " ") + name;
+  taken_text_ = name_;
+}
+
+/// By a click, as long as nothing was typed since, or because it was typed.
+bool FileDialog::isTaken(const std::string& name) const {
+  if (name_ != taken_text_) return name_ == name;
+  return std::find(taken_.begin(), taken_.end(), name) != taken_.end();
 }
 
 std::optional<FileDialog::Chosen> FileDialog::accept() {
@@ -195,8 +216,12 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
     chosen.files.push_back(whole(name_));  // perhaps with spaces in its name
     return chosen;
   }
-  std::istringstream names(name_);
-  for (std::string name; names >> name;) {
+  std::vector<std::string> names = taken_;  // perhaps with spaces
+  if (name_ != taken_text_) {
+    std::istringstream words(name_);
+    names.assign(std::istream_iterator<std::string>(words), {});
+  }
+  for (const std::string& name : names) {
     if (!fs::exists(whole(name), ignored)) {
       error_ = name + " does not exist";
       return std::nullopt;

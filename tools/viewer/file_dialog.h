@@ -41,12 +41,16 @@ class FileDialog {
  private:
   void enter(const std::filesystem::path& folder);
   void drawEntries(bool& accepts);
+  void take(std::vector<std::string> names);
+  bool isTaken(const std::string& name) const;
   std::optional<Chosen> accept();
 
   std::optional<Purpose> purpose_;
   bool opens_ = false;
   std::filesystem::path folder_;
   std::vector<FolderEntry> entries_;
+  std::vector<std::string> taken_;  // names that were clicked
+  std::string taken_text_;          // them, as they were put into `name_`
   std::string name_, error_, overwrites_;
 };
 

@@ -1,5 +1,8 @@
 #include "tools/viewer/first_view.h"
 
+#include <optional>
+#include <utility>
+
 #include "render/automatic/first_choice.h"
 
 namespace curvisplat {
@@ -34,8 +37,10 @@ EditedFunction automaticFunction(const CacheReader& cache, const std::string& sc
 }
 
 void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name) {
+  std::optional<EditedFunction> chosen;  // first: where reading fails, the state stays as it was
+  if (state.function.isAutomatic()) chosen = automaticFunction(cache, name);
   chooseVariable(state, cache.manifest(), name);
-  if (state.function.isAutomatic()) state.function = automaticFunction(cache, name);
+  if (chosen) state.function = *std::move(chosen);
 }
 
 }  // namespace curvisplat

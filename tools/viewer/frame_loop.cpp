@@ -52,13 +52,16 @@ struct FrameLoop::Drawing {
   std::vector<size_t> variables;
   uint64_t function_version = 0;
   std::optional<FrameRequest> last;  // that was drawn
+  bool keeps_going = false;          // past damaged bricks, since one was met
   Effort effort;
 };
 
-FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake)
+FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
+                     std::shared_future<void> after)
     : cache_(cache.atStep(cache.step())),
       backend_(backend),
       wake_(std::move(wake)),
+      after_(std::move(after)),
       thread_([this] { loop(); }) {}
 
 FrameLoop::~FrameLoop() {
@@ -129,6 +132,7 @@ void FrameLoop::publish(ShownFrame frame) {
 
 void FrameLoop::loop() {
   nameThisThread("frames");
+  if (after_.valid()) after_.wait();
   Drawing drawing(coarsestSplats(cache_));
   MutexLock lock(mutex_);
   while (true) {
@@ -145,10 +149,12 @@ void FrameLoop::loop() {
     std::exception_ptr failure;
     bool ends = false;
     try {
-      if (draws)
-        serve(drawing, request, number);
-      else
-        findValues(drawing, request, number);
+      serveDamaged(drawing, request, [&] {
+        if (draws)
+          serve(drawing, request, number);
+        else
+          findValues(drawing, request, number);
+      });
     } catch (const Interrupted&) {
     } catch (const UsageError&) {
       failure = std::current_exception();
@@ -166,23 +172,22 @@ void FrameLoop::loop() {
   }
 }
 
-void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
-  const DrawnScalars& scalars = request.scalars;
-  std::vector<size_t> variables{scalars.opacity.variable};
-  if (scalars.colour) variables.push_back(scalars.colour->variable);
-  const bool same_function = drawing.function_version == request.function_version;
-  // Of two scalars, the renderer can change neither the colours nor which of the functions changed.
-  if (!drawing.player || drawing.variables != variables || (scalars.colour && !same_function)) {
-    drawing.player.reset();  // frees its memory before the next one allocates
-    if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);
-    drawing.player = std::make_unique<StepPlayer>(cache_, scalars, backend_);
-    drawing.variables = variables;
-  } else if (!same_function) {
-    drawing.player->setTransferFunction(scalars.opacity.function);
+/// Where a brick is damaged, coarser ones are drawn from then on. Not from the beginning: then nothing is left out because
+/// it is hidden (FrameWorkers::prepare()).
+void FrameLoop::serveDamaged(Drawing& drawing, FrameRequest& request, const std::function<void()>& serve) {
+  request.options.keep_going |= drawing.keeps_going;
+  try {
+    return serve();
+  } catch (const DamagedBrick&) {
+    if (request.options.keep_going) throw;
   }
-  drawing.function_version = request.function_version;
-  drawing.last = request;
-  drawing.player->goTo({request.step});
+  request.options.keep_going = drawing.keeps_going = true;
+  drawing.player.reset();  // its frame was not completed
+  serve();
+}
+
+void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
+  preparePlayer(drawing, request);
   FrameRenderer& renderer = drawing.player->renderer();
   {
     const MutexLock lock(mutex_);
@@ -201,6 +206,9 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     frame.image = renderer.renderQuickly(request.camera, request.options,
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
                                          frame.is_final);
+    const std::vector<BrickFailure>& damaged = frame.statistics.bricks_unreadable;
+    if (!damaged.empty() && frame.statistics.splats_drawn == 0 && !request.options.scene)
+      throw DamagedBrick(damaged.front().reason);
     if (request.wants_bytes) frame.bytes = bytesOf(frame.image);
     if (request.moving) {
       // Drawing fewer splats than the limit does not mean that the view is complete: the next level may
@@ -215,10 +223,30 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   }
 }
 
+/// Of the request's scalars and functions, at its step.
+void FrameLoop::preparePlayer(Drawing& drawing, const FrameRequest& request) {
+  const DrawnScalars& scalars = request.scalars;
+  std::vector<size_t> variables{scalars.opacity.variable};
+  if (scalars.colour) variables.push_back(scalars.colour->variable);
+  const bool same_function = drawing.function_version == request.function_version;
+  // Of two scalars, the renderer can change neither the colours nor which of the functions changed.
+  if (!drawing.player || drawing.variables != variables || (scalars.colour && !same_function)) {
+    drawing.player.reset();  // frees its memory before the next one allocates
+    if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);
+    drawing.player = std::make_unique<StepPlayer>(cache_, scalars, backend_);
+    drawing.variables = variables;
+  } else if (!same_function) {
+    drawing.player->setTransferFunction(scalars.opacity.function);
+  }
+  drawing.function_version = request.function_version;
+  drawing.last = request;
+  drawing.player->goTo({request.step});
+}
+
 /// The place under the mouse need not be known to the pixel, and the values there are read from the data: a quarter of
 /// the pixels take a quarter of the time.
 void FrameLoop::findValues(Drawing& drawing, FrameRequest request, uint64_t number) {
-  drawing.player->goTo({request.step});
+  preparePlayer(drawing, request);
   ShownValues found;
   found.request = number;
   found.step = request.step;

@@ -5,7 +5,8 @@
 //
 // While the camera moves, each picture is as fine as its time budget allows and is always completed; the next
 // one begins when it is shown. At rest, each picture draws four times the splats of the previous one, and is
-// stopped by the next request.
+// stopped by the next request. Where a brick is damaged, coarser ones are drawn in its place from then on, and each
+// picture's statistics list it (bricks_unreadable); a picture that would show nothing for that reason is an error.
 //
 //             a request whose camera moves
 //   kIdle <------------------------------> kMoving     its one picture is completed
@@ -24,6 +25,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -95,8 +97,9 @@ class Effort {
 class FrameLoop {
  public:
   /// Calls `wake` on the loop's thread whenever take() has something to return. Opens the cache for itself, since it
-  /// goes from step to step.
-  FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake);
+  /// goes from step to step. If `after` is valid, it is waited for before anything is drawn: the memory of another loop.
+  FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
+            std::shared_future<void> after = {});
   /// Stops the picture being drawn.
   ~FrameLoop();
   FrameLoop(const FrameLoop&) = delete;
@@ -123,7 +126,9 @@ class FrameLoop {
   struct Drawing;
 
   void loop();
+  void serveDamaged(Drawing& drawing, FrameRequest& request, const std::function<void()>& serve);
   void serve(Drawing& drawing, const FrameRequest& request, uint64_t number);
+  void preparePlayer(Drawing& drawing, const FrameRequest& request);
   void readAhead(Drawing& drawing, const FrameRequest& request);
   void findValues(Drawing& drawing, FrameRequest request, uint64_t number);
   bool superseded(uint64_t number) const;
@@ -136,6 +141,7 @@ class FrameLoop {
   CacheReader cache_;  // at the step that is drawn; of the loop's thread
   const Backend backend_;
   const std::function<void()> wake_;
+  const std::shared_future<void> after_;
 
   mutable Mutex mutex_;
   ConditionVariable changed_;

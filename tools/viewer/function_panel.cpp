@@ -10,7 +10,6 @@
 
 #include "render/colour/published_maps.h"
 #include "stream/base/error.h"
-#include "tools/viewer/first_view.h"
 #include "tools/viewer/histogram.h"
 #include "tools/viewer/labels.h"
 #include "tools/viewer/widget_places.h"
@@ -145,28 +144,34 @@ void paintHeights(const Canvas& canvas) {
 
 }  // namespace
 
-void FunctionPanel::updateHistogram(const EditedFunction& function, size_t variable) {
+std::string FunctionPanel::updateHistogram(const EditedFunction& function, size_t variable) {
+  std::string failure;
   if (pending_histogram_.valid()) {
-    if (pending_histogram_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-    histogram_ = pending_histogram_.get();
+    if (pending_histogram_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return failure;
+    try {
+      histogram_ = pending_histogram_.get();
+    } catch (const Error& error) {
+      failure = error.what();
+    }
   }
   const HistogramOf of{variable, function.range(), function.logScale(), function.asinhScale()};
-  if (histogram_of_ == of) return;
+  if (histogram_of_ == of) return failure;
   histogram_of_ = of;
   pending_histogram_ = std::async(std::launch::async, [&cache = cache_, variable, function] {
     return histogramOf(cache, variable, function, kBins);
   });
+  return failure;
 }
 
 FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t variable, Shows shows) {
   const VariableInfo& info = cache_.manifest().variables[variable];
   Result result;
   ImGui::PushID(this);
-  updateHistogram(function, variable);
+  result.error = updateHistogram(function, variable);
   if (shows != Shows::kColours) result.changed |= drawCurve(function);
   if (shows != Shows::kOpacities) paintColours(function);
   paintNumbers(function);
-  if (shows != Shows::kOpacities) result.changed |= drawMaps(function, info);
+  if (shows != Shows::kOpacities) result.changed |= drawMaps(function, result);
   result.changed |= drawRange(function, info);
   if (shows != Shows::kColours) result.changed |= drawUnit(function);
   if (shows != Shows::kColours && ImGui::TreeNode("opacity points")) {
@@ -271,7 +276,7 @@ bool FunctionPanel::drawPoints(EditedFunction& function) {
   return true;
 }
 
-bool FunctionPanel::drawMaps(EditedFunction& function, const VariableInfo& variable) {
+bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
   bool changed = false;
   label("colours");
   const std::string& map = function.map();
@@ -283,10 +288,7 @@ bool FunctionPanel::drawMaps(EditedFunction& function, const VariableInfo& varia
     nameWidget("colours");
     return false;
   }
-  if (ImGui::Selectable("chosen from the data")) {
-    function = automaticFunction(cache_, variable.name);
-    changed = true;
-  }
+  if (ImGui::Selectable("chosen from the data")) result.automatic = true;
   nameWidget("colours chosen from the data");
   for (const auto& [category, title] : {std::pair(MapCategory::kSequential, "sequential"),
                                         {MapCategory::kDiverging, "diverging"},

@@ -21,8 +21,10 @@ class FunctionPanel {
   enum class Shows { kAll, kColours, kOpacities };
   struct Result {
     bool changed = false;
+    bool automatic = false;           // the user asked for a function that is chosen from the data
     bool dragging = false;            // a point is being dragged
     bool load = false, save = false;  // the user asked to load a function, or to save this one
+    std::string error;                // of reading the histogram
   };
   /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables. Throws UsageError for
   /// what the user asked for and cannot be.
@@ -31,13 +33,13 @@ class FunctionPanel {
  private:
   bool drawCurve(EditedFunction& function);
   bool drawPoints(EditedFunction& function);
-  bool drawMaps(EditedFunction& function, const VariableInfo& variable);
+  bool drawMaps(EditedFunction& function, Result& result);
   bool drawColours(EditedFunction& function);
   bool drawRange(EditedFunction& function, const VariableInfo& variable);
   bool drawUnit(EditedFunction& function);
   /// Takes the finished histogram, and starts computing another one if the function's range has changed.
-  /// Throws what reading throws.
-  void updateHistogram(const EditedFunction& function, size_t variable);
+  /// Returns why it cannot be read, once; the one before is kept then.
+  std::string updateHistogram(const EditedFunction& function, size_t variable);
 
   const CacheReader& cache_;
   std::optional<size_t> dragged_;

@@ -4,14 +4,19 @@
 #include <exception>
 #include <utility>
 
+#include "stream/base/mutex.h"
 #include "stream/base/thread_name.h"
 
 namespace curvisplat {
 namespace {
 
-/// What the threads of lists that are gone will find, and nobody asks for. For the main thread.
-std::vector<std::future<std::vector<SourceScalar>>>& leftThreads() {
-  static std::vector<std::future<std::vector<SourceScalar>>> left;
+/// What the threads of lists that are gone will find, and nobody asks for.
+struct LeftThreads {
+  Mutex mutex;
+  std::vector<std::future<std::vector<SourceScalar>>> found GUARDED_BY(mutex);
+};
+LeftThreads& leftThreads() {
+  static LeftThreads left;
   return left;
 }
 
@@ -31,12 +36,16 @@ FurtherScalarList::FurtherScalarList(const ConversionServices& services, std::fi
 }
 
 FurtherScalarList::~FurtherScalarList() {
-  std::erase_if(leftThreads(), isReady);
-  if (found_.valid() && !isReady(found_)) leftThreads().push_back(std::move(found_));
+  LeftThreads& left = leftThreads();
+  const MutexLock lock(left.mutex);
+  std::erase_if(left.found, isReady);
+  if (found_.valid() && !isReady(found_)) left.found.push_back(std::move(found_));
 }
 
 void FurtherScalarList::waitForThreads() {
-  leftThreads().clear();
+  LeftThreads& left = leftThreads();
+  const MutexLock lock(left.mutex);
+  left.found.clear();
 }
 
 void FurtherScalarList::look() {

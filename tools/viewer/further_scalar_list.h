@@ -17,6 +17,7 @@ struct FurtherScalars {
   bool is_looking = false, is_busy = false;  // busy: one is being added
   std::vector<SourceScalar> scalars;
   std::string error;
+  std::string note;  // why there are none and what to do, or empty
 };
 
 class FurtherScalarList {
@@ -24,7 +25,7 @@ class FurtherScalarList {
   /// `files` may be empty: then there are none. Calls `wake` when something is found. Opens nothing yet.
   FurtherScalarList(const ConversionServices& services, std::filesystem::path cache,
                     std::vector<std::filesystem::path> files, void (*wake)());
-  /// Does not wait for the thread, which may be reading for long: another view is to come at once.
+  /// Does not wait for the thread, which may be reading for long: another view is to come at once. Any thread.
   ~FurtherScalarList();
   FurtherScalarList(const FurtherScalarList&) = delete;
   FurtherScalarList& operator=(const FurtherScalarList&) = delete;

@@ -19,8 +19,12 @@ std::vector<double> histogramOf(const CacheReader& cache, size_t variable, const
   SplatGeometry geometry;
   SplatVariable values;
   for (const uint32_t brick : bricksAtALevel(cache, kMinSplats)) {
-    cache.readGeometry(brick, geometry);
-    cache.readVariable(brick, variable, values);
+    try {
+      cache.readGeometry(brick, geometry);
+      cache.readVariable(brick, variable, values);
+    } catch (const DamagedBrick&) {
+      continue;  // drawing it reports it
+    }
     for (size_t n = 0; n < values.size(); ++n) {
       total += geometry.weight[n];
       const double value = values.mean[n];

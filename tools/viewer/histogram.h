@@ -10,8 +10,8 @@
 namespace curvisplat {
 
 /// Returns the fraction of the data's volume in each of `bins` bins of [0, 1], of the scalar's coordinate along the
-/// function's range. Reads the coarsest level with at least 20,000 splats, or the finest level. Throws Error as reading
-/// does.
+/// function's range. Reads the coarsest level with at least 20,000 splats, or the finest level, without bricks
+/// that are damaged. Throws Error if the disk fails.
 std::vector<double> histogramOf(const CacheReader& cache, size_t variable, const EditedFunction& function,
                                 size_t bins);
 

@@ -24,6 +24,7 @@ void drawMarkers(ViewState& state, PanelActions& actions) {
     ImGui::SetNextItemWidth(6 * ImGui::GetFontSize());
     actions.changed |= ImGui::InputText("##name", &marker.name);
     nameWidget(fmt::format("marker {}", n + 1));
+    if (ImGui::IsItemActive()) nameWidget(fmt::format("editing marker {}", n + 1));
     ImGui::SameLine();
     ImGui::TextWrapped("%s", fmt::format("{} {:.5g}{}{}\n{:.5g}, {:.5g}, {:.5g}", marker.scalar, marker.value,
                                          marker.unit.empty() ? "" : " ", marker.unit, marker.point.x,
@@ -49,7 +50,10 @@ void drawMarkerSigns(const ViewState& state,
     const ImVec2 centre(static_cast<float>(at->x), static_cast<float>(at->y));
     list->AddCircleFilled(centre, radius, edge);
     list->AddCircleFilled(centre, 0.7f * radius, line);
-    const std::string text = fmt::format("{}: {:.4g} {}", marker.name, marker.value, marker.unit);
+    // Beside another scalar than the one that is shown stands its name.
+    const std::string text =
+        fmt::format("{}: {}{}{:.4g} {}", marker.name, marker.scalar == state.variable ? "" : marker.scalar,
+                    marker.scalar == state.variable ? "" : " ", marker.value, marker.unit);
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
     const ImVec2 lower(centre.x + 1.5f * radius, centre.y - 0.5f * size.y);
     list->AddRectFilled({lower.x - 3, lower.y - 1}, {lower.x + size.x + 3, lower.y + size.y + 1},

@@ -16,7 +16,7 @@ constexpr int kNice = 10;  // of the threads that convert: the window and its pi
 }  // namespace
 
 Opening::Opening(std::string title, Work work, void (*wake)())
-    : title_(std::move(title)), progress_([this, wake](const Progress::State* state) {
+    : title_(std::move(title)), phase_("reading"), progress_([this, wake](const Progress::State* state) {
         if (!state) return;
         {
           const MutexLock lock(mutex_);
@@ -38,6 +38,10 @@ Opening::Opening(std::string title, Work work, void (*wake)())
     events.say = [this](const std::string& text) {
       const MutexLock lock(mutex_);
       messages_.push_back(text);
+    };
+    events.reorder = [this](const std::vector<std::filesystem::path>& files) {
+      const MutexLock lock(mutex_);
+      files_ = files;
     };
     events.preview = [this, wake](Preview preview) {
       {
@@ -68,6 +72,11 @@ float Opening::part() const {
 std::vector<std::string> Opening::takeMessages() {
   const MutexLock lock(mutex_);
   return std::exchange(messages_, {});
+}
+
+std::vector<std::filesystem::path> Opening::takeFiles() {
+  const MutexLock lock(mutex_);
+  return std::exchange(files_, {});
 }
 
 std::optional<Preview> Opening::takePreview() {

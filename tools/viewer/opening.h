@@ -33,6 +33,8 @@ class Opening {
   float part() const;
   /// Warnings and notes since the last call.
   std::vector<std::string> takeMessages();
+  /// The files in their right order, once, if it was not as given.
+  std::vector<std::filesystem::path> takeFiles();
   /// What can be shown already, once.
   std::optional<Preview> takePreview();
   bool isDone() const;
@@ -45,6 +47,7 @@ class Opening {
   std::string phase_ GUARDED_BY(mutex_);
   float part_ GUARDED_BY(mutex_) = 0;
   std::vector<std::string> messages_ GUARDED_BY(mutex_);
+  std::vector<std::filesystem::path> files_ GUARDED_BY(mutex_);
   std::optional<Preview> preview_ GUARDED_BY(mutex_);
   Progress progress_;
   std::future<std::filesystem::path> cache_;

@@ -15,7 +15,9 @@ struct PanelActions {
   bool function_changed = false;  // implies `changed`
   bool dragging = false;          // a control is being dragged: a coarse picture suffices
   std::vector<Command> commands;
-  std::optional<uint64_t> step;  // to go to
+  std::optional<uint64_t> step;                       // to go to
+  std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
+  bool automatic_function = false;                    // colours and opacities chosen from the data
   bool load_function = false, save_function = false;
   std::optional<std::string> load_view, save_view, remove_view;  // by name
   bool looks_for_scalars = false;         // for what the sources have and the cache lacks

@@ -7,19 +7,11 @@
 #include <algorithm>
 
 #include "stream/base/error.h"
-#include "tools/viewer/first_view.h"
 #include "tools/viewer/labels.h"
 #include "tools/viewer/marker_panel.h"
 #include "tools/viewer/widget_places.h"
 
 namespace curvisplat {
-
-void chooseOpacityScalar(ViewState& state, const CacheReader& cache, const std::string& name) {
-  if (name.empty() || name == state.variable)
-    state.opacity_by.reset();
-  else
-    state.opacity_by = OpacityScalar{name, automaticFunction(cache, name)};
-}
 
 PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   PanelActions actions;
@@ -73,7 +65,11 @@ namespace {
 
 /// What the sources have besides, at the end of the list of scalars.
 void drawFurther(const FurtherScalars& further, PanelActions& actions) {
-  if (further.from.empty()) return;
+  if (further.from.empty()) {
+    if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());
+    if (!further.note.empty()) nameWidget("note " + further.note);
+    return;
+  }
   actions.looks_for_scalars = true;
   ImGui::Separator();
   ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
@@ -92,18 +88,15 @@ void drawFurther(const FurtherScalars& further, PanelActions& actions) {
 
 }  // namespace
 
-void Panels::drawScalars(ViewState& state, const FurtherScalars* further, PanelActions& actions) {
+void Panels::drawScalars(const ViewState& state, const FurtherScalars* further, PanelActions& actions) {
   const auto& variables = cache_.manifest().variables;
   label("scalar");
-  if (ImGui::BeginCombo("##scalar", state.variable.c_str(), ImGuiComboFlags_HeightLarge)) {
+  if (ImGui::BeginCombo("##scalar", state.variable.c_str(), ImGuiComboFlags_HeightLargest)) {
     for (const VariableInfo& one : variables) {
       const bool chosen = one.name == state.variable;
       const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) && !chosen;
       nameWidget("scalar " + one.name);
-      if (!chooses) continue;
-      chooseVariable(state, cache_, one.name);
-      if (state.opacity_by && state.opacity_by->variable == one.name) state.opacity_by.reset();
-      actions.function_changed = true;
+      if (chooses) actions.scalar = one.name;
     }
     if (further) drawFurther(*further, actions);
     ImGui::EndCombo();
@@ -115,19 +108,14 @@ void Panels::drawScalars(ViewState& state, const FurtherScalars* further, PanelA
   constexpr const char* kSame = "the same scalar";
   if (ImGui::BeginCombo("##opacity by", state.opacity_by ? state.opacity_by->variable.c_str() : kSame,
                         ImGuiComboFlags_HeightLarge)) {
-    if (ImGui::Selectable(kSame, !state.opacity_by) && state.opacity_by) {
-      chooseOpacityScalar(state, cache_, "");
-      actions.function_changed = true;
-    }
+    if (ImGui::Selectable(kSame, !state.opacity_by) && state.opacity_by) actions.opacity_scalar = "";
     nameWidget("opacity by the same scalar");
     for (const VariableInfo& one : variables) {
       if (one.name == state.variable) continue;
       const bool chosen = state.opacity_by && state.opacity_by->variable == one.name;
       const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) && !chosen;
       nameWidget("opacity by " + one.name);
-      if (!chooses) continue;
-      chooseOpacityScalar(state, cache_, one.name);
-      actions.function_changed = true;
+      if (chooses) actions.opacity_scalar = one.name;
     }
     ImGui::EndCombo();
   } else {
@@ -143,7 +131,9 @@ void Panels::drawFunctions(ViewState& state, PanelActions& actions) {
     const FunctionPanel::Result result = panel.draw(function, cache_.variableNamed(variable), shows);
     actions.function_changed |= result.changed;
     actions.dragging |= result.dragging;
+    actions.automatic_function |= result.automatic;
     actions.load_function |= result.load;
+    if (!result.error.empty()) actions.error = result.error;
     actions.save_function |= result.save;
   };
   if (state.opacity_by) {

@@ -39,7 +39,7 @@ class Panels {
 
  private:
   void drawTime(PanelActions& actions, Playback& playback);
-  void drawScalars(ViewState& state, const FurtherScalars* further, PanelActions& actions);
+  void drawScalars(const ViewState& state, const FurtherScalars* further, PanelActions& actions);
   void drawFunctions(ViewState& state, PanelActions& actions);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);
@@ -51,8 +51,5 @@ class Panels {
   FunctionPanel function_, opacity_function_;
   std::string view_name_;
 };
-
-/// The opacities of another scalar than the one that is shown; an empty name: of the same.
-void chooseOpacityScalar(ViewState& state, const CacheReader& cache, const std::string& name);
 
 }  // namespace curvisplat

@@ -13,8 +13,10 @@ PictureTexture::PictureTexture(const GlFunctions& gl) : gl_(gl) {
   gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
 }
 
-PictureTexture::~PictureTexture() {
-  gl_.DeleteTextures(1, &texture_);
+void PictureTexture::release() {
+  if (texture_ != 0) gl_.DeleteTextures(1, &texture_);
+  texture_ = 0;
+  size_ = {0, 0};
 }
 
 void PictureTexture::set(std::span<const uint8_t> rgba, ImageSize size) {

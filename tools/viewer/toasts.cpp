@@ -11,20 +11,22 @@ constexpr size_t kMaxShown = 3, kMaxLog = 100;
 
 }  // namespace
 
-void Toasts::add(const std::string& text, double now_s, bool is_error) {
+bool Toasts::add(const std::string& text, double now_s, bool is_error) {
   const double ends_s =
       now_s +
       (is_error ? kErrorSeconds : kShortestSeconds + kPerLetterSeconds * static_cast<double>(text.size()));
+  shown(now_s);
   const auto same =
       std::find_if(shown_.begin(), shown_.end(), [&](const Toast& toast) { return toast.text == text; });
   if (same != shown_.end()) {
     same->ends_s = ends_s;
-    return;
+    return false;
   }
   shown_.push_back({text, is_error, ends_s});
   if (shown_.size() > kMaxShown) shown_.pop_front();
   log_.push_back(text);
   if (log_.size() > kMaxLog) log_.pop_front();
+  return true;
 }
 
 const std::deque<Toast>& Toasts::shown(double now_s) {

@@ -16,8 +16,8 @@ struct Toast {
 
 class Toasts {
  public:
-  /// `now_s` is any clock's. The same text again only stays longer.
-  void add(const std::string& text, double now_s, bool is_error = false);
+  /// `now_s` is any clock's. The same text again only stays longer: then it returns false.
+  bool add(const std::string& text, double now_s, bool is_error = false);
   /// Those that are to be seen at `now_s`, the newest last.
   const std::deque<Toast>& shown(double now_s);
   /// One of shown() goes now.

@@ -8,15 +8,20 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <functional>
+#include <future>
 #include <memory>
 #include <utility>
 
 #include "stream/base/error.h"
 #include "stream/base/message.h"
+#include "stream/base/thread_name.h"
 #include "tools/viewer/cache_view.h"
 #include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/menus.h"
 #include "tools/viewer/opening.h"
+#include "tools/viewer/prepared_view.h"
+#include "tools/viewer/reports.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/widget_places.h"
 #include "tools/viewer/window.h"
@@ -42,7 +47,7 @@ class Viewer {
     if (settings_.text_scale != 1) window_.setTextScale(settings_.text_scale);
     if (cache) {
       const fs::path path = fs::absolute(cache->cachePath());
-      show(std::move(*cache), options, {path});
+      show(prepareView(std::move(*cache), options, pictureSize()), options, {path});
     }
     if (!options.files.empty()) open(options.files);
   }
@@ -50,6 +55,7 @@ class Viewer {
   ~Viewer() {
     opening_.reset();
     view_.reset();
+    retired_ = {};
     FurtherScalarList::waitForThreads();
   }
   Viewer(const Viewer&) = delete;
@@ -77,28 +83,84 @@ class Viewer {
     }
   }
 
-  void show(CacheReader cache, const ViewerOptions& options, const std::vector<fs::path>& files) {
+  void show(const PreparedView& prepared, const ViewerOptions& options, const std::vector<fs::path>& files) {
     if (view_) view_->remember();
-    view_ = std::make_unique<CacheView>(std::move(cache), options, window_, toasts_, dialog_, layout());
+    std::promise<void> before_has_ended;
+    auto view = std::make_unique<CacheView>(prepared, options, window_, reports_, dialog_,
+                                            before_has_ended.get_future().share());
+    if (options.carried && view_) view->takePictureOf(*view_);
+    retire(std::exchange(view_, std::move(view)), std::move(before_has_ended));
     window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
     std::vector<std::string> names;
     for (const fs::path& file : files) names.push_back(fs::absolute(file).string());
     settings_.opened(std::move(names));
   }
 
+  /// Ends a view on another thread: what it reads and draws is stopped, but not at once.
+  void retire(std::unique_ptr<CacheView> view, std::promise<void> has_ended) {
+    if (!view) return has_ended.set_value();
+    view->releasePictures();
+    auto before = std::exchange(retired_, {});  // in a row, so that one at most is kept
+    retired_ = std::async(std::launch::async, [view = std::move(view), has_ended = std::move(has_ended),
+                                               before = std::move(before)]() mutable {
+      nameThisThread("ending a view");
+      before = {};
+      view.reset();
+      has_ended.set_value();
+    });
+  }
+
+  ImageSize pictureSize() const {
+    const Rectangle picture = layout().picture;
+    const auto pixels = [this](double units) {
+      return std::max(1, static_cast<int>(std::lround(window_.pixelScale() * units)));
+    };
+    return {pixels(picture.width), pixels(picture.height)};
+  }
+
+  /// Of this size; where the view prepares on the thread that opens.
+  struct Preparation {
+    ViewerOptions options;
+    ImageSize picture;
+    std::shared_ptr<const PreparedView> prepared;  // once the thread has ended
+
+    void prepare(const fs::path& cache) {
+      prepared = std::make_shared<const PreparedView>(prepareView(CacheReader(cache), options, picture));
+    }
+  };
+
   /// What was chosen in a dialog or a menu, or dropped: a cache at once, a grid when it is converted.
   void open(const std::vector<fs::path>& files) {
     opening_.reset();  // the one before is given up
     opening_files_ = files;
+    opens_command_line_ = files == options_.files;
     adds_to_.reset();
+    preparation_ = std::make_shared<Preparation>(Preparation{viewOptions(), pictureSize(), nullptr});
     std::string names;
     for (const fs::path& file : files) names += fmt::format(" {}", file.filename().string());
     if (names.size() > kMaxTitle)
       names = fmt::format("{} ... ({} files)", names.substr(0, kMaxTitle), files.size());
     opening_ = std::make_unique<Opening>(
         "opening" + names,
-        [this, files](Progress& progress, const OpeningEvents& events) {
-          return options_.conversion.to_cache(files, progress, events);
+        [to_cache = options_.conversion.to_cache, files, of = preparation_](Progress& progress,
+                                                                            const OpeningEvents& events) {
+          OpeningEvents with_views = events;
+          with_views.preview = [&](Preview preview) {
+            Preparation own = *of;
+            own.options.preview = preview;
+            try {
+              own.prepare(preview.cache);
+            } catch (const Interrupted&) {
+              throw;
+            } catch (const Error&) {
+              return;  // of the whole it will be said
+            }
+            preview.view = own.prepared;
+            events.preview(std::move(preview));
+          };
+          const fs::path cache = to_cache(files, progress, with_views);
+          of->prepare(cache);
+          return cache;
         },
         Window::wake);
   }
@@ -107,11 +169,14 @@ class Viewer {
   void add(const std::string& scalar) {
     if (opening_) return;
     adds_to_ = scalar;
+    preparation_ = std::make_shared<Preparation>(Preparation{viewOptions(), pictureSize(), nullptr});
+    preparation_->options.scalar = scalar;
     opening_ = std::make_unique<Opening>(
         "adding " + scalar,
-        [this, scalar, cache = view_->cachePath(), files = view_->sources()](Progress& progress,
-                                                                             const OpeningEvents&) {
+        [this, scalar, cache = view_->cachePath(), files = view_->sources(), of = preparation_](
+            Progress& progress, const OpeningEvents&) {
           options_.conversion.add_scalar(cache, files, scalar, progress);
+          of->prepare(cache);
           return cache;
         },
         Window::wake);
@@ -120,7 +185,7 @@ class Viewer {
   /// The options of a view of what is opened now.
   ViewerOptions viewOptions() const {
     ViewerOptions options;
-    if ((!view_ || view_->preview()) && opening_files_ == options_.files) options = options_;
+    if ((!view_ || view_->preview()) && opens_command_line_) options = options_;
     options.backend = options_.backend;
     options.target_s = options_.target_s;
     options.memory_bytes = options_.memory_bytes;
@@ -131,11 +196,13 @@ class Viewer {
   /// Shows what has been opened.
   void takeOpened() {
     if (!opening_) return;
-    for (const std::string& text : opening_->takeMessages()) toasts_.add(text, glfwGetTime());
+    for (const std::string& text : opening_->takeMessages()) reports_.say(text);
+    if (auto files = opening_->takeFiles(); !files.empty()) opening_files_ = std::move(files);
     const bool is_done = opening_->isDone();
     if (auto preview = opening_->takePreview(); preview && !is_done) showPreview(*preview);
     if (!is_done) return;
     const std::unique_ptr<Opening> done = std::move(opening_);
+    const std::shared_ptr<Preparation> preparation = std::move(preparation_);
     try {
       const fs::path cache = done->take();
       ViewerOptions options = viewOptions();
@@ -143,18 +210,17 @@ class Viewer {
         options.grid_files = view_->gridFiles();
         options.carried = view_->carried();
         options.scalar = adds_to_;
-        return show(CacheReader(cache), options,
+        return show(*preparation->prepared, options,
                     options.grid_files.empty() ? std::vector{cache} : options.grid_files);
       }
       const bool is_kept = opening_files_.size() > 1 || opening_files_.front() != cache;
       if (is_kept) options.grid_files = opening_files_;
       const auto preview = view_ ? view_->preview() : std::nullopt;
       if (preview && preview->whole == cache) options.carried = view_->carried();
-      show(CacheReader(cache), options, opening_files_);
+      show(*preparation->prepared, options, opening_files_);
     } catch (const Interrupted&) {
     } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
-      printMessage("warning: {}", error.what());
-      toasts_.add(error.what(), glfwGetTime(), true);
+      reports_.report(error);
     }
   }
 
@@ -164,10 +230,11 @@ class Viewer {
       ViewerOptions options = viewOptions();
       options.grid_files = opening_files_;
       options.preview = preview;
-      show(CacheReader(preview.cache), options, opening_files_);
-      toasts_.add(fmt::format("A preview of {}; the whole follows.", preview.what), glfwGetTime());
+      options.preview->view.reset();
+      show(*preview.view, options, opening_files_);
+      reports_.say(fmt::format("A preview of {}; the whole follows.", preview.what));
     } catch (const std::exception& error) {
-      toasts_.add(fmt::format("no preview: {}", error.what()), glfwGetTime());
+      reports_.say(fmt::format("no preview: {}", error.what()));
     }
   }
 
@@ -191,8 +258,7 @@ class Viewer {
     ImGui::End();
     if (stops) opening_.reset();
     if (stops && view_ && view_->preview())
-      toasts_.add(fmt::format("Stopped. What is shown is a preview of {}.", view_->preview()->what),
-                  glfwGetTime());
+      reports_.say(fmt::format("Stopped. What is shown is a preview of {}.", view_->preview()->what));
   }
 
   WindowLayout layout() const {
@@ -214,16 +280,14 @@ class Viewer {
     const WindowLayout place = layout();
     window_.setPicture(place.picture);
     if (!window_.showsClick()) pressKeys();
-    drawMenuBar();
-    if (view_)
-      view_->draw(place);
-    else
-      drawWelcome(place);
+    attempt([&] { drawMenuBar(); });
+    attempt([&] { view_ ? view_->draw(place) : drawWelcome(place); });
     drawOpening(place.picture);
     drawKeys(keys_shown_, window_);
     drawMessages(toasts_, messages_shown_, window_);
     drawToasts(toasts_, place.picture, glfwGetTime(), window_);
-    const auto chosen = dialog_.draw(window_);
+    std::optional<FileDialog::Chosen> chosen;
+    attempt([&] { chosen = dialog_.draw(window_); });
     if (window_.showsClick()) pressKeys();
     window_.endFrame(glm::vec3(0.12f));
     writeWidgetPlaces();
@@ -232,13 +296,18 @@ class Viewer {
     if (chosen && chosen->purpose == FileDialog::Purpose::kOpenData)
       open(chosen->files);
     else if (chosen && view_)
-      view_->take(*chosen);
+      reports_.attempt([&] { view_->take(*chosen); });
     if (const auto files = std::exchange(to_open_, std::nullopt)) open({files->begin(), files->end()});
     if (const auto dropped = window_.takeDropped(); !dropped.empty()) open({dropped.begin(), dropped.end()});
     const bool is_busy = opening_ != nullptr;
     if (view_)
       if (const auto scalar = view_->takeWantedScalar(is_busy)) add(*scalar);
     takeOpened();
+  }
+
+  /// Does a part of a frame; an error of it is reported, and ends only this part.
+  void attempt(const std::function<void()>& part) {
+    if (!reports_.attempt(part)) window_.closeWidgets();
   }
 
   void drawMenuBar() {
@@ -260,6 +329,7 @@ class Viewer {
     ImGui::Begin("welcome", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
+    window_.coverCurrent();             // what is clicked here is not for a picture to come
     if (opening_) return ImGui::End();  // its progress is shown in this place
     ImGui::TextUnformatted("Drop a cache or a grid with its solution here, or");
     if (ImGui::Button("open...")) run(Command::kOpen);
@@ -278,7 +348,7 @@ class Viewer {
     for (const Window::Key& key : window_.takeKeys()) {
       if (dialog_.isOpen()) continue;
       const auto command = commandOf(key);
-      if (command && isEnabled(*command)) run(*command);
+      if (command && isEnabled(*command)) reports_.attempt([&] { run(*command); });
     }
   }
 
@@ -367,11 +437,15 @@ class Viewer {
   WindowSettings settings_;
   Window window_;
   Toasts toasts_;
+  Reports reports_{toasts_, glfwGetTime};
   FileDialog dialog_;
   std::unique_ptr<CacheView> view_;
-  std::vector<fs::path> opening_files_;  // that are being opened, or were
-  std::optional<std::string> adds_to_;   // the scalar that is being added instead
+  std::vector<fs::path> opening_files_;       // that are being opened, or were
+  bool opens_command_line_ = false;           // they are those of the command line
+  std::optional<std::string> adds_to_;        // the scalar that is being added instead
+  std::shared_ptr<Preparation> preparation_;  // of what is being opened
   std::unique_ptr<Opening> opening_;
+  std::future<void> retired_;  // the view before, while it ends
   bool panels_shown_ = true, keys_shown_ = false, messages_shown_ = false, look_changed_ = false;
   std::optional<std::vector<std::string>> to_open_;
 };

@@ -5,6 +5,7 @@
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <cmath>
@@ -215,6 +216,10 @@ void Window::coverCurrent() {
 std::optional<glm::dvec2> Window::pointed() const {
   if (isDragging() || !overPicture()) return std::nullopt;
   return mouse_;
+}
+
+void Window::closeWidgets() {
+  ImGui::ErrorCheckEndFrameRecover(nullptr);
 }
 
 void Window::endFrame(const glm::vec3& background) {

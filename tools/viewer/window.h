@@ -54,6 +54,8 @@ class Window {
 
   /// Begins and ends a Dear ImGui frame; endFrame() shows it.
   void beginFrame();
+  /// Closes what an exception has left open of this frame's windows, menus and lists.
+  void closeWidgets();
   void endFrame(const glm::vec3& background);
 
   /// Size of the contents in pixels; {0, 0} while the window is minimised.

@@ -1,0 +1,59 @@
+#include "tools/viewer/prepared_view.h"
+
+#include <utility>
+
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/message.h"
+#include "tools/viewer/first_view.h"
+#include "tools/viewer/state_files.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Surfaces and slices of the command line take the place of those of the state.
+void takeScene(const ViewerOptions& options, ViewState& state) {
+  const SurfaceScene& scene = *options.scene;
+  state.surfaces.clear();
+  for (size_t n = 0; n < scene.surfaces.size(); ++n)
+    state.surfaces.push_back(
+        {fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour, scene.surfaces[n].mesh});
+  state.faces.clear();
+  for (size_t n = 0; n < scene.grid_surfaces.size(); ++n)
+    state.faces.push_back({options.face_names.at(n), scene.grid_surfaces[n]});
+  state.faces_by = options.faces_by;
+  state.isovalues = scene.isovalues;
+  state.iso_opacity = scene.iso_opacity;
+  state.slices = scene.slices;
+  state.slice_opacity = scene.slice_opacity;
+  state.volume = scene.volume;
+}
+
+}  // namespace
+
+PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageSize picture) {
+  ViewState state = firstViewOf(cache, options.scalar.value_or(""), picture);
+  const std::string scalar = state.variable;
+  const EditedFunction automatic = state.function;
+  const fs::path& whole = options.preview ? options.preview->whole : cache.cachePath();
+  if (options.state) {
+    state = viewStateFromJson(readTextFile(*options.state), *options.state, cache.manifest());
+  } else if (const auto remembered = rememberedStateOf(whole); remembered && fs::exists(*remembered)) {
+    try {
+      ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, cache.manifest());
+      loadSurfaces(found);
+      state = std::move(found);
+    } catch (const Error& error) {
+      printMessage("warning: {}; using the initial view", error.what());
+    }
+  }
+  if (options.scalar && *options.scalar != state.variable) chooseVariable(state, cache, *options.scalar);
+  if (options.memory_bytes) state.memory_bytes = *options.memory_bytes;
+  if (options.scene) takeScene(options, state);
+  loadSurfaces(state);
+  return {std::move(cache), std::move(state), scalar, automatic};
+}
+
+}  // namespace curvisplat
