@@ -12,6 +12,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/codec/geometry_codec.h"
+#include "stream/codec/values_codec.h"
 
 namespace curvisplat {
 
@@ -196,10 +197,13 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
 
 void ValueBuilder::encode(uint32_t position, BrickSplats& brick, Built& built) const {
   thread_local StepReferences::Scratch scratch;
+  const ValuePrecision precision =
+      cache_->manifest().hasFeature(kFineValues) ? ValuePrecision::kFine : ValuePrecision::kNormal;
   for (size_t v = 0; v < brick.variables.size(); ++v) {
     TimeReferences references;
     if (references_) references = references_->of((*order_)[position], v, scratch);
-    built.values.push_back(encodeValues(brick.runs, brick.border_codes, brick.variables[v], references));
+    built.values.push_back(
+        encodeValues(brick.runs, brick.border_codes, brick.variables[v], references, precision));
   }
 }
 

@@ -85,11 +85,12 @@ struct CellBuilder::State {
   };
 
   State(const RootCube& root_cube, const std::vector<GridBlock>& grid_blocks, size_t variable_count,
-        const Progress& stopping)
+        const Progress& stopping, ValuePrecision value_precision)
       : root(root_cube),
         blocks(&grid_blocks),
         variables(variable_count),
         progress(&stopping),
+        precision(value_precision),
         scratch([this] {
           return Scratch{{}, OctantMerger(root, variables)};
         }) {
@@ -111,6 +112,7 @@ struct CellBuilder::State {
   const std::vector<GridBlock>* blocks;
   const size_t variables;
   const Progress* progress;
+  const ValuePrecision precision;
   std::vector<uint64_t> first_nodes;  // [block]
   tbb::enumerable_thread_specific<Scratch> scratch;
 };
@@ -132,7 +134,7 @@ Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool
   for (size_t begin = 0; begin < records.size(); begin += kMaxBrickSplats) {
     unpack(cell, records.subspan(begin, std::min<size_t>(kMaxBrickSplats, records.size() - begin)),
            own.brick);
-    leaf.built.bricks.push_back({encodeBrick(root, own.brick), 0, true});
+    leaf.built.bricks.push_back({encodeBrick(root, own.brick, precision), 0, true});
     if (!is_top) own.merger.add(own.brick);
   }
   leaf.built.own_bricks = leaf.built.bricks.size();
@@ -222,8 +224,8 @@ void CellBuilder::State::addToRuns(uint64_t node, std::vector<NodeRun>& runs) co
 }
 
 CellBuilder::CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-                         const Progress& progress)
-    : state_(std::make_unique<State>(root, blocks, variables, progress)) {}
+                         const Progress& progress, ValuePrecision precision)
+    : state_(std::make_unique<State>(root, blocks, variables, progress, precision)) {}
 
 CellBuilder::~CellBuilder() = default;
 

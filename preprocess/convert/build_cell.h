@@ -54,8 +54,9 @@ void sortByNode(RecordSpan records);
 class CellBuilder {
  public:
   /// `blocks` and `progress`, which can stop it, must outlive it.
+  /// `precision`: of the leaves' values.
   CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-              const Progress& progress);
+              const Progress& progress, ValuePrecision precision = ValuePrecision::kNormal);
   ~CellBuilder();
 
   /// Builds `cell` from its records (one at least), whose places it reorders. A cell is a leaf if it has at

@@ -24,7 +24,7 @@ OctreeBuilder::OctreeBuilder(const OctreePlan& plan, BucketTree& tree, CacheWrit
       writer_(&writer),
       temporary_folder_(plan.temporary_folder),
       progress_(&progress),
-      cells_(plan.root, plan.blocks, plan.variables, progress) {}
+      cells_(plan.root, plan.blocks, plan.variables, progress, plan.precision) {}
 
 void OctreeBuilder::build(const BucketFile& file) {
   const std::vector<uint32_t> leaves = tree_->leavesBelow(0);

@@ -33,6 +33,7 @@ struct OctreePlan {
   size_t variables;
   const MemoryPlan& memory;
   std::filesystem::path temporary_folder;
+  ValuePrecision precision = ValuePrecision::kNormal;
 };
 
 class OctreeBuilder {

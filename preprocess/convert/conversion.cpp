@@ -274,7 +274,7 @@ class Conversion {
   }
 
   OctreePlan octreePlan() const {
-    return {root_, origin_->blocks(), options_.scalars.size(), plan_, own_scratch_};
+    return {root_, origin_->blocks(), options_.scalars.size(), plan_, own_scratch_, options_.precision};
   }
 
   void build() {

@@ -72,6 +72,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given, Pro
   if (options.surfaces) checkPlanes(source.description(), options.planes);
   std::vector<ConversionFact> facts =
       factsOf(source.description(), options.scalars, options.blank_value, options.overlap);
+  facts.push_back({"--value-precision", options.precision == ValuePrecision::kFine ? "fine" : "normal"});
   ConvertReport report;
   if (isFinished(options, facts)) {
     const std::filesystem::path manifest = options.output / "manifest.json";

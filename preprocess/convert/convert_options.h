@@ -12,6 +12,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/overset/block_owners.h"
 #include "stream/base/ranks.h"
+#include "stream/codec/values_codec.h"
 
 namespace curvisplat {
 
@@ -27,9 +28,10 @@ struct ConvertOptions {
   std::filesystem::path temporary_folder;  // empty: the folder of the output
   std::string title;                       // empty: the output's name
   std::optional<double> time;              // of the step; otherwise the source's, or 0
-  bool surfaces = true;                    // store the grid's outer faces in the cache
-  std::vector<IndexPlane> planes;          // and these index planes
-  Overlap overlap = Overlap::kOwner;       // of blocks
+  ValuePrecision precision = ValuePrecision::kNormal;  // of the samples' values
+  bool surfaces = true;                                // store the grid's outer faces in the cache
+  std::vector<IndexPlane> planes;                      // and these index planes
+  Overlap overlap = Overlap::kOwner;                   // of blocks
 
   /// Processes that convert together: each has the same source and options, and calls convert(). Null: this process alone.
   Ranks* ranks = nullptr;

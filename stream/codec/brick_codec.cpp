@@ -112,9 +112,10 @@ Extent extentOf(std::span<const std::byte> bytes) {
 }
 
 EncodedValues encodeInRows(std::span<const Row> rows, std::span<const uint32_t> border_codes,
-                           std::span<SplatScalar> values, const TimeReferences& references) {
+                           std::span<SplatScalar> values, const TimeReferences& references,
+                           ValuePrecision precision) {
   EncodedValues encoded;
-  encoded.bytes = encodeValuesStream(rows, values, references);
+  encoded.bytes = encodeValuesStream(rows, values, references, precision);
   encoded.variable = summaryOf(values, border_codes);
   encoded.variable.values = extentOf(encoded.bytes);
   return encoded;
@@ -150,7 +151,7 @@ void toCoordinates(const std::vector<uint32_t>& from, double interval, float ins
 
 }  // namespace
 
-EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
+EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick, ValuePrecision precision) {
   checkInput(brick);
   DecodedGeometry& decoded = scratchGeometry();
   EncodedBrick encoded;
@@ -160,7 +161,7 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
   encoded.brick.geometry = extentOf(encoded.geometry);
   for (const Splat& splat : brick.splats) encoded.weight += splat.weight;
   for (auto& values : brick.variables) {
-    EncodedValues of_variable = encodeInRows(decoded.rows, brick.border_codes, values, {});
+    EncodedValues of_variable = encodeInRows(decoded.rows, brick.border_codes, values, {}, precision);
     encoded.values.push_back(std::move(of_variable.bytes));
     encoded.variables.push_back(of_variable.variable);
   }
@@ -168,8 +169,9 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
 }
 
 EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
-                           std::span<SplatScalar> values, const TimeReferences& references) {
-  return encodeInRows(rowsOf(runs, values.size()), border_codes, values, references);
+                           std::span<SplatScalar> values, const TimeReferences& references,
+                           ValuePrecision precision) {
+  return encodeInRows(rowsOf(runs, values.size()), border_codes, values, references, precision);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,

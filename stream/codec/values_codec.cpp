@@ -11,13 +11,15 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMeanSteps = 65535;
+constexpr double kMeanSteps = 65535, kFineMeanSteps = 16777215;
 constexpr double kSlopeSteps = 8192;
 constexpr double kDeviationSteps = 4096;
 constexpr size_t kMaxRowBytes = 10;  // two varints of up to 32 bits
 
 // An array code whose predictor applies to the differences in time.
 constexpr uint8_t kInTime = 8;
+// An array code of means in kFineMeanSteps.
+constexpr uint8_t kFine = 16;
 
 Predictor coded(Predictor predictor, bool in_time) {
   return static_cast<Predictor>(static_cast<uint8_t>(predictor) | (in_time ? kInTime : 0));
@@ -29,11 +31,26 @@ ArrayCode spatialPart(const ArrayCode& code) {
   return {static_cast<Predictor>(static_cast<uint8_t>(code.predictor) & ~kInTime), code.planes};
 }
 
+bool isFine(const ValuesHeader& header) {
+  return (static_cast<uint8_t>(header.arrays[0].predictor) & kFine) != 0;
+}
+void setFine(ValuesHeader& header) {
+  header.arrays[0].predictor =
+      static_cast<Predictor>(static_cast<uint8_t>(header.arrays[0].predictor) | kFine);
+}
+/// The header without the bit that isFine() reads.
+ValuesHeader withoutFine(ValuesHeader header) {
+  header.arrays[0].predictor =
+      static_cast<Predictor>(static_cast<uint8_t>(header.arrays[0].predictor) & ~kFine);
+  return header;
+}
+
 /// The values that codes stand for. Shared by encoder and decoder.
 struct Scale {
   explicit Scale(const ValuesHeader& header)
       : lower(header.lower),
-        mean_step((double{header.upper} - double{header.lower}) / kMeanSteps),
+        mean_steps(isFine(header) ? kFineMeanSteps : kMeanSteps),
+        mean_step((double{header.upper} - double{header.lower}) / mean_steps),
         slope_step(header.slope_step),
         deviation_step(header.deviation_step) {}
 
@@ -52,7 +69,7 @@ struct Scale {
     return static_cast<float>(std::clamp(value, -kLargest, kLargest));
   }
 
-  double lower, mean_step, slope_step, deviation_step;
+  double lower, mean_steps, mean_step, slope_step, deviation_step;
 };
 
 /// The codes that the references have for an array, in the steps of the stream that they predict.
@@ -70,7 +87,7 @@ class TimePrediction {
                         : array == 4 ? scale_.deviation_step
                                      : scale_.slope_step;
     const double least = array == 0 || array == 4 ? 0.0 : -kLargestCode;
-    const double most = array == 0 ? kMeanSteps : kLargestCode;
+    const double most = array == 0 ? scale_.mean_steps : kLargestCode;
     const double origin = array == 0 ? scale_.lower : 0.0;
     const float* const first = arrayOf(0, array);
     const float* const second = ratio_ > 0 ? arrayOf(1, array) : nullptr;
@@ -104,8 +121,10 @@ constexpr double kWorthwhile = 0.97;
 
 class ValuesEncoder {
  public:
-  ValuesEncoder(std::span<const Row> rows, std::span<SplatScalar> values, const TimeReferences& references)
-      : rows_(rows),
+  ValuesEncoder(std::span<const Row> rows, std::span<SplatScalar> values, const TimeReferences& references,
+                ValuePrecision precision)
+      : fine_(precision == ValuePrecision::kFine),
+        rows_(rows),
         values_(values),
         references_(references),
         sample_(sampleOf(rows)),
@@ -134,6 +153,7 @@ class ValuesEncoder {
       residualsOf(predictors[a], rows, codes.data(), residuals_.data());
       header_.arrays[a] = {coded(predictors[a], in_time[a]), planes.add(residuals_)};
     }
+    if (fine_) setFine(header_);
     return planes.compress(std::as_bytes(std::span(&header_, 1)));
   }
 
@@ -151,6 +171,7 @@ class ValuesEncoder {
     header_.upper = static_cast<float>(upper);
     header_.slope_step = span / kSlopeSteps;
     header_.deviation_step = span / kDeviationSteps;
+    if (fine_) setFine(header_);  // for Scale; encode() overwrites the codes
   }
 
   void quantise() {
@@ -161,7 +182,7 @@ class ValuesEncoder {
     for (size_t n = 0; n < values_.size(); ++n) {
       SplatScalar& value = values_[n];
       codes_[0][n] =
-          static_cast<uint32_t>(std::clamp((value.mean - scale.lower) * means + 0.5, 0.0, kMeanSteps));
+          static_cast<uint32_t>(std::clamp((value.mean - scale.lower) * means + 0.5, 0.0, scale.mean_steps));
       value.mean = scale.mean(codes_[0][n]);
       for (int c = 0; c < 3; ++c) {
         codes_[1 + c][n] = static_cast<uint32_t>(static_cast<int32_t>(std::lrint(value.slope[c] * slopes)));
@@ -196,6 +217,7 @@ class ValuesEncoder {
     planes.addBytes(bytes);
   }
 
+  const bool fine_;
   std::span<const Row> rows_;
   std::span<SplatScalar> values_;
   const TimeReferences& references_;
@@ -246,14 +268,15 @@ std::array<uint8_t, 2> stepsBackOf(std::span<const std::byte> stream) {
 }
 
 std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values,
-                                          const TimeReferences& references) {
-  return ValuesEncoder(rows, values, references).encode();
+                                          const TimeReferences& references, ValuePrecision precision) {
+  return ValuesEncoder(rows, values, references, precision).encode();
 }
 
 void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out,
                         const TimeReferences& references) {
-  const ValuesHeader header = headerOf(bytes);
-  const TimePrediction in_time(header, references);
+  const ValuesHeader stored = headerOf(bytes);
+  const ValuesHeader header = withoutFine(stored);
+  const TimePrediction in_time(stored, references);
   if (header.rows_bytes > kMaxRowBytes * count) throw Error("its header is invalid");
   size_t unpacked = header.rows_bytes;
   for (const ArrayCode& array : header.arrays) {
@@ -268,7 +291,7 @@ void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const 
   thread_local std::vector<uint32_t> scratch, expected;
   scratch.resize(count);
   uint32_t* codes = scratch.data();
-  const Scale scale(header);
+  const Scale scale(stored);
   const auto decode = [&](size_t array, float* values, auto value) {
     planes.values(header.arrays[array].planes, scratch);
     for (size_t n = 0; n < count; ++n) codes[n] = unzigzag(codes[n]);

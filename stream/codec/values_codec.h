@@ -3,7 +3,7 @@
 //   ValuesHeader | zstd frame: rows (varints) | planes of mean, slope0, slope1, slope2, deviation
 //
 //   span        the range of the brick's means, or its largest |slope component| or deviation if that is more
-//   mean        16 bits over the range of the brick's means
+//   mean        16 bits over the range of the brick's means; with ValuePrecision::kFine 24 bits, as floats have
 //   slope       in steps of 2^-13 of the span: at the edge of a splat's support, 1.556 from its centre, the
 //               scalar is wrong by at most 1.7e-4 of the span
 //   deviation   √variance in steps of 2^-12 of the span; 0 stays 0
@@ -27,6 +27,16 @@
 
 namespace curvisplat {
 
+/// How finely means are stored.
+enum class ValuePrecision { kNormal, kFine };
+
+/// The cache's feature (manifest.h) whose streams may have fine means: a bit in the array code of the means.
+inline constexpr const char* kFineValues = "fine-values";
+
+/// How far a decoded mean is from the encoded one at most, as a share of the range of the brick's means; rounding to
+/// floats adds to it.
+inline constexpr double kLargestMeanError = 0.5 / 65535, kLargestFineMeanError = 0.5 / 16777215;
+
 struct ValuesHeader {
   float lower, upper;                 //  0: range of the means
   double slope_step, deviation_step;  //  8: in the scalar's unit
@@ -49,7 +59,8 @@ std::array<uint8_t, 2> stepsBackOf(std::span<const std::byte> stream);
 /// Encodes `values` and replaces them by the decoded values. `rows`: the rows of the brick's geometry
 /// (rowsOf()). Predicts from `references` those arrays for which that takes fewer bits.
 std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values,
-                                          const TimeReferences& references = {});
+                                          const TimeReferences& references = {},
+                                          ValuePrecision precision = ValuePrecision::kNormal);
 
 /// Decodes untrusted bytes: throws Error unless they hold exactly `count` finite values. `out`: arrays of
 /// `count`. `references`: those that stepsBackOf() names.

@@ -85,6 +85,7 @@ class ModelFiles(ModelFileTest):
             ("KMT", "lat lon", deep, {}, levels),
             ("ocean", "depth lat lon", wet, {"standard_name": "sea_binary_mask"}, wet),
             ("ground", "lat lon", ~wet[0], {"standard_name": "land_binary_mask"}, wet[:1]),
+            ("LANDMASK", "lat lon", ~wet[0], {}, wet[:1]),
             ("kind", "lat lon", np.where(wet[0], 1, 2), flags, wet[:1]),
         ]
         for name, dims, values, attributes, seen in cases:
@@ -166,6 +167,60 @@ class ModelFiles(ModelFileTest):
                 else:
                     height = standard_altitude(pascals)
                 self.expect(self.info(), sphere(lon, lat, height), t, near=1e-3)
+
+    def test_sleve_heights(self):
+        a, b1, b2 = np.linspace(1, 0.05, 5), np.linspace(0, 0.9, 5), np.linspace(0, 0.95, 5) ** 3
+        large, small = 500 * RANDOM.random((8, 12)), 90 * RANDOM.random((8, 12))
+        t = RANDOM.random((5, 8, 12)).astype("f4")
+        with self.file(lon=12, lat=8, lev=5, time=None) as f:
+            lon, lat = self.air(f)
+            f.add("lev", "lev", a, standard_name="atmosphere_sleve_coordinate", positive="up",
+                  formula_terms="a: A b1: B1 b2: B2 ztop: TOP zsurf1: LARGE zsurf2: SMALL")
+            for name, values in (("A", a), ("B1", b1), ("B2", b2)):
+                f.add(name, "lev", values)
+            f.add("TOP", "", 20.0, units="km")
+            f.add("LARGE", "lat lon", large, units="m")
+            f.add("SMALL", "lat lon", small, units="m")
+            f.add("T", "time lev lat lon", t[None], "f4")
+        height = a[:, None, None] * 20 + 1e-3 * (b1[:, None, None] * large + b2[:, None, None] * small)
+        self.expect(self.info(), sphere(lon, lat, height), t, near=1e-3)
+
+    def test_sigma_over_z_and_double_sigma(self):
+        depth, eta = 100 + 900 * RANDOM.random((7, 10)), RANDOM.random((7, 10))
+        t = RANDOM.random((6, 7, 10)).astype("f4")
+        sigma = np.array([-0.1, -0.4, -0.9, np.nan, np.nan, np.nan])
+        zlev = np.array([np.nan, np.nan, np.nan, -300.0, -500, -900])
+        of_sigma = eta + sigma[:, None, None] * (np.minimum(200, depth) + eta)
+        expected = np.where(np.arange(6)[:, None, None] < 3, of_sigma, zlev[:, None, None])
+        over = np.linspace(0.1, 1, 3)
+        middle = 0.5 * (40 + 60) + 0.5 * (40 - 60) * np.tanh(2 * 0.2 / (40 - 60) * (depth - 400))
+        double = np.concatenate([-over[:, None, None] * middle, middle - (1 + over[:, None, None]) * (depth - middle)])
+        common = {"DEPTH": ("lat lon", depth, "m"), "ETA": ("lat lon", eta, "m")}
+        cases = [
+            ("ocean_sigma_z_coordinate", "sigma: S eta: ETA depth: DEPTH depth_c: DC zlev: Z", {}, expected),
+            ("ocean_sigma_z_coordinate", "sigma: S eta: ETA depth: DEPTH depth_c: DC nsigma: N zlev: Z", {"S": np.linspace(-0.1, -0.9, 6)}, None),
+            ("ocean_double_sigma_coordinate", "sigma: S depth: DEPTH z1: Z1 z2: Z2 a: A href: H k_c: K",
+             {"S": np.concatenate([-over, -over])}, double),
+        ]
+        for name, terms, other, height in cases:
+            with self.subTest(terms):
+                s = other.get("S", sigma)
+                if height is None:
+                    height = np.where(np.arange(6)[:, None, None] < 3, eta + s[:, None, None] * (np.minimum(200, depth) + eta),
+                                      zlev[:, None, None])
+                with self.file(lon=10, lat=7, lev=6) as f:
+                    lon, lat = np.linspace(0, 9, 10), np.linspace(30, 36, 7)
+                    f.add("lon", "lon", lon, units="degrees_east")
+                    f.add("lat", "lat", lat, units="degrees_north")
+                    f.add("lev", "lev", np.arange(6.0), standard_name=name, formula_terms=terms, positive="up")
+                    f.add("S", "lev", np.nan_to_num(s, nan=-999), fill=-999.0)
+                    f.add("Z", "lev", np.nan_to_num(zlev, nan=-999), fill=-999.0, units="m")
+                    for key, (dims, values, units) in common.items():
+                        f.add(key, dims, values, units=units)
+                    for key, value in {"DC": 200.0, "N": 3, "Z1": 40.0, "Z2": 60.0, "A": 0.2, "H": 400.0, "K": 3}.items():
+                        f.add(key, "", value)
+                    f.add("T", "lev lat lon", t, "f4")
+                self.expect(self.info(), sphere(lon, lat[:, None], 1e-3 * height), t, near=1e-3)
 
     def test_layers_of_density(self):
         thickness = 10 + 50 * RANDOM.random((5, 8, 12))

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of lists of time steps and of steps.bin: FOLDER/<target>/<seed>.
+"""make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of Tecplot's and XDMF's structured ones, of lists of time steps
+and of steps.bin: FOLDER/<target>/<seed>.
 
 What others wrote: VTK (python3-vtk9) and libnetcdf (python3-netcdf4). The other seeds are make_seeds's.
 """
@@ -13,6 +14,9 @@ import netCDF4
 import numpy as np
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "end_to_end"))
+from tecplot_files import Binary, padded, write_text
 
 OUT = pathlib.Path(sys.argv[1])
 POINTS = np.array([[i, j, k] for k in range(3) for j in range(2) for i in range(2)], "f8")
@@ -178,6 +182,57 @@ def su2_seeds():
         put("su2", name, struct.pack("<H", len(mesh)) + mesh.encode() + restart)
 
 
+class SmallBlock:
+    """Two zones' worth of numbers for Tecplot and XDMF."""
+    shape = (2, 3, 4)
+    places = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij")[::-1]).astype("f4")
+    p = np.arange(24, dtype="f4").reshape(shape)
+    c = np.arange(6, dtype="f4").reshape(1, 2, 3)
+
+
+def tecplot_seeds():
+    b = SmallBlock
+    names, cells = ("X", "Y", "Z", "p", "c"), [0, 0, 0, 0, 1]
+    for version in (104, 107, 112):
+        file = Binary(names, version, "<" if version < 112 else ">")
+        file.zone(b.shape, [*b.places, b.p, padded(b, b.c)], "a", strand=0, time=0.5, centrings=cells, auxiliary=[("key", "value")])
+        file.zone(b.shape, [None, None, None, b.p, None], "b", strand=0, time=1.5, centrings=cells, shared=[0, 0, 0, -1, -1],
+                  passive=[0, 0, 0, 0, 1])
+        file.geometry()
+        with tempfile.TemporaryDirectory() as folder:
+            file.write(pathlib.Path(folder) / "a.plt")
+            put("tecplot", f"binary_{version}", (pathlib.Path(folder) / "a.plt").read_bytes())
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "a.dat"
+        write_text(path, [("T=a I=4 J=3 K=2 F=BLOCK VARLOCATION=([5]=CELLCENTERED) SOLUTIONTIME=0.5", "BLOCK", [*b.places, b.p, b.c]),
+                          ("I=4 J=3 K=2 F=BLOCK VARSHARELIST=([1-3]=1) PASSIVEVARLIST=[5] DT=(SINGLE DOUBLE)", "BLOCK", [b.p])], names)
+        put("tecplot", "text_blocks", path.read_bytes() + b"TEXT X=1 T=\"a\"\nZONE I=4 J=3 K=2 D=(1,2,3,4,5)\n")
+        write_text(path, [("I=4, J=3, K=2", "POINT", [*b.places, b.p])], names[:4])
+        put("tecplot", "text_points", path.read_bytes().replace(b"0.0 0.0", b"2*0"))
+
+
+def xdmf_seeds():
+    b = SmallBlock
+    words = lambda values: " ".join(f"{v:g}" for v in np.asarray(values).ravel())
+    head = '<?xml version="1.0"?><Xdmf Version="3.0"><Domain>'
+    item = '<DataItem Dimensions="{}" Format="XML">{}</DataItem>'
+    places = item.format("2 3 4 3", words(np.moveaxis(b.places, 0, -1)))
+    topology = '<Topology TopologyType="3DSMesh" Dimensions="2 3 4"/>'
+    fields = f'<Attribute Name="p">{item.format("2 3 4", words(b.p))}</Attribute><Attribute Name="c" Center="Cell">{item.format("1 2 3", words(b.c))}</Attribute>'
+    grid = f"<Grid>{topology}<Geometry>{places}</Geometry>{fields}</Grid>"
+    put("xdmf", "inline", f"{head}{grid}</Domain></Xdmf>".encode())
+    steps = f'<Grid GridType="Collection" CollectionType="Temporal"><Time TimeType="List">{item.format(2, "0 1")}</Time>{grid}{grid}</Grid>'
+    put("xdmf", "steps", f"{head}{steps}</Domain></Xdmf>".encode())
+    binary = '<DataItem Dimensions="{}" Precision="4" Format="Binary" Seek="{}" Endian="Little">a.bin</DataItem>'
+    axes = "".join(binary.format(n, 8 * n) for n in (4, 3, 2))
+    put("xdmf", "axes", (f'{head}<Grid>{topology.replace("3DSMesh", "3DRectMesh")}<Geometry GeometryType="VXVYVZ">{axes}</Geometry>'
+                         f'<Attribute Name="v" AttributeType="Vector">{binary.format("2 3 4 3", 0)}</Attribute></Grid></Domain></Xdmf>').encode())
+    slab = f'<DataItem ItemType="HyperSlab" Dimensions="2 3 4">{item.format("3 3", "0 0 0 1 2 1 2 3 4")}{binary.format("2 6 4", 0)}</DataItem>'
+    uniform = f'<Geometry GeometryType="ORIGIN_DXDYDZ">{item.format(3, "0 0 0")}{item.format(3, "1 1 1")}</Geometry>'
+    put("xdmf", "slab", (f'{head}<Topology TopologyType="3DCoRectMesh" Dimensions="2 3 4"/><Grid><Topology Reference="/Xdmf/Domain/Topology"/>'
+                         f'{uniform}<Attribute Name="p">{slab}</Attribute></Grid></Domain></Xdmf>').encode())
+
+
 def ensight_seeds():
     for name, order in (("ascii", ""), ("binary", "<"), ("big_endian", ">")):
         for block in (False, True):
@@ -255,4 +310,6 @@ with tempfile.TemporaryDirectory() as name:
 foam_seeds()
 su2_seeds()
 ensight_seeds()
+tecplot_seeds()
+xdmf_seeds()
 lists_of_steps()

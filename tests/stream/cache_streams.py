@@ -36,15 +36,15 @@ def varints(data):
 
 def expected(array, header, references):
     """The codes q that the references of a values stream have, in its own steps."""
-    lower, upper, slope_step, deviation_step = header
+    lower, upper, slope_step, deviation_step, most = header
     b, values = references
     if array == 4:
         values = [np.sqrt(value) for value in values]
     e = values[0] if len(values) == 1 else values[0] + (values[0] - values[1]) * (b[0] / (b[1] - b[0]))
-    origin, step = (lower, (upper - lower) / 65535) if array == 0 else (0.0, deviation_step if array == 4 else slope_step)
+    origin, step = (lower, (upper - lower) / most) if array == 0 else (0.0, deviation_step if array == 4 else slope_step)
     if not step > 0:
         return np.zeros(len(e), np.uint64)
-    low, high = 0 if array in (0, 4) else -2.0**30, 65535 if array == 0 else 2.0**30
+    low, high = 0 if array in (0, 4) else -2.0**30, most if array == 0 else 2.0**30
     return np.rint(np.clip((e - origin) / step, low, high)).astype(np.int64).astype(np.uint64)
 
 
@@ -181,9 +181,10 @@ def decode_values(data, count, reference):
     need(varint_bytes <= 10 * count, "values header")
     back = [b for b in data[38:40] if b]
     need(back == sorted(set(back)) and (data[38] or not data[39]), "reference")
-    contents = Contents(data[40:], varint_bytes, zip(data[28:38:2], data[29:38:2]), count, bool(back))
+    most = 2**24 - 1 if data[28] & 16 else 65535  # with `fine-values`
+    contents = Contents(data[40:], varint_bytes, zip((data[28] & ~16, *data[30:38:2]), data[29:38:2]), count, bool(back))
     earlier = [reference(b) for b in back]
-    header = lower, upper, slope_step, deviation_step
+    header = lower, upper, slope_step, deviation_step, most
     rows, first = [], 0
     for length, distance in zip(contents.varints[::2], contents.varints[1::2]):
         need(length > 0 and distance <= first, "row")
@@ -194,5 +195,5 @@ def decode_values(data, count, reference):
     m, s0, s1, s2, d = (contents.signed(lambda a=a: expected(a, header, (back, [e[VALUES[a]].astype(np.float32).astype(np.float64)
                                                                                 for e in earlier])))
                         for a in range(5))
-    steps = lower + m * ((upper - lower) / 65535), s0 * slope_step, s1 * slope_step, s2 * slope_step
+    steps = lower + m * ((upper - lower) / most), s0 * slope_step, s1 * slope_step, s2 * slope_step
     return dict(zip(VALUES, (*steps, (d * deviation_step) ** 2)))

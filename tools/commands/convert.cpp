@@ -192,6 +192,10 @@ void addConvert(CLI::App& app) {
   addSeriesOptions(*command, *arguments);
   command->add_option("--blank", arguments->blank_value, "Treat samples with this value as blanked");
   command->add_option(
+      "--value-precision", arguments->precision,
+      "Stored values: normal (16 bits for the range of a brick), or fine (24 bits, as floats have; `info` "
+      "of a cache prints the bound)");
+  command->add_option(
       "--memory", arguments->memory,
       "Memory limit of this process, such as 512M (default: 2G, at most 1/4 of the machine's)");
   command->add_option("--threads", arguments->threads, "Number of threads (default 0: one per core)")

@@ -19,6 +19,7 @@
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/probe.h"
+#include "stream/codec/values_codec.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
 #include "tools/commands/info_steps.h"
@@ -63,6 +64,17 @@ std::vector<LevelSummary> levelsOf(const CacheReader& reader) {
       level.values_bytes += reader.brickVariables(v)[n].values.length;
   }
   return levels;
+}
+
+/// How far rounding moves a sample's stored mean at most. Besides, it is a float.
+double storedWithin(const CacheReader& reader, size_t variable) {
+  double range = 0;
+  for (size_t n = 0; n < reader.bricks().size(); ++n) {
+    if (!reader.bricks()[n].isLeaf()) continue;
+    const BrickVariable& values = reader.brickVariables(variable)[n];
+    range = std::max(range, double{values.max} - double{values.min});
+  }
+  return range * (reader.manifest().hasFeature(kFineValues) ? kLargestFineMeanError : kLargestMeanError);
 }
 
 uint64_t totalBytes(const Manifest& manifest) {
@@ -117,6 +129,9 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
     json["steps"] = stepsAsJson(reader);
     json["series_bytes"] = seriesBytes(reader);
   }
+  json["stored_within"] = Json::array();
+  for (size_t v = 0; v < manifest.variables.size(); ++v)
+    json["stored_within"].push_back(storedWithin(reader, v));
   json["bytes"] = totalBytes(manifest);
   json["bytes_per_node"] = bytesPerSample(manifest, totalBytes(manifest));
   json["bricks_by_level"] = Json::array();
@@ -172,9 +187,10 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
              countText(m.blocks.size(), "block"), m.blanked_nodes);
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
-  for (const VariableInfo& variable : m.variables)
-    fmt::print("scalar     {} {}: {:.6g} .. {:.6g}\n", variable.name,
-               variable.unit.empty() ? "" : "[" + variable.unit + "]", variable.min, variable.max);
+  for (size_t v = 0; v < m.variables.size(); ++v)
+    fmt::print("scalar     {} {}: {:.6g} .. {:.6g}, rounded within {:.1e}\n", m.variables[v].name,
+               m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit),
+               m.variables[v].min, m.variables[v].max, storedWithin(reader, v));
   fmt::print("\nlevel    bricks    leaves        splats   geometry B     values B      error\n");
   const std::vector<LevelSummary> levels = levelsOf(reader);
   for (size_t n = 0; n < levels.size(); ++n)

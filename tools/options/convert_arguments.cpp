@@ -129,6 +129,8 @@ void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options) {
     requireChoice("--overlap", *arguments.overlap, {"owner", "all"});
     options.overlap = *arguments.overlap == "all" ? Overlap::kAll : Overlap::kOwner;
   }
+  requireChoice("--value-precision", arguments.precision, {"normal", "fine"});
+  options.precision = arguments.precision == "fine" ? ValuePrecision::kFine : ValuePrecision::kNormal;
   options.surfaces = !arguments.no_surfaces;
   if (arguments.no_surfaces && !arguments.planes.empty())
     throw UsageError("--no-surfaces contradicts --surface {}; give one of them", arguments.planes.front());

@@ -32,6 +32,7 @@ struct ConvertArguments {
   std::vector<std::string> planes;  // --surface
   bool no_surfaces = false;
   std::optional<std::string> overlap;  // owner or all
+  std::string precision = "normal";    // or fine
   std::optional<std::string> steps;    // of a series
   std::optional<uint64_t> every;
   bool keep_going = false, adds_steps = false, follows = false;
@@ -52,7 +53,7 @@ std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std
 /// Moves words that are no files from the solutions to the scalars: the second of "--scalar a b".
 void takeScalarsFromSolutions(ConvertArguments& arguments);
 
-/// Of --surface, --no-surfaces and --overlap. Throws UsageError.
+/// Of --surface, --no-surfaces, --overlap and --value-precision. Throws UsageError.
 void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options);
 
 /// The sum over all phases.

@@ -1,4 +1,5 @@
 // The heights of cf_vertical.h, once their terms are found.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -13,10 +14,13 @@ constexpr double kSeaLevelPressure = 101325;
 }  // namespace
 
 /// Source: CF conventions 1.10, appendix D.
-double CfVertical::formula(double s, double c, double eta, double depth, double depth_c) const {
+double CfVertical::formula(const AtNode& node) const {
+  const auto [s, c, eta, depth, c2, depth2, level_number] = node;
   switch (kind_) {
     case Kind::kHybridHeight:
       return s + c * depth;
+    case Kind::kSleve:
+      return s * a_ + c * depth + c2 * depth2;
     case Kind::kLogPressure:
       return a_ * std::exp(-s);
     case Kind::kSigmaPressure:
@@ -25,17 +29,28 @@ double CfVertical::formula(double s, double c, double eta, double depth, double 
       return s * a_ + c * depth;
     case Kind::kSigma:
       return eta + s * (depth + eta);
+    case Kind::kSigmaZ:
+      // Each level has one of the two.
+      if (std::isfinite(s) && static_cast<double>(level_number) < levels_of_sigma_)
+        return eta + s * (std::min(depth_c_, depth) + eta);
+      return c;
+    case Kind::kDoubleSigma: {
+      const double half = 0.5 * (z1_ - z2_);
+      const double middle = 0.5 * (z1_ + z2_) + half * std::tanh(a_ / half * (depth - depth_c_));
+      if (static_cast<double>(level_number) < levels_of_sigma_) return s * middle;
+      return middle + (s - 1) * (depth - middle);
+    }
     case Kind::kS: {
       const double stretched = (1 - b_) * std::sinh(a_ * s) / std::sinh(a_) +
                                b_ * (std::tanh(a_ * (s + 0.5)) / (2 * std::tanh(0.5 * a_)) - 0.5);
-      return eta * (1 + s) + depth_c * s + (depth - depth_c) * stretched;
+      return eta * (1 + s) + depth_c_ * s + (depth - depth_c_) * stretched;
     }
     case Kind::kSG1: {
-      const double level = depth_c * s + (depth - depth_c) * c;
+      const double level = depth_c_ * s + (depth - depth_c_) * c;
       return level + eta * (1 + level / depth);
     }
     default: {
-      const double level = (depth_c * s + depth * c) / (depth_c + depth);
+      const double level = (depth_c_ * s + depth * c) / (depth_c_ + depth);
       return eta + (eta + depth) * level;
     }
   }
@@ -107,14 +122,18 @@ CfValues CfVertical::formulaHeights(const NetcdfFiles& file, const CfRange& rang
   if (pressure)
     for (double& value : depth.values) value = depth_ ? depth_c_ * value : kSeaLevelPressure;
   const CfValues c = c_ ? c_->read(file, range) : none, eta = eta_ ? eta_->read(file, range) : none;
+  const CfValues c2 = c2_ ? c2_->read(file, range) : none,
+                 depth2 = depth2_ ? depth2_->read(file, range) : none;
   for (size_t axis = 0; axis < 3; ++axis) heights.count[axis] = range.end[axis] - range.begin[axis];
   for (uint64_t k = 0; k < heights.count[2]; ++k)
     for (uint64_t j = 0; j < heights.count[1]; ++j)
       for (uint64_t i = 0; i < heights.count[0]; ++i) {
         // On land the elevation is missing, but the depth may be known.
         const double elevation = eta.at(i, j, k);
-        const double value = formula(s.at(i, j, k), c.at(i, j, k), std::isfinite(elevation) ? elevation : 0,
-                                     depth.at(i, j, k), depth_c_);
+        const std::array<uint64_t, 3> at{i, j, k};
+        const double value =
+            formula({s.at(i, j, k), c.at(i, j, k), std::isfinite(elevation) ? elevation : 0,
+                     depth.at(i, j, k), c2.at(i, j, k), depth2.at(i, j, k), range.begin[axis_] + at[axis_]});
         heights.values.push_back(pressure ? 1e-3 * standardAltitude(value) : scale_ * value);
       }
   return heights;

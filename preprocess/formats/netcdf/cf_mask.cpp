@@ -64,7 +64,8 @@ std::optional<CfMask::Rule> CfMask::ruleOf(const NetcdfVariable& variable, bool 
   if (!variable.numeric) return std::nullopt;
   if (!hiddenFlags(variable, ocean).empty()) return Rule::kFlags;
   if (isWaterMask(name, standard_name)) return ocean ? std::optional(Rule::kZero) : std::nullopt;
-  if (standard_name == "land_binary_mask") return ocean ? std::optional(Rule::kNotZero) : std::nullopt;
+  if (standard_name == "land_binary_mask" || isOneOf(name, {"landmask", "land_mask"}))
+    return ocean ? std::optional(Rule::kNotZero) : std::nullopt;
   if (isOneOf(name, {"kmt", "kmu"})) return Rule::kLevels;
   return std::nullopt;
 }

@@ -226,6 +226,9 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFiles& file, const N
       {"ocean_s_coordinate", Kind::kS},
       {"ocean_s_coordinate_g1", Kind::kSG1},
       {"ocean_s_coordinate_g2", Kind::kSG2},
+      {"ocean_sigma_z_coordinate", Kind::kSigmaZ},
+      {"ocean_double_sigma_coordinate", Kind::kDoubleSigma},
+      {"atmosphere_sleve_coordinate", Kind::kSleve},
       {"atmosphere_hybrid_height_coordinate", Kind::kHybridHeight},
       {"atmosphere_ln_pressure_coordinate", Kind::kLogPressure},
       {"atmosphere_sigma_coordinate", Kind::kSigmaPressure},
@@ -252,8 +255,9 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFiles& file, const N
   vertical.description_ = name + " of " + coordinate.name;
   if (vertical.ofPressure()) vertical.description_ += " (pressure, at heights of the standard atmosphere)";
   const char* lacking = "";
-  if (air ? !vertical.setAirTerms(file, terms, block, axis, lacking)
-          : !vertical.setOceanTerms(file, terms, block, axis, lacking)) {
+  if (vertical.kind_ == Kind::kSleve ? !vertical.setSleveTerms(file, terms, block, axis, lacking)
+      : air                          ? !vertical.setAirTerms(file, terms, block, axis, lacking)
+                                     : !vertical.setOceanTerms(file, terms, block, axis, lacking)) {
     reason = fmt::format("the formula of {} has no term '{}' on these dimensions", coordinate.name, lacking);
     return std::nullopt;
   }
@@ -266,17 +270,26 @@ bool CfVertical::setOceanTerms(const NetcdfFiles& file, const Terms& terms, cons
     lacking = key;
     return false;
   };
-  s_ = termNamed(file, terms, kind_ == Kind::kSigma ? "sigma" : "s", block);
+  const bool sigma = kind_ == Kind::kSigma || kind_ == Kind::kSigmaZ || kind_ == Kind::kDoubleSigma;
+  s_ = termNamed(file, terms, sigma ? "sigma" : "s", block);
   eta_ = termNamed(file, terms, "eta", block);
   depth_ = termNamed(file, terms, "depth", block);
-  if (!s_ || !s_->varies(axis)) return lacks("s");
+  if (!s_ || !s_->varies(axis)) return lacks(sigma ? "sigma" : "s");
   if (!depth_ || depth_->varies(axis)) return lacks("depth");
   scale_ = kilometresOf(depth_->variable().text("units")).value_or(1e-3);
+  axis_ = axis;
+  if (kind_ == Kind::kDoubleSigma) return setDoubleSigmaTerms(file, terms, block, lacking);
   if (!eta_) warnings_.push_back("no surface elevation (eta); 0 is assumed");
   if (kind_ == Kind::kSigma) return true;
 
   depth_c_ = constant(file, termNamed(file, terms, "depth_c", block));
   if (!std::isfinite(depth_c_)) return lacks("depth_c");
+  if (kind_ == Kind::kSigmaZ) {
+    levels_of_sigma_ = constant(file, termNamed(file, terms, "nsigma", block));
+    if (!std::isfinite(levels_of_sigma_)) levels_of_sigma_ = INFINITY;
+    c_ = termNamed(file, terms, "zlev", block);
+    return (c_ && c_->varies(axis)) || lacks("zlev");
+  }
   if (kind_ == Kind::kS) {
     a_ = constant(file, termNamed(file, terms, "a", block));
     b_ = constant(file, termNamed(file, terms, "b", block));
@@ -285,6 +298,47 @@ bool CfVertical::setOceanTerms(const NetcdfFiles& file, const Terms& terms, cons
   }
   c_ = termNamed(file, terms, "C", block);
   return (c_ && c_->varies(axis)) || lacks("C");
+}
+
+bool CfVertical::setDoubleSigmaTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block,
+                                     const char*& lacking) {
+  const struct {
+    const char* key;
+    double* value;
+  } constants[] = {{"z1", &z1_}, {"z2", &z2_}, {"a", &a_}, {"href", &depth_c_}, {"k_c", &levels_of_sigma_}};
+  for (const auto& [key, value] : constants) {
+    *value = constant(file, termNamed(file, terms, key, block));
+    if (std::isfinite(*value)) continue;
+    lacking = key;
+    return false;
+  }
+  return true;
+}
+
+/// s_: a; c_, c2_: b1, b2; depth_, depth2_: the large and the small scales of the ground; a_: ztop. Lengths as stored.
+bool CfVertical::setSleveTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block,
+                               size_t axis, const char*& lacking) {
+  const struct {
+    const char* key;
+    std::optional<CfTerm>* term;
+    bool of_levels;
+  } wanted[] = {{"a", &s_, true},
+                {"b1", &c_, true},
+                {"b2", &c2_, true},
+                {"zsurf1", &depth_, false},
+                {"zsurf2", &depth2_, false}};
+  for (const auto& [key, term, of_levels] : wanted) {
+    lacking = key;
+    *term = termNamed(file, terms, key, block);
+    if (!*term || (*term)->varies(axis) != of_levels) return false;
+  }
+  lacking = "ztop";
+  const auto top = termNamed(file, terms, "ztop", block);
+  a_ = constant(file, top);
+  if (!std::isfinite(a_)) return false;
+  scale_ = kilometresOf(depth_->variable().text("units")).value_or(1e-3);
+  a_ *= kilometresOf(top->variable().text("units")).value_or(1e-3) / scale_;
+  return true;
 }
 
 /// s_: a, ap, sigma or lev; c_: b; depth_: the surface's pressure or height; a_: p0 or ptop, in pascals.

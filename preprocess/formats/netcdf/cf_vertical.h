@@ -5,8 +5,8 @@
 //   pressure                  the height of that pressure in the standard atmosphere (standard_atmosphere.h)
 //   formulas of a pressure    atmosphere_sigma_, atmosphere_ln_pressure_, atmosphere_hybrid_sigma_pressure_
 //                             coordinate: that pressure's height
-//   formulas of a height      atmosphere_hybrid_height_coordinate, ocean_sigma_coordinate, ocean_s_coordinate
-//                             and its generic forms 1 and 2
+//   formulas of a height      atmosphere_hybrid_height_, atmosphere_sleve_, ocean_sigma_, ocean_sigma_z_,
+//                             ocean_double_sigma_coordinate, ocean_s_coordinate and its generic forms 1 and 2
 #pragma once
 
 #include <map>
@@ -55,7 +55,10 @@ class CfVertical {
     kS,
     kSG1,
     kSG2,
+    kSigmaZ,
+    kDoubleSigma,
     kHybridHeight,
+    kSleve,
     kPressure,
     kLogPressure,
     kSigmaPressure,
@@ -90,12 +93,24 @@ class CfVertical {
   bool ofPressure() const { return kind_ >= Kind::kPressure && kind_ <= Kind::kHybridPressure; }
   CfValues thicknessHeights(const NetcdfFiles& file, const CfRange& range) const;
   CfValues formulaHeights(const NetcdfFiles& file, const CfRange& range) const;
-  double formula(double s, double c, double eta, double depth, double depth_c) const;
+  bool setSleveTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block, size_t axis,
+                     const char*& lacking);
+  bool setDoubleSigmaTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block,
+                           const char*& lacking);
+  /// The terms of a formula at one node.
+  struct AtNode {
+    double s, c, eta, depth, c2, depth2;
+    uint64_t level;
+  };
+  double formula(const AtNode& node) const;
 
   Kind kind_ = Kind::kLevels;
   double scale_ = 1;                           // converts stored values to kilometres upwards
   std::vector<CfTerm> terms_;                  // height: one; geopotential: base and perturbation
   std::optional<CfTerm> s_, c_, eta_, depth_;  // terms of a formula; of the air: a, b, -, surface
+  std::optional<CfTerm> c2_, depth2_;          // kSleve: b2 and zsurf2
+  double z1_ = 0, z2_ = 0;                     // kDoubleSigma
+  double levels_of_sigma_ = 0;                 // kSigmaZ: infinite if not known; kDoubleSigma: k_c
   double depth_c_ = 0, a_ = 0, b_ = 0;         // of the air: a_ the reference or top pressure
   size_t axis_ = 2;                            // kThickness: of the layers
   uint64_t layers_ = 0;                        // kThickness: their number

@@ -1,7 +1,6 @@
 #include "preprocess/formats/open/foreign_formats.h"
 
 #include <algorithm>
-#include <sstream>
 #include <string_view>
 
 namespace curvisplat {
@@ -23,8 +22,8 @@ constexpr Magic kMagics[] = {
     {"CDF\x01"sv, "a NetCDF file"},
     {"CDF\x02"sv, "a NetCDF file"},
     {"CDF\x05"sv, "a NetCDF file"},
-    {"#!TDV"sv, "a Tecplot binary file, which is not read"},
-    {"#!SZPLT"sv, "a Tecplot binary file, which is not read"},
+    {"#!TDV"sv, "a Tecplot binary file"},
+    {"#!SZPLT"sv, "a Tecplot subzone file (.szplt), which is not read (save it as .plt)"},
     {"C Binary"sv, "an EnSight geometry file (give its case file instead)"},
     {"\x50\0\0\0Fortran Binary"sv, "an EnSight geometry file in Fortran Binary, which is not read"},
     {"\0\0\0\x50"
@@ -53,22 +52,7 @@ std::optional<std::string> foreignText(std::string begin) {
   if (std::any_of(begin.begin(), begin.end(), [](char c) { return c == '\0'; })) return std::nullopt;
   std::transform(begin.begin(), begin.end(), begin.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  if (begin.find("<xdmf") != std::string::npos || begin.find("<!doctype xdmf") != std::string::npos)
-    return "an XDMF file, which is not read";
   if (begin.starts_with("<?xml")) return "an XML file";
-  std::istringstream lines(begin);
-  for (std::string line; std::getline(lines, line);) {
-    const size_t first = line.find_first_not_of(" \t\r");
-    if (first == std::string::npos || line[first] == '#') continue;
-    line.erase(0, first);
-    for (const std::string_view word : {"title"sv, "variables"sv, "zone"sv, "filetype"sv}) {
-      if (!line.starts_with(word)) continue;
-      const size_t next = line.find_first_not_of(" \t", word.size());
-      if (next == std::string::npos || line[next] == '=' || (word == "zone" && next > word.size()))
-        return "a Tecplot text file, which is not read";
-    }
-    return std::nullopt;
-  }
   return std::nullopt;
 }
 

@@ -19,8 +19,10 @@
 #include "preprocess/formats/plot3d/plot3d_meta.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
 #include "preprocess/formats/su2/su2_source.h"
+#include "preprocess/formats/tecplot/tecplot_source.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
+#include "preprocess/formats/xdmf/xdmf_source.h"
 #include "preprocess/grid/scalar_names.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
@@ -67,6 +69,8 @@ constexpr GridFormat kFormats[] = {
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
     {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
+    {isTecplot, openAs<TecplotSource>, MoreFiles::kCombined},
+    {isXdmf, openAs<XdmfSource>, MoreFiles::kCombined},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {

@@ -1,0 +1,103 @@
+#include "preprocess/formats/tecplot/tecplot_data.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/text_reader.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kBufferBytes = size_t{256} << 10;
+
+template <typename Stored, typename Value>
+void convert(std::span<const std::byte> bytes, uint64_t stride, bool swap, std::span<Value> to) {
+  for (size_t n = 0; n < to.size(); ++n)
+    to[n] = static_cast<Value>(loadStored<Stored>(bytes.data() + n * stride, swap));
+}
+
+}  // namespace
+
+size_t bytesOf(TecplotType type) {
+  switch (type) {
+    case TecplotType::kDouble:
+      return 8;
+    case TecplotType::kInt16:
+      return 2;
+    case TecplotType::kByte:
+      return 1;
+    default:
+      return 4;
+  }
+}
+
+template <typename Value>
+void readTecplotValues(const TecplotValues& values, uint64_t first, std::span<Value> to) {
+  thread_local std::vector<std::byte> buffer;
+  const size_t width = bytesOf(values.type);
+  const auto most = static_cast<size_t>(std::max<uint64_t>(1, kBufferBytes / values.stride));
+  for (size_t done = 0; done < to.size(); done += most) {
+    const std::span<Value> part = to.subspan(done, std::min(most, to.size() - done));
+    buffer.resize(std::max(kBufferBytes, width));
+    const auto bytes =
+        std::span(buffer).first(static_cast<size_t>((part.size() - 1) * values.stride + width));
+    values.bytes->readAt(values.begin + (first + done) * values.stride, bytes);
+    switch (values.type) {
+      case TecplotType::kFloat:
+        convert<float>(bytes, values.stride, values.swap, part);
+        break;
+      case TecplotType::kDouble:
+        convert<double>(bytes, values.stride, values.swap, part);
+        break;
+      case TecplotType::kInt32:
+        convert<int32_t>(bytes, values.stride, values.swap, part);
+        break;
+      case TecplotType::kInt16:
+        convert<int16_t>(bytes, values.stride, values.swap, part);
+        break;
+      case TecplotType::kByte:
+        convert<uint8_t>(bytes, values.stride, values.swap, part);
+        break;
+    }
+  }
+}
+
+template void readTecplotValues(const TecplotValues&, uint64_t, std::span<float>);
+template void readTecplotValues(const TecplotValues&, uint64_t, std::span<double>);
+
+std::string TecplotZone::describe(size_t number) const {
+  constexpr size_t kShown = 60;
+  return fmt::format("zone {}{}", number + 1,
+                     name.empty() ? "" : fmt::format(" ({})", printable(name.substr(0, kShown))));
+}
+
+void shareTecplotValues(const std::string& file, TecplotData& data, size_t from, size_t to, size_t variable) {
+  const TecplotZone& zone = data.zones[to];
+  if (from >= to)
+    throw Error("{}: {} shares variable {} with zone {}; expected one of the zones before it", file,
+                zone.describe(to), variable + 1, from + 1);
+  if (data.zones[from].nodes != zone.nodes)
+    throw Error("{}: {} shares variable {} with {}, which has other dimensions", file, zone.describe(to),
+                variable + 1, data.zones[from].describe(from));
+  data.zones[to].values[variable] = data.zones[from].values[variable];
+}
+
+void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most) {
+  const auto [ni, nj, nk] = zone.nodes;
+  if (ni > 0 && nj > 0 && nk > 0 && ni <= most && nj <= most / ni && nk <= most / ni / nj) return;
+  throw Error("{}: {} has {}x{}x{} nodes, which the file has no room for; it is truncated or damaged", file,
+              zone.describe(number), ni, nj, nk);
+}
+
+void refuseTecplotZone(const std::string& file, const TecplotZone& zone, size_t number,
+                       const std::string& type) {
+  throw Error(
+      "{}: is a Tecplot file whose {} is {}, an unstructured zone, which is not read; expected ORDERED zones",
+      file, zone.describe(number), printable(type));
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,403 @@
+#include "preprocess/formats/tecplot/tecplot_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+
+#include "preprocess/formats/common/ascii_spool.h"
+#include "preprocess/formats/common/spool_file.h"
+#include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/tecplot/tecplot_header.h"
+#include "stream/base/error.h"
+#include "stream/base/free_space.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kLooked = 2048;
+constexpr size_t kMaxHeaderTokens = 1 << 20;
+constexpr uint64_t kMaxDimension = uint64_t{1} << 40;
+
+bool beginsNumber(std::string_view word) {
+  if (word.empty()) return false;
+  if (std::strchr("+-.0123456789", word[0])) return true;
+  double value = 0;
+  return parseNumber(word.substr(0, word.find(',')), value);  // nan, inf
+}
+
+/// Numbers that a word stands for: "1.5", "3*1.5", "1,2,3". Calls add(value, times). False if it is none.
+template <typename Add>
+bool forEachNumber(std::string_view word, const Add& add) {
+  while (!word.empty()) {
+    const size_t comma = std::min(word.find(','), word.size());
+    std::string_view number = word.substr(0, comma);
+    word.remove_prefix(std::min(comma + 1, word.size()));
+    if (number.empty()) continue;
+    uint64_t times = 1;
+    if (const size_t star = number.find('*'); star != std::string_view::npos) {
+      const auto [end, error] = std::from_chars(number.data(), number.data() + star, times);
+      if (error != std::errc() || end != number.data() + star) return false;
+      number.remove_prefix(star + 1);
+    }
+    if (!add(number, times)) return false;
+  }
+  return true;
+}
+
+/// Passes over the numbers at the reader's position and returns how many they are.
+uint64_t countNumbers(TextReader& text) {
+  uint64_t count = 0;
+  for (;;) {
+    const std::string_view word = text.peekWord();
+    if (word.starts_with('#')) {
+      text.line();
+      continue;
+    }
+    if (!beginsNumber(word)) return count;
+    const uint64_t before = count;
+    forEachNumber(word, [&](std::string_view, uint64_t times) {
+      count += std::min(times, kMaxDimension);
+      return true;
+    });
+    if (count < before || count > kMaxDimension)
+      throw Error("{}: byte {}: has more numbers than any grid; the file is damaged", text.file().name(),
+                  text.offset());
+    text.word();
+  }
+}
+
+/// Writes `count` doubles, the numbers from byte `begin`, to `sink`.
+void spoolNumbers(const std::shared_ptr<const PooledFile>& file, uint64_t begin, uint64_t count,
+                  const SpoolFile::Sink& sink) {
+  constexpr size_t kPending = 65536;
+  TextReader text(file, begin, file->size());
+  std::vector<double> pending;
+  const auto flush = [&] {
+    sink(std::as_bytes(std::span(pending)));
+    pending.clear();
+  };
+  for (uint64_t left = count; left > 0;) {
+    const std::string_view word = text.peekWord();
+    if (word.starts_with('#')) {
+      text.line();
+      continue;
+    }
+    const bool numbers = !word.empty() && forEachNumber(word, [&](std::string_view number, uint64_t times) {
+      double value = 0;
+      if (!parseNumber(number, value)) return false;
+      for (uint64_t n = 0; n < times && left > 0; ++n, --left) {
+        pending.push_back(value);
+        if (pending.size() == kPending) flush();
+      }
+      return true;
+    });
+    if (!numbers)
+      throw Error("{}: byte {}: found \"{}\"; expected a number", file->name(), text.offset(),
+                  printable(text.peekWord().substr(0, 30)));
+    text.word();
+  }
+  if (!pending.empty()) flush();
+}
+
+struct TextZone {
+  bool point = false, has_packing = false;
+  bool single = false;  // DT: all values have single precision
+  std::optional<double> time;
+  std::optional<int64_t> strand;
+  std::vector<int64_t> shared;  // [variable]: the zone, from 0; -1: none
+};
+
+class Reader {
+ public:
+  Reader(std::shared_ptr<const PooledFile> file, const std::filesystem::path& folder)
+      : file_(std::move(file)),
+        folder_(folder),
+        spool_(std::make_shared<SpoolFile>(folder)),
+        text_(file_, 0, file_->size()) {}
+
+  TecplotData run() {
+    for (;;) {
+      TecplotTokens tokens(takeHeader());
+      if (tokens.done()) break;
+      const bool data_of_zone = readRecords(tokens);
+      const uint64_t begin = text_.offset(), count = countNumbers(text_);
+      if (data_of_zone) placeValues(begin, count);
+    }
+    placeEmpty();
+    data_.encoding = "ASCII";
+    return std::move(data_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error("{}: {}, before byte {}", file_->name(), what, text_.offset());
+  }
+  [[noreturn]] void badValue(const std::string& key, const std::vector<TecplotToken>& value) const {
+    std::string shown;
+    for (const TecplotToken& token : value) shown += token.raw;
+    fail(fmt::format("{} has {} = {}, which is not understood",
+                     data_.zones.back().describe(data_.zones.size() - 1), key,
+                     printable(shown.substr(0, 40))));
+  }
+
+  /// The tokens up to the next numbers.
+  std::vector<TecplotToken> takeHeader() {
+    std::vector<TecplotToken> tokens;
+    int depth = 0;
+    for (;;) {
+      const std::string_view word = text_.peekWord();
+      if (word.empty() || (depth <= 0 && beginsNumber(word))) return tokens;
+      const auto line = text_.line();
+      const size_t before = tokens.size();
+      if (line) tokenizeTecplot(*line, tokens);
+      for (size_t n = before; n < tokens.size(); ++n) {
+        if (tokens[n].kind != TecplotToken::Kind::kSign) continue;
+        if (tokens[n].text == "(" || tokens[n].text == "[") ++depth;
+        if (tokens[n].text == ")" || tokens[n].text == "]") --depth;
+      }
+      if (tokens.size() > kMaxHeaderTokens) fail("has a header of more than a million words; it is damaged");
+    }
+  }
+
+  /// Whether the numbers that follow belong to a zone.
+  bool readRecords(TecplotTokens& tokens) {
+    bool zone = false;
+    while (!tokens.done()) {
+      const TecplotToken record = tokens.take();
+      zone = record.text == "ZONE";
+      if (zone) {
+        placeEmpty();
+        readZone(tokens);
+      } else if (record.text == "VARIABLES") {
+        readVariables(tokens);
+      } else if (record.text == "FILETYPE") {
+        tokens.takeSign('=');
+        if (tokens.peek().text == "SOLUTION")
+          throw Error(
+              "{}: is a Tecplot file of solutions alone, which is not read; write the grid into the same "
+              "file",
+              file_->name());
+      }
+      while (!tokens.done() && !tokens.atRecord()) tokens.take();
+    }
+    return zone;
+  }
+
+  void readVariables(TecplotTokens& tokens) {
+    if (!data_.zones.empty()) fail("has a second list of variables after its first zone, which is not read");
+    data_.variables.clear();
+    tokens.takeSign('=');
+    while (!tokens.done() && !tokens.atRecord()) {
+      if (tokens.takeSign(',')) continue;
+      data_.variables.push_back(tokens.take().raw);
+    }
+  }
+
+  void readZone(TecplotTokens& tokens) {
+    if (data_.variables.empty()) fail("has no VARIABLES before its first zone");
+    // Each variable of each zone needs memory; a zone has one number or more of each that it does not share.
+    if ((data_.zones.size() + 1) * data_.variables.size() > std::max<uint64_t>(file_->size(), 1024))
+      fail("has more zones and variables than a file of its size can hold");
+    TextZone& text = zones_.emplace_back();
+    TecplotZone& zone = data_.zones.emplace_back();
+    zone.values.resize(data_.variables.size());
+    text.shared.assign(data_.variables.size(), -1);
+    while (!tokens.done() && !tokens.atRecord()) {
+      if (tokens.takeSign(',')) continue;
+      const std::string key = tokens.take().text;
+      if (key == "AUXDATA") {
+        tokens.take();
+        if (tokens.takeSign('=')) tokens.take();
+      } else if (tokens.takeSign('=')) {
+        setKey(key, tokens.takeValue(), zone, text);
+      }
+    }
+    if (text.time && text.strand.value_or(1) != 0) zone.time = text.time;
+    checkTecplotZone(file_->name(), zone, data_.zones.size() - 1, kMaxDimension);
+  }
+
+  void setKey(const std::string& key, const std::vector<TecplotToken>& value, TecplotZone& zone,
+              TextZone& text) {
+    const std::string word = value.empty() ? "" : value.front().text;
+    const auto number = [&] {
+      double parsed = 0;
+      if (value.size() != 1 || !parseNumber(word, parsed)) badValue(key, value);
+      return parsed;
+    };
+    const auto count = [&] {
+      const double parsed = number();
+      if (!(parsed >= 1 && parsed <= static_cast<double>(kMaxDimension))) badValue(key, value);
+      return static_cast<uint64_t>(parsed);
+    };
+    const size_t index = data_.zones.size() - 1;
+    if (key == "T") {
+      zone.name = value.empty() ? "" : value.front().raw;
+    } else if (key == "I" || key == "J" || key == "K") {
+      zone.nodes[static_cast<size_t>(key[0] - 'I')] = count();
+    } else if (key == "IMAX" || key == "JMAX" || key == "KMAX") {
+      zone.nodes[static_cast<size_t>(key[0] - 'I')] = count();
+    } else if (key == "F" || key == "DATAPACKING") {
+      if (word.starts_with("FE")) refuseTecplotZone(file_->name(), zone, index, word);
+      if (word != "POINT" && word != "BLOCK") badValue(key, value);
+      text.point = word == "POINT";
+      text.has_packing = true;
+    } else if (key == "ZONETYPE") {
+      if (word != "ORDERED") refuseTecplotZone(file_->name(), zone, index, word);
+    } else if (key == "ET" || key == "ELEMENTS" || key == "NODES" || key == "E" || key == "N") {
+      refuseTecplotZone(file_->name(), zone, index, "of finite elements");
+    } else if (key == "SOLUTIONTIME") {
+      text.time = number();
+    } else if (key == "STRANDID") {
+      text.strand = static_cast<int64_t>(std::clamp(number(), -2.0, 1e9));
+    } else if (key == "DT") {
+      text.single = std::all_of(value.begin(), value.end(),
+                                [](const TecplotToken& token) { return token.text != "DOUBLE"; });
+    } else if (key == "VARLOCATION") {
+      setCentrings(key, value, zone);
+    } else if (key == "PASSIVEVARLIST") {
+      for (const auto& [numbers, unused] : sets(key, value))
+        for (const size_t n : numbers) zone.values[n].passive = true;
+    } else if (key == "VARSHARELIST" || key == "D") {
+      setShared(key, value, text);
+    }
+  }
+
+  TecplotSets sets(const std::string& key, const std::vector<TecplotToken>& value) const {
+    auto found = tecplotSets(value, data_.variables.size());
+    if (!found) badValue(key, value);
+    return std::move(*found);
+  }
+
+  void setCentrings(const std::string& key, const std::vector<TecplotToken>& value, TecplotZone& zone) {
+    const auto centring = [&](const std::string& word) {
+      if (word != "CELLCENTERED" && word != "NODAL") badValue(key, value);
+      return word == "CELLCENTERED" ? Centring::kCell : Centring::kNode;
+    };
+    if (!value.empty() && value.front().kind == TecplotToken::Kind::kWord &&
+        !beginsNumber(value.front().text)) {
+      size_t n = 0;  // (NODAL, NODAL, CELLCENTERED)
+      for (const TecplotToken& token : value) {
+        if (token.kind == TecplotToken::Kind::kSign) continue;
+        if (n == zone.values.size()) badValue(key, value);
+        zone.values[n++].centring = centring(token.text);
+      }
+      return;
+    }
+    for (const auto& [numbers, word] : sets(key, value))
+      for (const size_t n : numbers) zone.values[n].centring = centring(word);
+  }
+
+  void setShared(const std::string& key, std::vector<TecplotToken> value, TextZone& text) {
+    std::erase_if(value, [](const TecplotToken& token) { return token.text == "FECONNECT"; });
+    const size_t index = data_.zones.size() - 1;
+    for (const auto& [numbers, word] : sets(key, value)) {
+      size_t from = index;  // from 1: without a number the previous zone
+      if (!word.empty()) {
+        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), from);
+        if (error != std::errc() || end != word.data() + word.size()) badValue(key, value);
+      }
+      if (from < 1 || from > index) badValue(key, value);
+      for (const size_t n : numbers) text.shared[n] = static_cast<int64_t>(from) - 1;
+    }
+  }
+
+  /// The last zone, if no numbers followed it: it shares all that it has.
+  void placeEmpty() {
+    if (placed_ < data_.zones.size()) placeValues(text_.offset(), 0);
+  }
+
+  /// The positions of the last zone's values in the spool file, which is filled when it is first read.
+  void placeValues(uint64_t begin, uint64_t count) {
+    const size_t index = data_.zones.size() - 1;
+    TecplotZone& zone = data_.zones[index];
+    const TextZone& text = zones_[index];
+    placed_ = data_.zones.size();
+    std::vector<TecplotValues*> stored;
+    bool cells = false;
+    for (size_t n = 0; n < zone.values.size(); ++n) {
+      if (text.shared[n] >= 0) {
+        shareTecplotValues(file_->name(), data_, static_cast<size_t>(text.shared[n]), index, n);
+      } else if (!zone.values[n].passive) {
+        stored.push_back(&zone.values[n]);
+        cells = cells || zone.values[n].centring == Centring::kCell;
+      }
+    }
+    const bool point = text.has_packing ? text.point : !cells;
+    if (point && cells)
+      fail(fmt::format("{} has values of cells by points; expected DATAPACKING=BLOCK", zone.describe(index)));
+    const uint64_t nodes = zone.nodeCount();
+    uint64_t expected = 0;
+    for (TecplotValues* const values : stored) {
+      values->type = TecplotType::kDouble;
+      values->begin = 8 * expected;
+      values->stride = point ? 8 * stored.size() : 8;
+      const uint64_t less = values->centring == Centring::kCell ? 1 : 0;
+      std::array<uint64_t, 3> along = zone.nodes;
+      for (uint64_t& n : along) n = std::max<uint64_t>(1, n - less);
+      values->row_pitch = along[0];
+      values->columns = along[1];
+      expected += point ? 1 : along[0] * along[1] * along[2];
+    }
+    if (point) expected = stored.size() * nodes;
+    if (count != expected)
+      throw Error(
+          "{}: {} has {} numbers; expected {}, for {} variables of {}x{}x{} nodes; the file is truncated, or "
+          "its "
+          "packing another",
+          file_->name(), zone.describe(index), count, expected, stored.size(), zone.nodes[0], zone.nodes[1],
+          zone.nodes[2]);
+    checkSpace(zone, index, count);
+    const auto bytes = std::make_shared<SpooledBytes>(
+        spool_, 8 * count, [file = file_, begin, count](const SpoolFile::Sink& sink) {
+          spoolNumbers(file, begin, count, sink);
+        });
+    for (TecplotValues* const values : stored) values->bytes = bytes;
+  }
+
+  /// Repeated numbers (1000000*0) may be more than the file.
+  void checkSpace(const TecplotZone& zone, size_t index, uint64_t count) const {
+    const std::optional<uint64_t> available = freeBytes(folder_);
+    if (count > file_->size() && available && count > *available / 8)
+      throw Error("{}: {} has {} numbers, too many for the {} bytes free in {}", file_->name(),
+                  zone.describe(index), count, *available, folder_.string());
+  }
+
+  std::shared_ptr<const PooledFile> file_;
+  std::filesystem::path folder_;
+  std::shared_ptr<SpoolFile> spool_;
+  TextReader text_;
+  TecplotData data_;
+  std::vector<TextZone> zones_;
+  size_t placed_ = 0;  // zones
+};
+
+}  // namespace
+
+bool isTecplotText(const InputFile& file) {
+  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
+  file.readAt(0, std::span(begin.data(), begin.size()));
+  if (begin.find('\0') != std::string::npos) return false;
+  for (size_t at = 0; at < begin.size();) {
+    const size_t end = std::min(begin.find('\n', at), begin.size());
+    std::vector<TecplotToken> tokens;
+    tokenizeTecplot(std::string_view(begin).substr(at, end - at), tokens);
+    at = end + 1;
+    if (tokens.empty()) continue;
+    TecplotTokens record(tokens);
+    if (!record.atRecord()) return false;
+    const std::string word = record.take().text;
+    if (word == "TITLE" || word == "VARIABLES" || word == "FILETYPE")
+      return record.done() || record.takeSign('=');
+    return word == "ZONE" && !record.done() && record.peek().kind == TecplotToken::Kind::kWord;
+  }
+  return false;
+}
+
+TecplotData readTecplotText(const std::shared_ptr<const PooledFile>& file,
+                            const std::filesystem::path& folder) {
+  return Reader(file, folder).run();
+}
+
+}  // namespace curvisplat

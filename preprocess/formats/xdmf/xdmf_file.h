@@ -1,0 +1,56 @@
+// An XDMF file: grids in XML, whose arrays are in other files. The result of reading it, and the input of XdmfSource.
+//
+//   <Xdmf><Domain><Grid GridType="Collection" CollectionType="Temporal">
+//     <Grid> <Time Value="0.5"/>
+//       <Topology TopologyType="3DSMesh" Dimensions="NK NJ NI"/>
+//       <Geometry GeometryType="XYZ"> <DataItem Dimensions="NK NJ NI 3" Format="HDF">grid.h5:/xyz</DataItem> </Geometry>
+//       <Attribute Name="p" Center="Node"> <DataItem ...>grid.h5:/p</DataItem> </Attribute>
+//
+// Parsed as a whole: at most 16 MiB. Elements may refer to others by a simple path (Reference="/Xdmf/Domain/..."). XInclude
+// and computed items (Function, Coordinates) are refused.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/formats/xdmf/xdmf_values.h"
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+struct XdmfAttribute {
+  std::string name;
+  Centring centring = Centring::kNode;
+  uint64_t components = 1;
+  std::shared_ptr<const XdmfValues> values;  // null: not in this grid
+};
+
+struct XdmfGrid {
+  enum class Kind { kPoints, kSeparate, kAxes, kUniform };
+  std::string name;
+  std::array<uint64_t, 3> nodes{};  // i, j, k
+  Kind kind = Kind::kPoints;
+  /// kPoints: one array of x, y, z; kSeparate: x, y and z of the nodes; kAxes: along i, j and k.
+  std::array<std::shared_ptr<const XdmfValues>, 3> places;
+  std::array<double, 3> origin{}, spacing{};  // kUniform: x, y, z
+  std::vector<XdmfAttribute> attributes;
+};
+
+struct XdmfFile {
+  std::vector<XdmfGrid> grids;  // of the chosen time step, with volume
+  std::vector<double> times;
+  uint32_t time_step = 0;
+  std::vector<std::string> files, warnings;
+};
+
+/// Whether the file is XML with the element Xdmf.
+bool isXdmf(const InputFile& file);
+
+/// Throws Error.
+XdmfFile readXdmf(const OpenGridOptions& options);
+
+}  // namespace curvisplat

@@ -1,0 +1,61 @@
+// The numbers of an XDMF DataItem, wherever they are: in an HDF5 file, in a binary file, in the XML itself, or as a part of
+// another item (HyperSlab).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/open_files.h"
+
+namespace curvisplat {
+
+/// Any number of threads may read.
+class XdmfValues {
+ public:
+  virtual ~XdmfValues() = default;
+  /// Of all dimensions: the slowest comes first.
+  const std::vector<uint64_t>& dims() const { return dims_; }
+  uint64_t size() const { return size_; }
+  /// As stored: 4 or 8 for single and double precision.
+  virtual int valueBytes() const = 0;
+  /// The numbers [first, first + to.size()), in the order of the file. Throws Error with the file.
+  virtual void read(uint64_t first, std::span<double> to) const = 0;
+
+ protected:
+  /// Throws Error if the product is no number of values that a file can hold. `where`: for messages.
+  XdmfValues(std::vector<uint64_t> dims, const std::string& where);
+
+ private:
+  std::vector<uint64_t> dims_;
+  uint64_t size_ = 1;
+};
+
+/// A data set of an HDF5 file. Reads of one thread wait for those of another: every call holds dataLibraryMutex().
+std::shared_ptr<const XdmfValues> openXdmfHdf5(const std::filesystem::path& file, const std::string& name,
+                                               std::vector<uint64_t> dims);
+
+struct XdmfBinary {
+  std::shared_ptr<const PooledFile> file;
+  uint64_t seek = 0;
+  char kind = 'f';  // f: floating point, i: integers, u: without sign
+  int bytes = 4;
+  bool swap = false;
+};
+std::shared_ptr<const XdmfValues> openXdmfBinary(const XdmfBinary& binary, std::vector<uint64_t> dims);
+
+/// Numbers in memory.
+std::shared_ptr<const XdmfValues> xdmfInline(std::vector<double> numbers, std::vector<uint64_t> dims,
+                                             const std::string& where);
+
+/// Where a part of another item begins, its step and its count along each dimension.
+struct XdmfSlab {
+  std::vector<uint64_t> start, stride, count;
+};
+std::shared_ptr<const XdmfValues> xdmfHyperslab(std::shared_ptr<const XdmfValues> all, XdmfSlab slab,
+                                                const std::string& where);
+
+}  // namespace curvisplat

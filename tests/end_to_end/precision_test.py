@@ -1,0 +1,107 @@
+#!/usr/bin/python3
+"""precision_test.py CURVISPLAT
+
+How finely values are stored, as the reader that was written from stream/FORMAT.md decodes them: within the bound that `info` of the
+cache prints, at both precisions, in a series too. Exit status 77 (skipped) without python3-zstandard and python3-xxhash.
+"""
+import json
+import pathlib
+import sys
+import unittest
+
+from structured_formats import Block, RANDOM, StructuredFormats, np
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "stream"))
+try:
+    import read_cache
+except ModuleNotFoundError as error:
+    print(f"skipped: {error}; install python3-zstandard and python3-xxhash")
+    sys.exit(77)
+
+
+class Precision(StructuredFormats):
+    def block(self):
+        """A field with an outlier: 16 bits of its range are coarse for the others."""
+        block = Block((7, 8, 9), kind="f4")
+        block.p[3, 4, 5] = 1e5
+        return block
+
+    def means(self, cache, block, step=0):
+        """Of the leaves' splats, by node. A mean is over the node's cell: the node's value where the field is linear."""
+        reader = read_cache.Cache(cache, step)
+        found = np.full(block.shape, np.nan)
+        number = next(iter(reader.tables))
+        for n, brick in enumerate(reader.bricks):
+            if brick["children"][1]:
+                continue
+            means = iter(reader.values(number, n)["mean"].astype(np.float32))
+            for _, k, j, i, count in reader.geometry(n)["runs"]:
+                for m in range(count):
+                    found[k, j, i + m] = next(means)
+        self.assertFalse(np.isnan(found).any())
+        return found
+
+    def convert(self, *words):
+        cache = self.folder / "a.splats"
+        result = self.run_program("convert", *words, "-o", cache, "--scalar", "p", "--overwrite")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return cache
+
+    def test_a_linear_field(self):
+        """Its means are the nodes' values, but for the ends of the grid, where they are means over half a cell."""
+        block = self.block()
+        k, j, i = np.meshgrid(*map(np.arange, block.shape), indexing="ij")
+        block.places = np.stack([i, j, k]).astype("f4")
+        block.p = (1e5 * (i + 0.1 * j + 0.01 * k) + 0.3).astype("f4")
+        inside = (slice(1, -1),) * 3
+        bounds = []
+        for precision in ("normal", "fine"):
+            cache = self.convert(self.vtk_file([block]), "--value-precision", precision)
+            info = self.info(cache)
+            bounds.append(info["stored_within"][0])
+            errors = np.abs(self.means(cache, block) - block.p)
+            self.assertTrue((errors <= bounds[-1] + 2 * np.spacing(np.abs(block.p)))[inside].all(), (errors[inside].max(), bounds))
+            self.assertEqual("fine-values" in info["requires"], precision == "fine")
+            self.assertIn("rounded within", self.run_program("info", cache).stdout)
+            verified = self.run_program("info", cache, "--verify")
+            self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
+        self.assertAlmostEqual(bounds[0] / bounds[1], 16777215 / 65535, places=3)
+
+    def test_an_outlier(self):
+        """Both precisions store the same within their bounds; at the normal one the small values have lost a hundredth."""
+        block, means, bounds = self.block(), [], []
+        for precision in ("normal", "fine"):
+            cache = self.convert(self.vtk_file([block]), "--value-precision", precision)
+            means.append(self.means(cache, block))
+            bounds.append(self.info(cache)["stored_within"][0])
+        apart = np.abs(means[0] - means[1])
+        self.assertTrue((apart <= sum(bounds) + 2 * np.spacing(np.abs(means[1]).astype("f4"))).all(), (apart.max(), bounds))
+        self.assertGreater(apart.max(), 0.3 * bounds[0])
+        self.assertGreater(bounds[0], 0.1)
+        self.assertLess(bounds[1], 0.01)
+
+    def test_series(self):
+        """Steps that are predicted from earlier ones."""
+        blocks, alone = [self.block() for _ in range(4)], []
+        for n, block in enumerate(blocks):
+            block.places = blocks[0].places
+            block.p = (blocks[0].p * (1 + 0.01 * n)).astype("f4")
+            path = self.vtk_file([block]).rename(self.folder / f"t{n}.vtm")
+            (self.folder / "expected").rename(self.folder / f"t{n}")
+            path.write_text(path.read_text().replace("expected/", f"t{n}/"))
+            alone.append(self.means(self.convert(path, "--value-precision", "fine"), block))
+        cache = self.convert(*(self.folder / f"t{n}.vtm" for n in range(4)), "--value-precision", "fine")
+        bound = self.info(cache)["stored_within"][0] * 1.1
+        for n, block in enumerate(blocks):
+            apart = np.abs(self.means(cache, block, n) - alone[n])
+            self.assertTrue((apart <= 2 * bound + 2 * np.spacing(np.abs(alone[n]).astype("f4"))).all(), (n, apart.max(), bound))
+
+    def test_a_wrong_word(self):
+        result = self.run_program("convert", self.vtk_file([self.block()]), "-o", self.folder / "a.splats", "--value-precision", "finer")
+        self.assertEqual(result.returncode, 2)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        self.assertIn("fine", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,182 @@
+#!/usr/bin/python3
+"""round_trips_test.py CURVISPLAT
+
+One grid through the libraries that people write with: h5py in the layout of CGNS (pyCGNS is not packaged by Debian), netCDF4,
+xarray, VTK, meshio, and column-major writers as MATLAB and Fortran have them. The caches of structured files are byte for byte
+that of VTK's file. Exit status 77 (skipped) without python3-vtk9 or python3-h5py; a library that is missing skips its test.
+"""
+import importlib
+import json
+import unittest
+
+from structured_formats import RANDOM, Block, StructuredFormats, np, vtk
+
+
+def library(name):
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError:
+        raise unittest.SkipTest(f"{name} is not installed") from None
+
+
+class CgnsLayout:
+    """CGNS by h5py alone: groups with a name, a label and a type, and data sets named " data" in the order of C."""
+
+    def __init__(self, path):
+        self.file = library("h5py").File(path, "w")
+        self.label(self.file, "HDF5 MotherNode", "Root Node of HDF5 File", "MT")
+        self.node(self.file, "CGNSLibraryVersion", "CGNSLibraryVersion_t", np.array([4.2], "f4"))
+
+    @staticmethod
+    def label(group, name, label, kind):
+        for key, text, size in (("name", name, 33), ("label", label, 33), ("type", kind, 3)):
+            group.attrs.create(key, np.array(text.encode(), f"S{size}"))
+
+    def node(self, parent, name, label, data=None):
+        group = parent.create_group(name)
+        kinds = {"f4": "R4", "f8": "R8", "i4": "I4", "i8": "I8", "i1": "C1"}
+        if isinstance(data, str):
+            data = np.frombuffer(data.encode(), "i1")
+        self.label(group, name, label, "MT" if data is None else kinds[data.dtype.str[1:]])
+        if data is not None:
+            group.create_dataset(" data", data=data)
+        return group
+
+    def zone(self, base, name, block):
+        shape = np.array(block.shape[::-1])
+        zone = self.node(base, name, "Zone_t", np.array([shape, shape - 1, 0 * shape], "i4"))
+        self.node(zone, "ZoneType", "ZoneType_t", "Structured")
+        coordinates = self.node(zone, "GridCoordinates", "GridCoordinates_t")
+        for axis, values in zip("XYZ", block.places):
+            self.node(coordinates, f"Coordinate{axis}", "DataArray_t", values)
+        for name, location, values in (("nodes", "Vertex", block.p), ("cells", "CellCenter", block.c)):
+            solution = self.node(zone, name, "FlowSolution_t")
+            self.node(solution, "GridLocation", "GridLocation_t", location)
+            self.node(solution, "p" if location == "Vertex" else "c", "DataArray_t", values)
+
+
+class RoundTrips(StructuredFormats):
+    def test_h5py_in_the_layout_of_cgns(self):
+        for kind in ("f4", "f8"):
+            blocks = [Block(kind=kind), Block((4, 3, 5), 9, kind)]
+            path = self.folder / "grid.cgns"
+            file = CgnsLayout(path)
+            base = file.node(file.file, "Base", "CGNSBase_t", np.array([3, 3], "i4"))
+            for n, block in enumerate(blocks):
+                file.zone(base, f"zone {n}", block)
+            file.file.close()
+            self.expect_same([path], blocks)
+
+    def test_vtk(self):
+        """Files of other encodings than the one that is compared with."""
+        block = Block()
+        writer = vtk.vtkXMLStructuredGridWriter()
+        for mode in ("Ascii", "Binary", "Appended"):
+            path = self.folder / "grid.vts"
+            writer.SetFileName(str(path))
+            getattr(writer, f"SetDataModeTo{mode}")()
+            writer.SetInputData(block.vtk())
+            writer.Write()
+            self.expect_same([path], [block])
+        legacy = vtk.vtkStructuredGridWriter()
+        legacy.SetFileName(str(self.folder / "grid.vtk"))
+        legacy.SetFileTypeToBinary()
+        legacy.SetInputData(block.vtk())
+        legacy.Write()
+        self.expect_same([self.folder / "grid.vtk"], [block])
+
+    def ocean(self):
+        lon, lat, depth = np.linspace(0, 9, 7), np.linspace(30, 36, 5), np.linspace(5, 500, 6)
+        return lon, lat, depth, RANDOM.random((2, 6, 5, 7)).astype("f4")
+
+    def expect_ocean(self, path, values):
+        """Dimensions, times, and the range of each step."""
+        info = self.info(path)
+        block = info["blocks"][0]
+        self.assertEqual((block["nk"], block["nj"], block["ni"]), values.shape[1:])
+        self.assertEqual(len(info["times"]), len(values))
+        for step, of_step in enumerate(values):
+            result = self.run_program("info", path, "--json", "--time-step", step)
+            scalar = json.loads(result.stdout)["scalars"][0]
+            self.assertEqual([np.float32(scalar["min"]), np.float32(scalar["max"])], [of_step.min(), of_step.max()])
+
+    def test_xarray_and_netcdf4(self):
+        xarray, netcdf = library("xarray"), library("netCDF4")
+        lon, lat, depth, t = self.ocean()
+        data = xarray.Dataset({"t": (("time", "depth", "lat", "lon"), t)}, {
+            "time": ("time", np.array(["2001-01-01", "2001-01-02"], "M8[ns]")),
+            "depth": ("depth", depth, {"units": "m", "positive": "down"}),
+            "lat": ("lat", lat, {"units": "degrees_north"}), "lon": ("lon", lon, {"units": "degrees_east"})})
+        for form, engine in (("NETCDF4", "netcdf4"), ("NETCDF3_64BIT", "netcdf4"), ("NETCDF3_CLASSIC", "scipy")):
+            with self.subTest(form):
+                path = self.folder / f"{form}.nc"
+                data.to_netcdf(path, format=form, engine=engine)
+                self.expect_ocean(path, t)
+        packed = self.folder / "packed.nc"
+        data.to_netcdf(packed, encoding={"t": {"dtype": "i2", "scale_factor": 1e-4, "add_offset": 0.5, "_FillValue": -32768}})
+        self.expect_ocean(packed, (np.rint((t.astype("f8") - 0.5) / 1e-4) * 1e-4 + 0.5).astype("f4"))
+        caches = []
+        for name, form in (("a.nc", "NETCDF4"), ("b.nc", "NETCDF3_CLASSIC")):
+            with netcdf.Dataset(self.folder / name, "w", format=form) as f:
+                for key, values, units in (("depth", depth, "m"), ("lat", lat, "degrees_north"), ("lon", lon, "degrees_east")):
+                    f.createDimension(key, len(values))
+                    f.createVariable(key, "f8", (key,))[:] = values
+                    f[key].units = units
+                f["depth"].positive = "down"
+                f.createVariable("t", "f4", ("depth", "lat", "lon"))[:] = t[0]
+            caches.append(self.cache([self.folder / name], "t"))
+        caches.append(self.cache([self.folder / "NETCDF4.nc"], "t"))
+        self.assertEqual(caches[0], caches[1])
+        self.assertEqual(caches[0], caches[2])
+
+    def test_column_major_writers(self):
+        """MATLAB and Fortran store (i, j, k) with i the fastest. h5py and nccreate turn the dimensions round; fwrite does not."""
+        block = Block()
+        ijk = [np.asfortranarray(np.transpose(a)) for a in (*block.places, block.p)]  # as MATLAB has them in memory
+        self.assertEqual(ijk[0].shape, block.shape[::-1])
+        # fwrite(file, x, 'double'): the memory as it is. PLOT3D, without records.
+        ni, nj, nk = ijk[0].shape
+        head = np.array([ni, nj, nk], "i4").tobytes()
+        grid, function, xmf = self.folder / "grid.xyz", self.folder / "grid.f", self.folder / "grid.xmf"
+        grid.write_bytes(head + b"".join(a.tobytes(order="F") for a in ijk[:3]))
+        function.write_bytes(np.array([ni, nj, nk, 1], "i4").tobytes() + ijk[3].tobytes(order="F"))
+        (self.folder / "grid.nam").write_text("p\n")
+        self.expect_same([grid, function], [block], {"c": None})
+        # h5write: MATLAB's HDF5 files have the dimensions in the opposite order.
+        with library("h5py").File(self.folder / "grid.mat", "w", userblock_size=512) as file:
+            for name, values in zip("xyzp", ijk):
+                file.create_dataset(name, data=values.transpose(), chunks=True)
+        item = '<DataItem Dimensions="{} {} {}" Precision="8" Format="HDF">grid.mat:/{}</DataItem>'
+        places = "".join(item.format(nk, nj, ni, name) for name in "xyz")
+        xmf.write_text(f'<Xdmf Version="3.0"><Domain><Grid><Topology TopologyType="3DSMesh" Dimensions="{nk} {nj} {ni}"/>'
+                       f'<Geometry GeometryType="X_Y_Z">{places}</Geometry><Attribute Name="p">{item.format(nk, nj, ni, "p")}'
+                       "</Attribute></Grid></Domain></Xdmf>")
+        self.expect_same([xmf], [block], {"c": None})
+
+    def test_meshio(self):
+        meshio = library("meshio")
+        shape = (4, 3, 5)
+        block = Block(shape)
+        n = np.arange(np.prod(shape)).reshape(shape)
+        low = n[:-1, :-1, :-1].ravel()
+        si, sj, sk = 1, shape[2], shape[1] * shape[2]
+        cells = np.stack([low + o for o in (0, si, si + sj, sj, sk, sk + si, sk + si + sj, sk + sj)], -1)
+        mesh = meshio.Mesh(np.moveaxis(block.places, 0, -1).reshape(-1, 3), [("hexahedron", cells)],
+                           point_data={"p": block.p.ravel()}, cell_data={"c": [block.c.ravel()]})
+        caches = {}
+        for name, options in (("a.vtu", {"binary": False}), ("b.vtu", {"binary": True}), ("c.vtk", {"binary": True})):
+            path = self.folder / name
+            mesh.write(path, **options)
+            info = self.info(path)
+            self.assertEqual((info["nodes"], info["cells"]["count"]), (n.size, low.size))
+            caches[name] = [self.cache([path], scalar) for scalar in "pc"]
+            ranges = [[s["min"], s["max"]] for s in info["scalars"]]
+            np.testing.assert_allclose(ranges, [[a.min(), a.max()] for a in (block.p, block.c)], rtol=1e-6)
+        self.assertEqual(caches["b.vtu"], caches["c.vtk"])  # meshio writes eleven digits of text
+        path = self.folder / "d.xdmf"
+        mesh.write(path)
+        self.expect_line(path, words="unstructured grid")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

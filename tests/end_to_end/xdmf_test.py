@@ -1,0 +1,232 @@
+#!/usr/bin/python3
+"""xdmf_test.py CURVISPLAT
+
+XDMF files of structured grids, with arrays in HDF5 (h5py), in binary files (numpy) and in the XML itself, against VTK's files of
+the same grids. Exit status 77 (skipped) without python3-vtk9 or python3-h5py.
+"""
+import sys
+import unittest
+
+from structured_formats import RANDOM, Block, StructuredFormats, np
+
+try:
+    import h5py
+except ModuleNotFoundError as error:
+    print(f"skipped: {error}; install python3-h5py")
+    sys.exit(77)
+
+
+def dims(shape):
+    return " ".join(map(str, shape))
+
+
+class Writer:
+    """Puts arrays into a file beside the XML, and describes them as data items."""
+
+    def __init__(self, folder, kind="HDF", order="<", **options):
+        self.folder, self.kind, self.order, self.options, self.count = folder, kind, order, options, 0
+        self.binary = b""
+
+    def item(self, values, stored_shape=None):
+        self.count += 1
+        number = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind]
+        head = f'<DataItem Dimensions="{dims(values.shape)}" NumberType="{number}" Precision="{values.dtype.itemsize}" Format="{self.kind}"'
+        if self.kind == "XML":
+            return head + ">" + " ".join(repr(float(v)) for v in values.ravel()) + "</DataItem>"
+        stored = values.astype(values.dtype.newbyteorder(self.order)).reshape(stored_shape or values.shape)
+        if self.kind == "Binary":
+            endian = {"<": "Little", ">": "Big"}[self.order]
+            seek = len(self.binary)
+            self.binary += stored.tobytes()
+            (self.folder / "a.bin").write_bytes(self.binary)
+            return head + f' Endian="{endian}" Seek="{seek}">a.bin</DataItem>'
+        with h5py.File(self.folder / "a.h5", "a") as file:
+            file.create_dataset(f"group/{self.count}", data=stored, **self.options)
+        return head + f">\n a.h5:/group/{self.count}\n</DataItem>"
+
+
+def geometry(writer, block, kind="XYZ", **options):
+    if kind == "XYZ":
+        items = writer.item(np.moveaxis(block.places, 0, -1).copy(), **options)
+    else:
+        items = "".join(writer.item(axis) for axis in block.places)
+    return f'<Topology TopologyType="3DSMesh" Dimensions="{dims(block.shape)}"/><Geometry GeometryType="{kind}">{items}</Geometry>'
+
+
+def attribute(writer, name, values, centre="Node", kind="Scalar"):
+    return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{writer.item(values)}</Attribute>'
+
+
+def grid(writer, block, name="a", time=None, **options):
+    of_time = "" if time is None else f'<Time Value="{time}"/>'
+    fields = attribute(writer, "p", block.p) + attribute(writer, "c", block.c, "Cell")
+    return f'<Grid Name="{name}">{of_time}{geometry(writer, block, **options)}{fields}</Grid>'
+
+
+class Xdmf(StructuredFormats):
+    def write(self, grids, version="3.0"):
+        path = self.folder / "a.xmf"
+        path.write_text(f'<?xml version="1.0"?>\n<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>\n<Xdmf Version="{version}"><Domain>\n'
+                        f"{grids}\n</Domain></Xdmf>\n")
+        return path
+
+    def new(self, *words, **options):
+        for name in ("a.h5", "a.bin"):
+            (self.folder / name).unlink(missing_ok=True)
+        return Writer(self.folder, *words, **options)
+
+    def test_storages(self):
+        for kind in ("f4", "f8"):
+            blocks = [Block(kind=kind), Block((4, 3, 5), 9, kind)]
+            for words, options in ((("HDF",), {}), (("HDF", ">"), {}), (("HDF",), {"chunks": True, "compression": "gzip"}),
+                                   (("Binary", "<"), {}), (("Binary", ">"), {}), (("XML",), {})):
+                for of in ("XYZ", "X_Y_Z"):
+                    writer = self.new(*words, **options)
+                    self.expect_same([self.write("".join(grid(writer, b, f"g{n}", kind=of) for n, b in enumerate(blocks)))], blocks)
+        self.assertEqual([b["name"] for b in self.info(self.folder / "a.xmf")["blocks"]], ["g0", "g1"])
+
+    def test_arrays_of_other_shapes(self):
+        """An HDF5 data set that is flat, or whose dimensions are cut elsewhere than the item's."""
+        block = Block()
+        nk, nj, ni = block.shape
+        for shape in ((-1,), (-1, 3), (nk * nj, ni, 3), (nk, nj * ni * 3), (1, nk, nj, ni, 3)):
+            writer = self.new()
+            self.expect_same([self.write(grid(writer, block, stored_shape=shape))], [block])
+
+    def test_types(self):
+        block = Block()
+        for kind, values in (("i1", (-128, 128)), ("u1", (0, 256)), ("i2", (-(2**15), 2**15)), ("u4", (0, 2**32)), ("i8", (-(2**52), 2**52))):
+            block.p = RANDOM.integers(*values, block.shape).astype(kind)
+            for storage in ("HDF", "Binary"):
+                writer = self.new(storage)
+                path = self.write(f'<Grid>{geometry(writer, block)}{attribute(writer, "p", block.p)}</Grid>')
+                info = self.info(path)
+                scalar = info["scalars"][0]
+                self.assertEqual([scalar["min"], scalar["max"]], [np.float32(block.p.min()), np.float32(block.p.max())])
+
+    def test_vectors(self):
+        block = Block()
+        v = RANDOM.random((*block.shape, 3))
+        writer = self.new()
+        path = self.write(f'<Grid>{geometry(writer, block)}{attribute(writer, "v", v, kind="Vector")}</Grid>')
+        scalars = {s["name"]: [s["min"], s["max"]] for s in self.info(path)["scalars"]}
+        expected = {"v:mag": np.linalg.norm(v, axis=-1), "v:x": v[..., 0], "v:y": v[..., 1], "v:z": v[..., 2]}
+        self.assertEqual(list(scalars), list(expected))
+        for name, values in expected.items():
+            np.testing.assert_allclose(scalars[name], [values.min(), values.max()], rtol=1e-6)
+        block.p = v[..., 1].copy()
+        self.expect_same([path], [block], {"p": "v:y", "c": None})
+
+    def test_rectilinear_and_uniform(self):
+        block = Block()
+        shape = block.shape
+        axes = [np.cumsum(RANDOM.random(n) + 0.1) for n in shape[::-1]]
+        block.places = np.stack(np.meshgrid(axes[2], axes[1], axes[0], indexing="ij")[::-1])
+        writer = self.new()
+        topology = '<Topology TopologyType="{}" NumberOfElements="' + dims(shape) + '"/>'
+        fields = attribute(writer, "p", block.p) + attribute(writer, "c", block.c, "Cell")
+        items = "".join(writer.item(axis) for axis in axes)
+        path = self.write(f'<Grid>{topology.format("3DRectMesh")}<Geometry GeometryType="VXVYVZ">{items}</Geometry>{fields}</Grid>')
+        self.expect_same([path], [block])
+        # Origin and spacing are in the order of the dimensions: z, y, x.
+        origin, spacing = np.array([3.0, 2.0, 1.0]), np.array([0.5, 0.25, 2.0])
+        k, j, i = np.meshgrid(*(o + s * np.arange(n) for o, s, n in zip(origin, spacing, shape)), indexing="ij")
+        block.places = np.stack([i, j, k])
+        items = writer.item(origin) + writer.item(spacing)
+        path = self.write(f'<Grid>{topology.format("3DCoRectMesh")}<Geometry GeometryType="ORIGIN_DXDYDZ">{items}</Geometry>{fields}</Grid>')
+        self.expect_same([path], [block])
+
+    def test_times(self):
+        blocks = [Block() for _ in range(3)]
+        writer = self.new()
+        steps = [grid(writer, b, "moving", 0.5 * n) for n, b in enumerate(blocks)]
+        temporal = '<Grid GridType="Collection" CollectionType="Temporal">{}</Grid>'
+        bare = "".join(step.replace(f'<Time Value="{0.5 * n}"/>', "") for n, step in enumerate(steps))
+        listed = '<Time TimeType="List"><DataItem Dimensions="3" Format="XML">0 0.5 1</DataItem></Time>'
+        spread = '<Time TimeType="HyperSlab"><DataItem Dimensions="3" Format="XML">0 0.5 3</DataItem></Time>'
+        for text in ("".join(steps), listed + bare, spread + bare):
+            path = self.write(temporal.format(text))
+            self.assertEqual(self.info(path)["times"], [0, 0.5, 1])
+            for n, block in enumerate(blocks):
+                self.expect_same([path], [block], options=["--time-step", n])
+        self.assertEqual(self.info(self.write(temporal.format(bare)))["times"], [0, 1, 2])
+        both = '<Grid GridType="Collection" CollectionType="Spatial"><Time Value="{}"/>{}</Grid>'
+        path = self.write(temporal.format(both.format(1, bare[:0] + steps[0].replace('<Time Value="0.0"/>', "") + grid(writer, blocks[1], "b"))))
+        self.expect_same([path], [blocks[0], blocks[1]])
+
+    def test_hyperslabs_and_references(self):
+        """A step of an array of all steps; every second node; a topology and an item that stand elsewhere."""
+        blocks = [Block(), Block()]
+        writer = self.new()
+        places = np.stack([np.moveaxis(b.places, 0, -1) for b in blocks])
+        wide = RANDOM.random((2, *[2 * n - 1 for n in blocks[0].shape]))
+        for b, w in zip(blocks, wide):
+            b.p = w[::2, ::2, ::2].copy()
+        shape = blocks[0].shape
+        for n, block in enumerate(blocks):
+            def slab(all_of, start, stride, count):
+                numbers = dims((*start, *stride, *count))
+                return f'<DataItem ItemType="HyperSlab" Dimensions="{dims(count)}"><DataItem Dimensions="3 {len(count)}" Format="XML">{numbers}</DataItem>{all_of}</DataItem>'
+            where = slab(writer.item(places), (n, 0, 0, 0, 0), (1, 1, 1, 1, 1), (1, *shape, 3))
+            p = slab('<DataItem Reference="/Xdmf/Domain/DataItem[1]"/>', (n, 0, 0, 0), (1, 2, 2, 2), (1, *shape))
+            path = self.write(f'{writer.item(wide)}<Topology Name="t" TopologyType="3DSMesh" Dimensions="{dims(shape)}"/>'
+                              f'<Grid><Topology Reference="XML">/Xdmf/Domain/Topology[@Name="t"]</Topology><Geometry>{where}</Geometry>'
+                              f'<Attribute Name="p">{p}</Attribute></Grid>')
+            self.expect_same([path], [block], {"c": None})
+
+    def test_attributes_that_some_grids_lack(self):
+        a, b = Block(), Block((4, 3, 5), 9)
+        writer = self.new()
+        path = self.write(grid(writer, a) + f'<Grid Name="b">{geometry(writer, b)}{attribute(writer, "c", b.c, "Cell")}</Grid>')
+        b.p[:] = np.nan
+        self.expect_same([path], [a, b])
+        self.assertIn("1 of 2 grids have no attribute p", self.run_program("info", path).stdout)
+
+    def test_what_is_refused(self):
+        block = Block()
+        writer = self.new()
+        text = grid(writer, block)
+        shape = dims(block.shape)
+        for damaged, told in ((text.replace("3DSMesh", "Tetrahedron"), "unstructured grid"), (text.replace("3DSMesh", "Mixed"), "unstructured grid"),
+                              (text.replace(f'3DSMesh" Dimensions="{shape}"', '3DSMesh" Dimensions="1 30 7"'), "is flat"),
+                              (text.replace(f'3DSMesh" Dimensions="{shape}"', '3DSMesh" Dimensions="9 9 9"'), "expected 2187"),
+                              (text.replace("a.h5", "b.h5"), "does not exist"), (text.replace("/group/1", "/group/9"), "no such data set"),
+                              (text.replace("/group/1", "/group"), "no such data set"), (text.replace("a.h5:/group/1", "a.h5"), "expected FILE:/DATA"),
+                              (text.replace('Format="HDF"', 'ItemType="Function"'), "is a function"), (text.replace("HDF", "TIFF"), "tiff"),
+                              (text.replace(f'Dimensions="{shape} 3"', f'Dimensions="{shape} -3"'), "expected dimensions"),
+                              (text.replace(f'Dimensions="{shape} 3"', 'Dimensions="1e12 1e12 1e12"'), "impossible dimensions"),
+                              ('<Grid><Topology Reference="/Xdmf/Domain/Grid/Topology"/></Grid>', "refers to itself"),
+                              ('<Grid><Topology Reference="//*[//*]"/></Grid>', "refers to"),
+                              ('<Grid><xi:include href="b.xmf"/></Grid>', "XInclude"), ("", "has no Grid"), (text[:-9], "not valid XML")):
+            self.expect_line(self.write(damaged), words=told)
+        bad = self.new("Binary")
+        path = self.write(grid(bad, block))
+        (self.folder / "a.bin").write_bytes(bad.binary[:-1])
+        self.expect_line(path, words="truncated")
+
+    def test_damage(self):
+        block = Block((3, 4, 5))
+        path = self.write(grid(self.new(), block))
+        self.assertGreater(self.expect_harmless(path), 0.3)
+        self.expect_harmless(self.folder / "a.h5", opened=path)
+        path = self.write(grid(self.new("XML"), block))
+        self.expect_harmless(path)
+
+    def test_memory(self):
+        block = Block((120, 120, 151), kind="f4")
+        for words, options in ((("HDF",), {"chunks": (8, 64, 64), "compression": "gzip"}), (("Binary",), {})):
+            writer = self.new(*words)
+            if options:
+                with h5py.File(self.folder / "a.h5", "w") as file:
+                    for n, array in enumerate((np.moveaxis(block.places, 0, -1), block.p), 1):
+                        file.create_dataset(f"group/{n}", data=array, chunks=(*options["chunks"], 3)[: array.ndim], compression="gzip", compression_opts=1)
+                head = f'<Topology TopologyType="3DSMesh" Dimensions="{dims(block.shape)}"/>'
+                path = self.write(f'<Grid>{head}<Geometry><DataItem Dimensions="{dims(block.shape)} 3" Format="HDF">a.h5:/group/1</DataItem></Geometry>'
+                                  f'<Attribute Name="p"><DataItem Dimensions="{dims(block.shape)}" Format="HDF">a.h5:/group/2</DataItem></Attribute></Grid>')
+            else:
+                path = self.write(f'<Grid>{geometry(writer, block)}{attribute(writer, "p", block.p)}</Grid>')
+            self.assertLess(self.peak_memory(path, "p", "192M"), 192 << 20)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
