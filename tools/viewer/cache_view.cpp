@@ -51,6 +51,7 @@ CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& wi
                      FileDialog& dialog, const WindowLayout& layout)
     : cache_(std::move(cache)),
       target_s_(options.target_s),
+      faces_at_(options.faces_at),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
@@ -105,8 +106,8 @@ ViewState CacheView::openingState(const ViewerOptions& options, ImageSize pictur
 void CacheView::takeScene(const SurfaceScene& scene, const ViewerOptions& options, ViewState& state) const {
   state.surfaces.clear();
   for (size_t n = 0; n < scene.surfaces.size(); ++n)
-    state.surfaces.push_back(
-        {fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour, scene.surfaces[n].mesh});
+    state.surfaces.push_back({fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour,
+                              scene.surfaces[n].mesh, scene.surfaces[n].opacity.factor});
   state.faces.clear();
   for (size_t n = 0; n < scene.grid_surfaces.size(); ++n)
     state.faces.push_back({options.face_names.at(n), scene.grid_surfaces[n]});
@@ -114,7 +115,7 @@ void CacheView::takeScene(const SurfaceScene& scene, const ViewerOptions& option
   state.isovalues = scene.isovalues;
   state.iso_opacity = scene.iso_opacity;
   state.slices = scene.slices;
-  state.slice_opacity = scene.slice_opacity;
+  state.slice_opacity = {scene.slice_opacity, scene.slices_by_function};
   state.volume = scene.volume;
 }
 
@@ -231,6 +232,7 @@ void CacheView::ask(bool moving) {
   request.moving = moving;
   request.step = playback_.step();
   request.next_step = playback_.next();
+  request.faces_at = faces_at_;
   if (frames_failed_) restartFrames();
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
   request_ = frames_->request(std::move(request));

@@ -53,7 +53,29 @@ struct FrameLoop::Drawing {
   uint64_t function_version = 0;
   std::optional<FrameRequest> last;  // that was drawn
   Effort effort;
+
+  struct Faces {
+    uint64_t step = 0;
+    std::vector<GridSurface> given, there;
+  };
+  Faces faces;  // of the last step
+
+  void takeFaces(const CacheReader& cache, FrameRequest& request);
 };
+
+/// The request's faces at its step. The same ones as for the last request, where they can be: their meshes are kept.
+void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& request) {
+  const auto& scene = request.options.scene;
+  if (!request.faces_at || !scene || scene->grid_surfaces.empty()) return;
+  const auto same_mesh = [](const GridSurface& a, const GridSurface& b) { return a.hasMeshOf(b); };
+  if (faces.step != request.step || !std::ranges::equal(faces.given, scene->grid_surfaces, same_mesh)) {
+    faces = {};  // if it throws
+    faces = {request.step, scene->grid_surfaces, request.faces_at(cache, scene->grid_surfaces)};
+  }
+  auto moved = std::make_shared<SurfaceScene>(*scene);
+  moved->grid_surfaces = faces.there;
+  request.options.scene = std::move(moved);
+}
 
 FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake)
     : cache_(cache.atStep(cache.step())),
@@ -166,7 +188,7 @@ void FrameLoop::loop() {
   }
 }
 
-void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
+void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
   const DrawnScalars& scalars = request.scalars;
   std::vector<size_t> variables{scalars.opacity.variable};
   if (scalars.colour) variables.push_back(scalars.colour->variable);
@@ -183,6 +205,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   drawing.function_version = request.function_version;
   drawing.last = request;
   drawing.player->goTo({request.step});
+  drawing.takeFaces(cache_, request);
   FrameRenderer& renderer = drawing.player->renderer();
   {
     const MutexLock lock(mutex_);
@@ -219,6 +242,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
 /// the pixels take a quarter of the time.
 void FrameLoop::findValues(Drawing& drawing, FrameRequest request, uint64_t number) {
   drawing.player->goTo({request.step});
+  drawing.takeFaces(cache_, request);
   ShownValues found;
   found.request = number;
   found.step = request.step;
