@@ -27,6 +27,7 @@ constexpr double kFold = 4;          // pixels, between the depths of neighbours
 constexpr float kGrazing = 0.25f;    // the cosine between ray and normal
 constexpr double kSameLayer = 8;     // pixels, between the rays of one pixel
 constexpr double kOwnLayers = 1e-3;  // of what still comes through
+constexpr uint64_t kAlone = 2;  // times the memory, for a tile that one thread traces while the others wait
 
 /// What a pixel's middle ray has found, to be compared with its neighbours.
 struct Seen {
@@ -323,10 +324,10 @@ void IsoLayers::draw(const IsoSplats& splats, const Look& look, uint64_t bytes) 
                                 static_cast<int>(number / columns_) * kTileSide);
   });
   for (size_t n = 0; n < range.count(); ++n)
-    if (bytes_of[n] > bytes) throwTooLarge(range.begin + n, bytes_of[n], bytes);
+    if (bytes_of[n] > kAlone * bytes) throwTooLarge(range.begin + n, bytes_of[n], kAlone * bytes);
   uint64_t drawn = 0;  // tiles that take no more
   for (int threads = tbb::this_task_arena::max_concurrency(); threads > 0; threads /= 2) {
-    const uint64_t most = bytes / static_cast<uint64_t>(threads);
+    const uint64_t most = threads > 1 ? bytes / static_cast<uint64_t>(threads) : kAlone * bytes;
     std::vector<size_t> tiles;
     for (size_t n = 0; n < range.count(); ++n)
       if (bytes_of[n] > drawn && bytes_of[n] <= most) tiles.push_back(range.begin + n);
