@@ -224,10 +224,11 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
   }
   const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
   const double depth_origin = view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
-  const auto isosurfaces = this->isosurfaces(plan, options, depth_origin, statistics);
-  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   std::optional<ColourTable> opacities;
-  if (options.scene->slices_by_function) opacities.emplace(planner_.transferFunction());
+  if (options.scene->usesOpacities()) opacities.emplace(planner_.transferFunction());
+  const auto isosurfaces =
+      this->isosurfaces(plan, options, {depth_origin, opacities ? &*opacities : nullptr}, statistics);
+  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   const SceneLook look{planner_.colours(),
                        options.light,
                        plan.settings.clip_planes,
@@ -243,27 +244,40 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
   planner_.addLayers(plan, std::move(layers), options);
 }
 
-/// A part of the picture after the other, each as large as its splats fit into the memory; a tile always does.
+/// A part of the picture after the other, each as large as its splats fit into the memory. A tile of 32x32 pixels is
+/// the smallest.
 std::optional<IsoLayers> FramePipeline::isosurfaces(const FramePlan& plan, const FrameOptions& options,
-                                                    double depth_origin, FrameStatistics& statistics) {
+                                                    const IsoInput& input, FrameStatistics& statistics) {
   if (options.scene->isovalues.empty()) return std::nullopt;
   const ProjectionSettings& settings = plan.settings;
+  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
+  const SheetOpacity& opacity = options.scene->iso_opacity;
+  const IsoLayers::Look look{planner_.colours(),
+                             options.light,
+                             {opacity.factor, opacity.by_function ? input.opacities : nullptr, of_colours},
+                             coloured_by_ && !of_colours};
   IsoLayers layers(settings.view.size);
   std::vector<TileRange> left{{0, layers.tiles()}};
   while (!left.empty()) {
     const TileRange tiles = left.back();
     left.pop_back();
-    const uint64_t most_bytes =
-        tiles.count() > 1 ? isoSplatBytes(options) : std::numeric_limits<uint64_t>::max();
     IsoSplats splats({settings.view, options.scene->isovalues, settings.borders, settings.clip_planes,
-                      depth_origin, tiles, most_bytes},
+                      input.depth_origin, tiles, isoSplatBytes(options)},
                      plan.iso_parts.size());
     const auto take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& of_part) {
-      splats.add(part, cell_min, of_part.geometry, of_part.values,
-                 of_part.second ? &*of_part.second : nullptr, of_part.ranges);
+      const auto& values = of_colours ? *of_part.second : of_part.values;
+      const auto* const second = of_part.second ? &*of_part.second : nullptr;
+      splats.add(part, cell_min, of_part.geometry, values, of_colours ? &of_part.values : second,
+                 of_part.ranges);
     };
     sample({cache_, plan.iso_parts, take, options.keep_going}, options, statistics);
     if (splats.overflowed()) {
+      if (tiles.count() == 1)
+        throw UsageError(
+            "isosurfaces: the splats in {0}x{0} pixels are too many (they take more than their {1} KiB of "
+            "the memory); "
+            "give more --memory, or a larger --lod-pixels",
+            kTileSide, isoSplatBytes(options) >> 10);
       const size_t middle = (tiles.begin + tiles.end) / 2;
       left.push_back({middle, tiles.end});
       left.push_back({tiles.begin, middle});
@@ -272,8 +286,7 @@ std::optional<IsoLayers> FramePipeline::isosurfaces(const FramePlan& plan, const
     const StageTimer timer(statistics.surfaces_s, "draw isosurfaces");
     arenaOf(options).execute([&] {
       splats.sort();
-      layers.draw(splats, {planner_.colours(), options.light, options.scene->iso_opacity},
-                  isoTracerBytes(options));
+      layers.draw(splats, look, isoTracerBytes(options));
     });
   }
   return layers;

@@ -72,8 +72,12 @@ class FramePipeline {
   struct Pools;
 
   void sample(const SamplingWork& work, const FrameOptions& options, FrameStatistics& statistics);
+  struct IsoInput {
+    double depth_origin;
+    const ColourTable* opacities;  // of the picture's function; null: not needed
+  };
   std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
-                                       double depth_origin, FrameStatistics& statistics);
+                                       const IsoInput& input, FrameStatistics& statistics);
   bool beginSlab(const FramePlan& plan, const FrameOptions& options);
   void stopStages();
   void makePools(const FrameOptions& options);

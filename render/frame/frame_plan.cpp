@@ -148,7 +148,8 @@ std::vector<SlicePlan> FramePlanner::planSlices(const ProjectionSettings& settin
 void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions& limits,
                                    FramePlan& plan) const {
   if (!options.scene || options.scene->isovalues.empty()) return;
-  const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
+  const size_t variable = coloured_by_ && options.scene->iso_of_colours ? coloured_by_->variable : variable_;
+  const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable), subtrees_};
   const double reach = largestReach(plan.settings.view.low_pass_px2);
   const auto has_none = [&](const ValueBounds& bounds) {
     const std::pair<double, double> spread = spreadOf(bounds, reach);

@@ -93,7 +93,8 @@ void computeNormals(TriangleMesh& mesh) {
         const auto added = groups.empty() ? vertex : static_cast<uint32_t>(mesh.positions.size());
         if (!groups.empty()) {
           mesh.positions.push_back(mesh.positions[vertex]);
-          if (!mesh.scalars.empty()) mesh.scalars.push_back(mesh.scalars[vertex]);
+          for (auto* const scalars : {&mesh.scalars, &mesh.opacity_scalars})
+            if (!scalars->empty()) scalars->push_back((*scalars)[vertex]);
         }
         groups.push_back({normal, glm::vec3(0.0f), added});
         group = groups.end() - 1;
@@ -116,7 +117,7 @@ void computeNormals(TriangleMesh& mesh) {
 
 uint64_t TriangleMesh::bytes() const {
   return positions.size() * sizeof(positions[0]) + triangles.size() * sizeof(triangles[0]) +
-         normals.size() * sizeof(normals[0]) + scalars.size() * sizeof(scalars[0]);
+         normals.size() * sizeof(normals[0]) + (scalars.size() + opacity_scalars.size()) * sizeof(float);
 }
 
 TriangleMesh meshOf(RawMesh raw) {
@@ -140,6 +141,7 @@ TriangleMesh meshOf(RawMesh raw) {
     number[n] = static_cast<uint32_t>(mesh.positions.size());
     mesh.positions.emplace_back(raw.positions[n] - mesh.origin);
     if (!raw.scalars.empty()) mesh.scalars.push_back(raw.scalars[n]);
+    if (!raw.opacity_scalars.empty()) mesh.opacity_scalars.push_back(raw.opacity_scalars[n]);
   }
   raw.positions = {};
   mesh.triangles.reserve(raw.triangles.size());

@@ -14,6 +14,8 @@ struct TriangleMesh {
   std::vector<std::array<uint32_t, 3>> triangles;
   std::vector<glm::vec3> normals;  // [positions], of length 1; of either side. 0: not known
   std::vector<float> scalars;      // [positions], or none; NaN: no value
+  std::vector<float> opacity_scalars =
+      {};  // the same of the scalar that has the opacities; none: `scalars` has
 
   uint64_t bytes() const;
 };
@@ -22,7 +24,7 @@ struct TriangleMesh {
 struct RawMesh {
   std::vector<glm::dvec3> positions;
   std::vector<std::array<uint32_t, 3>> triangles;
-  std::vector<float> scalars = {};  // [positions], or none
+  std::vector<float> scalars = {}, opacity_scalars = {};  // [positions], or none
 };
 
 /// Merges coincident vertices, leaves out triangles without area and computes normals: of a vertex the mean of

@@ -14,8 +14,11 @@ namespace curvisplat {
 namespace {
 
 constexpr double kFinestPixels = 0.5;
+// What an edge leaves out lies within half its length of a node that is drawn: edges of twice the error, as far as that
+// is to be seen only by their number. Beyond, smooth normals would suffer.
+constexpr double kFreeEdges = 2;
 constexpr size_t kLeastNodes = 1 << 16;
-constexpr uint64_t kBytesANode = 136;  // while a mesh is made: nodes, triangles, and the mesh itself
+constexpr uint64_t kBytesANode = 148;  // while a mesh is made: nodes, triangles, and the mesh itself
 
 size_t mostNodes(uint64_t pixels) {
   return std::max<size_t>(kLeastNodes, pixels);
@@ -139,6 +142,9 @@ void appendQuads(const GridSurface& surface, const std::pair<uint32_t, uint32_t>
     const std::vector<float>& scalars = nodes.scalars[*surface.scalar];
     mesh.scalars.insert(mesh.scalars.end(), scalars.begin(), scalars.end());
   }
+  if (surface.opacity_scalar)
+    mesh.opacity_scalars.insert(mesh.opacity_scalars.end(), nodes.scalars.back().begin(),
+                                nodes.scalars.back().end());
   // Whether the middle of a quad, along an axis, lies in the part.
   const auto inside = [&](size_t along, uint64_t n) {
     const uint64_t twice = latticeIndex(face, patch, along, n) + latticeIndex(face, patch, along, n + 1);
@@ -161,6 +167,10 @@ void appendQuads(const GridSurface& surface, const std::pair<uint32_t, uint32_t>
   }
 }
 
+double longestEdge(double pixels) {
+  return std::max({pixels, std::min(2 * pixels, kFreeEdges), kFinestPixels});
+}
+
 }  // namespace
 
 ChosenPatches choosePatches(const GridSurface& surface, const ScreenView& view, double pixels,
@@ -176,7 +186,7 @@ ChosenPatches choosePatches(const GridSurface& surface, const ScreenView& view, 
   std::priority_queue<Candidate> coarse;
   ChosenPatches chosen;
   size_t nodes = 0;
-  const double allowed = std::max(pixels, kFinestPixels);
+  const double allowed = longestEdge(pixels);
   const auto add = [&](uint32_t part, uint32_t number) {
     const FacePatch& patch = patches[number];
     if (!overlaps(surface.faces->faces()[patch.face], patch, surface.parts[part])) return;
@@ -211,8 +221,16 @@ ChosenPatches choosePatches(const GridSurface& surface, const ScreenView& view, 
 
 TriangleMesh meshOfPatches(const GridSurface& surface, const ChosenPatches& chosen) {
   std::vector<PatchNodes> nodes(chosen.size());
-  tbb::parallel_for(size_t{0}, chosen.size(),
-                    [&](size_t n) { nodes[n] = surface.faces->read(chosen[n].second); });
+  tbb::parallel_for(size_t{0}, chosen.size(), [&](size_t n) {
+    nodes[n] = surface.faces->read(chosen[n].second);
+    if (!surface.opacity_scalar) return;
+    // The last of the scalars, and stitched with them.
+    PatchNodes other;
+    if (surface.opacity_faces != surface.faces) other = surface.opacity_faces->read(chosen[n].second);
+    PatchNodes& from = surface.opacity_faces != surface.faces ? other : nodes[n];
+    std::vector<float> values = from.scalars[*surface.opacity_scalar];
+    nodes[n].scalars.push_back(std::move(values));
+  });
   Stitches(*surface.faces, chosen, nodes).join();
   RawMesh mesh;
   for (size_t n = 0; n < chosen.size(); ++n) {

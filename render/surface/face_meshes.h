@@ -1,7 +1,8 @@
 // The grid's faces as meshes: which patches a view needs, and their triangles.
 //
-// A patch is refined while the longest edge of its quads is longer than the screen error allowed, the longest on
-// the screen first, and only where it is in sight. So a face of any size takes memory for what is seen of it.
+// A patch is refined while the longest edge of its quads is longer than the screen error allowed (up to two pixels, than
+// twice that: the nodes that it leaves out lie within half an edge), the longest on the screen first, and only where it
+// is in sight. So a face of any size takes memory for what is seen of it.
 // Where patches of two levels meet, the finer one's border follows the coarser one's edges: no gaps.
 #pragma once
 
@@ -17,8 +18,8 @@
 
 namespace curvisplat {
 
-/// The patches of a part of a surface that are drawn, in rising order. `pixels`: the longest edge on the screen;
-/// below half a pixel nothing is gained, and it is taken as that. At most about `max_nodes` nodes in all. Pure.
+/// The patches of a part of a surface that are drawn, in rising order. `pixels`: the screen error allowed. Below edges of
+/// half a pixel nothing is gained. At most about `max_nodes` nodes in all. Pure.
 using ChosenPatches = std::vector<std::pair<uint32_t, uint32_t>>;  // number of the part, patch
 ChosenPatches choosePatches(const GridSurface& surface, const ScreenView& view, double pixels,
                             size_t max_nodes);

@@ -12,11 +12,13 @@
 #include "render/project/tile_set.h"
 #include "render/surface/pixel_rays.h"
 #include "render/surface/surface_light.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr int kPixels = kTileSide * kTileSide;
+constexpr int kSeenSide = kTileSide + 2;  // with the pixels around the tile
 constexpr int kBlock = 4, kBlocks = kTileSide / kBlock;
 // Rays of a pixel at an outline, from its middle.
 constexpr std::array<std::array<float, 2>, 4> kOffsets{
@@ -25,6 +27,7 @@ constexpr double kFold = 4;          // pixels, between the depths of neighbours
 constexpr float kGrazing = 0.25f;    // the cosine between ray and normal
 constexpr double kSameLayer = 8;     // pixels, between the rays of one pixel
 constexpr double kOwnLayers = 1e-3;  // of what still comes through
+constexpr uint64_t kAlone = 2;  // times the memory, for a tile that one thread traces while the others wait
 
 /// What a pixel's middle ray has found, to be compared with its neighbours.
 struct Seen {
@@ -46,12 +49,18 @@ class IsoLayers::Tracer {
         light_(look.light, view_),
         rays_(splats.settings()) {}
 
-  /// What draw() takes for a tile's splats.
-  static uint64_t bytes(std::span<const IsoSplats::Placed> splats, int y0) {
-    const std::array<size_t, kBlocks> counts = countRows(splats, y0);
-    size_t all = 0;
-    for (const size_t count : counts) all += count;
-    return kOwnBytes + all * sizeof(IsoSplats::Placed) +
+  /// What draw() takes for a tile's splats. No packet is larger than a block of 4x4 pixels.
+  static uint64_t bytes(std::span<const IsoSplats::Placed> splats, int x0, int y0) {
+    uint64_t rows = 0;
+    std::array<size_t, kBlocks * kBlocks> counts{};
+    for (const IsoSplats::Placed& placed : splats) {
+      const IsoSplat& splat = *placed.splat;
+      const BlockRange across = blocksOf(splat.x0, splat.x1, x0), down = blocksOf(splat.y0, splat.y1, y0);
+      rows += down.last - down.first + 1;
+      for (size_t row = down.first; row <= down.last; ++row)
+        for (size_t column = across.first; column <= across.last; ++column) ++counts[row * kBlocks + column];
+    }
+    return kOwnBytes + rows * sizeof(IsoSplats::Placed) +
            IsoRays::bytes(*std::max_element(counts.begin(), counts.end()));
   }
 
@@ -63,9 +72,13 @@ class IsoLayers::Tracer {
     sortRows(number);
     for (auto& pixel : pixels_) pixel.clear();
     seen_.fill({});
-    for (int row = 0; row < kBlocks; ++row)
-      for (int column = 0; column < kBlocks; ++column) traceBlock(column, row);
-    for (int row = 0; row < kBlocks; ++row) smoothRow(row);
+    for (int y = 0; y < kTileSide; y += kBlock)
+      for (int x = 0; x < kTileSide; x += kBlock) trace({x, y, x + kBlock, y + kBlock});
+    if (splats_.settings().corrections.smooth) {
+      traceAround();
+      for (int row = 0; row < kBlocks; ++row)
+        for (int column = 0; column < kBlocks; ++column) smoothBlock(column, row);
+    }
     tile.begins.assign(1, 0);
     for (const auto& pixel : pixels_) {
       tile.layers.insert(tile.layers.end(), pixel.begin(), pixel.end());
@@ -76,20 +89,26 @@ class IsoLayers::Tracer {
  private:
   static constexpr uint64_t kOwnBytes = 1 << 19;  // itself, and the layers of its pixels
 
-  struct RowRange {
+  struct Pixel {
+    int x, y;  // from the tile's first
+  };
+  struct BlockRange {
     size_t first, last;
   };
-  /// The rows of blocks that a splat touches.
-  static RowRange rowsOf(const IsoSplat& splat, int y0) {
-    const auto rowAt = [&](float y) {
-      return static_cast<size_t>(std::clamp((y - static_cast<float>(y0)) / kBlock, 0.0f, kBlocks - 0.5f));
+  /// The blocks along an axis of the tile, from `begin` on, that lie between two places; the first and the last have the
+  /// pixels beside the tile as well.
+  static BlockRange blocksOf(float from, float to, int begin) {
+    const auto at = [&](float place) {
+      return static_cast<size_t>(
+          std::clamp((place - static_cast<float>(begin)) / kBlock, 0.0f, kBlocks - 0.5f));
     };
-    return {rowAt(splat.y0), rowAt(splat.y1)};
+    return {at(from), at(to)};
   }
+  static BlockRange rowsOf(const IsoSplat& splat, int y0) { return blocksOf(splat.y0, splat.y1, y0); }
   static std::array<size_t, kBlocks> countRows(std::span<const IsoSplats::Placed> splats, int y0) {
     std::array<size_t, kBlocks> counts{};
     for (const IsoSplats::Placed& placed : splats) {
-      const RowRange rows = rowsOf(*placed.splat, y0);
+      const BlockRange rows = rowsOf(*placed.splat, y0);
       for (size_t row = rows.first; row <= rows.last; ++row) ++counts[row];
     }
     return counts;
@@ -104,55 +123,71 @@ class IsoLayers::Tracer {
       rows_[row].reserve(counts[row]);
     }
     for (const IsoSplats::Placed& placed : splats) {
-      const RowRange rows = rowsOf(*placed.splat, y0_);
+      const BlockRange rows = rowsOf(*placed.splat, y0_);
       for (size_t row = rows.first; row <= rows.last; ++row) rows_[row].push_back(placed);
     }
   }
 
-  void traceBlock(int column, int row) {
+  /// Pixels of the tile, or beside it: from (x0, y0) to before (x1, y1).
+  struct Box {
+    int x0, y0, x1, y1;
+  };
+
+  /// What the neighbours' outermost pixels see, so that an outline on the edge of two tiles is found by both. Their
+  /// splats are this tile's, too.
+  void traceAround() {
+    for (const int y : {-1, kTileSide})
+      for (int x = 0; x < kTileSide; x += kBlock) trace({x, y, x + kBlock, y + 1});
+    for (const int x : {-1, kTileSide})
+      for (int y = 0; y < kTileSide; y += kBlock) trace({x, y, x + 1, y + kBlock});
+  }
+
+  /// One ray for each pixel of a box that lies in the picture.
+  void trace(const Box& box) {
     IsoPacket packet = emptyPacket();
-    std::array<int, IsoPacket::kRays> pixels{};
-    for (int y = row * kBlock; y < std::min((row + 1) * kBlock, height_); ++y)
-      for (int x = column * kBlock; x < std::min((column + 1) * kBlock, width_); ++x) {
-        pixels[packet.count] = y * kTileSide + x;
-        addRay(packet, pixels[packet.count], {0, 0});
+    std::array<Pixel, IsoPacket::kRays> pixels{};
+    for (int y = std::max(box.y0, -y0_); y < std::min(box.y1, view_.size.height - y0_); ++y)
+      for (int x = std::max(box.x0, -x0_); x < std::min(box.x1, view_.size.width - x0_); ++x) {
+        pixels[packet.count] = {x, y};
+        addRay(packet, {x, y}, {0, 0});
       }
     if (packet.count == 0) return;
-    rays_.trace(packet, rows_[static_cast<size_t>(row)]);
+    rays_.trace(packet, rows_[static_cast<size_t>(std::clamp(box.y0 / kBlock, 0, kBlocks - 1))]);
     for (size_t ray = 0; ray < packet.count; ++ray) {
       const auto hits = rays_.hits(ray).all();
       if (hits.empty()) continue;
-      const auto pixel = static_cast<size_t>(pixels[ray]);
+      const auto [x, y] = pixels[ray];
       const glm::vec3 n = hits[0].gradient;
       const glm::vec3 along = perspective_ ? rayOf(packet.x[ray], packet.y[ray]) : glm::vec3(0, 0, 1);
-      seen_[pixel] = {hits.size(), hits[0].depth,
+      seenAt(x, y) = {hits.size(), hits[0].depth,
                       std::abs(glm::dot(n, along)) < kGrazing * glm::length(n) * glm::length(along)};
-      merge(std::span(&ray, 1), packet, pixels_[pixel]);
+      if (x >= 0 && y >= 0 && x < kTileSide && y < kTileSide)
+        merge(std::span(&ray, 1), packet, layersOf({x, y}));
     }
   }
 
   /// Again, with four rays, where something ends.
-  void smoothRow(int row) {
+  void smoothBlock(int column, int row) {
     IsoPacket packet = emptyPacket();
-    std::array<int, IsoPacket::kRays> pixels{};
+    std::array<Pixel, IsoPacket::kRays> pixels{};
     const auto trace = [&] {
       if (packet.count == 0) return;
       rays_.trace(packet, rows_[static_cast<size_t>(row)]);
       for (size_t begin = 0; begin < packet.count; begin += kOffsets.size()) {
         std::array<size_t, kOffsets.size()> rays{};
         for (size_t n = 0; n < rays.size(); ++n) rays[n] = begin + n;
-        auto& layers = pixels_[static_cast<size_t>(pixels[begin])];
+        auto& layers = layersOf(pixels[begin]);
         layers.clear();
         merge(rays, packet, layers);
       }
       packet.count = 0;
     };
     for (int y = row * kBlock; y < std::min((row + 1) * kBlock, height_); ++y)
-      for (int x = 0; x < width_; ++x) {
+      for (int x = column * kBlock; x < std::min((column + 1) * kBlock, width_); ++x) {
         if (!isOutline(x, y)) continue;
         for (const auto& offset : kOffsets) {
-          pixels[packet.count] = y * kTileSide + x;
-          addRay(packet, pixels[packet.count], offset);
+          pixels[packet.count] = {x, y};
+          addRay(packet, {x, y}, offset);
         }
         if (packet.count == IsoPacket::kRays) trace();
       }
@@ -163,7 +198,10 @@ class IsoLayers::Tracer {
     const Seen& own = seenAt(x, y);
     if (own.count > 0 && own.grazing) return true;
     for (const auto& [dx, dy] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
-      if (x + dx < 0 || y + dy < 0 || x + dx >= width_ || y + dy >= height_) continue;
+      // Nothing is seen beside the picture.
+      if (x0_ + x + dx < 0 || y0_ + y + dy < 0 || x0_ + x + dx >= view_.size.width ||
+          y0_ + y + dy >= view_.size.height)
+        continue;
       const Seen& other = seenAt(x + dx, y + dy);
       if (own.count != other.count) return true;
       if (own.count > 0 && std::abs(own.depth - other.depth) > kFold * side(own.depth)) return true;
@@ -192,11 +230,11 @@ class IsoLayers::Tracer {
         const auto hits = rays_.hits(rays[n]).all();
         if (next[n] == hits.size() || hits[next[n]].depth > nearest + kSameLayer * side(nearest)) continue;
         const IsoHit& hit = hits[next[n]++];
-        const auto alpha = static_cast<float>(look_.opacity);
+        const float alpha = look_.opacity.at(hit);
         layer.colour +=
             through[n] * alpha * glm::vec4(colourOf(hit, packet.x[rays[n]], packet.y[rays[n]]), 1.0f);
         through[n] *= 1 - alpha;
-        layer.scalar += hit.scalar;
+        layer.scalar += look_.colours_of_other ? hit.other_scalar : hit.scalar;
         depth += depthOf(hit.depth, packet.x[rays[n]], packet.y[rays[n]]);
         ++count;
       }
@@ -212,21 +250,26 @@ class IsoLayers::Tracer {
     const glm::dvec3 n(hit.gradient);
     // A gradient: in data coordinates it is larger where they are stretched.
     const glm::dvec3 of_data = view_.scale * (n.x * view_.right + n.y * view_.down + n.z * view_.forward);
-    return light_.lit(look_.colours.at(double{hit.colour_scalar}), glm::vec3(of_data),
-                      towardsViewer(view_, x, y));
+    return light_.lit(look_.colours.at(double{look_.colours_of_other ? hit.other_scalar : hit.scalar}),
+                      glm::vec3(of_data), towardsViewer(view_, x, y));
   }
 
   IsoPacket emptyPacket() const {
     IsoPacket packet;
-    packet.opacity = static_cast<float>(look_.opacity);
+    packet.opacity = look_.opacity;
     return packet;
   }
-  void addRay(IsoPacket& packet, int pixel, const std::array<float, 2>& offset) const {
-    packet.x[packet.count] = static_cast<float>(x0_ + pixel % kTileSide) + 0.5f + offset[0];
-    packet.y[packet.count] = static_cast<float>(y0_ + pixel / kTileSide) + 0.5f + offset[1];
+  void addRay(IsoPacket& packet, const Pixel& pixel, const std::array<float, 2>& offset) const {
+    packet.x[packet.count] = static_cast<float>(x0_ + pixel.x) + 0.5f + offset[0];
+    packet.y[packet.count] = static_cast<float>(y0_ + pixel.y) + 0.5f + offset[1];
     ++packet.count;
   }
-  const Seen& seenAt(int x, int y) const { return seen_[static_cast<size_t>(y * kTileSide + x)]; }
+  static size_t seenPlace(int x, int y) { return static_cast<size_t>((y + 1) * kSeenSide + x + 1); }
+  const Seen& seenAt(int x, int y) const { return seen_[seenPlace(x, y)]; }
+  Seen& seenAt(int x, int y) { return seen_[seenPlace(x, y)]; }
+  std::vector<PixelLayer>& layersOf(const Pixel& pixel) {
+    return pixels_[static_cast<size_t>(pixel.y * kTileSide + pixel.x)];
+  }
   double side(double depth) const { return (perspective_ ? depth : 1) / view_.focal_px; }
   /// In view axes, at the depth 1.
   glm::vec3 rayOf(float x, float y) const {
@@ -247,7 +290,7 @@ class IsoLayers::Tracer {
   int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;
   std::array<std::vector<IsoSplats::Placed>, kBlocks> rows_;
   std::array<std::vector<PixelLayer>, kPixels> pixels_;
-  std::array<Seen, kPixels> seen_;
+  std::array<Seen, kSeenSide * kSeenSide> seen_;
 };
 
 IsoLayers::IsoLayers(ImageSize size)
@@ -260,6 +303,15 @@ void IsoLayers::drawTile(Tracer& tracer, size_t number) {
               static_cast<int>(number / columns_) * kTileSide, tiles_[number]);
 }
 
+/// The tile has no smaller part.
+void IsoLayers::throwTooLarge(size_t number, uint64_t taken, uint64_t bytes) const {
+  throw UsageError(
+      "isosurfaces: the splats in the {0}x{0} pixels at {1},{2} are too many (they take {3} KiB, and have "
+      "{4} KiB of the "
+      "memory); give more --memory, or a larger --lod-pixels",
+      kTileSide, number % columns_ * kTileSide, number / columns_ * kTileSide, taken >> 10, bytes >> 10);
+}
+
 /// Tiles that all threads may trace at a time, then those that half of them may, and so on. Tracers keep what they took, so each
 /// time new ones.
 void IsoLayers::draw(const IsoSplats& splats, const Look& look, uint64_t bytes) {
@@ -268,11 +320,14 @@ void IsoLayers::draw(const IsoSplats& splats, const Look& look, uint64_t bytes) 
   tbb::parallel_for(size_t{0}, range.count(), [&](size_t n) {
     const size_t number = range.begin + n;
     if (splats.inTile(number).empty()) return;
-    bytes_of[n] = Tracer::bytes(splats.inTile(number), static_cast<int>(number / columns_) * kTileSide);
+    bytes_of[n] = Tracer::bytes(splats.inTile(number), static_cast<int>(number % columns_) * kTileSide,
+                                static_cast<int>(number / columns_) * kTileSide);
   });
+  for (size_t n = 0; n < range.count(); ++n)
+    if (bytes_of[n] > kAlone * bytes) throwTooLarge(range.begin + n, bytes_of[n], kAlone * bytes);
   uint64_t drawn = 0;  // tiles that take no more
   for (int threads = tbb::this_task_arena::max_concurrency(); threads > 0; threads /= 2) {
-    const uint64_t most = threads > 1 ? bytes / static_cast<uint64_t>(threads) : UINT64_MAX;
+    const uint64_t most = threads > 1 ? bytes / static_cast<uint64_t>(threads) : kAlone * bytes;
     std::vector<size_t> tiles;
     for (size_t n = 0; n < range.count(); ++n)
       if (bytes_of[n] > drawn && bytes_of[n] <= most) tiles.push_back(range.begin + n);

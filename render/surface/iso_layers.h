@@ -19,13 +19,15 @@ class IsoLayers {
   struct Look {
     const ColourTable& colours;
     std::optional<Light> light;  // none: a light at the viewer
-    double opacity = 1;          // of a crossing
+    IsoOpacity opacity = {};
+    bool colours_of_other = false;  // of the other scalar
   };
   explicit IsoLayers(ImageSize size);
 
   size_t tiles() const { return tiles_.size(); }
   /// Traces the tiles of the splats, which have to be complete and sorted. Parallel on the caller's TBB arena, with as
-  /// many threads as `bytes` allow, or with one. The same bits for any threads, bytes and ranges of tiles.
+  /// many threads as `bytes` allow. Throws UsageError if they do not allow one. The same bits for any threads, bytes
+  /// and ranges of tiles.
   void draw(const IsoSplats& splats, const Look& look, uint64_t bytes);
 
   /// Of a pixel: from the nearest on.
@@ -39,6 +41,7 @@ class IsoLayers {
   class Tracer;
 
   void drawTile(Tracer& tracer, size_t number);
+  [[noreturn]] void throwTooLarge(size_t number, uint64_t taken, uint64_t bytes) const;
 
   ImageSize size_;
   size_t columns_;

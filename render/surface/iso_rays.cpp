@@ -19,7 +19,7 @@ constexpr size_t kMostSteps = 4096;    // of a packet
 constexpr float kLeastWeight = 0.02f;  // below it there is no field
 // Inside the data the weights add up to about 1, less what the neighbours have that do not hold the value.
 constexpr float kLeastInside = 0.15f;
-constexpr float kHidden = 1.0f / 4096;
+constexpr float kHidden = 1.0f / 4096, kClear = 1.0f / 1024;
 constexpr int kRefinements = 4;
 
 float kernelOf(float x) {
@@ -108,12 +108,15 @@ void IsoRays::cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> 
     across_x_[ray] = across.x;
     across_y_[ray] = across.y;
   }
-  crossed_.clear();
-  makeRoom(splats.size());
-  for (const IsoSplats::Placed& placed : splats) {
+  const auto touches = [&](const IsoSplats::Placed& placed) {
     const IsoSplat& s = *placed.splat;
-    if (s.x1 < *x0 || s.x0 > *x1 || s.y1 < *y0 || s.y0 > *y1) continue;
-    if (crossed_.empty()) base_depth_ = s.centre.z;
+    return s.x1 >= *x0 && s.x0 <= *x1 && s.y1 >= *y0 && s.y0 <= *y1;
+  };
+  crossed_.clear();
+  makeRoom(static_cast<size_t>(std::count_if(splats.begin(), splats.end(), touches)));
+  for (const IsoSplats::Placed& placed : splats) {
+    if (!touches(placed)) continue;
+    if (crossed_.empty()) base_depth_ = placed.splat->centre.z;
     crossed_.emplace_back();
     if (!crossOne(placed, crossed_.back())) crossed_.pop_back();
   }
@@ -124,7 +127,21 @@ void IsoRays::cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> 
   });
 }
 
+/// Without the common field: of each ray the splat that weighs most there.
+void IsoRays::heaviestAt(const Row& z, Field& field) const {
+  field = {};
+  for (const Crossed* splat : active_)
+    for (size_t ray = 0; ray < kRays; ++ray) {
+      const float t = z[ray] - splat->middle[ray];
+      const float w = splat->weight * kernelOf(std::max(splat->from[ray] - splat->by[ray] * t * t, 0.0f));
+      if (w <= field.weight[ray]) continue;
+      field.weight[ray] = w;
+      field.value[ray] = splat->mean[ray] + splat->change[ray] * t;
+    }
+}
+
 void IsoRays::fieldAt(const Row& z, Field& field) const {
+  if (!settings_.corrections.common_field) return heaviestAt(z, field);
   Row weight{}, sum{};
   for (const Crossed* splat : active_) {
     const Crossed& s = *splat;
@@ -192,7 +209,7 @@ bool IsoRays::isClipped(const glm::dvec3& at) const {
 /// What the splats have at a crossing.
 struct IsoRays::Point {
   glm::vec3 gradient{0.0f};
-  float weight = 0, colour = 0, outside = 0;
+  float weight = 0, other = 0, outside = 0;
 };
 
 void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned rays) {
@@ -215,8 +232,9 @@ void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned
       point.weight += w;
       point.gradient += w * glm::vec3(glm::dot(s.slope, s.by_right), glm::dot(s.slope, s.by_down),
                                       glm::dot(s.slope, s.by_forward));
-      point.colour += w * (s.colour_mean + glm::dot(s.colour_slope, u));
+      point.other += w * (s.other_mean + glm::dot(s.other_slope, u));
       const bool outside =
+          settings_.corrections.ended &&
           std::any_of(crossed->splat->faces.begin(), crossed->splat->faces.end(),
                       [&](const CutFace& face) { return glm::dot(face.inward, u) + face.distance < 0; });
       if (outside) point.outside += w;
@@ -224,18 +242,19 @@ void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned
     if (!(point.weight > kLeastInside) || point.outside > 0.5f * point.weight) continue;
     addHit(ray,
            {depth, point.gradient / point.weight, static_cast<float>(settings_.values[value]),
-            point.colour / point.weight},
+            point.other / point.weight},
            packet.opacity);
   }
 }
 
-void IsoRays::addHit(size_t ray, const IsoHit& hit, float opacity) {
+void IsoRays::addHit(size_t ray, const IsoHit& hit, const IsoOpacity& opacity) {
   Hits& hits = hits_[ray];
-  if (hits.count == kMostHits) return;
+  const float alpha = opacity.at(hit);
+  if (alpha < kClear || hits.count == kMostHits) return;
   size_t n = hits.count++;
   for (; n > 0 && hits.hit[n - 1].depth > hit.depth; --n) hits.hit[n] = hits.hit[n - 1];
   hits.hit[n] = hit;
-  through_[ray] *= 1 - opacity;
+  through_[ray] *= 1 - alpha;
   if (hits.count == kMostHits) through_[ray] = 0;
 }
 

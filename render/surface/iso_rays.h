@@ -17,16 +17,29 @@
 #include <span>
 #include <vector>
 
+#include "render/surface/colour_table.h"
 #include "render/surface/iso_splats.h"
 
 namespace curvisplat {
 
 /// A crossing of a ray.
 struct IsoHit {
-  double depth;         // along the view, as IsoSplat::centre
-  glm::vec3 gradient;   // in view axes, of a stretched unit
-  float scalar;         // the isovalue
-  float colour_scalar;  // that of the scalar that has the colours
+  double depth;        // along the view, as IsoSplat::centre
+  glm::vec3 gradient;  // in view axes, of a stretched unit
+  float scalar;        // the isovalue
+  float other_scalar;  // that of the picture's other scalar; of one scalar, the same
+};
+
+/// Of crossings. Those that are nearly clear are not there.
+struct IsoOpacity {
+  double factor = 1;
+  const ColourTable* function = nullptr;  // none: 1
+  bool of_other = false;                  // the function is of the other scalar
+
+  float at(const IsoHit& hit) const {
+    if (!function) return static_cast<float>(factor);
+    return static_cast<float>(factor) * function->opacityAt(double{of_other ? hit.other_scalar : hit.scalar});
+  }
 };
 
 /// Rays that lie close together: points of the picture.
@@ -35,7 +48,7 @@ struct IsoPacket {
 
   std::array<float, kRays> x{}, y{};
   size_t count = 0;
-  float opacity = 1;  // of a crossing: what lies behind those that hide it need not be found
+  IsoOpacity opacity;  // what lies behind crossings that hide it need not be found
 };
 
 class IsoRays {
@@ -88,9 +101,10 @@ class IsoRays {
   bool crossOne(const IsoSplats::Placed& placed, Crossed& out) const;
   glm::dvec2 acrossAt(const IsoPacket& packet, size_t ray) const;
   void fieldAt(const Row& z, Field& field) const;
+  void heaviestAt(const Row& z, Field& field) const;
   void refine(float value, const Place& begin, const Place& end, unsigned rays, Row& z) const;
   void take(const IsoPacket& packet, const Row& z, size_t value, unsigned rays);
-  void addHit(size_t ray, const IsoHit& hit, float opacity);
+  void addHit(size_t ray, const IsoHit& hit, const IsoOpacity& opacity);
   bool isClipped(const glm::dvec3& at) const;
 
   const IsoSplats::Settings settings_;

@@ -39,7 +39,7 @@ IsoSplats::IsoSplats(const Settings& settings, size_t parts)
       parts_(parts) {}
 
 void IsoSplats::add(size_t part, const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
-                    const VariableArrays<const float>& variable, const VariableArrays<const float>* colours,
+                    const VariableArrays<const float>& variable, const VariableArrays<const float>* other,
                     std::span<const SplatRange> ranges) {
   if (overflowed()) return;
   const auto wholeOf = [&](const VariableArrays<const float>& values, size_t i) {
@@ -50,7 +50,7 @@ void IsoSplats::add(size_t part, const glm::dvec3& cell_min, const GeometryArray
                       geometry.weight[i]};
   };
   Part& out = parts_[part];
-  BorderPieces pieces, coloured;
+  BorderPieces pieces, others;
   for (const SplatRange& range : ranges)
     for (size_t i = range.begin; i < range.end; ++i) {
       const uint32_t border_code = geometry.border_code[i];
@@ -60,13 +60,13 @@ void IsoSplats::add(size_t part, const glm::dvec3& cell_min, const GeometryArray
       if (!mayHold(whole, kSupport + (plain ? 0 : static_cast<float>(kMergedReach)), deviation)) continue;
       size_t count = 1;
       pieces[0] = whole;
-      if (colours) coloured[0] = wholeOf(*colours, i);
+      if (other) others[0] = wholeOf(*other, i);
       if (!plain) {
         count = partsAtBorder(whole, border_code, settings_.borders, pieces);
-        if (colours) partsAtBorder(coloured[0], border_code, settings_.borders, coloured);
+        if (other) partsAtBorder(others[0], border_code, settings_.borders, others);
       }
       for (size_t n = 0; n < count; ++n)
-        addPiece(out, cell_min, pieces[n], colours ? &coloured[n] : nullptr, deviation);
+        addPiece(out, cell_min, pieces[n], other ? &others[n] : nullptr, deviation);
     }
 }
 
@@ -77,7 +77,7 @@ bool IsoSplats::mayHold(const SplatPiece& piece, float reach, float deviation) c
 }
 
 void IsoSplats::addPiece(Part& part, const glm::dvec3& cell_min, const SplatPiece& piece,
-                         const SplatPiece* coloured, float deviation) {
+                         const SplatPiece* other, float deviation) {
   if (!mayHold(piece, kSupport, deviation)) return;
   const Shape& s = piece.shape;
   const float ratio = piece.weight / (s.axis0 * s.axis1 * s.axis2);
@@ -89,8 +89,8 @@ void IsoSplats::addPiece(Part& part, const glm::dvec3& cell_min, const SplatPiec
   if (tiles == 0) return;
   splat.mean = static_cast<float>(piece.mean - base());
   splat.slope = vectorOf(piece.slope);
-  splat.colour_mean = coloured ? coloured->mean : piece.mean;
-  splat.colour_slope = vectorOf(coloured ? coloured->slope : piece.slope);
+  splat.other_mean = other ? other->mean : piece.mean;
+  splat.other_slope = vectorOf(other ? other->slope : piece.slope);
   splat.first_face = static_cast<uint32_t>(part.faces.size());
   splat.faces = static_cast<uint32_t>(piece.faces.count);
   part.faces.insert(part.faces.end(), piece.faces.begin(), piece.faces.end());
@@ -143,8 +143,8 @@ IsoSplats::TileBox IsoSplats::tilesOf(const IsoSplat& splat) const {
   const auto tileAt = [](float at, int pixels) {
     return static_cast<size_t>(std::clamp(at, 0.0f, static_cast<float>(pixels - 1))) / kTileSide;
   };
-  return {tileAt(splat.x0, size.width), tileAt(splat.y0, size.height), tileAt(splat.x1, size.width),
-          tileAt(splat.y1, size.height)};
+  return {tileAt(splat.x0 - 1, size.width), tileAt(splat.y0 - 1, size.height),
+          tileAt(splat.x1 + 1, size.width), tileAt(splat.y1 + 1, size.height)};
 }
 
 /// Calls take(tile) for those of the range; how many.

@@ -34,10 +34,17 @@ struct IsoSplat {
   float weight;                             // V / √det S
   float mean;                               // less IsoSplats::base()
   glm::vec3 slope;                          // over u
-  float colour_mean;                        // of the scalar that has the colours; else those of the scalar
-  glm::vec3 colour_slope;
+  float other_mean;                         // of the picture's other scalar; else those of the scalar
+  glm::vec3 other_slope;
   float x0, y0, x1, y1;        // pixels that it may touch
   uint32_t first_face, faces;  // of its brick's
+};
+
+/// Each can be left out, to see what it is worth.
+struct IsoCorrections {
+  bool common_field = true;  // else the field is that of the splat that weighs most
+  bool ended = true;         // else surfaces reach as far behind borders as splats do
+  bool smooth = true;        // else outlines have one ray a pixel
 };
 
 class IsoSplats {
@@ -50,13 +57,14 @@ class IsoSplats {
     double depth_origin = 0;  // PixelLayers'
     TileRange tiles;
     uint64_t most_bytes = 0;
+    IsoCorrections corrections = {};
   };
   /// Of `parts` parts of bricks. What `settings` refers to outlives it.
   IsoSplats(const Settings& settings, size_t parts);
 
-  /// Adds the splats of one part. Any thread; each part once. `colours`: null: the scalar has them.
+  /// Adds the splats of one part. Any thread; each part once. `other`: the picture's other scalar, or null.
   void add(size_t part, const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
-           const VariableArrays<const float>& variable, const VariableArrays<const float>* colours,
+           const VariableArrays<const float>& variable, const VariableArrays<const float>* other,
            std::span<const SplatRange> ranges);
 
   /// Whether they take more than the memory: some are missing then.
@@ -71,7 +79,7 @@ class IsoSplats {
   };
   /// After the last add(): sorts them into the tiles.
   void sort();
-  /// The splats of a tile of the range, in the order of parts.
+  /// The splats of a tile of the range, and of the pixels around it, in the order of parts.
   std::span<const Placed> inTile(size_t tile) const;
 
  private:
@@ -83,7 +91,7 @@ class IsoSplats {
     size_t x0, y0, x1, y1;  // the last included
   };
 
-  void addPiece(Part& part, const glm::dvec3& cell_min, const SplatPiece& piece, const SplatPiece* coloured,
+  void addPiece(Part& part, const glm::dvec3& cell_min, const SplatPiece& piece, const SplatPiece* other,
                 float deviation);
   bool place(const glm::dvec3& centre, const Shape& shape, IsoSplat& splat) const;
   bool mayHold(const SplatPiece& piece, float reach, float deviation) const;

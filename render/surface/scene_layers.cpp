@@ -43,19 +43,25 @@ class Shader {
     const auto& corners = mesh.triangles[triangle];
     const glm::vec3 share = sharesAt(surface_number, corners, x, y);
     Point point{surface.colour, glm::vec3(0.0f), static_cast<float>(surface.opacity.factor)};
-    float scalar = 0;
     const glm::vec3 first = mesh.normals[corners[0]];
     for (int n = 0; n < 3; ++n) {
       glm::vec3 of_corner = mesh.normals[corners[static_cast<size_t>(n)]];
       if (glm::dot(of_corner, first) < 0) of_corner = -of_corner;
       point.normal += share[n] * of_corner;
-      if (!mesh.scalars.empty()) scalar += share[n] * mesh.scalars[corners[static_cast<size_t>(n)]];
     }
-    if (surface.by_scalar && !mesh.scalars.empty() && !std::isnan(scalar)) {
-      const ColourTable& colours = surface.colours ? *surface.colours : look_.colours;
-      point.colour = colours.at(double{scalar});
-      if (surface.opacity.by_function) point.opacity *= colours.opacityAt(double{scalar});
-    }
+    const auto valueOf = [&](const std::vector<float>& scalars) {
+      return scalars.empty() ? NAN
+                             : share.x * scalars[corners[0]] + share.y * scalars[corners[1]] +
+                                   share.z * scalars[corners[2]];
+    };
+    const float scalar = surface.by_scalar ? valueOf(mesh.scalars) : NAN;
+    const ColourTable& colours = surface.colours ? *surface.colours : look_.colours;
+    if (!std::isnan(scalar)) point.colour = colours.at(double{scalar});
+    if (!surface.opacity.by_function) return point;
+    const bool has_other = !mesh.opacity_scalars.empty() && look_.opacities;
+    const float of_opacity = has_other ? valueOf(mesh.opacity_scalars) : scalar;
+    if (!std::isnan(of_opacity))
+      point.opacity *= (has_other ? *look_.opacities : colours).opacityAt(double{of_opacity});
     return point;
   }
   bool isOpaque(uint32_t number) const {

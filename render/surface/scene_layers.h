@@ -21,7 +21,8 @@ struct SceneLook {
   std::optional<Light> light;              // none: surfaces have a light at the viewer, slices none
   std::span<const ClipPlane> clip_planes;  // of slices
   double depth_origin = 0;
-  // Of slices whose opacities are a function's: it, and where it is of another scalar, that one's samples.
+  // Of slices and surfaces whose opacities are the picture's function's: it, and where it is of another scalar, that one's
+  // samples of slices.
   const ColourTable* opacities = nullptr;
   std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
   const IsoLayers* isosurfaces = nullptr;

@@ -1,12 +1,14 @@
 // What is shown in a volume, or in its place: surfaces of triangles, slices and isosurfaces that have the scalar's colours.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "render/mesh/triangle_mesh.h"
@@ -21,7 +23,9 @@ inline constexpr size_t kMaxSlices = 8;
 /// How much of what lies behind a surface or a slice it hides.
 struct SheetOpacity {
   double factor = 1;
-  bool by_function = false;  // times the opacity that the transfer function of its colours has for the scalar
+  // Times the opacity that the transfer function of its colours has for the scalar; of two scalars, that of the
+  // opacities for the other.
+  bool by_function = false;
 
   bool opaque() const { return factor >= 1 && !by_function; }
 };
@@ -33,7 +37,7 @@ struct Surface {
   // The transfer function's colours for the mesh's scalars; `colour` where it has none.
   bool by_scalar = false;
   std::shared_ptr<const ColourTable> colours = nullptr;  // in place of those of the picture's function
-  SheetOpacity opacity = {};                             // by_function: where `by_scalar`
+  SheetOpacity opacity = {};  // by_function: where `by_scalar`, or the mesh has opacity_scalars
 };
 
 /// Faces of the grid from its cache, drawn as a Surface at a level of detail that depends on the view.
@@ -51,10 +55,16 @@ struct GridSurface {
   std::shared_ptr<const ColourTable> colours = nullptr;        // as Surface
   std::shared_ptr<const TransferFunction> function = nullptr;  // that `colours` are of
   SheetOpacity opacity = {};
+  // by_function: the scalar of the picture's opacities, among those of `opacity_faces`, which are the same faces, perhaps
+  // in another file; none: `scalar` has the opacities as well.
+  std::shared_ptr<const FacesReader> opacity_faces = nullptr;
+  std::optional<size_t> opacity_scalar = std::nullopt;
+  std::string opacity_name = {};  // in the cache
 
   /// Whether the same patches make the same mesh.
   bool hasMeshOf(const GridSurface& other) const {
-    return faces == other.faces && parts == other.parts && scalar == other.scalar;
+    return faces == other.faces && parts == other.parts && scalar == other.scalar &&
+           opacity_faces == other.opacity_faces && opacity_scalar == other.opacity_scalar;
   }
 };
 
@@ -64,13 +74,20 @@ struct SurfaceScene {
   std::vector<ClipPlane> slices;  // planes; either side
   double slice_opacity = 1;
   bool slices_by_function = false;  // times the function's opacity; of two scalars, of that of the opacities
-  std::vector<double> isovalues;    // of the picture's scalar; in the colours of its function
-  double iso_opacity = 1;
-  bool volume = true;  // false: surfaces, slices and isosurfaces alone
+  std::vector<double> isovalues;    // of the picture's scalar; of two, of that of the opacities
+  bool iso_of_colours = false;      // of two scalars: of that of the colours
+  SheetOpacity iso_opacity = {};    // by_function: the picture's opacities
+  bool volume = true;               // false: surfaces, slices and isosurfaces alone
 
   /// Whether it has nothing that makes layers.
   bool empty() const {
     return surfaces.empty() && grid_surfaces.empty() && slices.empty() && isovalues.empty();
+  }
+  /// Whether any opacity is that of the picture's function.
+  bool usesOpacities() const {
+    return slices_by_function || iso_opacity.by_function ||
+           std::any_of(grid_surfaces.begin(), grid_surfaces.end(),
+                       [](const GridSurface& surface) { return surface.opacity_scalar.has_value(); });
   }
 };
 

@@ -269,25 +269,43 @@ TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
     std::string cache;
     int status;
     std::string words;
-  } refused[] = {{{"--surface", "walls"},
-                  "wake.splats",
-                  1,
-                  "--surface walls names no face of the cache and no file; it has the faces jmin, "},
-                 {{"--surface", "walls"}, "wake.splats", 1, "block 1:k=20, and no boundary conditions"},
-                 {{"--surface", "k=7"}, "wake.splats", 1, "convert --surface \"k=7\" keeps an index plane"},
-                 {{"--surface", "block 2:kmin"}, "wake.splats", 1, "block 2:kmin names no face"},
-                 {{"--surface", "kmin,wing"}, "wake.splats", 1, "--surface wing names no face"},
-                 {{"--surface", "kmin"},
-                  "bare.splats",
-                  1,
-                  "the cache has no surfaces: it was converted with --no-surfaces"},
-                 {{"--surface", "kmin", "--surface-by", "nothing"}, "wake.splats", 1, "--surface-by: "},
-                 {{"--surface-by", "f"}, "wake.splats", 2, "--surface-by f needs faces of the grid"}};
+  } refused[] = {
+      {{"--surface", "walls"},
+       "wake.splats",
+       1,
+       "--surface walls names no face of the cache and no file; it has the faces jmin, "},
+      {{"--surface", "walls"}, "wake.splats", 1, "block 1:k=20, and no boundary conditions"},
+      {{"--surface", "k=7"}, "wake.splats", 1, "convert --surface \"k=7\" keeps an index plane"},
+      {{"--surface", "block 2:kmin"}, "wake.splats", 1, "block 2:kmin names no face"},
+      {{"--surface", "block 9:k=0"},
+       "wake.splats",
+       1,
+       "block 9:k=0 names no face of the cache and no file (the grid has one block, block 1)"},
+      {{"--surface", "kmin,wing"}, "wake.splats", 1, "--surface wing names no face"},
+      {{"--surface", "a.stl", "--surface-opacity", "function", "--surface-by", "f", "--surface", "kmin"},
+       "wake.splats",
+       2,
+       "--surface-opacity: a.stl is a file and has no scalar for a function"},
+      {{"--surface", "kmin", "--surface-opacity", "function"},
+       "wake.splats",
+       2,
+       "--surface-opacity function: needs the scalar of the function; add --surface-by NAME"},
+      {{"--surface", "kmin"},
+       "bare.splats",
+       1,
+       "the cache has no surfaces: it was converted with --no-surfaces"},
+      {{"--surface", "kmin", "--surface-by", "nothing"}, "wake.splats", 1, "--surface-by: "},
+      {{"--surface-by", "f"}, "wake.splats", 2, "--surface-by f needs faces of the grid"}};
   for (const auto& [options, cache, status, words] : refused) {
     const ProgramResult result = render(options, cache);
     EXPECT_EQ(result.status, status) << words << "\n" << result.err;
     EXPECT_NE(result.err.find(words), std::string::npos) << result.err << "  lacks " << words;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+  // No conversion keeps a plane that the grid does not have.
+  for (const char* face : {"block 9:k=0", "k=48"}) {
+    const ProgramResult result = render({"--surface", face});
+    EXPECT_EQ(result.err.find("convert --surface"), std::string::npos) << result.err;
   }
   const ProgramResult plane = runProgram(
       {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("no.splats"), "--surface", "k=200"});

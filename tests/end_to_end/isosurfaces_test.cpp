@@ -90,7 +90,7 @@ class Isosurfaces : public testing::Test {
     options.memory_bytes = resources.memory_bytes;
     auto scene = std::make_shared<SurfaceScene>();
     scene->isovalues = {kValue};
-    scene->iso_opacity = opacity;
+    scene->iso_opacity = {opacity};
     scene->volume = volume;
     options.scene = scene;
     return drawCache(folder_ / "a.splats", table, halfAnnulusCamera(), options, nullptr, resources.backend);

@@ -157,6 +157,105 @@ TEST_F(TwoScalarsTest, SlicesHaveTheOpacitiesOfTheOther) {
   EXPECT_LT(even, 40);
 }
 
+/// Lit from where the viewer is.
+glm::dvec3 lit(const glm::dvec3& colour, double facing) {
+  return glm::min((0.3 + 0.7 * facing) * colour + glm::dvec3(0.25 * std::pow(facing, 32)), glm::dvec3(1.0));
+}
+
+/// The inner cylinder of the half-annulus, jmin, in the colours of the one scalar and with the opacity of the other.
+TEST_F(TwoScalarsTest, SurfacesHaveTheOpacitiesOfTheOther) {
+  constexpr double kInner = 0.3;
+  const KnownFunction function = KnownFunction::of("smooth");
+  const double unit = function.table.opacityUnit();
+  const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+    std::vector<ReferenceLayer> found;
+    const double a = direction.x * direction.x + direction.y * direction.y;
+    const double b = origin.x * direction.x + origin.y * direction.y;
+    const double c = origin.x * origin.x + origin.y * origin.y - kInner * kInner;
+    for (const double sign : {-1.0, 1.0}) {
+      if (b * b <= a * c) break;
+      const double distance = (-b + sign * std::sqrt(b * b - a * c)) / a;
+      const glm::dvec3 at = origin + distance * direction, normal = glm::dvec3(at.x, at.y, 0) / kInner;
+      if (!annulus_->contains(at + 1e-9 * normal)) continue;
+      const double facing = std::abs(glm::dot(normal, direction));
+      const double opacity = -std::expm1(-function.exact(annulus_->scalar(at)).extinction * unit);
+      found.push_back({distance, lit(hues().at(hueAt(at)).colour, facing), opacity});
+    }
+    return found;
+  };
+  const Image reference = marched(function.exact, field_, layers);
+  FrameOptions options = knownFrame(kSize);
+  auto scene = std::make_shared<SurfaceScene>();
+  GridSurface& surface = scene->grid_surfaces.emplace_back();
+  surface.faces = FacesReader::open(folder_ / "a.splats", CacheReader(folder_ / "a.splats").manifest());
+  for (uint32_t n = 0; n < surface.faces->faces().size(); ++n) {
+    const GridFace& face = surface.faces->faces()[n];
+    if (face.axis == 1 && face.side == FaceSide::kMin)
+      surface.parts.push_back({n, {0, 0}, {face.nodes[0] - 1, face.nodes[1] - 1}});
+  }
+  surface.scalar = 1;
+  surface.opacity = {1, true};
+  options.scene = scene;
+  const double of_own = db(drawn(function.table, options), reference);
+  surface.opacity_faces = surface.faces;
+  surface.opacity_scalar = 0;
+  const double of_other = db(drawn(function.table, options), reference);
+  fmt::print("two scalars, surface with the opacity of the other: {:.1f} dB, of its own {:.1f} dB\n",
+             of_other, of_own);
+  EXPECT_GE(of_other, 74);
+  EXPECT_LT(of_own, 38);
+}
+
+/// The isosurface of the colours' scalar, as opaque as the other scalar's function has it there.
+TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
+  constexpr double kValue = 0.6;
+  const KnownFunction function = KnownFunction::of("smooth");
+  const double unit = function.table.opacityUnit();
+  const auto gradientAt = [](const glm::dvec3& at) {
+    glm::dvec3 gradient;
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 step(0.0);
+      step[axis] = 1e-5;
+      gradient[axis] = hueAt(at + step) - hueAt(at - step);
+    }
+    return glm::normalize(gradient);
+  };
+  const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+    std::vector<ReferenceLayer> found;
+    constexpr double kStep = 0.005;
+    for (double t = 0; t < 12; t += kStep) {
+      const glm::dvec3 from = origin + t * direction, to = origin + (t + kStep) * direction;
+      if ((hueAt(from) < kValue) == (hueAt(to) < kValue) || !annulus_->contains(from) ||
+          !annulus_->contains(to))
+        continue;
+      const double part = (kValue - hueAt(from)) / (hueAt(to) - hueAt(from));
+      const glm::dvec3 at = from + part * (to - from);
+      const double opacity = -std::expm1(-function.exact(annulus_->scalar(at)).extinction * unit);
+      const double facing = std::abs(glm::dot(gradientAt(at), direction));
+      found.push_back({t + part * kStep, lit(hues().at(kValue).colour, facing), 0.9 * opacity});
+    }
+    return found;
+  };
+  const Image reference = marched(function.exact, field_, layers);
+  FrameOptions options = knownFrame(kSize);
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->isovalues = {kValue};
+  scene->iso_of_colours = true;
+  scene->iso_opacity = {0.9, false};
+  options.scene = scene;
+  const double even = db(drawn(function.table, options), reference);
+  scene->iso_opacity.by_function = true;
+  const Image picture = drawn(function.table, options);
+  const double by_function = db(picture, reference);
+  fmt::print("two scalars, isosurface with the opacity of the other: {:.1f} dB, evenly {:.1f} dB\n",
+             by_function, even);
+  EXPECT_GE(by_function, 67);
+  EXPECT_LT(even, 35);
+  options.threads = 1;
+  options.memory_bytes = uint64_t{96} << 20;
+  EXPECT_EQ(drawn(function.table, options).rgba, picture.rgba);
+}
+
 TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
   // Where the isosurface of the one scalar is, the other's colours are.
   FrameOptions options = knownFrame(kSize);
@@ -250,6 +349,21 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
   EXPECT_EQ(readImage(output).rgba, once.rgba) << rest;
 
   EXPECT_EQ(run({"--scalar", "s1", "--iso-by", "s0", "--iso", "0.5", "--volume", "off"}).status, 0);
+  // Faces and isosurfaces with the opacities of the other.
+  const std::vector<std::string> two{"--scalar", "s1", "--opacity-by", "s0"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), two.begin(), two.end());
+    const ProgramResult result = run(more);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return readImage(output);
+  };
+  const Image plain = with({"--surface", "jmin"}),
+              seen = with({"--surface", "jmin", "--surface-opacity", "function"});
+  EXPECT_LT(db(seen, plain), 40);
+  EXPECT_LT(db(with({"--surface", "jmin", "--surface-opacity", "function*0.5"}), seen), 45);
+  const Image of_colours = with({"--iso-by", "s1", "--iso", "0.6"});
+  EXPECT_LT(db(with({"--iso", "0.6"}), of_colours), 40);
+  EXPECT_LT(db(with({"--iso-by", "s1", "--iso", "0.6", "--iso-opacity", "function"}), of_colours), 40);
   const struct {
     std::vector<std::string> options;
     int status;

@@ -1,5 +1,10 @@
 // The window on a series of time steps: slider, play and step keys.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <string>
 
 #include "tests/end_to_end/window_fixture.h"
 #include "tools/viewer/playback.h"
@@ -98,6 +103,41 @@ TEST_F(WindowPlayback, OpensAtAStep) {
   ASSERT_EQ(commands.size(), 1u);
   EXPECT_EQ(valueOf(commands[0], "--step"), "2");
   expectDraws(commands[0], picture);
+}
+
+/// A grid that moves: a shown face of it moves too.
+TEST_F(WindowPlayback, FacesMoveWithTheGrid) {
+  constexpr int kNodes[3] = {16, 12, 8};
+  for (int step = 0; step < 3; ++step) {
+    std::ofstream file(fmt::format("m_{}.vts", step));
+    const std::string extent = fmt::format("0 {} 0 {} 0 {}", kNodes[0] - 1, kNodes[1] - 1, kNodes[2] - 1);
+    std::string points, values;
+    for (int k = 0; k < kNodes[2]; ++k)
+      for (int j = 0; j < kNodes[1]; ++j)
+        for (int i = 0; i < kNodes[0]; ++i) {
+          points += fmt::format("{} {} {} ", i, j, k + 1.5 * step * std::sin(0.4 * i));
+          values += fmt::format("{} ", std::sin(0.3 * i) + 0.2 * j);
+        }
+    file << "<VTKFile type=\"StructuredGrid\" version=\"1.0\"><StructuredGrid WholeExtent=\"" << extent
+         << "\"><Piece Extent=\"" << extent
+         << "\"><PointData><DataArray type=\"Float32\" Name=\"f\" format=\"ascii\">" << values
+         << "</DataArray></PointData><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" "
+            "format=\"ascii\">"
+         << points << "</DataArray></Points></Piece></StructuredGrid></VTKFile>\n";
+  }
+  run({"convert", "m_%d.vts", "-o", "a.splats", "--overwrite"});
+  open({"--surface", "kmax", "--surface-colour", "#306090", "--volume", "off"});
+  const Image first = saveAndCopy();
+  press("period");
+  const Image second = saveAndCopy();
+  press("comma");
+  const Image again = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 3u);
+  EXPECT_LT(difference(first, second), 30);
+  EXPECT_GT(difference(first, again), 60);
+  expectDraws(commands[0], first);
+  expectDraws(commands[1], second);
 }
 
 }  // namespace

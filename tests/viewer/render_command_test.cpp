@@ -41,9 +41,9 @@ TEST(RenderCommand, HasEveryOption) {
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
   state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
-  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}}};
+  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25}};
   state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
-  state.slice_opacity = 0.5;
+  state.slice_opacity = {0.5, true};
   state.volume = false;
   state.lit = state.dark = true;
   state.annotations.axes = false;
@@ -67,7 +67,8 @@ TEST(RenderCommand, HasEveryOption) {
                                                 "--surface /a/wing.stl",
                                                 "--surface-colour '#ff8000'",
                                                 "--slice 0,0.25,0,0,-1,2",
-                                                "--slice-opacity 0.5",
+                                                "--surface-opacity 0.25",
+                                                "--slice-opacity 'function*0.5'",
                                                 "--volume off"});
 }
 

@@ -31,9 +31,9 @@ ViewState changedState() {
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
   state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
-  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}}};
+  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25}};
   state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
-  state.slice_opacity = 0.5;
+  state.slice_opacity = {0.5, true};
   state.volume = false;
   state.lit = true;
   state.dark = true;
@@ -59,7 +59,8 @@ TEST(ViewState, ComesBackFromItsText) {
 
 TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   auto json = nlohmann::json::parse(toJson(changedState()));
-  for (const char* field : {"clip_planes", "surfaces", "slices", "slice_opacity", "volume"})
+  for (const char* field :
+       {"clip_planes", "surfaces", "slices", "slice_opacity", "slices_by_function", "volume"})
     json.erase(field);
   json.erase("lit");
   const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
@@ -104,6 +105,8 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/slices/0/normal", nlohmann::json::array({0, 0, 0}), "slices[0].normal");
   expectError("/surfaces/0/colour", nlohmann::json::array({0, 0, 2}), "surfaces[0].colour");
   expectError("/slice_opacity", 2, "slice_opacity");
+  expectError("/slices_by_function", 2, "slices_by_function");
+  expectError("/surfaces/0/opacity", 0, "surfaces[0].opacity");
   expectError("/clip_planes/1/normal", nlohmann::json::array({0, 0, 0}), "clip_planes[1].normal");
   expectError("/dark", "yes", "dark");
   expectError("/function", 5, "preset");

@@ -79,7 +79,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkMotionArguments(arguments.camera, arguments.steps);
   checkFunctionArguments(arguments.scalar);
   checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
-  checkSurfaceArguments(arguments.surfaces);
+  checkSurfaceArguments(arguments.surfaces, !arguments.opacity.by.scalar.empty());
   checkAnnotationArguments(arguments.annotations);
   checkOutputName(arguments.output, severalFrames(arguments), size);
   checkPartArguments(arguments);
@@ -210,7 +210,8 @@ void render(const RenderArguments& given) {
     if (!scalars.colour) break;
   }
 
-  options.scene = sceneOf(arguments.surfaces, cache, shown, variable);
+  options.scene = sceneOf(arguments.surfaces, cache,
+                          {shown, variable, isoOfColours(arguments.opacity, arguments.scalar)});
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <filesystem>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,16 +40,19 @@ struct ViewArguments {
 
 /// The surfaces and slices of the command line.
 void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerOptions& options) {
-  requireFixedFaces(arguments.surfaces, cache);
   // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
-  options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),
-                          std::numeric_limits<size_t>::max());
+  options.scene = sceneOf(arguments.surfaces, cache, {});
   for (const std::string& surface : arguments.surfaces.surfaces)
     if (isSurfaceFile(surface))
       options.surface_files.emplace_back(surface);
     else
       options.face_names.emplace_back(surface);
   options.faces_by = arguments.surfaces.surface_by;
+  if (cache.series().steps.size() > 1 && hasFaces(arguments.surfaces))
+    options.faces_at = [surfaces = arguments.surfaces](const CacheReader& at_step,
+                                                       const std::vector<GridSurface>& first) {
+      return facesAt(surfaces, at_step, first);
+    };
 }
 
 /// What needs a cache from the beginning.
@@ -117,7 +119,6 @@ void view(const ViewArguments& arguments) {
   options.conversion = conversionServices();
   if (!arguments.files.empty() && !isGrid(arguments.files)) {
     cache = openAtStep(arguments.files.front(), arguments.steps);
-    requireFixedFaces(arguments.surfaces, *cache);
     takeScene(arguments, *cache, options);
   } else if (!arguments.files.empty()) {
     options.files = arguments.files;

@@ -127,11 +127,26 @@ class FaceFinder {
   GridSurface& surface_;
 };
 
+bool lacksBlock(const FaceName& name, const Manifest& manifest) {
+  return name.block && *name.block >= manifest.blocks.size();
+}
+
+/// Whether a conversion can keep this plane: some block of the name reaches so far.
+bool canBeKept(const FaceName& name, const Manifest& manifest) {
+  if (name.at != FaceName::At::kIndex) return false;
+  for (uint32_t n = 0; n < manifest.blocks.size(); ++n) {
+    const BlockInfo& block = manifest.blocks[n];
+    const uint64_t nodes = name.axis == 0 ? block.ni : name.axis == 1 ? block.nj : block.nk;
+    if (name.block.value_or(n) == n && name.index < nodes) return true;
+  }
+  return false;
+}
+
 /// What is wrong with a name that no face has: a block that there is not, or a letter.
 std::string meantBy(const std::string& word, const Manifest& manifest, const FacesReader& faces) {
   const auto name = parseFaceName(word);
   const size_t blocks = manifest.blocks.size();
-  if (word.starts_with("block") && (!name || name->at != FaceName::At::kIndex))
+  if (word.starts_with("block") && (!name || name->at != FaceName::At::kIndex || lacksBlock(*name, manifest)))
     return blocks == 1 ? " (the grid has one block, block 1)"
                        : fmt::format(" (the grid has blocks 1 to {})", blocks);
   std::vector<std::string> names{"imin", "imax", "jmin", "jmax", "kmin", "kmax", "all", "walls"};
@@ -168,7 +183,7 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
     word.erase(0, word.find_first_not_of(' '));
     if (finder.add(word)) continue;
     const auto name = parseFaceName(word);
-    const bool is_plane = name && name->at == FaceName::At::kIndex;
+    const bool is_plane = name && canBeKept(*name, cache.manifest());
     throw Error("{}: --surface {} names no face of the cache and no file{}; {}{}", path,
                 word.empty() ? text : word, meantBy(word, cache.manifest(), *faces), whatThereIs(*faces),
                 is_plane ? fmt::format("; convert --surface \"{}\" keeps an index plane", word) : "");
@@ -191,14 +206,31 @@ std::shared_ptr<const FacesReader> facesWith(const std::string& name, const Cach
       if (auto faces = FacesReader::open(cache.path(), cache.manifest(), facesFileOfVariable(added.number)))
         if (faces->scalarOf(number)) return faces;
   }
-  throw Error(
-      "{}: --surface-by {}: an earlier version added {} without the values of the faces; convert again",
-      cache.cachePath().string(), name, step != first ? fmt::format("step {}", step) : "the scalar");
+  throw Error("{}: the faces have no values of {}: an earlier version added {} without them; convert again",
+              cache.cachePath().string(), name, step != first ? fmt::format("step {}", step) : "the scalar");
 }
 
-void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache, size_t drawn) {
+std::optional<size_t> scalarOfFaces(const FacesReader& faces, const std::string& name,
+                                    const CacheReader& cache) {
+  return faces.scalarOf(cache.manifest().variables[variableOf(name, cache)].number);
+}
+
+void takeOpacities(GridSurface& surface, const std::string& name, const CacheReader& cache) {
+  surface.opacity_faces = facesWith(name, cache);
+  // One reader where both scalars are in the same file.
+  if (surface.opacity_faces->path() == surface.faces->path()) surface.opacity_faces = surface.faces;
+  if (surface.opacity_faces->patches().size() != surface.faces->patches().size())
+    throw Error("{}: has {} patches of faces (expected {}, as {}); convert again",
+                surface.opacity_faces->path().string(), surface.opacity_faces->patches().size(),
+                surface.faces->patches().size(), surface.faces->path().string());
+  surface.opacity_scalar = scalarOfFaces(*surface.opacity_faces, name, cache);
+  surface.opacity_name = name;
+}
+
+void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache,
+                    std::optional<size_t> drawn) {
   const size_t variable = variableOf(name, cache);
-  surface.scalar = surface.faces->scalarOf(cache.manifest().variables[variable].number);
+  surface.scalar = scalarOfFaces(*surface.faces, name, cache);
   if (variable == drawn) return;
   ScalarArguments arguments;
   arguments.scalar = name;

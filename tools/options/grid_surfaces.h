@@ -1,6 +1,8 @@
 // Finds the faces of a cache's grid by the names that users give: kmin, "block 3:k=min", walls, a boundary's name.
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "render/surface/surface_scene.h"
@@ -19,6 +21,14 @@ std::shared_ptr<const FacesReader> facesWith(const std::string& name, const Cach
 
 /// Colours the surface, whose faces have it, by the scalar `name`: the picture's colours if it is the scalar `drawn`,
 /// else those that are chosen from its own data.
-void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache, size_t drawn);
+void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache,
+                    std::optional<size_t> drawn);
+
+/// Takes the surface's opacities from the scalar `name`, at the cache's step.
+void takeOpacities(GridSurface& surface, const std::string& name, const CacheReader& cache);
+
+/// The scalar's position among those of the faces.
+std::optional<size_t> scalarOfFaces(const FacesReader& faces, const std::string& name,
+                                    const CacheReader& cache);
 
 }  // namespace curvisplat

@@ -53,9 +53,14 @@ void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std
       ->group(group);
   command
       .add_option("--iso-by", arguments.iso_scalar,
-                  "Name of the scalar whose isosurfaces --iso draws, in the colours of --scalar; with the "
-                  "volume, that of --opacity-by (default: that, or the --scalar)")
+                  "Name of the scalar whose isosurfaces --iso draws, in the colours of --scalar; with "
+                  "--opacity-by, one of the two (default: that of --opacity-by, or the --scalar)")
       ->group(surfaces_group);
+}
+
+bool isoOfColours(const OpacityArguments& arguments, const ScalarArguments& scalar) {
+  return !arguments.by.scalar.empty() && !arguments.iso_scalar.empty() &&
+         arguments.iso_scalar != arguments.by.scalar && arguments.iso_scalar == scalar.scalar;
 }
 
 void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArguments& scalar,
@@ -63,11 +68,13 @@ void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArgume
   if (!arguments.iso_scalar.empty()) {
     if (surfaces.isovalues.empty())
       throw UsageError("--iso-by {}: needs an isosurface: --iso VALUE", arguments.iso_scalar);
-    if (!arguments.by.scalar.empty() && arguments.by.scalar != arguments.iso_scalar)
+    if (!arguments.by.scalar.empty() && arguments.by.scalar != arguments.iso_scalar &&
+        !isoOfColours(arguments, scalar))
       throw UsageError(
-          "--iso-by {}: a picture has two scalars, and the isosurfaces are those of --opacity-by {}; leave "
-          "one of the two out",
-          arguments.iso_scalar, arguments.by.scalar);
+          "--iso-by {}: a picture has two scalars, and the isosurfaces are those of --opacity-by {} or of "
+          "--scalar; "
+          "add --scalar {}, or leave one of the two out",
+          arguments.iso_scalar, arguments.by.scalar, arguments.iso_scalar);
     if (arguments.by.scalar.empty() && surfaces.volume == "on")
       throw UsageError(
           "--iso-by {}: with the volume, its opacities are that scalar's: add --opacity-by {}, "

@@ -22,6 +22,9 @@ struct OpacityArguments {
 void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std::string& group,
                        const std::string& surfaces_group);
 
+/// Whether the isosurfaces of a picture of two scalars are those of the colours.
+bool isoOfColours(const OpacityArguments& arguments, const ScalarArguments& scalar);
+
 /// Throws UsageError if options contradict each other: without a look at any file.
 void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArguments& scalar,
                            const SurfaceArguments& surfaces);

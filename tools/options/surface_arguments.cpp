@@ -56,10 +56,11 @@ SheetOpacity surfaceOpacity(const SurfaceArguments& arguments, size_t n) {
                        : parseSheetOpacity("--surface-opacity", texts.size() == 1 ? texts[0] : texts.at(n));
 }
 
-void checkSurfaceOpacities(const SurfaceArguments& arguments) {
+void checkSurfaceOpacities(const SurfaceArguments& arguments, bool has_opacities) {
   const auto& texts = arguments.surface_opacities;
   for (const std::string& text : texts)
-    if (parseSheetOpacity("--surface-opacity", text).by_function && arguments.surface_by.empty())
+    if (parseSheetOpacity("--surface-opacity", text).by_function && arguments.surface_by.empty() &&
+        !has_opacities)
       throw UsageError("--surface-opacity {}: needs the scalar of the function; add --surface-by NAME", text);
   if (texts.size() > 1 && texts.size() != arguments.surfaces.size())
     throw UsageError(
@@ -67,6 +68,13 @@ void checkSurfaceOpacities(const SurfaceArguments& arguments) {
         texts.size(), arguments.surfaces.size());
   if (!texts.empty() && arguments.surfaces.empty())
     throw UsageError("--surface-opacity needs a surface: --surface FILE");
+  for (size_t n = 0; n < arguments.surfaces.size(); ++n)
+    if (surfaceOpacity(arguments, n).by_function && isSurfaceFile(arguments.surfaces[n]))
+      throw UsageError(
+          "--surface-opacity: {} is a file and has no scalar for a function; give a number for it, and an "
+          "opacity for "
+          "each --surface in their order",
+          arguments.surfaces[n]);
 }
 
 std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
@@ -78,14 +86,6 @@ std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
       begin = end + 1;
     }
   return values;
-}
-
-double parseIsoOpacity(const std::string& text) {
-  if (text.empty()) return 1;
-  const double opacity = parseNumber("--iso-opacity", text);
-  if (!(opacity > 0 && opacity <= 1))
-    throw UsageError("--iso-opacity {}: expected a number above 0 and at most 1", text);
-  return opacity;
 }
 
 glm::vec3 parseColour(const std::string& text) {
@@ -100,9 +100,10 @@ TriangleMesh meshFromFile(const std::filesystem::path& path) {
   return meshOf({std::move(surface.points), std::move(surface.triangles)});
 }
 
-void requireIsovalues(const SurfaceScene& scene, const CacheReader& cache, size_t drawn) {
-  if (drawn >= cache.manifest().variables.size()) return;  // of a window, which may show any
-  const VariableInfo& info = cache.manifest().variables[drawn];
+void requireIsovalues(const SurfaceScene& scene, const CacheReader& cache, const SceneScalars& scalars) {
+  const auto& variable = scalars.iso_of_colours ? scalars.colours : scalars.opacities;
+  if (!variable) return;
+  const VariableInfo& info = cache.manifest().variables[*variable];
   for (const double value : scene.isovalues)
     if (!(value >= info.min && value <= info.max))
       throw Error("--iso {}: no isosurface: the values of {} go from {:.6g} to {:.6g}", value, info.name,
@@ -135,9 +136,11 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
           "is drawn, else colours chosen from its data")
       ->group(group);
   command
-      .add_option("--surface-opacity", arguments.surface_opacities,
-                  "Opacity of the surfaces, above 0 and at most 1, or one for each in their order (default "
-                  "1); function: by the transfer function of the --surface-by scalar")
+      .add_option(
+          "--surface-opacity", arguments.surface_opacities,
+          "Opacity of the surfaces, above 0 and at most 1, or one for each in their order (default "
+          "1); function: by the transfer function of the --surface-by scalar, or with --opacity-by that of "
+          "its scalar; function*NUMBER: NUMBER times that")
       ->take_all()
       ->allow_extra_args(false)
       ->group(group);
@@ -162,8 +165,11 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->allow_extra_args(false)
       ->group(group);
   command
-      .add_option("--iso-opacity", arguments.iso_opacity,
-                  "Opacity of the isosurfaces, above 0 and at most 1 (default 1)")
+      .add_option(
+          "--iso-opacity", arguments.iso_opacity,
+          "Opacity of the isosurfaces, above 0 and at most 1; function: by the transfer function (that of "
+          "--opacity-by, if given); function*NUMBER: NUMBER times that")
+      ->capture_default_str()
       ->group(group);
   command
       .add_option("--volume", arguments.volume, "on, or off to draw surfaces, slices and isosurfaces alone")
@@ -171,10 +177,10 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->group(group);
 }
 
-void checkSurfaceArguments(const SurfaceArguments& arguments) {
+void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities) {
   parseSlices(arguments.slices);
   parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
-  checkSurfaceOpacities(arguments);
+  checkSurfaceOpacities(arguments, has_opacities);
   for (const std::string& colour : arguments.colours) parseColour(colour);
   if (arguments.colours.size() > 1 && arguments.colours.size() != arguments.surfaces.size())
     throw UsageError(
@@ -187,8 +193,8 @@ void checkSurfaceArguments(const SurfaceArguments& arguments) {
     throw UsageError("--surface-by {} needs faces of the grid, such as --surface kmin", arguments.surface_by);
   requireChoice("--volume", arguments.volume, {"on", "off"});
   parseIsovalues(arguments.isovalues);
-  parseIsoOpacity(arguments.iso_opacity);
-  if (!arguments.iso_opacity.empty() && arguments.isovalues.empty())
+  const SheetOpacity of_isosurfaces = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
+  if (!of_isosurfaces.opaque() && arguments.isovalues.empty())
     throw UsageError("--iso-opacity needs an isosurface: --iso VALUE");
   if (arguments.volume == "off" && arguments.surfaces.empty() && arguments.slices.empty() &&
       arguments.isovalues.empty())
@@ -211,36 +217,37 @@ bool hasFaces(const SurfaceArguments& arguments) {
   return !std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile);
 }
 
-std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
-                                            const std::shared_ptr<const SurfaceScene>& first) {
+std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                 const std::vector<GridSurface>& first) {
   const bool moves = cache.series().geometries() > 1;
-  if (!first || !hasFaces(arguments) || (!moves && arguments.surface_by.empty())) return first;
-  auto scene = std::make_shared<SurfaceScene>(*first);
+  const bool has_opacities = std::any_of(first.begin(), first.end(), [](const GridSurface& surface) {
+    return surface.opacity_scalar.has_value();
+  });
+  if (first.empty() || (!moves && arguments.surface_by.empty() && !has_opacities)) return first;
+  std::vector<GridSurface> surfaces = first;
   const auto faces = facesWith(arguments.surface_by, cache);
   size_t of_grid = 0;
   for (const std::string& text : arguments.surfaces) {
     if (isSurfaceFile(text)) continue;
-    GridSurface& surface = scene->grid_surfaces[of_grid++];
-    GridSurface named = gridSurfaceNamed(text, cache, faces);
+    GridSurface& surface = surfaces.at(of_grid++);
     surface.faces = faces;
-    surface.parts = std::move(named.parts);
-    if (!surface.scalar) continue;
-    const size_t variable = cache.variableNamed(arguments.surface_by);
-    surface.scalar = faces->scalarOf(cache.manifest().variables[variable].number);
+    surface.parts = gridSurfaceNamed(text, cache, faces).parts;
+    if (surface.scalar) surface.scalar = scalarOfFaces(*faces, arguments.surface_by, cache);
+    if (surface.opacity_scalar) takeOpacities(surface, surface.opacity_name, cache);
   }
+  return surfaces;
+}
+
+std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            const std::shared_ptr<const SurfaceScene>& first) {
+  if (!first || first->grid_surfaces.empty()) return first;
+  auto scene = std::make_shared<SurfaceScene>(*first);
+  scene->grid_surfaces = facesAt(arguments, cache, first->grid_surfaces);
   return scene;
 }
 
-void requireFixedFaces(const SurfaceArguments& arguments, const CacheReader& cache) {
-  if (hasFaces(arguments) && cache.series().geometries() > 1)
-    throw Error(
-        "{}: --surface: the grid of the series moves, and the window shows faces of one step; render draws "
-        "them",
-        cache.cachePath().string());
-}
-
 std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
-                                            size_t drawn, size_t classified) {
+                                            const SceneScalars& scalars) {
   if (!arguments.given()) return nullptr;
   auto scene = std::make_shared<SurfaceScene>();
   const auto faces = hasFaces(arguments) ? facesWith(arguments.surface_by, cache) : nullptr;
@@ -260,16 +267,19 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
         scene->grid_surfaces.emplace_back(gridSurfaceNamed(arguments.surfaces[n], cache, faces));
     surface.colour = colour;
     surface.opacity = surfaceOpacity(arguments, n);
-    if (!arguments.surface_by.empty()) colourByScalar(surface, arguments.surface_by, cache, drawn);
+    if (!arguments.surface_by.empty()) colourByScalar(surface, arguments.surface_by, cache, scalars.colours);
+    if (surface.opacity.by_function && scalars.areTwo())
+      takeOpacities(surface, cache.manifest().variables[*scalars.opacities].name, cache);
   }
   scene->slices = parseSlices(arguments.slices);
   const SheetOpacity of_slices = parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
   scene->slice_opacity = of_slices.factor;
   scene->slices_by_function = of_slices.by_function;
   scene->isovalues = parseIsovalues(arguments.isovalues);
-  scene->iso_opacity = parseIsoOpacity(arguments.iso_opacity);
+  scene->iso_opacity = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
+  scene->iso_of_colours = scalars.iso_of_colours;
   scene->volume = arguments.volume == "on";
-  requireIsovalues(*scene, cache, classified);
+  requireIsovalues(*scene, cache, scalars);
   return scene;
 }
 

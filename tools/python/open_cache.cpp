@@ -85,7 +85,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     const CameraArguments camera = choice.camera(arguments.camera, function, frame.size);
     const CameraMotion motion =
         chooseCameraMotion(camera, manifest.lower * frame.scale, manifest.upper * frame.scale, frame.size);
-    frame.scene = sceneOf(arguments.surfaces, reader_, variable, variable);
+    frame.scene = sceneOf(arguments.surfaces, reader_, {variable, variable});
     image = rendererOf(variable, arguments.backend, function)
                 .render(motion.camera(0), frame, picture.statistics, &of_work);
     picture.chosen = choice.chosenOptions();

@@ -51,6 +51,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
                      Reports& reports, FileDialog& dialog, std::shared_future<void> after)
     : cache_(prepared.cache.atStep(prepared.cache.step())),
       target_s_(options.target_s),
+      faces_at_(options.faces_at),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
@@ -235,6 +236,7 @@ void CacheView::ask(bool moving) {
   request.moving = moving;
   request.step = playback_.step();
   request.next_step = playback_.next();
+  request.faces_at = faces_at_;
   if (frames_failed_) restartFrames();
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
   request_ = frames_->request(std::move(request));

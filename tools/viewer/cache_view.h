@@ -123,6 +123,7 @@ class CacheView {
 
   const CacheReader cache_;
   const std::optional<double> target_s_;
+  const FacesAtStep faces_at_;
   const std::optional<Preview> preview_;
   const std::vector<std::filesystem::path> grid_files_;  // that were opened, if the cache is kept for them
   Window& window_;

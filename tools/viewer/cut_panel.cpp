@@ -113,13 +113,15 @@ void CutPanel::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const Vie
 
 /// Without a slice or a surface there is nothing to show but the volume.
 void CutPanel::drawSlices(ViewState& state, PanelActions& actions) {
-  auto opacity = static_cast<float>(state.slice_opacity);
+  auto opacity = static_cast<float>(state.slice_opacity.factor);
   label("opacity");
   if (ImGui::SliderFloat("##opacity", &opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
-    state.slice_opacity = static_cast<double>(opacity);
+    state.slice_opacity.factor = static_cast<double>(opacity);
     actions.changed = true;
   }
   actions.dragging |= ImGui::IsItemActive();
+  actions.changed |= ImGui::Checkbox("times the function's", &state.slice_opacity.by_function);
+  nameWidget("slices by function");
   const bool alone =
       state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty();
   ImGui::BeginDisabled(alone);

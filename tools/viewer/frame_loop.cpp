@@ -54,7 +54,31 @@ struct FrameLoop::Drawing {
   std::optional<FrameRequest> last;  // that was drawn
   bool keeps_going = false;          // past damaged bricks, since one was met
   Effort effort;
+
+  struct Faces {
+    uint64_t step = 0;
+    std::vector<GridSurface> given, there;
+  };
+  Faces faces;  // of the last step
+
+  void takeFaces(const CacheReader& cache, FrameRequest& request);
 };
+
+/// The request's faces at its step. The same ones as for the last request, where they can be: their meshes are kept.
+void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& request) {
+  const auto& scene = request.options.scene;
+  if (!request.faces_at || !scene || scene->grid_surfaces.empty()) return;
+  const auto same_mesh = [](const GridSurface& a, const GridSurface& b) { return a.hasMeshOf(b); };
+  if (faces.step != request.step || !std::ranges::equal(faces.given, scene->grid_surfaces, same_mesh)) {
+    faces = {};  // if it throws
+    const auto at_step = [&](const CacheReader& its) { return request.faces_at(its, scene->grid_surfaces); };
+    faces = {request.step, scene->grid_surfaces,
+             cache.step() == request.step ? at_step(cache) : at_step(cache.atStep(request.step))};
+  }
+  auto moved = std::make_shared<SurfaceScene>(*scene);
+  moved->grid_surfaces = faces.there;
+  request.options.scene = std::move(moved);
+}
 
 FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
                      std::shared_future<void> after)
@@ -186,8 +210,9 @@ void FrameLoop::serveDamaged(Drawing& drawing, FrameRequest& request, const std:
   serve();
 }
 
-void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
+void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
   preparePlayer(drawing, request);
+  drawing.takeFaces(cache_, request);
   FrameRenderer& renderer = drawing.player->renderer();
   {
     const MutexLock lock(mutex_);
@@ -247,6 +272,7 @@ void FrameLoop::preparePlayer(Drawing& drawing, const FrameRequest& request) {
 /// the pixels take a quarter of the time.
 void FrameLoop::findValues(Drawing& drawing, FrameRequest request, uint64_t number) {
   preparePlayer(drawing, request);
+  drawing.takeFaces(cache_, request);
   ShownValues found;
   found.request = number;
   found.step = request.step;

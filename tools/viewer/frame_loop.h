@@ -39,6 +39,10 @@
 
 namespace curvisplat {
 
+/// The faces of the grid at the cache's step, in the place of those of another step. Called on the loop's thread; throws Error.
+using FacesAtStep =
+    std::function<std::vector<GridSurface>(const CacheReader&, const std::vector<GridSurface>&)>;
+
 struct FrameRequest {
   DrawnScalars scalars;
   uint64_t function_version = 0;  // changes whenever a function changes
@@ -49,6 +53,7 @@ struct FrameRequest {
   uint64_t step = 0;                       // time step
   bool wants_bytes = true;                 // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
   std::optional<uint64_t> next_step = {};  // is likely to be wanted next, with this camera: read ahead
+  FacesAtStep faces_at = {};               // of options.scene; none: they are those of every step
 };
 
 struct ShownFrame {
@@ -127,7 +132,7 @@ class FrameLoop {
 
   void loop();
   void serveDamaged(Drawing& drawing, FrameRequest& request, const std::function<void()>& serve);
-  void serve(Drawing& drawing, const FrameRequest& request, uint64_t number);
+  void serve(Drawing& drawing, FrameRequest request, uint64_t number);
   void preparePlayer(Drawing& drawing, const FrameRequest& request);
   void readAhead(Drawing& drawing, const FrameRequest& request);
   void findValues(Drawing& drawing, FrameRequest request, uint64_t number);

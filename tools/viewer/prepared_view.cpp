@@ -18,8 +18,8 @@ void takeScene(const ViewerOptions& options, ViewState& state) {
   const SurfaceScene& scene = *options.scene;
   state.surfaces.clear();
   for (size_t n = 0; n < scene.surfaces.size(); ++n)
-    state.surfaces.push_back(
-        {fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour, scene.surfaces[n].mesh});
+    state.surfaces.push_back({fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour,
+                              scene.surfaces[n].mesh, scene.surfaces[n].opacity.factor});
   state.faces.clear();
   for (size_t n = 0; n < scene.grid_surfaces.size(); ++n)
     state.faces.push_back({options.face_names.at(n), scene.grid_surfaces[n]});
@@ -27,7 +27,7 @@ void takeScene(const ViewerOptions& options, ViewState& state) {
   state.isovalues = scene.isovalues;
   state.iso_opacity = scene.iso_opacity;
   state.slices = scene.slices;
-  state.slice_opacity = scene.slice_opacity;
+  state.slice_opacity = {scene.slice_opacity, scene.slices_by_function};
   state.volume = scene.volume;
 }
 

@@ -101,6 +101,21 @@ std::string text(const ClipPlane& plane) {
   return numbers(plane.point, size) + "," + numbers(plane.normal, glm::length(plane.normal));
 }
 
+std::string text(const SheetOpacity& opacity) {
+  if (!opacity.by_function) return number(opacity.factor);
+  return opacity.factor == 1 ? "function" : "function*" + number(opacity.factor);
+}
+
+/// Once for each surface, where any is not opaque.
+void addSurfaceOpacities(const ViewState& state, Words& words) {
+  std::vector<SheetOpacity> opacities;
+  for (const SurfaceFile& surface : state.surfaces) opacities.push_back({surface.opacity});
+  for (const NamedFaces& named : state.faces) opacities.push_back(named.surface.opacity);
+  if (std::all_of(opacities.begin(), opacities.end(), [](const SheetOpacity& one) { return one.opaque(); }))
+    return;
+  for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
+}
+
 void addSurfaces(const ViewState& state, Words& words) {
   const auto add_colour = [&](const glm::vec3& colour) {
     const glm::ivec3 rgb(255.0f * colour + 0.5f);
@@ -110,13 +125,14 @@ void addSurfaces(const ViewState& state, Words& words) {
   for (const NamedFaces& named : state.faces) words.add("--surface", named.name);
   for (const SurfaceFile& surface : state.surfaces) add_colour(surface.colour);
   for (const NamedFaces& named : state.faces) add_colour(named.surface.colour);
+  addSurfaceOpacities(state, words);
   if (!state.faces_by.empty()) words.add("--surface-by", state.faces_by);
   for (const ClipPlane& plane : state.slices) words.add("--slice", text(plane));
-  if (state.slice_opacity != 1 && !state.slices.empty())
-    words.add("--slice-opacity", number(state.slice_opacity));
+  if (!state.slice_opacity.opaque() && !state.slices.empty())
+    words.add("--slice-opacity", text(state.slice_opacity));
   if (!state.isovalues.empty()) {
     words.add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
-    words.add("--iso-opacity", number(state.iso_opacity));
+    words.add("--iso-opacity", text(state.iso_opacity));
   }
   if (!state.volume &&
       !(state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty()))

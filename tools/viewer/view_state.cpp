@@ -187,10 +187,12 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   if (!surfaces.empty() || !faces.empty() || !slices.empty() || !isovalues.empty()) {
     auto scene = std::make_shared<SurfaceScene>();
     for (const SurfaceFile& surface : surfaces)
-      if (surface.mesh) scene->surfaces.push_back({surface.mesh, surface.colour});
+      if (surface.mesh)
+        scene->surfaces.push_back({surface.mesh, surface.colour, false, nullptr, {surface.opacity}});
     for (const NamedFaces& named : faces) scene->grid_surfaces.push_back(named.surface);
     scene->slices = slices;
-    scene->slice_opacity = slice_opacity;
+    scene->slice_opacity = slice_opacity.factor;
+    scene->slices_by_function = slice_opacity.by_function;
     scene->isovalues = isovalues;
     scene->iso_opacity = iso_opacity;
     scene->volume = volume;
@@ -249,10 +251,12 @@ std::string toJson(const ViewState& state) {
   json["clip_planes"] = jsonOf(state.clip_planes);
   json["surfaces"] = Json::array();
   for (const SurfaceFile& surface : state.surfaces)
-    json["surfaces"].push_back(
-        {{"file", surface.path.string()}, {"colour", jsonOf(glm::dvec3(surface.colour))}});
+    json["surfaces"].push_back({{"file", surface.path.string()},
+                                {"colour", jsonOf(glm::dvec3(surface.colour))},
+                                {"opacity", surface.opacity}});
   json["slices"] = jsonOf(state.slices);
-  json["slice_opacity"] = state.slice_opacity;
+  json["slice_opacity"] = state.slice_opacity.factor;
+  json["slices_by_function"] = state.slice_opacity.by_function;
   json["volume"] = state.volume;
   json["lit"] = state.lit;
   json["dark"] = state.dark;
@@ -290,9 +294,13 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
       const glm::dvec3 colour = surface.at("colour").point();
       for (int c = 0; c < 3; ++c)
         if (!(colour[c] >= 0 && colour[c] <= 1)) surface.at("colour").fail("three numbers from 0 to 1");
-      state.surfaces.push_back({surface.at("file").text(), glm::vec3(colour)});
+      SurfaceFile& of_state =
+          state.surfaces.emplace_back(SurfaceFile{surface.at("file").text(), glm::vec3(colour)});
+      if (const auto opacity = surface.find("opacity")) of_state.opacity = opacity->number(1e-3, 1);
     }
-  if (const auto opacity = fields.find("slice_opacity")) state.slice_opacity = opacity->number(1e-3, 1);
+  if (const auto opacity = fields.find("slice_opacity"))
+    state.slice_opacity.factor = opacity->number(1e-3, 1);
+  if (const auto by = fields.find("slices_by_function")) state.slice_opacity.by_function = by->flag();
   if (const auto volume = fields.find("volume")) state.volume = volume->flag();
   if (const auto lit = fields.find("lit")) state.lit = lit->flag();
   state.dark = fields.at("dark").flag();

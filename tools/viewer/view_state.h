@@ -23,6 +23,7 @@ struct SurfaceFile {
   std::filesystem::path path;
   glm::vec3 colour{0.7f, 0.7f, 0.7f};
   std::shared_ptr<const TriangleMesh> mesh = nullptr;
+  double opacity = 1;
 };
 
 /// Faces of the grid, from the command line. Not saved.
@@ -61,9 +62,9 @@ struct ViewState {
   std::vector<NamedFaces> faces = {};
   std::string faces_by = {};  // --surface-by
   std::vector<ClipPlane> slices = {};
-  double slice_opacity = 1;
+  SheetOpacity slice_opacity = {};
   std::vector<double> isovalues = {};  // from the command line; not saved
-  double iso_opacity = 1;
+  SheetOpacity iso_opacity = {};
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
   bool dark = false;  // background

@@ -12,6 +12,7 @@
 #include "render/frame/backend.h"
 #include "render/surface/surface_scene.h"
 #include "tools/viewer/conversion_services.h"
+#include "tools/viewer/frame_loop.h"
 
 namespace curvisplat {
 
@@ -26,6 +27,7 @@ struct ViewerOptions {
   std::vector<std::filesystem::path> surface_files;  // of the scene's surfaces
   std::vector<std::string> face_names;               // of its grid surfaces
   std::string faces_by;                              // --surface-by
+  FacesAtStep faces_at;                              // the scene's grid surfaces at other steps
   std::optional<uint64_t> memory_bytes;
   ConversionServices conversion;
   std::vector<std::filesystem::path> files;  // to open first, in place of a cache
