@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Checks sources with Clang 14, without output: its warnings, which are errors, and -Wthread-safety, which checks
-that members are only touched while their mutex is held (stream/base/mutex.h). With --tidy, clang-tidy checks them
-by .clang-tidy as well. Takes the commands of build/release, which tools/build.sh configures. What most sources include
+"""Checks sources with Clang 14, without output: its warnings, which are errors; -Wthread-safety, which checks that
+members are only touched while their mutex is held (stream/base/mutex.h); and of those that are not tests, what clang-tidy
+finds by .clang-tidy. Takes the commands of build/release, which tools/build.sh configures. What most sources include
 (tools/cmake/common_headers.h, and GoogleTest) is parsed once for all that are compiled alike: half of the time.
 
-    tools/check_clang.py [--tidy] [FILE ...]    these; without any, all sources
-    tools/check_clang.py [--tidy] --since REV   those that have changed since this commit
+    tools/check_clang.py [FILE ...]    these; without any, all sources
+    tools/check_clang.py --since REV   those that have changed since this commit
 """
 
 import argparse
@@ -55,9 +55,9 @@ def clang_arguments(arguments):
     kept = []
     rest = iter(arguments)
     for argument in rest:
-        if argument in ("-o", "-c"):
+        if argument in ("-o", "-c", "-include"):  # a header that GCC has precompiled
             next(rest)
-        elif not argument.endswith("ccache") and not os.path.basename(argument).startswith(("c++", "g++")):
+        elif argument != "-Winvalid-pch" and not argument.endswith("ccache") and not os.path.basename(argument).startswith(("c++", "g++")):
             kept.append(argument)
     return kept
 
@@ -99,23 +99,19 @@ class CommonHeaders:
 
 
 def check(job, headers):
-    """Clang's output if it finds anything."""
+    """What is found in a source, or ""."""
     file, folder, arguments = job
-    words = ["clang++-14", *clang_arguments(arguments), *FLAGS, *headers.flags(file, arguments), "-fsyntax-only", str(file)]
+    words = [*clang_arguments(arguments), *FLAGS, *headers.flags(file, arguments)]
+    if file.is_relative_to(ROOT / "tests"):
+        words = ["clang++-14", *words, "-fsyntax-only", str(file)]
+    else:  # it gives the compiler's warnings, too
+        words = ["clang-tidy-14", "--quiet", str(file), "--", *words]
     run = subprocess.run(words, cwd=folder, text=True, capture_output=True)
-    return run.stderr if run.returncode else ""
-
-
-def tidy(files):
-    extra = [f"--extra-arg={flag}" for flag in FLAGS]
-    return subprocess.run(["xargs", "-0", "-n", "4", "-P", str(os.cpu_count()), "clang-tidy-14", "-p",
-                           "build/release", "--quiet", *extra], cwd=ROOT, text=True,
-                          input="\0".join(map(str, files)), stderr=subprocess.DEVNULL).returncode
+    return run.stdout + run.stderr if run.returncode else ""
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tidy", action="store_true", help="run clang-tidy, too")
     parser.add_argument("--since", metavar="REV", help="check the sources that have changed since this commit")
     parser.add_argument("files", nargs="*", type=pathlib.Path)
     options = parser.parse_args()
@@ -125,8 +121,7 @@ def main():
         if not chosen:
             print(f"check_clang: no source has changed since {options.since}")
             return 0
-    packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy else [])
-    subprocess.run([ROOT / "tools/setup.sh", *packages], check=True)
+    subprocess.run([ROOT / "tools/setup.sh", "clang-14", "clang-tidy-14"], check=True)
 
     jobs = commands(chosen)
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -134,9 +129,8 @@ def main():
         found = [output for output in pool.map(lambda job: check(job, headers), jobs) if output]
     for output in found:
         print(output, end="")
-    failed = bool(found) or (options.tidy and tidy([job[0] for job in jobs]) != 0)
-    print(f"check_clang: {len(jobs)} files, {'warnings above' if failed else 'no warnings'}")
-    return 1 if failed else 0
+    print(f"check_clang: {len(jobs)} files, {'warnings above' if found else 'no warnings'}")
+    return 1 if found else 0
 
 
 if __name__ == "__main__":
