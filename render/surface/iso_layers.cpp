@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <memory>
 
 #include "render/project/tile_set.h"
 #include "render/surface/pixel_rays.h"

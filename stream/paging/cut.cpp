@@ -211,7 +211,6 @@ class CutWalk {
       visitOctants(id, refined, false);
     } else if (refined == 0) {
       take({id, kAllOctants});
-      tookSome(id);
     } else {
       visitOctants(id, refined, true);
     }
@@ -235,19 +234,15 @@ class CutWalk {
     }
     if (pending == 0) return;
     take({id, pending});
-    tookSome(id);
   }
 
   void take(const BrickPart& part) {
     cut_.parts.push_back(part);
-    cut_.splats += SplatRanges(view_.brick(part.brick), part.octants).splats();
-  }
-
-  /// What counts once for all parts of a brick.
-  void tookSome(uint32_t id) {
-    cut_.bytes += view_.bytes(id);
-    cut_.deepest_level = std::max(cut_.deepest_level, view_.brick(id).cell.level);
-    cut_.largest_error_px = std::max(cut_.largest_error_px, view_.errorPixels(id));
+    const Brick& brick = view_.brick(part.brick);
+    cut_.splats += SplatRanges(brick, part.octants).splats();
+    cut_.bytes += view_.bytes(part.brick);
+    cut_.deepest_level = std::max(cut_.deepest_level, brick.cell.level);
+    cut_.largest_error_px = std::max(cut_.largest_error_px, view_.errorPixels(part.brick));
   }
 
   const BrickView& view_;

@@ -77,7 +77,7 @@ struct CutOptions {
 struct Cut {
   std::vector<BrickPart> parts;  // each brick once
   uint64_t splats = 0;
-  uint64_t bytes = 0;  // of the parts' streams; a brick in several parts counts once
+  uint64_t bytes = 0;  // of the parts' bricks
   uint32_t deepest_level = 0;
   bool complete = true;         // false: a limit keeps some of it coarser than lod_pixels asks for
   double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye

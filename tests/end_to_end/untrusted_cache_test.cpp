@@ -7,6 +7,7 @@
 #include <zstd.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <limits>

@@ -1,5 +1,6 @@
 // The window, as a person uses it: moved with the mouse and the keys, its panels edited, left and opened
 // again.
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <glm/geometric.hpp>

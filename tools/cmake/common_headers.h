@@ -1,4 +1,5 @@
-// What most sources include, compiled once where that is asked for: for tools/check_clang.py. Nobody includes it.
+// What most sources include, parsed once: CURVISPLAT_PRECOMPILE, and tools/check_clang.py. Nobody includes it, and every
+// source compiles without (tests/structure/check_standard_headers.py).
 #pragma once
 
 #include <algorithm>
