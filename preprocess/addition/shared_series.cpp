@@ -1,12 +1,17 @@
 #include "preprocess/addition/shared_series.h"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <span>
 #include <system_error>
 #include <utility>
 
 #include "preprocess/addition/series_part.h"
 #include "preprocess/addition/step_references.h"
+#include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_lock.h"
@@ -29,11 +34,30 @@ fs::path besideCache(const fs::path& cache, const char* suffix) {
   return folder;
 }
 
-std::string scratchOf(const fs::path& cache, const std::string& rank) {
-  return cache.filename().string() + ".rank" + rank;
+/// Removes the ranks' folders for temporary files that killed conversions to `cache` have left in `folder`.
+void removeAbandonedScratch(const fs::path& folder, const fs::path& cache) {
+  const std::regex rest(R"(\d+\.\d+\.\d+)");  // rank, process, count (ScratchFolder::newPath)
+  const std::string begin = scratchNameOfRanks(cache);
+  std::vector<fs::path> abandoned;
+  std::error_code error;  // ScratchFolder reports it
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with(begin) && std::regex_match(name.substr(begin.size()), rest))
+      abandoned.push_back(entry->path());
+  }
+  for (const fs::path& path : abandoned) removeAll(path);  // another rank may be doing the same
 }
 
 }  // namespace
+
+std::string scratchNameOfRanks(const fs::path& cache) {
+  const fs::path path = fs::absolute(cache).lexically_normal();
+  // Folders of one path may be different ones on different machines.
+  struct stat parent {};
+  ::stat(path.parent_path().c_str(), &parent);
+  const std::string key = fmt::format("{}\n{}", path.string(), parent.st_ino);
+  return fmt::format("{}.{:016x}.rank", path.filename().string(), checksumOf(std::as_bytes(std::span(key))));
+}
 
 std::vector<StepRange> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks) {
   std::vector<StepRange> ranges;
@@ -51,21 +75,18 @@ SharedSteps::SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ra
       ranks_(ranks),
       progress_(progress),
       folder_(besideCache(add_.cache, ".ranks.partial")) {
-  if (ranks_.isFirst()) {
-    locked_ = std::make_unique<PartialFolder>(besideCache(add_.cache, ".ranks"), false);
-    if (!add_.temporary_folder.empty())
-      // Of killed programs: as long as the folder above is locked, no other converts this series.
-      for (const auto& entry : fs::directory_iterator(add_.temporary_folder))
-        if (entry.path().filename().string().starts_with(scratchOf(add_.cache, ""))) removeAll(entry.path());
-  }
+  if (ranks_.isFirst()) locked_ = std::make_unique<PartialFolder>(besideCache(add_.cache, ".ranks"), false);
   ranks_.barrier();
   if (!fs::is_directory(folder_))
     throw Error("{}: does not exist here; several ranks need a file system that they share",
                 folder_.string());
+  // As long as that folder is locked, no other program converts this series. At each rank: --tmp may be of its machine.
+  if (!add_.temporary_folder.empty()) removeAbandonedScratch(add_.temporary_folder, add_.cache);
+  ranks_.barrier();
   if (ranks_.isFirst()) return;
   const fs::path parent = add_.temporary_folder.empty() ? folder_ : add_.temporary_folder;
   scratch_ = std::make_unique<ScratchFolder>(
-      ScratchFolder::newPath(parent, scratchOf(add_.cache, std::to_string(ranks_.rank()))),
+      ScratchFolder::newPath(parent, scratchNameOfRanks(add_.cache) + std::to_string(ranks_.rank())),
       ScratchFolder::Folder::kMake);
   add_.temporary_folder = scratch_->path();
 }

@@ -45,6 +45,10 @@ struct ConvertedSteps {
 /// group the cache has, 0 if the next begins one.
 std::vector<StepRange> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks);
 
+/// How the names of the ranks' folders for temporary files begin; those of other caches in a shared folder begin
+/// otherwise. The rank's number follows.
+std::string scratchNameOfRanks(const std::filesystem::path& cache);
+
 /// Parts of a series in a folder beside it, removed in the end.
 class SharedSteps {
  public:

@@ -136,6 +136,26 @@ TEST(SharedSeries, CanBeInterruptedInAnyRound) {
   }
 }
 
+TEST(SharedSeries, RemovesOnlyItsOwnTemporaryFiles) {
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(kSteady), optionsFor(folder / "one.splats"));
+  fs::create_directory(folder / "other");
+  const fs::path cache = folder / "w.splats";
+  const fs::path others[] = {folder / "w.splats.ranks_old", folder / "w.splats.rank1.77.0",
+                             folder / (scratchNameOfRanks(folder / "other" / "w.splats") + "1.77.0"),
+                             folder / (scratchNameOfRanks(cache) + "1.77.0.kept")};
+  const fs::path abandoned = folder / (scratchNameOfRanks(cache) + "1.77.0");
+  for (const fs::path& path : others) fs::create_directory(path);
+  fs::create_directory(abandoned);
+  SeriesOptions options = optionsFor(cache);
+  options.convert.temporary_folder = folder.path();  // the output's folder
+  convertBy(3, inputOf(kSteady), options);
+  EXPECT_TRUE(allFilesOf(cache) == allFilesOf(folder / "one.splats"));
+  for (const fs::path& path : others) EXPECT_TRUE(fs::exists(path)) << path;
+  EXPECT_FALSE(fs::exists(abandoned));
+  EXPECT_EQ(entriesOf(folder.path()), 2u + 1u + std::size(others)) << "something is left";
+}
+
 TEST(DealSteps, GivesEachRankAGroup) {
   const auto ends = [](const std::vector<StepRange>& ranges) {
     std::vector<uint64_t> numbers;
