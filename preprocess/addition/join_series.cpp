@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <string>
 #include <system_error>
 
 #include "preprocess/addition/series_part.h"
@@ -70,6 +72,44 @@ uint64_t countParts(const fs::path& folder) {
     throw Error("{}: has no finished parts; expected the folder that convert --part i/n writes",
                 folder.string());
   return *count;
+}
+
+/// Files of the first step that the manifest lists, in the order of their names.
+std::vector<FileInfo> firstStepFiles(const CacheReader& cache) {
+  std::vector<FileInfo> files = cache.manifest().files;
+  std::erase_if(files, [](const FileInfo& file) {
+    return file.name == kStepsFileName || file.name.starts_with("faces.step");
+  });
+  std::sort(files.begin(), files.end(), [](const FileInfo& a, const FileInfo& b) { return a.name < b.name; });
+  return files;
+}
+
+/// In what two parts, open at step 0, were not converted alike; empty if they were. The first step, which all parts have,
+/// shows it.
+std::string differenceOf(const CacheReader& a, const CacheReader& b) {
+  const Manifest &of_a = a.seriesManifest(), &of_b = b.seriesManifest();
+  const auto sameVariable = [](const VariableInfo& x, const VariableInfo& y) {
+    return x.number == y.number && x.name == y.name && x.unit == y.unit;
+  };
+  if (!std::equal(of_a.variables.begin(), of_a.variables.end(), of_b.variables.begin(), of_b.variables.end(),
+                  sameVariable) ||
+      of_a.cells != of_b.cells)
+    return "set of scalars";
+  const auto features = [](const Manifest& manifest) {
+    std::set<std::string> all(manifest.requirements.begin(), manifest.requirements.end());
+    all.erase(kSteps);
+    return all;
+  };
+  if (features(of_a) != features(of_b) || of_a.overlap != of_b.overlap)
+    return "form (--value-precision, --overlap)";
+  const auto sameFile = [](const FileInfo& x, const FileInfo& y) {
+    return x.name == y.name && x.size == y.size && x.checksum == y.checksum;
+  };
+  const auto files_a = firstStepFiles(a), files_b = firstStepFiles(b);
+  if (a.series().steps[0].time != b.series().steps[0].time ||
+      !std::equal(files_a.begin(), files_a.end(), files_b.begin(), files_b.end(), sameFile))
+    return "first step";
+  return "";
 }
 
 /// See joinParts().
@@ -144,6 +184,12 @@ class Joining {
     if (cache.series().steps.size() != places.size() || records_[index].origins.size() != places.size())
       throw Error("{}: has {} steps, expected {}; convert the part again", cache.cachePath().string(),
                   cache.series().steps.size(), places.size());
+    if (const std::string what = differenceOf(CacheReader(partCache(options_.folder, {0, count_})), cache);
+        !what.empty())
+      throw Error(
+          "{}: part {} was not converted as part 1 was: it has another {}; convert it again with the same "
+          "files and options",
+          options_.folder.string(), index + 1, what);
     for (uint64_t step = 1; step < places.size(); ++step) {
       progress_.throwIfStopped();
       const StepOrigin& origin = records_[index].origins[step];

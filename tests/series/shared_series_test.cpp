@@ -5,6 +5,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -170,7 +171,8 @@ TEST(DealSteps, GivesEachRankAGroup) {
 // ------------------------------------------------------------------------------------------------ parts
 
 /// Converts part `index` of `count` as `convert --part` does.
-void convertPart(const fs::path& output, const std::vector<StepKind>& kinds, const SeriesPart& part) {
+void convertPart(const fs::path& output, const std::vector<StepKind>& kinds, const SeriesPart& part,
+                 const std::function<void(SeriesInput&, SeriesOptions&)>& change = {}) {
   const std::vector<uint64_t> places = placesOfPart(part, kinds.size());
   const fs::path folder = partsFolder(output);
   beginPart(folder, part);
@@ -182,6 +184,7 @@ void convertPart(const fs::path& output, const std::vector<StepKind>& kinds, con
     input.places = places;
     SeriesOptions options = optionsFor(partCache(folder, part));
     options.to_part = part.index > 0;
+    if (change) change(input, options);
     origins = convertQuietly(input, options).report.origins;
   }
   writePartRecord(folder, part, kinds.size(), origins);
@@ -233,6 +236,45 @@ TEST(SeriesParts, ThatCannotBeJoinedAreRefused) {
   convertPart(output, kOnceAway, {0, 3});
   EXPECT_NE(refusal().find("parts of 2 and parts of 3"), std::string::npos) << refusal();
   EXPECT_EQ(entriesOf(folder.path()), 1u) << "something is left";
+}
+
+TEST(SeriesParts, OfOtherOptionsAreRefused) {
+  const TemporaryFolder folder;
+  const fs::path output = folder / "a.splats";
+  using Change = std::function<void(SeriesInput&, SeriesOptions&)>;
+  const auto scalars = [](std::vector<uint32_t> chosen) {
+    return Change([chosen](SeriesInput& input, SeriesOptions&) {
+      input.scalars = [chosen](const GridDescription&) { return chosen; };
+    });
+  };
+  const std::pair<Change, std::string> cases[] = {
+      {scalars({1, 0}), "set of scalars"},
+      {scalars({0}), "set of scalars"},
+      {[](SeriesInput&, SeriesOptions& options) { options.convert.precision = ValuePrecision::kFine; },
+       "--value-precision"},
+      {[](SeriesInput&, SeriesOptions& options) { options.convert.surfaces = false; }, "first step"},
+      {[](SeriesInput& input, SeriesOptions&) {
+         auto open = input.open;
+         input.open = [open](uint64_t step) {
+           return step == 0 ? std::make_unique<StepSource>(StepKind{-1}) : open(step);
+         };
+       },
+       "first step"}};
+  convertPart(output, kSteady, {0, 2});
+  for (const auto& [change, words] : cases) {
+    fs::remove_all(partCache(partsFolder(output), {1, 2}));
+    convertPart(output, kSteady, {1, 2}, change);
+    try {
+      Progress progress;
+      joinParts({partsFolder(output), output, true}, progress);
+      ADD_FAILURE() << "joined: " << words;
+    } catch (const Error& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find("part 2 was not converted as part 1 was"), std::string::npos) << message;
+      EXPECT_NE(message.find(words), std::string::npos) << message;
+    }
+    EXPECT_FALSE(fs::exists(output));
+  }
 }
 
 TEST(SeriesParts, HaveWholeGroupsAndTheFirstStep) {
