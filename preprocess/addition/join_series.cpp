@@ -157,7 +157,7 @@ class Joining {
       else if (isChangedInPlace(target.filename().string()))
         writeFileDurably(target, bytesOf(entry.path()));
       else
-        linkOrCopy(entry.path(), target);
+        linkOrCopy(entry.path(), target, progress_);
     }
     for (const auto& entry : fs::recursive_directory_iterator(to))
       if (entry.is_directory()) syncDirectory(entry.path());
@@ -194,7 +194,7 @@ class Joining {
       progress_.throwIfStopped();
       const StepOrigin& origin = records_[index].origins[step];
       const CacheLock lock(series);  // of a manifest that each step replaces
-      if (!takeStep(lock, {cache, step, origin.sources, origin.states_time}))
+      if (!takeStep(lock, {cache, step, origin.sources, origin.states_time}, progress_))
         throw Error(
             "{}: step {} cannot be joined: its grid is that of some steps before it, or its time does not "
             "follow theirs; convert the series in one process, or by ranks",

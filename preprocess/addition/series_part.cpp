@@ -1,12 +1,14 @@
 #include "preprocess/addition/series_part.h"
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <span>
 #include <system_error>
 #include <utility>
 
 #include "preprocess/addition/step_references.h"
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_file.h"
@@ -40,32 +42,64 @@ bool sameValues(const SeriesStep& a, const SeriesStep& b) {
                                         });
 }
 
-/// Names that are taken back unless the step comes into the series.
+void copyDurably(const fs::path& from, const fs::path& to, const Progress& progress) {
+  constexpr uint64_t kAtOnce = uint64_t{4} << 20;
+  const InputFile in(from);
+  OutputFile out(to);
+  std::vector<std::byte> bytes(std::min(in.size(), kAtOnce));
+  for (uint64_t at = 0; at < in.size(); at += kAtOnce) {
+    progress.throwIfStopped();
+    const std::span part = std::span(bytes).first(std::min(kAtOnce, in.size() - at));
+    in.readAt(at, part);
+    out.append(part);
+  }
+  out.close();
+}
+
+/// Names in a locked cache that are taken back unless the step comes into the series. If another cache has replaced that
+/// one, files of these names are that cache's.
 class NewNames {
  public:
+  NewNames(const CacheLock& lock, const Progress& progress) : lock_(lock), progress_(progress) {}
   ~NewNames() {
+    if (!lock_.isStillThere()) return;
     for (const fs::path& path : paths_) removeAll(path);
   }
   void add(const fs::path& from, const fs::path& to) {
+    progress_.throwIfStopped();
+    lock_.requireStillThere();
     paths_.push_back(to);
-    linkOrCopy(from, to);
+    linkOrCopy(from, to, progress_);
   }
   void addFolder(const fs::path& path) {
+    lock_.requireStillThere();
     removeAll(path);  // a killed program's
     paths_.push_back(path);
     makeFolder(path);
   }
-  void keep() { paths_.clear(); }
+  /// Keeps the names if `put` puts them into the series' manifest, or says that a power loss may undo that.
+  void keepIf(const std::function<void()>& put) {
+    try {
+      put();
+    } catch (const NameNotSynced&) {
+      paths_.clear();
+      throw;
+    }
+    paths_.clear();
+  }
 
  private:
+  const CacheLock& lock_;
+  const Progress& progress_;
   std::vector<fs::path> paths_;
 };
 
 /// See takeStep().
 class Taking {
  public:
-  Taking(const CacheLock& lock, const PartStep& step)
+  Taking(const CacheLock& lock, const PartStep& step, const Progress& progress)
       : lock_(lock),
+        progress_(progress),
         to_(openAtLast(lock.cache())),
         from_(step.part),
         number_(step.number),
@@ -99,13 +133,12 @@ class Taking {
     const fs::path from = cacheFolder(from_.cachePath(), geometryFolderName(taken_.geometry));
     const fs::path to = lock_.cache() / geometryFolderName(ours().geometries());
     const Manifest manifest = readManifest(from);
-    NewNames names;
+    NewNames names(lock_, progress_);
     names.addFolder(to);
     for (const FileInfo& file : manifest.files) names.add(cacheFile(from, file.name), to / file.name);
     names.add(cacheFile(from, kManifest), to / kManifest);
     syncDirectory(to);
-    addGeometryStep(lock_, to_, new_step_);
-    names.keep();
+    names.keepIf([&] { addGeometryStep(lock_, to_, new_step_); });
     return true;
   }
 
@@ -118,7 +151,7 @@ class Taking {
     SeriesStep step = taken_;
     step.geometry = geometry;
     step.geometry_checksum = ours().steps[ours().first_steps[geometry]].geometry_checksum;
-    NewNames names;
+    NewNames names(lock_, progress_);
     for (const VariableInfo& variable : to_.seriesManifest().variables) {
       const std::string name = stepValuesName(theirs(), number_, variable.number);
       names.add(cacheFile(source.path(), name),
@@ -130,8 +163,7 @@ class Taking {
       names.add(cacheFile(from_.cachePath(), faces->name), lock_.cache() / others[0].name);
     }
     syncDirectory(base.path());
-    addWrittenStep(lock_, to_, std::move(step), new_step_, others);
-    names.keep();
+    names.keepIf([&] { addWrittenStep(lock_, to_, std::move(step), new_step_, others); });
     return true;
   }
 
@@ -148,6 +180,7 @@ class Taking {
   }
 
   const CacheLock& lock_;
+  const Progress& progress_;
   const CacheReader to_;
   const CacheReader& from_;
   const uint64_t number_;
@@ -158,36 +191,32 @@ class Taking {
 
 }  // namespace
 
-void makePart(const CacheReader& series, const fs::path& path) {
+void makePart(const CacheReader& series, const fs::path& path, const Progress& progress) {
   const uint32_t geometry = series.series().steps[series.step()].geometry;
   const CacheReader first = series.atStep(series.series().first_steps[geometry]);
   makeFolder(path);
   Manifest manifest = first.manifest();
   std::erase_if(manifest.files, [](const FileInfo& file) { return file.name.starts_with("faces.step"); });
   for (const FileInfo& file : manifest.files)
-    linkOrCopy(cacheFile(first.path(), file.name), path / file.name);
+    linkOrCopy(cacheFile(first.path(), file.name), path / file.name, progress);
   replaceManifest(path, manifest);  // a file of its own: it is what locks a cache
 }
 
-bool takeStep(const CacheLock& lock, const PartStep& step) {
-  return Taking(lock, step).take();
+bool takeStep(const CacheLock& lock, const PartStep& step, const Progress& progress) {
+  return Taking(lock, step, progress).take();
 }
 
-void linkOrCopy(const fs::path& from, const fs::path& to) {
+void linkOrCopy(const fs::path& from, const fs::path& to, const Progress& progress) {
   removeAll(to);
   std::error_code no_links;
   fs::create_hard_link(from, to, no_links);
   if (!no_links) return;
-  constexpr uint64_t kAtOnce = uint64_t{4} << 20;
-  const InputFile in(from);
-  OutputFile out(to);
-  std::vector<std::byte> bytes(std::min(in.size(), kAtOnce));
-  for (uint64_t at = 0; at < in.size(); at += kAtOnce) {
-    const std::span part = std::span(bytes).first(std::min(kAtOnce, in.size() - at));
-    in.readAt(at, part);
-    out.append(part);
+  try {
+    copyDurably(from, to, progress);
+  } catch (...) {
+    removeAll(to);
+    throw;
   }
-  out.close();
 }
 
 }  // namespace curvisplat

@@ -15,14 +15,15 @@
 #include <string>
 #include <vector>
 
+#include "stream/base/progress.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 
 /// Makes a part in the folder `path`, which must not exist. Its step 0 is the first step of the geometry that `series` is
-/// open at. Throws Error.
-void makePart(const CacheReader& series, const std::filesystem::path& path);
+/// open at. Throws Error and Interrupted.
+void makePart(const CacheReader& series, const std::filesystem::path& path, const Progress& progress);
 
 /// Step `number` of a part, from 1 on.
 struct PartStep {
@@ -33,10 +34,12 @@ struct PartStep {
 };
 
 /// Adds the step to the locked cache, after its last. Returns false, and changes nothing, if the step that one process
-/// would have added is another one: then it has to be converted again. Throws Error if a file cannot be written.
-bool takeStep(const CacheLock& lock, const PartStep& step);
+/// would have added is another one: then it has to be converted again. Throws Error if a file cannot be written, and
+/// Interrupted; then, too, the cache is what it was. After NameNotSynced (durable_file.h) it has the step.
+bool takeStep(const CacheLock& lock, const PartStep& step, const Progress& progress);
 
-/// A second name for a file, or a copy of it that is on the disk. Replaces what is at `to`. Throws Error.
-void linkOrCopy(const std::filesystem::path& from, const std::filesystem::path& to);
+/// A second name for a file, or a copy of it that is on the disk. Replaces what is at `to`. Throws Error and Interrupted;
+/// then there is nothing at `to`.
+void linkOrCopy(const std::filesystem::path& from, const std::filesystem::path& to, const Progress& progress);
 
 }  // namespace curvisplat

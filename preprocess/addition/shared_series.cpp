@@ -118,7 +118,7 @@ ConvertedSteps SharedSteps::convertPart(const Start& start) const {
     removeAll(options.cache);
     const CacheReader series(add_.cache, start.step);
     double last = series.series().steps[start.step].time + static_cast<double>(own.begin - start.next);
-    makePart(series, options.cache);
+    makePart(series, options.cache, progress_);
     for (uint64_t number = own.begin; number < own.end; ++number) {
       progress_.throwIfStopped();
       const std::unique_ptr<DataSource> source = input_.open(number);
@@ -146,7 +146,7 @@ bool SharedSteps::take(unsigned of, const StepRange& range, const ConvertedSteps
     progress_.throwIfStopped();
     const ConvertedSteps::Step& step = converted.steps[n];
     const CacheLock lock(add_.cache);
-    if (!takeStep(lock, {part, n + 1, step.sources, step.states_time})) return false;
+    if (!takeStep(lock, {part, n + 1, step.sources, step.states_time}, progress_)) return false;
     AddStepReport report;
     report.time = part.series().steps[n + 1].time;
     report.new_geometry = step.new_geometry;

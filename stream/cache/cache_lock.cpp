@@ -42,4 +42,11 @@ bool CacheLock::isStillThere() const {
          ours.st_ino == theirs.st_ino && ours.st_dev == theirs.st_dev;
 }
 
+void CacheLock::requireStillThere() const {
+  if (isStillThere()) return;
+  throw Error(
+      "{}: another program has replaced the cache; the new cache was not changed: add the step to it again",
+      cache_.string());
+}
+
 }  // namespace curvisplat

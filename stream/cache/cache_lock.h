@@ -19,6 +19,8 @@ class CacheLock {
 
   /// Whether the locked file is still the cache's manifest; false if the cache has been replaced since.
   bool isStillThere() const;
+  /// Throws Error unless it is.
+  void requireStillThere() const;
 
  private:
   std::filesystem::path cache_, manifest_;

@@ -19,13 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void requireStillThere(const CacheLock& lock) {
-  if (lock.isStillThere()) return;
-  throw Error(
-      "{}: another program has replaced the cache; the new cache was not changed: add the step to it again",
-      lock.cache().string());
-}
-
 /// Appends the step to the series and replaces the manifest. `files`: further ones of the step.
 void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep step, const NewStep& added,
              std::span<const FileInfo> files) {
@@ -88,7 +81,7 @@ std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
     step.values.push_back({0, 0, infos.back().size, infos.back().checksum});
   }
   infos.insert(infos.end(), others_.begin(), others_.end());
-  requireStillThere(*lock_);
+  lock_->requireStillThere();
   for (NewFile& file : files_) {
     if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
       throw Error("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
@@ -108,7 +101,7 @@ std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
 
 void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep step, const NewStep& added,
                     std::span<const FileInfo> others) {
-  requireStillThere(lock);
+  lock.requireStillThere();
   syncDirectory(lock.cache());
   putStep(lock, cache.seriesManifest(), cache.series(), std::move(step), added, others);
 }
@@ -130,7 +123,7 @@ void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewS
       if (file.name == name) step.values.push_back({0, 0, file.size, file.checksum});
   }
   CURVISPLAT_CHECK_OP(step.values.size(), ==, cache.seriesManifest().variables.size());
-  requireStillThere(lock);
+  lock.requireStillThere();
   syncDirectory(lock.cache());
   putStep(lock, cache.seriesManifest(), series, std::move(step), added, {});
 }

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <optional>
 #include <set>
@@ -13,9 +15,12 @@
 #include "preprocess/addition/join_series.h"
 #include "preprocess/addition/series_part.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "tests/series/step_series.h"
+#include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
 
@@ -275,6 +280,64 @@ TEST(SeriesParts, OfOtherOptionsAreRefused) {
     }
     EXPECT_FALSE(fs::exists(output));
   }
+}
+
+/// A file system that cannot exchange names, so that a manifest that could not be synced stays.
+class WithoutExchange : public testing::FaultySystemCalls {
+ public:
+  int exchange(const char*, const char*) override {
+    errno = EINVAL;
+    return -1;
+  }
+};
+
+TEST(SeriesParts, AreWholeInTheCacheWhicheverSyncFails) {
+  for (const auto& kinds : {steadyGrid(7), kMoving}) {
+    const TemporaryFolder folder;
+    const fs::path output = folder / "a.splats", parts = partsFolder(output);
+    for (const uint64_t index : {0u, 1u}) convertPart(output, kinds, {index, 2});
+    const CacheReader part(partCache(parts, {1, 2}));
+    const uint64_t before = CacheReader(partCache(parts, {0, 2})).series().steps.size();
+    bool not_synced = false;
+    for (int64_t at = 0;; ++at) {
+      ASSERT_LT(at, 100);
+      fs::remove_all(output);
+      fs::copy(partCache(parts, {0, 2}), output, fs::copy_options::recursive);
+      WithoutExchange calls;
+      calls.fail_sync_at = at;
+      std::string failure;
+      try {
+        const ScopedSystemCalls faulty(calls);
+        const CacheLock lock(output);
+        EXPECT_TRUE(takeStep(lock, {part, 1, {}, true}, Progress()));
+      } catch (const Error& error) {
+        failure = error.what();
+      }
+      const bool is_added = failure.empty() || failure.find("power loss") != std::string::npos;
+      not_synced |= is_added && !failure.empty();
+      const CacheReader cache(output);
+      EXPECT_EQ(cache.series().steps.size(), before + (is_added ? 1 : 0)) << failure;
+      for (const std::string& finding : verifyCache(cache).findings)
+        ADD_FAILURE() << failure << ": " << finding;
+      if (failure.empty()) break;
+    }
+    EXPECT_TRUE(not_synced);
+  }
+}
+
+TEST(SeriesParts, CopiesOfFilesCanBeInterrupted) {
+  const TemporaryFolder folder;
+  const fs::path program = "/proc/self/exe";  // of another file system: no second name
+  const auto bytesOf = [](const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  Progress progress;
+  linkOrCopy(program, folder / "copy", progress);
+  EXPECT_TRUE(bytesOf(folder / "copy") == bytesOf(program));
+  progress.stop(SIGINT);
+  EXPECT_THROW(linkOrCopy(program, folder / "copy", progress), Interrupted);
+  EXPECT_FALSE(fs::exists(folder / "copy"));
 }
 
 TEST(SeriesParts, HaveWholeGroupsAndTheFirstStep) {
