@@ -2,11 +2,14 @@
 
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "preprocess/addition/shared_series.h"
 #include "preprocess/addition/step_references.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/cache/cache_reader.h"
@@ -44,6 +47,12 @@ class SeriesConversion {
   }
 
  private:
+  /// A step of the input, and how it is converted if it is the first.
+  struct OpenStep {
+    std::unique_ptr<DataSource> source;
+    ConvertOptions first;
+  };
+
   void takeOrLeaveOut(uint64_t number) {
     try {
       take(number);
@@ -59,21 +68,48 @@ class SeriesConversion {
   /// All ranks together up to the first step, which decides what is converted; then in rounds (shared_series.h).
   void runTogether(Ranks& ranks) {
     uint64_t next = 0;
-    while (next < input_.count && (times_.empty() || next_ < known_)) {
-      try {
-        take(next);
-      } catch (const Interrupted&) {
-        throw;
-      } catch (const UsageError&) {
-        throw;
-      } catch (const Error& error) {
-        throw Error("{}", refusal(next, error.what()));
-      }
-      ++next;
-    }
+    for (; next < input_.count && (times_.empty() || next_ < known_); ++next)
+      if (const std::optional<OpenStep> step = openTogether(ranks, next)) useTogether(next, *step);
     if (next == input_.count) return;
     const SharedSteps shared(input_, stepOptions(), ranks, progress_);
     while (next < input_.count) next = runRound(shared, ranks, next);
+  }
+
+  /// open() at all ranks; nullopt if all have left the step out.
+  std::optional<OpenStep> openTogether(Ranks& ranks, uint64_t number) {
+    std::optional<OpenStep> step;
+    std::string reason = "not all ranks can read it";
+    try {
+      step = open(number);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const UsageError&) {
+      throw;
+    } catch (const Error& error) {
+      reason = error.what();
+    }
+    std::vector<uint64_t> failed{step ? 0u : 1u};
+    ranks.sum(std::span(failed));
+    if (failed[0] == 0) return step;
+    if (failed[0] < ranks.count()) throw Error("{}", refusal(number, reason));
+    leaveOut(number, reason);
+    return std::nullopt;
+  }
+
+  /// Not all ranks may see why a conversion fails, so that they cannot leave the step out.
+  void useTogether(uint64_t number, const OpenStep& step) {
+    try {
+      use(number, step);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const UsageError&) {
+      throw;
+    } catch (const Error& error) {
+      const char* const advice =
+          "; ranks that have begun to convert the first step cannot leave it out: choose "
+          "another with --steps, or convert in one process";
+      throw Error("{}{}", refusal(number, error.what()), options_.keep_going ? advice : "");
+    }
   }
 
   /// Returns the number of the first step that is left for the next round.
@@ -123,27 +159,41 @@ class SeriesConversion {
                            cache.series().first_steps.back() == cache.series().steps.size() - 1;
   }
 
-  void take(uint64_t number) {
+  void take(uint64_t number) { use(number, open(number)); }
+
+  /// Throws Error if the step cannot be opened, is not the one that the cache has, or cannot be the first.
+  OpenStep open(uint64_t number) const {
     progress_.throwIfStopped();
-    const std::unique_ptr<DataSource> source = input_.open(number);
+    OpenStep step{input_.open(number), options_.convert};
+    const GridDescription& description = step.source->description();
     if (next_ < known_) {
-      const double time = timeFor(number, source->description());
-      for (const std::string& file : source->description().files)
-        if (!sources_.contains(file))
-          throw Error("the cache was not made from {}; to convert anew, add --overwrite", file);
-      if (time == times_[next_]) {
-        ++next_;
-        noteOrigin(source->description());
-        return;
-      }
+      requireKnown(timeFor(number, description), description);
+    } else if (times_.empty()) {
+      step.first.scalars = input_.scalars(description);
+      step.first.time = timeOf(description).value_or(0);
+      if (!std::isfinite(*step.first.time))
+        throw Error("its time is {:g}; expected a number", *step.first.time);
+    }
+    return step;
+  }
+
+  void requireKnown(double time, const GridDescription& description) const {
+    for (const std::string& file : description.files)
+      if (!sources_.contains(file))
+        throw Error("the cache was not made from {}; to convert anew, add --overwrite", file);
+    if (time != times_[next_])
       throw Error("its time {:g} is not {:g}, that of step {} of the cache; to convert anew, add --overwrite",
                   time, times_[next_], next_);
-    }
-    if (times_.empty())
-      convertFirst(number, *source);
+  }
+
+  void use(uint64_t number, const OpenStep& step) {
+    if (next_ < known_)
+      ++next_;
+    else if (times_.empty())
+      convertFirst(number, step);
     else
-      add(number, *source);
-    noteOrigin(source->description());
+      add(number, *step.source);
+    noteOrigin(step.source->description());
   }
 
   /// Stated, or counted on from the step before, which is `places` away.
@@ -159,18 +209,19 @@ class SeriesConversion {
     if (!input_.places.empty()) sums_.origins.push_back({timeOf(description).has_value(), description.files});
   }
 
-  void convertFirst(uint64_t number, const DataSource& source) {
-    ConvertOptions options = options_.convert;
-    options.scalars = input_.scalars(source.description());
-    options.time = timeOf(source.description()).value_or(0);
-    if (!std::isfinite(*options.time)) throw Error("its time is {:g}; expected a number", *options.time);
-    const ConvertReport converted = convert(source, options, progress_);
+  void convertFirst(uint64_t number, const OpenStep& step) {
+    const ConvertOptions& options = step.first;
+    if (options_.before_change) {
+      checkReplaceable(options.output, options.overwrite);  // as convert() does: an error changes nothing
+      options_.before_change();
+    }
+    const ConvertReport converted = convert(*step.source, options, progress_);
     times_.push_back(*options.time);
     next_ = known_ = 1;
     sums_.nodes = converted.nodes;
     ++sums_.converted;
     if (!ranks_ || ranks_->isFirst())
-      report_event_({input_.name(number), nullptr, &converted, &source.description(), ""});
+      report_event_({input_.name(number), nullptr, &converted, &step.source->description(), ""});
   }
 
   AddStepOptions stepOptions() const {
@@ -192,6 +243,7 @@ class SeriesConversion {
   void add(uint64_t number, const DataSource& source) {
     AddStepOptions options = stepOptions();
     if (!times_.empty()) options.time = timeFor(number, source.description());
+    if (options_.before_change) options_.before_change();
     note(number, addStep(source, options, progress_));
   }
 
@@ -208,7 +260,7 @@ class SeriesConversion {
     const std::string step = fmt::format("step {} ({})", numberOf(number), input_.name(number));
     if (!options_.keep_going) throw Error("{}", refusal(number, reason));
     ++sums_.left_out;
-    report_event_({step, nullptr, nullptr, nullptr, reason});
+    if (!ranks_ || ranks_->isFirst()) report_event_({step, nullptr, nullptr, nullptr, reason});
   }
 
   /// In messages.
@@ -217,13 +269,13 @@ class SeriesConversion {
   }
 
   std::string refusal(uint64_t number, const std::string& reason) const {
-    return fmt::format("{}: step {} ({}) cannot be converted: {}{}", options_.convert.output.string(),
-                       numberOf(number), input_.name(number), reason,
-                       times_.empty()
-                           ? ""
-                           : fmt::format("; the cache has the {} steps before it; --keep-going leaves out "
-                                         "such steps",
-                                         times_.size()));
+    std::string text =
+        fmt::format("{}: step {} ({}) cannot be converted: {}", options_.convert.output.string(),
+                    numberOf(number), input_.name(number), reason);
+    if (!times_.empty()) text += fmt::format("; the cache has {}", countText(times_.size(), "step"));
+    const bool may_leave_out = input_.places.empty() && !options_.keep_going;
+    if (!times_.empty() && may_leave_out) text += "; --keep-going leaves out such steps";
+    return text;
   }
 
   std::string whereItStands(const std::string& of_first) const {

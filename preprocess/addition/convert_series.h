@@ -18,10 +18,11 @@
 namespace curvisplat {
 
 struct SeriesOptions {
-  ConvertOptions convert;   // of the first step; `scalars` is not used
-  bool keep_going = false;  // leave out steps that do not fit
-  bool add = false;         // to an existing cache, which has other steps
-  bool to_part = false;     // the first step is there for its geometry (series_part.h)
+  ConvertOptions convert;               // of the first step; `scalars` is not used
+  bool keep_going = false;              // leave out steps that do not fit
+  bool add = false;                     // to an existing cache, which has other steps
+  bool to_part = false;                 // the first step is there for its geometry (series_part.h)
+  std::function<void()> before_change;  // called before the cache changes, if it does; may throw Error
 };
 
 /// One step that was converted, or left out for `reason`.

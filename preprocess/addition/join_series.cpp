@@ -233,11 +233,14 @@ fs::path partCache(const fs::path& folder, const SeriesPart& part) {
   return folder / (nameOf(part) + ".splats");
 }
 
-void beginPart(const fs::path& folder, const SeriesPart& part) {
+void makePartsFolder(const fs::path& folder) {
   std::error_code error;
   fs::create_directory(folder, error);  // another part may do so at the same time
   if (error || !fs::is_directory(folder))
     throw Error("{}: cannot be made: {}", folder.string(), error ? error.message() : "is not a directory");
+}
+
+void removePartRecord(const fs::path& folder, const SeriesPart& part) {
   if (const auto failure = removeAll(recordPath(folder, part)))
     throw Error("{}: cannot be removed: {}", recordPath(folder, part).string(), failure.message());
 }

@@ -29,8 +29,11 @@ std::vector<uint64_t> placesOfPart(const SeriesPart& part, uint64_t steps);
 std::filesystem::path partsFolder(const std::filesystem::path& cache);
 std::filesystem::path partCache(const std::filesystem::path& folder, const SeriesPart& part);
 
-/// Makes the folder, if no other part has, and removes what an earlier conversion of this part has noted. Throws Error.
-void beginPart(const std::filesystem::path& folder, const SeriesPart& part);
+/// Makes the folder, if no other part has. Throws Error.
+void makePartsFolder(const std::filesystem::path& folder);
+
+/// Removes what an earlier conversion of the part has noted: before its cache changes. Throws Error.
+void removePartRecord(const std::filesystem::path& folder, const SeriesPart& part);
 
 /// Notes that a part is complete: `origins` has its steps, one for each of placesOfPart(). Throws Error.
 void writePartRecord(const std::filesystem::path& folder, const SeriesPart& part, uint64_t steps,

@@ -120,6 +120,37 @@ TEST(SharedSeries, LeavesOutWhatDoesNotFitOrNamesIt) {
   EXPECT_EQ(entriesOf(folder.path()), 3u) << "something is left";
 }
 
+TEST(SharedSeries, LeavesOutStepsBeforeTheFirstAndOnResuming) {
+  std::vector<StepKind> kinds = steadyGrid(9);
+  kinds[2].lacks_scalar = true;
+  SeriesInput input = inputOf(kinds);
+  input.open = [open = input.open](uint64_t step) {
+    if (step == 0) throw Error("broken");
+    return open(step);
+  };
+  const TemporaryFolder folder;
+  SeriesOptions options = optionsFor(folder / "one.splats");
+  options.keep_going = true;
+  convertQuietly(input, options);
+  const auto wanted = allFilesOf(folder / "one.splats");
+  for (const uint64_t before : {0u, 4u}) {
+    SCOPED_TRACE(before);
+    options.convert.output = folder / "shared.splats";
+    fs::remove_all(options.convert.output);
+    if (before > 0) {
+      SeriesInput beginning = input;
+      beginning.count = before;
+      convertQuietly(beginning, options);
+      options.convert.resume = true;
+    }
+    const Conversion shared = convertBy(3, input, options);
+    EXPECT_EQ(shared.left_out.size(), 2u);
+    EXPECT_TRUE(allFilesOf(options.convert.output) == wanted);
+  }
+  options.keep_going = false;
+  EXPECT_THROW(convertBy(3, input, options), Error);
+}
+
 TEST(SharedSeries, CanBeInterruptedInAnyRound) {
   const TemporaryFolder folder;
   convertQuietly(inputOf(kSteady), optionsFor(folder / "one.splats"));
@@ -180,7 +211,7 @@ void convertPart(const fs::path& output, const std::vector<StepKind>& kinds, con
                  const std::function<void(SeriesInput&, SeriesOptions&)>& change = {}) {
   const std::vector<uint64_t> places = placesOfPart(part, kinds.size());
   const fs::path folder = partsFolder(output);
-  beginPart(folder, part);
+  makePartsFolder(folder);
   std::vector<StepOrigin> origins;
   if (!places.empty()) {
     std::vector<StepKind> own;
@@ -189,6 +220,7 @@ void convertPart(const fs::path& output, const std::vector<StepKind>& kinds, con
     input.places = places;
     SeriesOptions options = optionsFor(partCache(folder, part));
     options.to_part = part.index > 0;
+    options.before_change = [&] { removePartRecord(folder, part); };
     if (change) change(input, options);
     origins = convertQuietly(input, options).report.origins;
   }
@@ -338,6 +370,31 @@ TEST(SeriesParts, CopiesOfFilesCanBeInterrupted) {
   progress.stop(SIGINT);
   EXPECT_THROW(linkOrCopy(program, folder / "copy", progress), Interrupted);
   EXPECT_FALSE(fs::exists(folder / "copy"));
+}
+
+TEST(SeriesParts, StayFinishedUnlessTheyChange) {
+  const TemporaryFolder folder;
+  const fs::path output = folder / "a.splats", record = partsFolder(output) / "1of1.json";
+  const std::vector<StepKind> kinds = steadyGrid(2);
+  convertPart(output, kinds, {0, 1});
+  // Not given --overwrite; then continued with files of another time.
+  EXPECT_THROW(convertPart(output, kinds, {0, 1}), Error);
+  EXPECT_TRUE(fs::exists(record));
+  const auto resume = [](SeriesInput&, SeriesOptions& options) { options.convert.resume = true; };
+  EXPECT_THROW(convertPart(output, {{0}, {7}}, {0, 1}, resume), Error);
+  EXPECT_TRUE(fs::exists(record));
+  convertPart(output, kinds, {0, 1}, resume);
+  EXPECT_TRUE(fs::exists(record));
+  // Replaced, but not wholly.
+  const auto fail = [](SeriesInput& input, SeriesOptions& options) {
+    options.convert.overwrite = true;
+    input.open = [open = input.open](uint64_t step) {
+      if (step > 0) throw Error("broken");
+      return open(step);
+    };
+  };
+  EXPECT_THROW(convertPart(output, kinds, {0, 1}, fail), Error);
+  EXPECT_FALSE(fs::exists(record));
 }
 
 TEST(SeriesParts, HaveWholeGroupsAndTheFirstStep) {

@@ -175,7 +175,7 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   const std::vector<uint64_t> places = placesOfPart(part, steps.size());
   SeriesOptions options = seriesOptions(arguments);
   const std::filesystem::path folder = partsFolder(options.convert.output);
-  beginPart(folder, part);
+  makePartsFolder(folder);
   if (places.empty()) {
     writePartRecord(folder, part, steps.size(), {});
     fmt::print("{}: no steps in this part\n", folder.string());
@@ -187,6 +187,7 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   input.places = places;
   options.convert.output = partCache(folder, part);
   options.to_part = part.index > 0;
+  options.before_change = [&] { removePartRecord(folder, part); };
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   StepLog log(progress);
