@@ -151,9 +151,12 @@ TEST_F(RanksCommand, ConvertASeriesTogether) {
 
   // Parts by processes that know nothing of each other; the last one has nothing to do.
   for (const char* part : {"2/4", "4/4", "1/4"}) {
-    const ProgramResult made = runProgram(to("s3.splats", {"--part", part}));
+    const ProgramResult made = runProgram(to("s3.splats", {"--part", part, "--stats", file("p.json")}));
     EXPECT_EQ(made.status, 0) << made.err;
     EXPECT_EQ(lineCount(made.out), 1) << made.out;
+    const auto numbers = nlohmann::json::parse(readTextFile(file("p.json")));
+    EXPECT_EQ(numbers["each_step"].size(), numbers["converted"]);
+    fs::remove(file("p.json"));
   }
   const std::vector<std::string> join{"convert", "--join", file("s3.splats.parts"), "-o", file("s3.splats")};
   const ProgramResult early = runProgram(join);

@@ -255,6 +255,32 @@ TEST_F(SeriesCommand, RefusesInOneLine) {
   refused({"convert", "--add-steps", file("f.xyz"), file("f_0000.fun")}, 2, "--to");
   run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("a.splats")});
   refused({"render", file("a.splats"), "-o", file("a.png"), "--step", "3"}, 2, "steps 0 to 2");
+  refused(
+      {"convert", file("f.xyz"), file("f_*.fun"), "-o", file("w.splats"), "--follow", "--stats", file("s")},
+      2, "--stats");
+  // Options that would have no effect.
+  using Words = std::vector<std::string>;
+  for (const Words& option :
+       {Words{"--value-precision", "fine"}, {"--overlap", "all"}, {"--surface", "k=3"}, {"--no-surfaces"}})
+    for (const char* mode : {"--add-steps", "--add-scalar=f"}) {
+      Words words{"convert", mode, file("f.xyz"), file("f_0000.fun"), "--to", file("a.splats")};
+      words.insert(words.end(), option.begin(), option.end());
+      refused(words, 2, option[0] + " cannot be combined with");
+    }
+  for (const Words& option : {Words{"--trace", file("t.json")},
+                              {"--value-precision", "fine"},
+                              {"--blank", "0"},
+                              {"--tmp", file("")},
+                              {"--memory", "1G"},
+                              {"--threads", "1"},
+                              {"--keep-going"},
+                              {"--overlap", "all"},
+                              {"--time-step", "1"},
+                              {"--stats", file("s.json")}}) {
+    Words words{"convert", "--join", file("p.splats.parts"), "-o", file("p.splats")};
+    words.insert(words.end(), option.begin(), option.end());
+    refused(words, 2, option[0] + " cannot be combined with --join");
+  }
   refused({"render", file("a.splats"), "-o", file("a.png"), "--steps", "all"}, 2, "frame");
   refused({"convert", file("f.xyz"), file("f_0000.fun"), "--add-scalar", "f", "--to", file("a.splats")}, 1,
           "series of 3 steps");

@@ -30,7 +30,6 @@ void checkArguments(const ConvertArguments& arguments) {
   refuse(!arguments.scalars.empty(), "--scalar");
   refuse(arguments.overwrite, "--overwrite");
   refuse(arguments.resume, "--resume");
-  refuse(arguments.overlap.has_value(), "--overlap");
 }
 
 void printSummary(const ConvertArguments& arguments, const AddScalarReport& report, double seconds) {

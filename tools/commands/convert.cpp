@@ -4,8 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -120,6 +122,30 @@ void runConvert(ConvertArguments arguments) {
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 
+/// Throws UsageError if one of the command's options was given that would have no effect: one for which `hasNoEffect`
+/// is true.
+void refuseGiven(const CLI::App& command, const char* mode, const char* reason,
+                 const std::function<bool(const std::string& name)>& hasNoEffect) {
+  for (const CLI::Option* option : command.get_options())
+    if (option->count() > 0 && hasNoEffect(option->get_name()))
+      throw UsageError("{} cannot be combined with {}, {}",
+                       option->get_name() == "SOLUTION" ? "a further file" : option->get_name(), mode,
+                       reason);
+}
+
+void refuseWithoutEffect(const CLI::App& command, const ConvertArguments& arguments) {
+  using Names = std::set<std::string>;
+  if (arguments.joins)
+    return refuseGiven(command, "--join", "which joins what was converted", [](const std::string& name) {
+      return !Names{"GRID", "--output", "--join", "--overwrite"}.contains(name);
+    });
+  if (!arguments.adds_steps && arguments.added_scalars.empty()) return;
+  refuseGiven(command, arguments.adds_steps ? "--add-steps" : "--add-scalar",
+              "which follows the choice made for the cache", [](const std::string& name) {
+                return Names{"--value-precision", "--overlap", "--surface", "--no-surfaces"}.contains(name);
+              });
+}
+
 void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
   constexpr const char* kGroup = "Time steps";
   command
@@ -229,7 +255,8 @@ void addConvert(CLI::App& app) {
   command->add_option("--trace", arguments->trace, kTraceHelp);
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);
-  command->callback([arguments] {
+  command->callback([arguments, command] {
+    refuseWithoutEffect(*command, *arguments);
     if (arguments->joins) return runJoinSeries(*arguments);
     takeScalarsFromSolutions(*arguments);
     const bool series = isSeries(*arguments);

@@ -51,6 +51,8 @@ void checkArguments(const ConvertArguments& arguments) {
                      *arguments.grid.time_step, *arguments.grid.time_step);
   if (arguments.follows && !launchedRanks().alone())
     throw UsageError("--follow: one process converts; start curvisplat without mpirun");
+  if (arguments.follows && !arguments.statistics.empty())
+    throw UsageError("--stats cannot be combined with --follow, which may go on without an end");
   if (arguments.part) checkPartArguments(arguments);
   if (!arguments.adds_steps) return;
   const auto refuse = [](bool given, const char* option) {
@@ -168,6 +170,22 @@ void printSums(const SeriesReport& report, const std::filesystem::path& cache) {
              report.new_geometries);
 }
 
+/// To the --stats file, if there is one.
+void writeSeriesStatistics(const ConvertArguments& arguments, const SeriesReport& report, const StepLog& log,
+                           const Progress& progress) {
+  if (arguments.statistics.empty()) return;
+  nlohmann::json json = runStatistics();
+  json["ranks"] = launchedRanks().count();
+  json["steps"] = report.steps;
+  json["converted"] = report.converted;
+  json["left_out"] = report.left_out;
+  json["new_geometries"] = report.new_geometries;
+  json["samples"] = report.nodes;
+  json["each_step"] = log.steps();
+  addPhases(progress, json);
+  writeStatistics(arguments.statistics, json);
+}
+
 /// Steps `places` of `steps` into a part of their own.
 void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
   const FramePart number = parsePart(*arguments.part);
@@ -178,6 +196,8 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   makePartsFolder(folder);
   if (places.empty()) {
     writePartRecord(folder, part, steps.size(), {});
+    Progress nothing;
+    writeSeriesStatistics(arguments, {}, StepLog(nothing), nothing);
     fmt::print("{}: no steps in this part\n", folder.string());
     return;
   }
@@ -195,25 +215,14 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
       convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
   writePartRecord(folder, part, steps.size(), report.origins);
   printSums(report, options.convert.output);
+  writeSeriesStatistics(arguments, report, log, progress);
 }
 
 }  // namespace
 
 void runJoinSeries(ConvertArguments arguments) {
-  const auto refuse = [](bool given, const char* option) {
-    if (given) throw UsageError("{} cannot be combined with --join, which joins what was converted", option);
-  };
-  refuse(!arguments.grid.solutions.empty(), "a further file");
-  refuse(!arguments.scalars.empty(), "--scalar");
-  refuse(!arguments.added_scalars.empty(), "--add-scalar");
-  refuse(arguments.steps || arguments.every, "--steps or --every");
-  refuse(arguments.part.has_value(), "--part");
-  refuse(arguments.adds_steps || !arguments.to.empty(), "--add-steps or --to");
-  refuse(arguments.follows, "--follow");
-  refuse(arguments.resume, "--resume");
-  refuse(arguments.dry_run, "--dry-run");
-  refuse(!arguments.statistics.empty(), "--stats");
-  refuse(!launchedRanks().alone(), "mpirun");
+  if (!launchedRanks().alone())
+    throw UsageError("--join: one process joins the parts; start curvisplat without mpirun");
   if (arguments.output.empty()) throw UsageError("--output is required");
   if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
   checkOutputFolder("-o", arguments.output);
@@ -271,17 +280,7 @@ void runConvertSeries(ConvertArguments arguments) {
     fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample and step{}\n", seconds,
                1e-6 * samples / seconds, mebibytes(log.bytes()), static_cast<double>(log.bytes()) / samples,
                peakMemoryText());
-  if (arguments.statistics.empty()) return;
-  nlohmann::json json = runStatistics();
-  json["ranks"] = ranks.count();
-  json["steps"] = report.steps;
-  json["converted"] = report.converted;
-  json["left_out"] = report.left_out;
-  json["new_geometries"] = report.new_geometries;
-  json["samples"] = report.nodes;
-  json["each_step"] = log.steps();
-  addPhases(progress, json);
-  writeStatistics(arguments.statistics, json);
+  writeSeriesStatistics(arguments, report, log, progress);
 }
 
 }  // namespace curvisplat
