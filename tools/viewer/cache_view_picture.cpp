@@ -260,6 +260,7 @@ void CacheView::loadView(const std::string& name) {
     state.faces = state_.faces;  // of the command line
     state.faces_by = state_.faces_by;
     state.isovalues = state_.isovalues;
+    state.iso_opacity = state_.iso_opacity;
     loadSurfaces(state);
     restore(&state);
   } catch (const Error& error) {
@@ -297,14 +298,17 @@ void CacheView::choose(const MenuChoice& choice) {
   if (choice.view) loadView(*choice.view);
   if (choice.looks_for_scalars) further_.look();
   if (choice.add_scalar) wanted_scalar_ = choice.add_scalar;
-  if (choice.scalar && *choice.scalar != state_.variable) chooseScalar(*choice.scalar);
+  if (choice.scalar) chooseScalar(*choice.scalar);
   if (choice.opacity_scalar)
     chooseOpacityScalar(*choice.opacity_scalar == otherScalars().front() ? "" : *choice.opacity_scalar);
 }
 
 void CacheView::chooseScalar(const std::string& name) {
-  if (state_.function.isAutomatic()) return chooser_.ask({FunctionChooser::For::kScalar, name});
-  showScalar(name);
+  using For = FunctionChooser::For;
+  const bool is_shown = name == state_.variable;
+  if (!is_shown && state_.function.isAutomatic()) return chooser_.ask({For::kScalar, name});
+  chooser_.drop(For::kScalar);  // one that was chosen before
+  if (!is_shown) showScalar(name);
 }
 
 void CacheView::showScalar(const std::string& name) {
@@ -315,7 +319,12 @@ void CacheView::showScalar(const std::string& name) {
 }
 
 void CacheView::chooseOpacityScalar(const std::string& name) {
-  if (!name.empty() && name != state_.variable) return chooser_.ask({FunctionChooser::For::kOpacities, name});
+  using For = FunctionChooser::For;
+  const std::string& shown = state_.opacity_by ? state_.opacity_by->variable : state_.variable;
+  const bool is_shown = (name.empty() ? state_.variable : name) == shown;
+  if (!is_shown && !name.empty() && name != state_.variable) return chooser_.ask({For::kOpacities, name});
+  chooser_.drop(For::kOpacities);  // one that was chosen before
+  if (is_shown) return;
   state_.opacity_by.reset();
   ++function_version_;
   changed_ = true;
