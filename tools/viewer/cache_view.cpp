@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -374,6 +375,12 @@ void CacheView::restore(const ViewState* state) {
 std::shared_ptr<const CarriedView> CacheView::carried() const {
   if (isUntouchedPreview()) return nullptr;
   return std::make_shared<const CarriedView>(CarriedView{state_, history_});
+}
+
+bool CacheView::isOf(const CacheReader& cache) const {
+  const auto same_name = [](const VariableInfo& a, const VariableInfo& b) { return a.name == b.name; };
+  return cache.cachePath() == cache_.cachePath() && state_.faces.empty() &&
+         std::ranges::equal(cache.manifest().variables, manifest().variables, same_name);
 }
 
 std::optional<std::string> CacheView::takeWantedScalar(bool is_busy) {

@@ -82,6 +82,9 @@ class CacheView {
   std::optional<std::string> takeWantedScalar(bool is_busy);
   const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
   const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
+  /// Whether its state can be that of a view of this cache: it shows the same one, and no faces of the command line, which
+  /// are meshes of it.
+  bool isOf(const CacheReader& cache) const;
 
  private:
   ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
