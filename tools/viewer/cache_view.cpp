@@ -124,22 +124,33 @@ void CacheView::draw(const WindowLayout& layout) {
 
 void CacheView::takeFrame() {
   if (frames_failed_) return;
+  std::optional<ShownFrame> frame;
   try {
-    if (std::optional<ShownFrame> frame = frames_->take()) {
-      picture_.set(frame->bytes, frame->image.size);
-      shown_ = std::move(frame);
-      annotate();
-      reportDamage();
-    }
+    frame = frames_->take();
     if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
   } catch (const UsageError&) {  // of this request only
-    giveUpSaving();
+    giveUpRequest();
     throw;
   } catch (...) {
-    giveUpSaving();
     frames_failed_ = true;
+    giveUpRequest();
     throw;
   }
+  if (!frame) return;
+  picture_.set(frame->bytes, frame->image.size);
+  shown_ = std::move(frame);
+  annotate();
+  reportDamage();
+}
+
+/// Neither its picture nor its values will come.
+void CacheView::giveUpRequest() {
+  giveUpSaving();
+  clicked_.reset();  // the next picture's pixels may be others
+  values_failed_ = true;
+  if (!playback_.isPlaying()) return;
+  playback_.toggle();
+  was_moving_ = false;  // that it rests now is no reason to try again
 }
 
 /// What is to be saved will not come.
@@ -147,13 +158,14 @@ void CacheView::giveUpSaving() {
   if (std::exchange(save_to_, std::nullopt)) say("The picture was not saved, because it could not be drawn.");
 }
 
-/// Of each damaged brick once.
+/// Of each damaged brick of a step once.
 void CacheView::reportDamage() {
   const BrickFailure* first = nullptr;
   for (const BrickFailure& failure : shown_->statistics.bricks_unreadable)
-    if (damaged_.insert(failure.brick).second && !first) first = &failure;
+    if (damaged_.insert({shown_->step, failure.brick}).second && !first) first = &failure;
   if (!first) return;
-  const size_t number = damaged_.size();
+  const auto number =
+      std::ranges::count(damaged_, shown_->step, [](const auto& damaged) { return damaged.first; });
   reports_.report(fmt::format("{} of {} bricks cannot be read; coarser data is drawn there, or none: {}",
                               number, cache_.bricks().size(), first->reason));
 }
@@ -242,6 +254,7 @@ void CacheView::ask(bool moving) {
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
   request_ = frames_->request(std::move(request));
   values_.reset();
+  values_failed_ = false;
 }
 
 void CacheView::run(Command command) {

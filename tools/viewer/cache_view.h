@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stream/base/error.h"
@@ -94,6 +95,7 @@ class CacheView {
   /// A picture, once it is final; the empty name: the next number.
   void saveTo(const std::filesystem::path& file);
   void giveUpSaving();
+  void giveUpRequest();
   void restartFrames();
   void react(const WindowLayout& layout);
   void drawPanels(const WindowLayout& layout);
@@ -142,8 +144,8 @@ class CacheView {
   Navigation navigation_;
   const Backend backend_;
   std::optional<FrameLoop> frames_;
-  bool frames_failed_ = false;  // the loop has ended
-  std::set<uint32_t> damaged_;  // bricks, of which the user has been told
+  bool frames_failed_ = false;                       // the loop has ended
+  std::set<std::pair<uint64_t, uint32_t>> damaged_;  // steps' bricks, of which the user has been told
   PictureTexture picture_, overlay_;
   std::vector<std::string> views_;
   FurtherScalarList further_;
@@ -163,6 +165,7 @@ class CacheView {
   PointProbe probe_;
   FunctionChooser chooser_;
   uint64_t values_asked_for_ = 0;  // request
+  bool values_failed_ = false;     // of the newest request
   double pointed_since_s_ = 0;
   glm::dvec2 pointed_{-1.0};
   std::optional<glm::dvec2> clicked_;  // in pixels of the picture; a marker is to come there

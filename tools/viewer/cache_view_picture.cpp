@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
@@ -82,7 +83,12 @@ void CacheView::probe(const WindowLayout& layout) {
     return glm::dvec2((at.x - layout.picture.x) / width * data_size_.width,
                       (at.y - layout.picture.y) / layout.picture.height * data_size_.height);
   };
-  for (const glm::dvec2& click : window_.takeClicks()) clicked_ = pixelAt(click);
+  for (const glm::dvec2& click : window_.takeClicks()) {
+    clicked_ = pixelAt(click);
+    if (!std::exchange(values_failed_, false)) continue;
+    values_asked_for_ = 0;  // tries again
+    changed_ |= frames_failed_ || !isShown();
+  }
   const auto pointed = window_.pointed();
   if (!pointed || *pointed != pointed_) {
     pointed_since_s_ = glfwGetTime();
@@ -90,7 +96,8 @@ void CacheView::probe(const WindowLayout& layout) {
     if (!pointed) probed_.clear();
   }
   const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedForSeconds;
-  if ((rests || clicked_) && isFinal() && !frames_->busy() && values_asked_for_ != request_) {
+  if ((rests || clicked_) && isFinal() && !frames_failed_ && !frames_->busy() &&
+      values_asked_for_ != request_) {
     values_asked_for_ = request_;
     frames_->requestValues();
   }
@@ -148,7 +155,8 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   ImGui::Begin("status", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
-  const bool looks = values_asked_for_ == request_ && !(values_ && values_->request == request_);
+  const bool looks =
+      values_asked_for_ == request_ && !values_failed_ && !(values_ && values_->request == request_);
   const bool points = window_.pointed().has_value();
   const std::string text = !probed_.empty()       ? probed_
                            : looks && points      ? "reading the value under the mouse ..."
