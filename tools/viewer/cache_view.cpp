@@ -77,6 +77,8 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
 }
 
 void CacheView::releasePictures() {
+  if (save_to_) say("The picture was not saved, because something else has been opened.");
+  if (copy_requested_) say("The command was not copied, because something else has been opened.");
   picture_.release();
   overlay_.release();
 }
@@ -85,6 +87,12 @@ void CacheView::takePictureOf(CacheView& before) {
   picture_.swap(before.picture_);
   overlay_.swap(before.overlay_);
   shown_strip_ = before.shown_strip_;
+}
+
+void CacheView::takeRequestsOf(CacheView& before) {
+  save_to_ = std::exchange(before.save_to_, std::nullopt);
+  copy_requested_ = std::exchange(before.copy_requested_, false);
+  copies_movie_ = before.copies_movie_;
 }
 
 /// As the view before has it now. Reads only where the user has chosen another scalar since the view was prepared.

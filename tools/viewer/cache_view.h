@@ -52,8 +52,10 @@ class CacheView {
 
   /// Shows the picture of the view that this one replaces until its own first one comes.
   void takePictureOf(CacheView& before);
-  /// Gives up what is OpenGL's. Then nothing but the destructor may be called, and that on any thread: it waits for what is
-  /// being read and drawn.
+  /// Saves the picture and copies the command that the view before has not got to.
+  void takeRequestsOf(CacheView& before);
+  /// Gives up what is OpenGL's, and says what will not be saved or copied. Then nothing but the destructor may be called,
+  /// and that on any thread: it waits for what is being read and drawn.
   void releasePictures();
   /// Draws one frame with the effects of all input so far.
   void draw(const WindowLayout& layout);

@@ -89,6 +89,9 @@ class Viewer {
     auto view = std::make_unique<CacheView>(prepared, options, window_, reports_, dialog_,
                                             before_has_ended.get_future().share());
     if (options.carried && view_) view->takePictureOf(*view_);
+    const auto preview = view_ ? view_->preview() : std::nullopt;
+    if (view_ && (options.carried || (preview && preview->whole == prepared.cache.cachePath())))
+      view->takeRequestsOf(*view_);
     retire(std::exchange(view_, std::move(view)), std::move(before_has_ended));
     window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
     std::vector<std::string> names;
