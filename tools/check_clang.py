@@ -55,9 +55,9 @@ def clang_arguments(arguments):
     kept = []
     rest = iter(arguments)
     for argument in rest:
-        if argument in ("-o", "-c"):
+        if argument in ("-o", "-c", "-include"):  # -include: what GCC has precompiled
             next(rest)
-        elif not argument.endswith("ccache") and not os.path.basename(argument).startswith(("c++", "g++")):
+        elif argument != "-Winvalid-pch" and not argument.endswith("ccache") and not os.path.basename(argument).startswith(("c++", "g++")):
             kept.append(argument)
     return kept
 

@@ -54,6 +54,10 @@ CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
   return limits;
 }
 
+std::vector<ValueBounds> subtreesOf(const CacheReader& cache, size_t variable) {
+  return subtreeBounds(cache.bricks(), cache.brickVariables(variable));
+}
+
 }  // namespace
 
 FramePlanner::FramePlanner(const CacheReader& cache, const DrawnScalars& scalars)
@@ -65,12 +69,14 @@ FramePlanner::FramePlanner(const CacheReader& cache, const DrawnScalars& scalars
       colours_(coloured_by_ ? coloured_by_->function : transfer_function_),
       colour_classes_(colourClassesFor(cache, coloured_by_)),
       scalar_range_(transfer_function_.range()),
-      subtrees_(subtreeBounds(cache.bricks(), cache.brickVariables(variable_))) {}
+      subtrees_(subtreesOf(cache, variable_)),
+      colour_subtrees_(coloured_by_ ? subtreesOf(cache, coloured_by_->variable)
+                                    : std::vector<ValueBounds>()) {}
 
 uint64_t FramePlanner::bytes() const {
   return cache_.bricks().size() *
-         (sizeof(Brick) + cache_.manifest().variables.size() * sizeof(BrickVariable) + sizeof(ValueBounds) +
-          kFrameBytesABrick);
+         (sizeof(Brick) + cache_.manifest().variables.size() * sizeof(BrickVariable) +
+          (coloured_by_ ? 2 : 1) * sizeof(ValueBounds) + kFrameBytesABrick);
 }
 
 uint64_t FramePlanner::mostSplats() const {
@@ -83,7 +89,8 @@ uint64_t FramePlanner::mostSplats() const {
 void FramePlanner::stepChanged() {
   table_ = tableFor(cache_, variable_, transfer_function_);
   colour_classes_ = colourClassesFor(cache_, coloured_by_);
-  subtrees_ = subtreeBounds(cache_.bricks(), cache_.brickVariables(variable_));
+  subtrees_ = subtreesOf(cache_, variable_);
+  if (coloured_by_) colour_subtrees_ = subtreesOf(cache_, coloured_by_->variable);
 }
 
 void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
@@ -148,8 +155,10 @@ std::vector<SlicePlan> FramePlanner::planSlices(const ProjectionSettings& settin
 void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions& limits,
                                    FramePlan& plan) const {
   if (!options.scene || options.scene->isovalues.empty()) return;
-  const size_t variable = coloured_by_ && options.scene->iso_of_colours ? coloured_by_->variable : variable_;
-  const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable), subtrees_};
+  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
+  const CutTree tree{cache_.manifest().root, cache_.bricks(),
+                     cache_.brickVariables(of_colours ? coloured_by_->variable : variable_),
+                     of_colours ? colour_subtrees_ : subtrees_};
   const double reach = largestReach(plan.settings.view.low_pass_px2);
   const auto has_none = [&](const ValueBounds& bounds) {
     const std::pair<double, double> spread = spreadOf(bounds, reach);

@@ -123,6 +123,7 @@ class FramePlanner {
   std::optional<ClassificationTable> colour_classes_;
   std::pair<double, double> scalar_range_;  // of the transfer function
   std::vector<ValueBounds> subtrees_;
+  std::vector<ValueBounds> colour_subtrees_;  // of the scalar of the colours, if there is one
 };
 
 }  // namespace curvisplat

@@ -35,16 +35,18 @@ const TransferFunction& hues() {
 
 class TwoScalarsTest : public testing::Test {
  protected:
-  TwoScalarsTest() {
+  TwoScalarsTest() { convertTo("a.splats", 0); }
+
+  void convertTo(const char* name, double added_to_hues) const {
     const FunctionGridSource source(
-        {gridBlock(kNodes[0], kNodes[1], kNodes[2])}, 2, [this](const GridNode& node) {
+        {gridBlock(kNodes[0], kNodes[1], kNodes[2])}, 2, [&](const GridNode& node) {
           const glm::dvec3 uvw(double(node.i) / (kNodes[0] - 1), double(node.j) / (kNodes[1] - 1),
                                double(node.k) / (kNodes[2] - 1));
           const glm::dvec3 at = annulus_->position(uvw);
-          return NodeValues{at, {float(annulus_->scalar(at)), float(hueAt(at))}};
+          return NodeValues{at, {float(annulus_->scalar(at)), float(hueAt(at) + added_to_hues)}};
         });
     ConvertOptions options;
-    options.output = folder_ / "a.splats";
+    options.output = folder_ / name;
     options.scalars = {0, 1};
     Progress progress;
     convert(source, options, progress);
@@ -254,6 +256,28 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
   options.threads = 1;
   options.memory_bytes = uint64_t{96} << 20;
   EXPECT_EQ(drawn(function.table, options).rgba, picture.rgba);
+}
+
+/// Bricks are left out by the bounds of the isosurface's scalar, not of the other's.
+TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
+  convertTo("far.splats", 10);
+  FrameOptions options = knownFrame(kSize);
+  const auto sceneWith = [](double isovalue) {
+    auto scene = std::make_shared<SurfaceScene>();
+    scene->isovalues = {isovalue};
+    scene->iso_of_colours = true;
+    scene->volume = false;
+    return scene;
+  };
+  options.scene = sceneWith(0.6);
+  const TransferFunction opacity = KnownFunction::of("smooth").table;
+  const Image near = drawn(opacity, options);
+  options.scene = sceneWith(10.6);
+  const CacheReader cache(folder_ / "far.splats");
+  const TransferFunction far_hues = TransferFunction::preset("cool-warm", 10, 11, 1);
+  FrameRenderer renderer(cache, DrawnScalars({0, opacity}, {1, far_hues}), Backend::kCpu);
+  FrameStatistics statistics;
+  EXPECT_GE(db(renderer.render(halfAnnulusCamera(), options, statistics), near), 50);
 }
 
 TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {

@@ -45,9 +45,10 @@ until_() {
 # Each answer of the window to a key comes after everything that was done before it.
 commands() { wc -l < view.log; }
 more_commands() { [ "$(commands)" -gt "$1" ]; }
+has_widget() { grep -qsE "^[0-9 -]+ $1\$" widgets; }
 # at NAME [ACROSS [DOWN]]: a place in that widget, in percent of its size; waits for it.
 at() {
-  until_ 1200 grep -qsE "^[0-9 -]+ $1\$" widgets || fail "there is no widget $1" >&2
+  until_ 1200 has_widget "$1" || fail "there is no widget $1" >&2
   awk -v name="$1" -v across="${2:-50}" -v down="${3:-50}" '{
     x = $1; y = $2; w = $3; h = $4
     for (n = 0; n < 4; ++n) sub(/^[^ ]+ /, "")
@@ -56,7 +57,7 @@ at() {
 }
 # asked: what the window shows now, as the command that draws it.
 asked() {
-  local before place
+  local before place again
   before=$(commands)
   place=$(at picture)
   # One key, and as long as a busy machine takes to answer it. Only the first of all may come before the window hears.
@@ -108,10 +109,13 @@ drag() {
   do_ mousemove $from mousedown "$1" mousemove $half mousemove $to mouseup "$1" mousemove $from
 }
 # show NAME: that scalar. The list and the click on it are for frames of their own: between them, the window is asked.
+# A busy window may take the click that opens the list for none: it is clicked again then.
 show() {
+  local again
   for ((again = 0; again < 10; ++again)); do
     press scalar
     asked > /dev/null
+    until_ 100 has_widget "scalar $1" || continue
     press "scalar $1"
     ! asked | grep -qE -- "--scalar $1( |\$)" || return 0
   done
@@ -125,6 +129,7 @@ presets_points() {
 }
 # home: everything as it was first. An "o" too few or too many is put right.
 home() {
+  local again
   show f
   for ((again = 0; again < 4; ++again)); do
     presets_points

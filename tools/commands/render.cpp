@@ -211,7 +211,8 @@ void render(const RenderArguments& given) {
   }
 
   options.scene = sceneOf(arguments.surfaces, cache,
-                          {shown, variable, isoOfColours(arguments.opacity, arguments.scalar)});
+                          {shown, variable, isoOfColours(arguments.opacity, arguments.scalar),
+                           !arguments.opacity.by.scalar.empty()});
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 

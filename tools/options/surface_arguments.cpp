@@ -268,7 +268,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
     surface.colour = colour;
     surface.opacity = surfaceOpacity(arguments, n);
     if (!arguments.surface_by.empty()) colourByScalar(surface, arguments.surface_by, cache, scalars.colours);
-    if (surface.opacity.by_function && scalars.areTwo())
+    if (surface.opacity.by_function && scalars.opacity_by && scalars.areTwo())
       takeOpacities(surface, cache.manifest().variables[*scalars.opacities].name, cache);
   }
   scene->slices = parseSlices(arguments.slices);

@@ -46,6 +46,7 @@ bool hasFaces(const SurfaceArguments& arguments);
 struct SceneScalars {
   std::optional<size_t> colours, opacities;  // none: of a window, which may show any
   bool iso_of_colours = false;               // of two: isosurfaces are those of the colours
+  bool opacity_by = false;  // whether the opacities are those of --opacity-by, also for faces
 
   bool areTwo() const { return colours && opacities && colours != opacities; }
 };
