@@ -216,6 +216,21 @@ TEST_F(WindowOpening, WithoutAFileItAsksForOneAndRemembersIt) {
   close();
 }
 
+TEST_F(WindowOpening, OpeningWhatIsShownKeepsTheView) {
+  open();
+  const Image first = save();
+  dragPicture(1, 0.2, 0.1);
+  const Image turned = save();
+  ASSERT_LT(difference(first, turned), 30);
+  press("ctrl+o");
+  placeOf("file name");
+  act({"type", "a.splats"});
+  press("Return");
+  eventually([] { return false; }, 3);  // until it has been opened
+  EXPECT_GT(difference(save(), turned), 50);
+  close();
+}
+
 TEST_F(WindowOpening, AnswersWhileItConverts) {
   run({"generate", "half-annulus", "--size", "256x160x160", "-o", "large"});
   openWith({"large.xyz", "large.fun"});

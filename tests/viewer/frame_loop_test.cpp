@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
@@ -56,6 +59,13 @@ class FrameLoopTest : public testing::Test {
       if (!busy) return frames;
       wait();
     }
+  }
+
+  static std::vector<Brick> coarsest(const CacheReader& cache) {
+    std::vector<Brick> roots;
+    std::ranges::copy_if(cache.bricks(), std::back_inserter(roots),
+                         [](const Brick& brick) { return brick.parent == kNoBrick; });
+    return roots;
   }
 
   static std::unique_ptr<TemporaryFolder> folder_;
@@ -175,6 +185,49 @@ TEST_F(FrameLoopTest, CoarserDataIsDrawnWhereABrickIsDamaged) {
     options.keep_going = true;
     EXPECT_EQ(frames.back().image.rgba, renderer.render(request.camera, options, statistics).rgba);
   }
+}
+
+/// Coarse pictures show nothing then, finer ones all there is.
+TEST_F(FrameLoopTest, FinerDataIsDrawnWhereACoarseBrickIsDamaged) {
+  const std::filesystem::path copy = *folder_ / "root.splats";
+  std::filesystem::copy(*folder_ / "scene.splats", copy);
+  const CacheReader reader(copy);
+  ASSERT_EQ(coarsest(reader).size(), 1u);
+  {
+    std::fstream file(reader.geometryPath(), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(coarsest(reader).front().geometry.offset));
+    file.put('\x55').put('\x5a').put('\xa5');
+  }
+  for (const bool moving : {false, true}) {
+    SCOPED_TRACE(moving);
+    FrameLoop loop(reader, Backend::kCpu, waker());
+    FrameRequest request = requestOf();
+    request.moving = moving;
+    request.target_s = 1e-9;  // no picture is as quick as that: the coarsest are asked for
+    request.options.lod_pixels = 0;
+    for (int n = 0; n < (moving ? 4 : 1); ++n) {
+      loop.request(request);
+      const std::vector<ShownFrame> frames = all(loop);
+      ASSERT_FALSE(frames.empty());
+      for (const ShownFrame& frame : frames) EXPECT_GT(frame.statistics.splats_drawn, 0u);
+      EXPECT_TRUE(moving || frames.back().is_final);
+    }
+  }
+}
+
+TEST_F(FrameLoopTest, FacesThatAStepLacksEndTheRequestOnly) {
+  FrameLoop loop(cache_, Backend::kCpu, waker());
+  FrameRequest request = requestOf();
+  SurfaceScene scene;
+  scene.grid_surfaces.emplace_back();
+  request.options.scene = std::make_shared<const SurfaceScene>(scene);
+  request.faces_at = [](const CacheReader&, const auto&) -> std::vector<GridSurface> {
+    throw Error("no such faces");
+  };
+  loop.request(request);
+  EXPECT_THROW(all(loop), UsageError);
+  loop.request(requestOf());
+  EXPECT_TRUE(all(loop).back().is_final);
 }
 
 TEST_F(FrameLoopTest, ADamagedCacheEndsTheLoop) {

@@ -85,7 +85,7 @@ ConversionServices conversionServices() {
     } catch (const Interrupted&) {
       throw;
     } catch (const Error&) {
-      const auto ordered = gridFirst(files);
+      const auto ordered = gridFirst(files, progress);
       if (!ordered) throw;
       events.reorder(*ordered);
       return keptCacheOf(*ordered, progress, kept);

@@ -25,9 +25,11 @@ bool opens(const std::vector<std::filesystem::path>& files) {
 
 }  // namespace
 
-std::optional<std::vector<std::filesystem::path>> gridFirst(std::vector<std::filesystem::path> files) {
-  if (files.size() > kMaxFiles) return std::nullopt;
+std::optional<std::vector<std::filesystem::path>> gridFirst(std::vector<std::filesystem::path> files,
+                                                            const Progress& progress) {
+  if (files.size() < 2 || files.size() > kMaxFiles || opens(files)) return std::nullopt;
   for (size_t n = 1; n < files.size(); ++n) {
+    progress.throwIfStopped();
     std::rotate(files.begin(), files.begin() + static_cast<std::ptrdiff_t>(n),
                 files.begin() + static_cast<std::ptrdiff_t>(n) + 1);
     if (opens(files)) return files;

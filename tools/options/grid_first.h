@@ -5,10 +5,14 @@
 #include <optional>
 #include <vector>
 
+#include "stream/base/progress.h"
+
 namespace curvisplat {
 
 /// For files that do not open as given: with another of them first, which opens as a grid with the rest as its solutions;
-/// nullopt if there is none, or if there are more than eight. Opens files, which can take long.
-std::optional<std::vector<std::filesystem::path>> gridFirst(std::vector<std::filesystem::path> files);
+/// nullopt if there is none, if there are more than eight, or if they do open as given: then it is not their order that is
+/// wrong. Opens files, which can take long; throws Interrupted once `progress` is stopped.
+std::optional<std::vector<std::filesystem::path>> gridFirst(std::vector<std::filesystem::path> files,
+                                                            const Progress& progress);
 
 }  // namespace curvisplat

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <deque>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -139,7 +140,7 @@ class RemoteViewer::Work {
       frames_.reset();  // frees its memory before the next one allocates
       frames_ = std::make_unique<FrameLoop>(reader, limits_.backend, [this] { viewer_.wake(); });
       cache_ = view.cache;
-      damaged_said_ = 0;
+      damaged_said_.clear();
       asked_.clear();
     }
     picked_.reset();  // it was of another picture
@@ -164,16 +165,18 @@ class RemoteViewer::Work {
       return;
     }
     if (!frame) return;
-    reportDamage(frame->statistics.bricks_unreadable);
+    reportDamage(frame->step, frame->statistics.bricks_unreadable);
     while (!asked_.empty() && asked_.front().request < frame->request) asked_.pop_front();
     if (asked_.empty() || asked_.front().request != frame->request) return;
     send(asked_.front(), *frame);
   }
 
-  /// When there is more of it than was said.
-  void reportDamage(const std::vector<BrickFailure>& damaged) {
-    if (damaged.size() <= damaged_said_) return;
-    damaged_said_ = damaged.size();
+  /// When there is more of it than was said of this step.
+  void reportDamage(uint64_t step, const std::vector<BrickFailure>& damaged) {
+    if (damaged.empty()) return;
+    size_t& said = damaged_said_[step];
+    if (damaged.size() <= said) return;
+    said = damaged.size();
     report(Error("{} bricks cannot be read; coarser data is drawn there, or none: {}", damaged.size(),
                  damaged.front().reason));
   }
@@ -214,8 +217,8 @@ class RemoteViewer::Work {
   std::deque<Asked> asked_;
   LineQuality line_;
   uint32_t pictures_ = 0;
-  size_t damaged_said_ = 0;            // bricks of the cache, of which the viewer was told
-  std::unique_ptr<FrameLoop> frames_;  // the last: its thread calls wake()
+  std::map<uint64_t, size_t> damaged_said_;  // by step: bricks of the cache, of which the viewer was told
+  std::unique_ptr<FrameLoop> frames_;        // the last: its thread calls wake()
 };
 
 RemoteViewer::RemoteViewer(const ServedCaches& caches, const ViewerLimits& limits, Send send)

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -76,6 +77,8 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
 }
 
 void CacheView::releasePictures() {
+  if (save_to_) say("The picture was not saved, because something else has been opened.");
+  if (copy_requested_) say("The command was not copied, because something else has been opened.");
   picture_.release();
   overlay_.release();
 }
@@ -84,6 +87,12 @@ void CacheView::takePictureOf(CacheView& before) {
   picture_.swap(before.picture_);
   overlay_.swap(before.overlay_);
   shown_strip_ = before.shown_strip_;
+}
+
+void CacheView::takeRequestsOf(CacheView& before) {
+  save_to_ = std::exchange(before.save_to_, std::nullopt);
+  copy_requested_ = std::exchange(before.copy_requested_, false);
+  copies_movie_ = before.copies_movie_;
 }
 
 /// As the view before has it now. Reads only where the user has chosen another scalar since the view was prepared.
@@ -123,22 +132,33 @@ void CacheView::draw(const WindowLayout& layout) {
 
 void CacheView::takeFrame() {
   if (frames_failed_) return;
+  std::optional<ShownFrame> frame;
   try {
-    if (std::optional<ShownFrame> frame = frames_->take()) {
-      picture_.set(frame->bytes, frame->image.size);
-      shown_ = std::move(frame);
-      annotate();
-      reportDamage();
-    }
+    frame = frames_->take();
     if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
   } catch (const UsageError&) {  // of this request only
-    giveUpSaving();
+    giveUpRequest();
     throw;
   } catch (...) {
-    giveUpSaving();
     frames_failed_ = true;
+    giveUpRequest();
     throw;
   }
+  if (!frame) return;
+  picture_.set(frame->bytes, frame->image.size);
+  shown_ = std::move(frame);
+  annotate();
+  reportDamage();
+}
+
+/// Neither its picture nor its values will come.
+void CacheView::giveUpRequest() {
+  giveUpSaving();
+  clicked_.reset();  // the next picture's pixels may be others
+  values_failed_ = true;
+  if (!playback_.isPlaying()) return;
+  playback_.toggle();
+  was_moving_ = false;  // that it rests now is no reason to try again
 }
 
 /// What is to be saved will not come.
@@ -146,13 +166,14 @@ void CacheView::giveUpSaving() {
   if (std::exchange(save_to_, std::nullopt)) say("The picture was not saved, because it could not be drawn.");
 }
 
-/// Of each damaged brick once.
+/// Of each damaged brick of a step once.
 void CacheView::reportDamage() {
   const BrickFailure* first = nullptr;
   for (const BrickFailure& failure : shown_->statistics.bricks_unreadable)
-    if (damaged_.insert(failure.brick).second && !first) first = &failure;
+    if (damaged_.insert({shown_->step, failure.brick}).second && !first) first = &failure;
   if (!first) return;
-  const size_t number = damaged_.size();
+  const auto number =
+      std::ranges::count(damaged_, shown_->step, [](const auto& damaged) { return damaged.first; });
   reports_.report(fmt::format("{} of {} bricks cannot be read; coarser data is drawn there, or none: {}",
                               number, cache_.bricks().size(), first->reason));
 }
@@ -241,6 +262,7 @@ void CacheView::ask(bool moving) {
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
   request_ = frames_->request(std::move(request));
   values_.reset();
+  values_failed_ = false;
 }
 
 void CacheView::run(Command command) {
@@ -374,6 +396,12 @@ void CacheView::restore(const ViewState* state) {
 std::shared_ptr<const CarriedView> CacheView::carried() const {
   if (isUntouchedPreview()) return nullptr;
   return std::make_shared<const CarriedView>(CarriedView{state_, history_});
+}
+
+bool CacheView::isOf(const CacheReader& cache) const {
+  const auto same_name = [](const VariableInfo& a, const VariableInfo& b) { return a.name == b.name; };
+  return cache.cachePath() == cache_.cachePath() && state_.faces.empty() &&
+         std::ranges::equal(cache.manifest().variables, manifest().variables, same_name);
 }
 
 std::optional<std::string> CacheView::takeWantedScalar(bool is_busy) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stream/base/error.h"
@@ -51,8 +52,10 @@ class CacheView {
 
   /// Shows the picture of the view that this one replaces until its own first one comes.
   void takePictureOf(CacheView& before);
-  /// Gives up what is OpenGL's. Then nothing but the destructor may be called, and that on any thread: it waits for what is
-  /// being read and drawn.
+  /// Saves the picture and copies the command that the view before has not got to.
+  void takeRequestsOf(CacheView& before);
+  /// Gives up what is OpenGL's, and says what will not be saved or copied. Then nothing but the destructor may be called,
+  /// and that on any thread: it waits for what is being read and drawn.
   void releasePictures();
   /// Draws one frame with the effects of all input so far.
   void draw(const WindowLayout& layout);
@@ -82,6 +85,9 @@ class CacheView {
   std::optional<std::string> takeWantedScalar(bool is_busy);
   const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
   const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
+  /// Whether its state can be that of a view of this cache: it shows the same one, and no faces of the command line, which
+  /// are meshes of it.
+  bool isOf(const CacheReader& cache) const;
 
  private:
   ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
@@ -91,6 +97,7 @@ class CacheView {
   /// A picture, once it is final; the empty name: the next number.
   void saveTo(const std::filesystem::path& file);
   void giveUpSaving();
+  void giveUpRequest();
   void restartFrames();
   void react(const WindowLayout& layout);
   void drawPanels(const WindowLayout& layout);
@@ -139,8 +146,8 @@ class CacheView {
   Navigation navigation_;
   const Backend backend_;
   std::optional<FrameLoop> frames_;
-  bool frames_failed_ = false;  // the loop has ended
-  std::set<uint32_t> damaged_;  // bricks, of which the user has been told
+  bool frames_failed_ = false;                       // the loop has ended
+  std::set<std::pair<uint64_t, uint32_t>> damaged_;  // steps' bricks, of which the user has been told
   PictureTexture picture_, overlay_;
   std::vector<std::string> views_;
   FurtherScalarList further_;
@@ -160,6 +167,7 @@ class CacheView {
   PointProbe probe_;
   FunctionChooser chooser_;
   uint64_t values_asked_for_ = 0;  // request
+  bool values_failed_ = false;     // of the newest request
   double pointed_since_s_ = 0;
   glm::dvec2 pointed_{-1.0};
   std::optional<glm::dvec2> clicked_;  // in pixels of the picture; a marker is to come there

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
@@ -82,7 +83,12 @@ void CacheView::probe(const WindowLayout& layout) {
     return glm::dvec2((at.x - layout.picture.x) / width * data_size_.width,
                       (at.y - layout.picture.y) / layout.picture.height * data_size_.height);
   };
-  for (const glm::dvec2& click : window_.takeClicks()) clicked_ = pixelAt(click);
+  for (const glm::dvec2& click : window_.takeClicks()) {
+    clicked_ = pixelAt(click);
+    if (!std::exchange(values_failed_, false)) continue;
+    values_asked_for_ = 0;  // tries again
+    changed_ |= frames_failed_ || !isShown();
+  }
   const auto pointed = window_.pointed();
   if (!pointed || *pointed != pointed_) {
     pointed_since_s_ = glfwGetTime();
@@ -90,7 +96,8 @@ void CacheView::probe(const WindowLayout& layout) {
     if (!pointed) probed_.clear();
   }
   const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedForSeconds;
-  if ((rests || clicked_) && isFinal() && !frames_->busy() && values_asked_for_ != request_) {
+  if ((rests || clicked_) && isFinal() && !frames_failed_ && !frames_->busy() &&
+      values_asked_for_ != request_) {
     values_asked_for_ = request_;
     frames_->requestValues();
   }
@@ -148,7 +155,8 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   ImGui::Begin("status", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
-  const bool looks = values_asked_for_ == request_ && !(values_ && values_->request == request_);
+  const bool looks =
+      values_asked_for_ == request_ && !values_failed_ && !(values_ && values_->request == request_);
   const bool points = window_.pointed().has_value();
   const std::string text = !probed_.empty()       ? probed_
                            : looks && points      ? "reading the value under the mouse ..."
@@ -260,6 +268,7 @@ void CacheView::loadView(const std::string& name) {
     state.faces = state_.faces;  // of the command line
     state.faces_by = state_.faces_by;
     state.isovalues = state_.isovalues;
+    state.iso_opacity = state_.iso_opacity;
     loadSurfaces(state);
     restore(&state);
   } catch (const Error& error) {
@@ -297,14 +306,17 @@ void CacheView::choose(const MenuChoice& choice) {
   if (choice.view) loadView(*choice.view);
   if (choice.looks_for_scalars) further_.look();
   if (choice.add_scalar) wanted_scalar_ = choice.add_scalar;
-  if (choice.scalar && *choice.scalar != state_.variable) chooseScalar(*choice.scalar);
+  if (choice.scalar) chooseScalar(*choice.scalar);
   if (choice.opacity_scalar)
     chooseOpacityScalar(*choice.opacity_scalar == otherScalars().front() ? "" : *choice.opacity_scalar);
 }
 
 void CacheView::chooseScalar(const std::string& name) {
-  if (state_.function.isAutomatic()) return chooser_.ask({FunctionChooser::For::kScalar, name});
-  showScalar(name);
+  using For = FunctionChooser::For;
+  const bool is_shown = name == state_.variable;
+  if (!is_shown && state_.function.isAutomatic()) return chooser_.ask({For::kScalar, name});
+  chooser_.drop(For::kScalar);  // one that was chosen before
+  if (!is_shown) showScalar(name);
 }
 
 void CacheView::showScalar(const std::string& name) {
@@ -315,7 +327,12 @@ void CacheView::showScalar(const std::string& name) {
 }
 
 void CacheView::chooseOpacityScalar(const std::string& name) {
-  if (!name.empty() && name != state_.variable) return chooser_.ask({FunctionChooser::For::kOpacities, name});
+  using For = FunctionChooser::For;
+  const std::string& shown = state_.opacity_by ? state_.opacity_by->variable : state_.variable;
+  const bool is_shown = (name.empty() ? state_.variable : name) == shown;
+  if (!is_shown && !name.empty() && name != state_.variable) return chooser_.ask({For::kOpacities, name});
+  chooser_.drop(For::kOpacities);  // one that was chosen before
+  if (is_shown) return;
   state_.opacity_by.reset();
   ++function_version_;
   changed_ = true;

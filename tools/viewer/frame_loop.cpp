@@ -72,8 +72,14 @@ void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& reque
   if (faces.step != request.step || !std::ranges::equal(faces.given, scene->grid_surfaces, same_mesh)) {
     faces = {};  // if it throws
     const auto at_step = [&](const CacheReader& its) { return request.faces_at(its, scene->grid_surfaces); };
-    faces = {request.step, scene->grid_surfaces,
-             cache.step() == request.step ? at_step(cache) : at_step(cache.atStep(request.step))};
+    try {
+      faces = {request.step, scene->grid_surfaces,
+               cache.step() == request.step ? at_step(cache) : at_step(cache.atStep(request.step))};
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error& error) {
+      throw UsageError("{}", error.what());  // another step may have them
+    }
   }
   auto moved = std::make_shared<SurfaceScene>(*scene);
   moved->grid_surfaces = faces.there;
@@ -221,7 +227,7 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
   }
 
   Effort& effort = drawing.effort;
-  const double detail_px = request.moving ? effort.detailPixels() : 0;
+  double detail_px = request.moving ? effort.detailPixels() : 0;
   for (uint64_t splats = effort.splats();; splats *= kRefinement) {
     ShownFrame frame;
     frame.request = number;
@@ -232,8 +238,12 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
                                          frame.is_final);
     const std::vector<BrickFailure>& damaged = frame.statistics.bricks_unreadable;
-    if (!damaged.empty() && frame.statistics.splats_drawn == 0 && !request.options.scene)
-      throw DamagedBrick(damaged.front().reason);
+    if (!damaged.empty() && frame.statistics.splats_drawn == 0 && !request.options.scene) {
+      if (frame.is_final) throw DamagedBrick(damaged.front().reason);
+      if (superseded(number)) return;
+      detail_px = 0;  // the picture is final in the end
+      continue;       // finer bricks may be intact
+    }
     if (request.wants_bytes) frame.bytes = bytesOf(frame.image);
     if (request.moving) {
       // Drawing fewer splats than the limit does not mean that the view is complete: the next level may

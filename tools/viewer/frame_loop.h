@@ -39,7 +39,8 @@
 
 namespace curvisplat {
 
-/// The faces of the grid at the cache's step, in the place of those of another step. Called on the loop's thread; throws Error.
+/// The faces of the grid at the cache's step, in the place of those of another step. Called on the loop's thread; an Error ends
+/// the request only.
 using FacesAtStep =
     std::function<std::vector<GridSurface>(const CacheReader&, const std::vector<GridSurface>&)>;
 
@@ -113,7 +114,7 @@ class FrameLoop {
   /// Returns the request's number: 1, 2, ...
   uint64_t request(FrameRequest request);
   /// The newest picture since the last take(), or nullopt. Throws the error of reading or drawing that ended
-  /// the loop, or UsageError (too little memory for this size), which ends only the request.
+  /// the loop, or UsageError (too little memory for this size, no faces at this step), which ends only the request.
   std::optional<ShownFrame> take();
   /// Asks for the values of the newest request's picture, once that is shown. A request ends it.
   void requestValues();

@@ -1,7 +1,9 @@
-// The function that the data suggest for a scalar, found on another thread, since it reads for 0.1 to 0.3 s: the newest
-// question is answered, older ones are dropped. For the window's thread.
+// The function that the data suggest for a scalar, found on another thread, since it reads for 0.1 to 0.3 s. What is asked
+// for one purpose takes the place of what was asked for it before; questions for different purposes are all answered. For
+// the window's thread.
 #pragma once
 
+#include <array>
 #include <future>
 #include <optional>
 #include <string>
@@ -20,27 +22,32 @@ class FunctionChooser {
   struct Question {
     For what = For::kScalar;
     std::string scalar;
+    bool operator==(const Question&) const = default;
   };
   struct Answer {
     Question question;
     EditedFunction function;
   };
 
-  void ask(Question question);
-  /// What was asked is not wanted any more.
+  void ask(const Question& question);
+  /// What was asked is not wanted any more: all of it, or what was asked for this.
   void drop();
-  /// The answer, once. Throws what reading throws. Call it often.
+  void drop(For what) { wanted(what).reset(); }
+  /// An answer, once. Throws what reading throws, which ends this question only. Call it often.
   std::optional<Answer> take();
-  bool busy() const { return wanted_; }
+  bool busy() const;
 
  private:
-  void begin();
+  std::optional<std::string>& wanted(For what) { return wanted_[static_cast<size_t>(what)]; }
+  bool isWanted(const Question& question) { return wanted(question.what) == question.scalar; }
+  void beginNext();
 
   const CacheReader& cache_;
   void (*const wake_)();
-  bool wanted_ = false;           // an answer is to come
-  std::optional<Question> next_;  // in place of the one that is being answered
-  std::future<Answer> answering_;
+  std::array<std::optional<std::string>, 3>
+      wanted_;         // for each purpose, the scalar of the answer that is to come
+  Question question_;  // that is being answered
+  std::future<EditedFunction> answering_;
 };
 
 }  // namespace curvisplat

@@ -94,7 +94,7 @@ void Panels::drawScalars(const ViewState& state, const FurtherScalars* further, 
   if (ImGui::BeginCombo("##scalar", state.variable.c_str(), ImGuiComboFlags_HeightLargest)) {
     for (const VariableInfo& one : variables) {
       const bool chosen = one.name == state.variable;
-      const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) && !chosen;
+      const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen);
       nameWidget("scalar " + one.name);
       if (chooses) actions.scalar = one.name;
     }
@@ -108,12 +108,12 @@ void Panels::drawScalars(const ViewState& state, const FurtherScalars* further, 
   constexpr const char* kSame = "the same scalar";
   if (ImGui::BeginCombo("##opacity by", state.opacity_by ? state.opacity_by->variable.c_str() : kSame,
                         ImGuiComboFlags_HeightLarge)) {
-    if (ImGui::Selectable(kSame, !state.opacity_by) && state.opacity_by) actions.opacity_scalar = "";
+    if (ImGui::Selectable(kSame, !state.opacity_by)) actions.opacity_scalar = "";
     nameWidget("opacity by the same scalar");
     for (const VariableInfo& one : variables) {
       if (one.name == state.variable) continue;
       const bool chosen = state.opacity_by && state.opacity_by->variable == one.name;
-      const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) && !chosen;
+      const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen);
       nameWidget("opacity by " + one.name);
       if (chooses) actions.opacity_scalar = one.name;
     }

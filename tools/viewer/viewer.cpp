@@ -89,6 +89,9 @@ class Viewer {
     auto view = std::make_unique<CacheView>(prepared, options, window_, reports_, dialog_,
                                             before_has_ended.get_future().share());
     if (options.carried && view_) view->takePictureOf(*view_);
+    const auto preview = view_ ? view_->preview() : std::nullopt;
+    if (view_ && (options.carried || (preview && preview->whole == prepared.cache.cachePath())))
+      view->takeRequestsOf(*view_);
     retire(std::exchange(view_, std::move(view)), std::move(before_has_ended));
     window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
     std::vector<std::string> names;
@@ -131,7 +134,8 @@ class Viewer {
 
   /// What was chosen in a dialog or a menu, or dropped: a cache at once, a grid when it is converted.
   void open(const std::vector<fs::path>& files) {
-    opening_.reset();  // the one before is given up
+    opening_.reset();              // the one before is given up
+    if (view_) view_->remember();  // what is opened may be what is shown
     opening_files_ = files;
     opens_command_line_ = files == options_.files;
     adds_to_.reset();
@@ -216,7 +220,11 @@ class Viewer {
       const bool is_kept = opening_files_.size() > 1 || opening_files_.front() != cache;
       if (is_kept) options.grid_files = opening_files_;
       const auto preview = view_ ? view_->preview() : std::nullopt;
-      if (preview && preview->whole == cache) options.carried = view_->carried();
+      const bool follows_preview = preview && preview->whole == cache;
+      // Of one that is opened again, too, what the user has changed while it opened.
+      if (follows_preview || (view_ && view_->isOf(preparation->prepared->cache)))
+        options.carried = view_->carried();
+      if (options.carried) options.scalar.reset();  // the user has chosen since
       show(*preparation->prepared, options, opening_files_);
     } catch (const Interrupted&) {
     } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
