@@ -254,7 +254,8 @@ TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
   EXPECT_EQ(previewFolders(), 1u);
   EXPECT_TRUE(eventually([] { return !hasWidget("state preview") && hasWidget("state "); }, 300));
   EXPECT_FALSE(hasWidget("opening"));
-  EXPECT_TRUE(eventually([&] { return previewFolders() == 0; }));  // the view of it ends on a thread of its own
+  EXPECT_TRUE(
+      eventually([&] { return previewFolders() == 0; }));  // the view of it ends on a thread of its own
   ASSERT_EQ(kept().size(), 1u);
   EXPECT_EQ(kept()[0].filename(), "middle.splats");
   cache_ = "middle";
