@@ -12,6 +12,7 @@
 #include "preprocess/formats/common/ascii_spool.h"
 #include "preprocess/formats/common/stored_values.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/xdmf/xdmf_hdf5.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
@@ -360,7 +361,7 @@ class Reader {
       throw Error("{} has \"{}\"; expected FILE:/DATA", describe(item), printable(text.substr(0, 60)));
     const std::filesystem::path path = existing(item, text.substr(0, colon));
     addFile(path);
-    return openXdmfHdf5(path, text.substr(colon + 1), std::move(dims));
+    return openXdmfHdf5(hdf5_sets_, path, text.substr(colon + 1), std::move(dims));
   }
 
   std::shared_ptr<const XdmfValues> readBinary(const pugi::xml_node& item, const std::string& text,
@@ -388,6 +389,7 @@ class Reader {
 
   std::filesystem::path path_, folder_;
   std::shared_ptr<OpenFiles> pool_;
+  const std::shared_ptr<XdmfHdf5Sets> hdf5_sets_ = std::make_shared<XdmfHdf5Sets>();
   pugi::xml_document document_;
   std::vector<Leaf> leaves_;
   size_t visited_ = 0;
