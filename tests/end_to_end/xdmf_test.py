@@ -152,7 +152,8 @@ class Xdmf(StructuredFormats):
         bare = "".join(step.replace(f'<Time Value="{0.5 * n}"/>', "") for n, step in enumerate(steps))
         listed = '<Time TimeType="List"><DataItem Dimensions="3" Format="XML">0 0.5 1</DataItem></Time>'
         spread = '<Time TimeType="HyperSlab"><DataItem Dimensions="3" Format="XML">0 0.5 3</DataItem></Time>'
-        for text in ("".join(steps), listed + bare, spread + bare):
+        stored = f'<Time TimeType="List">{writer.item(np.array([0, 0.5, 1]))}</Time>'
+        for text in ("".join(steps), listed + bare, spread + bare, stored + bare):
             path = self.write(temporal.format(text))
             self.assertEqual(self.info(path)["times"], [0, 0.5, 1])
             for n, block in enumerate(blocks):
@@ -230,6 +231,14 @@ class Xdmf(StructuredFormats):
         path = self.write(grids)
         self.within(resource.RLIMIT_NOFILE, 60, "info", path)
         self.expect_same([path], blocks)
+
+    def test_items_that_many_refer_to(self):
+        """Numbers in the XML are kept once, however many refer to them."""
+        block = Block((40, 50, 50))
+        fields = "".join(f'<Attribute Name="p{n}"><DataItem Reference="/Xdmf/Domain/DataItem[1]"/></Attribute>' for n in range(300))
+        text = self.new("XML").item(block.p.round(3))
+        path = self.write(f'{text}<Grid>{geometry(self.new("Binary"), block)}{fields}</Grid>')
+        self.assertLess(self.peak_memory(path, "p7", "144M"), 144 << 20)
 
     def test_attributes_that_some_grids_lack(self):
         a, b = Block(), Block((4, 3, 5), 9)
