@@ -94,6 +94,13 @@ class TecplotText(StructuredFormats):
         self.assertEqual([s["name"] for s in info["scalars"]], ["p"])
         self.assertEqual(info["blanked"]["by_grid"], int((iblank == 0).sum()))
 
+    def test_names_that_move_the_cursor(self):
+        block = Block()
+        path = self.write([(f'T="a\x1b[2J" {size(block)}', "POINT", [*block.places, block.p])], ("a\x1b[1m", "b", "c", "p\x1b]0;x\x07"))
+        shown = self.run_program("info", path).stdout
+        self.assertIn("the first three (a [1m", shown)
+        self.assertEqual([c for c in shown if c < " " and c != "\n"], [])
+
     def test_the_reader_of_vtk_agrees(self):
         block = Block()
         path = self.write([(f'T="a" {size(block)} F=POINT', "POINT", [*block.places, block.p])])
