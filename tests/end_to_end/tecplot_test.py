@@ -94,6 +94,17 @@ class TecplotText(StructuredFormats):
         self.assertEqual([s["name"] for s in info["scalars"]], ["p"])
         self.assertEqual(info["blanked"]["by_grid"], int((iblank == 0).sum()))
 
+    def test_precision(self):
+        """Of coordinates: by the type of each variable, or by the digits."""
+        block = Block()
+        rounded = Block()
+        rounded.places = rounded.places.round(5)
+        rounded.p = rounded.p.round(5)
+        for b, words, expected in ((block, "", 8), (block, "DT=(DOUBLE DOUBLE DOUBLE SINGLE)", 8), (block, "DT=(SINGLE SINGLE SINGLE DOUBLE)", 4),
+                                   (block, "DT=(SINGLE, SINGLE, DOUBLE, SINGLE)", 8), (rounded, "", 4), (rounded, "DT=(DOUBLE DOUBLE DOUBLE DOUBLE)", 4)):
+            path = self.write([(f"{size(b)} {words}", "POINT", [*b.places, b.p])])
+            self.assertEqual(self.info(path)["coordinate_bytes"], expected, words)
+
     def test_names_that_move_the_cursor(self):
         block = Block()
         path = self.write([(f'T="a\x1b[2J" {size(block)}', "POINT", [*block.places, block.p])], ("a\x1b[1m", "b", "c", "p\x1b]0;x\x07"))
