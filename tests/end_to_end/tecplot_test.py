@@ -141,6 +141,9 @@ class TecplotText(StructuredFormats):
                             ("I=-3 J=4 K=5", "I = -3"), ("I=1e30 J=4 K=5", "I = 1e30")):
             arrays_of = [a.ravel()[:81] for a in arrays] if told == "is flat" else arrays
             self.expect_line(self.write([(words, "POINT", arrays_of)]), words=told)
+        sets = ",".join(["[1-4]=1"] * 9)
+        path = self.write([(size(block), "POINT", arrays), (f"{size(block)} VARSHARELIST=({sets})", "BLOCK", [])])
+        self.expect_line(path, words="VARSHARELIST")
         path = self.write([(size(block), "POINT", arrays)])
         text = path.read_text()
         for damaged, told in ((text.replace("0.", "o.", 9), "grid.dat"), (text[:len(text) // 2], "expected 840"),
