@@ -94,6 +94,24 @@ class TecplotText(StructuredFormats):
         self.assertEqual([s["name"] for s in info["scalars"]], ["p"])
         self.assertEqual(info["blanked"]["by_grid"], int((iblank == 0).sum()))
 
+    def test_precision(self):
+        """Of coordinates: by the type of each variable, or by the digits."""
+        block = Block()
+        rounded = Block()
+        rounded.places = rounded.places.round(5)
+        rounded.p = rounded.p.round(5)
+        for b, words, expected in ((block, "", 8), (block, "DT=(DOUBLE DOUBLE DOUBLE SINGLE)", 8), (block, "DT=(SINGLE SINGLE SINGLE DOUBLE)", 4),
+                                   (block, "DT=(SINGLE, SINGLE, DOUBLE, SINGLE)", 8), (rounded, "", 4), (rounded, "DT=(DOUBLE DOUBLE DOUBLE DOUBLE)", 4)):
+            path = self.write([(f"{size(b)} {words}", "POINT", [*b.places, b.p])])
+            self.assertEqual(self.info(path)["coordinate_bytes"], expected, words)
+
+    def test_names_that_move_the_cursor(self):
+        block = Block()
+        path = self.write([(f'T="a\x1b[2J" {size(block)}', "POINT", [*block.places, block.p])], ("a\x1b[1m", "b", "c", "p\x1b]0;x\x07"))
+        shown = self.run_program("info", path).stdout
+        self.assertIn("the first three (a [1m", shown)
+        self.assertEqual([c for c in shown if c < " " and c != "\n"], [])
+
     def test_the_reader_of_vtk_agrees(self):
         block = Block()
         path = self.write([(f'T="a" {size(block)} F=POINT', "POINT", [*block.places, block.p])])
@@ -123,6 +141,9 @@ class TecplotText(StructuredFormats):
                             ("I=-3 J=4 K=5", "I = -3"), ("I=1e30 J=4 K=5", "I = 1e30")):
             arrays_of = [a.ravel()[:81] for a in arrays] if told == "is flat" else arrays
             self.expect_line(self.write([(words, "POINT", arrays_of)]), words=told)
+        sets = ",".join(["[1-4]=1"] * 9)
+        path = self.write([(size(block), "POINT", arrays), (f"{size(block)} VARSHARELIST=({sets})", "BLOCK", [])])
+        self.expect_line(path, words="VARSHARELIST")
         path = self.write([(size(block), "POINT", arrays)])
         text = path.read_text()
         for damaged, told in ((text.replace("0.", "o.", 9), "grid.dat"), (text[:len(text) // 2], "expected 840"),

@@ -4,10 +4,12 @@
 XDMF files of structured grids, with arrays in HDF5 (h5py), in binary files (numpy) and in the XML itself, against VTK's files of
 the same grids. Exit status 77 (skipped) without python3-vtk9 or python3-h5py.
 """
+import resource
+import subprocess
 import sys
 import unittest
 
-from structured_formats import RANDOM, Block, StructuredFormats, np
+from structured_formats import PROGRAM, RANDOM, Block, StructuredFormats, np
 
 try:
     import h5py
@@ -18,6 +20,12 @@ except ModuleNotFoundError as error:
 
 def dims(shape):
     return " ".join(map(str, shape))
+
+
+def slab(all_of, start, stride, count):
+    """A part of a data item."""
+    numbers = dims((*start, *stride, *count))
+    return f'<DataItem ItemType="HyperSlab" Dimensions="{dims(count)}"><DataItem Dimensions="3 {len(count)}" Format="XML">{numbers}</DataItem>{all_of}</DataItem>'
 
 
 class Writer:
@@ -144,7 +152,8 @@ class Xdmf(StructuredFormats):
         bare = "".join(step.replace(f'<Time Value="{0.5 * n}"/>', "") for n, step in enumerate(steps))
         listed = '<Time TimeType="List"><DataItem Dimensions="3" Format="XML">0 0.5 1</DataItem></Time>'
         spread = '<Time TimeType="HyperSlab"><DataItem Dimensions="3" Format="XML">0 0.5 3</DataItem></Time>'
-        for text in ("".join(steps), listed + bare, spread + bare):
+        stored = f'<Time TimeType="List">{writer.item(np.array([0, 0.5, 1]))}</Time>'
+        for text in ("".join(steps), listed + bare, spread + bare, stored + bare):
             path = self.write(temporal.format(text))
             self.assertEqual(self.info(path)["times"], [0, 0.5, 1])
             for n, block in enumerate(blocks):
@@ -164,15 +173,72 @@ class Xdmf(StructuredFormats):
             b.p = w[::2, ::2, ::2].copy()
         shape = blocks[0].shape
         for n, block in enumerate(blocks):
-            def slab(all_of, start, stride, count):
-                numbers = dims((*start, *stride, *count))
-                return f'<DataItem ItemType="HyperSlab" Dimensions="{dims(count)}"><DataItem Dimensions="3 {len(count)}" Format="XML">{numbers}</DataItem>{all_of}</DataItem>'
             where = slab(writer.item(places), (n, 0, 0, 0, 0), (1, 1, 1, 1, 1), (1, *shape, 3))
             p = slab('<DataItem Reference="/Xdmf/Domain/DataItem[1]"/>', (n, 0, 0, 0), (1, 2, 2, 2), (1, *shape))
             path = self.write(f'{writer.item(wide)}<Topology Name="t" TopologyType="3DSMesh" Dimensions="{dims(shape)}"/>'
                               f'<Grid><Topology Reference="XML">/Xdmf/Domain/Topology[@Name="t"]</Topology><Geometry>{where}</Geometry>'
                               f'<Attribute Name="p">{p}</Attribute></Grid>')
             self.expect_same([path], [block], {"c": None})
+
+    def test_steps_of_hyperslabs(self):
+        """One component of a vector, parts of parts, and steps shorter and longer than a buffer, of arrays in every storage."""
+        block = Block()
+        shape, ones = block.shape, (1, 1, 1)
+        v, times = RANDOM.random((*shape, 3)), RANDOM.random((*shape, 5003))
+        wide = RANDOM.random([4 * n for n in shape])
+        for words, stored in ((("HDF",), None), (("HDF",), (-1,)), (("Binary",), None), (("XML",), None)):
+            cases = [(v, v[..., 1], lambda item: slab(item, (0, 0, 0, 1), (1, 1, 1, 1), (*shape, 1))),
+                     (v, v[1:, :, :, 2], lambda item: slab(item, (1, 0, 0, 2), (1, 1, 1, 9), (shape[0] - 1, *shape[1:], 1))),
+                     (wide, wide[1::4, 2::4, 3::4], lambda item: slab(item, (1, 2, 3), (4, 4, 4), shape)),
+                     (wide, wide[2::4, 2::4, 2::4], lambda item: slab(slab(item, (0, 0, 0), (2, 2, 2), [2 * n for n in shape]), ones, (2, 2, 2), shape))]
+            if words != ("XML",):
+                cases.append((times, times[..., 17], lambda item: slab(item, (0, 0, 0, 17), (1, 1, 1, 1), (*shape, 1))))
+            for all_of, expected, part in cases:
+                used = Block(expected.shape)
+                used.p = expected.copy()
+                writer = self.new(*words)
+                path = self.write(f'<Grid>{geometry(writer, used)}<Attribute Name="p">{part(writer.item(all_of, stored))}</Attribute></Grid>')
+                self.expect_same([path], [used], {"c": None})
+
+    def within(self, kind, limit, *words):
+        """A run of the program under a limit of the system."""
+        result = subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, check=False,
+                                preexec_fn=lambda: resource.setrlimit(kind, (limit, limit)))
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_far_steps_of_hyperslabs(self):
+        """Numbers far from one another: the array between them is not read."""
+        block = Block((3, 3, 3))
+        writer = self.new()
+        far = 1 << 25
+        with h5py.File(self.folder / "far.h5", "w") as file:
+            data = file.create_dataset("p", shape=(27 * far,), dtype="f8", chunks=(1 << 12,), fillvalue=0.5)
+            data[26 * far] = 0.75
+        item = f'<DataItem Dimensions="{27 * far}" Format="HDF">far.h5:/p</DataItem>'
+        for text in (item, item.replace(str(27 * far), f"27 {far}")):
+            part = slab(text, (0,), (far,), (27,)) if text == item else slab(text, (0, 0), (1, far), (27, 1))
+            path = self.write(f'<Grid>{geometry(writer, block)}<Attribute Name="p">{part}</Attribute></Grid>')
+            self.assertLess(self.peak_memory(path, "p", "144M"), 144 << 20)
+            scalar = self.info(path)["scalars"][0]
+            self.assertEqual([scalar["min"], scalar["max"]], [0.5, 0.75])
+
+    def test_more_files_than_may_be_open(self):
+        grids, blocks = "", [Block((2, 3, 4), 9 * n) for n in range(80)]
+        for n, block in enumerate(blocks):
+            text = grid(self.new(chunks=True), block, f"g{n}")
+            (self.folder / "a.h5").rename(self.folder / f"b{n}.h5")
+            grids += text.replace("a.h5", f"b{n}.h5")
+        path = self.write(grids)
+        self.within(resource.RLIMIT_NOFILE, 60, "info", path)
+        self.expect_same([path], blocks)
+
+    def test_items_that_many_refer_to(self):
+        """Numbers in the XML are kept once, however many refer to them."""
+        block = Block((40, 50, 50))
+        fields = "".join(f'<Attribute Name="p{n}"><DataItem Reference="/Xdmf/Domain/DataItem[1]"/></Attribute>' for n in range(300))
+        text = self.new("XML").item(block.p.round(3))
+        path = self.write(f'{text}<Grid>{geometry(self.new("Binary"), block)}{fields}</Grid>')
+        self.assertLess(self.peak_memory(path, "p7", "144M"), 144 << 20)
 
     def test_attributes_that_some_grids_lack(self):
         a, b = Block(), Block((4, 3, 5), 9)

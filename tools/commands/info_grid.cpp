@@ -16,6 +16,7 @@
 #include "tools/commands/info_estimate.h"
 #include "tools/commands/info_mesh.h"
 #include "tools/options/grid_options.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 
 namespace curvisplat {
@@ -88,12 +89,12 @@ std::string timeText(const GridDescription& description, size_t step) {
 
 void printTimes(const GridDescription& description) {
   const size_t steps = description.times.size();
-  if (steps == 1 && !description.time_unit.empty()) fmt::print("time      {}\n", timeText(description, 0));
+  if (steps == 1 && !description.time_unit.empty()) printLine("time      {}", timeText(description, 0));
   if (steps < 2) return;
-  fmt::print("times     {} steps, {} .. {}\n", steps, timeText(description, 0),
-             timeText(description, steps - 1));
-  fmt::print("time      {}; step {} was read\n", timeText(description, description.time_step),
-             description.time_step);
+  printLine("times     {} steps, {} .. {}", steps, timeText(description, 0),
+            timeText(description, steps - 1));
+  printLine("time      {}; step {} was read", timeText(description, description.time_step),
+            description.time_step);
 }
 
 nlohmann::ordered_json blocksAsJson(const GridInfo& info) {
@@ -186,10 +187,10 @@ void printBlocks(const GridInfo& info) {
     if (statistics.blank.by_grid > 0) remarks += fmt::format(", {} blanked", statistics.blank.by_grid);
     if (statistics.degenerate > 0) remarks += fmt::format(", {} degenerate cells", statistics.degenerate);
     if (statistics.inverted > 0) remarks += fmt::format(", {} inverted cells", statistics.inverted);
-    fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, remarks);
+    printLine("  {:<9} {}x{}x{}{}", block.name, block.ni, block.nj, block.nk, remarks);
   }
   if (description.blocks.size() > kBlocksListed)
-    fmt::print("  and {} more\n", description.blocks.size() - kBlocksListed);
+    printLine("  and {} more", description.blocks.size() - kBlocksListed);
 }
 
 void printScalars(const GridInfo& info) {
@@ -198,10 +199,10 @@ void printScalars(const GridInfo& info) {
     const uint32_t number = scalar.number > 0 ? scalar.number : scalar.function;
     const bool named = number > 0 && scalar.name != std::to_string(number);
     const ScalarRange& range = info.statistics.scalars[s];
-    fmt::print("scalar    {}{}{}{}: {}\n", scalar.name, named ? fmt::format(" ({})", number) : "",
-               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
-               scalar.centring == Centring::kCell ? ", cell-centred" : "",
-               isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
+    printLine("scalar    {}{}{}{}: {}", scalar.name, named ? fmt::format(" ({})", number) : "",
+              scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
+              scalar.centring == Centring::kCell ? ", cell-centred" : "",
+              isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
   }
   std::string names;
   for (const uint32_t position : info.derived) {
@@ -210,35 +211,34 @@ void printScalars(const GridInfo& info) {
     names += scalar.name;
     if (scalar.function > 0) names += fmt::format(" ({})", scalar.function);
   }
-  fmt::print("derived   {}\n", names);
+  printLine("derived   {}", names);
 }
 
 void printAsText(const GridInfo& info) {
   const GridDescription& description = *info.description;
-  fmt::print("{}\n", description.format);
-  for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
-  if (!info.overlaps.empty()) fmt::print("warning: {}\n", overlapWarning(description, info.overlaps));
+  printLine("{}", description.format);
+  for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
+  if (!info.overlaps.empty()) printLine("warning: {}", overlapWarning(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
-  fmt::print("nodes     {} in {}; {} blanked by the grid, {} not finite\n", info.nodes,
-             countText(description.blocks.size(), "block"), blank.by_grid, blank.not_finite);
-  if (const std::string rule = blankingRule(description); !rule.empty()) fmt::print("blanking  {}\n", rule);
+  printLine("nodes     {} in {}; {} blanked by the grid, {} not finite", info.nodes,
+            countText(description.blocks.size(), "block"), blank.by_grid, blank.not_finite);
+  if (const std::string rule = blankingRule(description); !rule.empty()) printLine("blanking  {}", rule);
   printBlocks(info);
-  fmt::print("cells     {}; {} degenerate, {} inverted\n", info.statistics.cells(),
-             info.statistics.degenerate(), info.statistics.inverted());
+  printLine("cells     {}; {} degenerate, {} inverted", info.statistics.cells(), info.statistics.degenerate(),
+            info.statistics.inverted());
   for (size_t axis = 0; axis < 3; ++axis)
-    fmt::print("{}         {:.9g} .. {:.9g}\n", "xyz"[axis], info.statistics.bounds[axis].min,
-               info.statistics.bounds[axis].max);
-  for (const std::string& note : description.notes) fmt::print("note      {}\n", note);
-  fmt::print("stored    coordinates in {} precision\n",
-             description.coordinate_bytes == 8 ? "double" : "single");
+    printLine("{}         {:.9g} .. {:.9g}", "xyz"[axis], info.statistics.bounds[axis].min,
+              info.statistics.bounds[axis].max);
+  for (const std::string& note : description.notes) printLine("note      {}", note);
+  printLine("stored    coordinates in {} precision", description.coordinate_bytes == 8 ? "double" : "single");
   printScalars(info);
   for (size_t n = 0; n < std::min(kBlocksListed, description.flow.size()); ++n) {
     const FlowConditions& flow = description.flow[n];
-    fmt::print("flow      block {}: Mach {:.6g}, alpha {:.6g}, Reynolds {:.6g}, time {:.6g}\n",
-               flow.block + 1, flow.mach, flow.alpha, flow.reynolds, flow.time);
+    printLine("flow      block {}: Mach {:.6g}, alpha {:.6g}, Reynolds {:.6g}, time {:.6g}", flow.block + 1,
+              flow.mach, flow.alpha, flow.reynolds, flow.time);
   }
   printTimes(description);
-  fmt::print("estimate  {}\n", info.estimate.toText());
+  printLine("estimate  {}", info.estimate.toText());
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "preprocess/gather/mesh_reader.h"
 #include "stream/base/count_text.h"
 #include "tools/commands/info_estimate.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 
 namespace curvisplat {
@@ -125,42 +126,41 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
 
 void printAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
-  fmt::print("{}\n", description.format);
-  for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
-  fmt::print("points    {} in {}; {} in no solid cell, {} blanked by the file, {} not finite\n", info.points,
-             countText(description.pieces.size(), "piece"), info.survey.unused_points,
-             info.survey.grid.blanked.by_grid, info.survey.grid.blanked.not_finite);
+  printLine("{}", description.format);
+  for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
+  printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} not finite", info.points,
+            countText(description.pieces.size(), "piece"), info.survey.unused_points,
+            info.survey.grid.blanked.by_grid, info.survey.grid.blanked.not_finite);
   std::string kinds;
   for (size_t kind = 1; kind < kKinds.size(); ++kind)
     if (info.survey.cells_of[kind] > 0)
       kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", info.survey.cells_of[kind], kKinds[kind]);
-  fmt::print("cells     {}: {}\n", info.cells, kinds);
+  printLine("cells     {}: {}", info.cells, kinds);
   if (description.pieces.size() > 1) {
     for (size_t n = 0; n < std::min(kPiecesListed, description.pieces.size()); ++n)
-      fmt::print("  {:<9} {} points, {} cells\n", description.pieces[n].name, description.pieces[n].points,
-                 description.pieces[n].cells);
+      printLine("  {:<9} {} points, {} cells", description.pieces[n].name, description.pieces[n].points,
+                description.pieces[n].cells);
     if (description.pieces.size() > kPiecesListed)
-      fmt::print("  and {} more\n", description.pieces.size() - kPiecesListed);
+      printLine("  and {} more", description.pieces.size() - kPiecesListed);
   }
   for (int axis = 0; axis < 3; ++axis)
-    fmt::print("{}         {:.9g} .. {:.9g}\n", "xyz"[axis], info.survey.grid.lower[axis],
-               info.survey.grid.upper[axis]);
-  for (const std::string& note : description.notes) fmt::print("note      {}\n", note);
-  fmt::print("stored    coordinates in {} precision\n",
-             description.coordinate_bytes == 8 ? "double" : "single");
+    printLine("{}         {:.9g} .. {:.9g}", "xyz"[axis], info.survey.grid.lower[axis],
+              info.survey.grid.upper[axis]);
+  for (const std::string& note : description.notes) printLine("note      {}", note);
+  printLine("stored    coordinates in {} precision", description.coordinate_bytes == 8 ? "double" : "single");
   for (size_t n = 0; n < info.ranges.size(); ++n) {
     const GridScalar& scalar = description.scalars[n];
     const ScalarRange& range = info.ranges[n];
-    fmt::print("scalar    {}{}{}: {}\n", scalar.name,
-               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
-               scalar.centring == Centring::kCell ? ", cell-centred" : "",
-               isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
+    printLine("scalar    {}{}{}: {}", scalar.name,
+              scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
+              scalar.centring == Centring::kCell ? ", cell-centred" : "",
+              isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
   }
   const size_t steps = description.times.size();
   if (steps > 1)
-    fmt::print("times     {} steps, {:.9g} .. {:.9g}; step {} was read\n", steps, description.times.front(),
-               description.times.back(), description.time_step);
-  fmt::print("estimate  {}\n", info.estimate.toText());
+    printLine("times     {} steps, {:.9g} .. {:.9g}; step {} was read", steps, description.times.front(),
+              description.times.back(), description.time_step);
+  printLine("estimate  {}", info.estimate.toText());
 }
 
 }  // namespace

@@ -15,7 +15,6 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kChunkBytes = size_t{1} << 20;
-constexpr size_t kDigitSamples = 100'000;
 // Repeat counts beyond this are checked against the free space first: a wrong one would fill the disk.
 constexpr uint64_t kMaxUncheckedRepeats = 1'000'000;
 
@@ -24,18 +23,6 @@ bool isSpace(char c) {
 }
 bool isSeparator(char c) {
   return isSpace(c) || c == ',';
-}
-
-/// Significant digits of the mantissa, which show the precision that the number was written with.
-int significantDigits(std::string_view token) {
-  int digits = 0;
-  for (const char c : token) {
-    if (c >= '0' && c <= '9')
-      digits += digits > 0 || c != '0';
-    else if (c != '.' && c != '-' && c != '+')
-      break;
-  }
-  return digits;
 }
 
 /// Parses notations that Fortran writes and std::from_chars rejects: "+1.5", "1.5D+00", "1.5-101", and
@@ -162,6 +149,17 @@ class Spooler {
 };
 
 }  // namespace
+
+int significantDigits(std::string_view token) {
+  int digits = 0;
+  for (const char c : token) {
+    if (c >= '0' && c <= '9')
+      digits += digits > 0 || c != '0';
+    else if (c != '.' && c != '-' && c != '+')
+      break;
+  }
+  return digits;
+}
 
 bool parseNumber(std::string_view text, double& value) {
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -5,6 +5,7 @@
 // whatever the size of the text.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -19,6 +20,13 @@ struct AsciiSpool {
   uint64_t count = 0;          // of doubles; doubles->size() predates the writing and must not be used
   int significant_digits = 0;  // the largest number of digits among the first numbers
 };
+
+/// A float is written with at most so many significant digits.
+constexpr int kDigitsOfFloat = 9;
+/// How many numbers of a text are asked for their digits.
+constexpr size_t kDigitSamples = 100'000;
+/// Significant digits of the mantissa, which show the precision that the number was written with.
+int significantDigits(std::string_view token);
 
 /// Parses a number in the notation of C, C++ or Fortran. False unless `text` is exactly one number.
 bool parseNumber(std::string_view text, double& value);

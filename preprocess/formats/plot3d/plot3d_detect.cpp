@@ -84,7 +84,6 @@ class Detection {
 
  private:
   int writtenPrecision(const Plot3dLayout& layout) const {
-    constexpr int kDigitsOfFloat = 9;
     if (!layout.ascii) return layout.precision_bytes;
     return force_.precision_bytes.value_or(digits_ > kDigitsOfFloat ? 8 : 4);
   }

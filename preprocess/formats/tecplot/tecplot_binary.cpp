@@ -269,9 +269,9 @@ class Reader {
       // Some writers keep the last plane of cells.
       end = placeValues(zone, layouts_[number], stored, begin, true);
     }
-    if (end < begin || end > words_.size())
-      throw Error("{}: {} ends at byte {}, beyond the file's {} bytes; the file is truncated", words_.name(),
-                  zone.describe(number), end, words_.size());
+    if (end == kNoEnd)
+      throw Error("{}: {} ends beyond the file's {} bytes; the file is truncated", words_.name(),
+                  zone.describe(number), words_.size());
     words_.seek(end);
     if (connectivity == -1) skipNeighbours(layouts_[number].neighbours, number);
   }
@@ -281,7 +281,7 @@ class Reader {
                        [](const TecplotValues* values) { return isOfCells(*values); });
   }
 
-  /// Sets the positions and returns the end of the values; the largest number if there is none.
+  /// Sets the positions and returns the end of the values; kNoEnd if the file ends before.
   uint64_t placeValues(TecplotZone& zone, const ZoneLayout& layout, const std::vector<TecplotValues*>& stored,
                        uint64_t begin, bool last_plane) const {
     const auto bytes = std::make_shared<FileBytes>(words_.file(), 0, words_.size());
@@ -296,17 +296,20 @@ class Reader {
       const bool cells = values->centring == Centring::kCell && !last_plane;
       const uint64_t count =
           cells ? zone.nodes[0] * zone.nodes[1] * std::max<uint64_t>(1, zone.nodes[2] - 1) : zone.nodeCount();
-      // At most as many as the file has bytes: no overflow.
+      // No overflow: both are at most a few times the file's size.
       end += layout.point ? bytesOf(values->type) : count * bytesOf(values->type);
+      if (end > words_.size()) return kNoEnd;
     }
-    return layout.point && !stored.empty() ? begin + node_bytes * zone.nodeCount() : end;
+    if (!layout.point || stored.empty()) return end;
+    const uint64_t room = words_.size() - begin;
+    return node_bytes > room / zone.nodeCount() ? kNoEnd : begin + node_bytes * zone.nodeCount();
   }
 
   /// Whether the next zone, or the end of the file, follows the values.
   bool endsWell(size_t number, uint64_t end, int32_t connectivity) {
     if (layouts_[number].neighbours > 0 && connectivity == -1) return true;
     if (number + 1 == data_.zones.size()) return end == words_.size();
-    if (end > words_.size() - 4) return false;
+    if (end == kNoEnd || end > words_.size() - 4) return false;
     words_.seek(end);
     return words_.take<float>() == kZone;
   }
@@ -317,6 +320,8 @@ class Reader {
     while (words_.take<float>() != kZone) continue;
     words_.seek(words_.offset() - 4);
   }
+
+  static constexpr uint64_t kNoEnd = std::numeric_limits<uint64_t>::max();
 
   Words words_;
   int version_ = 0;

@@ -26,6 +26,7 @@ struct TecplotValues {
   bool passive = false;  // the zone has no values of it
   TecplotType type = TecplotType::kFloat;
   bool swap = false;
+  bool from_single = false;  // of a text: the numbers have single precision, whatever the type
   std::shared_ptr<const ByteSource> bytes;
   uint64_t begin = 0, stride = 0;  // bytes: of the first value, and from one to the next
   uint64_t row_pitch = 0,

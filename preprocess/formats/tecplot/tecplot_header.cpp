@@ -37,7 +37,7 @@ bool appendRange(const std::string& text, size_t variables, std::vector<size_t>&
     if (failed != std::errc()) return false;
     at = stop;
   }
-  if (at != end || first < 1 || last < first || last > variables || to.size() > variables) return false;
+  if (at != end || first < 1 || last < first || last > variables) return false;
   for (size_t n = first; n <= last; ++n) to.push_back(n - 1);
   return true;
 }
@@ -107,8 +107,10 @@ std::vector<TecplotToken> TecplotTokens::takeValue() {
 }
 
 std::optional<TecplotSets> tecplotSets(const std::vector<TecplotToken>& value, size_t variables) {
+  constexpr size_t kOften = 4;  // a later set may correct an earlier one
   TecplotSets sets;
   TecplotTokens tokens(value);
+  size_t total = 0;
   while (!tokens.done()) {
     tokens.takeSign(',');
     if (tokens.done()) break;
@@ -116,8 +118,10 @@ std::optional<TecplotSets> tecplotSets(const std::vector<TecplotToken>& value, s
     const bool bracketed = tokens.takeSign('[');
     do {
       if (!appendRange(tokens.take().text, variables, numbers)) return std::nullopt;
+      if (total + numbers.size() > kOften * variables) return std::nullopt;
     } while (tokens.takeSign(',') && !tokens.done());
     if (bracketed && !tokens.takeSign(']')) return std::nullopt;
+    total += numbers.size();
     sets.emplace_back(std::move(numbers), "");
     if (tokens.takeSign('=')) sets.back().second = tokens.take().text;
   }

@@ -47,7 +47,8 @@ class TecplotTokens {
 };
 
 /// Numbers of variables, from 1, and what they are set to: "([4-5,7]=CELLCENTERED,[1]=NODAL)" as takeValue() gives it;
-/// also without brackets around the numbers. nullopt if it is not of that form, or has numbers beyond `variables`.
+/// also without brackets around the numbers. nullopt if it is not of that form, has numbers beyond `variables`, or
+/// has them many times over.
 using TecplotSets = std::vector<std::pair<std::vector<size_t>, std::string>>;
 std::optional<TecplotSets> tecplotSets(const std::vector<TecplotToken>& value, size_t variables);
 

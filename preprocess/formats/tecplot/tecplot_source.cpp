@@ -44,7 +44,8 @@ TecplotSource::TecplotSource(const OpenGridOptions& options) {
   description_.coordinate_bytes = 4;
   for (const TecplotZone& zone : data_.zones) {
     for (const size_t axis : axes_)
-      if (zone.values[axis].type == TecplotType::kDouble) description_.coordinate_bytes = 8;
+      if (zone.values[axis].type == TecplotType::kDouble && !zone.values[axis].from_single)
+        description_.coordinate_bytes = 8;
     const std::string name =
         zone.name.empty() ? fmt::format("zone {}", description_.blocks.size() + 1) : zone.name;
     description_.blocks.push_back(

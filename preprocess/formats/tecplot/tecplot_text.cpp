@@ -46,19 +46,28 @@ bool forEachNumber(std::string_view word, const Add& add) {
   return true;
 }
 
-/// Passes over the numbers at the reader's position and returns how many they are.
-uint64_t countNumbers(TextReader& text) {
-  uint64_t count = 0;
+struct Numbers {
+  uint64_t begin = 0, count = 0;
+  int digits = 0;  // the most significant ones among the first
+};
+
+/// Passes over the numbers at the reader's position.
+Numbers countNumbers(TextReader& text) {
+  Numbers numbers;
+  numbers.begin = text.offset();
+  uint64_t& count = numbers.count;
+  size_t sampled = 0;
   for (;;) {
     const std::string_view word = text.peekWord();
     if (word.starts_with('#')) {
       text.line();
       continue;
     }
-    if (!beginsNumber(word)) return count;
+    if (!beginsNumber(word)) return numbers;
     const uint64_t before = count;
-    forEachNumber(word, [&](std::string_view, uint64_t times) {
+    forEachNumber(word, [&](std::string_view number, uint64_t times) {
       count += std::min(times, kMaxDimension);
+      if (sampled++ < kDigitSamples) numbers.digits = std::max(numbers.digits, significantDigits(number));
       return true;
     });
     if (count < before || count > kMaxDimension)
@@ -103,7 +112,7 @@ void spoolNumbers(const std::shared_ptr<const PooledFile>& file, uint64_t begin,
 
 struct TextZone {
   bool point = false, has_packing = false;
-  bool single = false;  // DT: all values have single precision
+  std::vector<bool> single;  // DT: [variable], as far as it goes
   std::optional<double> time;
   std::optional<int64_t> strand;
   std::vector<int64_t> shared;  // [variable]: the zone, from 0; -1: none
@@ -122,8 +131,8 @@ class Reader {
       TecplotTokens tokens(takeHeader());
       if (tokens.done()) break;
       const bool data_of_zone = readRecords(tokens);
-      const uint64_t begin = text_.offset(), count = countNumbers(text_);
-      if (data_of_zone) placeValues(begin, count);
+      const Numbers numbers = countNumbers(text_);
+      if (data_of_zone) placeValues(numbers);
     }
     placeEmpty();
     data_.encoding = "ASCII";
@@ -252,8 +261,9 @@ class Reader {
     } else if (key == "STRANDID") {
       text.strand = static_cast<int64_t>(std::clamp(number(), -2.0, 1e9));
     } else if (key == "DT") {
-      text.single = std::all_of(value.begin(), value.end(),
-                                [](const TecplotToken& token) { return token.text != "DOUBLE"; });
+      text.single.clear();
+      for (const TecplotToken& token : value)
+        if (token.kind != TecplotToken::Kind::kSign) text.single.push_back(token.text == "SINGLE");
     } else if (key == "VARLOCATION") {
       setCentrings(key, value, zone);
     } else if (key == "PASSIVEVARLIST") {
@@ -305,11 +315,12 @@ class Reader {
 
   /// The last zone, if no numbers followed it: it shares all that it has.
   void placeEmpty() {
-    if (placed_ < data_.zones.size()) placeValues(text_.offset(), 0);
+    if (placed_ < data_.zones.size()) placeValues({text_.offset()});
   }
 
   /// The positions of the last zone's values in the spool file, which is filled when it is first read.
-  void placeValues(uint64_t begin, uint64_t count) {
+  void placeValues(const Numbers& numbers) {
+    const auto [begin, count, digits] = numbers;
     const size_t index = data_.zones.size() - 1;
     TecplotZone& zone = data_.zones[index];
     const TextZone& text = zones_[index];
@@ -321,6 +332,7 @@ class Reader {
         shareTecplotValues(file_->name(), data_, static_cast<size_t>(text.shared[n]), index, n);
       } else if (!zone.values[n].passive) {
         stored.push_back(&zone.values[n]);
+        zone.values[n].from_single = digits <= kDigitsOfFloat || (n < text.single.size() && text.single[n]);
         cells = cells || zone.values[n].centring == Centring::kCell;
       }
     }
@@ -350,7 +362,8 @@ class Reader {
           zone.nodes[2]);
     checkSpace(zone, index, count);
     const auto bytes = std::make_shared<SpooledBytes>(
-        spool_, 8 * count, [file = file_, begin, count](const SpoolFile::Sink& sink) {
+        spool_, 8 * count,
+        [file = file_, begin = numbers.begin, count = numbers.count](const SpoolFile::Sink& sink) {
           spoolNumbers(file, begin, count, sink);
         });
     for (TecplotValues* const values : stored) values->bytes = bytes;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <pugixml.hpp>
 #include <set>
 #include <sstream>
@@ -12,6 +14,7 @@
 #include "preprocess/formats/common/ascii_spool.h"
 #include "preprocess/formats/common/stored_values.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/xdmf/xdmf_hdf5.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
@@ -87,6 +90,17 @@ class Reader {
     std::optional<double> time;
   };
 
+  struct Times {
+    bool spread = false;  // numbers: the first time, the step and the count
+    std::vector<double> numbers;
+
+    std::optional<double> at(size_t n) const {
+      const auto number = static_cast<double>(n);
+      if (spread) return number < numbers[2] ? std::optional(numbers[0] + numbers[1] * number) : std::nullopt;
+      return n < numbers.size() ? std::optional(numbers[n]) : std::nullopt;
+    }
+  };
+
   std::string name() const { return path_.string(); }
 
   std::string describe(const pugi::xml_node& node) const {
@@ -146,17 +160,31 @@ class Reader {
     return counts;
   }
 
-  /// Times of the grids of a temporal collection, from its own Time element; empty if it has none.
-  std::vector<double> timesOf(const pugi::xml_node& collection) const {
-    const pugi::xml_node time = collection.child("Time");
+  /// Times of the grids of a temporal collection, from its own Time element; none if it has none.
+  const Times& timesOf(const pugi::xml_node& collection) {
+    const auto [found, is_new] = times_.try_emplace(collection);
+    Times& times = found->second;
+    const pugi::xml_node time = collection.child("Time"), given = time.child("DataItem");
     const std::string type = lower(attributeOf(time, {"TimeType", "Type"}));
-    std::vector<double> times = numbersIn(time, time.child("DataItem").text().get());
-    if (type == "hyperslab" && times.size() == 3) {  // start, step, count
-      std::vector<double> spread(static_cast<size_t>(std::clamp(times[2], 0.0, 1e6)));
-      for (size_t n = 0; n < spread.size(); ++n) spread[n] = times[0] + times[1] * static_cast<double>(n);
-      return spread;
+    if (!is_new || !given || (type != "list" && type != "hyperslab")) return times;
+    const pugi::xml_node item = resolved(given);
+    const std::string format = lower(attributeOf(item, {"Format"}));
+    if (format.empty() || format == "xml") {
+      times.numbers = numbersIn(item, item.text().get());
+    } else {
+      const std::shared_ptr<const XdmfValues> values = readItem(item, 0);
+      const auto grids = collection.children("Grid");
+      const auto used = static_cast<uint64_t>(std::distance(grids.begin(), grids.end()));
+      times.numbers.resize(static_cast<size_t>(std::min(values->size(), std::max<uint64_t>(used, 3))));
+      values->read(0, times.numbers);
     }
-    return type == "list" ? times : std::vector<double>();
+    if (!std::all_of(times.numbers.begin(), times.numbers.end(), [](double t) { return std::isfinite(t); }))
+      throw Error("{} has a time that is no number", describe(item));
+    times.spread = type == "hyperslab";
+    if (times.spread && times.numbers.size() != 3)
+      throw Error("{} has {} numbers; expected the first time, the step and the count", describe(item),
+                  times.numbers.size());
+    return times;
   }
 
   void findLeaves(const pugi::xml_node& given, std::optional<double> time, int depth) {
@@ -172,11 +200,11 @@ class Reader {
       return;
     }
     const bool temporal = lower(attributeOf(grid, {"CollectionType"})) == "temporal";
-    const std::vector<double> times = temporal ? timesOf(grid) : std::vector<double>();
+    const Times none, &times = temporal ? timesOf(grid) : none;
     size_t number = 0;
     for (const pugi::xml_node child : grid.children("Grid")) {
       std::optional<double> of_child = time;
-      if (temporal) of_child = number < times.size() ? times[number] : static_cast<double>(number);
+      if (temporal) of_child = times.at(number).value_or(static_cast<double>(number));
       findLeaves(child, of_child, depth + 1);
       ++number;
     }
@@ -310,6 +338,13 @@ class Reader {
   std::shared_ptr<const XdmfValues> readItem(const pugi::xml_node& given, int depth) {
     if (depth > kMaxDepth) throw Error("{}: data items are nested more than {} deep", name(), kMaxDepth);
     const pugi::xml_node item = resolved(given);
+    // Items that many grids refer to are kept once.
+    std::shared_ptr<const XdmfValues>& known = items_[item];
+    if (!known) known = readNewItem(item, depth);
+    return known;
+  }
+
+  std::shared_ptr<const XdmfValues> readNewItem(const pugi::xml_node& item, int depth) {
     const std::string type = lower(attributeOf(item, {"ItemType", "Type"}));
     if (type == "hyperslab") return readSlab(item, depth);
     if (!type.empty() && type != "uniform")
@@ -360,7 +395,7 @@ class Reader {
       throw Error("{} has \"{}\"; expected FILE:/DATA", describe(item), printable(text.substr(0, 60)));
     const std::filesystem::path path = existing(item, text.substr(0, colon));
     addFile(path);
-    return openXdmfHdf5(path, text.substr(colon + 1), std::move(dims));
+    return openXdmfHdf5(hdf5_sets_, path, text.substr(colon + 1), std::move(dims));
   }
 
   std::shared_ptr<const XdmfValues> readBinary(const pugi::xml_node& item, const std::string& text,
@@ -388,7 +423,10 @@ class Reader {
 
   std::filesystem::path path_, folder_;
   std::shared_ptr<OpenFiles> pool_;
+  const std::shared_ptr<XdmfHdf5Sets> hdf5_sets_ = std::make_shared<XdmfHdf5Sets>();
   pugi::xml_document document_;
+  std::map<pugi::xml_node, std::shared_ptr<const XdmfValues>> items_;
+  std::map<pugi::xml_node, Times> times_;  // of temporal collections
   std::vector<Leaf> leaves_;
   size_t visited_ = 0;
   XdmfFile file_;

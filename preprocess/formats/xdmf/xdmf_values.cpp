@@ -1,117 +1,19 @@
 #include "preprocess/formats/xdmf/xdmf_values.h"
 
-#include <hdf5.h>
-
 #include <algorithm>
 #include <array>
 #include <functional>
 #include <numeric>
 
-#include "preprocess/formats/common/hdf5_attribute.h"
-#include "preprocess/formats/common/hdf5_handle.h"
-#include "preprocess/formats/common/hdf5_trial.h"
 #include "preprocess/formats/common/stored_values.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMaxValues = uint64_t{1} << 48;
-
-/// Splits a range of numbers into boxes of an array of the given dimensions, and calls use(first, count) for each, in their
-/// order.
-using UseBox = std::function<void(std::span<const hsize_t> first, std::span<const hsize_t> count)>;
-void forEachBox(std::span<const hsize_t> dims, uint64_t begin, uint64_t count, const UseBox& use) {
-  const size_t rank = dims.size();
-  std::array<hsize_t, H5S_MAX_RANK> first{}, along{};
-  while (count > 0) {
-    uint64_t rest = begin;
-    for (size_t d = rank; d-- > 0;) {
-      first[d] = rest % dims[d];
-      rest /= dims[d];
-      along[d] = 1;
-    }
-    // The largest box that begins here: whole rows, whole planes, ... as far as the range goes.
-    uint64_t block = 1;
-    for (size_t d = rank; d-- > 0;) {
-      const uint64_t most = std::min<uint64_t>(dims[d] - first[d], count / block);
-      if (most == 0) break;
-      along[d] = most;
-      const bool whole = most == dims[d];
-      block *= most;
-      if (!whole) break;
-    }
-    use(std::span(first).first(rank), std::span(along).first(rank));
-    begin += block;
-    count -= block;
-  }
-}
-
-class Hdf5Values final : public XdmfValues {
- public:
-  Hdf5Values(std::filesystem::path path, std::string name, std::vector<uint64_t> dims)
-      : XdmfValues(std::move(dims), path.string() + ": " + name),
-        path_(std::move(path)),
-        name_(std::move(name)) {
-    tryHdf5(path_);
-    const QuietHdf5 quiet;
-    file_ = Hdf5File(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-    if (!file_) fail("is not an HDF5 file, or is damaged");
-    set_ = Hdf5DataSet(H5Dopen2(file_.id(), name_.c_str(), H5P_DEFAULT));
-    if (!set_) fail("has no such data set");
-    const Hdf5Space space(H5Dget_space(set_.id()));
-    const Hdf5Type type(H5Dget_type(set_.id()));
-    const H5T_class_t kind = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
-    if (kind != H5T_INTEGER && kind != H5T_FLOAT)
-      fail(std::string("has values of ") + describe(kind) + "; expected numbers");
-    bytes_ = kind == H5T_FLOAT && H5Tget_size(type.id()) <= 4 ? 4 : 8;
-    const int rank = space ? H5Sget_simple_extent_ndims(space.id()) : -1;
-    if (rank < 1 || rank > H5S_MAX_RANK) fail("has no dimensions; expected an array");
-    stored_.resize(static_cast<size_t>(rank));
-    H5Sget_simple_extent_dims(space.id(), stored_.data(), nullptr);
-    uint64_t values = 1;
-    for (const hsize_t n : stored_) values = n > 0 && values > kMaxValues / n ? kMaxValues + 1 : values * n;
-    if (values != size())
-      fail("has " + std::to_string(values) + " values; the XDMF file says " + std::to_string(size()));
-  }
-  ~Hdf5Values() override {
-    const QuietHdf5 quiet;
-    set_ = Hdf5DataSet();
-    file_ = Hdf5File();
-  }
-  Hdf5Values(const Hdf5Values&) = delete;
-  Hdf5Values& operator=(const Hdf5Values&) = delete;
-
-  int valueBytes() const override { return bytes_; }
-
-  void read(uint64_t first, std::span<double> to) const override {
-    const QuietHdf5 quiet;
-    const Hdf5Space space(H5Dget_space(set_.id()));
-    double* at = to.data();
-    forEachBox(stored_, first, to.size(), [&](std::span<const hsize_t> from, std::span<const hsize_t> count) {
-      const hsize_t values =
-          std::accumulate(count.begin(), count.end(), hsize_t{1}, [](hsize_t a, hsize_t b) { return a * b; });
-      const Hdf5Space memory(H5Screate_simple(1, &values, nullptr));
-      if (!space || !memory ||
-          H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, from.data(), nullptr, count.data(), nullptr) < 0 ||
-          H5Dread(set_.id(), H5T_NATIVE_DOUBLE, memory.id(), space.id(), H5P_DEFAULT, at) < 0)
-        fail("cannot be read (HDF5: " + hdf5Reason() + "); the file is damaged");
-      at += values;
-    });
-  }
-
- private:
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error("{}: {}: {}", path_.string(), name_, what);
-  }
-
-  std::filesystem::path path_;
-  std::string name_;
-  Hdf5File file_;
-  Hdf5DataSet set_;
-  std::vector<hsize_t> stored_;
-  int bytes_ = 8;
-};
+constexpr size_t kMaxDimensions = 32;  // as HDF5
+// Numbers: runs of so many, or so far from one another, are read one by one; others through a window.
+constexpr size_t kDirect = 4 << 10, kWindow = 32 << 10;
 
 class BinaryValues final : public XdmfValues {
  public:
@@ -179,33 +81,32 @@ class SlabValues final : public XdmfValues {
       fits = slab_.stride[d] > 0 && slab_.count[d] > 0 && slab_.start[d] < dims[d] &&
              slab_.count[d] - 1 <= (dims[d] - 1 - slab_.start[d]) / slab_.stride[d];
     if (!fits) throw Error("{}: selects a part that its DataItem does not have", where);
+    for (size_t d = 0; d < dims.size(); ++d)
+      if (slab_.count[d] == 1) slab_.stride[d] = 1;
   }
 
   int valueBytes() const override { return all_->valueBytes(); }
 
   void read(uint64_t first, std::span<double> to) const override {
-    const size_t rank = slab_.count.size();
-    const uint64_t row = slab_.count[rank - 1], step = slab_.stride[rank - 1];
-    std::vector<double> spread;
-    for (size_t done = 0; done < to.size();) {
-      const uint64_t at = first + done, column = at % row;
-      const auto count = static_cast<size_t>(std::min<uint64_t>(row - column, to.size() - done));
-      uint64_t rest = at / row, source = 0, pitch = 1;
-      for (size_t d = rank; d-- > 0;) {
-        const uint64_t index = d == rank - 1 ? column : rest % slab_.count[d];
-        if (d != rank - 1) rest /= slab_.count[d];
-        source += pitch * (slab_.start[d] + slab_.stride[d] * index);
-        pitch *= all_->dims()[d];
-      }
-      if (step == 1) {
-        all_->read(source, to.subspan(done, count));
-      } else {
-        spread.resize((count - 1) * step + 1);
-        all_->read(source, spread);
-        for (size_t n = 0; n < count; ++n) to[done + n] = spread[n * step];
-      }
-      done += count;
+    size_t done = 0;
+    forEachXdmfBox(dims(), first, to.size(),
+                   [&](std::span<const uint64_t> from, std::span<const uint64_t> count) {
+                     const auto values = static_cast<size_t>(xdmfProduct(count));
+                     readPart({{from.begin(), from.end()},
+                               std::vector<uint64_t>(from.size(), 1),
+                               {count.begin(), count.end()}},
+                              to.subspan(done, values));
+                     done += values;
+                   });
+  }
+
+  void readPart(const XdmfSlab& part, std::span<double> to) const override {
+    XdmfSlab of_all = part;
+    for (size_t d = 0; d < part.count.size(); ++d) {
+      of_all.start[d] = slab_.start[d] + slab_.stride[d] * part.start[d];
+      of_all.stride[d] = part.count[d] == 1 ? 1 : slab_.stride[d] * part.stride[d];
     }
+    all_->readPart(of_all, to);
   }
 
  private:
@@ -217,17 +118,87 @@ class SlabValues final : public XdmfValues {
 
 XdmfValues::XdmfValues(std::vector<uint64_t> dims, const std::string& where) : dims_(std::move(dims)) {
   for (const uint64_t n : dims_) {
-    if (n == 0 || size_ > kMaxValues / n)
+    if (n == 0 || size_ > kMaxXdmfValues / n)
       throw Error("{}: has impossible dimensions; the file is damaged", where);
     size_ *= n;
   }
-  if (dims_.empty() || dims_.size() > H5S_MAX_RANK)
+  if (dims_.empty() || dims_.size() > kMaxDimensions)
     throw Error("{}: has {} dimensions; expected one or more", where, dims_.size());
 }
 
-std::shared_ptr<const XdmfValues> openXdmfHdf5(const std::filesystem::path& file, const std::string& name,
-                                               std::vector<uint64_t> dims) {
-  return std::make_shared<Hdf5Values>(file, name, std::move(dims));
+uint64_t xdmfProduct(std::span<const uint64_t> counts) {
+  return std::accumulate(counts.begin(), counts.end(), uint64_t{1}, std::multiplies<>());
+}
+
+void forEachXdmfBox(std::span<const uint64_t> dims, uint64_t begin, uint64_t count, const UseXdmfBox& use) {
+  const size_t rank = dims.size();
+  std::array<uint64_t, kMaxDimensions> first{}, along{};
+  while (count > 0) {
+    uint64_t rest = begin;
+    for (size_t d = rank; d-- > 0;) {
+      first[d] = rest % dims[d];
+      rest /= dims[d];
+      along[d] = 1;
+    }
+    // The largest box that begins here: whole rows, whole planes, ... as far as the range goes.
+    uint64_t block = 1;
+    for (size_t d = rank; d-- > 0;) {
+      const uint64_t most = std::min<uint64_t>(dims[d] - first[d], count / block);
+      if (most == 0) break;
+      along[d] = most;
+      const bool whole = most == dims[d];
+      block *= most;
+      if (!whole) break;
+    }
+    use(std::span(first).first(rank), std::span(along).first(rank));
+    begin += block;
+    count -= block;
+  }
+}
+
+/// Numbers that follow one another are read into place; others through a window on the array, which moves forward only.
+void XdmfValues::readPart(const XdmfSlab& part, std::span<double> to) const {
+  const size_t rank = dims_.size();
+  std::array<uint64_t, kMaxDimensions> index{}, pitch{};
+  uint64_t source = 0, along = 1;
+  for (size_t d = rank; d-- > 0; along *= dims_[d]) {
+    pitch[d] = along;
+    source += along * part.start[d];
+  }
+  // Whole rows, whole planes, ... and a part of the dimension before them.
+  size_t outer = rank;
+  uint64_t run = 1;
+  while (outer > 0 && part.stride[outer - 1] == 1) {
+    run *= part.count[--outer];
+    if (part.count[outer] != dims_[outer]) break;
+  }
+  uint64_t last = source + run - 1, gap = 0;
+  for (size_t d = outer; d-- > 0;) {
+    if (gap == 0 && part.count[d] > 1) gap = pitch[d] * part.stride[d];
+    last += pitch[d] * part.stride[d] * (part.count[d] - 1);
+  }
+  const bool direct = run >= kDirect || gap >= kDirect;
+  std::vector<double> window;
+  uint64_t begin = 0;
+  for (uint64_t done = 0; done < to.size(); done += run) {
+    const std::span<double> into = to.subspan(done, run);
+    if (direct) {
+      read(source, into);
+    } else {
+      if (source < begin || source + run > begin + window.size()) {
+        begin = source;
+        window.resize(static_cast<size_t>(std::min<uint64_t>(kWindow, last + 1 - begin)));
+        read(begin, window);
+      }
+      std::copy_n(window.begin() + static_cast<ptrdiff_t>(source - begin), run, into.begin());
+    }
+    for (size_t d = outer; d-- > 0;) {
+      source += pitch[d] * part.stride[d];
+      if (++index[d] < part.count[d]) break;
+      source -= pitch[d] * part.stride[d] * part.count[d];
+      index[d] = 0;
+    }
+  }
 }
 
 std::shared_ptr<const XdmfValues> openXdmfBinary(const XdmfBinary& binary, std::vector<uint64_t> dims) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -12,6 +13,11 @@
 #include "preprocess/formats/common/open_files.h"
 
 namespace curvisplat {
+
+/// A part of an array: where it begins, its step and its count along each dimension.
+struct XdmfSlab {
+  std::vector<uint64_t> start, stride, count;
+};
 
 /// Any number of threads may read.
 class XdmfValues {
@@ -24,6 +30,9 @@ class XdmfValues {
   virtual int valueBytes() const = 0;
   /// The numbers [first, first + to.size()), in the order of the file. Throws Error with the file.
   virtual void read(uint64_t first, std::span<double> to) const = 0;
+  /// The numbers of a part, which must be within the dimensions, in the order of the file. Needs a buffer of 256 KiB
+  /// whatever the steps.
+  virtual void readPart(const XdmfSlab& part, std::span<double> to) const;
 
  protected:
   /// Throws Error if the product is no number of values that a file can hold. `where`: for messages.
@@ -34,9 +43,14 @@ class XdmfValues {
   uint64_t size_ = 1;
 };
 
-/// A data set of an HDF5 file. Reads of one thread wait for those of another: every call holds dataLibraryMutex().
-std::shared_ptr<const XdmfValues> openXdmfHdf5(const std::filesystem::path& file, const std::string& name,
-                                               std::vector<uint64_t> dims);
+constexpr uint64_t kMaxXdmfValues = uint64_t{1} << 48;
+
+uint64_t xdmfProduct(std::span<const uint64_t> counts);
+
+/// Splits a range of numbers into boxes of an array of the given dimensions, as few as possible, and calls
+/// use(first, count) for each, in their order.
+using UseXdmfBox = std::function<void(std::span<const uint64_t> first, std::span<const uint64_t> count)>;
+void forEachXdmfBox(std::span<const uint64_t> dims, uint64_t begin, uint64_t count, const UseXdmfBox& use);
 
 struct XdmfBinary {
   std::shared_ptr<const PooledFile> file;
@@ -51,10 +65,7 @@ std::shared_ptr<const XdmfValues> openXdmfBinary(const XdmfBinary& binary, std::
 std::shared_ptr<const XdmfValues> xdmfInline(std::vector<double> numbers, std::vector<uint64_t> dims,
                                              const std::string& where);
 
-/// Where a part of another item begins, its step and its count along each dimension.
-struct XdmfSlab {
-  std::vector<uint64_t> start, stride, count;
-};
+/// A part of another item. Throws Error if it does not have it.
 std::shared_ptr<const XdmfValues> xdmfHyperslab(std::shared_ptr<const XdmfValues> all, XdmfSlab slab,
                                                 const std::string& where);
 
