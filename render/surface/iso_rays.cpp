@@ -101,8 +101,8 @@ void IsoRays::makeRoom(size_t splats) {
 }
 
 void IsoRays::cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats) {
-  const auto [x0, x1] = std::minmax_element(packet.x.begin(), packet.x.begin() + packet.count);
-  const auto [y0, y1] = std::minmax_element(packet.y.begin(), packet.y.begin() + packet.count);
+  const auto x = std::minmax_element(packet.x.begin(), packet.x.begin() + packet.count);
+  const auto y = std::minmax_element(packet.y.begin(), packet.y.begin() + packet.count);
   for (size_t ray = 0; ray < kRays; ++ray) {
     const glm::dvec2 across = acrossAt(packet, std::min(ray, packet.count - 1));
     across_x_[ray] = across.x;
@@ -110,7 +110,7 @@ void IsoRays::cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> 
   }
   const auto touches = [&](const IsoSplats::Placed& placed) {
     const IsoSplat& s = *placed.splat;
-    return s.x1 >= *x0 && s.x0 <= *x1 && s.y1 >= *y0 && s.y0 <= *y1;
+    return s.x1 >= *x.first && s.x0 <= *x.second && s.y1 >= *y.first && s.y0 <= *y.second;
   };
   crossed_.clear();
   makeRoom(static_cast<size_t>(std::count_if(splats.begin(), splats.end(), touches)));

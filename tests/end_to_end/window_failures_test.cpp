@@ -134,6 +134,7 @@ TEST_F(WindowOnTwoLevels, DrawsWithoutTheBricksThatAreDamaged) {
 TEST_F(WindowOnACopy, LivesAndSaysSoWhereAFileBecomesShorter) {
   // Above the messages.
   const ImageSize part{pictureSize().width, pictureSize().height * 6 / 10};
+  save();  // the picture is final by then
   const Image before = shown(part);
   fs::resize_file("copy.splats/geometry.bin", 100);
   chooseSecondScalar();
