@@ -1,6 +1,8 @@
 #include "preprocess/addition/shared_series.h"
 
 #include <sys/stat.h>
+#include <chrono>
+#include <exception>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -92,6 +94,11 @@ SharedSteps::SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ra
 }
 
 SharedSteps::~SharedSteps() {
+  // After a failure the others still write into the folder, until they hear of it.
+  if (std::uncaught_exceptions() > 0 && ranks_.isFirst() && !ranks_.alone()) {
+    ranks_.transport()->announceFailure();
+    ranks_.waitForFailures(std::chrono::seconds(3));
+  }
   if (ranks_.isFirst()) return;
   removeAll(partOf(ranks_.rank()));
   scratch_.reset();

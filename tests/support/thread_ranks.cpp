@@ -75,11 +75,11 @@ class ThreadTransport final : public RankTransport {
   void announceFailure() override {
     const MutexLock lock(meeting_.mutex);
     if (meeting_.failed < 0) meeting_.failed = static_cast<int>(rank_);
-    ++meeting_.failed_count;
+    if (!std::exchange(announced_, true)) ++meeting_.failed_count;
   }
   unsigned failedCount() override {
     const MutexLock lock(meeting_.mutex);
-    return meeting_.failed_count;
+    return meeting_.failed_count - announced_;
   }
   void finish() override {}
   void abort(int) override { std::abort(); }
@@ -98,6 +98,7 @@ class ThreadTransport final : public RankTransport {
   Meeting& meeting_;
   const unsigned rank_, count_;
   std::vector<int64_t> own_;
+  bool announced_ = false;
   Take take_;
   uint64_t calls_ = 0;
 };

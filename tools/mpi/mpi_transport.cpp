@@ -9,6 +9,7 @@
 #include <cstring>
 #include <memory>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "stream/base/ranks.h"
@@ -78,6 +79,7 @@ class MpiTransport final : public RankTransport {
   }
 
   void announceFailure() override {
+    if (std::exchange(announced_, true)) return;
     for (unsigned n = 0; n < count_; ++n) {
       MPI_Request request;  // the message is empty, and nobody waits for it
       if (n != rank_) MPI_Isend(nullptr, 0, MPI_BYTE, static_cast<int>(n), kFailureTag, failures_, &request);
@@ -117,6 +119,7 @@ class MpiTransport final : public RankTransport {
   }
 
   unsigned rank_ = 0, count_ = 1, failed_count_ = 0;
+  bool announced_ = false;
   MPI_Comm work_ = MPI_COMM_NULL, failures_ = MPI_COMM_NULL;
   std::vector<MPI_Request> requests_;  // of the call under way
 };
