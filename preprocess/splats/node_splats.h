@@ -142,7 +142,6 @@ struct NodeSplatCorrections {
 struct NodeScratch {
   std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
   std::vector<uint8_t> has_blank;                            // [row around the box]
-  std::vector<uint8_t> left_over;                            // [node of a row's part]: InnerSplats
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

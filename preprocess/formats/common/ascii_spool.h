@@ -21,7 +21,7 @@ struct AsciiSpool {
   int significant_digits = 0;  // the largest number of digits among the first numbers
 };
 
-/// A float is written with at most so many significant digits.
+/// A float has at most this number of significant digits in text.
 constexpr int kDigitsOfFloat = 9;
 /// How many numbers of a text are asked for their digits.
 constexpr size_t kDigitSamples = 100'000;

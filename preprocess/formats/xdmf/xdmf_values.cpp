@@ -12,7 +12,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kMaxDimensions = 32;  // as HDF5
-// Numbers: runs of so many, or so far from one another, are read one by one; others through a window.
+// Strided numbers: runs this long, or this far apart, are read one by one; others through a window.
 constexpr size_t kDirect = 4 << 10, kWindow = 32 << 10;
 
 class BinaryValues final : public XdmfValues {
