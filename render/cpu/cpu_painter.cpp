@@ -86,6 +86,7 @@ struct CpuPainter::State {
           tbb::simple_partitioner());
     });
   }
+  BlockMask inImage(size_t number) const;
   void clear(size_t number);
   void allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_);
   void paintBatch();
@@ -115,11 +116,25 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
 }
 
 void CpuPainter::drawOnly(const TileSet& tiles) {
-  for (size_t number = 0; number < tileCount(state_->size); ++number) {
-    if (tiles.has(number)) continue;
-    state_->open[number].store(0, std::memory_order_relaxed);
-    state_->bins->close(static_cast<int>(number));
+  State& state = *state_;
+  if (!state.bins->empty()) state.paintBatch();
+  for (size_t number = 0; number < tileCount(state.size); ++number) {
+    const bool drawn = tiles.has(number);
+    state.open[number].store(drawn ? state.inImage(number) : 0, std::memory_order_relaxed);
+    if (drawn)
+      state.bins->open(static_cast<int>(number));
+    else
+      state.bins->close(static_cast<int>(number));
   }
+}
+
+/// The blocks of a tile that lie in the image at least in part.
+BlockMask CpuPainter::State::inImage(size_t number) const {
+  const auto columns = static_cast<size_t>(bins->columns());
+  const int x0 = static_cast<int>(number % columns) * kTileSide,
+            y0 = static_cast<int>(number / columns) * kTileSide;
+  return blocksOf(blocksAlong(0, static_cast<float>(size.width - 1 - x0), kTileSide).inTile(0),
+                  blocksAlong(0, static_cast<float>(size.height - 1 - y0), kTileSide).inTile(0));
 }
 
 /// Nothing in it; what lies outside of the image is saturated from the beginning.
@@ -127,16 +142,14 @@ void CpuPainter::State::clear(size_t number) {
   const auto columns = static_cast<size_t>(bins->columns());
   const int columns_left = size.width - static_cast<int>(number % columns) * kTileSide;
   const int rows_left = size.height - static_cast<int>(number / columns) * kTileSide;
-  BlockMask in_image = 0;
   float* at = tile(number);
   for (int block = 0; block < kTileBlocks * kTileBlocks; ++block) {
     const int x = block % kTileBlocks * kBlockSide, y = block / kTileBlocks * kBlockSide;
-    if (x < columns_left && y < rows_left) in_image |= BlockMask{1} << block;
     at = std::fill_n(at, 3 * kBlockPixels, 0.0f);
     for (int pixel = 0; pixel < kBlockPixels; ++pixel)
       *at++ = x + pixel % kBlockSide < columns_left && y + pixel / kBlockSide < rows_left;
   }
-  open[number].store(in_image, std::memory_order_relaxed);
+  open[number].store(inImage(number), std::memory_order_relaxed);
 }
 
 void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_) {

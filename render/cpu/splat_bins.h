@@ -45,6 +45,7 @@ class SplatBins {
 
   /// Opens all tiles. hidden() counts from here.
   void open();
+  void open(int tile) { closed_[static_cast<size_t>(tile)] = false; }
   void close(int tile) { closed_[static_cast<size_t>(tile)] = true; }
   /// Splats that were left out.
   uint64_t hidden() const { return hidden_; }

@@ -181,8 +181,8 @@ void FramePipeline::dropPools() {
   old.swap(pools_);
 }
 
-/// Starts the stages on the next slab. False if no slab is left.
-bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options) {
+/// Starts the stages on the next slab. False if no slab of the region is left.
+bool FramePipeline::beginSlab(const FramePlan& plan, const FrameRegion& region, const FrameOptions& options) {
   const MutexLock lock(mutex_);
   throwIfStopped(options.stop);
   if (!pools_->sweep.beginSlab(plan.parts)) return false;
@@ -195,7 +195,7 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
     return (may_hide && hidden_.hides(brick)) ||
            pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
   });
-  pools_->workers.start();
+  pools_->workers.start(region.tiles.get());
   return true;
 }
 
@@ -314,9 +314,13 @@ void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
-  const FrameWork work{cache_,    plan.parts, plan.settings,      planner_.table(),
-                       plan.keys, hidden_,    options.keep_going, plan.tiles.get()};
+  const FrameWork work{cache_,    plan.parts, plan.settings,     planner_.table(),
+                       plan.keys, hidden_,    options.keep_going};
   makePools(options);
+  // With keep_going, what replaces a damaged brick may reach into any region.
+  const std::vector<FrameRegion> regions =
+      options.keep_going ? std::vector<FrameRegion>{{plan.tiles, {}}}
+                         : frameRegions(plan, cache_, variable_, pools_->budget.sweep_splats);
   const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   {
     const MutexLock lock(mutex_);
@@ -329,8 +333,9 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   if (progress) progress->begin("drawing", plan.parts.size(), "bricks");
   Image image;
   try {
-    beginSlab(plan, options);
-    image = paint(plan, options, statistics, progress);
+    pools_->sweep.beginRegion(regions.front().left_out);
+    beginSlab(plan, regions.front(), options);
+    image = paint(plan, regions, options, statistics, progress);
   } catch (...) {
     pools_->workers.stop();
     try {
@@ -347,6 +352,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   const Cut& cut = plan.cut;
   statistics.ring_peak_bytes = pools_->ring.peakSplats() * sizeof(ScreenSplat);
   statistics.sweep_peak_bytes = SweepBuffer::bytes(pools_->sweep.peakSplats());
+  statistics.regions = regions.size();
   statistics.slabs = pools_->sweep.slabs();
   statistics.bricks_hidden = pools_->workers.partsHidden() + plan.parts_hidden;
   statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden - plan.parts_elsewhere;
@@ -361,9 +367,10 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   return image;
 }
 
-/// The stage "draw". No picture where the ring was closed: a worker has failed, or a stop was requested.
-Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
-                           Progress* progress) {
+/// The stage "draw"; the first slab is begun. No picture where the ring was closed: a worker has failed, or a stop was
+/// requested.
+Image FramePipeline::paint(const FramePlan& plan, const std::vector<FrameRegion>& regions,
+                           const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
   Image image;
   backend_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
@@ -371,7 +378,7 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
         plan.settings.view.size, options.background, planner_.table(),
         {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers, planner_.colourClasses()},
         resourcesOf(options));
-    if (plan.tiles) painter.drawOnly(*plan.tiles);
+    if (regions.front().tiles) painter.drawOnly(*regions.front().tiles);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
     uint64_t seen = 0;
@@ -380,13 +387,21 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
       if (progress) progress->advance(now - seen);
       seen = now;
     };
-    do {
-      while (drawer.drawNext()) advance();
-      pools_->workers.finish(statistics);
-      pools_->source.finish(statistics);
-      advance();
-      if (pools_->ring.isClosed()) return;
-    } while (beginSlab(plan, options));
+    for (size_t number = 0; number < regions.size(); ++number) {
+      const FrameRegion& region = regions[number];
+      if (number > 0) {
+        painter.drawOnly(*region.tiles);
+        pools_->sweep.beginRegion(region.left_out);
+        if (!beginSlab(plan, region, options)) return;
+      }
+      do {
+        while (drawer.drawNext()) advance();
+        pools_->workers.finish(statistics);
+        pools_->source.finish(statistics);
+        advance();
+        if (pools_->ring.isClosed()) return;
+      } while (beginSlab(plan, region, options));
+    }
     image = painter.end();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();

@@ -5,8 +5,8 @@
 //                                   | v
 //                                 SweepBuffer
 //
-// A frame is one sweep along the depth, or several slabs of it if the budget cannot hold a layer of the cut.
-// The source and the workers start again with each slab; the painter continues.
+// A frame is one sweep along the depth, or one for each region of the picture if the budget cannot hold a layer of the cut
+// (frame_regions.h), or several slabs of one. The source and the workers start again with each slab; the painter continues.
 //
 // All memory is in pools, which are allocated when the first frame needs them and sized from the budget. They
 // are replaced only if the budget's shares change. Between frames the workers can fill the cache of bricks.
@@ -21,6 +21,7 @@
 #include "render/frame/backend.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_plan.h"
+#include "render/frame/frame_regions.h"
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
 #include "render/surface/face_meshes.h"
@@ -78,12 +79,12 @@ class FramePipeline {
   };
   std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
                                        const IsoInput& input, FrameStatistics& statistics);
-  bool beginSlab(const FramePlan& plan, const FrameOptions& options);
+  bool beginSlab(const FramePlan& plan, const FrameRegion& region, const FrameOptions& options);
   void stopStages();
   void makePools(const FrameOptions& options);
   void dropPools();
-  Image paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
-              Progress* progress);
+  Image paint(const FramePlan& plan, const std::vector<FrameRegion>& regions, const FrameOptions& options,
+              FrameStatistics& statistics, Progress* progress);
 
   const CacheReader& cache_;
   const size_t variable_;

@@ -41,7 +41,7 @@ constexpr Fields<FetchStatistics, 16> kFetch{{
     {"pager_peak_bytes", &FetchStatistics::pager_peak_bytes},
 }};
 
-constexpr Fields<PrepareStatistics, 16> kPrepare{{
+constexpr Fields<PrepareStatistics, 17> kPrepare{{
     {"project", &PrepareStatistics::project_s, Combined::kSum, kSeconds},
     {"sort", &PrepareStatistics::sort_s, Combined::kSum, kSeconds},
     {"workers_waited", &PrepareStatistics::workers_waited_s, Combined::kSum, kSeconds},
@@ -55,6 +55,7 @@ constexpr Fields<PrepareStatistics, 16> kPrepare{{
     {"splats_off_screen", &PrepareStatistics::splats_off_screen},
     {"splats_transparent", &PrepareStatistics::splats_transparent},
     {"splats_behind", &PrepareStatistics::splats_behind},
+    {"regions", &PrepareStatistics::regions, Combined::kLargest},
     {"slabs", &PrepareStatistics::slabs, Combined::kLargest},
     {"ring_peak_bytes", &PrepareStatistics::ring_peak_bytes},
     {"sweep_peak_bytes", &PrepareStatistics::sweep_peak_bytes},

@@ -38,12 +38,14 @@ struct PrepareStatistics {
   /// Parts that were left out because splats in front hide them. How many depends on how far the stages are ahead of
   /// one another; the picture does not.
   uint64_t bricks_hidden = 0;
-  uint64_t bricks_again = 0;  // decoded or kept bricks that were prepared again, in a further slab
+  uint64_t bricks_again = 0;  // decoded or kept bricks that were prepared again, in a further slab or region
   uint64_t splats_read = 0, splats_drawn = 0;
   uint64_t splats_clipped = 0, splats_off_screen = 0,
            splats_transparent = 0;  // read but not drawn: the reason
   uint64_t splats_behind = 0;       // read but not drawn: behind opaque surfaces or slices
-  uint64_t slabs = 0;               // slabs of depth, drawn one by one: more than one if memory is short
+  // Drawn one by one: more than one if memory is short.
+  uint64_t regions = 0;  // of the picture
+  uint64_t slabs = 0;    // of depth, of all regions
   uint64_t ring_peak_bytes = 0;
   uint64_t sweep_peak_bytes = 0;  // of splats that wait for others that come before them in depth
   std::vector<BrickFailure> bricks_unreadable;  // with keep_going; sorted by number, each once

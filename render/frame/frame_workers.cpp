@@ -39,8 +39,9 @@ void FrameWorkers::beginFrame(const FrameWork& work) {
   parts_seen_ = 0;
 }
 
-void FrameWorkers::start() {
+void FrameWorkers::start(const TileSet* tiles) {
   begin();
+  tiles_ = tiles;
   team_.start([this](unsigned number) { loop(*workers_[number]); });
 }
 
@@ -178,7 +179,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
     const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched->cell);
     worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry,
                              {fetched->values, fetched->second}, fetched->ranges);
-    if (work_->tiles) worker.projector.keepTouching(*work_->tiles);
+    if (tiles_) worker.projector.keepTouching(*tiles_);
     worker.keys.resize(worker.projector.depths().size());
     work_->keys.keysOf(worker.projector.depths(), cell_min, part.keys, worker.keys);
   }

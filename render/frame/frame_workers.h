@@ -33,7 +33,6 @@ struct FrameWork {
   const DepthKeys& keys;
   const HiddenBricks& hidden;
   bool keep_going = false;
-  const TileSet* tiles = nullptr;  // what is drawn of the picture; null: all
 };
 
 /// The same for what is found from splats before the picture is drawn: slices and isosurfaces.
@@ -56,8 +55,8 @@ class FrameWorkers {
   /// Begins a frame.
   void beginFrame(const FrameWork& work);
   /// Starts the workers on the sweep's current slab. The source must have the slab's parts, and the ring must
-  /// be open.
-  void start();
+  /// be open. `tiles`: what is drawn of the picture, borrowed until finish(); null: all.
+  void start(const TileSet* tiles);
   /// Waits until the workers have ended. Either the whole slab is in the ring, which pauses after it; or the
   /// sweep, ring or source was stopped; or a worker failed, which stops all of them. Rethrows the first
   /// failure. Adds the workers' times and counts to `statistics`.
@@ -100,6 +99,7 @@ class FrameWorkers {
   SweepBuffer& sweep_;
   SegmentRing& ring_;
   const FrameWork* work_ = nullptr;
+  const TileSet* tiles_ = nullptr;
   std::vector<Seen> seen_;  // [part of the frame]; each is one worker's at a time
   std::atomic<uint64_t> parts_seen_ = 0;
   std::atomic<uint64_t> next_ = 0;  // sequence number of the slab's first part that no worker has taken

@@ -67,6 +67,13 @@ void SweepBuffer::beginFrame() {
   closed_ = false;
 }
 
+void SweepBuffer::beginRegion(std::span<const uint8_t> left_out) {
+  const MutexLock lock(mutex_);
+  CURVISPLAT_CHECK(closed_ || isQuiet());
+  entered_whole_.assign(left_out.begin(), left_out.end());
+  begin_ = end_ = {};
+}
+
 bool SweepBuffer::beginSlab(std::span<const SweptPart> swept) {
   const MutexLock lock(mutex_);
   CURVISPLAT_CHECK(closed_ || isQuiet());

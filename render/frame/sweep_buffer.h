@@ -28,6 +28,9 @@
 // The worker that has the turn waits only for such workers; if there are none, it makes space itself, with a
 // batch of final splats or by discarding.
 //
+// A picture can be swept region by region (frame_regions.h): each region has a sweep of its own over the parts that it
+// needs.
+//
 // Splats are stored in pages. A page is free again when all splats in it have been read or discarded.
 #pragma once
 
@@ -96,6 +99,8 @@ class SweepBuffer {
   /// Begins a frame with an empty, open buffer. No thread may use the buffer meanwhile, nor during
   /// beginSlab().
   void beginFrame();
+  /// Begins another sweep in the same frame, between slabs. `left_out` [swept]: 1 for the parts that it does not need.
+  void beginRegion(std::span<const uint8_t> left_out);
   /// Begins the next slab; the first begins with the first part. False if the last slab has reached the end.
   /// `swept` is borrowed and must be the same throughout the frame.
   bool beginSlab(std::span<const SweptPart> swept);

@@ -15,13 +15,6 @@ namespace {
 constexpr double kPaintPerPrepare = 1.5;
 constexpr double kTileCost = 300;
 
-/// The tiles x0 .. x1 - 1 in rows y0 .. y1 - 1.
-struct TileBox {
-  int x0, y0, x1, y1;
-  int columns() const { return x1 - x0; }
-  int rows() const { return y1 - y0; }
-};
-
 /// A part as the tiles see it, in units of tiles, within the picture.
 struct TilePart {
   double x0, y0, x1, y1;
@@ -58,22 +51,22 @@ struct CutCosts {
 class Dealer {
  public:
   Dealer(std::span<const PartCost> costs, ImageSize size)
-      : columns_(TileSet::tilesAlong(size.width)), owners_(TileSet::tilesOf(size)) {
+      : columns_(TileSet::tilesAlong(size.width)), owners_(TileSet::tilesOf(size), kNobody) {
     for (const PartCost& cost : costs)
       if (const TilePart part = TilePart::of(cost, size); part.isSeen()) parts_.push_back(part);
   }
 
-  std::vector<uint32_t> deal(const TileBox& all, uint32_t ranks) {
+  std::vector<uint32_t> deal(const TileBox& box, uint32_t ranks) {
     std::vector<uint32_t> parts(parts_.size());
     for (uint32_t n = 0; n < parts.size(); ++n) parts[n] = n;
-    divide(all, 0, ranks, parts);
+    divide(box, 0, ranks, touching(box, parts));
     return std::move(owners_);
   }
 
  private:
   /// Gives the tiles of a box to the ranks first .. first + ranks - 1. `parts`: those that touch it.
   void divide(const TileBox& box, uint32_t first, uint32_t ranks, const std::vector<uint32_t>& parts) {
-    if (ranks == 1 || box.columns() * box.rows() == 1) {
+    if (ranks == 1 || box.tiles() <= 1) {
       for (int y = box.y0; y < box.y1; ++y)
         for (int x = box.x0; x < box.x1; ++x) owners_[static_cast<size_t>(y * columns_ + x)] = first;
       return;
@@ -162,9 +155,14 @@ std::vector<PartCost> partCosts(std::span<const SweptPart> parts, std::span<cons
   return costs;
 }
 
+std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size, const TileBox& box,
+                                uint32_t ranks) {
+  return Dealer(parts, size).deal(box, ranks);
+}
+
 std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size, uint32_t ranks) {
-  return Dealer(parts, size)
-      .deal({0, 0, TileSet::tilesAlong(size.width), TileSet::tilesAlong(size.height)}, ranks);
+  return dealTiles(parts, size, {0, 0, TileSet::tilesAlong(size.width), TileSet::tilesAlong(size.height)},
+                   ranks);
 }
 
 std::vector<RankWork> workOfRanks(std::span<const PartCost> parts, ImageSize size,

@@ -1,5 +1,5 @@
-// Deals the tiles of a picture out to the ranks that draw it together. Each rank gets a rectangle of tiles, so
-// that few bricks are read by several ranks.
+// Deals the tiles of a picture out to the ranks that draw it together, or to the regions that are drawn one by one
+// (frame_regions.h). Each gets a rectangle of tiles, so that few bricks are read by several.
 //
 // The picture is halved again and again (a k-d tree), each time where the estimated costs of both sides, by the
 // ranks that they get, are most alike. Costs are estimated from the index alone:
@@ -18,6 +18,7 @@
 #include "render/image/image_size.h"
 #include "render/project/screen_box.h"
 #include "render/project/screen_view.h"
+#include "render/project/tile_set.h"
 #include "stream/model/brick.h"
 
 namespace curvisplat {
@@ -34,7 +35,12 @@ struct PartCost {
 std::vector<PartCost> partCosts(std::span<const SweptPart> parts, std::span<const Brick> bricks,
                                 std::span<const BrickVariable> variables, const ScreenView& view);
 
-/// [tile] the rank that draws it. Ranks may get nothing if there are more of them than tiles.
+/// [tile] the rank that draws it. Ranks may get nothing if there are more of them than tiles. Of a picture's tiles
+/// those in `box` are dealt out; the others get kNobody.
+inline constexpr uint32_t kNobody = UINT32_MAX;
+std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size, const TileBox& box,
+                                uint32_t ranks);
+/// All tiles.
 std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size, uint32_t ranks);
 
 /// What one rank has to do.

@@ -64,6 +64,7 @@ namespace curvisplat {
   X(ReadBuffer, PFNGLREADBUFFERPROC)                           \
   X(ReadPixels, PFNGLREADPIXELSPROC)                           \
   X(RenderbufferStorage, PFNGLRENDERBUFFERSTORAGEPROC)         \
+  X(Scissor, PFNGLSCISSORPROC)                                 \
   X(ShaderSource, PFNGLSHADERSOURCEPROC)                       \
   X(TexBuffer, PFNGLTEXBUFFERPROC)                             \
   X(TexImage2D, PFNGLTEXIMAGE2DPROC)                           \

@@ -156,6 +156,7 @@ GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(
   state_->footprint.fill<std::array<float, 2>>(gl, kFootprintUnit, GL_RG32F, texels);
 
   gl.Enable(GL_BLEND);
+  gl.Enable(GL_SCISSOR_TEST);
   gl.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   gl.check("setting up the painter");
 }
@@ -284,12 +285,19 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
                                .windows = windows}),
               table, shading);
   gl.Viewport(0, 0, size.width, size.height);
+  gl.Scissor(0, 0, size.width, size.height);
   state_->background = background;
   // With layers the picture is put together in end().
   const glm::vec4 behind = state_->layers ? glm::vec4(0) : background;
   gl.ClearColor(behind.r, behind.g, behind.b, behind.a);
   gl.Clear(GL_COLOR_BUFFER_BIT);
   gl.check("beginning a frame");
+}
+
+void GlPainter::drawOnly(const TileSet& tiles) {
+  const TileBox box = tiles.box();
+  state_->gl.Scissor(box.x0 * kTileSide, box.y0 * kTileSide, box.columns() * kTileSide,
+                     box.rows() * kTileSide);
 }
 
 std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {

@@ -21,6 +21,7 @@ class GlPainter final : public Painter {
   DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
              PixelShading shading, const PaintResources& resources = {}) override;
+  void drawOnly(const TileSet& tiles) override;
   void draw(std::span<const ScreenSplat> splats) override;
   size_t drawsUnderWay() const override;
   void finishDraws() override;

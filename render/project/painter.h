@@ -46,8 +46,9 @@ class Painter {
   /// larger than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      PixelShading shading, const PaintResources& resources = {}) = 0;
-  /// After begin(): only `tiles` of the picture are wanted; what the others show does not matter.
-  virtual void drawOnly(const TileSet& /*tiles*/) {}
+  /// After begin(): from now on only `tiles` are drawn, which fill their box. All splats of a tile are drawn before
+  /// another call leaves it out; tiles that no call has named show nothing that matters.
+  virtual void drawOnly(const TileSet& tiles) = 0;
   /// Blends `splats` into the frame in their order: behind all splats drawn so far, or in front of them, as
   /// order() says. The memory may be used again when the call returns, unless drawsUnderWay() counts the
   /// draw.

@@ -30,6 +30,15 @@ TileSet::TileSet(ImageSize size, const std::vector<uint32_t>& owners, uint32_t o
           before(column + 1, row) - before(column, row);
 }
 
+TileBox TileSet::box() const {
+  TileBox box{columns_, rows_, 0, 0};
+  for (int y = 0; y < rows_; ++y)
+    for (int x = 0; x < columns_; ++x)
+      if (has(static_cast<size_t>(y * columns_ + x)))
+        box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
+  return box.x0 < box.x1 ? box : TileBox{0, 0, 0, 0};
+}
+
 bool TileSet::touches(const ScreenBox& box) const {
   if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return true;  // no numbers: whatever draws it decides
   const int x0 = tileAt(box.x0 - kMargin, columns_), x1 = tileAt(box.x1 + kMargin, columns_) + 1;

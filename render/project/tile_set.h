@@ -1,4 +1,5 @@
-// Some of a picture's tiles: those that one of several processes draws. A tile is a square of kTileSide pixels.
+// Some of a picture's tiles: those that one of several processes draws, or that are drawn at a time. A tile is a square of
+// kTileSide pixels.
 #pragma once
 
 #include <cstddef>
@@ -11,6 +12,14 @@
 namespace curvisplat {
 
 inline constexpr int kTileSide = 32;  // pixels
+
+/// The tiles of columns x0 .. x1 - 1 in rows y0 .. y1 - 1.
+struct TileBox {
+  int x0, y0, x1, y1;
+  int columns() const { return x1 - x0; }
+  int rows() const { return y1 - y0; }
+  size_t tiles() const { return static_cast<size_t>(columns()) * static_cast<size_t>(rows()); }
+};
 
 /// Immutable; any thread.
 class TileSet {
@@ -26,6 +35,8 @@ class TileSet {
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   bool has(size_t tile) const { return has_[tile] != 0; }
+  /// The smallest box around its tiles; without tiles if it has none.
+  TileBox box() const;
   /// Whether a rectangle lies in one of the tiles at least in part, or within a pixel of one.
   bool touches(const ScreenBox& box) const;
 

@@ -99,6 +99,7 @@ class HalfHidden final : public Painter {
   DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
   void begin(ImageSize, const glm::vec4&, const ClassificationTable&, PixelShading,
              const PaintResources&) override {}
+  void drawOnly(const TileSet&) override {}
   void draw(std::span<const ScreenSplat>) override {}
   bool hides(const ScreenBox& box) const override { return box.x1 < 30; }
   Image end() override { return Image(); }
@@ -145,7 +146,7 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
     const FrameWork work{cache, swept, settings, table, keys, hidden};
     workers.beginFrame(work);
     ASSERT_TRUE(sweep.beginSlab(swept));
-    workers.start();
+    workers.start(nullptr);
     uint64_t drawn = 0;
     while (const auto segment = ring.next()) {
       drawn += segment->size();

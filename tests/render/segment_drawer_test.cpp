@@ -15,6 +15,7 @@ class LatePainter final : public Painter {
   DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
   void begin(ImageSize, const glm::vec4&, const ClassificationTable&, PixelShading,
              const PaintResources&) override {}
+  void drawOnly(const TileSet&) override {}
   void draw(std::span<const ScreenSplat> splats) override {
     under_way_.push_back(splats);
     if (under_way_.size() > 2) finishOldest();

@@ -1,0 +1,137 @@
+#include "render/frame/frame_regions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "render/frame/tile_dealer.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
+// What a layer may fill of the sweep's memory, by the estimate: pages are not full, and parts are swept ahead.
+constexpr double kLayerShare = 0.7;
+// What a slab has of it, on average, where the layer does not fit.
+constexpr double kSlabShare = 0.6;
+// Between regions threads wait for one another: as long as preparing so many splats takes.
+constexpr double kSplatsARegion = 100e3;
+
+/// [region] its box of tiles.
+std::vector<TileBox> boxesOf(const std::vector<uint32_t>& owners, ImageSize size, uint32_t regions) {
+  const int columns = TileSet::tilesAlong(size.width), rows = TileSet::tilesAlong(size.height);
+  std::vector<TileBox> boxes(regions, {columns, rows, 0, 0});
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const uint32_t owner = owners[static_cast<size_t>(y * columns + x)];
+      if (owner == kNobody) continue;
+      TileBox& box = boxes[owner];
+      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
+    }
+  return boxes;
+}
+
+/// How much of from .. to lies in tiles first .. last - 1; of a point: 1 or 0.
+double shareOf(float from, float to, int first, int last) {
+  const double low = std::max<double>(from, first * kTileSide), high = std::min<double>(to, last * kTileSide);
+  if (!(high >= low)) return 0;
+  return to > from && std::isfinite(to - from) ? (high - low) / (double{to} - from) : 1;
+}
+
+/// What drawing a region takes, in splats to be prepared.
+double workOf(const std::vector<PartInRegion>& parts, double sweep_splats) {
+  double all = 0, seen = 0, depth_first = std::numeric_limits<double>::infinity(), depth_last = 0;
+  for (const PartInRegion& part : parts) {
+    all += part.prepare;
+    seen += part.splats;
+    depth_first = std::min<double>(depth_first, part.keys.first);
+    depth_last = std::max<double>(depth_last, part.keys.last);
+  }
+  if (largestLayer(parts) <= kLayerShare * sweep_splats || depth_last <= depth_first)
+    return all + kSplatsARegion;
+  const double slabs = std::max(2.0, seen / (kSlabShare * sweep_splats));
+  double work = kSplatsARegion * slabs;
+  for (const PartInRegion& part : parts)
+    work += part.prepare * (1 + (slabs - 1) * static_cast<double>(part.keys.last - part.keys.first) /
+                                    (depth_last - depth_first));
+  return work;
+}
+
+}  // namespace
+
+double largestLayer(const std::vector<PartInRegion>& parts) {
+  // The splats behind a key are, of all parts that it lies in: rate (last - key).
+  struct Entered {
+    double last, rate;
+    bool operator<(const Entered& other) const { return last > other.last; }  // the first to end is on top
+  };
+  std::priority_queue<Entered> entered;
+  double rate = 0, rate_last = 0, largest = 0;
+  for (const PartInRegion& part : parts) {
+    const double key = part.keys.first;
+    while (!entered.empty() && entered.top().last <= key) {
+      rate -= entered.top().rate;
+      rate_last -= entered.top().rate * entered.top().last;
+      entered.pop();
+    }
+    const double last = part.keys.last + 1.0;
+    const double of_part = part.splats / (last - key);
+    entered.push({last, of_part});
+    rate += of_part;
+    rate_last += of_part * last;
+    largest = std::max(largest, rate_last - rate * key);
+  }
+  return largest;
+}
+
+std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& cache, size_t variable,
+                                      size_t sweep_splats) {
+  const auto capacity = static_cast<double>(sweep_splats);
+  if (static_cast<double>(plan.cut.splats) <= kLayerShare * capacity) return {{plan.tiles, {}}};
+  const ImageSize size = plan.settings.view.size;
+  const std::vector<PartCost> costs =
+      partCosts(plan.parts, cache.bricks(), cache.brickVariables(variable), plan.settings.view);
+  const TileBox all = plan.tiles
+                          ? plan.tiles->box()
+                          : TileBox{0, 0, TileSet::tilesAlong(size.width), TileSet::tilesAlong(size.height)};
+  const auto partsIn = [&](const TileBox& box) {
+    std::vector<PartInRegion> parts;
+    for (size_t n = 0; n < costs.size(); ++n) {
+      const double share = shareOf(costs[n].box.x0, costs[n].box.x1, box.x0, box.x1) *
+                           shareOf(costs[n].box.y0, costs[n].box.y1, box.y0, box.y1);
+      if (share > 0) parts.push_back({plan.parts[n].keys, share * costs[n].prepare, costs[n].prepare});
+    }
+    return parts;
+  };
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<uint32_t> owners;
+  uint32_t regions = 1;
+  for (const uint32_t number : kNumbers) {
+    if (number > all.tiles()) break;
+    std::vector<uint32_t> dealt = dealTiles(costs, size, all, number);
+    double work = 0;
+    bool fits = true;
+    for (const TileBox& box : boxesOf(dealt, size, number)) {
+      const std::vector<PartInRegion> parts = partsIn(box);
+      work += workOf(parts, capacity);
+      fits = fits && largestLayer(parts) <= kLayerShare * capacity;
+    }
+    if (work < least) {
+      least = work;
+      owners = std::move(dealt);
+      regions = number;
+    }
+    if (fits) break;  // more only cut more bricks
+  }
+  if (regions == 1) return {{plan.tiles, {}}};
+  std::vector<FrameRegion> made;
+  for (uint32_t region = 0; region < regions; ++region) {
+    FrameRegion one{std::make_shared<TileSet>(size, owners, region), std::vector<uint8_t>(plan.parts.size())};
+    for (size_t n = 0; n < costs.size(); ++n) one.left_out[n] = !one.tiles->touches(costs[n].box);
+    made.push_back(std::move(one));
+  }
+  return made;
+}
+
+}  // namespace curvisplat
