@@ -399,11 +399,13 @@ TEST_F(RenderOptions, StatisticsReportWhatWasDone) {
     EXPECT_TRUE(json.contains(key)) << key;
   ASSERT_EQ(json["frames"].size(), 1u);
   const auto& frame = json["frames"][0];
-  for (const char* key :
-       {"seconds", "bricks_drawn", "bricks_culled", "splats_read", "splats_drawn", "bytes_read",
-        "largest_level", "bricks_cached", "bricks_read", "read_requests", "mean_queue_depth", "read_by",
-        "cache_peak_bytes", "pager_peak_bytes", "ring_peak_bytes", "sweep_peak_bytes", "regions", "slabs",
-        "bricks_again", "bricks_unreadable"})
+  for (const char* key : {"seconds",          "bricks_drawn",     "bricks_culled",
+                          "splats_read",      "splats_drawn",     "bytes_read",
+                          "largest_level",    "bricks_cached",    "bricks_read",
+                          "read_requests",    "mean_queue_depth", "read_by",
+                          "cache_peak_bytes", "pager_peak_bytes", "ring_peak_bytes",
+                          "sweep_peak_bytes", "regions",          "slabs",
+                          "bricks_again",     "bricks_unreadable"})
     EXPECT_TRUE(frame.contains(key)) << key;
   for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw", "total",
                           "workers_waited_for_reads", "workers_waited", "painter_waited"})
