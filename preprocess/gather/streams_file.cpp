@@ -7,7 +7,7 @@ StreamsFile::StreamsFile(std::filesystem::path folder, size_t streams, uint64_t 
     : folder_(std::move(folder)),
       streams_(streams),
       buffer_bytes_(
-          std::clamp<uint64_t>(memory_bytes / 2 / std::max<size_t>(1, streams), kLeastBuffer, kMostBuffer)),
+          std::clamp<uint64_t>(memory_bytes / 2 / std::max<size_t>(1, streams), kMinBuffer, kMaxBuffer)),
       may_stay_(memory_bytes - std::min<uint64_t>(memory_bytes, streams * buffer_bytes_)) {}
 
 StreamsFile::~StreamsFile() = default;

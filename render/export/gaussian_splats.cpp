@@ -21,7 +21,7 @@ constexpr float kMinOpacity = 1.0f / 255;
 // Viewers blend in eight bits: much of what splats fainter than this absorb is rounded away. Finer levels, whose splats are
 // fainter, are left out where they would have more than a share of it in such splats.
 constexpr float kFaintOpacity = 0.015f;
-constexpr double kMostFaint = 0.3;
+constexpr double kMaxFaint = 0.3;
 // Viewers store opacities as logits, and few have more than eight bits.
 constexpr double kMaxOpacity = 0.999;
 
@@ -168,7 +168,7 @@ class Refinement {
       faint += children.back().faint;
       all += children.back().all;
     }
-    if (faint > kMostFaint * all) return;
+    if (faint > kMaxFaint * all) return;
     taken_.erase(number);
     splats_ -= brick.splats;
     for (uint32_t n = 0; n < brick.child_count; ++n) {

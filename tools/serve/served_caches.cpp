@@ -89,7 +89,7 @@ std::string ServedCaches::helloText() const {
   for (const Served& cache : caches_) json["caches"].push_back(cache.name);
   json["maps"] = Json::array();
   for (const PublishedMap& map : builtInMaps()) json["maps"].push_back(map.name);
-  json["most_pixels"] = kMostPixels;
+  json["most_pixels"] = kMaxPixels;
   json["largest_side"] = kLargestSide;
   return textOf(json);
 }
