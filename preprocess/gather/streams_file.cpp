@@ -12,8 +12,8 @@ StreamsFile::StreamsFile(std::filesystem::path folder, size_t streams, uint64_t 
 
 StreamsFile::~StreamsFile() = default;
 
-void StreamsFile::append(size_t number, std::span<const std::byte> record) {
-  Stream& stream = streams_[number];
+void StreamsFile::append(size_t stream_number, std::span<const std::byte> record) {
+  Stream& stream = streams_[stream_number];
   if (!stream.buffer.empty() && stream.buffer.size() + record.size() > buffer_bytes_) flush(stream);
   if (stream.buffer.capacity() == 0) stream.buffer.reserve(std::max(buffer_bytes_, record.size()));
   stream.buffer.insert(stream.buffer.end(), record.begin(), record.end());
@@ -42,9 +42,10 @@ void StreamsFile::close() {
   }
 }
 
-void StreamsFile::forEach(size_t number, const std::function<void(std::span<const std::byte>)>& use) const {
+void StreamsFile::forEach(size_t stream_number,
+                          const std::function<void(std::span<const std::byte>)>& use) const {
   std::vector<std::byte> buffer;
-  for (const Chunk& chunk : streams_[number].chunks) {
+  for (const Chunk& chunk : streams_[stream_number].chunks) {
     if (!chunk.in_memory.empty()) {
       use(chunk.in_memory);
       continue;

@@ -187,19 +187,19 @@ class Refinement {
 
 }  // namespace
 
-GaussianOpacity gaussianOpacity(double t) {
-  const double opacity = -std::expm1(-t);
-  if (!(t > 1e-6)) return {opacity, 1};
-  // Ein(t) = Σ -(-t)^n / (n n!), summed to convergence; for large t it is ln t + γ + E1(t), E1 negligible.
+GaussianOpacity gaussianOpacity(double optical_depth) {
+  const double opacity = -std::expm1(-optical_depth);
+  if (!(optical_depth > 1e-6)) return {opacity, 1};
+  // Ein(τ) = Σ -(-τ)^n / (n n!), summed to convergence; for large τ it is ln τ + γ + E1(τ), E1 negligible.
   double ein = 0;
-  if (t < 20) {
+  if (optical_depth < 20) {
     double term = 1;
     for (int n = 1; n < 100; ++n) {
-      term *= -t / n;
+      term *= -optical_depth / n;
       ein -= term / n;
     }
   } else {
-    ein = std::log(t) + std::numbers::egamma;
+    ein = std::log(optical_depth) + std::numbers::egamma;
   }
   return {opacity, ein / opacity};
 }

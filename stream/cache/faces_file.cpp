@@ -289,8 +289,8 @@ std::optional<size_t> FacesReader::scalarOf(uint32_t variable_number) const {
   return static_cast<size_t>(found - variables_.begin());
 }
 
-PatchNodes FacesReader::read(uint32_t number) const {
-  const FacePatch& patch = patches_[number];
+PatchNodes FacesReader::read(uint32_t patch_number) const {
+  const FacePatch& patch = patches_[patch_number];
   std::vector<std::byte> bytes(patch.extent.length);
   file_.readAt(patch.extent.offset, std::span(bytes));
   try {
@@ -298,8 +298,8 @@ PatchNodes FacesReader::read(uint32_t number) const {
       throw Error("has a wrong checksum (found {:016x}, expected {:016x})", found, patch.extent.checksum);
     return decodePatch(patch, variables_.size(), box_, bytes);
   } catch (const Error& error) {
-    throw Error("{}: patch {} of the faces: {}; the file is damaged: convert again", path().string(), number,
-                error.what());
+    throw Error("{}: patch {} of the faces: {}; the file is damaged: convert again", path().string(),
+                patch_number, error.what());
   }
 }
 
