@@ -8,7 +8,7 @@ by .clang-tidy. Takes the commands of build/release, which tools/build.sh config
 
 Headers take most of the time. So sources with the same macros are checked several at a time, as one that includes them, and
 what most include (tools/cmake/common_headers.h, and GoogleTest) is parsed once. Names that two of them have for themselves
-collide there: if anything is found in several, each half of them is checked again, down to single ones.
+collide there: if the compiler finds anything in several, each half of them is checked again, down to single ones.
 """
 
 import argparse
@@ -93,11 +93,11 @@ class Group:
                 words = ["clang++-14", *words, "-fsyntax-only", source]
             else:  # it gives the compiler's warnings, too
                 words = ["clang-tidy-14", "--quiet", f"--config-file={ROOT / '.clang-tidy'}", source, "--", *words]
-            run = subprocess.run(words, cwd=BUILD, text=True, capture_output=True)
+            run = subprocess.run(words, cwd=BUILD, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         if run.returncode == 0:
             return ""
-        if len(files) == 1:
-            return run.stdout + run.stderr
+        if len(files) == 1 or not (self.are_tests or "clang-diagnostic" in run.stdout):
+            return run.stdout
         half = len(files) // 2
         return self.findings(files[:half]) + self.findings(files[half:])
 
