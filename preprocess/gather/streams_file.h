@@ -44,7 +44,7 @@ class StreamsFile {
   void forget(size_t stream) { streams_[stream] = {}; }
 
   static constexpr size_t kMinBuffer = size_t{16} << 10, kMaxBuffer = size_t{256} << 10;
-  /// So many streams have buffers in that memory.
+  /// The number of streams whose buffers fit in that memory.
   static size_t mostStreams(uint64_t memory_bytes) { return memory_bytes / (2 * kMinBuffer) + 1; }
 
  private:
