@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Checks sources with Clang 14, without output: its warnings, which are errors; -Wthread-safety, which checks that
-members are only touched while their mutex is held (stream/base/mutex.h); and, of those that are not tests, what clang-tidy finds
-by .clang-tidy. Takes the commands of build/release, which tools/build.sh configures.
+"""Checks sources with Clang 14, without output: its warnings, which are errors, and -Wthread-safety, which checks
+that members are only touched while their mutex is held (stream/base/mutex.h). With --tidy, those that are not tests are checked
+by clang-tidy (.clang-tidy) as well. Takes the commands of build/release, which tools/build.sh configures.
 
-    tools/check_clang.py [FILE ...]    these; without any, all sources
-    tools/check_clang.py --since REV   those that have changed since this commit
+    tools/check_clang.py [--tidy] [FILE ...]    these; without any, all sources
+    tools/check_clang.py [--tidy] --since REV   those that have changed since this commit
 
 Headers take most of the time. So sources with the same macros are checked several at a time, as one that includes them, and
 what most include (tools/cmake/common_headers.h, and GoogleTest) is parsed once. Names that two of them have for themselves
@@ -57,8 +57,8 @@ def changed_since(revision):
 class Group:
     """Sources with the same macros, and what Clang needs to parse any of them."""
 
-    def __init__(self, folder, are_tests):
-        self.folder, self.are_tests = folder, are_tests
+    def __init__(self, folder, are_tests, tidy):
+        self.folder, self.are_tests, self.tidy = folder, are_tests, tidy
         self.files, self.flags, self.precompiled = [], [], []
 
     def add(self, file, arguments):
@@ -89,30 +89,31 @@ class Group:
             several.flush()
             words = [*self.flags, *FLAGS, *self.precompiled]
             source = several.name if len(files) > 1 else str(files[0])
-            if self.are_tests:
-                words = ["clang++-14", *words, "-fsyntax-only", source]
-            else:  # it gives the compiler's warnings, too
+            if self.tidy:  # it gives the compiler's warnings, too
                 words = ["clang-tidy-14", "--quiet", f"--config-file={ROOT / '.clang-tidy'}", source, "--", *words]
+            else:
+                words = ["clang++-14", *words, "-fsyntax-only", source]
             run = subprocess.run(words, cwd=BUILD, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         if run.returncode == 0:
             return ""
-        if len(files) == 1 or not (self.are_tests or "clang-diagnostic" in run.stdout):
+        if len(files) == 1 or (self.tidy and "clang-diagnostic" not in run.stdout):
             return run.stdout
         half = len(files) // 2
         return self.findings(files[:half]) + self.findings(files[half:])
 
 
-def groups(folder, sources):
+def groups(folder, sources, tidy):
     found = {}
     for file, arguments in sources:
         are_tests = file.is_relative_to(ROOT / "tests")
         macros = sorted(argument for argument in arguments if argument.startswith("-D"))
-        found.setdefault((are_tests, *macros), Group(folder, are_tests)).add(file, arguments)
+        found.setdefault((are_tests, *macros), Group(folder, are_tests, tidy and not are_tests)).add(file, arguments)
     return list(found.values())
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tidy", action="store_true", help="run clang-tidy, too")
     parser.add_argument("--since", metavar="REV", help="check the sources that have changed since this commit")
     parser.add_argument("files", nargs="*", type=pathlib.Path)
     options = parser.parse_args()
@@ -122,11 +123,12 @@ def main():
         if not chosen:
             print(f"check_clang: no source has changed since {options.since}")
             return 0
-    subprocess.run([ROOT / "tools/setup.sh", "clang-14", "clang-tidy-14"], check=True)
+    packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy else [])
+    subprocess.run([ROOT / "tools/setup.sh", *packages], check=True)
 
     sources = commands(chosen)
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        alike = groups(pathlib.Path(folder), sources)
+        alike = groups(pathlib.Path(folder), sources, options.tidy)
         list(pool.map(Group.precompile, [group for group in alike if len(group.files) > AT_A_TIME]))
         batches = [batch for group in alike for batch in group.batches()]
         found = [findings for findings in pool.map(lambda batch: batch[0].findings(batch[1]), batches) if findings]
