@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that two builds of the program make the same caches and pictures, byte for byte, and compares their processor time.
 
-    bench/same_bytes.py OLD NEW FOLDER [--rounds 3] [--time 200x200x160]
+    bench/same_bytes.py OLD NEW FOLDER [--only NAME,...] [--rounds 3] [--time 200x200x160]
 
 Generated grids, kept in FOLDER: scenes with smooth, growing and collapsing cells, a grid of cells, one with blanked nodes, and two
 blocks that share a face. Each is converted by OLD once, and by NEW with one thread, with all, and within the least memory; both
@@ -113,7 +113,9 @@ def picture(program, cache, folder):
 def compare(arguments):
     """Returns the number of grids with a difference."""
     differing = 0
-    for name, grid in grids_in(arguments.folder, arguments.old).items():
+    grids = grids_in(arguments.folder, arguments.old)
+    for name in arguments.only.split(",") if arguments.only else grids:
+        grid = grids[name]
         cache = arguments.folder / "same.splats"
         convert(arguments.old, grid, cache, [])
         expected, drawn = contents(cache), picture(arguments.old, cache, arguments.folder)
@@ -149,6 +151,7 @@ def main():
     parser.add_argument("old", type=os.path.abspath)
     parser.add_argument("new", type=os.path.abspath)
     parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--only", default="", help="names of the grids to compare (default: all)")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--time", default="200x200x160")
     arguments = parser.parse_args()

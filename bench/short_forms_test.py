@@ -14,11 +14,14 @@ PROGRAM, FOLDER = pathlib.Path(sys.argv.pop(1)).absolute(), pathlib.Path(sys.arg
 SCRIPTS = pathlib.Path(__file__).resolve().parent
 
 
-def run(script, *arguments, status=0):
-    done = subprocess.run([sys.executable, str(SCRIPTS / script), *map(str, arguments), "--program", str(PROGRAM)],
-                          capture_output=True, text=True)
-    assert done.returncode == status, f"{script}: {done.returncode}\n{done.stdout}{done.stderr}"
+def output(command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    assert done.returncode == 0, f"{command}: {done.returncode}\n{done.stdout}{done.stderr}"
     return done.stdout
+
+
+def run(script, *arguments):
+    return output([sys.executable, SCRIPTS / script, *arguments, "--program", PROGRAM])
 
 
 class ShortForms(unittest.TestCase):
@@ -57,6 +60,24 @@ class ShortForms(unittest.TestCase):
                                    *(str(n) for n in nodes), ""]))
         lines = run("format_memory.py", grid, "--scalar", "p", "--memory", "1G").splitlines()
         self.assertRegex(lines[-1], r"^\| cube.vtk \| 512 \| \d+\.\d \| \d+ \| 1024 \|$")
+
+    def test_same_bytes(self):
+        lines = output([SCRIPTS / "same_bytes.py", PROGRAM, PROGRAM, FOLDER / "same", "--only", "blocks", "--rounds", 1,
+                        "--time", "12x10x6"]).splitlines()
+        self.assertEqual(lines[0], "blocks: the same")
+        self.assertRegex(lines[1], r"^old: \d+\.\d+ \+ \d+\.\d+ s, least ")
+
+    def test_many_steps(self):
+        lines = output([SCRIPTS / "many_steps.py", FOLDER / "many", "--steps", 20, "--program", PROGRAM]).splitlines()
+        self.assertRegex(lines[0], r"^20 steps: manifest.json \d+ KiB, steps.bin \d+ KiB$")
+        self.assertRegex(lines[1], r"^drawing one step: \S+ s of processors with 3 steps, \S+ s with 20$")
+
+    def test_page_times(self):
+        made = FOLDER / "page"
+        subprocess.run([PROGRAM, "generate", "half-annulus", "--size", "24x12x12", "-o", made], check=True, capture_output=True)
+        subprocess.run([PROGRAM, "convert", f"{made}.xyz", f"{made}.fun", "-o", f"{made}.splats"], check=True, capture_output=True)
+        line = output([SCRIPTS / "page_times.py", f"{made}.splats", "--seconds", 0.5, "--size", "64x48", "--program", PROGRAM])
+        self.assertRegex(line, r"^first picture after .* pictures a second; .* of [1-9]\d* splats$")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
 """Checks sources with Clang 14, without output: its warnings, which are errors, and -Wthread-safety, which checks
-that members are only touched while their mutex is held (stream/base/mutex.h). With --tidy, clang-tidy checks them
-by .clang-tidy as well. Takes the commands of build/release, which tools/build.sh configures. What most sources include
-(tools/cmake/common_headers.h, and GoogleTest) is parsed once for all that are compiled alike: half of the time.
+that members are only touched while their mutex is held (stream/base/mutex.h). With --tidy, those that are not tests are checked
+by clang-tidy (.clang-tidy) as well. Takes the commands of build/release, which tools/build.sh configures.
 
     tools/check_clang.py [--tidy] [FILE ...]    these; without any, all sources
     tools/check_clang.py [--tidy] --since REV   those that have changed since this commit
+
+Headers take most of the time. So sources with the same macros are checked several at a time, as one that includes them, and
+what most include (tools/cmake/common_headers.h, and GoogleTest) is parsed once. Names that two of them have for themselves
+collide there: if the compiler finds anything in several, each half of them is checked again, down to single ones.
 """
 
 import argparse
@@ -19,26 +22,27 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build/release"
 # GCC's commands name warnings and pragmas that Clang does not know; and Clang warns of & between cheap conditions.
 FLAGS = ["-Wthread-safety", "-Werror", "-Wno-unknown-warning-option", "-Wno-bitwise-instead-of-logical",
          "-Wno-unknown-pragmas"]
+AT_A_TIME = 8
 
 
 def commands(chosen):
-    """(file, folder, arguments) of each source of ours, or of those chosen."""
-    path = ROOT / "build/release/compile_commands.json"
+    """(file, its compiler's arguments) of each source of ours, or of those chosen."""
+    path = BUILD / "compile_commands.json"
     if not path.exists():
         sys.exit("check_clang: build/release is not configured; run tools/build.sh first")
     ours = {}
     for entry in json.loads(path.read_text()):
         file = pathlib.Path(entry["file"])
-        if file.is_relative_to(ROOT / "build") or (chosen and file not in chosen):
-            continue
-        ours[file] = (entry["directory"], shlex.split(entry["command"]))
+        if not file.is_relative_to(ROOT / "build") and (not chosen or file in chosen):
+            ours[file] = shlex.split(entry["command"])
     missing = chosen - ours.keys()
     if missing:
         sys.exit(f"check_clang: {min(missing)}: no target compiles this file; name a .cpp file of the build")
-    return sorted((file, *rest) for file, rest in ours.items())
+    return sorted(ours.items())
 
 
 def changed_since(revision):
@@ -50,67 +54,61 @@ def changed_since(revision):
     return {ROOT / line for line in run.stdout.splitlines()}
 
 
-def clang_arguments(arguments):
-    """Those of the compiler's that are left for Clang."""
-    kept = []
-    rest = iter(arguments)
-    for argument in rest:
-        if argument in ("-o", "-c", "-include"):  # -include: what GCC has precompiled
-            next(rest)
-        elif argument != "-Winvalid-pch" and not argument.endswith("ccache") and not os.path.basename(argument).startswith(("c++", "g++")):
-            kept.append(argument)
-    return kept
+class Group:
+    """Sources with the same macros, and what Clang needs to parse any of them."""
+
+    def __init__(self, folder, are_tests, tidy):
+        self.folder, self.are_tests, self.tidy = folder, are_tests, tidy
+        self.files, self.flags, self.precompiled = [], [], []
+
+    def add(self, file, arguments):
+        self.files.append(file)
+        rest = iter(arguments)
+        for argument in rest:
+            if argument == "-isystem":
+                argument += next(rest)
+            if argument.startswith(("-D", "-I", "-isystem", "-std", "-W")) and argument not in (*self.flags, "-Winvalid-pch"):
+                self.flags.append(argument)
+
+    def precompile(self):
+        headers = ["-include", "gtest/gtest.h"] if self.are_tests else []
+        output = str(self.folder / f"{id(self)}.pch")
+        subprocess.run(["clang++-14", *self.flags, *FLAGS, *headers, "-x", "c++-header",
+                        str(ROOT / "tools/cmake/common_headers.h"), "-o", output], cwd=BUILD, check=True)
+        self.precompiled = ["-include-pch", output]
+
+    def batches(self):
+        """Neighbours, which have most names in common, are in different ones."""
+        count = -(-len(self.files) // AT_A_TIME)
+        return [(self, self.files[n::count]) for n in range(count)]
+
+    def findings(self, files):
+        """What is found in these files, or ""."""
+        with tempfile.NamedTemporaryFile("w", suffix=".cpp", dir=self.folder) as several:
+            several.writelines(f'#include "{file}"\n' for file in files)
+            several.flush()
+            words = [*self.flags, *FLAGS, *self.precompiled]
+            source = several.name if len(files) > 1 else str(files[0])
+            if self.tidy:  # it gives the compiler's warnings, too
+                words = ["clang-tidy-14", "--quiet", f"--config-file={ROOT / '.clang-tidy'}", source, "--", *words]
+            else:
+                words = ["clang++-14", *words, "-fsyntax-only", source]
+            run = subprocess.run(words, cwd=BUILD, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        if run.returncode == 0:
+            return ""
+        if len(files) == 1 or (self.tidy and "clang-diagnostic" not in run.stdout):
+            return run.stdout
+        half = len(files) // 2
+        return self.findings(files[:half]) + self.findings(files[half:])
 
 
-class CommonHeaders:
-    """What most sources include, precompiled: once for each set of flags that Clang requires to be the same."""
-
-    LEAST_SOURCES = 8  # of one set of flags; fewer cost less without
-
-    def __init__(self, folder, jobs):
-        self.headers = {}
-        groups = {}
-        for file, cwd, arguments in jobs:
-            groups.setdefault(self.key(file, arguments), []).append((cwd, clang_arguments(arguments)))
-        for key, members in groups.items():
-            if len(members) >= self.LEAST_SOURCES:
-                self.headers[key] = self.precompile(folder / f"{len(self.headers)}.pch", *key[:1], members)
-
-    @staticmethod
-    def key(file, arguments):
-        is_test = file.name.endswith("_test.cpp")
-        return (is_test, *sorted(a for a in arguments if a.startswith(("-f", "-s", "-O", "-m", "-p"))))
-
-    @staticmethod
-    def precompile(output, is_test, members):
-        """Without the macros and folders that only some of its sources have."""
-        cwd, first = members[0]
-        common = set(first).intersection(*(arguments for _, arguments in members))
-        kept = [a for n, a in enumerate(first) if a in common and first[n - 1] != "-isystem" and a != "-isystem"]
-        words = ["clang++-14", *kept, *FLAGS]
-        words += ["-include", "gtest/gtest.h"] if is_test else []
-        words += ["-x", "c++-header", str(ROOT / "tools/cmake/common_headers.h"), "-o", str(output)]
-        subprocess.run(words, cwd=cwd, check=True)
-        return output
-
-    def flags(self, file, arguments):
-        header = self.headers.get(self.key(file, arguments))
-        return ["-include-pch", str(header)] if header else []
-
-
-def check(job, headers):
-    """Clang's output if it finds anything."""
-    file, folder, arguments = job
-    words = ["clang++-14", *clang_arguments(arguments), *FLAGS, *headers.flags(file, arguments), "-fsyntax-only", str(file)]
-    run = subprocess.run(words, cwd=folder, text=True, capture_output=True)
-    return run.stderr if run.returncode else ""
-
-
-def tidy(files):
-    extra = [f"--extra-arg={flag}" for flag in FLAGS]
-    return subprocess.run(["xargs", "-0", "-n", "4", "-P", str(os.cpu_count()), "clang-tidy-14", "-p",
-                           "build/release", "--quiet", *extra], cwd=ROOT, text=True,
-                          input="\0".join(map(str, files)), stderr=subprocess.DEVNULL).returncode
+def groups(folder, sources, tidy):
+    found = {}
+    for file, arguments in sources:
+        are_tests = file.is_relative_to(ROOT / "tests")
+        macros = sorted(argument for argument in arguments if argument.startswith("-D"))
+        found.setdefault((are_tests, *macros), Group(folder, are_tests, tidy and not are_tests)).add(file, arguments)
+    return list(found.values())
 
 
 def main():
@@ -128,15 +126,16 @@ def main():
     packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy else [])
     subprocess.run([ROOT / "tools/setup.sh", *packages], check=True)
 
-    jobs = commands(chosen)
+    sources = commands(chosen)
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        headers = CommonHeaders(pathlib.Path(folder), jobs)
-        found = [output for output in pool.map(lambda job: check(job, headers), jobs) if output]
-    for output in found:
-        print(output, end="")
-    failed = bool(found) or (options.tidy and tidy([job[0] for job in jobs]) != 0)
-    print(f"check_clang: {len(jobs)} files, {'warnings above' if failed else 'no warnings'}")
-    return 1 if failed else 0
+        alike = groups(pathlib.Path(folder), sources, options.tidy)
+        list(pool.map(Group.precompile, [group for group in alike if len(group.files) > AT_A_TIME]))
+        batches = [batch for group in alike for batch in group.batches()]
+        found = [findings for findings in pool.map(lambda batch: batch[0].findings(batch[1]), batches) if findings]
+    for findings in found:
+        print(findings, end="")
+    print(f"check_clang: {len(sources)} files, {'warnings above' if found else 'no warnings'}")
+    return 1 if found else 0
 
 
 if __name__ == "__main__":

@@ -4,13 +4,14 @@
 #   tools/demo.sh                   a generated wake behind a cylinder
 #   tools/demo.sh GRID SOLUTION     your PLOT3D files: grid, and Q solution or function file
 #
-# Writes the cache and the picture to out/.
+# Writes the cache and the picture to out/, or to the folder OUT of the environment. CURVISPLAT names a program that is
+# used instead of one built here.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 if [[ $# -ne 0 && $# -ne 2 ]] || [[ ${1-} == -* ]]; then
-  sed -n '2,7s/^# \?//p' "${BASH_SOURCE[0]}" >&2
+  sed -n '2,8s/^# \?//p' "${BASH_SOURCE[0]}" >&2
   exit 2
 fi
 for file in "$@"; do
@@ -20,9 +21,9 @@ for file in "$@"; do
   fi
 done
 
-"$root/tools/build.sh" curvisplat
-curvisplat=$root/build/release/tools/curvisplat
-out=$root/out
+curvisplat=${CURVISPLAT:-$root/build/release/tools/curvisplat}
+[[ -n ${CURVISPLAT:-} ]] || "$root/tools/build.sh" curvisplat
+out=${OUT:-$root/out}
 mkdir -p "$out"
 
 if [[ $# -eq 2 ]]; then

@@ -75,13 +75,13 @@ void CacheGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_
       if (no_cell[n]) values[n] = std::numeric_limits<float>::quiet_NaN();
 }
 
-void CacheGrid::restrict(uint32_t number, const NodeBox& box, std::vector<uint8_t>& blank) const {
-  const GridBlock& block = description().blocks[number];
+void CacheGrid::restrict(uint32_t block_number, const NodeBox& box, std::vector<uint8_t>& blank) const {
+  const GridBlock& block = description().blocks[block_number];
   size_t at = 0;
   for (uint64_t k = box.k0; k < box.k1; ++k) {
     for (uint64_t j = box.j0; j < box.j1; ++j, at += block.ni) {
       const std::span<uint8_t> row(&blank[at], block.ni);
-      const uint64_t first = first_nodes_[number] + (k * block.nj + j) * block.ni;
+      const uint64_t first = first_nodes_[block_number] + (k * block.nj + j) * block.ni;
       const bool on_face = j == 0 || j + 1 == block.nj || k == 0 || k + 1 == block.nk;
       if (!all_faces_)
         drawn_->blankOthers(first, row);

@@ -254,10 +254,10 @@ uint32_t BucketFile::buckets() const {
   return static_cast<uint32_t>(state_->buckets.size());
 }
 
-void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
+void BucketFile::append(uint32_t bucket_number, std::span<const std::byte> records) {
   const size_t room = state_->chunk_bytes - sizeof(ChunkHeader);
   CURVISPLAT_CHECK_OP(records.size(), <=, room);
-  Bucket& bucket = state_->buckets[number];
+  Bucket& bucket = state_->buckets[bucket_number];
   const MutexLock lock(bucket.mutex);
   if (bucket.buffer.size() + records.size() > state_->chunk_bytes) state_->flush(bucket);
   if (bucket.buffer.empty()) {

@@ -52,8 +52,8 @@ bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>
 
 }  // namespace
 
-ConvertReport convert(const DataSource& source, const ConvertOptions& given, Progress& progress) {
-  ConvertOptions options = given;
+ConvertReport convert(const DataSource& source, const ConvertOptions& given_options, Progress& progress) {
+  ConvertOptions options = given_options;
   if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   const auto* const grid = dynamic_cast<const GridSource*>(&source);

@@ -46,7 +46,7 @@ uint64_t GridOrigin::smallSlabBytes() const {
   return std::min(plan_.slab_bytes, std::max(kBytes, leastSlabBytes(blocks(), reader_.scalars(), kNoHalo)));
 }
 
-/// So many slabs that all ranks have about as many.
+/// Makes the slabs small enough for every rank to get about eight.
 bool GridOrigin::shareWith(Ranks& ranks) {
   constexpr uint64_t kSlabsOfRank = 8;
   ranks_ = &ranks;

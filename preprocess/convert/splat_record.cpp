@@ -35,13 +35,13 @@ double product(const std::array<double, 3>& axis) {
 
 }  // namespace
 
-void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const RootPosition& position,
-                std::vector<std::byte>& out) {
-  CURVISPLAT_CHECK_OP(in.node, <, kMaxNodes);
-  const double cell = product(in.splat.axis);
-  const double ratio = cell > 0 ? in.splat.weight / cell : 0;
-  const bool irregular =
-      !in.regular || in.border_code != kNoBorder || !(ratio >= kSmallestRatio) || !(ratio <= kLargestRatio);
+void packRecord(const NodeSplat& node_splat, std::span<const SplatScalar> values,
+                const RootPosition& position, std::vector<std::byte>& out) {
+  CURVISPLAT_CHECK_OP(node_splat.node, <, kMaxNodes);
+  const double cell = product(node_splat.splat.axis);
+  const double ratio = cell > 0 ? node_splat.splat.weight / cell : 0;
+  const bool irregular = !node_splat.regular || node_splat.border_code != kNoBorder ||
+                         !(ratio >= kSmallestRatio) || !(ratio <= kLargestRatio);
   const size_t bytes = irregular ? irregularRecordBytes(values.size()) : regularRecordBytes(values.size());
   const size_t start = out.size();
   out.resize(start + bytes);
@@ -56,27 +56,27 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
     std::memcpy(at, &single, sizeof single);
     at += sizeof single;
   };
-  putWord48(in.node | uint64_t{irregular} << 47);
+  putWord48(node_splat.node | uint64_t{irregular} << 47);
   for (const uint64_t coordinate : position.at) putWord48(coordinate);
-  for (const double axis : in.splat.axis) {
+  for (const double axis : node_splat.splat.axis) {
     const uint32_t bits = axisBits(axis);
     std::memcpy(at, &bits, 3);
     at += 3;
   }
-  for (const double shear : in.splat.shear) putFloat(shear);
+  for (const double shear : node_splat.splat.shear) putFloat(shear);
   const auto ratio_code = irregular ? uint16_t{0} : static_cast<uint16_t>(ratio * kRatioSteps + 0.5);
   std::memcpy(at, &ratio_code, sizeof ratio_code);
   at += sizeof ratio_code;
-  std::memcpy(at, &in.growth_code, sizeof in.growth_code);
-  at += sizeof in.growth_code;
+  std::memcpy(at, &node_splat.growth_code, sizeof node_splat.growth_code);
+  at += sizeof node_splat.growth_code;
   for (const SplatScalar& value : values) {
     putFloat(value.mean);
     for (int axis = 0; axis < 3; ++axis) putFloat(value.slope[axis]);
   }
   if (irregular) {
     putFloat(ratio);
-    std::memcpy(at, &in.border_code, sizeof in.border_code);
-    at += sizeof in.border_code;
+    std::memcpy(at, &node_splat.border_code, sizeof node_splat.border_code);
+    at += sizeof node_splat.border_code;
     for (const SplatScalar& value : values) putFloat(value.variance);
   }
 }

@@ -96,8 +96,8 @@ void FaceSpool::fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& pro
   }
 }
 
-void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
-  const GridFace& face = faces_[number];
+void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
+  const GridFace& face = faces_[face_number];
   const NodeArrays& nodes = loaded.nodes;
   const Node size = sizeOf(reader_.source().description().blocks[face.block]);
   const bool of_cells = ofCells();
@@ -124,7 +124,8 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
         codes.push_back({LatticeRow::kNone, 0, 0});
     }
     if (!is_last(part, v)) continue;
-    file_.out().writeAt(places_[number].positions + first * kPositionBytes, std::as_bytes(std::span(codes)));
+    file_.out().writeAt(places_[face_number].positions + first * kPositionBytes,
+                        std::as_bytes(std::span(codes)));
     codes.clear();
   }
   if (scalars() == 0) return;
@@ -142,7 +143,7 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
       for (const std::vector<float>& scalar : nodes.scalars) values.push_back(none ? NAN : scalar[at]);
     }
     if (!is_last(of_values, v)) continue;
-    file_.out().writeAt(places_[number].scalars + first * scalars() * sizeof(float),
+    file_.out().writeAt(places_[face_number].scalars + first * scalars() * sizeof(float),
                         std::as_bytes(std::span(values)));
     values.clear();
   }
@@ -194,20 +195,21 @@ std::vector<uint8_t> FaceSpool::cellsOfRow(size_t face, uint64_t v) const {
   return there;
 }
 
-LatticeRow FaceSpool::row(size_t number, uint64_t v) const {
-  const GridFace& face = faces_[number];
+LatticeRow FaceSpool::row(size_t face_number, uint64_t v) const {
+  const GridFace& face = faces_[face_number];
   LatticeRow row;
   row.codes.resize(face.nodes[0]);
-  file_.in().readAt(places_[number].positions + v * face.nodes[0] * kPositionBytes, std::span(row.codes));
+  file_.in().readAt(places_[face_number].positions + v * face.nodes[0] * kPositionBytes,
+                    std::span(row.codes));
   row.scalars.assign(scalars(), std::vector<float>(face.nodes[0]));
   if (scalars() == 0) return row;
-  const std::vector<float> here = storedScalars(number, v);
+  const std::vector<float> here = storedScalars(face_number, v);
   if (!ofCells()) {
     for (size_t s = 0; s < scalars(); ++s)
       for (size_t u = 0; u < face.nodes[0]; ++u) row.scalars[s][u] = here[u * scalars() + s];
     return row;
   }
-  const std::vector<float> before = v > 0 ? storedScalars(number, v - 1) : here;
+  const std::vector<float> before = v > 0 ? storedScalars(face_number, v - 1) : here;
   for (size_t s = 0; s < scalars(); ++s)
     for (size_t u = 0; u < face.nodes[0]; ++u) {
       double sum = 0;

@@ -53,8 +53,8 @@ class FaceSpool {
   struct Place {
     uint64_t positions, scalars;  // offsets of the face's arrays
   };
-  void take(const LoadedSlab& slab, size_t face);
-  void addEnds(const LoadedSlab& slab, AbuttingFaces& abutting) const;
+  void take(const LoadedSlab& loaded, size_t face);
+  void addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const;
   std::vector<float> storedScalars(size_t face, uint64_t v) const;
 
   const NodeReader& reader_;

@@ -74,8 +74,8 @@ size_t CornerGather::take(const LoadedCells& loaded, size_t begin, GatheredCells
   size_t n = begin;
   for (; n < cells.size(); ++n) {
     if (cells.shapes[n] == CellKind::kNone) continue;
-    if (out.size() > 0 && (out.corners.size() + cells.cornersOfCell(n).size() > GatheredCells::kMostCorners ||
-                           out.faces.size() + cells.facesOfCell(n).size() > GatheredCells::kMostCorners))
+    if (out.size() > 0 && (out.corners.size() + cells.cornersOfCell(n).size() > GatheredCells::kMaxCorners ||
+                           out.faces.size() + cells.facesOfCell(n).size() > GatheredCells::kMaxCorners))
       break;
     out.numbers.push_back(loaded.range.number + n);
     out.shapes.push_back(cells.shapes[n]);

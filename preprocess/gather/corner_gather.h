@@ -20,7 +20,7 @@
 
 namespace curvisplat {
 
-/// Cells with their corners. Only those that are drawn. As many as have kMostCorners corners, and places of faces,
+/// Cells with their corners. Only those that are drawn. As many as have kMaxCorners corners, and places of faces,
 /// together; a single cell may have more.
 struct GatheredCells {
   std::vector<uint64_t> numbers;        // [cell] in the whole mesh
@@ -33,7 +33,7 @@ struct GatheredCells {
   std::vector<uint32_t> faces;          // as MeshCells'
   std::vector<float> cell_values;       // [cell * fields + field], of cell-centred scalars
 
-  static constexpr size_t kMostCorners = size_t{1} << 17;
+  static constexpr size_t kMaxCorners = size_t{1} << 17;
 
   size_t size() const { return shapes.size(); }
   CellView view(size_t n, size_t corner_fields) const;

@@ -29,7 +29,7 @@ bool areSame(const FaceCorners& a, const FaceCorners& b) {
 FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes,
                          std::filesystem::path folder)
     : record_bytes_(record_bytes) {
-  const uint64_t most = std::min<uint64_t>(std::max<uint64_t>(faces, 1), kMostWaiting);
+  const uint64_t most = std::min<uint64_t>(std::max<uint64_t>(faces, 1), kMaxWaiting);
   buckets_.assign(std::bit_ceil(2 * most), kNone);
   // A stream is sorted in memory.
   const uint64_t bytes = faces * (sizeof(FaceCorners) + record_bytes + 2 * sizeof(uint64_t));
@@ -43,7 +43,7 @@ FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_by
 FaceMatcher::~FaceMatcher() = default;
 
 uint64_t FaceMatcher::waitingBytes(size_t record_bytes, uint64_t faces) {
-  return std::min<uint64_t>(faces, kMostWaiting) * (sizeof(Waiting) + record_bytes + 4 * sizeof(uint32_t));
+  return std::min<uint64_t>(faces, kMaxWaiting) * (sizeof(Waiting) + record_bytes + 4 * sizeof(uint32_t));
 }
 
 uint64_t FaceMatcher::bucketOf(const FaceCorners& corners) const {
@@ -70,13 +70,13 @@ uint32_t FaceMatcher::newEntry() {
     free_.pop_back();
     return entry;
   }
-  if (waiting_.size() < kMostWaiting) {
+  if (waiting_.size() < kMaxWaiting) {
     waiting_.emplace_back();
     records_.resize(records_.size() + record_bytes_);
     return static_cast<uint32_t>(waiting_.size() - 1);
   }
   const uint32_t entry = next_to_spill_;
-  next_to_spill_ = (next_to_spill_ + 1) % kMostWaiting;
+  next_to_spill_ = (next_to_spill_ + 1) % kMaxWaiting;
   spill(entry);
   unlink(entry);
   return entry;

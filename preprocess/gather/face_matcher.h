@@ -52,7 +52,7 @@ class FaceMatcher {
   /// The others, and those without another. Once, after all faces.
   void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
 
-  static constexpr uint32_t kMostWaiting = uint32_t{1} << 17;
+  static constexpr uint32_t kMaxWaiting = uint32_t{1} << 17;
   /// Of as many faces as wait at the most.
   static uint64_t waitingBytes(size_t record_bytes, uint64_t faces);
 

@@ -216,16 +216,16 @@ void GradientMesh::prepare(std::span<const uint32_t> scalars, uint64_t memory_by
   }
 }
 
-const GradientMesh::Values& GradientMesh::valuesOf(uint32_t number) const {
+const GradientMesh::Values& GradientMesh::valuesOf(uint32_t quantity_number) const {
   const MutexLock lock(mutex_);
-  const auto found = values_.find(number);
+  const auto found = values_.find(quantity_number);
   CURVISPLAT_CHECK(found != values_.end() && found->second);
   return *found->second;
 }
 
 std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& quantity,
                                                             uint64_t memory_bytes,
-                                                            const Progress& outer) const {
+                                                            const Progress& outer_progress) const {
   const FlowMesh flow_mesh(*source_, inputs_, gas_, blank_value_, quantity.needs);
   const size_t fields = flow_mesh.description().scalars.size();
   std::vector<uint32_t> all(fields);
@@ -234,7 +234,7 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
   const bool cells = inputs_.centring == Centring::kCell;
   auto values = std::make_unique<Values>(folder_, cells ? reader.cells() : reader.points());
   Progress progress;  // the outer one counts samples of another pass
-  progress.stopWith(outer);
+  progress.stopWith(outer_progress);
   const PointNumbers numbers(reader, memory_bytes / 2, folder_, progress);
 
   struct Run {  // samples that follow one another

@@ -14,7 +14,7 @@ namespace {
 // Faces against each other: the cosine of their normals, and how far the centre of one is from the plane of the other, in
 // the lengths of that. The sides of a sharp edge are neither.
 constexpr double kOpposite = -0.98, kApart = 0.05;
-constexpr size_t kMostCompared = 256;  // at one number, pair by pair
+constexpr size_t kMaxCompared = 256;  // at one number, pair by pair
 
 glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
@@ -43,7 +43,7 @@ bool isBeside(const Side& side, const Side& other) {
 
 /// Those that lie against another one; all where very many meet.
 void markClosed(std::span<Side> sides) {
-  if (sides.size() > kMostCompared) {
+  if (sides.size() > kMaxCompared) {
     for (Side& side : sides) side.closed = true;
     return;
   }

@@ -7,10 +7,10 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kFacesOfCell = 6;
-constexpr size_t kMostCorners = 8;  // of a polyhedron's the first
+constexpr size_t kMaxCorners = 8;  // of a polyhedron's the first
 
 struct FaceRecord {
-  std::array<uint64_t, kMostCorners> corners;  // those of the face, then the cell's others
+  std::array<uint64_t, kMaxCorners> corners;  // those of the face, then the cell's others
   uint32_t of_face, count;
   glm::dvec3 inward, centre;
 };
@@ -20,7 +20,7 @@ FaceRecord recordOf(const GatheredCells& cells, const CellFace& face) {
   FaceRecord record{};
   const std::span<const uint64_t> corners = cells.cornersOfCell(face.cell);
   const auto put = [&](uint64_t corner) {
-    bool known = record.count == kMostCorners;
+    bool known = record.count == kMaxCorners;
     for (uint32_t n = 0; n < record.count; ++n) known |= record.corners[n] == corner;
     if (!known) record.corners[record.count++] = corner;
   };

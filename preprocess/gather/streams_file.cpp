@@ -7,13 +7,13 @@ StreamsFile::StreamsFile(std::filesystem::path folder, size_t streams, uint64_t 
     : folder_(std::move(folder)),
       streams_(streams),
       buffer_bytes_(
-          std::clamp<uint64_t>(memory_bytes / 2 / std::max<size_t>(1, streams), kLeastBuffer, kMostBuffer)),
+          std::clamp<uint64_t>(memory_bytes / 2 / std::max<size_t>(1, streams), kMinBuffer, kMaxBuffer)),
       may_stay_(memory_bytes - std::min<uint64_t>(memory_bytes, streams * buffer_bytes_)) {}
 
 StreamsFile::~StreamsFile() = default;
 
-void StreamsFile::append(size_t number, std::span<const std::byte> record) {
-  Stream& stream = streams_[number];
+void StreamsFile::append(size_t stream_number, std::span<const std::byte> record) {
+  Stream& stream = streams_[stream_number];
   if (!stream.buffer.empty() && stream.buffer.size() + record.size() > buffer_bytes_) flush(stream);
   if (stream.buffer.capacity() == 0) stream.buffer.reserve(std::max(buffer_bytes_, record.size()));
   stream.buffer.insert(stream.buffer.end(), record.begin(), record.end());
@@ -42,9 +42,10 @@ void StreamsFile::close() {
   }
 }
 
-void StreamsFile::forEach(size_t number, const std::function<void(std::span<const std::byte>)>& use) const {
+void StreamsFile::forEach(size_t stream_number,
+                          const std::function<void(std::span<const std::byte>)>& use) const {
   std::vector<std::byte> buffer;
-  for (const Chunk& chunk : streams_[number].chunks) {
+  for (const Chunk& chunk : streams_[stream_number].chunks) {
     if (!chunk.in_memory.empty()) {
       use(chunk.in_memory);
       continue;

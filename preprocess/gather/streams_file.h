@@ -43,9 +43,9 @@ class StreamsFile {
   /// Frees the memory that a stream has.
   void forget(size_t stream) { streams_[stream] = {}; }
 
-  static constexpr size_t kLeastBuffer = size_t{16} << 10, kMostBuffer = size_t{256} << 10;
-  /// So many streams have buffers in that memory.
-  static size_t mostStreams(uint64_t memory_bytes) { return memory_bytes / (2 * kLeastBuffer) + 1; }
+  static constexpr size_t kMinBuffer = size_t{16} << 10, kMaxBuffer = size_t{256} << 10;
+  /// The number of streams whose buffers fit in that memory.
+  static size_t mostStreams(uint64_t memory_bytes) { return memory_bytes / (2 * kMinBuffer) + 1; }
 
  private:
   struct Chunk {

@@ -24,7 +24,7 @@ struct SampledBox {
   }
 };
 
-/// So many of `count` rows around row `middle`.
+/// The first and the end of `rows` of `count` rows, around row `middle`.
 std::pair<uint64_t, uint64_t> around(uint64_t middle, uint64_t rows, uint64_t count) {
   rows = std::min(rows, count);
   const uint64_t before = std::min(middle, rows / 2);

@@ -46,7 +46,7 @@ std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t wi
 /// Size of the largest window that cutIntoSlabs() cannot divide: a row and its neighbours.
 uint64_t leastSlabBytes(const std::vector<GridBlock>& blocks, size_t scalars, Halo halo);
 
-/// So many times `slab_bytes` may be one slab of long rows, since it is alone in memory.
+/// The largest slab of long rows, as a multiple of `slab_bytes`: it is alone in memory.
 inline constexpr uint64_t kSlabsOfLongRows = 3;
 
 /// Cuts `box` into boxes of about `nodes` nodes, one for each task.

@@ -12,12 +12,12 @@ namespace {
 
 constexpr double kSimilar = 0.7;  // cosine: of one plane
 constexpr double kEven = 0.9;     // the length of a mean of unit vectors that are about the same
-constexpr size_t kMostDirections = 16;
+constexpr size_t kMaxDirections = 16;
 
 /// The planes that touch, or do not, similar ones as one. A prism may have more sides than VoxelPlanes: then those that
 /// are not closed, the largest first.
 VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
-  std::array<VoxelPlanes::Plane, kMostDirections> places;
+  std::array<VoxelPlanes::Plane, kMaxDirections> places;
   size_t count = 0;
   for (const OuterPlane& plane : planes) {
     if (plane.touches != touching) continue;
@@ -28,7 +28,7 @@ VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
       if (glm::dot(sum, plane.inward) > kSimilar * glm::length(sum) * area) same = &places[n];
     }
     if (!same) {
-      if (count == kMostDirections) continue;
+      if (count == kMaxDirections) continue;
       same = &places[count++];
       *same = {glm::dvec3(0.0), glm::dvec3(0.0), 0, 0, true};
     }
@@ -43,7 +43,7 @@ VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
     plane.inward /= length;
     plane.point /= plane.area;
   }
-  std::array<VoxelPlanes::Plane, kMostDirections> kept;
+  std::array<VoxelPlanes::Plane, kMaxDirections> kept;
   auto end = count > VoxelPlanes::kMost
                  ? std::copy_if(all.begin(), all.end(), kept.begin(),
                                 [&](const VoxelPlanes::Plane& plane) { return !isClosed(plane, all); })

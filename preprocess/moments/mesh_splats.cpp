@@ -15,7 +15,7 @@ namespace curvisplat {
 namespace {
 
 // A direction that the neighbours cover less than this, of the best covered one, has no slope.
-constexpr double kLeastCover = 1e-3;
+constexpr double kMinCover = 1e-3;
 
 // Squares of what is left beside the diagonal, of the trace's.
 constexpr double kConverged = 1e-30;
@@ -109,7 +109,7 @@ void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, 
   // With eigenvalues p >= q >= r > 0, r / p is at least 2 p q r / (p + q + r)³: then every direction counts.
   const glm::dmat3 m(a[0][0], a[0][1], a[0][2], a[1][0], a[1][1], a[1][2], a[2][0], a[2][1], a[2][2]);
   const double trace = a[0][0] + a[1][1] + a[2][2];
-  if (2 * glm::determinant(m) > kLeastCover * trace * trace * trace) {
+  if (2 * glm::determinant(m) > kMinCover * trace * trace * trace) {
     const glm::dmat3 inverse = glm::inverse(m);
     for (glm::dvec3& gradient : out) gradient = inverse * gradient;
     return;
@@ -121,7 +121,7 @@ void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, 
     const glm::dvec3 right = out[field];
     out[field] = glm::dvec3(0.0);
     for (size_t n = 0; n < 3; ++n) {
-      if (!(a[n][n] > kLeastCover * most)) continue;
+      if (!(a[n][n] > kMinCover * most)) continue;
       const glm::dvec3 direction(v[0][n], v[1][n], v[2][n]);
       out[field] += glm::dot(direction, right) / a[n][n] * direction;
     }

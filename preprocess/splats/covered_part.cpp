@@ -14,8 +14,8 @@ constexpr double kPartVariance = 1.0 / 256;  // of a sixteenth of a cell, times 
 
 // A part is cut at its end like the half cell at a border. Of slices of whole cells, and of those that are nearly whole, too few
 // points say where that is.
-constexpr double kLeastCut = 0.1;     // of the cell
-constexpr double kLeastShift = 1e-3;  // of the middle, in cells: the rest may lie around what is covered
+constexpr double kMinCut = 0.1;     // of the cell
+constexpr double kMinShift = 1e-3;  // of the middle, in cells: the rest may lie around what is covered
 
 /// 12 times the covariance of the points that are left, and of the part of the cell that each stands for; of all
 /// points the identity.
@@ -137,7 +137,7 @@ std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std
   PartMoments part = momentsOf(~cell.covered);
   // The face between the blocks is about at right angles to where the rest's middle is.
   const double shift = glm::length(part.middle);
-  const bool has_face = shift > kLeastShift;
+  const bool has_face = shift > kMinShift;
   const double to_face = has_face ? shift + planeDistance(cell.covered, part.middle / shift) : 0;
   part.middle = cell.axes * part.middle;
   part.shape = cell.axes * part.shape * glm::transpose(cell.axes);
@@ -156,7 +156,7 @@ std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std
     const glm::dvec3 inward =
         glm::transpose(lower) * part.middle / shift;  // as long as the cell is to the part
     const double length = glm::length(inward);
-    face = {inward / length, to_face / length, part.share >= kLeastCut && part.share <= 1 - kLeastCut};
+    face = {inward / length, to_face / length, part.share >= kMinCut && part.share <= 1 - kMinCut};
   }
   return borderOf(lower, face, cell);
 }

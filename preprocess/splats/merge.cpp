@@ -62,7 +62,7 @@ double largestEigenvalue(const Symmetric3& s, double least) {
 void blurEvenly(const Symmetric3& cells, double voxel_size, const VoxelPlanes& planes, Splat& splat,
                 std::span<SplatScalar> values) {
   constexpr double kBlur = 0.582;  // of the kernel's variance (stretch.h)
-  constexpr double kMostSteeper = 2;
+  constexpr double kMaxSteeper = 2;
   const Symmetric3 own = shapeMatrix(splat), even = raisedTo(cells, voxel_size * voxel_size);
   glm::dmat3 more(even.xx - own.xx, even.xy - own.xy, even.xz - own.xz, even.xy - own.xy, even.yy - own.yy,
                   even.yz - own.yz, even.xz - own.xz, even.yz - own.yz, even.zz - own.zz);
@@ -82,7 +82,7 @@ void blurEvenly(const Symmetric3& cells, double voxel_size, const VoxelPlanes& p
   setShape(splat, shape, splat.axis[0]);
   for (SplatScalar& value : values) {
     // A sliver's scalar, carried on as steeply over a voxel's length, would leave the data's range.
-    const double most = kMostSteeper * glm::length(value.slope);
+    const double most = kMaxSteeper * glm::length(value.slope);
     value.slope = gradientOf(before, value.slope) * splat.factor();
     const double length = glm::length(value.slope);
     if (length > most) value.slope *= most / length;

@@ -20,7 +20,7 @@ constexpr double kEdgeOn = 0.02;
 constexpr double kTick = 0.4, kGap = 0.35;  // in units of the font's size
 constexpr double kLabelSpace = 4.5;         // between ticks, in the same
 constexpr double kShortest = 3;             // edge with coordinates
-constexpr int kFewestTicks = 3, kMostTicks = 8;
+constexpr int kMinTicks = 3, kMaxTicks = 8;
 
 using Line = std::pair<glm::dvec2, glm::dvec2>;
 
@@ -43,7 +43,7 @@ class Box {
       const double low = scene.lower[axis], high = scene.upper[axis];
       const int wanted = static_cast<int>(longest / (kLabelSpace * fontSize(scene.view.size)));
       if (std::isfinite(low) && std::isfinite(high) && low < high)
-        ticks_[axis] = axisTicks(low, high, std::clamp(wanted, kFewestTicks, kMostTicks), false);
+        ticks_[axis] = axisTicks(low, high, std::clamp(wanted, kMinTicks, kMaxTicks), false);
     }
   }
 

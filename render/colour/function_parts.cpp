@@ -38,30 +38,30 @@ TransferFunctionDefinition FunctionParts::definition() const {
   return spreadOver(std::move(preset), range, asinh);
 }
 
-TransferFunctionDefinition spreadOver(TransferFunctionDefinition preset, std::pair<double, double> range,
+TransferFunctionDefinition spreadOver(TransferFunctionDefinition definition, std::pair<double, double> range,
                                       const std::optional<AsinhScale>& asinh) {
   const auto [low, high] = range;
   if (!(low < high)) throw UsageError("the range {},{} of a transfer function must increase", low, high);
   if (!asinh) {
-    for (ColourPoint& point : preset.colours) point.x = std::lerp(low, high, point.x);
-    for (OpacityPoint& point : preset.opacities) point.x = std::lerp(low, high, point.x);
-    return preset;
+    for (ColourPoint& point : definition.colours) point.x = std::lerp(low, high, point.x);
+    for (OpacityPoint& point : definition.opacities) point.x = std::lerp(low, high, point.x);
+    return definition;
   }
   const double begin = asinh->coordinate(low), end = asinh->coordinate(high);
-  const ColourMap colours(preset.colours, preset.colour_space);
-  const OpacityCurve curve(preset.opacities);
-  preset.colours.clear();
-  preset.opacities.clear();
-  preset.colour_space = ColourSpace::kRgb;
+  const ColourMap colours(definition.colours, definition.colour_space);
+  const OpacityCurve curve(definition.opacities);
+  definition.colours.clear();
+  definition.opacities.clear();
+  definition.colour_space = ColourSpace::kRgb;
   for (int piece = 0; piece <= kAsinhPieces; ++piece) {
     const double x = static_cast<double>(piece) / kAsinhPieces;
     const double scalar = piece == 0              ? low
                           : piece == kAsinhPieces ? high
                                                   : asinh->scalar(std::lerp(begin, end, x));
-    preset.colours.push_back({scalar, colours.at(x)});
-    preset.opacities.push_back({scalar, curve.at(x)});
+    definition.colours.push_back({scalar, colours.at(x)});
+    definition.opacities.push_back({scalar, curve.at(x)});
   }
-  return preset;
+  return definition;
 }
 
 TransferFunction FunctionParts::function() const {

@@ -19,9 +19,9 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMostRatio = 1000;  // of V to √det S': beyond it a splat is degenerate
+constexpr double kMaxRatio = 1000;  // of V to √det S': beyond it a splat is degenerate
 constexpr size_t kKernelSteps = 4096;
-constexpr double kMostPlaces = 4;  // of a box, each way
+constexpr double kMaxPlaces = 4;  // of a box, each way
 
 /// K over equal steps of r².
 const std::vector<double>& kernelTable() {
@@ -80,7 +80,7 @@ class Sums {
       const glm::dmat3 s = a * glm::transpose(a);
       for (int axis = 0; axis < 3; ++axis)
         places[axis] = static_cast<int>(
-            std::clamp(std::ceil(2 * lattice_.spacing[axis] / std::sqrt(s[axis][axis])), 1.0, kMostPlaces));
+            std::clamp(std::ceil(2 * lattice_.spacing[axis] / std::sqrt(s[axis][axis])), 1.0, kMaxPlaces));
     }
     const glm::dvec3 box = lattice_.spacing / glm::dvec3(places);
     for (int z = 0; z < places.z; ++z)
@@ -96,8 +96,8 @@ class Sums {
     for (size_t n = 0; n < sums_.size(); ++n) {
       const Sum& sum = sums_[n];
       const auto density = static_cast<float>(sum.inside);
-      out.density[n] = density > kLeastDensity ? density : 0;
-      out.value[n] = density > kLeastDensity
+      out.density[n] = density > kMinDensity ? density : 0;
+      out.value[n] = density > kMinDensity
                          ? static_cast<float>(std::clamp(sum.scalar / sum.weight, low_, high_))
                          : std::numeric_limits<float>::quiet_NaN();
     }
@@ -134,7 +134,7 @@ class Sums {
     const double ratio = double{piece.weight} / (l[0][0] * l[1][1] * l[2][2]);
     if (!(ratio > 0 && std::isfinite(ratio))) return;
     const glm::dvec3 share = box / lattice_.spacing;
-    Placed placed{centre, l, share.x * share.y * share.z * std::min(ratio, kMostRatio)};
+    Placed placed{centre, l, share.x * share.y * share.z * std::min(ratio, kMaxRatio)};
     placed.slope = solved(l, a * glm::dvec3(piece.slope.w0, piece.slope.w1, piece.slope.w2));
     placed.mean = piece.mean;
     for (const CutFace& face : piece.faces) {

@@ -32,11 +32,11 @@ struct SampleLattice {
   uint64_t planePoints() const { return uint64_t{size[0]} * size[1]; }
 };
 
-/// Planes of a lattice. A value is NaN where the density is at most kLeastDensity.
+/// Planes of a lattice. A value is NaN where the density is at most kMinDensity.
 struct FieldSamples {
   std::vector<float> value, density;
 };
-inline constexpr float kLeastDensity = 1.0f / 256;
+inline constexpr float kMinDensity = 1.0f / 256;
 inline constexpr uint64_t kSampleBytes = 32;  // of a point, while it is sampled
 
 /// The bricks that together hold all of the data, each with at most `detail` (world units) merged away.

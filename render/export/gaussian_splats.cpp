@@ -21,7 +21,7 @@ constexpr float kMinOpacity = 1.0f / 255;
 // Viewers blend in eight bits: much of what splats fainter than this absorb is rounded away. Finer levels, whose splats are
 // fainter, are left out where they would have more than a share of it in such splats.
 constexpr float kFaintOpacity = 0.015f;
-constexpr double kMostFaint = 0.3;
+constexpr double kMaxFaint = 0.3;
 // Viewers store opacities as logits, and few have more than eight bits.
 constexpr double kMaxOpacity = 0.999;
 
@@ -168,7 +168,7 @@ class Refinement {
       faint += children.back().faint;
       all += children.back().all;
     }
-    if (faint > kMostFaint * all) return;
+    if (faint > kMaxFaint * all) return;
     taken_.erase(number);
     splats_ -= brick.splats;
     for (uint32_t n = 0; n < brick.child_count; ++n) {
@@ -187,19 +187,19 @@ class Refinement {
 
 }  // namespace
 
-GaussianOpacity gaussianOpacity(double t) {
-  const double opacity = -std::expm1(-t);
-  if (!(t > 1e-6)) return {opacity, 1};
-  // Ein(t) = Σ -(-t)^n / (n n!), summed to convergence; for large t it is ln t + γ + E1(t), E1 negligible.
+GaussianOpacity gaussianOpacity(double optical_depth) {
+  const double opacity = -std::expm1(-optical_depth);
+  if (!(optical_depth > 1e-6)) return {opacity, 1};
+  // Ein(τ) = Σ -(-τ)^n / (n n!), summed to convergence; for large τ it is ln τ + γ + E1(τ), E1 negligible.
   double ein = 0;
-  if (t < 20) {
+  if (optical_depth < 20) {
     double term = 1;
     for (int n = 1; n < 100; ++n) {
-      term *= -t / n;
+      term *= -optical_depth / n;
       ein -= term / n;
     }
   } else {
-    ein = std::log(t) + std::numbers::egamma;
+    ein = std::log(optical_depth) + std::numbers::egamma;
   }
   return {opacity, ein / opacity};
 }

@@ -66,7 +66,7 @@ class Grids {
     for (uint32_t k = k_begin; k < k_end; ++k)
       for (uint32_t j = 0; j < size_[1]; ++j)
         for (uint32_t i = 0; i < size_[0]; ++i, ++n) {
-          if (!(samples.density[n] > kLeastDensity)) continue;
+          if (!(samples.density[n] > kMinDensity)) continue;
           const openvdb::Coord at(static_cast<int>(i), static_cast<int>(j), static_cast<int>(k));
           values.setValue(at, samples.value[n]);
           densities.setValue(at, samples.density[n]);

@@ -37,8 +37,8 @@ unsigned threadsOf(const FrameOptions& options) {
 
 /// What the splats of isosurfaces may take; where it is too little they are found in several parts of the picture.
 uint64_t isoSplatBytes(const FrameOptions& options) {
-  constexpr uint64_t kLeastBytes = 4 << 20;
-  return std::max(kLeastBytes, options.memory_bytes / 8);
+  constexpr uint64_t kMinBytes = 4 << 20;
+  return std::max(kMinBytes, options.memory_bytes / 8);
 }
 
 /// What finding where rays meet them may take; where it is too little fewer threads do.
@@ -61,7 +61,7 @@ uint64_t sceneBytes(const FrameOptions& options) {
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
       std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
   constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 12, kTriangleBytes = 8;
-  uint64_t bytes = kSampleTileBytes * (peels ? PixelLayers::kMostLayers : 1) * threadsOf(options) +
+  uint64_t bytes = kSampleTileBytes * (peels ? PixelLayers::kMaxLayers : 1) * threadsOf(options) +
                    options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +

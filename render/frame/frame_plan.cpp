@@ -240,14 +240,15 @@ void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers>
   });
 }
 
-QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& quick,
-                                  DrawingOrder order) const {
+QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options,
+                                  const QuickLimits& quick_limits, DrawingOrder order) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
   CutOptions limits = limitsOf(options, order);
-  limits.max_splats = std::min(limits.max_splats, quick.max_splats);
-  limits.max_bytes = std::min(limits.max_bytes, quick.max_bytes);
+  limits.max_splats = std::min(limits.max_splats, quick_limits.max_splats);
+  limits.max_bytes = std::min(limits.max_bytes, quick_limits.max_bytes);
   Cut cut = chooseCut(settings, options, limits);
-  const ReducedSize size(options.size, std::max(quick.detail_px, cut.complete ? 0 : cut.largest_error_px));
+  const ReducedSize size(options.size,
+                         std::max(quick_limits.detail_px, cut.complete ? 0 : cut.largest_error_px));
   ProjectionSettings reduced = size.isWhole() ? settings : settingsFor(camera, options, size.size());
   FramePlan plan = planOf(reduced, std::move(cut), order);
   plan.slices = planSlices(plan.settings, options, limits);

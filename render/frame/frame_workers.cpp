@@ -63,13 +63,13 @@ void FrameWorkers::begin() {
   }
 }
 
-void FrameWorkers::finish(FrameStatistics& sum) {
+void FrameWorkers::finish(FrameStatistics& statistics) {
   team_.wait();
   for (const auto& worker : workers_) {
-    combine(sum, worker->statistics);
-    sum.verify_s += worker->scratch.times.verify_s;
-    sum.decode_s += worker->scratch.times.decode_s;
-    sum.read_waited_s += worker->scratch.waited_s;
+    combine(statistics, worker->statistics);
+    statistics.verify_s += worker->scratch.times.verify_s;
+    statistics.decode_s += worker->scratch.times.decode_s;
+    statistics.read_waited_s += worker->scratch.waited_s;
   }
   const MutexLock lock(failing_);
   if (first_failure_) std::rethrow_exception(first_failure_);

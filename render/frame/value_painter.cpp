@@ -29,7 +29,7 @@ namespace {
 constexpr int kFootprintSteps = 1024;
 constexpr size_t kEntriesASplat = 4;
 constexpr float kBefore = -1e30f, kHardly = 1e-5f;
-constexpr float kLeastOpacity = 1.0f / 510;  // of a pixel that has values
+constexpr float kMinOpacity = 1.0f / 510;  // of a pixel that has values
 
 /// One pixel on its way to the half of its opacity.
 struct Halfway {
@@ -149,7 +149,7 @@ class ValuePainter final : public Painter {
     pixels_.assign(size.pixels(), {});
     for (size_t n = 0; n < pixels_.size(); ++n) {
       const float opacity = inputs_.picture.rgba[4 * n + 3];
-      pixels_[n].found = opacity < kLeastOpacity;
+      pixels_[n].found = opacity < kMinOpacity;
       pixels_[n].target = 1 - 0.5f * opacity;
     }
   }
@@ -258,7 +258,7 @@ class ValuePainter final : public Painter {
   /// low-pass; with q the depth's change in the frame of A and S2' = S2 + low-pass, it has S2'⁻¹ B q, and from its
   /// deviation |q|² is known: so is what they would be without.
   glm::dvec3 gradientOf(const UnpackedSplat& of, const ScreenSplat& s) const {
-    constexpr double kLeastHidden = 1e-12;
+    constexpr double kMinHidden = 1e-12;
     const double l11 = s.l11, l21 = s.l21, l22 = s.l22;
     const auto perPixel = [&](double by0, double by1) {
       return glm::dvec2(by0 / l11 - by1 * l21 / (l11 * l22), by1 / l22);
@@ -269,7 +269,7 @@ class ValuePainter final : public Painter {
     const double sigma_per_depth = kKernelSigma * of.depth.per_depth,
                  hidden = 1 / (sigma_per_depth * sigma_per_depth);
     const double q2 = hidden + glm::dot(depth, bq);
-    const double least = kLeastHidden * q2;
+    const double least = kMinHidden * q2;
     const double determinant = glm::determinant(shape);
     const glm::dvec2 by = determinant > 0 ? glm::inverse(shape) * bq : depth;
     const double own = std::max(q2 - glm::dot(by, bq), least);

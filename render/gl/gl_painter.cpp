@@ -44,7 +44,7 @@ struct TableTexture {
 };
 
 /// How many records of a splat may come behind it.
-constexpr size_t kMostRecords = 3;
+constexpr size_t kMaxRecords = 3;
 
 /// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the two records that cut it,
 /// so that there are more in the buffer than are drawn; its skew; and its ScreenColour. Leaves itself bound.
@@ -220,7 +220,7 @@ void GlPainter::State::useRecords(bool with_colours) {
 
 /// The depths of the pixels' layers, as the shader reads them.
 void GlPainter::State::loadLayers() {
-  static_assert(PixelLayers::kMostLayers == 4);
+  static_assert(PixelLayers::kMaxLayers == 4);
   std::vector<float> depths(4 * size.pixels(), PixelLayers::kNowhere);
   for (int y = 0; y < size.height; ++y)
     for (int x = 0; x < size.width; ++x) {
@@ -309,7 +309,7 @@ std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
   if (!gl.has44()) return {};
   state.mapped.emplace(gl);
   state.mapped->setUp(gl, state.coloured);
-  const auto bytes = static_cast<GLsizeiptr>((count + kMostRecords) * sizeof(ScreenSplat));
+  const auto bytes = static_cast<GLsizeiptr>((count + kMaxRecords) * sizeof(ScreenSplat));
   constexpr GLbitfield kHow = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
   gl.BufferStorage(GL_ARRAY_BUFFER, bytes, nullptr, kHow);
   void* const memory = gl.MapBufferRange(GL_ARRAY_BUFFER, 0, bytes, kHow);
@@ -354,7 +354,7 @@ void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
       // Fresh storage each time: the driver keeps what it still draws from.
       const StageTimer timer(upload_s, "upload splats");
       const auto bytes = static_cast<GLsizeiptr>(splats.size_bytes());
-      gl.BufferData(GL_ARRAY_BUFFER, bytes + static_cast<GLsizeiptr>(kMostRecords * sizeof(ScreenSplat)),
+      gl.BufferData(GL_ARRAY_BUFFER, bytes + static_cast<GLsizeiptr>(kMaxRecords * sizeof(ScreenSplat)),
                     nullptr, GL_STREAM_DRAW);
       gl.BufferSubData(GL_ARRAY_BUFFER, 0, bytes, splats.data());
     }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kFormats = "STL, PLY and OBJ files can be read";
 // A vertex or a triangle takes at least two bytes of a file.
-constexpr uint64_t kMostBytes = uint64_t{1} << 36;
+constexpr uint64_t kMaxBytes = uint64_t{1} << 36;
 
 std::string extensionOf(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
@@ -57,9 +57,9 @@ RawMesh parseMesh(std::span<const std::byte> bytes, const std::filesystem::path&
 
 TriangleMesh readMeshFile(const std::filesystem::path& path) {
   const InputFile file(path);
-  if (file.size() > kMostBytes)
+  if (file.size() > kMaxBytes)
     throw Error("{}: is too large for a surface ({} bytes, expected at most {})", path.string(), file.size(),
-                kMostBytes);
+                kMaxBytes);
   std::vector<std::byte> bytes(file.size());
   file.readAt(0, std::span(bytes));
   RawMesh raw = parseMesh(bytes, path);

@@ -59,8 +59,8 @@ Type typeOf(std::string_view name, const std::filesystem::path& path) {
 }
 
 Header parseHeader(std::string_view bytes, const std::filesystem::path& path) {
-  constexpr size_t kMostHeader = 1 << 16;
-  MeshText text(bytes.substr(0, kMostHeader), path);
+  constexpr size_t kMaxHeader = 1 << 16;
+  MeshText text(bytes.substr(0, kMaxHeader), path);
   Header header;
   bool format = false;
   while (text.nextLine()) {
@@ -68,7 +68,7 @@ Header parseHeader(std::string_view bytes, const std::filesystem::path& path) {
     if (word == "end_header") {
       if (!format) throw Error("{}: the header has no format", path.string());
       text.nextLine();
-      header.size = std::min(bytes.size(), kMostHeader) - text.left();
+      header.size = std::min(bytes.size(), kMaxHeader) - text.left();
       return header;
     }
     if (word == "format") {
@@ -100,7 +100,7 @@ Header parseHeader(std::string_view bytes, const std::filesystem::path& path) {
     }
   }
   throw Error("{}: is truncated: the header has no end_header in its first {} bytes", path.string(),
-              kMostHeader);
+              kMaxHeader);
 }
 
 /// Values one after the other, from text or bytes.

@@ -11,14 +11,14 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMostKey = (1 << 28) - 1;
+constexpr double kMaxKey = (1 << 28) - 1;
 // Of a brick's largest radius. Cutting a splat moves the centres of its pieces by less than half the sum of
 // A's columns, 1.5 of its singular values, and a border by less than 0.6; a radius has 1.55 of them.
 constexpr double kPieceReach = 1.35;
 
 /// Defined for NaN as well.
 uint32_t keyOf(double steps) {
-  return static_cast<uint32_t>(std::min(std::max(0.0, steps), kMostKey));
+  return static_cast<uint32_t>(std::min(std::max(0.0, steps), kMaxKey));
 }
 
 /// The bits of a distance, which must not be negative: they increase with the distance.
@@ -34,7 +34,7 @@ DepthKeys::DepthKeys(const ScreenView& view, const RootCube& root, DrawingOrder 
   const glm::dvec3 along = view.forward * view.scale;
   nearest_ = depthOf(root.min + glm::dvec3(along.x < 0, along.y < 0, along.z < 0) * root.size);
   const double extent = root.size * (std::abs(along.x) + std::abs(along.y) + std::abs(along.z));
-  if (extent > 0) steps_ = kMostKey / extent;
+  if (extent > 0) steps_ = kMaxKey / extent;
 }
 
 double DepthKeys::depthOf(const glm::dvec3& data) const {

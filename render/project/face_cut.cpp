@@ -116,11 +116,11 @@ ScreenDepth depthAlongRay(const ScreenRows& rows, const glm::vec3& depth_row, fl
   const RayFrame::Field field =
       ray.fieldOf({s.axis0 * (depth_row.x + depth_row.y * s.shear10 + depth_row.z * s.shear20),
                    s.axis1 * (depth_row.y + depth_row.z * s.shear21), s.axis2 * depth_row.z});
-  constexpr float kMostPerDepth = 1e30f;
+  constexpr float kMaxPerDepth = 1e30f;
   ScreenDepth out;
   out.middle = depth;
   out.by = {ellipse.l11 * field.g0 + ellipse.l21 * field.g1, ellipse.l22 * field.g1};
-  out.per_depth = std::min(1 / (kSigma * std::sqrt(field.hidden)), kMostPerDepth);
+  out.per_depth = std::min(1 / (kSigma * std::sqrt(field.hidden)), kMaxPerDepth);
   const float deviation = std::sqrt(ray.determinant * field.hidden);
   out.correlation = ray.correlation(piece.slope, ellipse, deviation > 0 ? field.along / deviation : 0);
   return out;

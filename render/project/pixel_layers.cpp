@@ -26,7 +26,7 @@ void PixelLayers::Row::endPixel(size_t first_layer) {
     const PixelLayer layer = layers[n];
     if (layer.colour.w < kClear) continue;
     if (kept > first_layer && layers[kept - 1].colour.w >= 1) break;
-    if (kept - first_layer == kMostLayers)
+    if (kept - first_layer == kMaxLayers)
       layers[kept - 1].colour += (1 - layers[kept - 1].colour.w) * layer.colour;
     else
       layers[kept++] = layer;

@@ -41,7 +41,7 @@ struct PixelResult {
 
 class PixelLayers {
  public:
-  static constexpr int kMostLayers = 4, kMostWindows = kMostLayers + 1;
+  static constexpr int kMaxLayers = 4, kMaxWindows = kMaxLayers + 1;
   static constexpr float kNowhere = std::numeric_limits<float>::infinity();
 
   /// The layers of a row of pixels, or of a piece of it, one pixel after the other.

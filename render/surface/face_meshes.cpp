@@ -17,11 +17,11 @@ constexpr double kFinestPixels = 0.5;
 // What an edge leaves out lies within half its length of a node that is drawn: edges of twice the error, as far as that
 // is to be seen only by their number. Beyond, smooth normals would suffer.
 constexpr double kFreeEdges = 2;
-constexpr size_t kLeastNodes = 1 << 16;
+constexpr size_t kMinNodes = 1 << 16;
 constexpr uint64_t kBytesANode = 148;  // while a mesh is made: nodes, triangles, and the mesh itself
 
 size_t mostNodes(uint64_t pixels) {
-  return std::max<size_t>(kLeastNodes, pixels);
+  return std::max<size_t>(kMinNodes, pixels);
 }
 
 /// How a box looks in a view.

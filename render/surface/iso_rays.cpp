@@ -14,11 +14,11 @@ namespace {
 constexpr auto kSupport = static_cast<float>(kKernelSupport);
 // K in x = 1 - (r / support)²: x² times this, fitted by least squares.
 constexpr float kKernel[] = {0.0451566f, 0.2057787f, -0.2786960f, 0.7582452f, -0.1769623f};
-constexpr float kStep = 0.35f;         // of half the support of the shortest splat
-constexpr size_t kMostSteps = 4096;    // of a packet
-constexpr float kLeastWeight = 0.02f;  // below it there is no field
+constexpr float kStep = 0.35f;       // of half the support of the shortest splat
+constexpr size_t kMaxSteps = 4096;   // of a packet
+constexpr float kMinWeight = 0.02f;  // below it there is no field
 // Inside the data the weights add up to about 1, less what the neighbours have that do not hold the value.
-constexpr float kLeastInside = 0.15f;
+constexpr float kMinInside = 0.15f;
 constexpr float kHidden = 1.0f / 4096, kClear = 1.0f / 1024;
 constexpr int kRefinements = 4;
 
@@ -239,7 +239,7 @@ void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned
                       [&](const CutFace& face) { return glm::dot(face.inward, u) + face.distance < 0; });
       if (outside) point.outside += w;
     }
-    if (!(point.weight > kLeastInside) || point.outside > 0.5f * point.weight) continue;
+    if (!(point.weight > kMinInside) || point.outside > 0.5f * point.weight) continue;
     addHit(ray,
            {depth, point.gradient / point.weight, static_cast<float>(settings_.values[value]),
             point.other / point.weight},
@@ -250,12 +250,12 @@ void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned
 void IsoRays::addHit(size_t ray, const IsoHit& hit, const IsoOpacity& opacity) {
   Hits& hits = hits_[ray];
   const float alpha = opacity.at(hit);
-  if (alpha < kClear || hits.count == kMostHits) return;
+  if (alpha < kClear || hits.count == kMaxHits) return;
   size_t n = hits.count++;
   for (; n > 0 && hits.hit[n - 1].depth > hit.depth; --n) hits.hit[n] = hits.hit[n - 1];
   hits.hit[n] = hit;
   through_[ray] *= 1 - alpha;
-  if (hits.count == kMostHits) through_[ray] = 0;
+  if (hits.count == kMaxHits) through_[ray] = 0;
 }
 
 void IsoRays::trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats) {
@@ -271,7 +271,7 @@ void IsoRays::trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> 
   float least_step = 0;
   if (!order_.empty()) {
     now.z.fill(crossed_[order_[0]].begin);
-    for (const Crossed& s : crossed_) least_step = std::max(least_step, (s.end - now.z[0]) / kMostSteps);
+    for (const Crossed& s : crossed_) least_step = std::max(least_step, (s.end - now.z[0]) / kMaxSteps);
   }
   while (true) {
     float at = now.z[0];
@@ -296,8 +296,8 @@ void IsoRays::trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> 
     if (!fresh) {
       unsigned open = 0;
       for (size_t ray = 0; ray < packet.count; ++ray)
-        open |= static_cast<unsigned>(through_[ray] > kHidden && before.field.weight[ray] > kLeastWeight &&
-                                      now.field.weight[ray] > kLeastWeight)
+        open |= static_cast<unsigned>(through_[ray] > kHidden && before.field.weight[ray] > kMinWeight &&
+                                      now.field.weight[ray] > kMinWeight)
                 << ray;
       for (size_t value = 0; value < settings_.values.size(); ++value) {
         const auto wanted = static_cast<float>(settings_.values[value] - settings_.values.front());

@@ -53,9 +53,9 @@ struct IsoPacket {
 
 class IsoRays {
  public:
-  static constexpr size_t kMostHits = 6;
+  static constexpr size_t kMaxHits = 6;
   struct Hits {
-    std::array<IsoHit, kMostHits> hit;
+    std::array<IsoHit, kMaxHits> hit;
     size_t count = 0;
 
     std::span<const IsoHit> all() const { return {hit.data(), count}; }

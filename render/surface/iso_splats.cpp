@@ -13,7 +13,7 @@ namespace curvisplat {
 namespace {
 
 constexpr auto kSupport = static_cast<float>(kKernelSupport);
-constexpr float kMostRatio = 1000;  // of V to √det S: beyond it a splat is degenerate
+constexpr float kMaxRatio = 1000;  // of V to √det S: beyond it a splat is degenerate
 // A neighbour whose linear field just misses the value has a part in the mean of all as well.
 constexpr float kMargin = 1.25f, kDeviations = 2;
 
@@ -83,7 +83,7 @@ void IsoSplats::addPiece(Part& part, const glm::dvec3& cell_min, const SplatPiec
   const float ratio = piece.weight / (s.axis0 * s.axis1 * s.axis2);
   if (!(ratio > 0 && std::isfinite(ratio))) return;
   IsoSplat splat;
-  splat.weight = std::min(ratio, kMostRatio);
+  splat.weight = std::min(ratio, kMaxRatio);
   if (!place(cell_min + glm::dvec3(piece.position), s, splat)) return;
   const size_t tiles = forTiles(splat, [](size_t) {});
   if (tiles == 0) return;

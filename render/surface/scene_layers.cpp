@@ -21,8 +21,8 @@ namespace {
 // Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and by no
 // more than this many pixels.
 constexpr double kSteepest = 4, kNear = 0.25;
-constexpr size_t kMostShaded = 3;  // triangles of a pixel and layer
-constexpr float kSmooth = 0.97f;   // of the cosine between normals: what is in a pixel is lit once
+constexpr size_t kMaxShaded = 3;  // triangles of a pixel and layer
+constexpr float kSmooth = 0.97f;  // of the cosine between normals: what is in a pixel is lit once
 
 /// Colours of the surfaces' triangles at the pixels.
 class Shader {
@@ -193,21 +193,21 @@ class PixelSurfaces {
       uint32_t number;
       float x, y, count;
     };
-    std::array<Part, kMostShaded> parts;
+    std::array<Part, kMaxShaded> parts;
     size_t count = 0;
     double value = 0;
     for (const Seen& sample : seen) {
       value += double{sample.value};
       size_t n = 0;
       while (n < count && parts[n].number != sample.number) ++n;
-      if (n == kMostShaded) continue;
+      if (n == kMaxShaded) continue;
       if (n == count) parts[count++] = {sample.number, 0, 0, 0};
       parts[n].x += static_cast<float>(kSampleOffsets[sample.place][0]);
       parts[n].y += static_cast<float>(kSampleOffsets[sample.place][1]);
       ++parts[n].count;
     }
     const float middle_x = static_cast<float>(x) + 0.5f, middle_y = static_cast<float>(y) + 0.5f;
-    std::array<Shader::Point, kMostShaded> points;
+    std::array<Shader::Point, kMaxShaded> points;
     Shader::Point mean;
     float shaded = 0;
     bool smooth = true;
@@ -308,7 +308,7 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
   tbb::enumerable_thread_specific<std::vector<SampleTile>> tiles_of_threads;
   tbb::parallel_for(size_t{0}, columns * static_cast<size_t>(bins.rows()), [&](size_t number) {
     std::vector<SampleTile>& tiles = tiles_of_threads.local();
-    tiles.resize(pixel_surfaces.hasTranslucent() ? PixelLayers::kMostLayers : 1);
+    tiles.resize(pixel_surfaces.hasTranslucent() ? PixelLayers::kMaxLayers : 1);
     const auto column = static_cast<int>(number % columns), row = static_cast<int>(number / columns);
     size_t drawn = 0;
     while (drawn < tiles.size() &&

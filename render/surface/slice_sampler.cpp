@@ -15,7 +15,7 @@ constexpr double kFixed = 4294967296.0;  // of the sums
 // over their cells.
 constexpr double kOwn = 0.9;
 constexpr double kMost = 1e5;          // pixels, or ranges of the scalar a pixel
-constexpr double kMostRatio = 1000;    // of V to √det S: beyond it a splat is degenerate
+constexpr double kMaxRatio = 1000;     // of V to √det S: beyond it a splat is degenerate
 constexpr double kSeenAtLeast = 1e-6;  // of the plane's normal along a ray
 // Inside the data the weights add up to 1, to within a tenth; at an end without a face to half of that.
 constexpr double kOutside = 0.25, kInside = 0.5;
@@ -193,7 +193,7 @@ void SliceSampler::addPiece(const glm::dvec3& cell_min, const SplatPiece& piece)
       const glm::dvec3 u = (v[0] + static_cast<double>(x) * vx + static_cast<double>(row) * vy) / inverse;
       const double r2 = glm::dot(u, u);
       if (!(r2 < kSupport2)) continue;
-      const double weight = std::min(ratio, kMostRatio) * kernel(std::sqrt(r2));
+      const double weight = std::min(ratio, kMaxRatio) * kernel(std::sqrt(r2));
       const double change =
           double{piece.slope.w0} * u.x + double{piece.slope.w1} * u.y + double{piece.slope.w2} * u.z;
       const glm::dvec3 moved = per_length_ * inSpace(s, u);

@@ -14,7 +14,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 constexpr size_t kAtOnce = 16;
 constexpr int kGridBits = 4;          // 1/16 pixel
 constexpr float kFarthest = 1 << 20;  // pixels: grid coordinates are exact
-constexpr float kLeastArea = 1e-9f;   // square pixels: below it a triangle's plane is rounding error
+constexpr float kMinArea = 1e-9f;     // square pixels: below it a triangle's plane is rounding error
 using Floats = hn::CappedTag<float, kAtOnce>;
 using Ints = hn::RebindToSigned<Floats>;
 using Samples = hn::CappedTag<float, kSamples>;
@@ -114,7 +114,7 @@ HWY_INLINE void setUp(const SampleBox& box, size_t n, Setups& s) {
   const V dv1 = hn::Sub(v1, v0), dv2 = hn::Sub(v2, v0);
   const V exact = hn::Sub(hn::Mul(dx1, dy2), hn::Mul(dy1, dx2));
   const V per_area =
-      hn::IfThenElseZero(hn::Gt(hn::Abs(exact), hn::Set(d, kLeastArea)), hn::Div(hn::Set(d, 1.0f), exact));
+      hn::IfThenElseZero(hn::Gt(hn::Abs(exact), hn::Set(d, kMinArea)), hn::Div(hn::Set(d, 1.0f), exact));
   const V by_x = hn::Mul(hn::Sub(hn::Mul(dv1, dy2), hn::Mul(dv2, dy1)), per_area);
   const V by_y = hn::Mul(hn::Sub(hn::Mul(dv2, dx1), hn::Mul(dv1, dx2)), per_area);
   const V half = hn::Set(d, 0.5f);

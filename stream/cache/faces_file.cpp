@@ -15,8 +15,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMostTableBytes = uint64_t{1} << 30;
-constexpr uint64_t kMostNodes = uint64_t{1} << 40;  // along an axis
+constexpr uint64_t kMaxTableBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxNodes = uint64_t{1} << 40;  // along an axis
 
 template <size_t N>
 std::array<char, N> padded(const std::string& text) {
@@ -99,7 +99,7 @@ class FacesChecker {
     const GridFace& face = faces_[n];
     if (face.axis > 2 || face.side > FaceSide::kPlane) refuse("face", n, "its axis or side is invalid");
     for (const uint64_t nodes : face.nodes)
-      if (nodes < 2 || nodes > kMostNodes)
+      if (nodes < 2 || nodes > kMaxNodes)
         refuse("face", n, fmt::format("it has {} nodes along an axis", nodes));
     if (face.root >= patches_.size() || patches_[face.root].face != n)
       refuse("face", n, "its coarsest patch belongs to another face");
@@ -238,7 +238,7 @@ FacesReader::FacesReader(const std::filesystem::path& path, const FileInfo& info
       uint64_t{header.variables} * sizeof(uint32_t) + uint64_t{header.faces} * sizeof(FaceRecord) +
       uint64_t{header.patches} * sizeof(PatchRecord) + uint64_t{header.regions} * sizeof(RegionRecord);
   if (header.table_offset < sizeof header || header.table_offset > file_.size() ||
-      table_bytes != file_.size() - header.table_offset || table_bytes > kMostTableBytes)
+      table_bytes != file_.size() - header.table_offset || table_bytes > kMaxTableBytes)
     throw Error("{}: its table has {} bytes at {}; expected it to end the file of {}; convert again",
                 path.string(), table_bytes, header.table_offset, file_.size());
   std::vector<std::byte> bytes(table_bytes);
@@ -289,8 +289,8 @@ std::optional<size_t> FacesReader::scalarOf(uint32_t variable_number) const {
   return static_cast<size_t>(found - variables_.begin());
 }
 
-PatchNodes FacesReader::read(uint32_t number) const {
-  const FacePatch& patch = patches_[number];
+PatchNodes FacesReader::read(uint32_t patch_number) const {
+  const FacePatch& patch = patches_[patch_number];
   std::vector<std::byte> bytes(patch.extent.length);
   file_.readAt(patch.extent.offset, std::span(bytes));
   try {
@@ -298,8 +298,8 @@ PatchNodes FacesReader::read(uint32_t number) const {
       throw Error("has a wrong checksum (found {:016x}, expected {:016x})", found, patch.extent.checksum);
     return decodePatch(patch, variables_.size(), box_, bytes);
   } catch (const Error& error) {
-    throw Error("{}: patch {} of the faces: {}; the file is damaged: convert again", path().string(), number,
-                error.what());
+    throw Error("{}: patch {} of the faces: {}; the file is damaged: convert again", path().string(),
+                patch_number, error.what());
   }
 }
 

@@ -72,9 +72,9 @@ void StepWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
   for (size_t n = 0; n < values.size(); ++n) appendValues(files_[n].file, values[n], files_[n].table[brick]);
 }
 
-std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
+std::vector<FileInfo> StepWriter::finish(const NewStep& added_step) {
   const SeriesStep& first = series_.steps[series_.first_steps[geometry_]];
-  SeriesStep step{added.time, geometry_, first.geometry_checksum, first.grid_checksum, {}};
+  SeriesStep step{added_step.time, geometry_, first.geometry_checksum, first.grid_checksum, {}};
   std::vector<FileInfo> infos;
   for (NewFile& file : files_) {
     infos.push_back(finishVariableFile(file.file, file.path.filename().string(), file.table));
@@ -90,7 +90,7 @@ std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
   }
   syncDirectory(folder_);
   try {
-    putStep(*lock_, manifest_, series_, std::move(step), added, others_);
+    putStep(*lock_, manifest_, series_, std::move(step), added_step, others_);
   } catch (const NameNotSynced&) {
     in_place_ = true;
     throw;
@@ -106,13 +106,13 @@ void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep 
   putStep(lock, cache.seriesManifest(), cache.series(), std::move(step), added, others);
 }
 
-void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added) {
+void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added_step) {
   const Series& series = cache.series();
   const fs::path folder = cacheFolder(lock.cache(), geometryFolderName(series.geometries()));
   const fs::path path = cacheFile(folder, "manifest.json");
   const std::string text = readTextFile(path);
   const Manifest manifest = Manifest::fromJson(text, path);
-  SeriesStep step{added.time,
+  SeriesStep step{added_step.time,
                   series.geometries(),
                   checksumOf(std::as_bytes(std::span(text))),
                   manifest.grid_checksum.value_or(0),
@@ -125,7 +125,7 @@ void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewS
   CURVISPLAT_CHECK_OP(step.values.size(), ==, cache.seriesManifest().variables.size());
   lock.requireStillThere();
   syncDirectory(lock.cache());
-  putStep(lock, cache.seriesManifest(), series, std::move(step), added, {});
+  putStep(lock, cache.seriesManifest(), series, std::move(step), added_step, {});
 }
 
 }  // namespace curvisplat

@@ -32,7 +32,7 @@ constexpr double kDistanceSteps = 128;  // to a cell
 constexpr int kRatioShift = 3;
 constexpr uint32_t kRatioBits = 0x1f;
 constexpr double kSmallestRatio = 0.75, kRatioSteps = 10;  // to a factor of 2
-constexpr uint32_t kMostRatio = 21;                        // of 3
+constexpr uint32_t kMaxRatio = 21;                         // of 3
 constexpr double kLongestNext = 3;                         // splats behind, to a merged one's length
 
 /// In 16 bits: the octahedron |x| + |y| + |z| = 1, its lower half folded outwards.
@@ -75,7 +75,7 @@ uint32_t packMergedCode(const glm::dvec3& inward, double distance, double ratio)
   const uint32_t code = packLayerCode(inward, distance);
   if (code == kNoBorder) return kNoBorder;
   const double step = 1 + kRatioSteps * std::log2(std::max(ratio, kSmallestRatio) / kSmallestRatio);
-  return code | static_cast<uint32_t>(std::min(std::round(step), 1.0 * kMostRatio)) << kRatioShift;
+  return code | static_cast<uint32_t>(std::min(std::round(step), 1.0 * kMaxRatio)) << kRatioShift;
 }
 
 uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
@@ -137,7 +137,7 @@ bool isPossibleBorderCode(uint32_t border_code) {
   const uint32_t count = border_code & 3, faces = border_code >> kFacesShift & 7;
   if (count == 0) {
     const uint32_t ratio = border_code >> kRatioShift & kRatioBits, distance = border_code >> kDistanceShift;
-    return (border_code & 7) == kLayer && ratio <= kMostRatio && distance != 0 &&
+    return (border_code & 7) == kLayer && ratio <= kMaxRatio && distance != 0 &&
            (ratio == 0 || distance <= kDistanceSteps);
   }
   return faces >> count == 0;

@@ -37,9 +37,9 @@ uint64_t pagedBytes(const BrickExtents& brick) {
   return bytes;
 }
 
-ReadBatch planBatch(std::span<const BrickExtents> all, uint64_t limit_bytes) {
-  CURVISPLAT_CHECK(!all.empty());
-  const std::span<const BrickExtents> bricks = all.first(bricksWithin(all, limit_bytes));
+ReadBatch planBatch(std::span<const BrickExtents> all_bricks, uint64_t limit_bytes) {
+  CURVISPLAT_CHECK(!all_bricks.empty());
+  const std::span<const BrickExtents> bricks = all_bricks.first(bricksWithin(all_bricks, limit_bytes));
   ReadBatch batch;
   batch.bricks.resize(bricks.size());
   std::vector<uint32_t> order(bricks.size());

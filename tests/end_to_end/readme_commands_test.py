@@ -5,6 +5,7 @@
 
 - In README.md and tools/REFERENCE.md every indented line that begins with `curvisplat` is run, in the order of the page, with
   small grids and pictures in place of large ones. All input files are made here.
+- tools/demo.sh is run as it stands, but for building the program, which is the one tested.
 - `curvisplat view` is run without a display: it has to fail for that reason, and not for its options.
 - In all pages the scripts and programs of indented commands have to exist, scripts have to be executable, and the options have
   to be in their --help; presets and targets of CMake have to be defined. bench/README.md's scripts are run in short by
@@ -296,6 +297,14 @@ def check_links(page, text):
             fail(page, f"link to {target}, which does not exist")
 
 
+def run_demo(program, folder):
+    result = subprocess.run([os.path.join(ROOT, "tools/demo.sh")], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                            env={**os.environ, "CURVISPLAT": program, "OUT": os.path.join(folder, "demo")}, check=False)
+    picture = os.path.join(folder, "demo/demo.png")
+    if result.returncode != 0 or f"Wrote {picture}" not in result.stdout or not os.path.exists(picture):
+        fail("README.md", f"tools/demo.sh: exit status {result.returncode}: {result.stdout}{result.stderr}")
+
+
 def pages():
     for folder, folders, names in os.walk(ROOT):
         folders[:] = [name for name in folders if name not in (".git", "build", "out")]
@@ -320,6 +329,7 @@ def main():
                     run += 1
             if run == 0:
                 fail(page, "quotes no command; is it laid out differently?")
+        run_demo(program, folder)
     for page in pages():
         with open(os.path.join(ROOT, page), encoding="utf-8") as file:
             text = file.read()

@@ -267,7 +267,7 @@ class Bomb {
     std::memcpy(&header, header_.data(), sizeof header);
     return header;
   }
-  /// A frame of so many zeros, without its size in it if so wished.
+  /// A zstd frame of `zeros` zeros; `sized`: with its size in its header.
   std::vector<std::byte> stream(const GeometryHeader& header, uint64_t zeros, bool sized = true) const {
     const std::string content(zeros, '\0');
     std::string frame(ZSTD_compressBound(content.size()), '\0');

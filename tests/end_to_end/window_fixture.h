@@ -148,7 +148,7 @@ class WindowTest : public testing::Test {
   Image shown(ImageSize size) const {
     if (hasWidget("message ")) {
       display_->act({"key", "Escape"});
-      eventually([&] { return !hasWidget("message "); }, 5);
+      EXPECT_TRUE(eventually([&] { return !hasWidget("message "); }));
     }
     const Image screen = display_->screenshot();
     const auto [left, top] = placeOf("picture", 0, 0);

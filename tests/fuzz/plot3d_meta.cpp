@@ -11,7 +11,7 @@
 namespace curvisplat {
 namespace {
 
-/// Single precision without record markers: `head`, then so many values.
+/// Single precision without record markers: `head`, then `values` values.
 void writeFile(const char* name, const std::vector<int32_t>& head, size_t values) {
   std::vector<float> words(head.size() + values);
   for (size_t n = 0; n < words.size(); ++n)

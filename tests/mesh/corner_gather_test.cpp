@@ -38,8 +38,8 @@ TEST(CornerGather, GivesFewPolyhedraAtATime) {
     size_t next = 0, calls = 0;
     gather.forEach([&](const GatheredCells& cells) {
       ++calls;
-      EXPECT_LE(cells.corners.size(), GatheredCells::kMostCorners);
-      EXPECT_LE(cells.faces.size(), GatheredCells::kMostCorners);
+      EXPECT_LE(cells.corners.size(), GatheredCells::kMaxCorners);
+      EXPECT_LE(cells.faces.size(), GatheredCells::kMaxCorners);
       for (size_t n = 0; n < cells.size(); ++n, ++next) {
         ASSERT_EQ(cells.numbers[n], next);
         ASSERT_EQ(cells.cornersOfCell(n).size(), next % 2 == 0 ? 4u : kCorners);
@@ -48,12 +48,12 @@ TEST(CornerGather, GivesFewPolyhedraAtATime) {
       }
     });
     EXPECT_EQ(next, kCells);
-    EXPECT_GE(calls, kPrisms * kCorners / GatheredCells::kMostCorners);
+    EXPECT_GE(calls, kPrisms * kCorners / GatheredCells::kMaxCorners);
   }
 }
 
 TEST(CornerGather, GivesACellOfManyCornersAlone) {
-  constexpr uint64_t kCorners = GatheredCells::kMostCorners + 2;
+  constexpr uint64_t kCorners = GatheredCells::kMaxCorners + 2;
   const ArrayMesh mesh({prisms(2, kCorners)});
   const MeshReader reader(mesh, {0}, std::nullopt);
   const TemporaryFolder folder;

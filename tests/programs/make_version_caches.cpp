@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// So many nodes that there are levels; so plain, but for the small third block, that they take little room.
+/// Enough nodes for several levels, with plain values that take little space, except in the small third block.
 FunctionGridSource blocks() {
   std::vector<GridBlock> made{gridBlock(41, 41, 41), gridBlock(4, 41, 41), gridBlock(9, 9, 7)};
   made[0].has_blanking = true;

@@ -18,19 +18,19 @@ CellGridSource::CellGridSource(const GridSource& nodes, std::vector<Function> fu
   }
 }
 
-void CellGridSource::read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
+void CellGridSource::read(uint32_t block_number, const NodeBox& box, std::span<const uint32_t> scalars,
                           NodeArrays& out) const {
   const auto of_nodes = static_cast<uint32_t>(nodes_->description().scalars.size());
   std::vector<uint32_t> wanted;
   for (const uint32_t scalar : scalars)
     if (scalar < of_nodes) wanted.push_back(scalar);
-  nodes_->read(number, box, wanted, out);
+  nodes_->read(block_number, box, wanted, out);
   std::vector<std::vector<float>> node_scalars = std::move(out.scalars);
 
-  const GridBlock& block = description_.blocks[number];
+  const GridBlock& block = description_.blocks[block_number];
   const NodeBox with_corners{box.j0, std::min(box.j1 + 1, block.nj), box.k0, std::min(box.k1 + 1, block.nk)};
   NodeArrays nodes;
-  nodes_->read(number, with_corners, {}, nodes);
+  nodes_->read(block_number, with_corners, {}, nodes);
   const size_t row = block.ni, plane = row * (with_corners.j1 - with_corners.j0);
   out.scalars.clear();
   size_t next_of_nodes = 0;
@@ -47,7 +47,7 @@ void CellGridSource::read(uint32_t number, const NodeBox& box, std::span<const u
             values.push_back(std::numeric_limits<float>::quiet_NaN());
             continue;
           }
-          GridCell cell{number, i, j, k, {}};
+          GridCell cell{block_number, i, j, k, {}};
           for (size_t corner = 0; corner < 8; ++corner) {
             const size_t n = i + (corner & 1) + (j - box.j0 + (corner >> 1 & 1)) * row +
                              (k - box.k0 + (corner >> 2)) * plane;

@@ -21,9 +21,9 @@ FunctionGridSource::FunctionGridSource(std::vector<GridBlock> blocks, size_t sca
   }
 }
 
-void FunctionGridSource::read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
+void FunctionGridSource::read(uint32_t block_number, const NodeBox& box, std::span<const uint32_t> scalars,
                               NodeArrays& out) const {
-  const GridBlock& block = description_.blocks[number];
+  const GridBlock& block = description_.blocks[block_number];
   const size_t nodes = block.ni * (box.j1 - box.j0) * (box.k1 - box.k0);
   for (auto* axis : {&out.x, &out.y, &out.z}) axis->resize(nodes);
   out.blank.resize(nodes);
@@ -33,7 +33,7 @@ void FunctionGridSource::read(uint32_t number, const NodeBox& box, std::span<con
   for (uint64_t k = box.k0; k < box.k1; ++k) {
     for (uint64_t j = box.j0; j < box.j1; ++j) {
       for (uint64_t i = 0; i < block.ni; ++i, ++n) {
-        const NodeValues node = function_({number, i, j, k});
+        const NodeValues node = function_({block_number, i, j, k});
         out.x[n] = node.position.x;
         out.y[n] = node.position.y;
         out.z[n] = node.position.z;

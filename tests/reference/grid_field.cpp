@@ -120,13 +120,13 @@ bool GridField::crossings(const glm::dvec3& origin, const glm::dvec3& direction,
   return true;
 }
 
-void GridField::addOuterFaces(uint32_t number, std::vector<OuterFaces::Face>& faces) const {
-  const Block& block = blocks_[number];
+void GridField::addOuterFaces(uint32_t block_number, std::vector<OuterFaces::Face>& faces) const {
+  const Block& block = blocks_[block_number];
   const uint64_t cells[3] = {block.ni - 1, block.nj - 1, block.nk - 1};
   for (uint64_t k = 0; k < cells[2]; ++k)
     for (uint64_t j = 0; j < cells[1]; ++j)
       for (uint64_t i = 0; i < cells[0]; ++i) {
-        const CellAddress cell{number, {i, j, k}};
+        const CellAddress cell{block_number, {i, j, k}};
         if (!isThere(cell)) continue;
         const std::array<size_t, 8> corners = cornersOf(cell);
         for (int axis = 0; axis < 3; ++axis)

@@ -34,9 +34,9 @@ RearrangedGridSource::RearrangedGridSource(const GridSource& source, const Rearr
       }
 }
 
-void RearrangedGridSource::read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
+void RearrangedGridSource::read(uint32_t block_number, const NodeBox& box, std::span<const uint32_t> scalars,
                                 NodeArrays& out) const {
-  const GridBlock& block = description_.blocks[number];
+  const GridBlock& block = description_.blocks[block_number];
   const size_t count = block.ni * (box.j1 - box.j0) * (box.k1 - box.k0);
   for (auto* axis : {&out.x, &out.y, &out.z}) axis->resize(count);
   out.blank.resize(count);
@@ -49,7 +49,7 @@ void RearrangedGridSource::read(uint32_t number, const NodeBox& box, std::span<c
         const std::array<uint64_t, 3> here{i, j, k};
         std::array<uint64_t, 3> at;  // in the original
         for (int axis = 0; axis < 3; ++axis) {
-          const uint64_t index = first_[number][axis] + here[axis], nodes = size_[how_.axes[axis]];
+          const uint64_t index = first_[block_number][axis] + here[axis], nodes = size_[how_.axes[axis]];
           at[how_.axes[axis]] = how_.mirrored[axis] ? nodes - 1 - index : index;
         }
         const size_t from = (at[2] * size_[1] + at[1]) * size_[0] + at[0];

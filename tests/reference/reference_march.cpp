@@ -353,14 +353,14 @@ ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& f
   };
 }
 
-OpticalProperties smoothFunction(double f) {
-  return {sectionNineColour(f), 8 * f * f};
+OpticalProperties smoothFunction(double scalar) {
+  return {sectionNineColour(scalar), 8 * scalar * scalar};
 }
-OpticalProperties bandFunction(double f) {
-  return {sectionNineColour(f), 24 * std::exp(-(f - 0.5) * (f - 0.5) / 0.0018)};
+OpticalProperties bandFunction(double scalar) {
+  return {sectionNineColour(scalar), 24 * std::exp(-(scalar - 0.5) * (scalar - 0.5) / 0.0018)};
 }
-OpticalProperties stepFunction(double f) {
-  return {sectionNineColour(f), f > 0.5 ? 16.0 : 0.0};
+OpticalProperties stepFunction(double scalar) {
+  return {sectionNineColour(scalar), scalar > 0.5 ? 16.0 : 0.0};
 }
 
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,

@@ -38,7 +38,7 @@ struct Line {
       free_at_s = std::max(free_at_s, now_s) + bytes() / bytes_per_s;
       quality.sent(++pictures, now_s, true);
       reports.emplace_back(free_at_s + delay_s, pictures);
-      EXPECT_LE(reports.size(), LineQuality::kMostOnTheWay);
+      EXPECT_LE(reports.size(), LineQuality::kMaxOnTheWay);
     }
     return static_cast<double>(pictures - before) / seconds;
   }

@@ -5,7 +5,8 @@
 
   types       UpperCamel; specialisations have their template's name
   enumerators kUpperCamel
-  constants   kUpperCamel: constexpr variables, wherever they are, and const ones of a namespace
+  constants   kUpperCamel: constexpr variables, wherever they are, and const ones of a namespace; limits are kMax and kMin,
+              not kMost and kLeast
 
 C++ is read as clang-format leaves it: what a namespace holds is not indented.
 """
@@ -23,7 +24,7 @@ CONSTEXPR = re.compile(r"^[ \t]*(?:(?:static|inline|thread_local|HWY_MAYBE_UNUSE
 CONST = re.compile(r"^(?:(?:static|inline)\s+)*const\s+" + DECLARED, re.M)
 
 UPPER_CAMEL = re.compile(r"[A-Z][A-Za-z0-9]*")
-CONSTANT = re.compile(r"k[A-Z0-9][A-Za-z0-9]*")
+CONSTANT = re.compile(r"k(?!(?:Most|Least)[A-Z])[A-Z0-9][A-Za-z0-9]*")
 
 
 def is_function(match):
@@ -63,7 +64,7 @@ def main():
                 checked += 1
                 if not fits:
                     faults += 1
-                    expected = "UpperCamel" if kind == "type" else "kUpperCamel"
+                    expected = "UpperCamel" if kind == "type" else "kUpperCamel, and of limits kMax or kMin"
                     print(f"{path.relative_to(root).as_posix()}:{line}: {kind} {name}; expected {expected}")
     if checked == 0:
         print(f"{root}: there are no sources")

@@ -21,6 +21,11 @@ class Checks(unittest.TestCase):
         self.assertEqual(self.faults("const std::string usual = \"a\";\n"), [(1, "constant", "usual")])
         self.assertEqual(self.faults("inline constexpr auto kSupport = static_cast<float>(kKernelSupport);\n"), [])
 
+    def test_limits(self):
+        self.assertEqual(self.faults("constexpr int kMostNodes = 3, kMaxFiles = 2;\n"), [(1, "constant", "kMostNodes")])
+        self.assertEqual(self.faults("constexpr int kMost = 3, kMostly = 2;\nconstexpr int kLeastArea = 1;\n"),
+                         [(2, "constant", "kLeastArea")])
+
     def test_types(self):
         self.assertEqual(self.faults("struct brick_t {\n};\nclass octree final : public Tree<int> {\n"),
                          [(1, "type", "brick_t"), (3, "type", "octree")])

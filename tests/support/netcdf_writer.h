@@ -32,7 +32,7 @@ class NetcdfWriter {
   NetcdfWriter(const NetcdfWriter&) = delete;
   NetcdfWriter& operator=(const NetcdfWriter&) = delete;
 
-  /// `unlimited`: it is written as such, with so many records.
+  /// `unlimited`: it is written as an unlimited dimension with `length` records.
   void dimension(const std::string& name, size_t length, bool unlimited = false);
   /// Of the file.
   void attribute(const std::string& name, const std::string& text);

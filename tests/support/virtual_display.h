@@ -32,6 +32,6 @@ class VirtualDisplay {
 };
 
 /// Asks again and again until `holds` or `seconds` have passed; whether it held.
-bool eventually(const std::function<bool()>& holds, double seconds = 60);
+[[nodiscard]] bool eventually(const std::function<bool()>& holds, double seconds = 60);
 
 }  // namespace curvisplat

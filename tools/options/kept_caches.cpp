@@ -212,18 +212,18 @@ std::string namesOf(const std::vector<fs::path>& files) {
   return names;
 }
 
-fs::path keptCacheOf(const std::vector<fs::path>& given, Progress& progress, const KeptCacheEvents& events,
-                     const std::vector<std::string>& scalars) {
+fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progress,
+                     const KeptCacheEvents& events, const std::vector<std::string>& scalars) {
   const auto folder = keptFolder();
   if (!folder)
     throw Error(
         "{}: cannot find the user's cache folder: neither XDG_CACHE_HOME nor HOME is set; use convert",
-        given.front().string());
+        given_files.front().string());
   const uint64_t limit = limitOfFolder();
   std::error_code error;
   fs::create_directories(*folder / "known", error);
   if (error) throw Error("{}: cannot create the directory: {}", folder->string(), error.message());
-  const std::vector<fs::path> files = wholePaths(given);
+  const std::vector<fs::path> files = wholePaths(given_files);
   const fs::path place = *folder / fmt::format("{:016x}", contentsOf(files, *folder / "known", progress));
   const fs::path cache = place / (files.front().stem().string() + ".splats");
   fs::create_directories(place, error);

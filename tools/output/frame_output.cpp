@@ -70,8 +70,8 @@ class Movie : public FrameOutput {
 
 }  // namespace
 
-FrameNames::FrameNames(const std::filesystem::path& path) : folder_(path.parent_path()) {
-  const std::string pattern = path.filename().string();
+FrameNames::FrameNames(const std::filesystem::path& pattern_path) : folder_(pattern_path.parent_path()) {
+  const std::string pattern = pattern_path.filename().string();
   int numbers = 0;
   for (size_t at = 0; at < pattern.size(); ++at) {
     std::string& part = numbers == 0 ? before_ : after_;

@@ -21,9 +21,9 @@ namespace curvisplat::python {
 namespace {
 
 constexpr uint64_t kMaxPoints = uint64_t{1} << 31;
-constexpr uint32_t kMostSlab = 4;           // planes
-constexpr uint64_t kReturnedBytes = 8;      // of a point
-constexpr uint64_t kLeastBytes = 64 << 20;  // that sampling may take; or a quarter of what is returned
+constexpr uint32_t kMaxSlab = 4;          // planes
+constexpr uint64_t kReturnedBytes = 8;    // of a point
+constexpr uint64_t kMinBytes = 64 << 20;  // that sampling may take; or a quarter of what is returned
 
 /// A numpy array that owns the values.
 template <typename T>
@@ -69,9 +69,9 @@ struct SweepPlan {
 /// to a plane at a time.
 SweepPlan sweepPlanOf(const SampleLattice& lattice) {
   const uint64_t returned = kReturnedBytes * lattice.planePoints() * lattice.size[2];
-  const uint64_t bytes = std::max(kLeastBytes, returned / 4);
+  const uint64_t bytes = std::max(kMinBytes, returned / 4);
   const auto wanted = static_cast<unsigned>(tbb::info::default_concurrency());
-  for (uint32_t slab = kMostSlab; slab > 1; slab /= 2)
+  for (uint32_t slab = kMaxSlab; slab > 1; slab /= 2)
     if (FieldSampler::threadsWithin(bytes, lattice, slab, wanted) == wanted) return {slab, wanted};
   return {1, std::max(1u, FieldSampler::threadsWithin(bytes, lattice, 1, wanted))};
 }

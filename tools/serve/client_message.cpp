@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMostNumber = uint64_t{1} << 53;  // what JavaScript counts to
+constexpr uint64_t kMaxNumber = uint64_t{1} << 53;  // what JavaScript counts to
 constexpr size_t kLongestName = 1000;
 
 size_t cacheIn(const JsonField& message, size_t caches) {
@@ -20,7 +20,7 @@ ImageSize sizeIn(const JsonField& message) {
   if (!size.isArray() || size.size() != 2) size.fail("a width and a height in pixels");
   const ImageSize pixels{static_cast<int>(size[0].count(1, kLargestSide)),
                          static_cast<int>(size[1].count(1, kLargestSide))};
-  if (static_cast<uint64_t>(pixels.width) * static_cast<uint64_t>(pixels.height) > kMostPixels)
+  if (static_cast<uint64_t>(pixels.width) * static_cast<uint64_t>(pixels.height) > kMaxPixels)
     size.fail("at most 8.3 million pixels");
   return pixels;
 }
@@ -34,12 +34,12 @@ std::string nameIn(const JsonField& message, const char* field) {
 
 ViewRequest viewIn(const JsonField& message, size_t caches) {
   ViewRequest view;
-  view.number = message.at("number").count(0, kMostNumber);
+  view.number = message.at("number").count(0, kMaxNumber);
   view.cache = cacheIn(message, caches);
   view.size = sizeIn(message);
   view.moving = message.at("moving").flag();
-  view.step = message.at("step").count(0, kMostNumber);
-  if (const auto next = message.find("next")) view.next = next->count(0, kMostNumber);
+  view.step = message.at("step").count(0, kMaxNumber);
+  if (const auto next = message.find("next")) view.next = next->count(0, kMaxNumber);
   const JsonField state = message.at("state");
   if (!state.isObject()) state.fail("an object");
   // Bytes that are no UTF-8 do not get here: the parser refuses them.
@@ -71,7 +71,7 @@ ClientMessage parseClientMessage(std::string_view text, size_t caches) {
   if (name == "histogram") return histogramIn(message, caches);
   if (name == "colours") return ColoursRequest{nameIn(message, "map")};
   if (name == "pick") return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1)};
-  if (name == "shown") return ShownReport{message.at("picture").count(0, kMostNumber)};
+  if (name == "shown") return ShownReport{message.at("picture").count(0, kMaxNumber)};
   type.fail("open, view, choose, histogram, colours, pick or shown");
 }
 

@@ -26,7 +26,7 @@ namespace curvisplat {
 inline constexpr size_t kLongestMessage = 64 << 10;
 /// Longest side of a picture, and the most pixels of one.
 inline constexpr int kLargestSide = 4096;
-inline constexpr uint64_t kMostPixels = 8'300'000;  // 3840 x 2160
+inline constexpr uint64_t kMaxPixels = 8'300'000;  // 3840 x 2160
 
 struct OpenRequest {
   size_t cache = 0;

@@ -26,8 +26,8 @@ constexpr seconds kRequestTime{10};      // for a whole request, and for its ans
 constexpr seconds kQuietTime{60};        // without a sign of life; half of it after a ping
 constexpr seconds kPartTime{20};         // for a part of a message
 constexpr size_t kPartBytes = 32 << 10;  // sent at a time
-constexpr size_t kMostWaitingBytes = 64 << 20;
-constexpr size_t kMostWaiting = 64;
+constexpr size_t kMaxWaitingBytes = 64 << 20;
+constexpr size_t kMaxWaiting = 64;
 
 constexpr const char* kPath = "/socket";
 
@@ -181,7 +181,7 @@ void Connection::send(std::string message, bool is_text) {
   if (closing_) return;
   outgoing_bytes_ += message.size();
   outgoing_.push_back({std::move(message), is_text});
-  if (outgoing_.size() > kMostWaiting || outgoing_bytes_ > kMostWaitingBytes) return drop();
+  if (outgoing_.size() > kMaxWaiting || outgoing_bytes_ > kMaxWaitingBytes) return drop();
   if (outgoing_.size() == 1) writeNext();
 }
 

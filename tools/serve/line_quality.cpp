@@ -46,7 +46,7 @@ void LineQuality::learn(double delay_s) {
   in_time_ = over_s < kEarlySeconds ? in_time_ + 1 : 0;
   int level = level_;
   // Pictures that were on their way at the last change say nothing about this level.
-  if ((over_s > kLateSeconds || delay_s > kTooLongSeconds) && since_change_ > static_cast<int>(kMostOnTheWay))
+  if ((over_s > kLateSeconds || delay_s > kTooLongSeconds) && since_change_ > static_cast<int>(kMaxOnTheWay))
     level = std::min(kCoarsest, level_ + 1);
   else if (in_time_ >= kInTimeToRefine)
     level = std::max(0, level_ - 1);

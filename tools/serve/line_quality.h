@@ -20,11 +20,11 @@ struct PictureQuality {
 
 class LineQuality {
  public:
-  static constexpr size_t kMostOnTheWay = 3;
+  static constexpr size_t kMaxOnTheWay = 3;
   static constexpr int kCoarsest = 6;
 
   /// Whether a further picture may be sent.
-  bool isOpen() const { return sent_.size() < kMostOnTheWay; }
+  bool isOpen() const { return sent_.size() < kMaxOnTheWay; }
   size_t onTheWay() const { return sent_.size(); }
   int level() const { return level_; }
   PictureQuality quality() const;
@@ -45,8 +45,8 @@ class LineQuality {
   std::deque<Sent> sent_;
   std::deque<double> delays_;  // lately
   int level_ = 0;
-  int in_time_ = 0;                   // pictures since the last late one
-  int since_change_ = kMostOnTheWay;  // pictures since the level changed
+  int in_time_ = 0;                  // pictures since the last late one
+  int since_change_ = kMaxOnTheWay;  // pictures since the level changed
 };
 
 }  // namespace curvisplat

@@ -20,9 +20,9 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kMostReports =
+constexpr size_t kMaxReports =
     16;  // that wait to be read; a page sends as many as there are pictures on their way
-constexpr size_t kMostAsked = 64;
+constexpr size_t kMaxAsked = 64;
 
 double clockSeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -146,7 +146,7 @@ class RemoteViewer::Work {
     picked_.reset();  // it was of another picture
     const uint64_t number = frames_->request(std::move(request));
     // A page that asks faster than pictures come does not make this grow.
-    if (asked_.size() == kMostAsked) asked_.pop_front();
+    if (asked_.size() == kMaxAsked) asked_.pop_front();
     asked_.push_back(
         {number, static_cast<double>(view.number), view.moving, std::move(state), view.size, data});
   }
@@ -243,7 +243,7 @@ void RemoteViewer::receive(ClientMessage message) {
     if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
     if (auto* const pick = std::get_if<PickRequest>(&message)) inbox_.pick = *pick;
     if (auto* const shown = std::get_if<ShownReport>(&message))
-      if (inbox_.shown.size() < kMostReports) inbox_.shown.push_back(shown->picture);
+      if (inbox_.shown.size() < kMaxReports) inbox_.shown.push_back(shown->picture);
     news_ = true;
   }
   changed_.notify_all();

@@ -89,7 +89,7 @@ std::string ServedCaches::helloText() const {
   for (const Served& cache : caches_) json["caches"].push_back(cache.name);
   json["maps"] = Json::array();
   for (const PublishedMap& map : builtInMaps()) json["maps"].push_back(map.name);
-  json["most_pixels"] = kMostPixels;
+  json["most_pixels"] = kMaxPixels;
   json["largest_side"] = kLargestSide;
   return textOf(json);
 }
@@ -137,9 +137,9 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
   return textOf(json);
 }
 
-std::string ServedCaches::markerText(size_t number, const MarkedScalar& scalar,
+std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& scalar,
                                      const glm::dvec3& point) const {
-  const Served& cache = caches_[number];
+  const Served& cache = caches_[cache_number];
   const size_t variable = variableOf(cache.reader, cache.name, scalar.name);
   const MutexLock lock(reading_);
   const CacheReader reader = cache.reader.atStep(scalar.step);
@@ -154,7 +154,7 @@ std::string ServedCaches::markerText(size_t number, const MarkedScalar& scalar,
                        {"i", found->i},
                        {"j", found->j},
                        {"k", found->k}};
-  return textOf({{"type", "marker"}, {"cache", number}, {"marker", marker}});
+  return textOf({{"type", "marker"}, {"cache", cache_number}, {"marker", marker}});
 }
 
 std::string ServedCaches::coloursText(const ColoursRequest& request) {

@@ -24,7 +24,7 @@ using asio::ip::tcp;
 using ErrorCode = boost::system::error_code;
 
 constexpr std::chrono::milliseconds kLookForStop{200};
-constexpr size_t kMostRequests = 64;  // connections that are not viewers
+constexpr size_t kMaxRequests = 64;  // connections that are not viewers
 
 /// Ends viewers on a thread of its own: each first ends the picture that it draws.
 class ViewerCloser {
@@ -152,7 +152,7 @@ class Server : public ConnectionHost {
       if (!acceptor_.is_open()) return;
       connections_.remove_if([](const auto& weak) { return weak.expired(); });
       // More than may be are not heard; those that wait for a viewer's end count as viewers.
-      if (!error && connections_.size() < kMostRequests + options_.viewers) {
+      if (!error && connections_.size() < kMaxRequests + options_.viewers) {
         const auto connection = std::make_shared<Connection>(std::move(socket), *this);
         connections_.push_back(connection);
         connection->start();

@@ -18,9 +18,9 @@ struct PageResidence {
 /// Residence of `bytes` bytes of the file from `offset`, a multiple of the page size; uses mincore. The
 /// kernel reports all pages of a file as resident if the caller neither owns it nor may write it. Throws
 /// Error.
-PageResidence residenceOf(const std::filesystem::path& file, uint64_t offset, uint64_t bytes);
+PageResidence residenceOf(const std::filesystem::path& path, uint64_t offset, uint64_t bytes);
 /// Residence of the whole file.
-PageResidence residenceOf(const std::filesystem::path& file);
+PageResidence residenceOf(const std::filesystem::path& path);
 
 /// Writes back and evicts the pages of `files`, then checks with mincore. Returns nullopt if all are evicted,
 /// else the reason: a file system in memory keeps its pages, and so does another process that maps them.

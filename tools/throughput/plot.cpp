@@ -29,7 +29,7 @@ constexpr std::array<Colour, 7> kColours{{{0.00, 0.45, 0.70},
 constexpr Colour kInk{0.13, 0.13, 0.13}, kGrid{0.87, 0.87, 0.87}, kFaint{0.4, 0.4, 0.4};
 constexpr double kPixelsPerPoint = 2;  // for high-resolution displays
 constexpr double kPanelWidth = 460, kLineHeight = 320, kBarHeight = 19, kLegendHeight = 20;
-constexpr size_t kMostInARow = 3;
+constexpr size_t kMaxInARow = 3;
 constexpr double kFont = 12, kTitleFont = 14;
 
 /// Sizes in points.
@@ -259,7 +259,7 @@ std::vector<std::byte> drawPanels(const std::vector<Panel>& panels) {
     body_height = std::max(body_height, heightOf(panel));
   }
   const double body_top = kLegendTop + legend_height + 4, height = body_top + body_height + 8;
-  const size_t columns = std::min(panels.size(), kMostInARow), rows = (panels.size() + columns - 1) / columns;
+  const size_t columns = std::min(panels.size(), kMaxInARow), rows = (panels.size() + columns - 1) / columns;
   PlotCanvas canvas(kPanelWidth * static_cast<double>(columns), height * static_cast<double>(rows));
   for (size_t n = 0; n < panels.size(); ++n) {
     const double left = kPanelWidth * static_cast<double>(n % columns);

@@ -37,10 +37,10 @@ const char* stateOfPicture(const ShownStatistics& shown) {
   return shown.is_final ? "final" : shown.busy ? "refining" : "coarse";
 }
 
-void drawStatistics(const ViewState& state, const ShownStatistics& facts) {
+void drawStatistics(const ViewState& state, const ShownStatistics& shown) {
   if (!ImGui::BeginTable("statistics", 2, ImGuiTableFlags_SizingFixedFit)) return;
-  row("picture", stateOfPicture(facts));
-  if (const FrameStatistics* s = facts.statistics) {
+  row("picture", stateOfPicture(shown));
+  if (const FrameStatistics* s = shown.statistics) {
     row("frame", milliseconds(s->total_s));
     row("plan", milliseconds(s->plan_s));
     row("read, decode",
@@ -62,7 +62,7 @@ void drawStatistics(const ViewState& state, const ShownStatistics& facts) {
   const ProcessUsage usage = ProcessUsage::now();
   row("process", fmt::format("{:.0f} MiB, peak {:.0f} MiB", mebibytes(usage.memory_bytes),
                              mebibytes(usage.peak_memory_bytes)));
-  row("drawn by", facts.backend);
+  row("drawn by", shown.backend);
   ImGui::EndTable();
 }
 

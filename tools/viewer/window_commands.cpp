@@ -85,8 +85,8 @@ const CommandInfo& infoOf(Command command) {
   return *found;
 }
 
-std::optional<Command> commandOf(const Window::Key& pressed) {
-  const Window::Key key = usual(pressed);
+std::optional<Command> commandOf(const Window::Key& pressed_key) {
+  const Window::Key key = usual(pressed_key);
   for (const CommandInfo& info : kCommands)
     if (info.key != 0 && info.key == key.code && info.shift == key.shift && info.control == key.control)
       return info.command;

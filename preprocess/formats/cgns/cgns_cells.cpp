@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint64_t kChunk = 65536;
 // Elements of the highest order that CGNS knows have 125 nodes and a type.
-constexpr int64_t kMostNumbers = 126;
+constexpr int64_t kMaxNumbers = 126;
 
 /// From 1; what is none of them is refused as any number that is too large.
 uint64_t pointOf(int64_t node) {
@@ -82,7 +82,7 @@ void CgnsCells::countCells(const CgnsSection& section) {
   for (uint64_t first = 0; first < section.elements; first += kChunk / 8) {
     const uint64_t count = std::min(kChunk / 8, section.elements - first);
     const std::vector<int64_t> begins = integersOf(section.begins, first, count + 1);
-    if (static_cast<uint64_t>(begins.back() - begins.front()) > count * kMostNumbers)
+    if (static_cast<uint64_t>(begins.back() - begins.front()) > count * kMaxNumbers)
       throw Error("{}: {} has {} numbers for {} elements; the file is damaged", file_, section.path,
                   begins.back() - begins.front(), count);
     const std::vector<int64_t> numbers =
@@ -185,7 +185,7 @@ FaceLists CgnsCells::faceLists() const {
 void CgnsCells::readFixed(const CgnsSection& section, uint64_t first, uint64_t count, MeshCells& out) const {
   const CgnsElementKind kind = cgnsElementKind(section.type);
   const std::vector<int64_t> nodes = integersOf(section.connectivity, first * kind.nodes, count * kind.nodes);
-  std::array<uint64_t, kMostNumbers> points{};
+  std::array<uint64_t, kMaxNumbers> points{};
   for (uint64_t n = 0; n < count; ++n) {
     for (size_t node = 0; node < kind.nodes; ++node) points[node] = pointOf(nodes[n * kind.nodes + node]);
     out.append(kind.cell, std::span(points).first(kind.nodes));
@@ -197,7 +197,7 @@ void CgnsCells::readMixed(const CgnsSection& section, uint64_t first, uint64_t c
   const auto base = static_cast<uint64_t>(begins.front());
   const std::vector<int64_t> numbers =
       integersOf(section.connectivity, base, static_cast<uint64_t>(begins.back()) - base);
-  std::array<uint64_t, kMostNumbers> points{};
+  std::array<uint64_t, kMaxNumbers> points{};
   for (uint64_t n = 0; n < count; ++n) {
     const auto from = static_cast<size_t>(begins[n]) - base;
     const CgnsElementKind kind = cgnsElementKind(numbers[from]);  // checked when the zone was opened

@@ -37,9 +37,9 @@ CgnsMeshSource::CgnsMeshSource(std::shared_ptr<const CgnsFile> file, CgnsTree tr
 }
 
 /// Where the zone's fields do not have a value for each of its cells.
-void CgnsMeshSource::dropFieldsOfCells(size_t number) {
-  CgnsZone& zone = tree_.zones[number];
-  const uint64_t cells = cells_[number].cells();
+void CgnsMeshSource::dropFieldsOfCells(size_t zone_number) {
+  CgnsZone& zone = tree_.zones[zone_number];
+  const uint64_t cells = cells_[zone_number].cells();
   if (cells == zone.cells) return;
   const size_t dropped =
       std::erase_if(zone.fields, [](const CgnsField& field) { return field.centring == Centring::kCell; });

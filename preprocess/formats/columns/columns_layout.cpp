@@ -13,7 +13,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMostSides = 64, kMostLevels = 1 << 20;
+constexpr uint64_t kMaxSides = 64, kMaxLevels = 1 << 20;
 
 std::optional<size_t> dimensionNamed(const NetcdfFiles& file, std::string_view name) {
   for (size_t n = 0; n < file.dimensions().size(); ++n)
@@ -58,9 +58,9 @@ void setSizes(const NetcdfFiles& file, ColumnsMap& map) {
   map.faces = file.dimensions()[map.face_dim].length;
   map.nodes = file.dimensions()[map.node_dim].length;
   map.most_sides = file.dimension(nodes, side_axis).length;
-  if (map.most_sides < 3 || map.most_sides > kMostSides || map.faces == 0 || map.nodes == 0)
+  if (map.most_sides < 3 || map.most_sides > kMaxSides || map.faces == 0 || map.nodes == 0)
     throw Error("{}: has {} faces of up to {} nodes; expected 3 to {}", file.path().string(), map.faces,
-                map.most_sides, kMostSides);
+                map.most_sides, kMaxSides);
 }
 
 ColumnsMap ugridOf(const NetcdfFiles& file, const NetcdfVariable& topology) {
@@ -98,7 +98,7 @@ std::vector<double> heightsOf(const NetcdfFiles& file, const NetcdfVariable& var
     box.start.push_back(0);
     box.count.push_back(file.dimension(variable, axis).length);
   }
-  if (box.values() > 2 * kMostLevels) return {};
+  if (box.values() > 2 * kMaxLevels) return {};
   std::vector<double> values(box.values());
   file.read(variable, box, std::span(values));
   for (double& value : values)
@@ -204,7 +204,7 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
         others.push_back(variable.dims[axis]);
     }
     const uint64_t layers = others.size() == 1 ? file.dimensions()[others[0]].length : 0;
-    if (layers < 2 || layers > kMostLevels || &variable == map.nodes_of_face) continue;
+    if (layers < 2 || layers > kMaxLevels || &variable == map.nodes_of_face) continue;
     const Centring centring = faces ? Centring::kCell : Centring::kNode;
     auto group = std::find_if(groups.begin(), groups.end(), [&](const ColumnsScalars& g) {
       return g.centring == centring && g.layer_dim == others[0] && g.time_dim == time;

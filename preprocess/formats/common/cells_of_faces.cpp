@@ -10,7 +10,7 @@ namespace {
 
 // Cells whose faces are sorted in memory by one pass; and the most faces that may lie between faces that are read
 // together.
-constexpr uint64_t kCellsAtOnce = 500'000, kMostGap = 512;
+constexpr uint64_t kCellsAtOnce = 500'000, kMaxGap = 512;
 
 /// The points of some faces.
 struct LoadedFaces {
@@ -55,7 +55,7 @@ LoadedFaces load(const FaceLists& lists, const CellChunk& chunk) {
   loaded.length.resize(numbers.size());
   for (size_t from = 0; from < numbers.size();) {
     size_t to = from + 1;
-    while (to < numbers.size() && numbers[to] - numbers[to - 1] < kMostGap) ++to;
+    while (to < numbers.size() && numbers[to] - numbers[to - 1] < kMaxGap) ++to;
     loadRun(lists, from, to, chunk.file, loaded);
     from = to;
   }

@@ -25,8 +25,8 @@ namespace {
 
 // Processor time for a small file, and what a larger one may take: indices of chunks grow with the file.
 constexpr rlim_t kSeconds = 10, kBytesPerSecond = rlim_t{64} << 20;
-constexpr size_t kMostAttributeBytes = size_t{1} << 20, kMostChunkBytes = size_t{1} << 18;
-constexpr size_t kMostReadBytes = size_t{1} << 26;  // of all chunks
+constexpr size_t kMaxAttributeBytes = size_t{1} << 20, kMaxChunkBytes = size_t{1} << 18;
+constexpr size_t kMaxReadBytes = size_t{1} << 26;  // of all chunks
 
 using Hdf5Object = Hdf5Handle<H5Oclose>;
 using Hdf5Properties = Hdf5Handle<H5Pclose>;
@@ -47,7 +47,7 @@ herr_t readAttribute(hid_t object, const char* name, const H5A_info_t*, void*) {
   const Hdf5Type type(H5Aget_type(attribute.id()));
   const Hdf5Space space(H5Aget_space(attribute.id()));
   const size_t bytes =
-      space ? bytesOf(H5Sget_simple_extent_npoints(space.id()), type, kMostAttributeBytes) : 0;
+      space ? bytesOf(H5Sget_simple_extent_npoints(space.id()), type, kMaxAttributeBytes) : 0;
   if (bytes == 0) return 0;
   std::vector<std::byte> values(bytes);
   if (H5Aread(attribute.id(), type.id(), values.data()) >= 0)
@@ -61,15 +61,15 @@ size_t readableBytes(const Hdf5DataSet& set, const Hdf5Space& space, const Hdf5T
   if (!properties || H5Pget_external_count(properties.id()) != 0) return 0;
   const H5D_layout_t layout = H5Pget_layout(properties.id());
   if (layout == H5D_VIRTUAL) return 0;
-  if (layout != H5D_CHUNKED) return bytesOf(1, type, kMostChunkBytes);
+  if (layout != H5D_CHUNKED) return bytesOf(1, type, kMaxChunkBytes);
   std::array<hsize_t, H5S_MAX_RANK> chunk{};
   const int rank = H5Pget_chunk(properties.id(), H5S_MAX_RANK, chunk.data());
   hssize_t points = rank > 0 && rank == H5Sget_simple_extent_ndims(space.id()) ? 1 : 0;
   for (int axis = 0; axis < rank && points > 0; ++axis) {
-    const auto length = static_cast<hssize_t>(std::min<hsize_t>(chunk[axis], kMostChunkBytes + 1));
-    points = length > 0 && points <= static_cast<hssize_t>(kMostChunkBytes) / length ? points * length : 0;
+    const auto length = static_cast<hssize_t>(std::min<hsize_t>(chunk[axis], kMaxChunkBytes + 1));
+    points = length > 0 && points <= static_cast<hssize_t>(kMaxChunkBytes) / length ? points * length : 0;
   }
-  return bytesOf(points, type, kMostChunkBytes);
+  return bytesOf(points, type, kMaxChunkBytes);
 }
 
 /// Its index, and its first and last value.
@@ -83,7 +83,7 @@ void readDataSet(hid_t object, size_t& read) {
   const size_t bytes = readableBytes(set, space, type);
   std::array<hsize_t, H5S_MAX_RANK> dims{}, first{}, one{};
   const int rank = H5Sget_simple_extent_dims(space.id(), dims.data(), nullptr);
-  if (bytes == 0 || read + 2 * bytes > kMostReadBytes || rank <= 0 ||
+  if (bytes == 0 || read + 2 * bytes > kMaxReadBytes || rank <= 0 ||
       std::find(dims.begin(), dims.begin() + rank, hsize_t{0}) != dims.begin() + rank)
     return;
   read += 2 * bytes;
@@ -157,9 +157,9 @@ class TriedFiles {
     return files_.contains(keyOf(file));
   }
   void add(const struct stat& file) {
-    constexpr size_t kMostFiles = 4096;
+    constexpr size_t kMaxFiles = 4096;
     const MutexLock lock(mutex_);
-    if (files_.size() >= kMostFiles) files_.clear();
+    if (files_.size() >= kMaxFiles) files_.clear();
     files_.insert(keyOf(file));
   }
 

@@ -16,7 +16,7 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kLooked = 2048;
-constexpr double kMostSteps = 1 << 20;
+constexpr double kMaxSteps = 1 << 20;
 
 std::string trimmed(std::string_view text) {
   const size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
@@ -54,7 +54,7 @@ Entry entryOf(const std::string& value, size_t least) {
   // Up to two whole numbers come first.
   for (int n = 0; n < 2 && entry.words.size() > least; ++n) {
     double number = 0;
-    if (!parseNumber(entry.words[0], number) || number < 1 || number > kMostSteps) break;
+    if (!parseNumber(entry.words[0], number) || number < 1 || number > kMaxSteps) break;
     if (n == 0) entry.time_set = static_cast<size_t>(number);
     entry.file_set = n == 1;
     entry.words.erase(entry.words.begin());
@@ -127,7 +127,7 @@ void CaseReader::takeTime(const std::string& key, const std::string& value) {
   }
   if (numbers.empty()) return;
   if (key == "time set") {
-    set_ = &sets_[numbers[0] >= 1 && numbers[0] <= kMostSteps ? static_cast<size_t>(numbers[0]) : 1];
+    set_ = &sets_[numbers[0] >= 1 && numbers[0] <= kMaxSteps ? static_cast<size_t>(numbers[0]) : 1];
     return;
   }
   if (!set_)
@@ -194,7 +194,7 @@ EnsightCase CaseReader::run(std::optional<uint32_t> step) {
   if (!model_ || model_->words.empty()) throw Error("{}: names no geometry (model:)", path_.string());
   EnsightCase result;
   for (const auto& [number, set] : sets_) {
-    if (set.steps != static_cast<double>(set.times.size()) || !(set.steps <= kMostSteps) ||
+    if (set.steps != static_cast<double>(set.times.size()) || !(set.steps <= kMaxSteps) ||
         !std::is_sorted(set.times.begin(), set.times.end()))
       throw Error(
           "{}: time set {} has {} times for {:g} steps, or times that do not rise; the file is damaged",

@@ -11,7 +11,7 @@ namespace {
 
 constexpr size_t kTextBytes = 80;
 constexpr uint64_t kChunk = 65536;
-constexpr double kMostCount = 0x1p40;
+constexpr double kMaxCount = 0x1p40;
 
 std::string trimmed(std::string_view text) {
   text = text.substr(0, text.find('\0'));
@@ -132,7 +132,7 @@ uint64_t EnsightFile::integer(bool decides_order) {
     value = text_->number();
     text_->line();
   }
-  if (!(value >= 0 && value <= kMostCount))
+  if (!(value >= 0 && value <= kMaxCount))
     throw Error("{}: has the count {} at byte {}; expected 0 or more; the file is damaged", name(), value,
                 binary_ ? at_ - 4 : text_->offset());
   return static_cast<uint64_t>(value);

@@ -9,9 +9,8 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kChunk = 65536;
-constexpr uint64_t kMostAxis =
-    1 << 24;  // nodes along an axis of a rectilinear part, which are kept in memory
-constexpr uint64_t kMostPoints = 1ull << 31;
+constexpr uint64_t kMaxAxis = 1 << 24;  // nodes along an axis of a rectilinear part, which are kept in memory
+constexpr uint64_t kMaxPoints = 1ull << 31;
 
 struct Type {
   std::string_view name;
@@ -78,9 +77,9 @@ void GeometryReader::readHead() {
 
 void GeometryReader::readCoordinates(EnsightPart& part) {
   part.points = file_.integer();
-  if (part.points > kMostPoints)
+  if (part.points > kMaxPoints)
     throw Error("{}: part {} has {} nodes; expected at most {}", file_.name(), part.number, part.points,
-                kMostPoints);
+                kMaxPoints);
   if (node_ids_) file_.integers(part.points);
   part.coordinates = file_.floats(3 * part.points);
 }
@@ -96,7 +95,7 @@ SpooledNumbers GeometryReader::beginsOf(const EnsightList& lengths) {
     lengths.read(first, std::span(values));
     for (const double value : values) {
       begins.add(total);
-      if (!(value >= 0 && value <= static_cast<double>(kMostPoints)))
+      if (!(value >= 0 && value <= static_cast<double>(kMaxPoints)))
         throw Error("{}: a polyhedron or a face has {} faces or nodes; the file is damaged", file_.name(),
                     value);
       total += static_cast<uint64_t>(value);
@@ -133,9 +132,9 @@ void GeometryReader::readElements(const std::string& type, EnsightPart& part) {
   } else if (polygons) {
     file_.integers(lastOf(beginsOf(file_.integers(elements.count))));
   } else {
-    if (elements.count > kMostPoints)
+    if (elements.count > kMaxPoints)
       throw Error("{}: part {} has {} elements of type {}; expected at most {}", file_.name(), part.number,
-                  elements.count, type, kMostPoints);
+                  elements.count, type, kMaxPoints);
     elements.nodes = file_.integers(elements.count * elements.nodes_each);
   }
   if (elements.kind != CellKind::kNone) part.cells += elements.count;
@@ -151,19 +150,19 @@ void GeometryReader::readBlock(const std::string& words, EnsightPart& part) {
   part.points = 1;
   part.cells = 1;
   for (size_t axis = 0; axis < 3; ++axis) {
-    if (!(sizes[axis] >= 1 && sizes[axis] <= static_cast<double>(kMostPoints)))
+    if (!(sizes[axis] >= 1 && sizes[axis] <= static_cast<double>(kMaxPoints)))
       throw Error("{}: part {} has {} nodes along {}; the file is damaged", file_.name(), part.number,
                   sizes[axis], "ijk"[axis]);
     part.nodes[axis] = static_cast<uint64_t>(sizes[axis]);
-    if (part.nodes[axis] > kMostPoints * 8 / part.points)
+    if (part.nodes[axis] > kMaxPoints * 8 / part.points)
       throw Error("{}: part {} has too many nodes; the file is damaged", file_.name(), part.number);
     part.points *= part.nodes[axis];
     part.cells *= part.nodes[axis] - 1;
   }
   if (has("uniform") || has("rectilinear")) {
     part.kind = has("uniform") ? EnsightPart::Kind::kUniform : EnsightPart::Kind::kRectilinear;
-    if (*std::max_element(part.nodes.begin(), part.nodes.end()) > kMostAxis)
-      throw Error("{}: part {} has more than {} nodes along an axis", file_.name(), part.number, kMostAxis);
+    if (*std::max_element(part.nodes.begin(), part.nodes.end()) > kMaxAxis)
+      throw Error("{}: part {} has more than {} nodes along an axis", file_.name(), part.number, kMaxAxis);
     if (has("uniform")) {
       const std::vector<double> values = file_.valuesOf(file_.floats(6));
       for (size_t axis = 0; axis < 3; ++axis)

@@ -144,9 +144,9 @@ void EnsightData::addScalars(const std::vector<EnsightVariable>& variables) {
   }
 }
 
-void EnsightData::readValues(uint32_t number, size_t part, size_t list, uint64_t first, uint64_t count,
+void EnsightData::readValues(uint32_t scalar_number, size_t part, size_t list, uint64_t first, uint64_t count,
                              std::span<float> to) const {
-  const Scalar& scalar = scalars_.at(number);
+  const Scalar& scalar = scalars_.at(scalar_number);
   const EnsightValues& values = values_[scalar.variable][part];
   if (list >= values.lists.size() || values.lists[list].count == 0)
     return std::fill(to.begin(), to.end(), kNaN);

@@ -22,7 +22,7 @@ uint64_t lengthOf(const NetcdfFile& file, const std::string& dimension) {
 }
 
 // Elements of the highest order that the format knows have 64 nodes.
-constexpr uint64_t kMostNodes = 1024;
+constexpr uint64_t kMaxNodes = 1024;
 
 /// The numbers of the element blocks, of their variables connect1, connect2, ...: a damaged dimension num_el_blk
 /// may be any number.
@@ -109,9 +109,9 @@ void ExodusSource::findBlocks() {
     if (block.kind != CellKind::kNone && block.nodes_each < cornersOf(block.kind))
       throw Error("{}: {} is of {} with {} nodes each, too few; the file is damaged", name, connect->name,
                   type, block.nodes_each);
-    if (block.kind != CellKind::kNone && block.nodes_each > kMostNodes)
+    if (block.kind != CellKind::kNone && block.nodes_each > kMaxNodes)
       throw Error("{}: {} is of {} with {} nodes each; expected at most {}; the file is damaged", name,
-                  connect->name, type, block.nodes_each, kMostNodes);
+                  connect->name, type, block.nodes_each, kMaxNodes);
     (block.kind == CellKind::kNone ? others : solid) += block.elements;
     if (block.nodes_each > cornersOf(block.kind) && block.kind != CellKind::kNone) curved += block.elements;
     elements_ += block.elements;

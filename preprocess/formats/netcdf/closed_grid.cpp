@@ -16,10 +16,10 @@ using Row = std::vector<glm::dvec3>;
 // Nodes coincide if they are this much nearer than their neighbours: single precision leaves 1e-4 of a step
 // of a kilometre.
 constexpr double kCoincide = 0.02;
-constexpr uint64_t kMostHalo = 4;
+constexpr uint64_t kMaxHalo = 4;
 constexpr uint64_t kRowsLookedAt = 9;
 // Shares of a row's nodes that must fit, since land may have no coordinates.
-constexpr double kMostOfThem = 0.9;
+constexpr double kMinMatching = 0.9;
 
 double stepAt(const Row& row, size_t n) {
   return glm::distance(row[n], row[n > 0 ? n - 1 : n + 1]);
@@ -39,7 +39,7 @@ double turns(const Row& row) {
 /// step is missing; nullopt if the row does not close.
 std::optional<uint64_t> repeatedColumns(const Row& row) {
   const size_t n = row.size();
-  for (uint64_t repeated = 1; repeated <= kMostHalo && repeated + 3 < n; ++repeated) {
+  for (uint64_t repeated = 1; repeated <= kMaxHalo && repeated + 3 < n; ++repeated) {
     bool all = true;
     for (uint64_t c = 0; c < repeated; ++c)
       all &= glm::distance(row[c], row[n - repeated + c]) < kCoincide * stepAt(row, c + 1);
@@ -85,16 +85,16 @@ void setNorth(const std::array<Row, 3>& rows, GridClosure& closure) {
     closure.mirror = mirrorOf(rows[0], rows[row]);
     return mirrored(rows[0], rows[row], closure.mirror, coincides);
   };
-  if (share(2) > kMostOfThem) {
+  if (share(2) > kMinMatching) {
     closure.north = GridClosure::North::kDropRow;
-  } else if (share(1) > kMostOfThem) {
+  } else if (share(1) > kMinMatching) {
     closure.north = GridClosure::North::kHalfRow;
-  } else if (share(0) <= kMostOfThem) {
+  } else if (share(0) <= kMinMatching) {
     const auto a_step_away = [&](uint64_t i, double distance) {
       const double step = glm::distance(rows[0][i], rows[1][i]);
       return distance > 0.3 * step && distance < 2 * step;
     };
-    if (mirrored(rows[0], rows[0], closure.mirror, a_step_away) > kMostOfThem)
+    if (mirrored(rows[0], rows[0], closure.mirror, a_step_away) > kMinMatching)
       closure.north = GridClosure::North::kAddRow;
   }
 }

@@ -17,7 +17,7 @@ namespace {
 
 constexpr size_t kBufferBytes = size_t{256} << 10;
 constexpr size_t kChunk = 32768;  // numbers
-constexpr uint64_t kMostNumbers = 100'000'000'000'000;
+constexpr uint64_t kMaxNumbers = 100'000'000'000'000;
 
 /// A list goes to its sink in chunks.
 template <typename Number>
@@ -127,7 +127,7 @@ struct FoamFile::Parser {
     const std::string word = token();
     uint64_t value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc{} || end != word.data() + word.size() || value > kMostNumbers)
+    if (error != std::errc{} || end != word.data() + word.size() || value > kMaxNumbers)
       fail(fmt::format("found \"{}\"; expected a number of 0 or more; the file is truncated or damaged",
                        word.substr(0, 30)));
     return value;

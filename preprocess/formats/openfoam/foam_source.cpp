@@ -200,11 +200,12 @@ void FoamSource::findFields() {
   }
 }
 
-const FoamList& FoamSource::valuesOf(uint32_t number, size_t field, std::vector<double>& uniform) const {
+const FoamList& FoamSource::valuesOf(uint32_t piece_number, size_t field,
+                                     std::vector<double>& uniform) const {
   const MutexLock lock(mutex_);
-  Values& values = values_[number][field];
+  Values& values = values_[piece_number][field];
   if (!values.read) {
-    const Piece& piece = pieces_[number];
+    const Piece& piece = pieces_[piece_number];
     FoamFile file(piece.folder / time_names_[description_.time_step] / fields_[field].name, spool_,
                   temporary_folder_);
     if (componentsOf(file.type()) != fields_[field].components)
@@ -223,13 +224,13 @@ const FoamList& FoamSource::valuesOf(uint32_t number, size_t field, std::vector<
   return values.list;
 }
 
-void FoamSource::readPoints(uint32_t number, uint64_t first, uint64_t count, std::span<const uint32_t>,
+void FoamSource::readPoints(uint32_t piece_number, uint64_t first, uint64_t count, std::span<const uint32_t>,
                             MeshPoints& out) const {
   for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
   out.hidden.assign(count, 0);
   out.scalars.clear();
   std::vector<double> points(3 * count);
-  pieces_[number].points.read(3 * first, std::span(points));
+  pieces_[piece_number].points.read(3 * first, std::span(points));
   for (size_t n = 0; n < count; ++n) {
     out.x[n] = points[3 * n];
     out.y[n] = points[3 * n + 1];
@@ -237,9 +238,9 @@ void FoamSource::readPoints(uint32_t number, uint64_t first, uint64_t count, std
   }
 }
 
-void FoamSource::readCells(uint32_t number, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
-                           MeshCells& out) const {
-  const Piece& piece = pieces_[number];
+void FoamSource::readCells(uint32_t piece_number, uint64_t first, uint64_t count,
+                           std::span<const uint32_t> scalars, MeshCells& out) const {
+  const Piece& piece = pieces_[piece_number];
   out.clear();
   std::vector<uint64_t> begins(count + 1);
   piece.cells.begins.read(first, std::span(begins));
@@ -249,14 +250,14 @@ void FoamSource::readCells(uint32_t number, uint64_t first, uint64_t count, std:
   const FaceLists lists{[&](uint64_t from, std::span<uint64_t> to) { face_begins.read(from, to); },
                         [&](uint64_t from, std::span<uint64_t> to) { labels.read(from, to); },
                         face_begins.count > 0 ? face_begins.count - 1 : 0, labels.count};
-  appendCellsOfFaces(lists, {begins, faces, description_.pieces[number].file, first}, out);
+  appendCellsOfFaces(lists, {begins, faces, description_.pieces[piece_number].file, first}, out);
 
   out.scalars.resize(scalars.size());
   std::vector<double> values, uniform;
   for (size_t n = 0; n < scalars.size(); ++n) {
     const Scalar& scalar = scalars_[scalars[n]];
     const size_t components = fields_[scalar.field].components;
-    const FoamList& list = valuesOf(number, scalar.field, uniform);
+    const FoamList& list = valuesOf(piece_number, scalar.field, uniform);
     values.resize(count * components);
     if (uniform.empty())
       list.read(first * components, std::span(values));

@@ -14,8 +14,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMostCount = 0x1p40;
-constexpr size_t kMostWords = 16;  // of a line: a hexahedron has a type, 8 points and a number
+constexpr double kMaxCount = 0x1p40;
+constexpr size_t kMaxWords = 16;  // of a line: a hexahedron has a type, 8 points and a number
 
 /// A line without comment and surrounding space.
 std::string_view trimmed(std::string_view line) {
@@ -49,7 +49,7 @@ class MeshParser {
   bool nextLine();
   std::optional<std::string_view> valueOf(std::string_view key) const;
   uint64_t count(std::string_view value) const;
-  /// The numbers of the line. False unless it has from `least` to kMostWords of them.
+  /// The numbers of the line. False unless it has from `least` to kMaxWords of them.
   bool numbers(size_t least);
   void readCells(uint64_t count);
   void readPoints(uint64_t count);
@@ -60,7 +60,7 @@ class MeshParser {
   const std::filesystem::path& folder_;
   uint64_t line_number_ = 0;
   std::string_view line_;
-  std::array<double, kMostWords> numbers_{};
+  std::array<double, kMaxWords> numbers_{};
   size_t filled_ = 0;
   std::optional<SpooledMeshWriter> writer_;
   std::vector<std::string> markers_;
@@ -88,7 +88,7 @@ std::optional<std::string_view> MeshParser::valueOf(std::string_view key) const 
 uint64_t MeshParser::count(std::string_view value) const {
   double number = -1;
   const bool good = parseNumber(value.substr(0, value.find_first_of(" \t")), number);
-  if (!good || !(number >= 0 && number <= kMostCount) ||
+  if (!good || !(number >= 0 && number <= kMaxCount) ||
       number != static_cast<double>(static_cast<uint64_t>(number)))
     fail("has the count '{}'; expected a whole number; the file is damaged", printable(value.substr(0, 40)));
   return static_cast<uint64_t>(number);
@@ -98,7 +98,7 @@ bool MeshParser::numbers(size_t least) {
   filled_ = 0;
   for (size_t at = 0; at < line_.size();) {
     const size_t end = std::min(line_.find_first_of(" \t,", at), line_.size());
-    if (end > at && (filled_ == kMostWords || !parseNumber(line_.substr(at, end - at), numbers_[filled_++])))
+    if (end > at && (filled_ == kMaxWords || !parseNumber(line_.substr(at, end - at), numbers_[filled_++])))
       return false;
     at = end + 1;
   }
@@ -118,7 +118,7 @@ void MeshParser::readCells(uint64_t count) {
       fail("an element of type {} has {} numbers; expected {} points", numbers_[0], filled_ - 1, points);
     for (size_t c = 0; c < points; ++c) {
       const double point = numbers_[c + 1];
-      if (!(point >= 0 && point <= kMostCount)) fail("an element has the point {}", point);
+      if (!(point >= 0 && point <= kMaxCount)) fail("an element has the point {}", point);
       corners[c] = static_cast<uint64_t>(point);
     }
     writer_->addCell(kind, std::span(corners).first(points));

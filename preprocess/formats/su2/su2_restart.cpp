@@ -14,7 +14,7 @@ namespace {
 
 constexpr int32_t kMagic = 535532;
 constexpr size_t kNameBytes = 33, kHeadBytes = 5 * sizeof(int32_t);
-constexpr int32_t kMostVariables = 10'000;
+constexpr int32_t kMaxVariables = 10'000;
 
 /// The fields of a line: separated by commas, or by tabs and spaces; quotes are left out.
 std::vector<std::string_view> fieldsOf(std::string_view line) {
@@ -64,7 +64,7 @@ void Su2Restart::openBinary(uint64_t points) {
   file_->readAt(0, head);
   const auto variables = loadStored<int32_t>(head.data() + 4, swap_);
   const auto stored = loadStored<int32_t>(head.data() + 8, swap_);
-  if (variables < 1 || variables > kMostVariables || stored < 0 || static_cast<uint64_t>(stored) != points)
+  if (variables < 1 || variables > kMaxVariables || stored < 0 || static_cast<uint64_t>(stored) != points)
     throw Error("{}: has {} variables at {} points; expected some at {}, the mesh's", file_->name(),
                 variables, stored, points);
   const auto count = static_cast<size_t>(variables);

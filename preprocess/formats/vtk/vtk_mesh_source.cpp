@@ -128,21 +128,21 @@ void VtkMeshSource::readScalars(uint32_t piece, uint64_t first, uint64_t count,
                         });
 }
 
-void VtkMeshSource::readPoints(uint32_t number, uint64_t first, uint64_t count,
+void VtkMeshSource::readPoints(uint32_t piece_number, uint64_t first, uint64_t count,
                                std::span<const uint32_t> scalars, MeshPoints& out) const {
-  const VtkPiece& piece = mesh_.pieces.at(number);
+  const VtkPiece& piece = mesh_.pieces.at(piece_number);
   for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
   const std::array<WantedComponent<double>, 3> wanted{
       {{0, out.x.data()}, {1, out.y.data()}, {2, out.z.data()}}};
   readTuples<double>(std::get<VtkPoints>(piece.nodes), first, count, wanted);
   readFlags(piece.point_ghosts, first, count, kHiddenPoint, out.hidden);
-  readScalars(number, first, count, scalars, out.scalars);
+  readScalars(piece_number, first, count, scalars, out.scalars);
 }
 
-void VtkMeshSource::readCells(uint32_t number, uint64_t first, uint64_t count,
+void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t count,
                               std::span<const uint32_t> scalars, MeshCells& out) const {
-  const VtkCells& cells = mesh_.cells.at(number);
-  const MeshPiece& piece = mesh_.names[number];
+  const VtkCells& cells = mesh_.cells.at(piece_number);
+  const MeshPiece& piece = mesh_.names[piece_number];
   out.clear();
   std::vector<uint64_t> types, points, faces;
   readIntegers(cells.types, first, count, types);
@@ -185,8 +185,8 @@ void VtkMeshSource::readCells(uint32_t number, uint64_t first, uint64_t count,
       throw Error("{}: polyhedron {} has faces that do not add up; the file is damaged", piece.file,
                   first + n);
   }
-  readFlags(mesh_.pieces[number].cell_ghosts, first, count, kHiddenCell, out.hidden);
-  readScalars(number, first, count, scalars, out.scalars);
+  readFlags(mesh_.pieces[piece_number].cell_ghosts, first, count, kHiddenCell, out.hidden);
+  readScalars(piece_number, first, count, scalars, out.scalars);
 }
 
 }  // namespace curvisplat

@@ -116,10 +116,10 @@ void VtkSource::readField(const VtkFields::Field& field, const VtkBlock& block, 
   }
 }
 
-void VtkSource::read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
+void VtkSource::read(uint32_t block_number, const NodeBox& box, std::span<const uint32_t> scalars,
                      NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(number, <, grid_.blocks.size());
-  const VtkBlock& block = grid_.blocks[number];
+  CURVISPLAT_CHECK_OP(block_number, <, grid_.blocks.size());
+  const VtkBlock& block = grid_.blocks[block_number];
   const VtkPiece& piece = grid_.pieces[block.piece];
   const VtkBox nodes_box = nodesOf(piece, block, box);
   const auto nodes = static_cast<size_t>(nodes_box.size());

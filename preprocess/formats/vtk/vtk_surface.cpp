@@ -13,7 +13,7 @@ namespace {
 using Node = pugi::xml_node;
 
 constexpr uint64_t kChunk = 65536;
-constexpr uint64_t kMostPoints = std::numeric_limits<uint32_t>::max();
+constexpr uint64_t kMaxPoints = std::numeric_limits<uint32_t>::max();
 
 /// Passes on the tuples of an array, some at a time, so that no more memory is taken than there is data.
 template <typename Use>
@@ -52,7 +52,7 @@ class PieceReader {
  private:
   uint64_t countOf(const char* attribute) const {
     const uint64_t count = piece_.attribute(attribute).as_ullong(0);
-    if (count > kMostPoints) file_.fail(std::string(attribute) + " is too large");
+    if (count > kMaxPoints) file_.fail(std::string(attribute) + " is too large");
     return count;
   }
 
@@ -68,7 +68,7 @@ class PieceReader {
     std::vector<uint64_t> ends;
     forTuples(file_.array(arrayNamed(node, "offsets"), cells), 1, [&](const auto& values, size_t n) {
       const double end = values[0][n];
-      if (!(end >= (ends.empty() ? 0.0 : static_cast<double>(ends.back())) && end <= 8.0 * kMostPoints))
+      if (!(end >= (ends.empty() ? 0.0 : static_cast<double>(ends.back())) && end <= 8.0 * kMaxPoints))
         file_.fail("the offsets of its cells do not increase");
       ends.push_back(static_cast<uint64_t>(end));
     });
@@ -112,7 +112,7 @@ VtkSurface readVtkSurface(const std::filesystem::path& path) {
     file.fail("is a VTK file of type " + file.type() + "; a surface is a .vtp file, of type PolyData");
   VtkSurface surface;
   for (const Node& piece : file.content().children("Piece")) PieceReader(file, piece, surface).read();
-  if (surface.points.size() > kMostPoints) file.fail("has too many points");
+  if (surface.points.size() > kMaxPoints) file.fail("has too many points");
   if (surface.triangles.empty()) file.fail("has no polygons");
   return surface;
 }

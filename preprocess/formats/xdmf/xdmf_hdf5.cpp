@@ -13,7 +13,7 @@ namespace curvisplat {
 namespace {
 
 /// Three coordinates and a scalar for each of a few threads, which wait for one another in HDF5 anyway.
-constexpr size_t kMostOpen = 16;
+constexpr size_t kMaxOpen = 16;
 
 class Hdf5Values final : public XdmfValues {
  public:
@@ -132,7 +132,7 @@ void XdmfHdf5Sets::with(const std::filesystem::path& path, const std::string& na
     if (!file) throw Error("{}: {}: is not an HDF5 file, or is damaged", path.string(), name);
     Hdf5DataSet set(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT));
     if (!set) throw Error("{}: {}: has no such data set", path.string(), name);
-    if (open_.size() == kMostOpen) open_.pop_back();
+    if (open_.size() == kMaxOpen) open_.pop_back();
     open_.push_front({path, name, std::move(file), std::move(set)});
   }
   use(open_.front().set.id());
