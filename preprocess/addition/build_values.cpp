@@ -94,6 +94,7 @@ void ValueBuilder::buildLeaf(const Leaf& leaf, LoadedValues& loaded, OctantMerge
     BrickSplats brick = decode(position, loaded);
     takeValues(position, loaded, brick);
     encode(position, brick, built[position - loaded.first]);
+    writer_->histograms().add(brick);
     if (has_parent) merger.add(brick);
   }
   if (has_parent && !leaf.goes_on)
