@@ -2,8 +2,10 @@
 """Measures series of time steps: conversion of further steps, bytes, and frames while the steps change.
 
     bench/steps.py FOLDER [--nodes 192x128x48] [--steps 12] [--memory 512M] [--json OUT.json]
+    bench/steps.py FOLDER --nodes 512x500x250 --steps 100 --one-by-one --series fixed --views 4px
 
-The wake on a fixed grid, and on one that moves. Frames are drawn by `render --steps`, forwards, at the finest level (256x256) and
+The wake on a fixed grid, and on one that moves. With --one-by-one each step is generated, added to the cache and removed before the
+next one: the disk then holds one step's files beside the cache (64 M nodes: 1.3 GB beside 1.4 bytes a node and step). Frames are drawn by `render --steps`, forwards, at the finest level (256x256) and
 at 4 pixels (600x600); the first frame, which opens the cache, is a measurement of its own. The processors' time, of opening and
 writing too, tells more than the clock where other programs run.
 """
@@ -13,6 +15,7 @@ import pathlib
 import resource
 import shutil
 import statistics
+import time
 
 import results
 
@@ -29,7 +32,34 @@ def convert(arguments, name, moving, out):
     results.run([program, "convert", f"{grid}_%04d.xyz" if moving else f"{grid}.xyz", f"{grid}_%04d.fun", "-o", cache, "--memory",
                  arguments.memory, "--stats", told])
     report = json.loads(told.read_text())
-    steps, nodes = report["each_step"], report["samples"]
+    tell(name, report["each_step"], report["samples"], out)
+    return cache
+
+
+def add_one_by_one(arguments, name, moving, out):
+    program, folder = arguments.program, arguments.folder
+    grid, cache = folder / name, folder / f"{name}.splats"
+    shutil.rmtree(cache, ignore_errors=True)
+    ni, nj, nk = (int(number) for number in arguments.nodes.split("x"))
+    steps, before = [], 0
+    for step in range(arguments.steps):
+        results.run([program, "generate", "wake", "--size", arguments.nodes, "--first-step", step, "--steps", 1, "-o", grid,
+                     *(["--moving"] if moving else [])])
+        files = [folder / (f"{name}_{step:04}.xyz" if moving else f"{name}.xyz"), folder / f"{name}_{step:04}.fun"]
+        to = ["--add-steps", "--to", cache] if step else ["-o", cache]
+        began = time.monotonic()
+        results.run([program, "convert", *files, *to, "--memory", arguments.memory])
+        seconds = time.monotonic() - began
+        size = sum(file.stat().st_size for file in cache.rglob("*") if file.is_file())
+        steps.append(dict(seconds=seconds, bytes=size - before))
+        before = size
+        for file in files:
+            file.unlink()
+    tell(name, steps, ni * nj * nk, out)
+    return cache
+
+
+def tell(name, steps, nodes, out):
     rates = [nodes / step["seconds"] for step in steps]
     size = [step["bytes"] / nodes for step in steps]
     out.add(f"steps/{name}/convert/first", "nodes/s", rates[:1])
@@ -37,7 +67,6 @@ def convert(arguments, name, moving, out):
     out.add(f"steps/{name}/bytes_per_node/further", "1", size[1:])
     print(f"{name}: first step {rates[0] / 1e6:.2f} M nodes/s, further {statistics.median(rates[1:]) / 1e6:.2f} "
           f"({statistics.median(rates[1:]) / rates[0]:.2f} times), {statistics.mean(size[1:]):.2f} bytes a node and step", flush=True)
-    return cache
 
 
 def cpu_seconds():
@@ -67,6 +96,9 @@ def main():
     parser.add_argument("--nodes", default="192x128x48", help="NIxNJxNK of the grid")
     parser.add_argument("--steps", type=int, default=12)
     parser.add_argument("--memory", default="512M")
+    parser.add_argument("--one-by-one", action="store_true", help="one step's files at a time")
+    parser.add_argument("--series", choices=("fixed", "moving"), help="only this one")
+    parser.add_argument("--views", nargs="+", choices=VIEWS, default=list(VIEWS))
     parser.add_argument("--json")
     parser.add_argument("--smoke", action="store_true", help="a small grid and three steps: whether it runs, not how fast")
     arguments = parser.parse_args()
@@ -75,8 +107,10 @@ def main():
     arguments.folder.mkdir(parents=True, exist_ok=True)
     out = results.Results()
     for name, moving in (("fixed", False), ("moving", True)):
-        cache = convert(arguments, name, moving, out)
-        for view in VIEWS:
+        if arguments.series not in (None, name):
+            continue
+        cache = (add_one_by_one if arguments.one_by_one else convert)(arguments, name, moving, out)
+        for view in arguments.views:
             draw(arguments, name, cache, view, out)
     if arguments.json:
         out.write(arguments.json, "steps", results.version_of(arguments.program))

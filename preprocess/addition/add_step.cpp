@@ -198,7 +198,7 @@ class StepAddition {
     GridSurvey survey;
     survey.ranges = ranges_;
     checkRanges(survey, source_.description(), scalars_);
-    StepWriter writer(lock_, cache);
+    StepWriter writer(lock_, cache, newStep());
     pass("seams", 0, "nodes", [&] { passes.mergeSeams(); });
     pass("build", cache.manifest().splats, "splats", [&] {
       const StepReferences references(cache, options_.to_part);
@@ -212,7 +212,7 @@ class StepAddition {
         if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer.addFile(*file);
       });
     pass("finish", 0, "bricks", [&] {
-      for (const FileInfo& file : writer.finish(newStep())) report_.files.push_back({file.name, file.size});
+      for (const FileInfo& file : writer.finish()) report_.files.push_back({file.name, file.size});
     });
   }
 

@@ -1,6 +1,5 @@
 #include "preprocess/addition/build_values.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -25,19 +24,21 @@ ValueBuilder::ValueBuilder(const CacheReader& cache, const ConversionOrder& orde
       variables_(variables),
       numbers_(cache.manifest().blocks),
       writer_(&writer),
-      progress_(&progress) {}
+      progress_(&progress),
+      scratch_([this] {
+        return Scratch{newMerger(), {}, {}};
+      }) {}
 
 void ValueBuilder::build(LoadedValues& loaded) {
   const uint32_t begin = buckets_->begin(loaded.bucket), end = buckets_->end(loaded.bucket);
   std::vector<Built> built(end - begin);
-  tbb::enumerable_thread_specific<OctantMerger> mergers([this] { return newMerger(); });
 
   const std::vector<Leaf> leaves = leavesOf(loaded);
   std::unique_ptr<OctantMerger> continued = std::move(open_);
   tbb::parallel_for(size_t{0}, leaves.size(), [&](size_t n) {
     const Leaf& leaf = leaves[n];
     if (leaf.is_continued) return buildLeaf(leaf, loaded, *continued, built);
-    if (!leaf.goes_on) return buildLeaf(leaf, loaded, mergers.local(), built);
+    if (!leaf.goes_on) return buildLeaf(leaf, loaded, scratch_.local().merger, built);
     // One at most does: the last.
     open_ = std::make_unique<OctantMerger>(newMerger());
     buildLeaf(leaf, loaded, *open_, built);
@@ -53,9 +54,8 @@ void ValueBuilder::build(LoadedValues& loaded) {
   }
   for (size_t level = inner.size(); level-- > 0;) {
     const std::vector<uint32_t>& positions = inner[level];
-    tbb::parallel_for(size_t{0}, positions.size(), [&](size_t n) {
-      built[positions[n] - begin] = buildInner(positions[n], loaded, mergers.local());
-    });
+    tbb::parallel_for(size_t{0}, positions.size(),
+                      [&](size_t n) { built[positions[n] - begin] = buildInner(positions[n], loaded); });
     for (const uint32_t position : positions) {
       octants_.erase((*order_)[position]);
       giveToParent(position, std::move(built[position - begin].octant));
@@ -86,23 +86,28 @@ std::vector<ValueBuilder::Leaf> ValueBuilder::leavesOf(const LoadedValues& loade
 }
 
 void ValueBuilder::buildLeaf(const Leaf& leaf, LoadedValues& loaded, OctantMerger& merger,
-                             std::vector<Built>& built) const {
+                             std::vector<Built>& built) {
+  Scratch& own = scratch_.local();
+  BrickSplats& brick = own.brick;
   const Cell& cell = brickAt(leaf.begin).cell;
   const bool has_parent = cell.level > 0;
   if (has_parent && !leaf.is_continued) merger.begin(cell);
   for (uint32_t position = leaf.begin; position < leaf.end; ++position) {
-    BrickSplats brick = decode(position, loaded);
+    decode(position, loaded, brick);
+    brick.variables.swap(own.variables);
     takeValues(position, loaded, brick);
     encode(position, brick, built[position - loaded.first]);
+    writer_->histograms().add(brick);
     if (has_parent) merger.add(brick);
+    brick.variables.swap(own.variables);
   }
-  if (has_parent && !leaf.goes_on)
-    built[leaf.end - 1 - loaded.first].octant = merger.finish().splats.variables;
+  if (has_parent && !leaf.goes_on) built[leaf.end - 1 - loaded.first].octant = merger.finishValues();
 }
 
-ValueBuilder::Built ValueBuilder::buildInner(uint32_t position, const LoadedValues& loaded,
-                                             OctantMerger& merger) {
-  BrickSplats brick = decode(position, loaded);
+ValueBuilder::Built ValueBuilder::buildInner(uint32_t position, const LoadedValues& loaded) {
+  Scratch& own = scratch_.local();
+  BrickSplats& brick = own.brick;
+  decode(position, loaded, brick);
   std::array<Values, 8>& octants = octants_.at((*order_)[position]);
   brick.variables.resize(variables_);
   for (Values& octant : octants) {
@@ -118,9 +123,9 @@ ValueBuilder::Built ValueBuilder::buildInner(uint32_t position, const LoadedValu
   Built built;
   encode(position, brick, built);
   if (brick.cell.level > 0) {
-    merger.begin(brick.cell);
-    merger.add(brick);
-    built.octant = merger.finish().splats.variables;
+    own.merger.begin(brick.cell);
+    own.merger.add(brick);
+    built.octant = own.merger.finishValues();
   }
   return built;
 }
@@ -131,7 +136,7 @@ void ValueBuilder::giveToParent(uint32_t position, Values&& octant) {
   octants_[brick.parent][static_cast<size_t>(brick.cell.octantInParent())] = std::move(octant);
 }
 
-BrickSplats ValueBuilder::decode(uint32_t position, const LoadedValues& loaded) const {
+void ValueBuilder::decode(uint32_t position, const LoadedValues& loaded, BrickSplats& out) const {
   const Brick& brick = brickAt(position);
   const std::span<const std::byte> geometry = loaded.geometryOf(position);
   const uint64_t found = checksumOf(geometry);
@@ -141,7 +146,7 @@ BrickSplats ValueBuilder::decode(uint32_t position, const LoadedValues& loaded) 
                        "convert again",
                        found, brick.geometry.checksum));
   try {
-    return decodeForMerging(cache_->manifest().root, brick, geometry, {}, {});
+    decodeForMerging(cache_->manifest().root, brick, geometry, out);
   } catch (const Error& error) {
     refuse(position, error.what());
   }
@@ -171,7 +176,8 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
     return near;
   };
 
-  brick.variables.assign(variables_, std::vector<SplatScalar>(brick.size()));
+  brick.variables.resize(variables_);
+  for (auto& values : brick.variables) values.resize(brick.size());
   std::vector<SplatScalar> values(variables_);
   size_t n = 0;
   for (const NodeRun& run : brick.runs) {

@@ -4,6 +4,8 @@
 // variables at once would have written.
 #pragma once
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <array>
 #include <cstdint>
 #include <map>
@@ -44,12 +46,18 @@ class ValueBuilder {
   };
 
   std::vector<Leaf> leavesOf(const LoadedValues& loaded) const;
-  void buildLeaf(const Leaf& leaf, LoadedValues& loaded, OctantMerger& merger,
-                 std::vector<Built>& built) const;
-  Built buildInner(uint32_t position, const LoadedValues& loaded, OctantMerger& merger);
+  /// What a thread needs; kept, since it is large.
+  struct Scratch {
+    OctantMerger merger;
+    BrickSplats brick;
+    std::vector<std::vector<SplatScalar>> variables;  // of a leaf, to keep their capacity
+  };
+
+  void buildLeaf(const Leaf& leaf, LoadedValues& loaded, OctantMerger& merger, std::vector<Built>& built);
+  Built buildInner(uint32_t position, const LoadedValues& loaded);
   void giveToParent(uint32_t position, Values&& octant);
 
-  BrickSplats decode(uint32_t position, const LoadedValues& loaded) const;
+  void decode(uint32_t position, const LoadedValues& loaded, BrickSplats& out) const;
   void takeValues(uint32_t position, LoadedValues& loaded, BrickSplats& brick) const;
   void encode(uint32_t position, BrickSplats& brick, Built& built) const;
   [[noreturn]] void refuse(uint32_t position, const std::string& what) const;
@@ -70,6 +78,7 @@ class ValueBuilder {
   // Of inner bricks some of whose children are built: what these gave, [octant].
   std::map<uint32_t, std::array<Values, 8>> octants_;
   std::unique_ptr<OctantMerger> open_;  // of the leaf cell whose bricks go on in the next bucket
+  tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 
 }  // namespace curvisplat

@@ -62,11 +62,9 @@ void ValueSink::add(const NodeSplat& splat, std::span<const SplatScalar> values)
     leaf_ = leaf;
     leaf_shares_ = order_->sharesItsCell(leaf);
   }
-  record_.clear();
+  if (gathered_.size() + maxValueRecordBytes(values.size()) > kGatheredBytes) flush();
   packValueRecord(splat.node, order_->positionOf(leaf_), placeInCell(position, cache_->bricks()[leaf_].cell),
-                  values, record_);
-  if (gathered_.size() + record_.size() > kGatheredBytes) flush();
-  gathered_.insert(gathered_.end(), record_.begin(), record_.end());
+                  values, gathered_);
 }
 
 void ValueSink::flush() {

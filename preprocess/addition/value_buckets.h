@@ -62,7 +62,7 @@ class ValueSink : public SplatSink {
   uint32_t leaf_ = kNoBrick;
   bool leaf_shares_ = false;
   uint32_t number_ = 0;  // of the leaf's bucket, in the file
-  std::vector<std::byte> record_, gathered_;
+  std::vector<std::byte> gathered_;
 };
 
 /// A bucket in memory.

@@ -11,9 +11,12 @@ void packValueRecord(uint64_t node, uint32_t brick, const std::array<uint32_t, 3
   CURVISPLAT_CHECK_OP(node, <, kMaxNodes);
   const bool varied = std::any_of(values.begin(), values.end(),
                                   [](const SplatScalar& value) { return recordFloat(value.variance) != 0; });
-  const auto put = [&out](const auto& number, size_t bytes) {
-    const auto* from = reinterpret_cast<const std::byte*>(&number);
-    out.insert(out.end(), from, from + bytes);
+  const size_t begin = out.size();
+  out.resize(begin + (varied ? maxValueRecordBytes(values.size()) : minValueRecordBytes(values.size())));
+  std::byte* to = out.data() + begin;
+  const auto put = [&to](const auto& number, size_t bytes) {
+    std::memcpy(to, &number, bytes);
+    to += bytes;
   };
   put(node | uint64_t{varied} << 47, 6);
   put(brick, sizeof brick);

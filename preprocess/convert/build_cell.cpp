@@ -85,10 +85,11 @@ struct CellBuilder::State {
   };
 
   State(const RootCube& root_cube, const std::vector<GridBlock>& grid_blocks, size_t variable_count,
-        const Progress& stopping, ValuePrecision value_precision)
+        HistogramSums& histogram_sums, const Progress& stopping, ValuePrecision value_precision)
       : root(root_cube),
         blocks(&grid_blocks),
         variables(variable_count),
+        histograms(&histogram_sums),
         progress(&stopping),
         precision(value_precision),
         scratch([this] {
@@ -111,6 +112,7 @@ struct CellBuilder::State {
   const RootCube root;
   const std::vector<GridBlock>* blocks;
   const size_t variables;
+  HistogramSums* const histograms;
   const Progress* progress;
   const ValuePrecision precision;
   std::vector<uint64_t> first_nodes;  // [block]
@@ -135,6 +137,7 @@ Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool
     unpack(cell, records.subspan(begin, std::min<size_t>(kMaxBrickSplats, records.size() - begin)),
            own.brick);
     leaf.built.bricks.push_back({encodeBrick(root, own.brick, precision), 0, true});
+    histograms->add(own.brick);
     if (!is_top) own.merger.add(own.brick);
   }
   leaf.built.own_bricks = leaf.built.bricks.size();
@@ -224,8 +227,8 @@ void CellBuilder::State::addToRuns(uint64_t node, std::vector<NodeRun>& runs) co
 }
 
 CellBuilder::CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-                         const Progress& progress, ValuePrecision precision)
-    : state_(std::make_unique<State>(root, blocks, variables, progress, precision)) {}
+                         HistogramSums& histograms, const Progress& progress, ValuePrecision precision)
+    : state_(std::make_unique<State>(root, blocks, variables, histograms, progress, precision)) {}
 
 CellBuilder::~CellBuilder() = default;
 

@@ -12,6 +12,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/progress.h"
+#include "stream/cache/value_histogram.h"
 #include "stream/codec/brick_codec.h"
 #include "stream/model/octree.h"
 
@@ -53,10 +54,10 @@ void sortByNode(RecordSpan records);
 
 class CellBuilder {
  public:
-  /// `blocks` and `progress`, which can stop it, must outlive it.
+  /// `blocks`, `progress`, which can stop it, and `histograms`, which leaves are added to, must outlive it.
   /// `precision`: of the leaves' values.
   CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-              const Progress& progress, ValuePrecision precision = ValuePrecision::kNormal);
+              HistogramSums& histograms, const Progress& progress, ValuePrecision precision);
   ~CellBuilder();
 
   /// Builds `cell` from its records (one at least), whose places it reorders. A cell is a leaf if it has at

@@ -24,7 +24,7 @@ OctreeBuilder::OctreeBuilder(const OctreePlan& plan, BucketTree& tree, CacheWrit
       writer_(&writer),
       temporary_folder_(plan.temporary_folder),
       progress_(&progress),
-      cells_(plan.root, plan.blocks, plan.variables, progress, plan.precision) {}
+      cells_(plan.root, plan.blocks, plan.variables, writer.histograms(), progress, plan.precision) {}
 
 void OctreeBuilder::build(const BucketFile& file) {
   const std::vector<uint32_t> leaves = tree_->leavesBelow(0);
@@ -48,7 +48,7 @@ uint64_t OctreeBuilder::bricksOf(uint32_t node) const {
 }
 
 /// Notes which nodes the writer's bricks are of. Those behind the last that completes a node are of one that
-/// is to be built again.
+/// is to be built again. The histograms lack those that stay.
 void OctreeBuilder::takeUpBricks() {
   built_.resize(tree_->size());
   const std::span<const Brick> bricks = writer_->bricks();
@@ -64,6 +64,11 @@ void OctreeBuilder::takeUpBricks() {
   for (Built& built : built_)
     if (built.first_brick + built.bricks > complete) built = {};
   writer_->keep(complete);
+  tbb::parallel_for(uint64_t{0}, complete, [&](uint64_t id) {
+    const BrickSplats brick = writer_->readBack(id);
+    const bool is_leaf = !brick.runs.empty();
+    if (is_leaf) writer_->histograms().add(brick);
+  });
 }
 
 /// Builds the parents that the bricks taken up lack. Returns the first bucket with more to build.

@@ -87,6 +87,17 @@ MergedOctant OctantMerger::finish() {
   return merged;
 }
 
+std::vector<std::vector<SplatScalar>> OctantMerger::finishValues() {
+  std::vector<std::vector<SplatScalar>> merged(variables_);
+  for (size_t voxel = 0; voxel < kOctantVoxels; ++voxel) {
+    if (voxels_.count(voxel) == 0) continue;
+    voxels_.finishValues(voxel, values_);
+    for (size_t variable = 0; variable < variables_; ++variable)
+      merged[variable].push_back(values_[variable]);
+  }
+  return merged;
+}
+
 BrickSplats joinOctants(const Cell& cell, size_t variables, std::array<MergedOctant, 8>&& octants) {
   BrickSplats brick;
   brick.cell = cell;

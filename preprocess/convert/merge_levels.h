@@ -33,6 +33,8 @@ class OctantMerger {
   /// Adds the decoded splats of one of its bricks. Sums follow the order of the calls and of the splats.
   void add(const BrickSplats& brick);
   MergedOctant finish();
+  /// The values of the splats that finish() gives: [variable][splat].
+  std::vector<std::vector<SplatScalar>> finishValues();
 
  private:
   size_t voxelOf(const RootPosition& position) const;

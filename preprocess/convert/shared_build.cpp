@@ -231,6 +231,9 @@ void joinBricks(const SharedBuild& build, CacheWriter& own, CacheWriter* whole, 
   std::vector<uint64_t> counts(ranks.count());
   counts[ranks.rank()] = own.bricks().size();
   ranks.sum(std::span<uint64_t>(counts));
+  std::vector<uint64_t> histograms = own.histograms().words();
+  ranks.sum(std::span<uint64_t>(histograms));
+  if (whole) whole->histograms().setWords(histograms);
 
   std::vector<Ranks::Bytes> offsets(ranks.count());
   if (whole) {

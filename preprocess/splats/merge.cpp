@@ -168,7 +168,26 @@ SplatCodes VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar
     std::copy_n(first_values, variables_, values.data());
     return first_codes_[voxel];
   }
+  finishMoments(voxel, splat, values);
+  if (!(voxel_size_ > 0)) return {};
+  const VoxelPlanes planes = finishInLattice(voxel, splat, values);
+  return {mergedBorderCode(planes, splat.position, splat, voxel_size_), kNoGrowth};
+}
 
+void VoxelMerger::finishValues(size_t voxel, std::span<SplatScalar> values) const {
+  CURVISPLAT_CHECK_OP(clusters_[voxel].count, >, 0u);
+  if (clusters_[voxel].count == 1) {
+    std::copy_n(first_values_.data() + voxel * variables_, variables_, values.data());
+    return;
+  }
+  Splat splat;
+  finishMoments(voxel, splat, values);
+  if (voxel_size_ > 0) finishInLattice(voxel, splat, values);
+}
+
+void VoxelMerger::finishMoments(size_t voxel, Splat& splat, std::span<SplatScalar> values) const {
+  const Splat& first = first_[voxel];
+  const SplatScalar* first_values = first_values_.data() + voxel * variables_;
   const GeometrySums& sums = sums_[voxel];
   const double share = 1 / sums.weight;
   const glm::dvec3 centre = share * sums.centre;
@@ -191,15 +210,14 @@ SplatCodes VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar
     if (explained > t) slope *= std::sqrt(t / explained);
     values[v] = {first_values[v].mean + mean, slope, std::max(0.0, t - explained)};
   }
-  return voxel_size_ > 0 ? finishInLattice(voxel, splat, values) : SplatCodes{};
 }
 
-SplatCodes VoxelMerger::finishInLattice(size_t voxel, Splat& splat, std::span<SplatScalar> values) const {
+VoxelPlanes VoxelMerger::finishInLattice(size_t voxel, Splat& splat, std::span<SplatScalar> values) const {
   const VoxelPlanes planes = faces_.of(voxel);
   Symmetric3 cells;
   addScaled(cells, 1 / sums_[voxel].weight, sums_[voxel].shape);
   blurEvenly(cells, voxel_size_, planes, splat, values);
-  return {mergedBorderCode(planes, splat.position, splat, voxel_size_), kNoGrowth};
+  return planes;
 }
 
 double VoxelMerger::detail(size_t voxel, double least) const {

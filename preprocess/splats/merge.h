@@ -42,6 +42,9 @@ class VoxelMerger {
   /// with the blur that belongs to the lattice, and ends at the faces that its splats end at.
   SplatCodes finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
 
+  /// The values alone.
+  void finishValues(size_t voxel, std::span<SplatScalar> values) const;
+
   /// World units: the square root of the largest eigenvalue of 12 x the covariance of the merged centres (n³
   /// unit cells: √(n² - 1)). 0 for a single splat. What Brick::error is the largest of. Or `least`, if that is more, which
   /// most often is known from a bound.
@@ -66,7 +69,9 @@ class VoxelMerger {
         false;  // a weight > 0 has come; until then each splat counts as 1, from then on by its weight
   };
 
-  SplatCodes finishInLattice(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
+  void finishMoments(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
+  /// Blurs a splat of a lattice. Returns its faces.
+  VoxelPlanes finishInLattice(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
   void accumulate(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatScalar* values);
   void clearSums(size_t voxel);
 

@@ -5,6 +5,7 @@
 //
 //   var.<n>.bin    VariableHeader | values streams | zeros | VariableRecord x bricks, in bricks.bin's order
 //                  ^ offset 0                              ^ table_offset, a multiple of kPageBytes
+//                  The last of the zeros may be a HistogramRecord (value_histogram.h).
 //
 //   geometry.bin   geometry streams | zeros to a multiple of kPageBytes; bricks.bin has the streams' extents
 //

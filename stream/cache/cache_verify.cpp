@@ -12,6 +12,7 @@
 #include "stream/cache/brick_grids.h"
 #include "stream/cache/cache_file.h"
 #include "stream/cache/faces_file.h"
+#include "stream/cache/series_histogram.h"
 #include "stream/model/border_code.h"
 #include "stream/model/shape_extent.h"
 
@@ -27,7 +28,11 @@ constexpr double kRounding = 1e-5;
 class Verifier {
  public:
   explicit Verifier(const CacheReader& reader)
-      : reader_(reader), bricks_(reader.bricks()), weights_(bricks_.size()), whole_(bricks_.size()) {}
+      : reader_(reader),
+        bricks_(reader.bricks()),
+        weights_(bricks_.size()),
+        whole_(bricks_.size()),
+        volumes_(reader.manifest().variables.size()) {}
 
   CacheVerification verify(Progress* progress) {
     if (progress) progress->begin("verify", bricks_.size(), "bricks");
@@ -37,6 +42,7 @@ class Verifier {
       if (progress) progress->advance(1);
     }
     verifyWeights();
+    verifyHistograms();
     verifyGrids();
     verifyFaces();
     if (progress) progress->end();
@@ -147,8 +153,10 @@ class Verifier {
     try {
       reader_.readVariable(n, v, values);
     } catch (const Error& error) {
+      all_values_ = false;
       return find("{}", error.what());
     }
+    addToHistogram(n, v);
     const BrickVariable& record = reader_.brickVariables(v)[n];
     const auto [lowest, highest] = std::minmax_element(values.mean.begin(), values.mean.end());
     double slope = 0, variance = 0;
@@ -172,6 +180,44 @@ class Verifier {
                     "and {}",
                     reader_.manifest().variables[v].name, *lowest, *highest, slope, std::sqrt(variance),
                     record.min, record.max, record.largest_slope, record.largest_deviation));
+  }
+
+  void addToHistogram(uint32_t n, size_t v) {
+    all_values_ &= whole_[n];
+    if (!bricks_[n].isLeaf() || !whole_[n]) return;
+    const VariableInfo& variable = reader_.manifest().variables[v];
+    for (size_t s = 0; s < values_.size(); ++s)
+      volumes_[v][histogramBin(double{values_.mean[s]}, variable.min, variable.max)] += geometry_.weight[s];
+  }
+
+  void verifyHistograms() {
+    for (size_t v = 0; v < volumes_.size(); ++v) {
+      try {
+        if (const auto histogram = stepHistogram(reader_, v)) verifyHistogram(v, *histogram);
+      } catch (const Error& error) {
+        find("{}", error.what());
+      }
+    }
+  }
+
+  void verifyHistogram(size_t v, const ValueHistogram& histogram) {
+    const VariableInfo& variable = reader_.manifest().variables[v];
+    const std::string path = reader_.valuesPath(v).string();
+    if (histogram.lower != variable.min || histogram.upper != variable.max)
+      return find("{}: its histogram goes from {} to {}, the samples from {} to {}", path, histogram.lower,
+                  histogram.upper, variable.min, variable.max);
+    if (!all_values_) return;
+    double volume = 0;
+    for (const double of_bin : volumes_[v]) volume += of_bin;
+    if (std::abs(histogram.volume - volume) > kWeightTolerance * volume)
+      find("{}: its histogram is of a volume of {}, the leaves' weights sum to {}", path, histogram.volume,
+           volume);
+    for (size_t bin = 0; bin < kHistogramBins; ++bin) {
+      const double share = volumes_[v][bin] / volume;
+      if (std::abs(histogram.shares[bin] - share) > kRounding)
+        return find("{}: bin {} of its histogram has a share of {}, the leaves' splats have {}", path, bin,
+                    histogram.shares[bin], share);
+    }
   }
 
   void verifyWeights() {
@@ -265,8 +311,10 @@ class Verifier {
 
   const CacheReader& reader_;
   const std::span<const Brick> bricks_;
-  std::vector<double> weights_;  // [brick]
-  std::vector<bool> whole_;      // [brick]: whether its geometry could be decoded
+  std::vector<double> weights_;                              // [brick]
+  std::vector<bool> whole_;                                  // [brick]: whether its geometry could be decoded
+  std::vector<std::array<double, kHistogramBins>> volumes_;  // [variable]: of the leaves' splats, by bin
+  bool all_values_ = true;                                   // could be decoded
   CacheVerification result_;
   SplatGeometry geometry_;
   SplatVariable values_;

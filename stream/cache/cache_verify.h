@@ -23,6 +23,7 @@ struct CacheVerification {
 ///   inner bricks    the sum of the weights equals the children's, within 1e-3
 ///   the cache       the sum of the leaves' weights equals the manifest's volume, within 1e-3; bricks.vdb
 ///                   agrees with bricks.bin
+///   histograms      the shares are those of the leaves' splats, within 1e-5
 ///   faces.bin       its table; every patch's checksum; that it decodes; that its nodes lie in its box, and the box in
 ///                   that of its parent
 CacheVerification verifyCache(const CacheReader& reader, Progress* progress = nullptr);

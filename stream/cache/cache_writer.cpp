@@ -58,7 +58,8 @@ struct CacheWriter::State {
         geometry(folder.path() / "geometry.bin", Caching::kPages, OutputFile::Existing::kKeep),
         tables(variables.size()),
         geometry_input(geometry.path()),
-        log(folder.path(), variables.size()) {
+        log(folder.path(), variables.size()),
+        histograms(root, variables) {
     for (const VariableInfo& variable : variables) {
       values.emplace_back(folder.path() / variableFileName(variable), Caching::kPages,
                           OutputFile::Existing::kKeep);
@@ -89,6 +90,7 @@ struct CacheWriter::State {
   InputFile geometry_input;
   std::vector<InputFile> values_input;
   BrickLog log;
+  HistogramSums histograms;
 };
 
 void CacheWriter::State::add(AppendedBrick&& appended) {
@@ -162,6 +164,10 @@ std::span<const Brick> CacheWriter::bricks() const {
 
 void CacheWriter::keep(uint64_t count) {
   state_->keep(count);
+}
+
+HistogramSums& CacheWriter::histograms() {
+  return state_->histograms;
 }
 
 uint64_t CacheWriter::append(EncodedBrick&& encoded, float error) {
@@ -303,7 +309,8 @@ FileInfo CacheWriter::State::writeTable(size_t variable, const std::vector<uint3
   std::vector<BrickVariable> table;
   table.reserve(order.size());
   for (uint32_t id : order) table.push_back(tables[variable][id]);
-  return finishVariableFile(values[variable], variableFileName(variables[variable]), table);
+  return finishVariableFile(values[variable], variableFileName(variables[variable]), table,
+                            histograms.of(variable));
 }
 
 FileInfo CacheWriter::State::writeGrids(const std::vector<Brick>& ordered) {

@@ -17,6 +17,7 @@
 #include "stream/cache/brick_log.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/partial_folder.h"
+#include "stream/cache/value_histogram.h"
 #include "stream/codec/brick_codec.h"
 #include "stream/model/brick.h"
 
@@ -49,6 +50,9 @@ class CacheWriter {
   /// Reads back the brick that append() wrote under `id`, for merging into coarser levels. Any number of
   /// threads may read at the same time, while nothing is appended.
   BrickSplats readBack(uint64_t id) const;
+
+  /// For the histograms of the variables: finish() writes those to which every leaf was added. Any thread may add.
+  HistogramSums& histograms();
 
   /// What append() has noted of a brick.
   AppendedBrick appended(uint64_t id) const;

@@ -41,14 +41,27 @@ void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep
   replaceManifest(lock.cache(), manifest);
 }
 
+/// The variables with their ranges at the new step.
+std::vector<VariableInfo> variablesOf(const CacheReader& cache, const NewStep& step) {
+  std::vector<VariableInfo> variables = cache.seriesManifest().variables;
+  CURVISPLAT_CHECK_OP(step.ranges.size(), ==, variables.size());
+  for (size_t v = 0; v < variables.size(); ++v) {
+    variables[v].min = step.ranges[v].min;
+    variables[v].max = step.ranges[v].max;
+  }
+  return variables;
+}
+
 }  // namespace
 
-StepWriter::StepWriter(const CacheLock& lock, const CacheReader& cache)
-    : lock_(&lock),
+StepWriter::StepWriter(const CacheLock& lock, const CacheReader& cache, NewStep step)
+    : ValuesWriter(cache.manifest().root, variablesOf(cache, step)),
+      lock_(&lock),
       folder_(cache.path()),
       manifest_(cache.seriesManifest()),
       series_(cache.series()),
-      geometry_(cache.series().steps[cache.step()].geometry) {
+      geometry_(cache.series().steps[cache.step()].geometry),
+      added_(std::move(step)) {
   for (const VariableInfo& variable : manifest_.variables) {
     const fs::path path = folder_ / fmt::format("var.{}.{}.bin", variable.number, series_.steps.size());
     fs::path part = path;
@@ -72,12 +85,13 @@ void StepWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
   for (size_t n = 0; n < values.size(); ++n) appendValues(files_[n].file, values[n], files_[n].table[brick]);
 }
 
-std::vector<FileInfo> StepWriter::finish(const NewStep& added_step) {
+std::vector<FileInfo> StepWriter::finish() {
   const SeriesStep& first = series_.steps[series_.first_steps[geometry_]];
-  SeriesStep step{added_step.time, geometry_, first.geometry_checksum, first.grid_checksum, {}};
+  SeriesStep step{added_.time, geometry_, first.geometry_checksum, first.grid_checksum, {}};
   std::vector<FileInfo> infos;
   for (NewFile& file : files_) {
-    infos.push_back(finishVariableFile(file.file, file.path.filename().string(), file.table));
+    infos.push_back(finishVariableFile(file.file, file.path.filename().string(), file.table,
+                                       histograms().of(infos.size())));
     step.values.push_back({0, 0, infos.back().size, infos.back().checksum});
   }
   infos.insert(infos.end(), others_.begin(), others_.end());
@@ -90,7 +104,7 @@ std::vector<FileInfo> StepWriter::finish(const NewStep& added_step) {
   }
   syncDirectory(folder_);
   try {
-    putStep(*lock_, manifest_, series_, std::move(step), added_step, others_);
+    putStep(*lock_, manifest_, series_, std::move(step), added_, others_);
   } catch (const NameNotSynced&) {
     in_place_ = true;
     throw;
@@ -106,13 +120,13 @@ void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep 
   putStep(lock, cache.seriesManifest(), cache.series(), std::move(step), added, others);
 }
 
-void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added_step) {
+void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added) {
   const Series& series = cache.series();
   const fs::path folder = cacheFolder(lock.cache(), geometryFolderName(series.geometries()));
   const fs::path path = cacheFile(folder, "manifest.json");
   const std::string text = readTextFile(path);
   const Manifest manifest = Manifest::fromJson(text, path);
-  SeriesStep step{added_step.time,
+  SeriesStep step{added.time,
                   series.geometries(),
                   checksumOf(std::as_bytes(std::span(text))),
                   manifest.grid_checksum.value_or(0),
@@ -125,7 +139,7 @@ void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewS
   CURVISPLAT_CHECK_OP(step.values.size(), ==, cache.seriesManifest().variables.size());
   lock.requireStillThere();
   syncDirectory(lock.cache());
-  putStep(lock, cache.seriesManifest(), series, std::move(step), added_step, {});
+  putStep(lock, cache.seriesManifest(), series, std::move(step), added, {});
 }
 
 }  // namespace curvisplat

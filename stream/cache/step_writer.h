@@ -31,9 +31,9 @@ struct NewStep {
 /// For one thread at a time.
 class StepWriter : public ValuesWriter {
  public:
-  /// `lock` must outlive the writer. `cache`: opened under the lock, at a step of the geometry. Throws Error if a
-  /// file cannot be created.
-  StepWriter(const CacheLock& lock, const CacheReader& cache);
+  /// `lock` must outlive the writer. `cache`: opened under the lock, at a step of the geometry. `step`: the new one.
+  /// Throws Error if a file cannot be created.
+  StepWriter(const CacheLock& lock, const CacheReader& cache, NewStep step);
   /// Removes the new files unless finish() has succeeded.
   ~StepWriter() override;
   StepWriter(const StepWriter&) = delete;
@@ -46,7 +46,7 @@ class StepWriter : public ValuesWriter {
 
   /// Writes the tables, syncs, and puts files and manifest into place. Returns the new files. After an Error the
   /// cache is what it was.
-  std::vector<FileInfo> finish(const NewStep& step);
+  std::vector<FileInfo> finish();
 
  private:
   struct NewFile {
@@ -61,6 +61,7 @@ class StepWriter : public ValuesWriter {
   const Manifest manifest_;  // of the series
   const Series series_;
   const uint32_t geometry_;
+  const NewStep added_;
   std::vector<NewFile> files_;  // [variable]
   std::vector<FileInfo> others_;
   bool in_place_ = false;

@@ -41,10 +41,18 @@ void appendValues(OutputFile& file, const EncodedValues& values, BrickVariable& 
   record.values.offset = appendStream(file, values.bytes);
 }
 
-FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span<const BrickVariable> table) {
+FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span<const BrickVariable> table,
+                            const std::optional<ValueHistogram>& histogram) {
   std::vector<VariableRecord> records;
   records.reserve(table.size());
   for (const BrickVariable& variable : table) records.push_back(recordOf(variable));
+  if (histogram) {
+    // It ends where the table begins.
+    const HistogramRecord record = recordOf(*histogram);
+    const uint64_t pages = (file.size() + sizeof record + kPageBytes - 1) / kPageBytes;
+    padTo(file, pages * kPageBytes - sizeof record);
+    file.append(bytesOf(record));
+  }
   padToPage(file);
   VariableHeader header;
   header.record_bytes = sizeof(VariableRecord);

@@ -3,12 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "stream/base/file.h"
 #include "stream/cache/manifest.h"
+#include "stream/cache/value_histogram.h"
 #include "stream/codec/brick_codec.h"
 #include "stream/model/brick.h"
 
@@ -36,8 +38,9 @@ void beginVariableFile(OutputFile& file);
 /// Appends the values of a brick and fills its record in the table; once for each brick.
 void appendValues(OutputFile& file, const EncodedValues& values, BrickVariable& record);
 
-/// Appends the table, writes the header and closes the file. `table` is in the order of bricks.bin. `name`:
-/// the file's name in the manifest. Returns the manifest's entry.
-FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span<const BrickVariable> table);
+/// Appends the histogram, if there is one, and the table, writes the header and closes the file. `table` is in the
+/// order of bricks.bin. `name`: the file's name in the manifest. Returns the manifest's entry.
+FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span<const BrickVariable> table,
+                            const std::optional<ValueHistogram>& histogram = std::nullopt);
 
 }  // namespace curvisplat

@@ -24,7 +24,7 @@ constexpr const char* kPartSuffix = ".part";
 }  // namespace
 
 VariableWriter::VariableWriter(const CacheLock& lock, Manifest manifest, std::vector<VariableInfo> variables)
-    : lock_(&lock), manifest_(std::move(manifest)) {
+    : ValuesWriter(manifest.root, variables), lock_(&lock), manifest_(std::move(manifest)) {
   removeLeftovers();
   uint32_t number = 0;
   for (const VariableInfo& variable : manifest_.variables) number = std::max(number, variable.number + 1);
@@ -76,8 +76,9 @@ void VariableWriter::append(uint32_t brick, std::span<const EncodedValues> value
 
 std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sources) {
   std::vector<FileInfo> infos;
-  for (NewFile& file : files_)
-    infos.push_back(finishVariableFile(file.file, variableFileName(file.variable), file.table));
+  for (size_t v = 0; v < files_.size(); ++v)
+    infos.push_back(finishVariableFile(files_[v].file, variableFileName(files_[v].variable), files_[v].table,
+                                       histograms().of(v)));
   infos.insert(infos.end(), others_.begin(), others_.end());
   if (!lock_->isStillThere())
     throw Error(

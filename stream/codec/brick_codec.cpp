@@ -218,16 +218,8 @@ BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span
                              std::span<const BrickVariable> variables,
                              std::span<const std::vector<std::byte>> values) {
   CURVISPLAT_CHECK_OP(variables.size(), ==, values.size());
-  DecodedGeometry& decoded = scratchGeometry();
-  decodeNaming(brick, "geometry", [&] { decodeGeometryStream(brick.cell, brick.splats, geometry, decoded); });
   BrickSplats out;
-  out.cell = brick.cell;
-  out.runs = decoded.runs;
-  out.positions.resize(brick.splats);
-  out.splats.resize(brick.splats);
-  fillGeometry(root, decoded, out);
-  out.border_codes = decoded.border_code;
-  out.growth_codes = decoded.growth_code;
+  decodeForMerging(root, brick, geometry, out);
   SplatVariable variable;
   for (size_t v = 0; v < values.size(); ++v) {
     decodeVariable(brick, variables[v], values[v], variable);
@@ -238,6 +230,20 @@ BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span
                variable.variance[n]};
   }
   return out;
+}
+
+void decodeForMerging(const RootCube& root, const Brick& brick, std::span<const std::byte> geometry,
+                      BrickSplats& out) {
+  DecodedGeometry& decoded = scratchGeometry();
+  decodeNaming(brick, "geometry", [&] { decodeGeometryStream(brick.cell, brick.splats, geometry, decoded); });
+  out.cell = brick.cell;
+  out.runs = decoded.runs;
+  out.positions.resize(brick.splats);
+  out.splats.resize(brick.splats);
+  fillGeometry(root, decoded, out);
+  out.border_codes = decoded.border_code;
+  out.growth_codes = decoded.growth_code;
+  out.variables.clear();
 }
 
 }  // namespace curvisplat

@@ -72,5 +72,8 @@ void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const 
 BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span<const std::byte> geometry,
                              std::span<const BrickVariable> variables,
                              std::span<const std::vector<std::byte>> values);
+/// The geometry alone. Overwrites `out`, which has no variables then, and keeps its capacity.
+void decodeForMerging(const RootCube& root, const Brick& brick, std::span<const std::byte> geometry,
+                      BrickSplats& out);
 
 }  // namespace curvisplat

@@ -139,8 +139,23 @@ BrickSplats backwardLeaf() {
   return brick;
 }
 
+/// The other leaves have weights that no histogram takes.
+void makeWithHistogram(const fs::path& path) {
+  CacheWriter writer(path, false, kRoot, {{0, "f", "", 1, 20}, {3, "g", "K", -1, 1}});
+  Manifest manifest;
+  manifest.lower = kRoot.min;
+  manifest.upper = kRoot.min + kRoot.size;
+  manifest.blocks = {{"a", 60, 10, 5}};
+  BrickSplats leaf = smoothLeaf();
+  manifest.nodes = leaf.size();
+  writer.append(encodeBrick(kRoot, leaf), 0);
+  writer.histograms().add(leaf);
+  writer.finish(manifest);
+}
+
 void make(const fs::path& folder) {
   writeRandomCache(folder / "random.splats");
+  makeWithHistogram(folder / "histogram.splats");
   CacheWriter writer(folder / "odd.splats", false, kRoot, {{0, "f", "", -1, 1}, {3, "g", "K", -1, 1}});
   Manifest manifest;
   manifest.title = "odd \"names\" \\ and, blanks : {ü}";

@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "tests/end_to_end/window_fixture.h"
 #include "tools/viewer/playback.h"
@@ -37,7 +39,7 @@ TEST(Playback, GoesOnWhenTheStepHasBeenShown) {
   playback.setStepsPerSecond(10);
   EXPECT_FALSE(playback.tick(0));
   playback.toggle();
-  EXPECT_EQ(playback.next(), 1u);
+  EXPECT_EQ(playback.next(), StepPosition{1});
   EXPECT_FALSE(playback.tick(5));  // shown since now
   EXPECT_NEAR(playback.wait(5.06), 0.04, 1e-9);
   EXPECT_FALSE(playback.tick(5.06));
@@ -55,6 +57,48 @@ TEST(Playback, GoesOnWhenTheStepHasBeenShown) {
   Playback steady(1);
   steady.toggle();
   EXPECT_FALSE(steady.isPlaying());
+}
+
+/// Between steps 0 and 1 and between 2 and 3; steps 1 and 2 have different grids.
+TEST(Playback, StopsBetweenStepsOfOneGeometry) {
+  Playback playback(4, {true, false, true});
+  playback.setStepsPerSecond(10);
+  EXPECT_FALSE(playback.goTo(StepPosition{0, 0.3})) << "does not interpolate yet";
+  EXPECT_FALSE(playback.setInterpolates(true));
+  EXPECT_TRUE(playback.goTo(StepPosition{0, 0.3}));
+  EXPECT_EQ(playback.position(), (StepPosition{0, 0.3}));
+  EXPECT_TRUE(playback.goTo(StepPosition{1, 0.3}));
+  EXPECT_EQ(playback.position(), (StepPosition{1, 0}));
+  EXPECT_TRUE(playback.goTo(StepPosition{3, 0.3}));
+  EXPECT_EQ(playback.position(), (StepPosition{3, 0}));
+
+  // Keys go to steps.
+  playback.goTo(StepPosition{2, 0.6});
+  playback.advance(false);
+  EXPECT_EQ(playback.position(), (StepPosition{2, 0}));
+  playback.goTo(StepPosition{0, 0.6});
+  playback.advance(true);
+  EXPECT_EQ(playback.position(), (StepPosition{1, 0}));
+
+  // Plays at the same speed, with pictures between; from a place between two stops, the next stop follows.
+  playback.goTo(StepPosition{0, 0.3});
+  playback.toggle();
+  double now_s = 0;
+  std::vector<StepPosition> seen;
+  std::vector<double> times_s;
+  for (int n = 0; n < 9; ++n) {
+    while (!playback.tick(now_s)) now_s += 0.001;
+    seen.push_back(playback.position());
+    times_s.push_back(now_s);
+  }
+  EXPECT_EQ(seen, (std::vector<StepPosition>{
+                      {0, 0.5}, {0, 0.75}, {1}, {2}, {2, 0.25}, {2, 0.5}, {2, 0.75}, {3}, {0}}));
+  EXPECT_NEAR(times_s[7] - times_s[3], 0.1, 0.01);
+  EXPECT_NEAR(times_s[3] - times_s[2], 0.1, 0.01);
+
+  playback.goTo(StepPosition{0, 0.5});
+  EXPECT_TRUE(playback.setInterpolates(false));
+  EXPECT_EQ(playback.position(), StepPosition{});
 }
 
 class WindowPlayback : public WindowTest {
@@ -103,6 +147,27 @@ TEST_F(WindowPlayback, OpensAtAStep) {
   ASSERT_EQ(commands.size(), 1u);
   EXPECT_EQ(valueOf(commands[0], "--step"), "2");
   expectDraws(commands[0], picture);
+}
+
+TEST_F(WindowPlayback, InterpolatesBetweenSteps) {
+  open();
+  click("interpolate between steps");
+  click(placeOf("step", 0.5, 0.5));
+  moveTo(rest_);
+  const Image between = saveAndCopy();
+  click("interpolate between steps");  // back to the step before
+  moveTo(rest_);
+  const Image step = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_EQ(valueOf(commands[1], "--step"), "1");
+  EXPECT_NE(std::find(commands[0].begin(), commands[0].end(), "--interpolate"), commands[0].end());
+  const double time = std::stod(valueOf(commands[0], "--time"));
+  EXPECT_GT(time, 1.2);
+  EXPECT_LT(time, 1.8);
+  EXPECT_LT(difference(between, step), 60);
+  expectDraws(commands[0], between);
+  expectDraws(commands[1], step);
 }
 
 /// A grid that moves: a shown face of it moves too.

@@ -117,6 +117,19 @@ class Cache:
         return decode_values(data, self.bricks[n]["splats"], reference)
 
 
+    def histogram(self, number):
+        """Range, volume and shares of the finest splats, or None: the last bytes before the table may be such a record."""
+        name = self.values_name(number, self.step)
+        data, end = self.data[name], struct.unpack_from("<Q", self.data[name], 24)[0]
+        record = data[max(0, end - 2096):end]
+        if len(record) < 2096 or record[:8] != b"CVShisto":
+            return None
+        _, version, bins, lower, upper, volume, digest = struct.unpack_from("<8sIIdddQ", record)
+        need((version, bins) == (1, 512), "histogram")
+        need(checksum(record[:40] + record[48:]) == digest, "checksum of a histogram")
+        return lower, upper, volume, struct.unpack_from("<512f", record, 48)
+
+
 def main(folder, step=0):
     cache = Cache(folder, int(step))
     for n, brick in enumerate(cache.bricks):

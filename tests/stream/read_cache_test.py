@@ -76,7 +76,26 @@ def compare(cache, dump, seen):
             seen |= {"values with rows" if any(header[24:28]) else "values without rows"}
     if dump.read(1):
         sys.exit(f"{cache.folder}: the program decodes more bricks")
+    for number in cache.tables:
+        if cache.histogram(number):
+            compare_histogram(cache, number)
+            seen.add("histogram")
     print(f"{cache.folder}: {len(cache.bricks)} bricks, {numbers} numbers agree")
+
+
+def compare_histogram(cache, number):
+    """The shares that the program has written, with those of the leaves that were decoded here."""
+    lower, upper, volume, shares = cache.histogram(number)
+    volumes = np.zeros(len(shares))
+    for n, brick in enumerate(cache.bricks):
+        if brick["children"][1] == 0:
+            means = cache.values(number, n)["mean"].astype(np.float32).astype(np.float64)
+            bins = np.clip((means - lower) * (len(shares) / (upper - lower)) if upper > lower else 0 * means, 0, len(shares) - 1)
+            np.add.at(volumes, bins.astype(int), cache.geometry(n)["weight"])
+    variable = next(v for v in cache.manifest["variables"] if v["number"] == number)
+    if (lower, upper) != (variable["min"], variable["max"]) or abs(volume - volumes.sum()) > 1e-9 * volume \
+            or np.abs(volumes / volumes.sum() - shares).max() > 1e-6:
+        sys.exit(f"{cache.folder}: the histogram of variable {number} is not that of its leaves")
 
 
 def compare_faces(cache, dump):
@@ -123,7 +142,7 @@ def main(program, *caches):
                 compare_faces(cache, io.BytesIO(dump))
                 seen.add("faces")
     wanted = {f"{kind} predictor {n}" for kind in ("geometry", "values") for n in range(5)}
-    wanted |= {"flag 1", "flag 2", "flag 4", "values with rows", "values without rows", "faces"}
+    wanted |= {"flag 1", "flag 2", "flag 4", "values with rows", "values without rows", "faces", "histogram"}
     if not made or wanted - seen:
         sys.exit(f"no cache uses: {', '.join(sorted(wanted - seen))}")
 

@@ -24,6 +24,7 @@ struct GenerateOptions {
   std::string prefix;
   std::optional<double> clustering;
   std::optional<uint64_t> steps;
+  uint64_t first_step = 0;
   bool moving = false;
 };
 
@@ -49,12 +50,12 @@ void generateSteps(const GenerateOptions& options) {
   Progress progress{progressBar()};
   uint64_t nodes = 0;
   double seconds = 0;
-  for (uint64_t step = 0; step < *options.steps; ++step) {
+  for (uint64_t step = options.first_step; step < options.first_step + *options.steps; ++step) {
     const SceneTime time{static_cast<double>(step) / kStepsPerUnitOfTime, options.moving};
     const SceneGridSource source(makeScenesAt(options.scene, options.clustering, time), size);
     const auto paths = writePlot3d(source, fmt::format("{}_{:04}", options.prefix, step), progress);
     if (!options.moving) {
-      if (step == 0)
+      if (step == options.first_step)
         std::filesystem::rename(paths[0], options.prefix + ".xyz");
       else
         std::filesystem::remove(paths[0]);
@@ -71,6 +72,7 @@ void generate(const GenerateOptions& options) {
   if (options.size.empty()) throw UsageError("--size NIxNJxNK is required, such as --size 128x64x64");
   if (options.steps) return generateSteps(options);
   if (options.moving) throw UsageError("--moving needs --steps");
+  if (options.first_step > 0) throw UsageError("--first-step needs --steps");
   const SceneGridSource source(makeScenes(options.scene, options.clustering), parseSize(options.size));
   Progress progress{progressBar()};
   const auto paths = writePlot3d(source, options.prefix, progress);
@@ -99,6 +101,8 @@ void addGenerate(CLI::App& app) {
           "--steps", options->steps,
           "Time steps of the wake, whose vortices move: PREFIX.xyz, PREFIX_0000.fun, PREFIX_0001.fun, ...")
       ->check(CLI::Range(uint64_t{1}, uint64_t{9999}));
+  command->add_option("--first-step", options->first_step, "Number of the first of --steps (default 0)")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{9999}));
   command->add_flag("--moving", options->moving, "The grid moves with time: PREFIX_0000.xyz, ...");
   command->callback([options] { generate(*options); });
 }

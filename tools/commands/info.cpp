@@ -19,6 +19,7 @@
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/probe.h"
+#include "stream/cache/series_histogram.h"
 #include "stream/codec/values_codec.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
@@ -87,6 +88,26 @@ double bytesPerSample(const Manifest& manifest, uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(manifest.nodes - manifest.blanked_nodes);
 }
 
+/// The histograms of all scalars, each from `read`; null where the cache has none.
+template <typename Read>
+Json histogramsAsJson(const CacheReader& reader, const Read& read) {
+  Json json = Json::array();
+  for (size_t v = 0; v < reader.manifest().variables.size(); ++v) {
+    const std::optional<ValueHistogram> of = read(v);
+    json.push_back(
+        of ? Json{{"min", of->lower}, {"max", of->upper}, {"volume", of->volume}, {"shares", of->shares}}
+           : Json(nullptr));
+  }
+  return json;
+}
+
+/// A line on how a scalar's values are spread, if the cache says so.
+void printSpread(const char* of, const std::optional<ValueHistogram>& histogram) {
+  if (!histogram || !(histogram->lower < histogram->upper)) return;
+  fmt::print("           by volume{}: 1 % below {:.4g}, 50 % below {:.4g}, 99 % below {:.4g}\n", of,
+             histogram->percentile(0.01), histogram->percentile(0.5), histogram->percentile(0.99));
+}
+
 Json jsonOf(const ProbeResult& found, const CacheReader& reader) {
   Json json = {{"block", found.block},
                {"i", found.i},
@@ -128,7 +149,10 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
   if (reader.series().steps.size() > 1) {
     json["steps"] = stepsAsJson(reader);
     json["series_bytes"] = seriesBytes(reader);
+    json["series_histograms"] =
+        histogramsAsJson(reader, [&](size_t v) { return seriesHistogram(reader, v); });
   }
+  json["histograms"] = histogramsAsJson(reader, [&](size_t v) { return stepHistogram(reader, v); });
   json["stored_within"] = Json::array();
   for (size_t v = 0; v < manifest.variables.size(); ++v)
     json["stored_within"].push_back(storedWithin(reader, v));
@@ -187,10 +211,13 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
              countText(m.blocks.size(), "block"), m.blanked_nodes);
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
-  for (size_t v = 0; v < m.variables.size(); ++v)
+  for (size_t v = 0; v < m.variables.size(); ++v) {
     fmt::print("scalar     {} {}: {:.6g} .. {:.6g}, rounded within {:.1e}\n", m.variables[v].name,
                m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit),
                m.variables[v].min, m.variables[v].max, storedWithin(reader, v));
+    printSpread("", stepHistogram(reader, v));
+    if (reader.series().steps.size() > 1) printSpread(", all steps", seriesHistogram(reader, v));
+  }
   fmt::print("\nlevel    bricks    leaves        splats   geometry B     values B      error\n");
   const std::vector<LevelSummary> levels = levelsOf(reader);
   for (size_t n = 0; n < levels.size(); ++n)

@@ -135,7 +135,7 @@ class RemoteViewer::Work {
     request.wants_bytes = false;
     request.target_s = limits_.target_s;
     request.step = view.step;
-    if (view.next && *view.next < reader.series().steps.size()) request.next_step = view.next;
+    if (view.next && *view.next < reader.series().steps.size()) request.next = StepPosition{*view.next};
     if (!frames_ || cache_ != view.cache) {
       frames_.reset();  // frees its memory before the next one allocates
       frames_ = std::make_unique<FrameLoop>(reader, limits_.backend, [this] { viewer_.wake(); });

@@ -46,6 +46,14 @@ std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& 
   return options.conversion.sources_of(cache.seriesManifest(), cache.cachePath());
 }
 
+/// [step]: whether the next one has its geometry.
+std::vector<bool> joinedSteps(const Series& series) {
+  std::vector<bool> joined;
+  for (size_t step = 0; step + 1 < series.steps.size(); ++step)
+    joined.push_back(series.steps[step].geometry == series.steps[step + 1].geometry);
+  return joined;
+}
+
 }  // namespace
 
 CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options, Window& window,
@@ -63,7 +71,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       first_state_(toJson(state_)),
       history_(options.carried ? options.carried->history : History(state_)),
       panels_(cache_),
-      playback_(cache_.series().steps.size()),
+      playback_(cache_.series().steps.size(), joinedSteps(cache_.series())),
       backend_(options.backend),
       picture_(window.gl()),
       overlay_(window.gl()),
@@ -225,7 +233,8 @@ void CacheView::drawPanels(const WindowLayout& layout) {
 }
 
 void CacheView::apply(const PanelActions& actions) {
-  if (actions.step) changed_ |= playback_.goTo(*actions.step);
+  if (actions.time) changed_ |= playback_.goTo(*actions.time);
+  if (actions.interpolates) changed_ |= playback_.setInterpolates(*actions.interpolates);
   dragging_ = actions.dragging;
   changed_ |= actions.changed;
   if (actions.function_changed) ++function_version_;
@@ -256,7 +265,8 @@ void CacheView::ask(bool moving) {
                        state_.frameOptions(data_size_)};
   request.moving = moving;
   request.step = playback_.step();
-  request.next_step = playback_.next();
+  request.part = playback_.position().part;
+  request.next = playback_.next();
   request.faces_at = faces_at_;
   if (frames_failed_) restartFrames();
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);

@@ -111,6 +111,7 @@ class CacheView {
   void keepHistory();
   void restore(const ViewState* state);
   void savePictureIfFinal();
+  std::string timeOption() const;
   void copyCommand(bool turns);
   void saveFunction(const std::filesystem::path& file);
   void saveView(const std::string& name);

@@ -105,7 +105,7 @@ void CacheView::probe(const WindowLayout& layout) {
     const auto question = [&](const glm::dvec2& pixel) -> std::optional<PointProbe::Question> {
       const auto point = pointSeenAt(*values_, manifest(), pixel, data_size_);
       if (!point) return std::nullopt;
-      return PointProbe::Question{*point, cache_.variableNamed(state_.variable), playback_.step()};
+      return PointProbe::Question{*point, cache_.variableNamed(state_.variable), playback_.position()};
     };
     if (clicked_) {
       marker_question_ = question(*std::exchange(clicked_, std::nullopt));
@@ -199,6 +199,14 @@ void CacheView::savePictureIfFinal() {
   }
 }
 
+/// That draws what is shown; empty of one step.
+std::string CacheView::timeOption() const {
+  const StepPosition at = playback_.position();
+  if (playback_.steps() == 1) return {};
+  return at.part == 0 ? fmt::format(" --step {}", at.step)
+                      : fmt::format(" --time={} --interpolate", cache_.series().timeAt(at));
+}
+
 void CacheView::copyCommand(bool turns) {
   try {
     CommandOptions options{shortPath(whole()), picture_size_, {}, {}, turns};
@@ -214,9 +222,8 @@ void CacheView::copyCommand(bool turns) {
     };
     keep(state_.function, "colours", options.function_file);
     if (state_.opacity_by) keep(state_.opacity_by->function, "opacities", options.opacity_file);
-    const std::string command = renderCommand(state_, options) +
-                                (playback_.steps() > 1 ? fmt::format(" --step {}", playback_.step()) : "") +
-                                (lacks().empty() ? "" : " --keep-going");
+    const std::string command =
+        renderCommand(state_, options) + timeOption() + (lacks().empty() ? "" : " --keep-going");
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);

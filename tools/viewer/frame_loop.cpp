@@ -253,12 +253,12 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
     }
     const bool is_final = frame.is_final;
     publish(std::move(frame));
-    if (request.next_step) readAhead(drawing, request);
+    if (request.next) readAhead(drawing, request);
     if (is_final || request.moving || superseded(number)) return;
   }
 }
 
-/// Of the request's scalars and functions, at its step.
+/// Of the request's scalars and functions, at its time.
 void FrameLoop::preparePlayer(Drawing& drawing, const FrameRequest& request) {
   const DrawnScalars& scalars = request.scalars;
   std::vector<size_t> variables{scalars.opacity.variable};
@@ -275,7 +275,7 @@ void FrameLoop::preparePlayer(Drawing& drawing, const FrameRequest& request) {
   }
   drawing.function_version = request.function_version;
   drawing.last = request;
-  drawing.player->goTo({request.step});
+  drawing.player->goTo({request.step, request.part});
 }
 
 /// The place under the mouse need not be known to the pixel, and the values there are read from the data: a quarter of
@@ -301,7 +301,7 @@ void FrameLoop::findValues(Drawing& drawing, FrameRequest request, uint64_t numb
 
 /// Goes to the step that is likely to be wanted next, and begins to decode it while this one is looked at.
 void FrameLoop::readAhead(Drawing& drawing, const FrameRequest& request) {
-  drawing.player->goTo({*request.next_step});
+  drawing.player->goTo(*request.next);
   const double detail_px = request.moving ? drawing.effort.detailPixels() : 0;
   drawing.player->renderer().prefetch(request.camera, request.options,
                                       {.max_splats = drawing.effort.splats(), .detail_px = detail_px});

@@ -50,11 +50,12 @@ struct FrameRequest {
   Camera camera;
   FrameOptions options;
   bool moving = false;
-  double target_s = 0.1;                   // time budget of a picture while moving
-  uint64_t step = 0;                       // time step
-  bool wants_bytes = true;                 // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
-  std::optional<uint64_t> next_step = {};  // is likely to be wanted next, with this camera: read ahead
-  FacesAtStep faces_at = {};               // of options.scene; none: they are those of every step
+  double target_s = 0.1;                  // time budget of a picture while moving
+  uint64_t step = 0;                      // time step
+  double part = 0;                        // of the way to the next one: its values, with the faces of `step`
+  bool wants_bytes = true;                // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
+  std::optional<StepPosition> next = {};  // is likely to be wanted next, with this camera: read ahead
+  FacesAtStep faces_at = {};              // of options.scene; none: they are those of every step
 };
 
 struct ShownFrame {

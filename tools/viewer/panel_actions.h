@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "stream/cache/steps_file.h"
 #include "tools/viewer/window_commands.h"
 
 namespace curvisplat {
@@ -15,7 +16,8 @@ struct PanelActions {
   bool function_changed = false;  // implies `changed`
   bool dragging = false;          // a control is being dragged: a coarse picture suffices
   std::vector<Command> commands;
-  std::optional<uint64_t> step;                       // to go to
+  std::optional<StepPosition> time;                   // to go to
+  std::optional<bool> interpolates;                   // between steps
   std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
   bool automatic_function = false;                    // colours and opacities chosen from the data
   bool load_function = false, save_function = false;

@@ -5,6 +5,7 @@
 #include <imgui_stdlib.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "stream/base/error.h"
 #include "tools/viewer/labels.h"
@@ -43,11 +44,21 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
 }
 
 void Panels::drawTime(PanelActions& actions, Playback& playback) {
-  const double time = cache_.series().steps[playback.step()].time;
-  int step = static_cast<int>(playback.step());
+  const StepPosition at = playback.position();
+  const double time = cache_.series().timeAt(at);
   label("step");
-  if (ImGui::SliderInt("##step", &step, 0, static_cast<int>(playback.steps() - 1)))
-    actions.step = static_cast<uint64_t>(std::max(0, step));
+  if (playback.interpolates()) {
+    double place = static_cast<double>(at.step) + at.part;
+    const double first = 0, last = static_cast<double>(playback.steps() - 1);
+    if (ImGui::SliderScalar("##step", ImGuiDataType_Double, &place, &first, &last, "%.2f")) {
+      const double whole = std::floor(std::clamp(place, first, last));
+      actions.time = StepPosition{static_cast<uint64_t>(whole), std::clamp(place, first, last) - whole};
+    }
+  } else {
+    int step = static_cast<int>(at.step);
+    if (ImGui::SliderInt("##step", &step, 0, static_cast<int>(playback.steps() - 1)))
+      actions.time = StepPosition{static_cast<uint64_t>(std::max(0, step))};
+  }
   nameWidget("step");
   actions.dragging |= ImGui::IsItemActive();
   label("time");
@@ -59,6 +70,8 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   ImGui::SameLine(8.5f * ImGui::GetFontSize());
   bool loops = playback.loops();
   if (option("loop", loops)) playback.setLoop(loops);
+  bool interpolates = playback.interpolates();
+  if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
 }
 
 namespace {

@@ -1,19 +1,28 @@
 #include "tools/viewer/playback.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace curvisplat {
 
-bool Playback::goTo(uint64_t step) {
-  step = std::min(step, steps_ - 1);
-  if (step == step_) return false;
+bool Playback::goTo(const StepPosition& position) {
+  const uint64_t step = std::min(position.step, steps_ - 1);
+  const double part = dividesAfter(step) ? position.part : 0;
+  if (step == step_ && part == part_) return false;
   step_ = step;
+  part_ = part;
   shown_since_s_.reset();
   return true;
 }
 
+bool Playback::setInterpolates(bool interpolates) {
+  interpolates_ = interpolates;
+  return goTo(position());
+}
+
 bool Playback::advance(bool forwards) {
   if (forwards) return goTo(step_ + 1 < steps_ ? step_ + 1 : loops_ ? 0 : step_);
+  if (part_ > 0) return goTo(step_);
   return goTo(step_ > 0 ? step_ - 1 : loops_ ? steps_ - 1 : 0);
 }
 
@@ -23,17 +32,19 @@ void Playback::toggle() {
   if (playing_ && !loops_ && step_ + 1 == steps_) step_ = 0;
 }
 
-std::optional<uint64_t> Playback::next() const {
+std::optional<StepPosition> Playback::next() const {
   if (!playing_) return std::nullopt;
-  if (step_ + 1 < steps_) return step_ + 1;
-  return loops_ ? std::optional<uint64_t>(0) : std::nullopt;
+  const double part = std::floor(part_ * kParts + 1) / kParts;
+  if (dividesAfter(step_) && part < 1) return StepPosition{step_, part};
+  if (step_ + 1 < steps_) return StepPosition{step_ + 1};
+  return loops_ ? std::optional(StepPosition{}) : std::nullopt;
 }
 
 bool Playback::tick(double now_s) {
   if (!playing_) return false;
   if (!shown_since_s_) shown_since_s_ = now_s;
   if (wait(now_s) > 0) return false;
-  const std::optional<uint64_t> following = next();
+  const std::optional<StepPosition> following = next();
   if (!following) {
     playing_ = false;
     return true;  // the last step is drawn at rest now
@@ -42,7 +53,8 @@ bool Playback::tick(double now_s) {
 }
 
 double Playback::wait(double now_s) const {
-  return shown_since_s_ ? *shown_since_s_ + 1 / steps_per_s_ - now_s : 0;
+  const double for_s = 1 / steps_per_s_ / (dividesAfter(step_) ? kParts : 1);
+  return shown_since_s_ ? *shown_since_s_ + for_s - now_s : 0;
 }
 
 }  // namespace curvisplat

@@ -17,7 +17,7 @@ std::optional<PointProbe::Answer> PointProbe::take() {
   if (next_ && !answering_.valid())
     answering_ = std::async(std::launch::async,
                             [&cache = cache_, question = *std::exchange(next_, std::nullopt)]() -> Answer {
-                              const CacheReader reader = cache.atStep(question.step);
+                              const CacheReader reader = cache.at(question.at);
                               const size_t variables[]{question.variable};
                               return {question, probe(reader, variables, question.point)};
                             });

@@ -17,7 +17,7 @@ class PointProbe {
   struct Question {
     glm::dvec3 point{0.0};  // data coordinates
     size_t variable = 0;
-    uint64_t step = 0;
+    StepPosition at;
     bool operator==(const Question&) const = default;
   };
   struct Answer {
