@@ -2,8 +2,9 @@
 """odd_hosts_test.py CURVISPLAT
 
 Hosts that are set up in another way: locales with a decimal comma and with another lower case of I, file systems without
-O_DIRECT or O_TMPFILE, a clock that runs backwards. The same files are made everywhere, byte for byte. What the machine
-lacks (localedef, the right to mount, a C compiler) is skipped and said.
+O_DIRECT or O_TMPFILE, a clock that runs backwards, and a stand-in for a network file system: calls that behave like one's.
+The same files are made everywhere, byte for byte. What the machine lacks (localedef, the right to mount, a C compiler) is
+skipped and said.
 """
 import ctypes
 import hashlib
@@ -45,6 +46,140 @@ int gettimeofday(struct timeval* to, void* zone) {
   to->tv_sec = now.tv_sec;
   to->tv_usec = now.tv_nsec / 1000;
   return 0;
+}
+"""
+
+# The calls of a network file system, as libraries see them: reads and writes of half of what is asked for, no O_DIRECT, no
+# O_TMPFILE, no fallocate, no io_uring, with NO_FLOCK no flock; stat() by name answers from a cache of attributes until the file is opened.
+# With ESTALE_AT=n the n-th read or write of a regular file below ESTALE_FOLDER, and all that follow of that descriptor, fail.
+NETWORK = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <pthread.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+#define NEXT(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
+
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+static struct { char path[512]; struct stat status; } cached[256];
+static int places = 0;
+static atomic_int stale[4096];
+static atomic_long transfers, refused, cut, late;
+
+static void forget(const char* path) {
+  pthread_mutex_lock(&mutex);
+  for (int n = 0; n < places; ++n)
+    if (strcmp(cached[n].path, path) == 0) cached[n].path[0] = 0;
+  pthread_mutex_unlock(&mutex);
+}
+
+static int refuses(int flags) {
+  if ((flags & O_TMPFILE) == O_TMPFILE) errno = EOPNOTSUPP;
+  else if (flags & O_DIRECT) errno = EINVAL;
+  else return 0;
+  ++refused;
+  return 1;
+}
+
+#define OPEN(name)                                             \
+  int name(const char* path, int flags, ...) {                 \
+    va_list more;                                              \
+    va_start(more, flags);                                     \
+    mode_t mode = va_arg(more, mode_t);                        \
+    va_end(more);                                              \
+    if (refuses(flags)) return -1;                             \
+    forget(path);                                              \
+    int fd = NEXT(name)(path, flags, mode);                    \
+    if (fd >= 0 && fd < 4096) stale[fd] = 0;                   \
+    return fd;                                                 \
+  }
+OPEN(open)
+OPEN(open64)
+
+static int answer(const char* path, struct stat* to, int (*ask)(const char*, struct stat*)) {
+  pthread_mutex_lock(&mutex);
+  for (int n = 0; n < places; ++n)
+    if (strcmp(cached[n].path, path) == 0) {
+      struct stat now;
+      if (ask(path, &now) == 0 && now.st_ino == cached[n].status.st_ino) {
+        if (now.st_size != cached[n].status.st_size) ++late;
+        *to = cached[n].status;
+        pthread_mutex_unlock(&mutex);
+        return 0;
+      }
+      cached[n].path[0] = 0;
+    }
+  int result = ask(path, to), error = errno;
+  if (result == 0 && S_ISREG(to->st_mode) && strlen(path) < sizeof cached[0].path && places < 256) {
+    strcpy(cached[places].path, path);
+    cached[places++].status = *to;
+  }
+  pthread_mutex_unlock(&mutex);
+  errno = error;
+  return result;
+}
+int stat(const char* path, struct stat* to) { return answer(path, to, NEXT(stat)); }
+int stat64(const char* path, struct stat64* to) { return answer(path, (struct stat*)to, NEXT(stat)); }
+
+static int isStale(int fd) {
+  static long at = -1;
+  if (at < 0) at = getenv("ESTALE_AT") ? atol(getenv("ESTALE_AT")) : 0;
+  if (fd < 0 || fd >= 4096) return 0;
+  if (!stale[fd] && at > 0) {
+    struct stat status;
+    char name[64], path[PATH_MAX];
+    snprintf(name, sizeof name, "/proc/self/fd/%d", fd);
+    ssize_t length = readlink(name, path, sizeof path - 1);
+    const char* folder = getenv("ESTALE_FOLDER");
+    if (length <= 0 || strncmp(path, folder, strlen(folder)) != 0 || fstat(fd, &status) != 0 || !S_ISREG(status.st_mode))
+      return 0;
+    if (++transfers == at) stale[fd] = 1;
+  }
+  if (stale[fd]) errno = ESTALE;
+  return stale[fd];
+}
+static size_t half(size_t bytes) {
+  if (bytes > 1) ++cut;
+  return bytes - bytes / 2;
+}
+
+ssize_t read(int fd, void* to, size_t bytes) { return isStale(fd) ? -1 : NEXT(read)(fd, to, half(bytes)); }
+ssize_t pread(int fd, void* to, size_t bytes, off_t at) { return isStale(fd) ? -1 : NEXT(pread)(fd, to, half(bytes), at); }
+ssize_t pread64(int fd, void* to, size_t bytes, off64_t at) { return isStale(fd) ? -1 : NEXT(pread64)(fd, to, half(bytes), at); }
+ssize_t write(int fd, const void* from, size_t bytes) {
+  return isStale(fd) ? -1 : NEXT(write)(fd, from, fd > 2 ? half(bytes) : bytes);
+}
+ssize_t pwrite(int fd, const void* from, size_t bytes, off_t at) { return isStale(fd) ? -1 : NEXT(pwrite)(fd, from, half(bytes), at); }
+ssize_t pwrite64(int fd, const void* from, size_t bytes, off64_t at) {
+  return isStale(fd) ? -1 : NEXT(pwrite64)(fd, from, half(bytes), at);
+}
+int flock(int fd, int what) {
+  if (!getenv("NO_FLOCK")) return NEXT(flock)(fd, what);
+  errno = ENOLCK;
+  return -1;
+}
+int fallocate(int fd, int mode, off_t at, off_t bytes) { (void)fd, (void)mode, (void)at, (void)bytes; errno = EOPNOTSUPP; return -1; }
+int fallocate64(int fd, int mode, off64_t at, off64_t bytes) { (void)fd, (void)mode, (void)at, (void)bytes; errno = EOPNOTSUPP; return -1; }
+int io_uring_queue_init(unsigned entries, void* ring, unsigned flags) { (void)entries, (void)ring, (void)flags; return -ENOSYS; }
+int io_uring_queue_init_params(unsigned entries, void* ring, void* how) { (void)entries, (void)ring, (void)how; return -ENOSYS; }
+
+__attribute__((destructor)) static void report(void) {
+  const char* name = getenv("NETWORK_REPORT");
+  FILE* to = name ? fopen(name, "a") : NULL;
+  if (!to) return;
+  fprintf(to, "%ld %ld %ld\n", (long)cut, (long)refused, (long)late);
+  fclose(to);
 }
 """
 
@@ -169,6 +304,59 @@ class OddHosts(unittest.TestCase):
         folder = self.folder / "clock"
         folder.mkdir()
         self.expect_same(folder, {"LD_PRELOAD": str(library)})
+
+    def network(self):
+        compiler = shutil.which("cc") or shutil.which("gcc")
+        if not compiler:
+            self.skipTest("no C compiler")
+        library = self.folder / "network.so"
+        if not library.exists():
+            source = self.folder / "network.c"
+            source.write_text(NETWORK)
+            subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True)
+        return {"LD_PRELOAD": str(library)}
+
+    def test_calls_of_a_network_file_system(self):
+        environment = self.network()
+        folder, report = self.folder / "network", self.folder / "network.txt"
+        folder.mkdir()
+        self.expect_same(folder, {**environment, "NETWORK_REPORT": str(report)})
+        cut, refused, _ = (sum(int(line.split()[n]) for line in report.read_text().splitlines()) for n in range(3))
+        print(f"network: {cut} short transfers, {refused} opens refused")
+        self.assertGreater(cut, 100)
+        self.assertGreater(refused, 0)
+
+    def test_a_stale_handle_is_one_line_and_leaves_nothing(self):
+        """The server has forgotten a file, at one of its reads or writes."""
+        environment = self.network()
+        folder = self.folder / "stale"
+        folder.mkdir()
+        run = lambda *words, at=0: subprocess.run([PROGRAM, *words], cwd=folder, capture_output=True, text=True, check=False, env={
+            **os.environ, **environment, "ESTALE_FOLDER": str(folder), **({"ESTALE_AT": str(at)} if at else {})})
+        self.assertEqual(run("generate", "o-grid", "--size", "12x10x8", "-o", "o").returncode, 0)
+        self.assertEqual(run("convert", "o.xyz", "o.fun", "-o", "whole.splats").returncode, 0)
+        jobs = {"convert": ["convert", "o.xyz", "o.fun", "-o", "new.splats", "--threads", "1"],
+                "render": ["render", "whole.splats", "-o", "new.png", "--size", "48x32", "--threads", "1"],
+                "info": ["info", "whole.splats", "--verify"]}
+        for name, words in jobs.items():
+            failures = 0
+            before = sorted(folder.iterdir())
+            for at in (*range(1, 30), 35, 40, 50, 60, 80, 100, 130, 160, 200, 250, 300, 400):
+                with self.subTest(name, at=at):
+                    result = run(*words, at=at)
+                    made = [path for path in folder.iterdir() if path not in before]
+                    if result.returncode == 0:
+                        self.assertLessEqual({path.name for path in made}, {"new.splats", "new.png"})
+                    else:
+                        failures += 1
+                        self.assertEqual(result.returncode, 1, result.stderr)
+                        lines = [line for line in result.stderr.splitlines() if not line.startswith("curvisplat: note")]
+                        self.assertEqual(len(lines), 1, result.stderr)
+                        self.assertEqual(made, [], result.stderr)
+                    for path in made:
+                        shutil.rmtree(path) if path.is_dir() else path.unlink()
+            print(f"ESTALE: {name}: {failures} ended with one line", flush=True)
+            self.assertGreater(failures, 0, name)
 
 
 if __name__ == "__main__":
