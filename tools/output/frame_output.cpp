@@ -64,8 +64,7 @@ class Movie : public FrameOutput {
 };
 
 [[noreturn]] void refusePattern(const std::string& pattern, std::string_view why) {
-  throw UsageError("-o {}: {}; use a name such as frame_%04d.png, or a movie: .mp4, .webm or .gif", pattern,
-                   why);
+  throw UsageError("-o {}: {}; use a name such as frame_%04d.png, or a movie: .mp4 or .gif", pattern, why);
 }
 
 }  // namespace
