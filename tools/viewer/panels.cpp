@@ -59,6 +59,7 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   ImGui::SameLine(8.5f * ImGui::GetFontSize());
   bool loops = playback.loops();
   if (option("loop", loops)) playback.setLoop(loops);
+  commandButton(Command::kSaveStepsMovie, actions, "save movie...");
 }
 
 namespace {
@@ -211,6 +212,7 @@ void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   actions.changed |= option("axes grid", state.annotations.axes_grid);
   commandButton(Command::kSavePicture, actions, "save picture");
   ImGui::SameLine(column);
+  commandButton(Command::kSaveTurnMovie, actions, "save movie...");
   commandButton(Command::kCopyCommand, actions, "copy command");
 }
 
