@@ -46,6 +46,8 @@ class MeshReader {
   const MeshSource& source() const { return *source_; }
   const std::vector<MeshPiece>& pieces() const { return source_->description().pieces; }
   size_t scalars() const { return scalars_.size(); }
+  /// Their indices in the description.
+  const std::vector<uint32_t>& scalarIndices() const { return scalars_; }
   Centring centring() const { return centring_; }
   uint64_t points() const { return points_; }
   uint64_t cells() const { return cells_; }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <ostream>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -67,6 +68,58 @@ INSTANTIATE_TEST_SUITE_P(Scenes, DefaultPictures,
                            std::erase(name, '-');
                            return name;
                          });
+
+/// Real grids, which lie in a folder beside the project, where they are there; and the scalars that vary.
+struct RealGrid {
+  const char* name;
+  std::vector<std::string> files, scalars;
+};
+void PrintTo(const RealGrid& grid, std::ostream* out) {
+  *out << grid.name;
+}
+std::vector<RealGrid> realGrids() {
+  const std::vector<std::string> whole_flow{"density", "momentum_x", "momentum_y", "momentum_z", "energy"};
+  return {
+      {"bluntfin", {"bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin"}, whole_flow},
+      {"delta_wing", {"delta_wing/delta_vertex.cgns"}, {"Density", "mach_number", "vorticity_magnitude"}},
+      {"lox_post",  // its density is constant
+       {"lox_post/postxyz.bin", "lox_post/postq.bin"},
+       {"momentum_x", "momentum_y", "momentum_z", "energy"}},
+      {"combustor",  // its energy is constant
+       {"combustor/combxyz.bin", "combustor/combq.bin"},
+       {"density", "momentum_x", "momentum_y", "momentum_z"}},
+      {"nek", {"nek/Combined_PressureSide_Block.xyz", "nek/pressure.fun"}, {"1", "2", "3", "4"}},
+      {"vtk_sample", {"vtk/SampleStructGrid.vtk"}, {"scalars"}},
+      {"vtk_comb", {"vtk/multicomb_0.vts"}, {"Density", "Momentum:mag"}},
+      {"mitgcm", {"vts_encodings/face3_appended_raw.vts"}, {"T", "S"}},
+      {"cgns_sqnz", {"cgns/sqnz_s.hdf.cgns"}, {"Density", "MomentumX"}},
+      {"nemo", {"nemo_northsea/nemo_northsea_u.xyz", "nemo_northsea/nemo_northsea_u.fun"}, {"uo", "depth"}},
+  };
+}
+
+class DefaultPicturesOfRealGrids : public testing::TestWithParam<RealGrid> {};
+
+TEST_P(DefaultPicturesOfRealGrids, ShowSomething) {
+  const std::filesystem::path data = CURVISPLAT_SHARED_DATA;
+  if (!std::filesystem::exists(data / GetParam().files.front()))
+    GTEST_SKIP() << data.string() << " is not there";
+  const TemporaryFolder folder;
+  std::vector<std::string> words{"convert"};
+  for (const std::string& name : GetParam().files) words.push_back((data / name).string());
+  words.insert(words.end(), {"-o", (folder / "a.splats").string()});
+  for (const std::string& scalar : GetParam().scalars) words.insert(words.end(), {"--scalar", scalar});
+  const ProgramResult converted = runProgram(words);
+  ASSERT_EQ(converted.status, 0) << converted.err;
+  for (const std::string& scalar : GetParam().scalars) {
+    const std::string picture = (folder / "a.png").string();
+    const ProgramResult drawn = runProgram(
+        {"render", (folder / "a.splats").string(), "-o", picture, "--size", "240x240", "--scalar", scalar});
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    EXPECT_GE(contrastOf(readImage(picture), glm::vec4(1)).other, 0.05) << scalar << ": " << drawn.out;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Grids, DefaultPicturesOfRealGrids, testing::ValuesIn(realGrids()),
+                         [](const auto& grid) { return std::string(grid.param.name); });
 
 TEST_F(DefaultPictures, RangesByPercentilesAndOfAllData) {
   convert("wake", "48x32x24");

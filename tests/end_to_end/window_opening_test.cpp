@@ -412,6 +412,77 @@ TEST_F(FurtherScalarTest, WithoutTheSourcesNoneIsOffered) {
   close();
 }
 
+/// All steps get it: the series is converted again beside the window.
+TEST_F(WindowOpening, AScalarIsAddedToASeries) {
+  run({"generate", "wake", "--size", "24x16x12", "--steps", "3", "-o", "s"});
+  run({"convert", "s.xyz", "s_%04d.fun", "-o", "street.splats", "--scalar", "vorticity", "--overwrite"});
+  const std::string before = runProgram({"info", "street.splats"}).out;
+  const std::string further = before.find("vorticity") == std::string::npos ? "vorticity" : "volume";
+  cache_ = "street";
+  open({"--step", "1"});
+  click("scalar");
+  click("further scalar " + further);
+  ASSERT_TRUE(eventually([&] {
+    return runProgram({"info", "street.splats"}).out.find(further) != std::string::npos &&
+           !hasWidget("opening");
+  }));
+  saveAndCopy();
+  const auto commands = close();
+  cache_ = "a";
+  EXPECT_EQ(valueOf(commands.at(0), "--scalar"), further);
+  run({"convert", "s.xyz", "s_%04d.fun", "-o", "both.splats", "--scalar", "vorticity", "--scalar", further,
+       "--overwrite"});
+  for (const char* const step : {"0", "2"}) {
+    for (const char* const of : {"street", "both"})
+      run({"render", fmt::format("{}.splats", of), "-o", fmt::format("{}.png", of), "--size", "60x50",
+           "--scalar", further, "--step", step});
+    EXPECT_EQ(readImage("street.png").rgba, readImage("both.png").rgba);
+  }
+  for (const auto& entry : fs::directory_iterator("."))
+    EXPECT_EQ(entry.path().filename().string().find(".adding"), std::string::npos);
+}
+
+/// A coarse sample of the first step, then the step, then all of them.
+TEST_F(WindowOpening, ASeriesOfLargeStepsHasACoarsePreview) {
+  run({"generate", "wake", "--size", "144x96x80", "--steps", "2", "-o", "wide"});
+  openWith({"wide.xyz", "wide_0000.fun", "wide_0001.fun"});
+  EXPECT_TRUE(
+      eventually([] { return hasWidget("state preview of every 2nd index plane of the first time step"); }));
+  press("x");
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview of the first time step"); }, 300));
+  EXPECT_TRUE(eventually([] { return hasWidget("step") && !hasWidget("opening"); }, 300));
+  cache_ = "wide";
+  saveAndCopy();
+  const auto command = close().at(0);
+  cache_ = "a";
+  const std::string position = valueOf(command, "--position"), focus = valueOf(command, "--focal-point");
+  EXPECT_EQ(position.substr(position.find(',')), focus.substr(focus.find(',')));  // still from +x
+  EXPECT_EQ(previewFolders(), 1u);                                                // series.*, with the whole
+}
+
+/// A million cells and more: a lattice stands for them.
+TEST_F(WindowOpening, AMeshHasAPreview) {
+  const ProgramResult made =
+      RunningProgram({CURVISPLAT_TEST_DATA "/../../bench/big_mesh.py", "cube.vtu", "--size", "101"},
+                     "/usr/bin/python3")
+          .wait();
+  if (made.status != 0) GTEST_SKIP() << made.err;
+  openWith({"cube.vtu"});
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview of 62 x 62 x 62 points"); }));
+  click("stop opening");
+  EXPECT_TRUE(eventually([] { return hasWidget("message Stopped"); }));
+  cache_ = "cube";
+  const Image picture = save();
+  cache_ = "a";
+  close();
+  EXPECT_TRUE(kept().empty());
+  fs::remove("cube.vtu");
+  size_t drawn = 0;
+  for (int y = 0; y < picture.size.height; ++y)
+    for (int x = 0; x < picture.size.width; ++x) drawn += picture.pixel(x, y)[1] < 0.9f;
+  EXPECT_GT(drawn, picture.size.pixels() / 20);
+}
+
 TEST_F(WindowOpening, AFileThatCannotBeOpenedIsReportedAndTheWindowLives) {
   std::ofstream("no.xyz") << "no grid";
   openWith({"no.xyz", "a.fun"});

@@ -173,6 +173,26 @@ TEST(Verdict, ADifferenceWithinTheSpreadIsNone) {
   EXPECT_TRUE(says(judge(four, speeds(), cores), "--threads 4 instead of 1: no difference measured"));
 }
 
+/// Reading 0.44 s, the cores 0.47 s: which of them bounds the frame is not known if the rates vary by a tenth.
+TEST(Verdict, OfTwoResourcesWithinTheSpreadNoneIsBlamed) {
+  JudgedFrame judged = frame();
+  judged.read_fraction = 1;
+  StageSpeeds noisy = speeds();
+  noisy.verify_splats_s = noisy.decode_splats_s = 1e12;
+  noisy.read_bytes_s = 8e6 / 0.44;
+  EXPECT_EQ(judge(judged, noisy, {}).lines.back(), "to draw this faster, buy a graphics card");
+  noisy.spread = 0.1;
+  const Verdict verdict = judge(judged, noisy, {});
+  EXPECT_TRUE(says(verdict, "the work on the cores (0.47 s) and reading (0.44 s): no difference measured"))
+      << all(verdict);
+  EXPECT_TRUE(verdict.lines.back().starts_with("nothing that could be bought alone is sure to draw this"))
+      << all(verdict);
+  EXPECT_FALSE(says(verdict, "buy ")) << all(verdict);
+  noisy.read_bytes_s = 8e6 / 0.2;  // far from it
+  EXPECT_EQ(judge(judged, noisy, {}).lines.back(),
+            "to draw this faster, buy a graphics card; a faster disk would change little");
+}
+
 TEST(Verdict, ReportsTimeThatNoStageTakes) {
   JudgedFrame judged = frame();
   EXPECT_FALSE(says(judge(judged, speeds(), {}), "overhead"));

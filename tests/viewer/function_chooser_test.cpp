@@ -73,5 +73,16 @@ TEST_F(FunctionChooserTest, AnErrorEndsItsQuestionOnly) {
   EXPECT_EQ(answersOf(chooser_), (std::vector<FunctionChooser::Question>{{For::kOpacities, scalar_}}));
 }
 
+/// Of a view that is replaced while it chooses.
+TEST_F(FunctionChooserTest, AnotherTakesItsQuestions) {
+  FunctionChooser next(cache_, [] {});
+  chooser_.ask({For::kScalar, scalar_});
+  chooser_.ask({For::kOpacities, scalar_});
+  next.takeQuestionsOf(chooser_);
+  EXPECT_FALSE(chooser_.busy());
+  EXPECT_EQ(answersOf(next),
+            (std::vector<FunctionChooser::Question>{{For::kScalar, scalar_}, {For::kOpacities, scalar_}}));
+}
+
 }  // namespace
 }  // namespace curvisplat

@@ -21,6 +21,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
+#include "tools/output/frame_output.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
 #include "tools/viewer/viewer.h"
@@ -65,10 +66,28 @@ void checkGridOptions(const ViewArguments& arguments) {
 std::string whatOf(const KeptPreview& preview) {
   constexpr std::array<const char*, 4> kEndings{"th", "st", "nd", "rd"};
   const uint64_t last = preview.stride % 10, tens = preview.stride / 10 % 10;
-  return preview.stride == 1 ? "the first time step"
-                             : fmt::format("every {}{} index plane", preview.stride,
-                                           kEndings[tens != 1 && last < kEndings.size() ? last : 0]);
+  const std::string part = preview.lattice > 0 ? fmt::format("{0} x {0} x {0} points", preview.lattice)
+                           : preview.stride > 1
+                               ? fmt::format("every {}{} index plane", preview.stride,
+                                             kEndings[tens != 1 && last < kEndings.size() ? last : 0])
+                               : "";
+  if (!preview.first_step) return part;
+  return part.empty() ? "the first time step" : part + " of the first time step";
 }
+
+/// `render`'s output of frames, for the window.
+class MovieFile final : public MovieOutput {
+ public:
+  MovieFile(const std::filesystem::path& file, ImageSize size, double frames_per_s) {
+    checkOutputName(file, true, size);
+    output_ = makeFrameOutput(file, true, size, frames_per_s);
+  }
+  void write(uint64_t frame, const Image& image) override { output_->write(frame, image); }
+  void finish() override { output_->finish(); }
+
+ private:
+  std::unique_ptr<FrameOutput> output_;
+};
 
 ConversionServices conversionServices() {
   using Paths = ConversionServices::Paths;
@@ -117,6 +136,9 @@ void view(const ViewArguments& arguments) {
                        surface);
   std::optional<CacheReader> cache;
   options.conversion = conversionServices();
+  options.open_movie = [](const std::filesystem::path& file, ImageSize size, double frames_per_s) {
+    return std::make_unique<MovieFile>(file, size, frames_per_s);
+  };
   if (!arguments.files.empty() && !isGrid(arguments.files)) {
     cache = openAtStep(arguments.files.front(), arguments.steps);
     takeScene(arguments, *cache, options);

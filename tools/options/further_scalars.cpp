@@ -9,6 +9,7 @@
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/options/convert_arguments.h"
+#include "tools/options/series_scalar.h"
 
 namespace curvisplat {
 namespace {
@@ -21,6 +22,10 @@ ConvertArguments argumentsFor(const std::vector<fs::path>& files, const fs::path
   arguments.grid.solutions.assign(files.begin() + 1, files.end());
   arguments.to = cache;
   return arguments;
+}
+
+bool isSeries(const CacheReader& cache) {
+  return cache.series().steps.size() > 1;
 }
 
 }  // namespace
@@ -39,9 +44,9 @@ std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache)
 
 std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::vector<fs::path>& files) {
   const CacheReader reader(cache);
-  if (reader.series().steps.size() > 1)
-    throw Error("{}: is a series of time steps, to which no scalar can be added", cache.string());
-  const auto source = openSource(argumentsFor(files, cache), cache);
+  ConvertArguments arguments = argumentsFor(files, cache);
+  if (isSeries(reader)) arguments.grid = stepsOfFiles(files).front().options;
+  const auto source = openSource(arguments, cache);
   std::set<std::string> names;
   for (const VariableInfo& variable : reader.manifest().variables) names.insert(variable.name);
   const Centring centring = reader.manifest().cells ? Centring::kCell : Centring::kNode;
@@ -54,6 +59,7 @@ std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::ve
 
 void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files, const std::string& name,
                       Progress& progress) {
+  if (isSeries(CacheReader(cache))) return addScalarToSeries(cache, files, name, progress);
   ConvertArguments arguments = argumentsFor(files, cache);
   arguments.added_scalars = {name};
   const auto source = openSource(arguments, cache);
@@ -73,7 +79,7 @@ void addMissingScalars(const fs::path& cache, const std::vector<fs::path>& files
   missing.erase("");
   const CacheReader reader(cache);
   for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
-  if (missing.empty() || reader.series().steps.size() > 1) return;
+  if (missing.empty()) return;
   for (const FurtherScalar& one : furtherScalarsOf(cache, files))
     if (missing.contains(one.name)) addFurtherScalar(cache, files, one.name, progress);
 }

@@ -19,12 +19,12 @@ struct FurtherScalar {
 /// one is missing.
 std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std::filesystem::path& cache);
 
-/// What `files` have and `cache` lacks, of the same centring, in the order of the files. Opens the files. Throws Error if
-/// they cannot be opened, or if the cache takes no further scalars: a series.
+/// What `files` have and `cache` lacks, of the same centring, in the order of the files; of a series, what its first step has.
+/// Opens the files. Throws Error if they cannot be opened.
 std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
                                             const std::vector<std::filesystem::path>& files);
 
-/// Adds the scalar to the cache. Throws Error as furtherScalarsOf() and addScalars() do, Interrupted once `progress` is
+/// Adds the scalar to the cache; a series is converted again for that (series_scalar.h). Throws Error as furtherScalarsOf() and addScalars() do, Interrupted once `progress` is
 /// stopped; then the cache is as it was.
 void addFurtherScalar(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
                       const std::string& name, Progress& progress);

@@ -1,11 +1,14 @@
 #include "tools/options/kept_conversion.h"
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 #include <system_error>
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/series_files.h"
+#include "preprocess/gather/mesh_lattice.h"
 #include "preprocess/grid/thinned_source.h"
 #include "stream/base/error.h"
 #include "tools/options/convert_arguments.h"
@@ -17,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char *kPreview = "preview", *kSeries = "series";  // names of folders
+constexpr uint64_t kBytesForPreview = uint64_t{1} << 30;          // for the points of a mesh
 
 ConvertOptions optionsFor(const fs::path& output, const std::string& title) {
   ConvertOptions options;
@@ -39,28 +43,73 @@ uint64_t nodesOf(const GridSource& grid) {
   return nodes;
 }
 
-/// A cache of every n-th index plane, if the grid is large. A grid that cannot be thinned, or a preview that fails, has
-/// none: the conversion of the whole says what is wrong.
-void makePreview(const DataSource& source, const ConvertOptions& whole, Progress& progress,
+/// A source that is quick to convert, of the scalars `scalars`.
+struct CoarseSource {
+  std::unique_ptr<GridSource> source;  // null: there is none
+  std::vector<uint32_t> scalars;
+  KeptPreview what;
+};
+
+CoarseSource coarseGrid(const GridSource& grid, const std::vector<uint32_t>& scalars) {
+  if (nodesOf(grid) <= kNodesWithoutPreview) return {};
+  const uint64_t stride = strideFor(grid.description(), kNodesWithoutPreview / 4);
+  CoarseSource coarse{thinned(grid, stride), scalars, {}};
+  if (nodesOf(*coarse.source) > kNodesWithoutPreview) return {};  // of many small blocks
+  coarse.what.stride = stride;
+  return coarse;
+}
+
+CoarseSource coarseMesh(const MeshSource& mesh, const std::vector<uint32_t>& scalars, Progress& progress) {
+  const MeshReader reader(mesh, scalars, std::nullopt);
+  if (std::max(reader.points(), reader.cells()) <= kNodesWithoutPreview) return {};
+  CoarseSource coarse{latticeOf(reader, kNodesWithoutPreview / 4, kBytesForPreview, progress), {}, {}};
+  for (uint32_t n = 0; n < scalars.size(); ++n) coarse.scalars.push_back(n);
+  if (coarse.source) coarse.what.lattice = coarse.source->description().blocks.front().ni;
+  return coarse;
+}
+
+/// A cache of a coarse sample, if the grid is large. A grid that cannot be sampled, or a preview that fails, has none: the
+/// conversion of the whole says what is wrong. `whole`: as the whole is converted.
+void makePreview(const DataSource& source, const ConvertOptions& whole, bool first_step, Progress& progress,
                  const KeptCacheEvents& events) {
-  const auto* const grid = dynamic_cast<const GridSource*>(&source);
-  if (!events.preview || !grid) return;
-  if (nodesOf(*grid) <= kNodesWithoutPreview) return;
-  const uint64_t stride = strideFor(grid->description(), kNodesWithoutPreview / 4);
-  const auto coarse = thinned(*grid, stride);
-  if (nodesOf(*coarse) > kNodesWithoutPreview) return;  // of many small blocks
-  ConvertOptions options = whole;
-  options.surfaces = false;
+  if (!events.preview) return;
   try {
+    const auto* const grid = dynamic_cast<const GridSource*>(&source);
+    const CoarseSource coarse =
+        grid ? coarseGrid(*grid, whole.scalars)
+             : coarseMesh(dynamic_cast<const MeshSource&>(source), whole.scalars, progress);
+    if (!coarse.source) return;
     const auto folder = std::make_shared<const PreviewFolder>(whole.output.parent_path(), kPreview);
+    ConvertOptions options = whole;
+    options.scalars = coarse.scalars;
+    options.surfaces = false;
     options.output = folder->path() / whole.output.filename();
     options.temporary_folder = folder->path();
-    convert(*coarse, options, progress);
-    events.preview({options.output, whole.output, stride, folder});
+    convert(*coarse.source, options, progress);
+    KeptPreview preview = coarse.what;
+    preview.cache = options.output;
+    preview.whole = whole.output;
+    preview.first_step = first_step;
+    preview.folder = folder;
+    events.preview(preview);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error&) {
   } catch (const fs::filesystem_error&) {
+  }
+}
+
+void makePreviewOfFirstStep(const SeriesInput& input, const ConvertOptions& whole, Progress& progress,
+                            const KeptCacheEvents& events) {
+  if (!events.preview) return;
+  try {
+    const std::unique_ptr<DataSource> first = input.open(0);
+    ConvertOptions options = whole;
+    options.scalars = input.scalars(first->description());
+    makePreview(*first, options, true, progress, events);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {  // the conversion of the step says it
   }
 }
 
@@ -72,11 +121,20 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   arguments.output = folder->path() / output.filename();
   const std::vector<StepFiles> steps = stepsOf(arguments.grid);
   SeriesOptions options;
-  options.convert = optionsFor(arguments.output, arguments.grid.grid.stem().string());
-  convertSeries(seriesInput(arguments, steps), options, progress, [&](const SeriesEvent& event) {
+  const std::string title = arguments.grid.grid.stem().string();
+  options.convert = optionsFor(arguments.output, title);
+  const SeriesInput input = seriesInput(arguments, steps);
+  makePreviewOfFirstStep(input, optionsFor(output, title), progress, events);
+  convertSeries(input, options, progress, [&](const SeriesEvent& event) {
     if (!event.converted) return;
     if (event.source) sayAll(events, *event.source, *event.converted);
-    if (events.preview) events.preview({arguments.output, output, 1, folder});
+    if (!events.preview) return;
+    KeptPreview preview;
+    preview.cache = arguments.output;
+    preview.whole = output;
+    preview.first_step = true;
+    preview.folder = folder;
+    events.preview(preview);
   });
   std::error_code error;
   if (fs::is_symlink(output, error)) fs::remove(output, error);  // to a series that someone has removed
@@ -99,7 +157,7 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   const auto source = openSource(arguments, output);
   ConvertOptions options = optionsFor(output, files.front().stem().string());
   options.scalars = chooseScalars(arguments, {}, source->description());
-  makePreview(*source, options, progress, events);
+  makePreview(*source, options, false, progress, events);
   sayAll(events, source->description(), convert(*source, options, progress));
 }
 

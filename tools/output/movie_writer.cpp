@@ -28,8 +28,8 @@ namespace {
 [[noreturn]] void failToStart(const std::filesystem::path& movie, int error) {
   if (error == ENOENT)
     throw Error(
-        "{}: ffmpeg, which writes movies, was not found in PATH; install it, or write pictures with "
-        "-o frame_%04d.png",
+        "{}: ffmpeg, which writes movies, was not found in PATH; install it, or write numbered pictures: "
+        "frame_%04d.png",
         movie.string());
   throw Error("{}: cannot start ffmpeg: {}", movie.string(), std::strerror(error));
 }

@@ -283,7 +283,14 @@ std::optional<Verdict> verdictOf(const Measurements& measurements,
                            .bytes = finest->bytes,
                            .read_fraction = readFraction(middle),
                            .draws_apart = draws_apart};
-  const StageSpeeds speeds{measurements.median("stages/read"), *verify, *decode, *project, *sort, *draw};
+  double spread = 0;
+  for (const std::string& name :
+       {std::string("stages/read"), stageName("verify", threads), stageName("decode", threads),
+        stageName("project", threads), stageName("sort", threads), draw_stage})
+    if (const Measurement* const measured = measurements.find(name))
+      spread = std::max(spread, spreadOf(measured->samples));
+  const StageSpeeds speeds{
+      measurements.median("stages/read"), *verify, *decode, *project, *sort, *draw, spread};
   return judge(judged, speeds, others);
 }
 

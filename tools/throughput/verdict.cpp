@@ -59,6 +59,7 @@ class Judge {
 
   Verdict verdict() {
     const double card_s = frame_.draws_apart ? draw_s_ : 0;
+    compareResources(card_s);
     if (read_s_ > std::max(cores_s_, card_s)) {
       boundApart("reading", read_s_);
       buys_.emplace_back("a faster disk");
@@ -84,6 +85,22 @@ class Judge {
     verdict_.lines.push_back(
         fmt::format("{} bounds the frame: in isolation it takes {} of {}; the work on the cores takes {}",
                     stage, secondsText(seconds), secondsText(frame_.seconds), secondsText(cores_s_)));
+  }
+
+  /// Disk, cores and graphics card work at the same time: the slowest of them bounds the frame, if it is slower by more than
+  /// the measured rates spread.
+  void compareResources(double card_s) {
+    std::array<Stage, 3> all{{{"reading", read_s_},
+                              {"the work on the cores", cores_s_},
+                              {"drawing by the graphics card", card_s}}};
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Stage& a, const Stage& b) { return a.seconds > b.seconds; });
+    const double spread_s = speeds_.spread * (all[0].seconds + all[1].seconds);
+    if (spread_s == 0 || all[0].seconds - all[1].seconds > spread_s) return;
+    undecided_ = fmt::format("{} ({}) and {} ({})", all[0].name, secondsText(all[0].seconds), all[1].name,
+                             secondsText(all[1].seconds));
+    verdict_.lines.push_back(fmt::format("{}: no difference measured, since the rates spread by {:.0f} %",
+                                         undecided_, 100 * speeds_.spread));
   }
 
   void boundOnCores() {
@@ -192,6 +209,12 @@ class Judge {
 
   /// One sentence without terms of ours. It names what was measured or follows from the stages, and nothing else.
   void sayWhatToBuy() {
+    if (!undecided_.empty()) {
+      verdict_.lines.push_back(
+          fmt::format("nothing that could be bought alone is sure to draw this faster: {} take equally long",
+                      undecided_));
+      return;
+    }
     const bool reads_little = read_s_ < cores_s_ / 2;
     if (buys_.empty()) buys_.emplace_back("a processor with faster cores");
     verdict_.lines.push_back(
@@ -215,6 +238,7 @@ class Judge {
   double read_s_ = 0, draw_s_ = 0, cores_s_ = 0;
   std::vector<Stage> on_cores_;
   std::vector<std::string> buys_;  // what would make the frame faster, the surest first
+  std::string undecided_;          // the two resources that bound the frame equally, or empty
   Verdict verdict_;
 };
 

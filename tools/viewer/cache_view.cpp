@@ -39,9 +39,9 @@ ImageSize pixelsOf(const Rectangle& place, const Window& window) {
   return window.pixels().width > 0 ? ImageSize{pixels(place.width), pixels(place.height)} : ImageSize{0, 0};
 }
 
-/// The files that can have further scalars; none of a preview or of a series, to which none can be added.
+/// The files that can have further scalars; none of a preview, to which none can be added.
 std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& options) {
-  if (options.preview || cache.series().steps.size() > 1 || !options.conversion.sources_of) return {};
+  if (options.preview || !options.conversion.sources_of) return {};
   if (!options.grid_files.empty()) return options.grid_files;
   return options.conversion.sources_of(cache.seriesManifest(), cache.cachePath());
 }
@@ -87,6 +87,8 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
 void CacheView::releasePictures() {
   if (save_to_) say("The picture was not saved, because something else has been opened.");
   if (copy_requested_) say("The command was not copied, because something else has been opened.");
+  if (wanted_scalar_)
+    say(fmt::format("{} was not added, because something else has been opened.", *wanted_scalar_));
   picture_.release();
   overlay_.release();
 }
@@ -101,6 +103,8 @@ void CacheView::takeRequestsOf(CacheView& before) {
   save_to_ = std::exchange(before.save_to_, std::nullopt);
   copy_requested_ = std::exchange(before.copy_requested_, false);
   copies_movie_ = before.copies_movie_;
+  wanted_scalar_ = std::exchange(before.wanted_scalar_, std::nullopt);
+  chooser_.takeQuestionsOf(before.chooser_);
 }
 
 /// As the view before has it now. Reads only where the user has chosen another scalar since the view was prepared.
@@ -286,6 +290,10 @@ void CacheView::run(Command command) {
       return;
     case Command::kSavePictureAs:
       return dialog_.open(FileDialog::Purpose::kSavePicture, cache_.cachePath().stem().string() + ".png");
+    case Command::kSaveTurnMovie:
+    case Command::kSaveStepsMovie:
+      movie_kind_ = command == Command::kSaveTurnMovie ? MovieKind::kTurn : MovieKind::kSteps;
+      return dialog_.open(FileDialog::Purpose::kSaveMovie, cache_.cachePath().stem().string() + ".mp4");
     case Command::kCopyCommand:
     case Command::kCopyMovieCommand:
       copy_requested_ = true;
@@ -344,6 +352,7 @@ bool CacheView::isEnabled(Command command) const {
     case Command::kPlay:
     case Command::kNextStep:
     case Command::kPreviousStep:
+    case Command::kSaveStepsMovie:
       return playback_.steps() > 1;
     case Command::kAddClipPlane:
       return state_.clip_planes.size() < kMaxClipPlanes;
@@ -416,7 +425,12 @@ bool CacheView::isOf(const CacheReader& cache) const {
 
 std::optional<std::string> CacheView::takeWantedScalar(bool is_busy) {
   adds_scalar_ = is_busy;
-  return std::exchange(wanted_scalar_, std::nullopt);
+  if (is_busy) return std::nullopt;
+  std::optional<std::string> wanted = std::exchange(wanted_scalar_, std::nullopt);
+  const auto is_wanted = [&](const VariableInfo& one) { return one.name == wanted; };
+  if (!wanted || std::ranges::none_of(manifest().variables, is_wanted)) return wanted;
+  reports_.attempt([&] { chooseScalar(*wanted); });  // it has been added meanwhile
+  return std::nullopt;
 }
 
 void CacheView::remember() const {

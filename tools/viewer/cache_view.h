@@ -18,6 +18,7 @@
 #include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/history.h"
 #include "tools/viewer/menus.h"
+#include "tools/viewer/movie.h"
 #include "tools/viewer/navigation.h"
 #include "tools/viewer/panels.h"
 #include "tools/viewer/picture_texture.h"
@@ -52,7 +53,7 @@ class CacheView {
 
   /// Shows the picture of the view that this one replaces until its own first one comes.
   void takePictureOf(CacheView& before);
-  /// Saves the picture and copies the command that the view before has not got to.
+  /// Does what the view before has not got to: saves the picture, copies the command, chooses and adds scalars.
   void takeRequestsOf(CacheView& before);
   /// Gives up what is OpenGL's, and says what will not be saved or copied. Then nothing but the destructor may be called,
   /// and that on any thread: it waits for what is being read and drawn.
@@ -81,8 +82,11 @@ class CacheView {
   std::shared_ptr<const CarriedView> carried() const;
   const std::optional<Preview>& preview() const { return preview_; }
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }
-  /// A scalar of the sources that is to be added to the cache, once. `is_busy`: one is being added.
+  /// A scalar of the sources that is to be added to the cache, once. `is_busy`: something is being opened or added; then it
+  /// waits.
   std::optional<std::string> takeWantedScalar(bool is_busy);
+  /// A movie that is to be drawn, once.
+  std::optional<MovieRequest> takeWantedMovie() { return std::exchange(wanted_movie_, std::nullopt); }
   const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
   const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
   /// Whether its state can be that of a view of this cache: it shows the same one, and no faces of the command line, which
@@ -96,6 +100,7 @@ class CacheView {
   void reportDamage();
   /// A picture, once it is final; the empty name: the next number.
   void saveTo(const std::filesystem::path& file);
+  void saveMovieTo(const std::filesystem::path& file);
   void giveUpSaving();
   void giveUpRequest();
   void restartFrames();
@@ -107,6 +112,8 @@ class CacheView {
   void showPicture(const WindowLayout& layout);
   void showPlanesAndMarkers(const WindowLayout& layout);
   void probe(const WindowLayout& layout);
+  struct Click;
+  bool isSeenAt(const Click& click) const;
   void drawStatus(const WindowLayout& layout);
   void keepHistory();
   void restore(const ViewState* state);
@@ -154,6 +161,8 @@ class CacheView {
   FurtherScalarList further_;
   bool adds_scalar_ = false;  // one is being added
   std::optional<std::string> wanted_scalar_;
+  MovieKind movie_kind_ = MovieKind::kTurn;  // for which a file is being chosen
+  std::optional<MovieRequest> wanted_movie_;
 
   bool changed_ = true;  // since the newest request
   uint64_t function_version_ = 1, request_ = 0;
@@ -171,7 +180,13 @@ class CacheView {
   bool values_failed_ = false;     // of the newest request
   double pointed_since_s_ = 0;
   glm::dvec2 pointed_{-1.0};
-  std::optional<glm::dvec2> clicked_;  // in pixels of the picture; a marker is to come there
+  struct Click {
+    glm::dvec2 pixel{0.0};  // of the picture; a marker is to come there
+    Camera camera;          // that it was seen with
+    ImageSize size;
+    uint64_t step = 0;
+  };
+  std::optional<Click> clicked_;
   std::optional<PointProbe::Question> marker_question_;
   std::string probed_;
 };

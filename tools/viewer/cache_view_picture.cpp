@@ -84,7 +84,7 @@ void CacheView::probe(const WindowLayout& layout) {
                       (at.y - layout.picture.y) / layout.picture.height * data_size_.height);
   };
   for (const glm::dvec2& click : window_.takeClicks()) {
-    clicked_ = pixelAt(click);
+    clicked_ = {pixelAt(click), shown_ ? shown_->camera : state_.camera, data_size_, playback_.step()};
     if (!std::exchange(values_failed_, false)) continue;
     values_asked_for_ = 0;  // tries again
     changed_ |= frames_failed_ || !isShown();
@@ -94,6 +94,10 @@ void CacheView::probe(const WindowLayout& layout) {
     pointed_since_s_ = glfwGetTime();
     pointed_ = pointed.value_or(glm::dvec2(-1.0));
     if (!pointed) probed_.clear();
+  }
+  if (clicked_ && !isSeenAt(*clicked_)) {
+    clicked_.reset();  // another point lies under that pixel now
+    say("No marker was set, because the view has changed since the click.");
   }
   const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedForSeconds;
   if ((rests || clicked_) && isFinal() && !frames_failed_ && !frames_->busy() &&
@@ -108,7 +112,7 @@ void CacheView::probe(const WindowLayout& layout) {
       return PointProbe::Question{*point, cache_.variableNamed(state_.variable), playback_.position()};
     };
     if (clicked_) {
-      marker_question_ = question(*std::exchange(clicked_, std::nullopt));
+      marker_question_ = question(std::exchange(clicked_, std::nullopt)->pixel);
       if (marker_question_)
         probe_.ask(*marker_question_, true);
       else
@@ -143,6 +147,16 @@ void CacheView::probe(const WindowLayout& layout) {
   state_.markers.push_back(marker);
   rests_ = false;
   say(fmt::format("marker {}: {}", marker.name, probed_));
+}
+
+/// Whether what is shown now is seen under the same pixel as when it was clicked.
+bool CacheView::isSeenAt(const Click& click) const {
+  const Camera &then = click.camera, &now = state_.camera;
+  return then.position == now.position && then.focal_point == now.focal_point &&
+         then.view_up == now.view_up && then.projection == now.projection &&
+         then.parallel_scale == now.parallel_scale && then.view_angle_deg == now.view_angle_deg &&
+         click.size.width == data_size_.width && click.size.height == data_size_.height &&
+         click.step == playback_.step();
 }
 
 void CacheView::drawStatus(const WindowLayout& layout) {
@@ -207,6 +221,17 @@ std::string CacheView::timeOption() const {
                       : fmt::format(" --time={} --interpolate", cache_.series().timeAt(at));
 }
 
+/// What is shown now, whatever is changed while it is drawn.
+void CacheView::saveMovieTo(const fs::path& file) {
+  MovieRequest movie{movie_kind_, file, cache_.atStep(playback_.step()), state_, picture_size_};
+  if (movie_kind_ == MovieKind::kSteps) movie.frames_per_s = playback_.stepsPerSecond();
+  movie.backend = backend_;
+  movie.faces_at = faces_at_;
+  movie.keep_going = !damaged_.empty();
+  if (preview_) movie.keeps = preview_->folder;
+  wanted_movie_ = std::move(movie);
+}
+
 void CacheView::copyCommand(bool turns) {
   try {
     CommandOptions options{shortPath(whole()), picture_size_, {}, {}, turns};
@@ -250,6 +275,8 @@ void CacheView::take(const FileDialog::Chosen& chosen) {
             fmt::format("saved {}; draw with it: render --tf {}", file.string(), shortPath(file).string()));
       case FileDialog::Purpose::kSavePicture:
         return saveTo(file);
+      case FileDialog::Purpose::kSaveMovie:
+        return saveMovieTo(file);
       case FileDialog::Purpose::kOpenData:
         return;
     }
@@ -302,10 +329,7 @@ void CacheView::addTo(MenuFacts& facts) {
 FurtherScalars CacheView::furtherScalars() {
   FurtherScalars further = further_.known();
   further.is_busy = adds_scalar_;
-  if (cache_.series().steps.size() > 1)
-    further.note = "for more, convert the series again with --scalar NAME";
-  else if (preview_)
-    further.note = "more when the whole is there";
+  if (preview_) further.note = "more when the whole is there";
   return further;
 }
 

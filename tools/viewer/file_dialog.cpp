@@ -34,6 +34,8 @@ Look lookOf(FileDialog::Purpose purpose) {
       return {"Save colours and opacities", "save", true, {".json"}};
     case FileDialog::Purpose::kSavePicture:
       return {"Save picture", "save", true, {".png", ".exr", ".pfm"}};
+    case FileDialog::Purpose::kSaveMovie:
+      return {"Save movie", "save", true, {".mp4", ".gif", ".png"}};
   }
   return {"", ""};
 }
@@ -128,6 +130,8 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   ImGui::SameLine();
   if (error_.empty() && *purpose_ == Purpose::kOpenData)
     ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
+  else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
+    ImGui::TextDisabled(".mp4 or .gif; .png: a numbered picture of each frame");
   else
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;

@@ -26,7 +26,7 @@ std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
 
 class FileDialog {
  public:
-  enum class Purpose { kOpenData, kLoadFunction, kSaveFunction, kSavePicture };
+  enum class Purpose { kOpenData, kLoadFunction, kSaveFunction, kSavePicture, kSaveMovie };
   struct Chosen {
     Purpose purpose;
     std::vector<std::filesystem::path> files;

@@ -14,6 +14,12 @@ void FunctionChooser::ask(const Question& question) {
   if (!answering_.valid()) beginNext();
 }
 
+void FunctionChooser::takeQuestionsOf(FunctionChooser& other) {
+  for (size_t what = 0; what < wanted_.size(); ++what)
+    if (const auto scalar = std::exchange(other.wanted_[what], std::nullopt))
+      ask({static_cast<For>(what), *scalar});
+}
+
 void FunctionChooser::drop() {
   wanted_ = {};
 }

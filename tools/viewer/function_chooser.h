@@ -30,6 +30,8 @@ class FunctionChooser {
   };
 
   void ask(const Question& question);
+  /// Asks what another has not answered yet, of a cache that may be another one of the same grid. It is dropped there.
+  void takeQuestionsOf(FunctionChooser& other);
   /// What was asked is not wanted any more: all of it, or what was asked for this.
   void drop();
   void drop(For what) { wanted(what).reset(); }

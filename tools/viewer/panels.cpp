@@ -72,6 +72,7 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   if (option("loop", loops)) playback.setLoop(loops);
   bool interpolates = playback.interpolates();
   if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
+  commandButton(Command::kSaveStepsMovie, actions, "save movie...");
 }
 
 namespace {
@@ -224,6 +225,7 @@ void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   actions.changed |= option("axes grid", state.annotations.axes_grid);
   commandButton(Command::kSavePicture, actions, "save picture");
   ImGui::SameLine(column);
+  commandButton(Command::kSaveTurnMovie, actions, "save movie...");
   commandButton(Command::kCopyCommand, actions, "copy command");
 }
 

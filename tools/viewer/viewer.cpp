@@ -9,18 +9,15 @@
 #include <cmath>
 #include <exception>
 #include <functional>
-#include <future>
 #include <memory>
 #include <utility>
 
 #include "stream/base/error.h"
 #include "stream/base/message.h"
-#include "stream/base/thread_name.h"
 #include "tools/viewer/cache_view.h"
-#include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/menus.h"
-#include "tools/viewer/opening.h"
-#include "tools/viewer/prepared_view.h"
+#include "tools/viewer/movie.h"
+#include "tools/viewer/opened_view.h"
 #include "tools/viewer/reports.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/widget_places.h"
@@ -36,7 +33,6 @@ namespace fs = std::filesystem;
 constexpr double kIdleWaitSeconds = 0.5;
 constexpr int kFramesAfterInput = 2;  // Dear ImGui needs them to settle
 constexpr double kTextStep = 1.125;
-constexpr size_t kMaxTitle = 60;
 
 class Viewer {
  public:
@@ -45,18 +41,12 @@ class Viewer {
     printMessage("window: OpenGL {}", window_.contextName());
     if (settings_.light_theme) window_.setLightTheme(true);
     if (settings_.text_scale != 1) window_.setTextScale(settings_.text_scale);
-    if (cache) {
-      const fs::path path = fs::absolute(cache->cachePath());
-      show(prepareView(std::move(*cache), options, pictureSize()), options, {path});
-    }
-    if (!options.files.empty()) open(options.files);
+    if (cache) opened_.show(std::move(*cache));
+    if (!options.files.empty()) opened_.open(options.files);
   }
 
   ~Viewer() {
-    opening_.reset();
-    view_.reset();
-    retired_ = {};
-    FurtherScalarList::waitForThreads();
+    if (movie_) printMessage("{}: stopped, because the window was closed", movie_->title());
   }
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
@@ -77,40 +67,10 @@ class Viewer {
     int frames_to_settle = kFramesAfterInput;
     while (window_.isOpen()) {
       stopped.throwIfStopped();
-      window_.wait(frames_to_settle > 0 ? 0 : view_ ? view_->wait() : kIdleWaitSeconds);
+      window_.wait(frames_to_settle > 0 ? 0 : opened_.view() ? opened_.view()->wait() : kIdleWaitSeconds);
       frames_to_settle = window_.takeInput() ? kFramesAfterInput : std::max(0, frames_to_settle - 1);
       update();
     }
-  }
-
-  void show(const PreparedView& prepared, const ViewerOptions& options, const std::vector<fs::path>& files) {
-    if (view_) view_->remember();
-    std::promise<void> before_has_ended;
-    auto view = std::make_unique<CacheView>(prepared, options, window_, reports_, dialog_,
-                                            before_has_ended.get_future().share());
-    if (options.carried && view_) view->takePictureOf(*view_);
-    const auto preview = view_ ? view_->preview() : std::nullopt;
-    if (view_ && (options.carried || (preview && preview->whole == prepared.cache.cachePath())))
-      view->takeRequestsOf(*view_);
-    retire(std::exchange(view_, std::move(view)), std::move(before_has_ended));
-    window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
-    std::vector<std::string> names;
-    for (const fs::path& file : files) names.push_back(fs::absolute(file).string());
-    settings_.opened(std::move(names));
-  }
-
-  /// Ends a view on another thread: what it reads and draws is stopped, but not at once.
-  void retire(std::unique_ptr<CacheView> view, std::promise<void> has_ended) {
-    if (!view) return has_ended.set_value();
-    view->releasePictures();
-    auto before = std::exchange(retired_, {});  // in a row, so that one at most is kept
-    retired_ = std::async(std::launch::async, [view = std::move(view), has_ended = std::move(has_ended),
-                                               before = std::move(before)]() mutable {
-      nameThisThread("ending a view");
-      before = {};
-      view.reset();
-      has_ended.set_value();
-    });
   }
 
   ImageSize pictureSize() const {
@@ -121,152 +81,33 @@ class Viewer {
     return {pixels(picture.width), pixels(picture.height)};
   }
 
-  /// Of this size; where the view prepares on the thread that opens.
-  struct Preparation {
-    ViewerOptions options;
-    ImageSize picture;
-    std::shared_ptr<const PreparedView> prepared;  // once the thread has ended
-
-    void prepare(const fs::path& cache) {
-      prepared = std::make_shared<const PreparedView>(prepareView(CacheReader(cache), options, picture));
-    }
-  };
-
-  /// What was chosen in a dialog or a menu, or dropped: a cache at once, a grid when it is converted.
-  void open(const std::vector<fs::path>& files) {
-    opening_.reset();              // the one before is given up
-    if (view_) view_->remember();  // what is opened may be what is shown
-    opening_files_ = files;
-    opens_command_line_ = files == options_.files;
-    adds_to_.reset();
-    preparation_ = std::make_shared<Preparation>(Preparation{viewOptions(), pictureSize(), nullptr});
-    std::string names;
-    for (const fs::path& file : files) names += fmt::format(" {}", file.filename().string());
-    if (names.size() > kMaxTitle)
-      names = fmt::format("{} ... ({} files)", names.substr(0, kMaxTitle), files.size());
-    opening_ = std::make_unique<Opening>(
-        "opening" + names,
-        [to_cache = options_.conversion.to_cache, files, of = preparation_](Progress& progress,
-                                                                            const OpeningEvents& events) {
-          OpeningEvents with_views = events;
-          with_views.preview = [&](Preview preview) {
-            Preparation own = *of;
-            own.options.preview = preview;
-            try {
-              own.prepare(preview.cache);
-            } catch (const Interrupted&) {
-              throw;
-            } catch (const Error&) {
-              return;  // of the whole it will be said
-            }
-            preview.view = own.prepared;
-            events.preview(std::move(preview));
-          };
-          const fs::path cache = to_cache(files, progress, with_views);
-          of->prepare(cache);
-          return cache;
-        },
+  void begin(MovieRequest request) {
+    if (movie_) return reports_.say("A movie is being saved already: stop it, or wait for its end.");
+    const fs::path name = movieNameOf(request.file).filename();
+    movie_ = std::make_unique<BackgroundJob>(
+        fmt::format("saving {}", name.string()), "beginning",
+        [movie = std::make_shared<MovieRequest>(std::move(request)),
+         open = options_.open_movie](Progress& progress) { return drawMovie(*movie, open, progress); },
         Window::wake);
   }
 
-  /// Adds a scalar of the sources to the cache that is shown.
-  void add(const std::string& scalar) {
-    if (opening_) return;
-    adds_to_ = scalar;
-    preparation_ = std::make_shared<Preparation>(Preparation{viewOptions(), pictureSize(), nullptr});
-    preparation_->options.scalar = scalar;
-    opening_ = std::make_unique<Opening>(
-        "adding " + scalar,
-        [this, scalar, cache = view_->cachePath(), files = view_->sources(), of = preparation_](
-            Progress& progress, const OpeningEvents&) {
-          options_.conversion.add_scalar(cache, files, scalar, progress);
-          of->prepare(cache);
-          return cache;
-        },
-        Window::wake);
+  /// Begins the movie that the view wants, and takes the one that is done. One at a time.
+  void updateMovie() {
+    CacheView* const view = opened_.view();
+    if (std::optional<MovieRequest> wanted = view ? view->takeWantedMovie() : std::nullopt)
+      begin(std::move(*wanted));
+    if (!movie_ || !movie_->isDone()) return;
+    const std::unique_ptr<BackgroundJob> done = std::move(movie_);
+    reports_.attempt([&] { reports_.say("saved " + fs::absolute(done->take()).string()); });
   }
 
-  /// The options of a view of what is opened now.
-  ViewerOptions viewOptions() const {
-    ViewerOptions options;
-    if ((!view_ || view_->preview()) && opens_command_line_) options = options_;
-    options.backend = options_.backend;
-    options.target_s = options_.target_s;
-    options.memory_bytes = options_.memory_bytes;
-    options.conversion = options_.conversion;
-    return options;
-  }
-
-  /// Shows what has been opened.
-  void takeOpened() {
-    if (!opening_) return;
-    for (const std::string& text : opening_->takeMessages()) reports_.say(text);
-    if (auto files = opening_->takeFiles(); !files.empty()) opening_files_ = std::move(files);
-    const bool is_done = opening_->isDone();
-    if (auto preview = opening_->takePreview(); preview && !is_done) showPreview(*preview);
-    if (!is_done) return;
-    const std::unique_ptr<Opening> done = std::move(opening_);
-    const std::shared_ptr<Preparation> preparation = std::move(preparation_);
-    try {
-      const fs::path cache = done->take();
-      ViewerOptions options = viewOptions();
-      if (adds_to_) {
-        options.grid_files = view_->gridFiles();
-        options.carried = view_->carried();
-        options.scalar = adds_to_;
-        return show(*preparation->prepared, options,
-                    options.grid_files.empty() ? std::vector{cache} : options.grid_files);
-      }
-      const bool is_kept = opening_files_.size() > 1 || opening_files_.front() != cache;
-      if (is_kept) options.grid_files = opening_files_;
-      const auto preview = view_ ? view_->preview() : std::nullopt;
-      const bool follows_preview = preview && preview->whole == cache;
-      // Of one that is opened again, too, what the user has changed while it opened.
-      if (follows_preview || (view_ && view_->isOf(preparation->prepared->cache)))
-        options.carried = view_->carried();
-      if (options.carried) options.scalar.reset();  // the user has chosen since
-      show(*preparation->prepared, options, opening_files_);
-    } catch (const Interrupted&) {
-    } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
-      reports_.report(error);
-    }
-  }
-
-  /// A coarse cache of what is being opened, until it is complete.
-  void showPreview(const Preview& preview) {
-    try {
-      ViewerOptions options = viewOptions();
-      options.grid_files = opening_files_;
-      options.preview = preview;
-      options.preview->view.reset();
-      show(*preview.view, options, opening_files_);
-      reports_.say(fmt::format("A preview of {}; the whole follows.", preview.what));
-    } catch (const std::exception& error) {
-      reports_.say(fmt::format("no preview: {}", error.what()));
-    }
-  }
-
-  /// In the corner of the picture, where it hides nothing that is looked at.
-  void drawOpening(const Rectangle& picture) {
-    if (!opening_) return;
-    const float unit = ImGui::GetFontSize();
-    ImGui::SetNextWindowPos({static_cast<float>(picture.x) + unit, static_cast<float>(picture.y) + unit});
-    ImGui::SetNextWindowSize({26 * unit, 0});
-    ImGui::Begin("opening", nullptr,
-                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                     ImGuiWindowFlags_AlwaysAutoResize);
-    window_.coverCurrent();
-    ImGui::TextUnformatted(opening_->title().c_str());
-    if (view_ && view_->preview() && !adds_to_)
-      ImGui::TextDisabled("what is shown is a preview: %s", view_->preview()->what.c_str());
-    ImGui::ProgressBar(opening_->part(), {-1, 0}, opening_->phase().c_str());
-    nameWidget("opening");
-    const bool stops = ImGui::Button("stop");
-    nameWidget("stop opening");
-    ImGui::End();
-    if (stops) opening_.reset();
-    if (stops && view_ && view_->preview())
-      reports_.say(fmt::format("Stopped. What is shown is a preview of {}.", view_->preview()->what));
+  /// Of what goes on in the background.
+  void drawJobs(const Rectangle& picture) {
+    JobDisplay display(picture, window_);
+    opened_.drawOpening(display);
+    if (!movie_ || !display.draw(*movie_, "movie")) return;
+    movie_.reset();
+    reports_.say("Stopped. The movie was not saved.");
   }
 
   WindowLayout layout() const {
@@ -289,8 +130,8 @@ class Viewer {
     window_.setPicture(place.picture);
     if (!window_.showsClick()) pressKeys();
     attempt([&] { drawMenuBar(); });
-    attempt([&] { view_ ? view_->draw(place) : drawWelcome(place); });
-    drawOpening(place.picture);
+    attempt([&] { opened_.view() ? opened_.view()->draw(place) : drawWelcome(place); });
+    drawJobs(place.picture);
     drawKeys(keys_shown_, window_);
     drawMessages(toasts_, messages_shown_, window_);
     drawToasts(toasts_, place.picture, glfwGetTime(), window_);
@@ -302,15 +143,15 @@ class Viewer {
     // What replaces the view or the font waits until the frame is over.
     applyLook();
     if (chosen && chosen->purpose == FileDialog::Purpose::kOpenData)
-      open(chosen->files);
-    else if (chosen && view_)
-      reports_.attempt([&] { view_->take(*chosen); });
-    if (const auto files = std::exchange(to_open_, std::nullopt)) open({files->begin(), files->end()});
-    if (const auto dropped = window_.takeDropped(); !dropped.empty()) open({dropped.begin(), dropped.end()});
-    const bool is_busy = opening_ != nullptr;
-    if (view_)
-      if (const auto scalar = view_->takeWantedScalar(is_busy)) add(*scalar);
-    takeOpened();
+      opened_.open(chosen->files);
+    else if (chosen && opened_.view())
+      reports_.attempt([&] { opened_.view()->take(*chosen); });
+    if (const auto files = std::exchange(to_open_, std::nullopt))
+      opened_.open({files->begin(), files->end()});
+    if (const auto dropped = window_.takeDropped(); !dropped.empty())
+      opened_.open({dropped.begin(), dropped.end()});
+    updateMovie();
+    opened_.update();
   }
 
   /// Does a part of a frame; an error of it is reported, and ends only this part.
@@ -323,11 +164,11 @@ class Viewer {
     facts.is_enabled = [this](Command command) { return isEnabled(command); };
     facts.is_checked = [this](Command command) { return isChecked(command); };
     facts.recent = settings_.recent;
-    if (view_) view_->addTo(facts);
+    if (CacheView* const view = opened_.view()) view->addTo(facts);
     const MenuChoice choice = drawMenus(facts, window_);
     for (const Command command : choice.commands) run(command);
     if (choice.open) to_open_ = choice.open;
-    if (view_) view_->choose(choice);
+    if (CacheView* const view = opened_.view()) view->choose(choice);
   }
 
   void drawWelcome(const WindowLayout& place) {
@@ -337,8 +178,8 @@ class Viewer {
     ImGui::Begin("welcome", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
-    window_.coverCurrent();             // what is clicked here is not for a picture to come
-    if (opening_) return ImGui::End();  // its progress is shown in this place
+    window_.coverCurrent();                        // what is clicked here is not for a picture to come
+    if (opened_.isOpening()) return ImGui::End();  // its progress is shown in this place
     ImGui::TextUnformatted("Drop a cache or a grid with its solution here, or");
     if (ImGui::Button("open...")) run(Command::kOpen);
     nameWidget("open");
@@ -372,8 +213,12 @@ class Viewer {
       case Command::kSmallerText:
       case Command::kPanels:
         return true;
+      case Command::kSaveTurnMovie:
+      case Command::kSaveStepsMovie:
+        if (movie_) return false;
+        [[fallthrough]];
       default:
-        return view_ && view_->isEnabled(command);
+        return opened_.view() && opened_.view()->isEnabled(command);
     }
   }
 
@@ -388,7 +233,7 @@ class Viewer {
       case Command::kMessages:
         return messages_shown_;
       default:
-        return view_ && view_->isChecked(command);
+        return opened_.view() && opened_.view()->isChecked(command);
     }
   }
 
@@ -422,7 +267,7 @@ class Viewer {
         return;
       }
       default:
-        if (view_) view_->run(command);
+        if (CacheView* const view = opened_.view()) view->run(command);
     }
   }
 
@@ -433,7 +278,7 @@ class Viewer {
   }
 
   void remember() {
-    if (view_) view_->remember();
+    if (const CacheView* const view = opened_.view()) view->remember();
     try {
       writeSettings(settings_);
     } catch (const Error& error) {
@@ -442,19 +287,14 @@ class Viewer {
   }
 
   const ViewerOptions options_;
+  bool panels_shown_ = true, keys_shown_ = false, messages_shown_ = false, look_changed_ = false;
   WindowSettings settings_;
   Window window_;
   Toasts toasts_;
   Reports reports_{toasts_, glfwGetTime};
   FileDialog dialog_;
-  std::unique_ptr<CacheView> view_;
-  std::vector<fs::path> opening_files_;       // that are being opened, or were
-  bool opens_command_line_ = false;           // they are those of the command line
-  std::optional<std::string> adds_to_;        // the scalar that is being added instead
-  std::shared_ptr<Preparation> preparation_;  // of what is being opened
-  std::unique_ptr<Opening> opening_;
-  std::future<void> retired_;  // the view before, while it ends
-  bool panels_shown_ = true, keys_shown_ = false, messages_shown_ = false, look_changed_ = false;
+  OpenedView opened_{options_, {window_, reports_, dialog_, settings_, [this] { return pictureSize(); }}};
+  std::unique_ptr<BackgroundJob> movie_;  // that is being drawn
   std::optional<std::vector<std::string>> to_open_;
 };
 

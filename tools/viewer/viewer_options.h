@@ -13,6 +13,7 @@
 #include "render/surface/surface_scene.h"
 #include "tools/viewer/conversion_services.h"
 #include "tools/viewer/frame_loop.h"
+#include "tools/viewer/movie.h"
 
 namespace curvisplat {
 
@@ -30,6 +31,7 @@ struct ViewerOptions {
   FacesAtStep faces_at;                              // the scene's grid surfaces at other steps
   std::optional<uint64_t> memory_bytes;
   ConversionServices conversion;
+  OpenMovieOutput open_movie;
   std::vector<std::filesystem::path> files;  // to open first, in place of a cache
   std::optional<double> target_s;  // per picture while moving; default 0.033 with a graphics card, else 0.1
 

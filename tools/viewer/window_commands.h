@@ -13,6 +13,8 @@ enum class Command {
   kOpen,
   kSavePicture,
   kSavePictureAs,
+  kSaveTurnMovie,
+  kSaveStepsMovie,
   kCopyCommand,
   kCopyMovieCommand,
   kQuit,

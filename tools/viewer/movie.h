@@ -1,0 +1,57 @@
+// A movie of what the window shows: once around the focal point, or all time steps. Drawn in the background.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "render/frame/backend.h"
+#include "render/image/image.h"
+#include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/viewer/frame_loop.h"
+#include "tools/viewer/view_state.h"
+
+namespace curvisplat {
+
+enum class MovieKind { kTurn, kSteps };
+
+/// Takes the pictures 0, 1, 2, ...; unless finish() is called, nothing is left of a movie. Throws Error.
+class MovieOutput {
+ public:
+  virtual ~MovieOutput() = default;
+  virtual void write(uint64_t frame, const Image& image) = 0;
+  virtual void finish() = 0;
+};
+
+/// Writing movies is no part of the window: the subcommand supplies this function. By the name's ending: .mp4 and .gif by
+/// ffmpeg, else numbered pictures. Throws Error, and UsageError for a name that does not suit.
+using OpenMovieOutput = std::function<std::unique_ptr<MovieOutput>(const std::filesystem::path& file,
+                                                                   ImageSize size, double frames_per_s)>;
+
+struct MovieRequest {
+  MovieKind kind = MovieKind::kTurn;
+  std::filesystem::path file;
+  CacheReader cache;  // at the step that is shown
+  ViewState state;
+  ImageSize size;  // of the picture in the window; the movie has an even width and height
+  double frames_per_s = 25;
+  Backend backend = Backend::kAutomatic;
+  FacesAtStep faces_at = {};               // of the state's faces; none: they are those of every step
+  bool keep_going = false;                 // past damaged bricks
+  std::shared_ptr<const void> keeps = {};  // the folder of a preview
+};
+
+/// Frames of a movie: 90 once around, as `render --orbit 360` draws; or one a time step.
+uint64_t framesOf(const MovieRequest& movie);
+
+/// Where a movie named so is written: as it is, or with the frame's number if it is of pictures: "a.png" -> "a_%04d.png".
+std::filesystem::path movieNameOf(const std::filesystem::path& file);
+
+/// Draws and writes all of it; returns the name of what was written. Its reader goes to other steps. Any thread. Throws Error as
+/// drawing and writing do, and Interrupted once `progress` is stopped.
+std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open, Progress& progress);
+
+}  // namespace curvisplat
