@@ -32,10 +32,12 @@ class SeriesConversion {
 
   SeriesReport run() {
     try {
-      if (ranks_)
+      if (ranks_) {
         runTogether(*ranks_);
-      else
+      } else {
+        if (!options_.to_part) removeLeftOfRanks(options_.convert.output, options_.convert.temporary_folder);
         for (uint64_t number = 0; number < input_.count; ++number) takeOrLeaveOut(number);
+      }
     } catch (const Interrupted& interrupted) {
       throw Interrupted(interrupted.signal(), whereItStands(interrupted.what()));
     }

@@ -61,6 +61,13 @@ std::string scratchNameOfRanks(const fs::path& cache) {
   return fmt::format("{}.{:016x}.rank", path.filename().string(), checksumOf(std::as_bytes(std::span(key))));
 }
 
+void removeLeftOfRanks(const fs::path& cache, const fs::path& temporary_folder) {
+  const fs::path folder = besideCache(cache, ".ranks");
+  if (!hasUnfinished(folder)) return;
+  const PartialFolder left(folder, false);  // locked, and removed at the end
+  if (!temporary_folder.empty()) removeAbandonedScratch(temporary_folder, cache);
+}
+
 std::vector<StepRange> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks) {
   std::vector<StepRange> ranges;
   for (unsigned rank = 0; rank < ranks; ++rank) {

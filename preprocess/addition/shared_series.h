@@ -85,6 +85,10 @@ class SharedSteps {
   std::unique_ptr<ScratchFolder> scratch_;  // of the others
 };
 
+/// Removes what ranks that were killed in the rounds of this series have left; for one process. Throws Error if ranks
+/// are converting it now.
+void removeLeftOfRanks(const std::filesystem::path& cache, const std::filesystem::path& temporary_folder);
+
 Ranks::Bytes toBytes(const ConvertedSteps& converted);
 ConvertedSteps convertedFrom(const Ranks::Bytes& bytes);
 

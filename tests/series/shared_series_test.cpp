@@ -94,6 +94,29 @@ TEST(SharedSeries, AddsStepsAndResumes) {
   }
 }
 
+TEST(SharedSeries, OneProcessRemovesWhatKilledRanksHaveLeft) {
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats", left = folder / "a.splats.ranks.partial";
+  convertQuietly(inputOf({kSteady[0], kSteady[1]}), optionsFor(cache));
+  {
+    const PartialFolder made(folder / "a.splats.ranks", false);
+    fs::create_directory(left / "rank1.splats");
+    fs::copy(left, folder / "kept", fs::copy_options::recursive);
+  }
+  fs::rename(folder / "kept", left);
+  SeriesOptions resuming = optionsFor(cache);
+  resuming.convert.resume = true;
+  {
+    const PartialFolder running(folder / "a.splats.ranks", false);
+    EXPECT_THROW(convertQuietly(inputOf(kSteady), resuming), Error);
+    fs::copy(left, folder / "kept", fs::copy_options::recursive);
+  }
+  fs::rename(folder / "kept", left);
+  convertQuietly(inputOf(kSteady), resuming);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_EQ(CacheReader(cache).series().steps.size(), kSteady.size());
+}
+
 TEST(SharedSeries, LeavesOutWhatDoesNotFitOrNamesIt) {
   std::vector<StepKind> kinds = kSteady;
   kinds[5].lacks_scalar = kinds[6].other_blocks = true;
