@@ -124,7 +124,7 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
     throw Error("{}: exists and was not made by curvisplat; remove it, or choose another output",
                 path_.string());
   try {
-    lock();
+    lock(is_new);
     mark();
   } catch (...) {
     if (lock_ >= 0 && is_new) SystemCalls::current().remove((path_ / kPartialLock).c_str());
@@ -157,7 +157,7 @@ PartialFolder::~PartialFolder() {
   SystemCalls::current().close(lock_);
 }
 
-void PartialFolder::lock() {
+void PartialFolder::lock(bool is_new) {
   const fs::path name = path_ / kPartialLock;
   const int fd = openRetrying(name, O_RDWR | O_CREAT | O_NOFOLLOW, 0666);
   if (fd < 0) throw Error("{}: cannot be opened: {}", name.string(), reason());
@@ -178,7 +178,9 @@ void PartialFolder::lock() {
   if (busy || locked)
     throw Error("{}: another conversion to this output is running; wait for it, or choose another output",
                 path_.string());
-  throw Error("{}: cannot be locked: {}", name.string(), why);
+  if (is_new) SystemCalls::current().remove(name.c_str());  // no other conversion can have locked it either
+  throw Error("{}: cannot be locked: {}; choose an output on a file system that supports flock",
+              name.string(), why);
 }
 
 void PartialFolder::mark() {

@@ -59,7 +59,7 @@ class PartialFolder {
   void removeReplaced();
 
  private:
-  void lock();
+  void lock(bool is_new);
   void mark();
 
   std::filesystem::path target_, path_;

@@ -326,6 +326,19 @@ class OddHosts(unittest.TestCase):
         self.assertGreater(cut, 100)
         self.assertGreater(refused, 0)
 
+    def test_without_flock_a_conversion_is_refused_and_leaves_nothing(self):
+        folder = self.folder / "unlocked"
+        folder.mkdir()
+        run = lambda *words: subprocess.run([PROGRAM, *words], cwd=folder, capture_output=True, text=True, check=False,
+                                            env={**os.environ, **self.network(), "NO_FLOCK": "1"})
+        self.assertEqual(run("generate", "o-grid", "--size", "12x10x8", "-o", "o").returncode, 0)
+        before = sorted(folder.iterdir())
+        result = run("convert", "o.xyz", "o.fun", "-o", "o.splats")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("No locks available; choose an output on a file system that supports flock", result.stderr)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        self.assertEqual(sorted(folder.iterdir()), before)
+
     def test_a_stale_handle_is_one_line_and_leaves_nothing(self):
         """The server has forgotten a file, at one of its reads or writes."""
         environment = self.network()
