@@ -18,6 +18,7 @@
 #include "render/project/splat_maps.h"
 #include "stream/base/check.h"
 #include "stream/model/border_code.h"
+#include "stream/model/border_pairs.h"
 #include "stream/model/growth_code.h"
 
 namespace curvisplat {
@@ -316,17 +317,21 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   };
   // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
   constexpr float kCoarsest = 1e30f;
-  bool complete = false;
-  // Beyond a few hundred it is for splats that are in no grid.
-  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= coarseness < 256 ? 2 : 16) {
+  const auto attempt = [&](const BorderStyle* borders, float coarseness) {
     splats_.clear();
     depths_.clear();
     counts_ = {};
-    cutting.borders = coarseness == 1 ? &settings.borders : nullptr;
-    complete = settings.view.projection == Projection::kOrthographic
-                   ? projectAll(OrthographicMap(settings.view, cell_min))
-                   : projectAll(PerspectiveMap(settings.view, cell_min, coarseness));
-  }
+    cutting.borders = borders;
+    return settings.view.projection == Projection::kOrthographic
+               ? projectAll(OrthographicMap(settings.view, cell_min))
+               : projectAll(PerspectiveMap(settings.view, cell_min, coarseness));
+  };
+  const bool pairs = isOfPairs(settings.borders);
+  const BorderStyle& single = pairs ? kWholeCellStyle : settings.borders;
+  bool complete = pairs && attempt(&settings.borders, 1);
+  // Beyond a few hundred it is for splats that are in no grid.
+  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= coarseness < 256 ? 2 : 16)
+    complete = attempt(coarseness == 1 ? &single : nullptr, coarseness);
   for (const SplatRange& range : ranges) counts_.read += range.size();
   counts_.pieces = splats_.size();
 }

@@ -11,6 +11,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
+#include "stream/cache/border_style.h"
 #include "stream/cache/cache_format.h"
 #include "stream/codec/values_codec.h"
 
@@ -20,7 +21,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
-constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth, kMergedBorders, kSteps, kFineValues};
+constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth, kMergedBorders,
+                                          kBorderPairs, kSteps,      kFineValues};
 constexpr const char* kFormat = "curvisplat splat cache";
 // 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;
