@@ -28,7 +28,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.upper = survey.upper;
   for (const GridBlock& block : origin.blocks())
     manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
-  manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders};
+  manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers};
   if (options.precision == ValuePrecision::kFine) manifest.requirements.push_back(kFineValues);
   manifest.overlap = splats.overlap;
   manifest.cells = origin.centring() == Centring::kCell;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "preprocess/splats/shape.h"
+#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {
@@ -20,8 +21,8 @@ double thickness(const Splat& splat, const glm::dvec3& q) {
   return 1 / glm::length(gradientOf(splat, q));
 }
 
-bool isUnlike(double a, double b) {
-  return std::max(a, b) > kMaxJointRatio * std::min(a, b);
+bool isUnlike(double a, double b, double most) {
+  return std::max(a, b) > most * std::min(a, b);
 }
 
 /// How two parts of one point lie to one another.
@@ -45,8 +46,10 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
       if (!of_a.hasFace(n) || !of_b.hasFace(m)) continue;
       // Directions are coded to 0.01 of the cell, which is many times a thin cell's thickness: a joint across
       // such cells would look unlike. Weights are exact, and halves of one face differ in them as in thickness.
-      unlike |= isUnlike(thickness(a.splat, inward), thickness(b.splat, other)) &&
-                isUnlike(a.splat.weight, b.splat.weight);
+      const bool of_elements = (a.ends_of_elements >> n & b.ends_of_elements >> m & 1) != 0;
+      const double most = of_elements ? kMaxElementJointRatio : kMaxJointRatio;
+      unlike |= isUnlike(thickness(a.splat, inward), thickness(b.splat, other), most) &&
+                isUnlike(a.splat.weight, b.splat.weight, most);
     }
   if (opposite == 0) return Neighbourhood::kOther;
   if (opposite > 1) return Neighbourhood::kDiagonal;
@@ -90,12 +93,29 @@ void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values
   if (part.node < lowest_.splat.node) lowest_.splat = part;
 }
 
+/// Its probes tell of them; those of the other parts tell the same of the same faces.
+std::vector<OpenBorders::Layer> MergedParts::layersOfLowest() const {
+  const NodeSplat& lowest = lowest_.splat;
+  const InwardAxes inward = inwardAxes(lowest.border_code);
+  std::vector<OpenBorders::Layer> layers;
+  for (int n = 0; n < 3; ++n) {
+    const int axis = latticeAxis(lowest.layers, n);
+    if (axis < 0) continue;
+    const glm::dvec3 along = lowest.splat.factor() * glm::dvec3(inward.axis[static_cast<size_t>(n)]);
+    layers.push_back({along, lowest.splat.position - static_cast<double>(layerDistance(0)) * along,
+                      static_cast<uint8_t>(axis)});
+  }
+  return layers;
+}
+
 SplatWithValues MergedParts::finish() const {
   SplatWithValues merged = lowest_;
   if (nodes_.size() == 1) return merged;
   merger_.finish(merged.splat.splat, merged.values);
   bend_.correct(merged.values);
-  merged.splat.border_code = borders_.of(merged.splat.splat);
+  const LayeredBorder border = borders_.of(merged.splat.splat, layersOfLowest());
+  merged.splat.border_code = border.code;
+  merged.splat.layers = border.layers;
   merged.splat.regular = false;
   const JointGrowth::Found growth = growth_.of(merged.splat.splat, lowest_.splat);
   merged.splat.growth_code = growth.code;

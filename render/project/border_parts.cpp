@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "stream/model/border_pairs.h"
+#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {
@@ -103,6 +104,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     return 1;
   }
   const bool pairs = isOfPairs(style) && inward.ratio == 0;
+  const uint32_t layers = layersOf(border_code);
   size_t count = 1;
   for (int a = 0; a < inward.count; ++a)
     if (pairs || !inward.hasFace(a)) count *= 2;
@@ -147,6 +149,14 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
       const glm::vec3 normal = transposed(l, q);
       const float inverse = 1 / glm::length(normal);
       piece.faces.add({inverse * normal, inverse * (inward.distance + glm::dot(q, offset))});
+    }
+    for (int a = 0; a < 3; ++a) {
+      if ((layers >> a & 1) == 0) continue;
+      const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
+      const glm::vec3 normal = transposed(l, q);
+      const float inverse = 1 / glm::length(normal);
+      const float distance = layerDistance(growthAlong(whole.growth, q));
+      piece.faces.add({inverse * normal, inverse * (distance + glm::dot(q, offset)), true});
     }
   }
   return count;

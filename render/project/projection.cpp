@@ -20,6 +20,7 @@
 #include "stream/model/border_code.h"
 #include "stream/model/border_pairs.h"
 #include "stream/model/growth_code.h"
+#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {
@@ -150,7 +151,8 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   auto best = SplatChooser::Fate::kOffScreen;
   // A splat that is cut has a record of its own, as any splat; what it takes beyond that counts.
   const size_t least = brick.colours ? 2 : 1;
-  size_t own = how.clipped || how.layered || inwardAxes(border_code).faces != 0 ? least : 0;
+  const bool has_faces = inwardAxes(border_code).faces != 0 || layersOf(border_code) != 0;
+  size_t own = how.clipped || how.layered || has_faces ? least : 0;
   const SplatPiece* coloured = nullptr;  // the part that is placed, with the scalar of the colours
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;

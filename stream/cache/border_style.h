@@ -6,7 +6,9 @@
 
 namespace curvisplat {
 
-/// A feature, as manifest.h has others.
+// Features, as manifest.h has others.
+inline constexpr const char* kFaceLayers =
+    "face-layers";  // cells are cut at more faces that they are behind (layers_code.h)
 inline constexpr const char* kBorderPairs =
     "border-pairs";  // cells at faces are drawn as two splats (border_pairs.h)
 

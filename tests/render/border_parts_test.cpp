@@ -14,6 +14,7 @@
 #include "stream/model/border_code.h"
 #include "stream/model/border_pairs.h"
 #include "stream/model/kernel.h"
+#include "stream/model/layers_code.h"
 #include "tests/reference/splat_arrays.h"
 
 namespace curvisplat {
@@ -218,6 +219,43 @@ TEST(BorderParts, InTheLayerBehindAFaceAreItselfCutThere) {
   ASSERT_EQ(pieces[0].faces.count, 1);
   EXPECT_EQ(pieces[0].faces.face[0].distance, 0.75f);
   EXPECT_LT(glm::distance(glm::dvec3(pieces[0].faces.face[0].inward), kInward[0]), 0.02);
+}
+
+TEST(BorderParts, AreCutAtTheFacesThatTheyLieBehind) {
+  const glm::dmat3 a = factorOf(kWhole.shape);
+  for (size_t ends = 0; ends <= 2; ++ends) {
+    const uint32_t code = packLayersCode({kInward, 3}, ends);
+    const InwardAxes inward = inwardAxes(code);
+    for (const float growth : {0.0f, 0.5f}) {
+      SplatPiece whole = kWhole;
+      if (growth != 0) {
+        whole.growth.count = 1;
+        whole.growth.unit[0] = -inward.axis[2];
+        whole.growth.growth[0] = -growth;
+      }
+      BorderPieces pieces;
+      ASSERT_EQ(partsAtBorder(whole, code, kHalfCellStyle, pieces), 1u);
+      const SplatPiece& piece = pieces[0];
+      ASSERT_EQ(piece.faces.count, 3);
+      const glm::dmat3 to_frame = glm::inverse(factorOf(piece.shape));
+      for (size_t n = 0; n < 3; ++n) {
+        const CutFace& face = piece.faces.face[n];
+        const bool is_layer = n >= ends;
+        EXPECT_EQ(face.edge_on, is_layer);
+        const double distance = !is_layer ? 0.5 : n == 2 ? layerDistance(growth) : 1;
+        const glm::dvec3 q(inward.axis[n]), other(inward.axis[(n + 1) % 3]);
+        for (const double away : {-1.0, 0.0, 2.0}) {
+          const glm::dvec3 on_face = glm::dvec3(kWhole.position) + a * (-distance * q + away * other);
+          const glm::dvec3 u = to_frame * (on_face - glm::dvec3(piece.position));
+          EXPECT_NEAR(glm::dot(glm::dvec3(face.inward), u), -face.distance, 1e-4);
+        }
+      }
+      if (ends > 0) continue;
+      EXPECT_EQ(piece.position, kWhole.position);
+      EXPECT_EQ(factorOf(piece.shape), factorOf(kWhole.shape));
+      EXPECT_EQ(piece.weight, kWhole.weight);
+    }
+  }
 }
 
 TEST(BorderParts, KeepTheirFacesWhereTheyAreHalved) {
