@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/model/border_code.h"
 #include "stream/model/layers_code.h"
 
 namespace curvisplat {

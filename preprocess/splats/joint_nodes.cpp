@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "preprocess/splats/shape.h"
+#include "stream/model/border_code.h"
 #include "stream/model/layers_code.h"
 
 namespace curvisplat {

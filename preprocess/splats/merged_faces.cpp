@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "stream/model/border_code.h"
 #include "stream/model/layers_code.h"
 
 namespace curvisplat {

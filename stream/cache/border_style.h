@@ -6,12 +6,6 @@
 
 namespace curvisplat {
 
-// Features, as manifest.h has others.
-inline constexpr const char* kFaceLayers =
-    "face-layers";  // cells are cut at more faces that they are behind (layers_code.h)
-inline constexpr const char* kBorderPairs =
-    "border-pairs";  // cells at faces are drawn as two splats (border_pairs.h)
-
 inline BorderStyle borderStyleOf(const Manifest& manifest) {
   if (!manifest.cells) return kHalfCellStyle;
   return manifest.hasFeature(kBorderPairs) ? kWholeCellPairs : kWholeCellStyle;

@@ -11,7 +11,6 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
-#include "stream/cache/border_style.h"
 #include "stream/cache/cache_format.h"
 #include "stream/codec/values_codec.h"
 

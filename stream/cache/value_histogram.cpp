@@ -14,7 +14,7 @@ namespace {
 constexpr int kPartBits = 40;
 constexpr double kWholesOfRoot = 0x1p40;
 /// Cells may overlap, but not so often.
-constexpr double kMostWholes = 0x1p62;
+constexpr double kMaxWholes = 0x1p62;
 
 uint64_t checksumOfRecord(const HistogramRecord& record) {
   const auto bytes = std::as_bytes(std::span(&record, 1));
@@ -102,7 +102,7 @@ std::optional<ValueHistogram> HistogramSums::of(size_t variable) const {
         static_cast<double>(sums[bin].whole) + std::ldexp(static_cast<double>(sums[bin].part), -kPartBits);
     total += volumes[bin];
   }
-  if (!(total > 0 && total < kMostWholes)) return std::nullopt;
+  if (!(total > 0 && total < kMaxWholes)) return std::nullopt;
   ValueHistogram histogram{ranges_[variable].lower, ranges_[variable].upper, total / per_volume_, {}};
   for (size_t bin = 0; bin < kHistogramBins; ++bin)
     histogram.shares[bin] = static_cast<float>(volumes[bin] / total);
@@ -127,14 +127,14 @@ void HistogramSums::setWords(std::span<const uint64_t> words) {
 }
 
 void HistogramSums::Sum::add(double units) {
-  const double wholes = std::floor(std::min(units, kMostWholes));
+  const double wholes = std::floor(std::min(units, kMaxWholes));
   whole += static_cast<uint64_t>(wholes);
-  part += static_cast<uint64_t>(std::ldexp(std::min(units, kMostWholes) - wholes, kPartBits));
+  part += static_cast<uint64_t>(std::ldexp(std::min(units, kMaxWholes) - wholes, kPartBits));
   carry();
 }
 
 void HistogramSums::Sum::carry() {
-  whole = std::min(whole + (part >> kPartBits), static_cast<uint64_t>(kMostWholes));
+  whole = std::min(whole + (part >> kPartBits), static_cast<uint64_t>(kMaxWholes));
   part &= (uint64_t{1} << kPartBits) - 1;
 }
 

@@ -169,22 +169,11 @@ uint32_t layersOf(uint32_t border_code) {
 }
 
 bool isPossibleBorderCode(uint32_t border_code) {
-<<<<<<< ours
-  if (border_code == kNoBorder) return true;
-  const uint32_t count = border_code & 3, faces = border_code >> kFacesShift & 7;
-  if (count == 0) {
-    const uint32_t ratio = border_code >> kRatioShift & kRatioBits, distance = border_code >> kDistanceShift;
-    return (border_code & 7) == kLayer && ratio <= kMaxRatio && distance != 0 &&
-           (ratio == 0 || distance <= kDistanceSteps);
-  }
-  return faces >> count == 0;
-=======
   if (border_code == kNoBorder || (border_code & 3) != 0) return true;
   if ((border_code & 7) != kLayer) return false;
   const uint32_t ratio = border_code >> kRatioShift & kRatioBits, distance = border_code >> kDistanceShift;
   if (ratio >= kLayers) return true;
-  return ratio <= kMostRatio && distance != 0 && (ratio == 0 || distance <= kDistanceSteps);
->>>>>>> theirs
+  return ratio <= kMaxRatio && distance != 0 && (ratio == 0 || distance <= kDistanceSteps);
 }
 
 BorderPart mergedPart(const InwardAxes& inward) {

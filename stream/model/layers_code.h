@@ -16,8 +16,6 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-#include "stream/model/border_code.h"
-
 namespace curvisplat {
 
 /// `inward`: directions at right angles, two or three. The first `count` lead from borders that are faces, the others, at

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "preprocess/splats/shape.h"
+#include "stream/model/border_code.h"
 #include "stream/model/layers_code.h"
 #include "tests/reference/mapped_block.h"
 

@@ -14,6 +14,7 @@
 #include "preprocess/splats/shape.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/model/border_code.h"
 #include "stream/model/layers_code.h"
 #include "tests/reference/mapped_block.h"
 
