@@ -67,12 +67,13 @@ void makePreview(const DataSource& source, const ConvertOptions& whole, Progress
 /// A series is made beside its place, since a cache of its first steps looks complete. It is not moved when it is, since
 /// a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
-                const KeptCacheEvents& events) {
+                const KeptCacheEvents& events, ValuePrecision precision) {
   const auto folder = std::make_shared<PreviewFolder>(output.parent_path(), kSeries);
   arguments.output = folder->path() / output.filename();
   const std::vector<StepFiles> steps = stepsOf(arguments.grid);
   SeriesOptions options;
   options.convert = optionsFor(arguments.output, arguments.grid.grid.stem().string());
+  options.convert.precision = precision;
   convertSeries(seriesInput(arguments, steps), options, progress, [&](const SeriesEvent& event) {
     if (!event.converted) return;
     if (event.source) sayAll(events, *event.source, *event.converted);
@@ -88,16 +89,17 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
 }  // namespace
 
 void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, Progress& progress,
-                   const KeptCacheEvents& events) {
+                   const KeptCacheEvents& events, ValuePrecision precision) {
   for (const char* const name : {kPreview, kSeries})
     PreviewFolder::removeLeftOnes(output.parent_path(), name);
   ConvertArguments arguments;
   arguments.grid.grid = files.front();
   arguments.grid.solutions.assign(files.begin() + 1, files.end());
   arguments.output = output;
-  if (hasSeveralStepFiles(arguments.grid)) return makeSeries(arguments, output, progress, events);
+  if (hasSeveralStepFiles(arguments.grid)) return makeSeries(arguments, output, progress, events, precision);
   const auto source = openSource(arguments, output);
   ConvertOptions options = optionsFor(output, files.front().stem().string());
+  options.precision = precision;
   options.scalars = chooseScalars(arguments, {}, source->description());
   makePreview(*source, options, progress, events);
   sayAll(events, source->description(), convert(*source, options, progress));
