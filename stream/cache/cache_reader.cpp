@@ -15,6 +15,7 @@
 #include "stream/cache/cache_index.h"
 #include "stream/cache/geometry_folder.h"
 #include "stream/codec/brick_codec.h"
+#include "stream/codec/fine_means.h"
 
 namespace curvisplat {
 namespace {
@@ -186,7 +187,15 @@ class CacheReader::State::ValuesDecoder {
               const VariableArrays<float>& out) {
     if (++streams_ > kMaxStreams) refuse(file, fmt::format("it needs more than {} streams", kMaxStreams));
     TimeReferences references;
-    State::decode(file, of_.brick, of_.times, [&] { references.steps_back = stepsBackOf(stream); });
+    State::decode(file, of_.brick, of_.times, [&] {
+      references.steps_back = stepsBackOf(stream);
+      if (hasFineMeans(stream) && !state_.of_series->hasFeature(kFineValues))
+        throw Error(
+            "its values are stored as the feature '{}' has them, which the manifest does not name; the cache "
+            "is "
+            "damaged: convert again",
+            kFineValues);
+    });
     // The one further back first: the other may be predicted from it as well.
     for (const size_t n : {size_t{1}, size_t{0}})
       if (references.steps_back[n] > 0)

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "stream/base/error.h"
+#include "stream/codec/fine_means.h"
 #include "stream/codec/planes.h"
 
 namespace curvisplat {
@@ -265,6 +266,10 @@ std::array<uint8_t, 2> stepsBackOf(std::span<const std::byte> stream) {
   const std::array<uint8_t, 2> back = headerOf(stream).steps_back;
   if (back[1] != 0 && (back[0] == 0 || back[1] <= back[0])) throw Error("its header is invalid");
   return back;
+}
+
+bool hasFineMeans(std::span<const std::byte> stream) {
+  return isFine(headerOf(stream));
 }
 
 std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values,

@@ -5,9 +5,9 @@ import ctypes.util
 import numpy as np
 
 MODE_WRITE, ADF, HDF5 = 1, 1, 2
-UNSTRUCTURED, VERTEX, CELL_CENTER, REAL_SINGLE, REAL_DOUBLE = 3, 2, 3, 3, 4
+STRUCTURED, UNSTRUCTURED, VERTEX, CELL_CENTER, REAL_SINGLE, REAL_DOUBLE = 2, 3, 2, 3, 3, 4
 TETRA_4, PYRA_5, PENTA_6, HEXA_8, HEXA_20, QUAD_4, TRI_3, MIXED, NGON, NFACE = 10, 12, 14, 17, 18, 7, 5, 20, 22, 23
-BC_WALL, POINT_LIST = 20, 2
+BC_WALL, POINT_LIST, POINT_RANGE = 20, 2, 4
 
 
 def library():
@@ -61,6 +61,18 @@ class CgnsFile:
         for axis in range(3):
             pointer, _kept = self.numbers(points[:, axis])
             self.call("cg_coord_write", self.b, self.z, REAL_DOUBLE, f"Coordinate{'XYZ'[axis]}".encode(), pointer)
+
+    def block(self, name, places):
+        """A structured zone. `places`: [axis, k, j, i]."""
+        nodes = np.array(places.shape[:0:-1], "i4")
+        self.z = self.call("cg_zone_write", self.b, name.encode(), self.ints([nodes, nodes - 1, 0 * nodes]), STRUCTURED)
+        for axis in range(3):
+            pointer, _kept = self.numbers(places[axis])
+            self.call("cg_coord_write", self.b, self.z, REAL_DOUBLE, f"Coordinate{'XYZ'[axis]}".encode(), pointer)
+
+    def hole(self, name, ranges, location=VERTEX):
+        """An overset hole: [range][6], from 1."""
+        self.call("cg_hole_write", self.b, self.z, name.encode(), location, POINT_RANGE, len(ranges), 2 * len(ranges), self.ints(ranges))
 
     def section(self, name, kind, elements, count=None, begins=None):
         """`elements`: numbers of nodes from 1, in rows or, with `begins`, in a list of `count` elements."""

@@ -9,19 +9,17 @@ import json
 import pathlib
 import shutil
 import subprocess
-import sys
 import unittest
 
-sys.argv.insert(1, sys.argv[1])  # the modules of both families take the program from there
-from mesh_formats import PROGRAM, Mesh, MeshFormats, np  # noqa: E402
+from mesh_formats import PROGRAM, Mesh, MeshFormats, np
 
-import cgns_library as cg  # noqa: E402
-import mesh_cgns_test  # noqa: E402
-import mesh_ensight_test  # noqa: E402
-import mesh_files_test  # noqa: E402
-import mesh_foam_test  # noqa: E402
-import mesh_formats_test  # noqa: E402
-import mesh_su2_test  # noqa: E402
+import cgns_library as cg
+import mesh_cgns_test
+import mesh_ensight_test
+import mesh_files_test
+import mesh_foam_test
+import mesh_formats_test
+import mesh_su2_test
 
 CELLS_OF_A_CHUNK = 16384  # preprocess/gather/mesh_reader.cpp
 SIDE = 26  # 17,576 cubes

@@ -1,37 +1,13 @@
 """What the tests of files with unstructured grids share: the program, a folder, and what `info` and `convert` make of a file."""
-import json
-import pathlib
-import subprocess
-import sys
-import tempfile
-import unittest
-
-import numpy as np
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
+from format_case import PROGRAM, FormatCase, np  # noqa: F401
 
 
-class MeshCase(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def run_program(self, *words):
-        return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True)
-
-    def info(self, path):
-        result = self.run_program("info", path, "--json")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return json.loads(result.stdout)
-
+class MeshCase(FormatCase):
     def volume(self, path, scalar):
-        cache = self.folder / "mesh.splats"
-        result = self.run_program("convert", path, "-o", cache, "--scalar", scalar, "--overwrite")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return json.loads((cache / "manifest.json").read_text())["volume"]
+        return self.manifest(self.convert([path], scalar))["volume"]
 
     def check(self, path, grid):
         info = self.info(path)

@@ -100,9 +100,9 @@ class MeshFiles(MeshCase):
                          "</PUnstructuredGrid></VTKFile>")
         for scalar in ("p", "c"):
             expected = self.volume(whole, scalar)
-            of_whole = json.loads((self.folder / "mesh.splats/manifest.json").read_text())
+            of_whole = self.manifest(self.folder / "a.splats")
             self.assertAlmostEqual(self.volume(parts, scalar), expected, delta=1e-6)
-            of_parts = json.loads((self.folder / "mesh.splats/manifest.json").read_text())
+            of_parts = self.manifest(self.folder / "a.splats")
             self.assertEqual(of_parts["splats"], of_whole["splats"])
 
     def test_series_and_collections(self):
@@ -273,9 +273,9 @@ class MeshFiles(MeshCase):
         path = self.folder / "mesh.vtu"
         write_xml(grid, path)
         self.volume(path, "p")
-        result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "mesh.splats")
+        result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "a.splats")
         self.assertEqual(result.returncode, 0, result.stderr)
-        result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "mesh.splats")
+        result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "a.splats")
         self.assertIn("already has a scalar 'v:x'", result.stderr)
         write_xml(grid, self.folder / "fields.vtu")
         result = self.run_program("convert", path, self.folder / "fields.vtu", "-o", self.folder / "two.splats")

@@ -1,27 +1,20 @@
 """What the tests of unstructured formats share. Each grid is written by the libraries of the field and converted, and so is VTK's
-file of the same cells in the same order: the caches are equal byte by byte but for the names in their manifests. Where VTK reads
-the format, it is asked, too.
+file of the same cells in the same order: the caches are equal byte by byte (format_case.py). Where VTK reads the format, it is
+asked, too.
 """
-import hashlib
-import json
-import pathlib
-import subprocess
 import sys
-import tempfile
-import unittest
+
+from format_case import PROGRAM, FormatCase, np  # noqa: F401
 
 try:
-    import numpy as np
     import vtk
     from vtk.util.numpy_support import numpy_to_vtk
 
-    from sweep import some_of
     from mesh_cubes import HEXAHEDRON_FACES, hexahedra, lattice, write_xml
 except ModuleNotFoundError as error:
-    print(f"skipped: {error}; install python3-vtk9 and python3-numpy")
+    print(f"skipped: {error}; install python3-vtk9")
     sys.exit(77)
 
-PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
 RANDOM = np.random.default_rng(7)
 TETRAHEDRA = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
 VTK_KINDS = {4: vtk.VTK_TETRA, 5: vtk.VTK_PYRAMID, 6: vtk.VTK_WEDGE, 8: vtk.VTK_HEXAHEDRON}
@@ -99,65 +92,17 @@ class Mesh:
         return faces, sides, of_cells
 
 
-class MeshFormats(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+class MeshFormats(FormatCase):
+    SCALAR = "c"
+    RANDOM = RANDOM
 
-    def run_program(self, *words):
-        return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, check=False,
-                              errors="replace")
-
-    def info(self, *paths):
-        result = self.run_program("info", *paths, "--json")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return json.loads(result.stdout)
-
-    def cache(self, paths, scalar, *options):
-        """Checksums of a cache's files, and its volume."""
-        cache = self.folder / "a.splats"
-        result = self.run_program("convert", *paths, "-o", cache, "--scalar", scalar, "--overwrite", *options)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        files = {str(p.relative_to(cache)): hashlib.sha256(p.read_bytes()).hexdigest()
-                 for p in cache.rglob("*") if p.is_file() and p.name != "manifest.json"}
-        return files, json.loads((cache / "manifest.json").read_text())["volume"]
+    def volume(self, paths, scalar, *options):
+        """Of the cache."""
+        return self.manifest(self.convert(paths, scalar, *options))["volume"]
 
     def expect_same(self, paths, grid, names=None, options=()):
-        """The file and VTK's file of `grid` give the same caches. `names`: what the file calls p and c."""
+        """The file and VTK's file of `grid`, of volume 1, give the same caches. `names`: what the file calls p and c."""
         vtu = self.folder / "expected.vtu"
         write_xml(grid, vtu)
-        for name in "pc":
-            called = (names or {}).get(name, name)
-            if called is None:
-                continue
-            found, volume = self.cache(paths, called, *options)
-            expected, _ = self.cache([vtu], name)
-            self.assertGreater(len(expected), 1)
-            self.assertEqual(sorted(found.values()), sorted(expected.values()), (name, sorted(found)))
-            self.assertAlmostEqual(volume, 1, delta=2e-3)
-
-    def expect_line(self, *paths, scalar="c", words=""):
-        result = self.run_program("convert", *paths, "-o", self.folder / "d.splats", "--overwrite", "--scalar", scalar)
-        self.assertEqual(result.returncode, 1, result.stderr)
-        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
-        self.assertIn(words, result.stderr)
-
-    def expect_harmless(self, path, count=40, scalar="c"):
-        """Truncated files, and some with a wrong byte, are refused by one line or read. Returns the share that is refused."""
-        data, refused = path.read_bytes(), 0
-        damaged = [data[:len(data) * n // count] for n in range(count)]
-        for n in RANDOM.integers(0, len(data), 2 * count):
-            wrong = bytearray(data)
-            wrong[n] ^= int(RANDOM.integers(1, 256))
-            damaged.append(bytes(wrong))
-        tried = some_of(damaged)
-        for bytes_of in tried:
-            path.write_bytes(bytes_of)
-            result = self.run_program("convert", path, "-o", self.folder / "d.splats", "--overwrite", "--scalar", scalar)
-            self.assertIn(result.returncode, (0, 1, 2), result.stderr)
-            if result.returncode:
-                refused += 1
-                self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
-        path.write_bytes(data)
-        return refused / len(tried)
+        self.expect_same_caches(paths, vtu, names, options)
+        self.assertAlmostEqual(self.manifest(self.folder / "a.splats")["volume"], 1, delta=2e-3)

@@ -75,7 +75,7 @@ class Columns(MeshFormats):
         scalar = next(s for s in found["scalars"] if s["name"] == name)
         self.assertAlmostEqual(scalar["min"], float(self.t.min()), places=6)
         self.assertAlmostEqual(scalar["max"], float(self.t.max()), places=6)
-        volumes = [self.cache(paths, name)[1], self.cache([vtu], "c")[1]]
+        volumes = [self.volume(paths, name), self.volume([vtu], "c")]
         self.assertAlmostEqual(volumes[0] / volumes[1], 1, delta=1e-5)
         drawn = []
         for words, scalar in ((paths, name), ([vtu], "c")):
@@ -132,7 +132,25 @@ class Columns(MeshFormats):
         self.assertEqual(info["nodes"], self.LAYERS * len(self.nodes))
         self.assertEqual(info["cells"]["count"], (self.LAYERS - 1) * len(self.faces))
         self.assertEqual(info["scalars"][0]["max"], self.LAYERS * len(self.nodes) - 1)
-        self.assertGreater(self.cache([self.path], "t")[1], 0)
+        self.assertGreater(self.volume([self.path], "t"), 0)
+
+    def test_ugrid_beside_a_structured_grid(self):
+        self.write_ugrid()
+        values = RANDOM.random((3, 4, 5)).astype("f4")
+        with netCDF4.Dataset(self.path, "a") as f:
+            for name, size, unit in (("height", 3, "m"), ("latitude", 4, "degrees_north"), ("longitude", 5, "degrees_east")):
+                f.createDimension(name, size)
+                v = f.createVariable(name, "f8", (name,))
+                v.units = unit
+                v[:] = np.arange(size) * 10.0
+            f["height"].standard_name = "height"
+            f.createVariable("salt", "f4", ("height", "latitude", "longitude"))[:] = values
+        info = self.info(self.path)
+        self.assertIn("left out: salt, on a structured grid; choose it with --scalar salt", info["warnings"])
+        self.assertEqual(info["cells"]["count"], self.LAYERS * len(self.faces))
+        manifest = self.manifest(self.convert([self.path], "salt"))
+        self.assertEqual([[b["ni"], b["nj"], b["nk"]] for b in manifest["blocks"]], [[5, 4, 3]])
+        self.assertAlmostEqual(manifest["variables"][0]["max"], float(values.max()), places=6)
 
     def write_icon(self):
         """Returns the triangles, and their heights at the levels in metres. The grid is in a second file, icon_grid.nc."""
@@ -203,7 +221,7 @@ class Columns(MeshFormats):
                 self.assertEqual(info["cells"]["count"], 2 * self.LAYERS)
                 whole = self.expected(True, faces=faces, nodes=nodes, heights=-np.repeat(self.levels[:, None] / 1000, len(nodes), 1))
                 write_xml(whole, self.folder / "whole.vtu")
-                share = self.cache([self.path], "t")[1] / self.cache([self.folder / "whole.vtu"], "c")[1]
+                share = self.volume([self.path], "t") / self.volume([self.folder / "whole.vtu"], "c")
                 self.assertAlmostEqual(share, (600 + 100) / 1200, delta=2e-3)  # the hidden ones are not counted
                 continue
             of_nodes = np.array([[np.mean([heights[l, n] for n, face in enumerate(faces) if node in face])

@@ -5,11 +5,13 @@ How finely values are stored, as the reader that was written from stream/FORMAT.
 cache prints, at both precisions, in a series too. Exit status 77 (skipped) without python3-zstandard and python3-xxhash.
 """
 import json
+import os
 import pathlib
+import subprocess
 import sys
 import unittest
 
-from structured_formats import Block, RANDOM, StructuredFormats, np
+from structured_formats import PROGRAM, RANDOM, Block, StructuredFormats, np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "stream"))
 try:
@@ -45,7 +47,37 @@ class Precision(StructuredFormats):
         cache = self.folder / "a.splats"
         result = self.run_program("convert", *words, "-o", cache, "--scalar", "p", "--overwrite")
         self.assertEqual(result.returncode, 0, result.stderr)
+        self.said = result.stdout
         return cache
+
+    def test_convert_prints_the_bound(self):
+        paths = []
+        for n in range(2):
+            block = self.block()
+            block.p *= 1 + n
+            path = self.vtk_file([block]).rename(self.folder / f"t{n}.vtm")
+            (self.folder / "expected").rename(self.folder / f"t{n}")
+            path.write_text(path.read_text().replace("expected/", f"t{n}/"))
+            paths.append(path)
+        for precision in ("normal", "fine"):
+            bound = self.info(self.convert(paths[0], "--value-precision", precision))["stored_within"][0]
+            self.assertIn(f", rounded within {bound:.1e}\n", self.said)
+            cache = self.convert(*paths, "--value-precision", precision)
+            bound = json.loads(self.run_program("info", cache, "--json", "--step", 1).stdout)["stored_within"][0]
+            self.assertIn("last step:\np: ", self.said)
+            self.assertIn(f", rounded within {bound:.1e}\n", self.said)
+
+    def test_grids_that_are_opened_directly(self):
+        path, kept = self.vtk_file([self.block()]), self.folder / "kept"
+        for precision in ("normal", "fine", "fine"):
+            done = subprocess.run([PROGRAM, "render", path, "-o", self.folder / "a.png", "--size", "20x20", "--value-precision", precision],
+                                  env={**os.environ, "XDG_CACHE_HOME": str(kept)}, capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        caches = [json.loads(m.read_text())["requires"] for m in kept.rglob("manifest.json")]
+        self.assertEqual(sorted("fine-values" in c for c in caches), [False, True])
+        result = self.run_program("render", self.convert(path), "-o", self.folder / "a.png", "--value-precision", "fine")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("is for grids", result.stderr)
 
     def test_a_linear_field(self):
         """Its means are the nodes' values, but for the ends of the grid, where they are means over half a cell."""

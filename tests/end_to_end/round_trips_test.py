@@ -9,6 +9,7 @@ import importlib
 import json
 import unittest
 
+import cgns_library as cg
 from structured_formats import RANDOM, Block, StructuredFormats, np, vtk
 
 
@@ -67,6 +68,34 @@ class RoundTrips(StructuredFormats):
             file.file.close()
             self.expect_same([path], blocks)
 
+    @unittest.skipUnless(cg.library(), "no libcgns")
+    def test_overset_holes_of_cgns(self):
+        """Holes are what VTK calls blanked points and cells."""
+        path, expected, block = self.folder / "grid.cgns", self.folder / "expected.vts", Block()
+        inside = np.s_[:3, 1:4, 1:5]  # k, j, i: from 1, with their ends
+        ranges = [[2, 2, 1, 5, 4, 3]]
+        for kind in (cg.ADF, cg.HDF5):
+            for location in (cg.VERTEX, cg.CELL_CENTER):
+                with cg.CgnsFile(path, kind) as file:
+                    file.base()
+                    file.block("zone", block.places)
+                    file.solution("nodes", cg.VERTEX, {"p": block.p})
+                    file.solution("cells", cg.CELL_CENTER, {"c": block.c})
+                    file.hole("hole", ranges, location)
+                grid = block.vtk()
+                hidden = np.zeros(block.shape if location == cg.VERTEX else block.c.shape, bool)
+                hidden[inside] = True
+                for n in np.flatnonzero(hidden):
+                    (grid.BlankPoint if location == cg.VERTEX else grid.BlankCell)(int(n))
+                writer = vtk.vtkXMLStructuredGridWriter()
+                writer.SetFileName(str(expected))
+                writer.SetInputData(grid)
+                writer.Write()
+                info = self.info(path)
+                self.assertIn("overset holes: 1 set", info["notes"])
+                self.assertGreater(info["blanked"]["by_grid"], 0)
+                self.expect_same_caches([path], expected)
+
     def test_vtk(self):
         """Files of other encodings than the one that is compared with."""
         block = Block()
@@ -78,6 +107,13 @@ class RoundTrips(StructuredFormats):
             writer.SetInputData(block.vtk())
             writer.Write()
             self.expect_same([path], [block])
+        block = Block((60, 90, 101), kind="f4")
+        for mode in ("Ascii", "Binary", "Appended"):
+            getattr(writer, f"SetDataModeTo{mode}")()
+            writer.SetInputData(block.vtk())
+            writer.Write()
+            self.assertLess(self.peak_memory(path, "p", "144M"), 144 << 20, mode)
+        block = Block()
         legacy = vtk.vtkStructuredGridWriter()
         legacy.SetFileName(str(self.folder / "grid.vtk"))
         legacy.SetFileTypeToBinary()

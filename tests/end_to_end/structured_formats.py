@@ -1,26 +1,18 @@
 """What the tests of structured formats share. Each grid is written in the format under test, and by VTK: the caches are equal byte
-by byte but for the names in their manifests, so that every coordinate, value and blanked sample is the same. Where VTK reads the
-format, it is asked, too.
+by byte (format_case.py), so that every coordinate, value and blanked sample is the same. Where VTK reads the format, it is asked,
+too.
 """
-import hashlib
-import json
-import pathlib
-import subprocess
 import sys
-import tempfile
-import unittest
+
+from format_case import PROGRAM, FormatCase, np  # noqa: F401
 
 try:
-    import numpy as np
     import vtk
     from vtk.util.numpy_support import numpy_to_vtk
-
-    from sweep import some_of
 except ModuleNotFoundError as error:
-    print(f"skipped: {error}; install python3-vtk9 and python3-numpy")
+    print(f"skipped: {error}; install python3-vtk9")
     sys.exit(77)
 
-PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
 RANDOM = np.random.default_rng(11)
 
 
@@ -47,27 +39,8 @@ class Block:
         return grid
 
 
-class StructuredFormats(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def run_program(self, *words):
-        return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True, check=False, errors="replace")
-
-    def info(self, *paths):
-        result = self.run_program("info", *paths, "--json")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return json.loads(result.stdout)
-
-    def cache(self, paths, scalar, *options):
-        """Checksums of a cache's files."""
-        cache = self.folder / "a.splats"
-        result = self.run_program("convert", *paths, "-o", cache, "--scalar", scalar, "--overwrite", *options)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return sorted(hashlib.sha256(p.read_bytes()).hexdigest()
-                      for p in cache.rglob("*") if p.is_file() and p.name != "manifest.json")
+class StructuredFormats(FormatCase):
+    RANDOM = RANDOM
 
     def vtk_file(self, blocks):
         """VTK's own file of the blocks."""
@@ -83,46 +56,4 @@ class StructuredFormats(unittest.TestCase):
 
     def expect_same(self, paths, blocks, names=None, options=()):
         """The files and VTK's file of the blocks give the same caches. `names`: what the files call p and c; None: nothing."""
-        expected = self.vtk_file(blocks)
-        for name in "pc":
-            called = (names or {}).get(name, name)
-            if called is None:
-                continue
-            found = self.cache(paths, called, *options)
-            self.assertGreater(len(found), 1)
-            self.assertEqual(found, self.cache([expected], name), name)
-
-    def expect_line(self, *paths, scalar="p", words=""):
-        result = self.run_program("convert", *paths, "-o", self.folder / "d.splats", "--overwrite", "--scalar", scalar)
-        self.assertEqual(result.returncode, 1, result.stderr)
-        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
-        self.assertIn(words, result.stderr)
-
-    def expect_harmless(self, path, count=40, scalar="p", opened=None):
-        """Truncated files, and some with a wrong byte, are refused by one line or read. Returns the share that is refused.
-        `opened`: the file that names `path`."""
-        data, refused = path.read_bytes(), 0
-        damaged = [data[:len(data) * n // count] for n in range(count)]
-        for n in RANDOM.integers(0, len(data), 2 * count):
-            wrong = bytearray(data)
-            wrong[n] ^= int(RANDOM.integers(1, 256))
-            damaged.append(bytes(wrong))
-        tried = some_of(damaged)
-        for bytes_of in tried:
-            path.write_bytes(bytes_of)
-            result = self.run_program("convert", opened or path, "-o", self.folder / "d.splats", "--overwrite", "--scalar", scalar)
-            self.assertIn(result.returncode, (0, 1, 2), result.stderr)
-            if result.returncode:
-                refused += 1
-                errors = [line for line in result.stderr.splitlines() if not line.startswith("curvisplat: warning")]
-                self.assertEqual(len(errors), 1, result.stderr)
-        path.write_bytes(data)
-        return refused / len(tried)
-
-    def peak_memory(self, path, scalar, budget):
-        """Peak memory in bytes of a conversion within `budget` ("144M")."""
-        statistics = self.folder / "stats.json"
-        result = self.run_program("convert", path, "-o", self.folder / "m.splats", "--overwrite", "--scalar", scalar,
-                                  "--memory", budget, "--stats", statistics)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return json.loads(statistics.read_text())["peak_memory_bytes"]
+        self.expect_same_caches(paths, self.vtk_file(blocks), names, options)

@@ -124,6 +124,19 @@ class Xdmf(StructuredFormats):
             np.testing.assert_allclose(scalars[name], [values.min(), values.max()], rtol=1e-6)
         block.p = v[..., 1].copy()
         self.expect_same([path], [block], {"p": "v:y", "c": None})
+        # In parts, which a function joins.
+        for function in ("JOIN($0, $1, $2)", "join($0,$1,$2)"):
+            writer = self.new()
+            items = "".join(writer.item(v[..., n].copy()) for n in range(3))
+            joined = f'<DataItem ItemType="Function" Function="{function}" Dimensions="{dims(v.shape)}">{items}</DataItem>'
+            path = self.write(f'<Grid>{geometry(writer, block)}<Attribute Name="v" AttributeType="Vector">{joined}</Attribute></Grid>')
+            self.expect_same([path], [block], {"p": "v:y", "c": None})
+        # What is computed otherwise is left out, and does not stop the others.
+        writer = self.new()
+        computed = f'<DataItem ItemType="Function" Function="$0 + $1">{writer.item(v[..., 0].copy()) * 2}</DataItem>'
+        path = self.write(f'<Grid>{geometry(writer, block)}{attribute(writer, "p", block.p)}<Attribute Name="s">{computed}</Attribute></Grid>')
+        self.expect_same([path], [block], {"c": None})
+        self.assertIn("attribute s is left out", " ".join(self.info(path)["warnings"]))
 
     def test_rectilinear_and_uniform(self):
         block = Block()

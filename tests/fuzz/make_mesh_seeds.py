@@ -2,7 +2,7 @@
 """make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of Tecplot's and XDMF's structured ones, of lists of time steps
 and of steps.bin: FOLDER/<target>/<seed>.
 
-What others wrote: VTK (python3-vtk9) and libnetcdf (python3-netcdf4). The other seeds are make_seeds's.
+What others wrote: VTK (python3-vtk9), libnetcdf (python3-netcdf4) and libcgns. The other seeds are make_seeds's.
 """
 import json
 import pathlib
@@ -16,6 +16,7 @@ import vtk
 from vtk.util.numpy_support import numpy_to_vtk
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "end_to_end"))
+from cgns_library import ADF, CELL_CENTER, HEXA_8, VERTEX, CgnsFile
 from tecplot_files import Binary, padded, write_text
 
 OUT = pathlib.Path(sys.argv[1])
@@ -291,6 +292,21 @@ def columns_seeds(folder):
         put("columns", kind, path.read_bytes())
 
 
+def adf_seeds(folder):
+    for name, structured in (("blocks", True), ("mesh", False)):
+        with CgnsFile(folder / "a.cgns", ADF) as file:
+            file.base()
+            if structured:
+                file.block("zone", np.moveaxis(POINTS.reshape(3, 2, 2, 3), -1, 0))
+                file.hole("hole", [[1, 1, 1, 2, 1, 1]])
+            else:
+                file.zone("zone", POINTS, 2)
+                file.section("hexahedra", HEXA_8, CELLS + 1)
+            file.solution("nodes", VERTEX, {"p": np.arange(12.0)})
+            file.solution("cells", CELL_CENTER, {"c": np.arange(2.0)})
+        put("cgns_adf", name, (folder / "a.cgns").read_bytes())
+
+
 def lists_of_steps():
     files = [{"name": f"step{n}.vts", "time": n / 2} for n in (0, 1)]
     put("file_series", "two_steps", json.dumps({"file-series-version": "1.0", "files": files}).encode())
@@ -307,6 +323,7 @@ with tempfile.TemporaryDirectory() as name:
     vtk_seeds(pathlib.Path(name))
     exodus_seeds(pathlib.Path(name))
     columns_seeds(pathlib.Path(name))
+    adf_seeds(pathlib.Path(name))
 foam_seeds()
 su2_seeds()
 ensight_seeds()

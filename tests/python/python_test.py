@@ -5,6 +5,7 @@ interrupts and memory are as its pages say.
     python_test.py PROGRAM    the curvisplat program; the package is found by PYTHONPATH
 """
 
+import json
 import os
 import pathlib
 import signal
@@ -373,6 +374,12 @@ class Arrays(PythonTest):
             self.assertEqual((whole / name).read_bytes(), (of_files / name).read_bytes(), name)
         with curvisplat.open(whole) as cache:
             self.assertEqual(cache.scalars[0][:2], ("t", "K"))
+        for words, path in (((curvisplat.Block(x, y, z, {"t": t}),), whole), ((grid, [function]), of_files)):
+            convert = curvisplat.convert_arrays if path == whole else curvisplat.convert
+            convert(path, *words, overwrite=True, value_precision="fine")
+            self.assertIn("fine-values", json.loads((path / "manifest.json").read_text())["requires"])
+        with self.assertRaises(curvisplat.UsageError):
+            curvisplat.convert(of_files, grid, [function], overwrite=True, value_precision="finer")
 
     def test_of_any_strides_and_layouts_are_the_same(self):
         x, y, z, t = bent_duct()

@@ -172,4 +172,13 @@ void CgnsWriter::boundary(const std::string& name, bool wall) {
                       CGNS_ENUMV(PointRange), 2, range.data(), &condition));
 }
 
+void CgnsWriter::hole(const std::string& name, bool cells, const std::vector<int>& indices, bool ranges) {
+  const std::vector<cgsize_t> points(indices.begin(), indices.end());
+  const int sets = ranges ? static_cast<int>(points.size() / 6) : 1;
+  int hole = 0;
+  check(cg_hole_write(file_, base_, zone_, name.c_str(), cells ? CGNS_ENUMV(CellCenter) : CGNS_ENUMV(Vertex),
+                      ranges ? CGNS_ENUMV(PointRange) : CGNS_ENUMV(PointList), sets,
+                      static_cast<cgsize_t>(ranges ? 2 * sets : points.size() / 3), points.data(), &hole));
+}
+
 }  // namespace curvisplat

@@ -59,6 +59,8 @@ class CgnsWriter {
   void pointers(const std::string& name, const std::vector<std::string>& solutions);
   /// A wall or an inflow on the lowest plane of the last zone.
   void boundary(const std::string& name, bool wall);
+  /// An overset hole of the last zone, of nodes or of cells: ranges of 6 indices from 1 each, or else points of 3.
+  void hole(const std::string& name, bool cells, const std::vector<int>& indices, bool ranges);
 
  private:
   void writeArray(const std::string& name, const CgnsWriterField& field, const std::array<int, 3>& values,

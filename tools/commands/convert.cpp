@@ -19,10 +19,13 @@
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
 #include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/stored_precision.h"
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/convert_series.h"
 #include "tools/commands/dry_run.h"
+#include "tools/commands/written_precision.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/grid_options.h"
 #include "tools/options/option_parsers.h"
@@ -37,7 +40,8 @@
 namespace curvisplat {
 namespace {
 
-void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds) {
+void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds,
+                  const CacheReader& cache) {
   const auto samples = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
   fmt::print("{}: {}, {} in {}, {}\n", arguments.output.string(), countText(report.nodes, "sample"),
@@ -48,6 +52,7 @@ void printSummary(const ConvertArguments& arguments, const ConvertReport& report
                                           : fmt::format(", {:.2f} M samples/s", 1e-6 * samples / seconds);
   fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes per sample{}\n", seconds, rate, mebibytes(bytes),
              static_cast<double>(bytes) / samples, peakMemoryText());
+  printStoredPrecision(cache);
 }
 
 /// Prints warnings and notes on the grid to standard error.
@@ -118,7 +123,10 @@ void runConvert(ConvertArguments arguments) {
   nlohmann::json numbers = statistics(report, progress);
   numbers["ranks"] = ranks.count();
   printWarnings(source->description(), arguments.grid.time_step, report);
-  printSummary(arguments, report, secondsOf(progress));
+  const CacheReader cache(options.output);
+  for (size_t n = 0; n < cache.manifest().variables.size(); ++n)
+    numbers["stored_within"].push_back(storedWithin(cache, n));
+  printSummary(arguments, report, secondsOf(progress), cache);
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 

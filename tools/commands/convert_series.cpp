@@ -19,6 +19,7 @@
 #include "tools/commands/dry_run.h"
 #include "tools/commands/folder_events.h"
 #include "tools/commands/written_files.h"
+#include "tools/commands/written_precision.h"
 #include "tools/options/frame_part.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/series_input.h"
@@ -280,6 +281,10 @@ void runConvertSeries(ConvertArguments arguments) {
     fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample and step{}\n", seconds,
                1e-6 * samples / seconds, mebibytes(log.bytes()), static_cast<double>(log.bytes()) / samples,
                peakMemoryText());
+  if (report.steps > 0) {
+    fmt::print("last step:\n");
+    printStoredPrecision(CacheReader(options.convert.output, report.steps - 1));
+  }
   writeSeriesStatistics(arguments, report, log, progress);
 }
 

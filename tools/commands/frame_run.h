@@ -35,7 +35,7 @@ struct RenderArguments {
   SurfaceArguments surfaces;
   StepArguments steps;
   FrameArguments frame;
-  std::string backend = "auto";
+  std::string backend = "auto", value_precision = "normal";
   std::optional<std::string> frame_rate, part, channels;
   AnnotationArguments annotations;
 };

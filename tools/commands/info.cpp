@@ -20,7 +20,7 @@
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/probe.h"
 #include "stream/cache/series_histogram.h"
-#include "stream/codec/values_codec.h"
+#include "stream/cache/stored_precision.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
 #include "tools/commands/info_steps.h"
@@ -65,17 +65,6 @@ std::vector<LevelSummary> levelsOf(const CacheReader& reader) {
       level.values_bytes += reader.brickVariables(v)[n].values.length;
   }
   return levels;
-}
-
-/// How far rounding moves a sample's stored mean at most. Besides, it is a float.
-double storedWithin(const CacheReader& reader, size_t variable) {
-  double range = 0;
-  for (size_t n = 0; n < reader.bricks().size(); ++n) {
-    if (!reader.bricks()[n].isLeaf()) continue;
-    const BrickVariable& values = reader.brickVariables(variable)[n];
-    range = std::max(range, double{values.max} - double{values.min});
-  }
-  return range * (reader.manifest().hasFeature(kFineValues) ? kLargestFineMeanError : kLargestMeanError);
 }
 
 uint64_t totalBytes(const Manifest& manifest) {

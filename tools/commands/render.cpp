@@ -37,6 +37,7 @@
 #include "tools/options/scalar_arguments.h"
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
+#include "tools/options/value_precision.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/movie_writer.h"
@@ -165,14 +166,21 @@ void printResult(const RenderReport& report) {
 std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
   std::vector<std::filesystem::path> files{arguments.cache};
   files.insert(files.end(), arguments.solutions.begin(), arguments.solutions.end());
-  if (!isGrid(files)) return arguments.cache;
+  const ValuePrecision precision = parseValuePrecision("--value-precision", arguments.value_precision);
+  if (!isGrid(files)) {
+    if (precision != ValuePrecision::kNormal)
+      throw UsageError("--value-precision {}: is for grids; {} is a cache, which has its own",
+                       arguments.value_precision, arguments.cache.string());
+    return arguments.cache;
+  }
   if (!launchedRanks().alone())
     throw Error("{}: several processes draw from a cache; convert the grid first", files.front().string());
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   KeptCacheEvents events;
   events.say = [](const std::string& text) { printMessage("{}", text); };
-  return keptCacheOf(files, progress, events, {arguments.scalar.scalar, arguments.opacity.by.scalar});
+  return keptCacheOf(files, progress, events, {arguments.scalar.scalar, arguments.opacity.by.scalar},
+                     precision);
 }
 
 constexpr double kAxesRoom = 0.17;  // around the data, of its box
@@ -294,6 +302,8 @@ void addRender(CLI::App& app) {
           "folder")
       ->required();
   command->add_option("SOLUTION", arguments->solutions, "Further files of the grid");
+  command->add_option("--value-precision", arguments->value_precision,
+                      "Of a grid: how finely values are stored, normal or fine, as for convert");
   command
       ->add_option("-o,--output", arguments->output,
                    "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "

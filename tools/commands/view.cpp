@@ -21,6 +21,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
+#include "tools/options/value_precision.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
@@ -32,7 +33,7 @@ namespace {
 struct ViewArguments {
   std::vector<std::filesystem::path>
       files;  // a cache, or a grid with its solutions; none: chosen in the window
-  std::string size = "1200x800", backend = "auto";
+  std::string size = "1200x800", backend = "auto", value_precision = "normal";
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
   SurfaceArguments surfaces;
@@ -89,10 +90,10 @@ class MovieFile final : public MovieOutput {
   std::unique_ptr<FrameOutput> output_;
 };
 
-ConversionServices conversionServices() {
+ConversionServices conversionServices(ValuePrecision precision) {
   using Paths = ConversionServices::Paths;
   ConversionServices services;
-  services.to_cache = [](const Paths& files, Progress& progress, const OpeningEvents& events) {
+  services.to_cache = [precision](const Paths& files, Progress& progress, const OpeningEvents& events) {
     if (!isGrid(files)) return files.front();
     KeptCacheEvents kept;
     kept.say = events.say;
@@ -100,14 +101,14 @@ ConversionServices conversionServices() {
       events.preview({preview.cache, preview.whole, whatOf(preview), preview.folder});
     };
     try {
-      return keptCacheOf(files, progress, kept);
+      return keptCacheOf(files, progress, kept, {}, precision);
     } catch (const Interrupted&) {
       throw;
     } catch (const Error&) {
       const auto ordered = gridFirst(files, progress);
       if (!ordered) throw;
       events.reorder(*ordered);
-      return keptCacheOf(*ordered, progress, kept);
+      return keptCacheOf(*ordered, progress, kept, {}, precision);
     }
   };
   services.sources_of = sourcesOf;
@@ -135,7 +136,8 @@ void view(const ViewArguments& arguments) {
       throw UsageError("--surface {}: the window shows STL, PLY and OBJ files; render draws .vtp files",
                        surface);
   std::optional<CacheReader> cache;
-  options.conversion = conversionServices();
+  const ValuePrecision precision = parseValuePrecision("--value-precision", arguments.value_precision);
+  options.conversion = conversionServices(precision);
   options.open_movie = [](const std::filesystem::path& file, ImageSize size, double frames_per_s) {
     return std::make_unique<MovieFile>(file, size, frames_per_s);
   };
@@ -163,6 +165,8 @@ void addView(CLI::App& app) {
   command->add_option("FILE", arguments->files,
                       "Splat cache, a directory NAME.splats; or a grid and its solutions, which are "
                       "converted into the user's cache folder. If none is given, the window asks for one");
+  command->add_option("--value-precision", arguments->value_precision,
+                      "Of grids: how finely values are stored, normal or fine, as for convert");
   command->add_option("--size", arguments->size, "Size of the window, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
   command->add_option("--scalar", arguments->scalar, "Name of the scalar to show (default: as last time)");

@@ -12,6 +12,7 @@
 #include "tools/options/choices.h"
 #include "tools/options/face_names.h"
 #include "tools/options/grid_options.h"
+#include "tools/options/value_precision.h"
 #include "tools/output/output_paths.h"
 
 namespace curvisplat {
@@ -129,8 +130,7 @@ void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options) {
     requireChoice("--overlap", *arguments.overlap, {"owner", "all"});
     options.overlap = *arguments.overlap == "all" ? Overlap::kAll : Overlap::kOwner;
   }
-  requireChoice("--value-precision", arguments.precision, {"normal", "fine"});
-  options.precision = arguments.precision == "fine" ? ValuePrecision::kFine : ValuePrecision::kNormal;
+  options.precision = parseValuePrecision("--value-precision", arguments.precision);
   options.surfaces = !arguments.no_surfaces;
   if (arguments.no_surfaces && !arguments.planes.empty())
     throw UsageError("--no-surfaces contradicts --surface {}; give one of them", arguments.planes.front());

@@ -213,7 +213,8 @@ std::string namesOf(const std::vector<fs::path>& files) {
 }
 
 fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progress,
-                     const KeptCacheEvents& events, const std::vector<std::string>& scalars) {
+                     const KeptCacheEvents& events, const std::vector<std::string>& scalars,
+                     ValuePrecision precision) {
   const auto folder = keptFolder();
   if (!folder)
     throw Error(
@@ -224,13 +225,15 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
   fs::create_directories(*folder / "known", error);
   if (error) throw Error("{}: cannot create the directory: {}", folder->string(), error.message());
   const std::vector<fs::path> files = wholePaths(given_files);
-  const fs::path place = *folder / fmt::format("{:016x}", contentsOf(files, *folder / "known", progress));
+  const uint64_t contents = contentsOf(files, *folder / "known", progress);
+  const char* const suffix = precision == ValuePrecision::kFine ? "-fine" : "";
+  const fs::path place = *folder / fmt::format("{:016x}{}", contents, suffix);
   const fs::path cache = place / (files.front().stem().string() + ".splats");
   fs::create_directories(place, error);
   if (error) throw Error("{}: cannot create the directory: {}", place.string(), error.message());
   {
     const MakingLock lock(place / "used", progress);
-    if (!fs::exists(cache / "manifest.json", error)) makeKeptCache(files, cache, progress, events);
+    if (!fs::exists(cache / "manifest.json", error)) makeKeptCache(files, cache, progress, events, precision);
     addMissingScalars(cache, files, scalars, progress);
     fs::last_write_time(place / "used", fs::file_time_type::clock::now(), error);
   }

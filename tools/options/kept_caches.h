@@ -1,7 +1,7 @@
 // Caches of grids that were opened without `convert`: kept in the user's cache folder, $XDG_CACHE_HOME/curvisplat or
 // ~/.cache/curvisplat, and found again by the contents of the grid's files, wherever these lie.
 //
-//   <folder>/<key>/NAME.splats      NAME: of the grid's file
+//   <folder>/<key>/NAME.splats      NAME: of the grid's file; one for each --value-precision
 //   <folder>/<key>/preview.*        a coarse cache, while the other is made and until the window has left it
 //   <folder>/<key>/series.*         the cache of a series, to which NAME.splats links once it is complete
 //   <folder>/<key>/used             its time: when it was opened last; locked while it is made
@@ -29,12 +29,12 @@ std::optional<std::filesystem::path> keptFolder();
 bool isGrid(const std::vector<std::filesystem::path>& files);
 
 /// The cache of a grid's files, or of a series' (q.0 q.1 ...): the one that is kept, or a new one, made with all default
-/// options of `convert`. Those of `scalars` that it lacks and the files have are added; empty names and others are passed
-/// over. Processes that want the same one wait for each other. Throws Error as opening and converting do, Interrupted
+/// options of `convert` but the precision. Those of `scalars` that it lacks and the files have are added; empty names and
+/// others are passed over. Processes that want the same one wait for each other. Throws Error as opening and converting do, Interrupted
 /// once `progress` is stopped.
 std::filesystem::path keptCacheOf(const std::vector<std::filesystem::path>& files, Progress& progress,
-                                  const KeptCacheEvents& events,
-                                  const std::vector<std::string>& scalars = {});
+                                  const KeptCacheEvents& events, const std::vector<std::string>& scalars = {},
+                                  ValuePrecision precision = ValuePrecision::kNormal);
 
 /// Removes the caches in `folder` that were not used for longest, until the rest takes `limit` bytes at most. Keeps
 /// `kept`, and those that are being made.

@@ -116,13 +116,14 @@ void makePreviewOfFirstStep(const SeriesInput& input, const ConvertOptions& whol
 /// A series is made beside its place, since a cache of its first steps looks complete. It is not moved when it is, since
 /// a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
-                const KeptCacheEvents& events) {
+                const KeptCacheEvents& events, ValuePrecision precision) {
   const auto folder = std::make_shared<PreviewFolder>(output.parent_path(), kSeries);
   arguments.output = folder->path() / output.filename();
   const std::vector<StepFiles> steps = stepsOf(arguments.grid);
   SeriesOptions options;
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
+  options.convert.precision = precision;
   const SeriesInput input = seriesInput(arguments, steps);
   makePreviewOfFirstStep(input, optionsFor(output, title), progress, events);
   convertSeries(input, options, progress, [&](const SeriesEvent& event) {
@@ -146,16 +147,17 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
 }  // namespace
 
 void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, Progress& progress,
-                   const KeptCacheEvents& events) {
+                   const KeptCacheEvents& events, ValuePrecision precision) {
   for (const char* const name : {kPreview, kSeries})
     PreviewFolder::removeLeftOnes(output.parent_path(), name);
   ConvertArguments arguments;
   arguments.grid.grid = files.front();
   arguments.grid.solutions.assign(files.begin() + 1, files.end());
   arguments.output = output;
-  if (hasSeveralStepFiles(arguments.grid)) return makeSeries(arguments, output, progress, events);
+  if (hasSeveralStepFiles(arguments.grid)) return makeSeries(arguments, output, progress, events, precision);
   const auto source = openSource(arguments, output);
   ConvertOptions options = optionsFor(output, files.front().stem().string());
+  options.precision = precision;
   options.scalars = chooseScalars(arguments, {}, source->description());
   makePreview(*source, options, false, progress, events);
   sayAll(events, source->description(), convert(*source, options, progress));

@@ -1,4 +1,4 @@
-// The conversion behind a kept cache: with all default options of `convert`; and before that of a large grid, one of a
+// The conversion behind a kept cache: with all default options of `convert` but the precision; and before that of a large grid, one of a
 // coarse sample of it, which can be shown within a second.
 #pragma once
 
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "stream/base/progress.h"
+#include "stream/codec/values_codec.h"
 #include "tools/options/preview_folder.h"
 
 namespace curvisplat {
@@ -38,6 +39,7 @@ inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
 /// large, then the step as converted. Throws Error as opening and converting do, Interrupted once
 /// `progress` is stopped.
 void makeKeptCache(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output,
-                   Progress& progress, const KeptCacheEvents& events);
+                   Progress& progress, const KeptCacheEvents& events,
+                   ValuePrecision precision = ValuePrecision::kNormal);
 
 }  // namespace curvisplat

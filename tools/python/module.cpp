@@ -23,6 +23,7 @@
 #include "tools/options/convert_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/value_precision.h"
 #include "tools/python/array_source.h"
 #include "tools/python/cache_arrays.h"
 #include "tools/python/interruptible.h"
@@ -212,6 +213,8 @@ ConvertOptions convertOptions(const std::filesystem::path& output, const py::dic
   options.blank_value = py::cast<std::optional<double>>(given_options["blank_value"]);
   options.threads = py::cast<unsigned>(given_options["threads"]);
   options.title = py::cast<std::string>(given_options["title"]);
+  options.precision =
+      parseValuePrecision("value_precision", py::cast<std::string>(given_options["value_precision"]));
   const auto memory = py::cast<std::string>(given_options["memory"]);
   if (!memory.empty()) options.memory_bytes = parseMemory("memory", memory);
   return options;

@@ -42,7 +42,8 @@ CgnsSource::CgnsSource(std::shared_ptr<const CgnsFile> file, CgnsTree tree, uint
       boundary.block = static_cast<uint32_t>(description_.blocks.size());
       description_.boundaries.push_back(std::move(boundary));
     }
-    description_.blocks.push_back({name, zone.nodes[0], zone.nodes[1], zone.nodes[2], false});
+    description_.blocks.push_back({name, zone.nodes[0], zone.nodes[1], zone.nodes[2], !zone.holes.empty()});
+    if (!zone.holes.empty()) description_.blanking = "in overset holes of the zones";
   }
   arrays_ = describeCgnsScalars(tree_, description_);
 }
@@ -60,12 +61,15 @@ void CgnsSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
     if (!empty(part)) file_->read(array.node, array.shape, part, axes[axis]->data());
   }
   out.blank.assign(nodes, 0);
+  if (!zone.holes.empty()) zone.holes.blankNodes(zone.nodes, box, out.blank);
   out.scalars.resize(scalars.size());
   for (size_t n = 0; n < scalars.size(); ++n) {
     CURVISPLAT_CHECK_OP(scalars[n], <, arrays_.size());
     out.scalars[n].assign(nodes, std::numeric_limits<float>::quiet_NaN());
     readScalar(zone, box, arrays_[scalars[n]][block], description_.scalars[scalars[n]].centring,
                out.scalars[n]);
+    if (description_.scalars[scalars[n]].centring == Centring::kCell)
+      zone.holes.blankCells(zone.nodes, box, out.scalars[n]);
   }
 }
 

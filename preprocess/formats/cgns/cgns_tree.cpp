@@ -59,6 +59,7 @@ class TreeReader {
   std::vector<uint64_t> rindOf(const Nodes& children, size_t axes) const;
   bool setSizes(const CgnsNode& node, bool unstructured, CgnsZone& zone);
   void addConditions(const Nodes& children, CgnsZone& zone);
+  void addHoles(const CgnsNode& node, CgnsZone& zone);
   void readFamilyType(const CgnsNode& family);
   std::string familyType(const CgnsNode& condition, const Nodes& details) const;
   void writeNotes();
@@ -138,7 +139,21 @@ void TreeReader::addConditions(const Nodes& children, CgnsZone& zone) {
       }
     if (node.label == "ZoneGridConnectivity_t")
       for (const CgnsNode& connectivity : file_.children(node))
-        holes_ += connectivity.label == "OversetHoles_t";
+        if (connectivity.label == "OversetHoles_t") addHoles(connectivity, zone);
+  }
+}
+
+void TreeReader::addHoles(const CgnsNode& node, CgnsZone& zone) {
+  if (!zone.sections.empty()) {
+    tree_.warnings.push_back(fmt::format("{} is not applied: its zone is unstructured", node.path.substr(1)));
+    return;
+  }
+  try {
+    zone.holes.add(file_, node, zone.nodes);
+    ++holes_;
+  } catch (const Error& error) {
+    tree_.warnings.push_back(
+        fmt::format("{} is not applied, and its cells are drawn: {}", node.path.substr(1), error.what()));
   }
 }
 
@@ -154,9 +169,7 @@ void TreeReader::writeNotes() {
   if (!conditions.empty()) tree_.notes.push_back("boundary conditions: " + listed(conditions));
   if (!families_.empty()) tree_.notes.push_back("families: " + listed(families_));
   if (!units_.empty()) tree_.notes.push_back("units: " + listed(units_));
-  if (holes_ > 0)
-    tree_.warnings.push_back(
-        fmt::format("{} sets of overset holes are not applied: their cells are drawn", holes_));
+  if (holes_ > 0) tree_.notes.push_back("overset holes: " + countText(holes_, "set"));
 }
 
 void TreeReader::readBase(const CgnsNode& base) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "preprocess/formats/cgns/cgns_file.h"
+#include "preprocess/formats/cgns/cgns_holes.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
@@ -39,6 +40,7 @@ struct CgnsZone {
   std::vector<CgnsNode> sections;        // of an unstructured zone: Elements_t
   std::array<CgnsArray, 3> coordinates;  // x, y, z
   std::vector<CgnsField> fields;
+  CgnsHoles holes;  // of a structured zone
 };
 
 struct CgnsTree {

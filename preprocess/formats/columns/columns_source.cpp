@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 
+#include "preprocess/formats/netcdf/cf_grid.h"
 #include "preprocess/formats/netcdf/cf_roles.h"
 #include "preprocess/grid/scalar_names.h"
 #include "preprocess/grid/time_steps.h"
@@ -29,11 +31,26 @@ ColumnsMap mapOf(const NetcdfFiles& file) {
   return std::move(*map);
 }
 
+/// Names of the variables on longitude, latitude and levels that the files have besides.
+std::vector<std::string> structuredVariables(const NetcdfFiles& file) {
+  std::vector<std::string> names;
+  try {
+    for (const CfGrid& grid : findCfGrids(file, 0).grids)
+      for (const NetcdfVariable* const variable : grid.variables) names.push_back(variable->name);
+  } catch (const Error&) {  // of no concern where polygons are read
+  }
+  return names;
+}
+
 }  // namespace
 
 bool isColumnsGrid(const OpenGridOptions& options) {
   try {
-    return findColumnsMap(NetcdfFiles(filesOf(options))).has_value();
+    const NetcdfFiles file(filesOf(options));
+    if (!findColumnsMap(file)) return false;
+    if (options.scalars.empty()) return true;
+    const std::vector<std::string> others = structuredVariables(file);
+    return std::find(others.begin(), others.end(), options.scalars.front()) == others.end();
   } catch (const Error&) {
     return false;  // the reader of structured grids says what is wrong
   }
@@ -93,6 +110,12 @@ void ColumnsSource::describe(const OpenGridOptions& options) {
   description_.format =
       fmt::format("{} ({}), {} faces, {}, heights of {} times {:g}, in km", map_.format, file_.kind(),
                   map_.faces, shape, heights_.words, options.globe.vertical_scale);
+  const std::vector<std::string> others = structuredVariables(file_);
+  if (!others.empty())
+    description_.warnings.push_back(fmt::format(
+        "left out: {}{}, on a structured grid; choose it with --scalar {}",
+        fmt::join(others.begin(), others.begin() + std::min<ptrdiff_t>(3, std::ssize(others)), ", "),
+        others.size() > 3 ? fmt::format(" and {} more", others.size() - 3) : "", others.front()));
   const auto& duplicates = file_.duplicates();
   description_.warnings.insert(description_.warnings.end(), duplicates.begin(), duplicates.end());
 }

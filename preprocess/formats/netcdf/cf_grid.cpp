@@ -16,6 +16,8 @@
 namespace curvisplat {
 namespace {
 
+constexpr uint64_t kMaxFaces = 512;
+
 /// An unlimited dimension without a coordinate is one of time only if the variable has three others.
 bool isTime(const NetcdfFiles& file, size_t dim, size_t rank) {
   const NetcdfDimension& dimension = file.dimensions()[dim];
@@ -27,7 +29,23 @@ bool isTime(const NetcdfFiles& file, size_t dim, size_t rank) {
   return dimension.unlimited && rank > 3;
 }
 
-/// The three dimensions in space and the time dimension.
+/// Whether a dimension numbers the faces of a grid: by its name, if longitude (or x) differs between them.
+bool numbersFaces(const NetcdfFiles& file, size_t dim) {
+  static const std::set<std::string> names{"nf",   "face",  "faces", "nface", "nfaces",
+                                           "tile", "tiles", "ntile", "ntiles"};
+  const NetcdfDimension& dimension = file.dimensions()[dim];
+  if (dimension.length < 2 || dimension.length > kMaxFaces || !names.contains(lowerCase(dimension.name)))
+    return false;
+  return std::any_of(file.variables().begin(), file.variables().end(), [&](const NetcdfVariable& variable) {
+    if (variable.dims.size() < 2 ||
+        std::find(variable.dims.begin(), variable.dims.end(), dim) == variable.dims.end())
+      return false;
+    const CfRole role = cfRole(file, variable);
+    return role == CfRole::kLongitude || role == CfRole::kX;
+  });
+}
+
+/// The three dimensions in space, the time dimension and that of faces.
 std::optional<CfDimensions> dimensionsOf(const NetcdfFiles& file, const NetcdfVariable& variable) {
   CfDimensions dims;
   std::vector<size_t> space;
@@ -43,6 +61,12 @@ std::optional<CfDimensions> dimensionsOf(const NetcdfFiles& file, const NetcdfVa
       space.erase(space.begin() + static_cast<ptrdiff_t>(n));
     else
       ++n;
+  }
+  const auto face =
+      std::find_if(space.begin(), space.end(), [&](size_t dim) { return numbersFaces(file, dim); });
+  if (face != space.end()) {
+    dims.face = *face;
+    space.erase(face);
   }
   if (space.size() != 3 || std::set<size_t>(space.begin(), space.end()).size() != 3) return std::nullopt;
   dims.axes = {space[2], space[1], space[0]};
@@ -72,6 +96,7 @@ std::optional<CfTerm> coordinateOf(const NetcdfFiles& file, const NetcdfVariable
       if (cfRole(file, *candidate) != role || (!exact && candidate->file == variable.file)) continue;
       const auto term = CfTerm::of(file, *candidate, dims);
       if (!term || !(exact ? term->exact() : term->onNodes())) continue;
+      if (dims.face && !term->ofFaces()) continue;  // GEOS' Xdim, "for GrADS"
       if (term->axes() == 1 || term->axes() == 2) return term;
     }
   return std::nullopt;
@@ -117,10 +142,13 @@ class GridFinder {
 
   void add(const NetcdfVariable& variable, bool steady, bool coordinate) {
     auto dims = dimensionsOf(file_, variable);
+    if (!dims && !steady && !coordinate) noteRank(variable);
     if (!dims || dims->time.has_value() == steady) return;
     dims->time_step = time_step_;
     for (CfGrid& grid : found_.grids) {
-      if (grid.dims.axes != dims->axes || (dims->time && dims->time != grid.dims.time)) continue;
+      if (grid.dims.axes != dims->axes || grid.dims.face != dims->face || !hasPointsOf(grid, variable))
+        continue;
+      if (dims->time && dims->time != grid.dims.time) continue;
       grid.variables.push_back(&variable);
       return;
     }
@@ -130,6 +158,37 @@ class GridFinder {
       found_.grids.push_back(std::move(*grid));
     else if (!coordinate)
       found_.left_out.push_back({variable.name, reason});
+  }
+
+  /// Members of an ensemble, ERA5's experiments: more dimensions than a grid has.
+  void noteRank(const NetcdfVariable& variable) {
+    std::vector<std::string> names;
+    for (const size_t dim : variable.dims)
+      if (file_.dimensions()[dim].length > 1 && !isTime(file_, dim, variable.dims.size()))
+        names.push_back(file_.dimensions()[dim].name);
+    if (names.size() > 3)
+      found_.left_out.push_back(
+          {variable.name,
+           fmt::format("{} dimensions besides time ({}); expected 3: write a file with one value of "
+                       "the others (ncks -d {},0)",
+                       names.size(), fmt::join(names, ", "), names.front())});
+  }
+
+  /// Whether a variable with the grid's dimensions is at its points: not if its `coordinates` name another longitude (POP's
+  /// ULONG beside TLONG).
+  bool hasPointsOf(const CfGrid& grid, const NetcdfVariable& variable) const {
+    const NetcdfVariable& own = grid.longitude.variable();
+    if (grid.indices) return true;
+    std::istringstream names(variable.text("coordinates"));
+    for (std::string name; names >> name;)
+      if (const NetcdfVariable* const named = file_.find(name);
+          named && named != &own && cfRole(file_, *named) == cfRole(file_, own)) {
+        const auto term = CfTerm::of(file_, *named, grid.dims);
+        if (term && term->exact() && term->axes() == grid.longitude.axes()) return false;
+      } else if (named == &own) {
+        return true;
+      }
+    return true;
   }
 
   std::optional<CfGrid> gridOf(const NetcdfVariable& variable, const CfDimensions& dims,
@@ -194,7 +253,7 @@ class GridFinder {
     }
     reason = fmt::format("no longitude and latitude, or x and y, on its dimensions {}",
                          describe(file_, grid.dims));
-    if (!by_index_) return false;
+    if (!by_index_ || grid.dims.face) return false;
     for (size_t axis = 0; axis < 2; ++axis)
       if (file_.find(file_.dimensions()[grid.dims.axes[axis]].name)) return false;
     grid.degrees = false;
@@ -211,6 +270,14 @@ class GridFinder {
 };
 
 }  // namespace
+
+void CfGrid::setFace(uint64_t number) {
+  face = number;
+  longitude.setFace(number);
+  latitude.setFace(number);
+  vertical.setFace(number);
+  if (mask) mask->setFace(number);
+}
 
 CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step) {
   return GridFinder(file, time_step).find();

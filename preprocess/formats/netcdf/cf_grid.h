@@ -1,5 +1,6 @@
 // The curvilinear grids in NetCDF files, by the CF conventions. Variables with the same three dimensions
-// (and time) share a grid. A file of a staggered mesh has several grids; a variable's dimensions decide.
+// (and time) share a grid. A file of a staggered mesh has several grids; a variable's dimensions decide. A fourth
+// dimension may number the faces of a grid: of a cubed sphere (GEOS' nf), of the "lat-lon-cap" (MITgcm's face, ECCO's tile).
 #pragma once
 
 #include <optional>
@@ -24,6 +25,10 @@ struct CfGrid {
   CfVertical vertical;
   size_t levels = 2;  // the axis along which longitude and latitude do not vary
   std::optional<CfMask> mask;
+
+  /// Of a grid of several faces (dims.face): whose nodes its terms read, from 0. At first those of the first.
+  void setFace(uint64_t number);
+  uint64_t face = 0;
 };
 
 /// A variable that is on no grid, and the reason.

@@ -56,6 +56,12 @@ double CfVertical::formula(const AtNode& node) const {
   }
 }
 
+void CfVertical::setFace(uint64_t face) {
+  for (CfTerm& term : terms_) term.setFace(face);
+  for (std::optional<CfTerm>* term : {&s_, &c_, &eta_, &depth_, &c2_, &depth2_})
+    if (*term) (*term)->setFace(face);
+}
+
 bool CfVertical::readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const {
   if (kind_ != Kind::kLevels || !terms_[0].ofNodes()) return false;
   const NetcdfBox box = terms_[0].boxOf(range);

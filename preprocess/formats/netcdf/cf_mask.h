@@ -34,6 +34,9 @@ class CfMask {
   /// "mask_rho is 0", for messages.
   const std::string& description() const { return description_; }
 
+  /// Of a grid of several faces: whose nodes are masked.
+  void setFace(uint64_t face) { term_.setFace(face); }
+
   /// Sets the marks of nodes that the mask hides to 1. `blank`: the nodes of `range`, i fastest.
   void apply(const NetcdfFiles& files, const CfRange& range, std::span<uint8_t> blank) const;
 

@@ -18,7 +18,8 @@ bool beginsWithOneOf(std::string_view text, std::initializer_list<std::string_vi
 
 bool isVerticalName(std::string_view standard_name) {
   return isOneOf(standard_name, {"depth", "height", "altitude", "geopotential_height", "model_level_number",
-                                 "depth_below_geoid", "air_pressure", "hybrid_sigma_pressure"}) ||
+                                 "depth_below_geoid", "air_pressure", "hybrid_sigma_pressure",
+                                 "mid_layer_heights", "mid_level_pressure"}) ||
          beginsWithOneOf(standard_name, {"height_above_", "ocean_s", "ocean_double_sigma", "atmosphere_"});
 }
 

@@ -61,6 +61,9 @@ std::optional<CfTerm> CfTerm::of(const NetcdfFiles& file, const NetcdfVariable& 
     const auto axis = std::find(block.axes.begin(), block.axes.end(), dim);
     if (block.time && dim == *block.time) {
       term.start_[d] = block.time_step;
+    } else if (block.face && dim == *block.face) {
+      if (term.face_) return std::nullopt;
+      term.face_ = d;
     } else if (axis != block.axes.end()) {
       std::optional<size_t>& along = term.along_[static_cast<size_t>(axis - block.axes.begin())];
       if (along) return std::nullopt;
@@ -72,7 +75,7 @@ std::optional<CfTerm> CfTerm::of(const NetcdfFiles& file, const NetcdfVariable& 
   term.exact_ = unknown.empty();
   // Matched from the last dimension (i) to the first, as in the block, skipping axes that are taken.
   for (auto d = unknown.rbegin(); d != unknown.rend(); ++d) {
-    const size_t axis = variable.dims.size() - 1 - *d;
+    const size_t axis = variable.dims.size() - 1 - *d - (term.face_ && *term.face_ > *d ? 1 : 0);
     if (axis > 2 || term.along_[axis]) return std::nullopt;
     const uint64_t length = lengthOf(variable.dims[*d]), wanted = lengthOf(block.axes[axis]);
     if (length + 1 < wanted || length > wanted + 1) return std::nullopt;

@@ -27,10 +27,10 @@ struct CfValues {
   }
 };
 
-/// The block's dimensions in the file: along i, j, k, and of time.
+/// The block's dimensions in the file: along i, j, k, of time, and of the faces of a grid that has several.
 struct CfDimensions {
   std::array<size_t, 3> axes{};
-  std::optional<size_t> time;
+  std::optional<size_t> time, face;
   size_t time_step = 0;
 };
 
@@ -60,6 +60,13 @@ class CfTerm {
   bool exact() const { return exact_; }
   /// Whether its points are the block's nodes: nothing is interpolated.
   bool onNodes() const { return longer_ == std::array<int, 3>{}; }
+  /// Whether the nodes are half-way between its points along `axis`.
+  bool surrounds(size_t axis) const { return longer_[axis] > 0; }
+  /// Whether it differs between the faces of the grid. read() takes the values of one, at first of the first.
+  bool ofFaces() const { return face_.has_value(); }
+  void setFace(uint64_t face) {
+    if (face_) start_[*face_] = face;
+  }
   size_t axes() const { return varies(0) + varies(1) + varies(2); }
 
   /// Whether it stores one value for each node, in the order of the nodes (i fastest).
@@ -74,8 +81,10 @@ class CfTerm {
   std::array<int, 3> longer_{};                 // [axis]: its length minus the block's: -1, 0 or 1
   std::array<uint64_t, 3> length_{};            // [axis]: its length
   bool exact_ = true;
-  double index_metres_ = 0;    // above 0: there is no variable, see ofIndex()
-  std::vector<size_t> start_;  // [dimension]: the time step for the time dimension, else 0
+  double index_metres_ = 0;     // above 0: there is no variable, see ofIndex()
+  std::optional<size_t> face_;  // its dimension of the faces
+  std::vector<size_t>
+      start_;  // [dimension]: the time step for that of time, the face for that of faces, else 0
 };
 
 }  // namespace curvisplat

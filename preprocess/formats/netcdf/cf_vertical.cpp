@@ -159,19 +159,20 @@ std::optional<CfVertical> CfVertical::byNodeGeopotential(const NetcdfFiles& file
   return std::nullopt;
 }
 
-/// MOM6's `e`, at the layers' interfaces: there is one more than layers.
+/// MOM6's `e`, COSMO's HHL and other heights of every node at the layers' interfaces: there is one more than layers.
 std::optional<CfVertical> CfVertical::byInterfaces(const NetcdfFiles& file, const CfDimensions& block,
                                                    size_t axis) {
   for (const NetcdfVariable& variable : file.variables()) {
     const auto kilometres = kilometresOf(variable.text("units"));
     const std::string words = lowerCase(variable.text("long_name"));
     if (!variable.numeric || !kilometres) continue;
-    if (variable.name != "e" && words.find("interface height") == std::string::npos) continue;
+    const bool named = variable.name == "e" || words.find("interface height") != std::string::npos;
+    if (!named && cfRole(file, variable) != CfRole::kVertical) continue;
     const auto term = CfTerm::of(file, variable, block);
-    if (!term || term->axes() != 3 || !term->varies(axis)) continue;
+    if (!term || term->axes() != 3 || !term->varies(axis) || !(named || term->surrounds(axis))) continue;
     CfVertical vertical;
     vertical.terms_.push_back(*term);
-    vertical.scale_ = *kilometres;
+    vertical.scale_ = *kilometres * (!named && growsDownwards(variable) ? -1 : 1);
     vertical.description_ = "interface height " + variable.name;
     return vertical;
   }

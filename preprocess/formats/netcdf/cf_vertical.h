@@ -42,6 +42,9 @@ class CfVertical {
   /// `to` and returns true, without a buffer. Else returns false.
   bool readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const;
 
+  /// Of a grid of several faces: whose heights are read.
+  void setFace(uint64_t face);
+
   const std::string& description() const {
     return description_;
   }  // "depth", "ocean_s_coordinate_g2 of s_rho"

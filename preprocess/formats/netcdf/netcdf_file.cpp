@@ -305,8 +305,13 @@ void NetcdfFile::addRange(const NetcdfVariable& variable, Packing& packing) {
 std::string NetcdfFile::missingValues(const NetcdfVariable& variable) const {
   const Packing& packing = packings_.at(variable.position);
   std::string words = packing.range;
-  if (!packing.missing.empty())
-    words += fmt::format("{}equal to {:g}", words.empty() ? "" : " or ", fmt::join(packing.missing, " or "));
+  std::vector<std::string> values;  // as _FillValue and missing_value are often the same
+  for (const double missing : packing.missing)
+    if (std::string value = fmt::format("{:g}", missing);
+        std::find(values.begin(), values.end(), value) == values.end())
+      values.push_back(std::move(value));
+  if (!values.empty())
+    words += fmt::format("{}equal to {}", words.empty() ? "" : " or ", fmt::join(values, " or "));
   return words;
 }
 

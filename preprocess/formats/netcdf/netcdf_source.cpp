@@ -18,10 +18,6 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kNamesListed = 3;
-// Positions are computed for this many nodes at a time, which bounds the buffers.
-constexpr uint64_t kNodesAtATime = 1 << 16;
-// The mask variable, if it is not requested itself, is read for this many nodes at a time.
-constexpr uint64_t kMaskNodesAtATime = 1 << 20;
 
 std::string listed(const std::vector<std::string>& names) {
   const size_t count = std::min(kNamesListed, names.size());
@@ -65,31 +61,18 @@ std::vector<std::filesystem::path> filesOf(const OpenGridOptions& options) {
   return files;
 }
 
-/// Calls `each` for pieces of a box that are contiguous in it, of about `nodes` nodes or a row.
-template <typename Each>
-void forEachPiece(const NodeBox& box, uint64_t ni, uint64_t nodes, const Each& each) {
-  const uint64_t nj = box.j1 - box.j0;
-  const uint64_t rows = std::clamp<uint64_t>(nodes / ni, 1, nj);
-  const uint64_t planes = rows < nj ? 1 : std::clamp<uint64_t>(nodes / (ni * rows), 1, box.k1 - box.k0);
-  for (uint64_t k = box.k0; k < box.k1; k += planes)
-    for (uint64_t j = box.j0; j < box.j1; j += rows)
-      each(NodeBox{j, std::min(j + rows, box.j1), k, std::min(k + planes, box.k1)});
-}
-
 }  // namespace
-
-std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options) {
-  auto source = std::make_unique<NetcdfSource>(options);
-  if (const auto closure = source->closure())
-    return std::make_unique<ClosedGrid>(std::move(source), *closure);
-  return source;
-}
 
 NetcdfSource::NetcdfSource(const OpenGridOptions& options)
     : file_(filesOf(options)),
       grid_(chooseGrid(file_, options, description_, mask_)),
-      length_(kilometresOf(grid_.longitude.variable().text("units")).value_or(1e-3)),
       globe_(globeOf(options.globe)) {
+  const uint64_t faces = grid_.dims.face ? file_.dimensions()[*grid_.dims.face].length : 1;
+  for (uint64_t face = 0; face < faces; ++face) {
+    CfGrid grid = grid_;
+    grid.setFace(face);
+    blocks_.emplace_back(file_, std::move(grid), globe_, mask_);
+  }
   describe(options);
 }
 
@@ -129,9 +112,12 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     if (g == chosen) continue;
     std::vector<std::string> names;
     for (const NetcdfVariable* variable : found.grids[g].variables) names.push_back(variable->name);
-    description.warnings.push_back(
-        fmt::format("left out: {}, on another grid ({}); select that grid with --scalar NAME", listed(names),
-                    describeDimensions(file, found.grids[g])));
+    std::string where = describeDimensions(file, found.grids[g]);
+    if (where == describeDimensions(file, found.grids[chosen]))
+      where += fmt::format(" at {}, {}", found.grids[g].longitude.variable().name,
+                           found.grids[g].latitude.variable().name);
+    description.warnings.push_back(fmt::format(
+        "left out: {}, on another grid ({}); select that grid with --scalar NAME", listed(names), where));
   }
   for (const auto& [reason, names] : byReason(found.left_out))
     description.warnings.push_back(fmt::format("left out: {}: {}", listed(names), reason));
@@ -160,10 +146,6 @@ Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
   return Globe(options, degrees, longitude);
 }
 
-bool NetcdfSource::projects() const {
-  return grid_.projection && globe_.degrees();
-}
-
 void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.files = file_.paths();
   const CfTimes times = cfTimes(file_, grid_);
@@ -176,7 +158,12 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
 
   const auto length = [&](size_t axis) { return file_.dimensions()[grid_.dims.axes[axis]].length; };
-  description_.blocks.push_back({describeDimensions(file_, grid_), length(0), length(1), length(2), true});
+  for (size_t face = 0; face < blocks_.size(); ++face) {
+    const std::string name = grid_.dims.face
+                                 ? fmt::format("{} {}", file_.dimensions()[*grid_.dims.face].name, face + 1)
+                                 : describeDimensions(file_, grid_);
+    description_.blocks.push_back({name, length(0), length(1), length(2), true});
+  }
   for (const NetcdfVariable* variable : grid_.variables) {
     GridScalar scalar{variable->name, variable->text("units"), {}, 0, Centring::kNode};
     if (const std::string name = simplifiedName(variable->text("standard_name")); !name.empty())
@@ -229,7 +216,7 @@ double NetcdfSource::shareOfZeros() const {
     std::vector<uint8_t> zeros(block.ni, 1);
     std::vector<float> values(block.ni);
     for (const uint64_t k : {uint64_t{0}, block.nk / 2, block.nk - 1}) {
-      readScalar({j, j + 1, k, k + 1}, mask_, values);
+      blocks_[0].readScalar({{0, j, k}, {block.ni, j + 1, k + 1}}, mask_, values);
       for (uint64_t i = 0; i < block.ni; ++i) {
         if (std::isnan(values[i])) return 0;
         zeros[i] &= values[i] == 0;
@@ -243,119 +230,26 @@ double NetcdfSource::shareOfZeros() const {
 
 void NetcdfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                         NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(block, ==, 0u);
-  const size_t nodes = description_.blocks[0].ni * (box.j1 - box.j0) * (box.k1 - box.k0);
-  for (std::vector<double>* axis : {&out.x, &out.y, &out.z}) axis->resize(nodes);
-  readPlaces(box, out);
-  out.blank.assign(nodes, 0);
-  out.scalars.resize(scalars.size());
-  const std::vector<float>* mask = nullptr;
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    CURVISPLAT_CHECK_OP(scalars[n], <, grid_.variables.size());
-    out.scalars[n].resize(nodes);
-    readScalar(box, scalars[n], out.scalars[n]);
-    if (scalars[n] == mask_) mask = &out.scalars[n];
-  }
-  if (mask)
-    for (size_t n = 0; n < nodes; ++n) out.blank[n] = std::isnan((*mask)[n]);
-  else
-    readBlank(box, out.blank);
-  if (grid_.mask) applyMask(box, out.blank);
+  readPart(block, {{0, box.j0, box.k0}, {description_.blocks[0].ni, box.j1, box.k1}}, scalars, out);
 }
 
-void NetcdfSource::applyMask(const NodeBox& box, std::vector<uint8_t>& blank) const {
-  const uint64_t ni = description_.blocks[0].ni;
-  size_t n = 0;
-  forEachPiece(box, ni, kNodesAtATime, [&](const NodeBox& piece) {
-    const size_t nodes = ni * (piece.j1 - piece.j0) * (piece.k1 - piece.k0);
-    grid_.mask->apply(file_, {{0, piece.j0, piece.k0}, {ni, piece.j1, piece.k1}}, {&blank[n], nodes});
-    n += nodes;
-  });
+void NetcdfSource::readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
+                            NodeArrays& out) const {
+  CURVISPLAT_CHECK_OP(block, <, blocks_.size());
+  blocks_[block].read(range, scalars, out);
 }
 
-void NetcdfSource::readBlank(const NodeBox& box, std::vector<uint8_t>& blank) const {
-  const uint64_t ni = description_.blocks[0].ni;
-  std::vector<float> values;
-  size_t n = 0;
-  forEachPiece(box, ni, kMaskNodesAtATime, [&](const NodeBox& piece) {
-    values.resize(ni * (piece.j1 - piece.j0) * (piece.k1 - piece.k0));
-    readScalar(piece, mask_, values);
-    for (const float value : values) blank[n++] = std::isnan(value);
-  });
-}
-
-/// The columns of the box's nodes; those of its first plane only where one column serves all levels.
-void NetcdfSource::readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const {
-  const CfValues east = grid_.longitude.read(file_, range), north = grid_.latitude.read(file_, range);
-  const double scale = !grid_.degrees && !projects() ? length_ : 1;
-  const bool upright = !grid_.longitude.varies(2) && !grid_.latitude.varies(2);
-  const uint64_t planes = upright ? 1 : range.end[2] - range.begin[2];
-  std::vector<double> x, y;
-  for (uint64_t k = 0; k < planes; ++k)
-    for (uint64_t j = 0; j < range.end[1] - range.begin[1]; ++j)
-      for (uint64_t i = 0; i < range.end[0] - range.begin[0]; ++i) {
-        x.push_back(scale * east.at(i, j, k));
-        y.push_back(scale * north.at(i, j, k));
-      }
-  if (projects()) {
-    if (!grid_.degrees)  // PROJ's lengths are metres
-      for (std::vector<double>* axis : {&x, &y})
-        for (double& value : *axis) value *= 1e3 * length_;
-    grid_.projection->toGeographic(x, y);
-  }
-  columns.clear();
-  for (size_t n = 0; n < x.size(); ++n) columns.push_back(globe_.column(x[n], y[n]));
+std::vector<glm::dvec3> NetcdfSource::pointsOf(uint32_t block, const CfRange& range) const {
+  CURVISPLAT_CHECK_OP(block, <, blocks_.size());
+  return blocks_[block].points(range);
 }
 
 std::optional<GridClosure> NetcdfSource::closure() const {
-  if (!globe_.sphere() || grid_.levels != 2) return std::nullopt;
+  if (!onSphere() || blocks_.size() > 1) return std::nullopt;
   const GridBlock& block = description_.blocks[0];
   return closureOf(block.ni, block.nj, [&](uint64_t j) {
-    std::vector<GlobeColumn> columns;
-    readColumns({{0, j, 0}, {block.ni, j + 1, 1}}, columns);
-    std::vector<glm::dvec3> points;
-    for (const GlobeColumn& column : columns) points.push_back({column.x, column.y, column.z});
-    return points;
+    return pointsOf(0, {{0, j, 0}, {block.ni, j + 1, 1}});
   });
-}
-
-void NetcdfSource::readPlaces(const NodeBox& box, NodeArrays& out) const {
-  const uint64_t ni = description_.blocks[0].ni;
-  std::vector<GlobeColumn> columns;
-  const bool read = grid_.vertical.readNodes(file_, {{0, box.j0, box.k0}, {ni, box.j1, box.k1}}, out.z);
-  CfValues height;
-  size_t n = 0;
-  forEachPiece(box, ni, kNodesAtATime, [&](const NodeBox& piece) {
-    const CfRange range{{0, piece.j0, piece.k0}, {ni, piece.j1, piece.k1}};
-    readColumns(range, columns);
-    if (!read) height = grid_.vertical.heights(file_, range);
-    size_t column = 0;
-    for (uint64_t k = 0; k < piece.k1 - piece.k0; ++k)
-      for (uint64_t j = 0; j < piece.j1 - piece.j0; ++j)
-        for (uint64_t i = 0; i < ni; ++i, ++n, ++column) {
-          if (column == columns.size()) column = 0;
-          const GlobePlace place = globe_.place(columns[column], read ? out.z[n] : height.at(i, j, k));
-          out.x[n] = place.x;
-          out.y[n] = place.y;
-          out.z[n] = place.z;
-        }
-  });
-}
-
-void NetcdfSource::readScalar(const NodeBox& box, size_t scalar, std::vector<float>& to) const {
-  const NetcdfVariable& variable = *grid_.variables[scalar];
-  const std::array<uint64_t, 3> begin{0, box.j0, box.k0},
-      count{description_.blocks[0].ni, box.j1 - box.j0, box.k1 - box.k0};
-  NetcdfBox part{std::vector<size_t>(variable.dims.size(), 0), std::vector<size_t>(variable.dims.size(), 1)};
-  for (size_t d = 0; d < variable.dims.size(); ++d) {
-    if (grid_.dims.time && variable.dims[d] == *grid_.dims.time) part.start[d] = grid_.dims.time_step;
-    for (size_t axis = 0; axis < 3; ++axis)
-      if (variable.dims[d] == grid_.dims.axes[axis]) {
-        part.start[d] = begin[axis];
-        part.count[d] = count[axis];
-      }
-  }
-  file_.read(variable, part, std::span<float>(to));
 }
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
 // A curvilinear grid by the CF conventions (ocean, atmosphere, ...) in one or more NetCDF files, as a
-// GridSource of one block at one time step.
+// GridSource of one time step: of one block, or of one for each face of a cubed sphere and the like.
 //
 // If a file has several grids (a staggered mesh), the source uses that of the first scalar that the user
 // requests, else the grid with the most variables; warnings list the others. Nodes where that scalar (else
@@ -8,21 +8,20 @@
 // NetCDF is not thread-safe: reads by several threads run one after the other.
 #pragma once
 
+#include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/netcdf/cf_grid.h"
+#include "preprocess/formats/netcdf/cf_nodes.h"
 #include "preprocess/formats/netcdf/closed_grid.h"
 #include "preprocess/formats/netcdf/globe.h"
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
-
-/// Opens the files, and closes a grid that runs around the Earth (closed_grid.h). Throws Error.
-std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options);
 
 class NetcdfSource final : public GridSource {
  public:
@@ -33,7 +32,16 @@ class NetcdfSource final : public GridSource {
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
 
-  /// How the grid closes if it runs around the Earth; of grids on a sphere with their levels along k.
+  /// As read(), of a box that begins and ends anywhere along i.
+  void readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
+                NodeArrays& out) const;
+
+  /// Whether the nodes are on a sphere, with their levels along k.
+  bool onSphere() const { return globe_.sphere() && grid_.levels == 2; }
+  /// On the unit sphere, of the nodes of a range with a single level.
+  std::vector<glm::dvec3> pointsOf(uint32_t block, const CfRange& range) const;
+
+  /// How the grid closes if it runs around the Earth; of grids of one block on a sphere.
   std::optional<GridClosure> closure() const;
 
  private:
@@ -42,19 +50,13 @@ class NetcdfSource final : public GridSource {
   Globe globeOf(const GlobeOptions& options) const;
   void describe(const OpenGridOptions& options);
   double shareOfZeros() const;
-  bool projects() const;
-  void readPlaces(const NodeBox& box, NodeArrays& out) const;
-  void readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const;
-  void applyMask(const NodeBox& box, std::vector<uint8_t>& blank) const;
-  void readBlank(const NodeBox& box, std::vector<uint8_t>& blank) const;
-  void readScalar(const NodeBox& box, size_t scalar, std::vector<float>& to) const;
 
   NetcdfFiles file_;
   GridDescription description_;
   size_t mask_ = 0;  // the scalar whose missing values blank nodes
-  CfGrid grid_;
-  double length_ = 1;  // unit of x and y in kilometres, unless they are degrees
+  CfGrid grid_;      // of the first block
   Globe globe_;
+  std::vector<CfNodes> blocks_;  // one, or one for each face
 };
 
 }  // namespace curvisplat

@@ -142,7 +142,7 @@ class Reader {
 
   void readVariables() {
     const uint64_t count = words_.count("the number of variables");
-    if (count > words_.size() / 4) words_.damaged("the number of variables", count, "fewer");
+    checkTecplotCounts(words_.name(), 0, count);
     for (uint64_t n = 0; n < count; ++n) data_.variables.push_back(words_.text());
   }
 
@@ -185,6 +185,7 @@ class Reader {
       refuseTecplotZone(words_.name(), zone, number, kTypeNames[type]);
     if (type != 0) words_.damaged("the type of a zone", type, "0 to 7");
     if (has_packing_) layout.point = words_.flag("the packing of a zone");
+    checkTecplotCounts(words_.name(), number + 1, data_.variables.size());
     // Each has a type in the data.
     if ((number + 1) * data_.variables.size() > words_.size() / 4)
       words_.damaged("the number of zones", number + 1, "fewer, by the size of the file");

@@ -35,6 +35,16 @@ size_t bytesOf(TecplotType type) {
   }
 }
 
+void checkTecplotCounts(const std::string& file, size_t zones, uint64_t variables) {
+  constexpr uint64_t kMaxVariables = 1 << 16, kMaxArrays = 1 << 22;
+  if (variables > kMaxVariables)
+    throw Error("{}: has {} variables (expected at most {}); the file is damaged", file, variables,
+                kMaxVariables);
+  if (zones * variables > kMaxArrays)
+    throw Error("{}: has {} variables in {} zones or more (at most {} in all are read); split the file", file,
+                variables, zones, kMaxArrays);
+}
+
 template <typename Value>
 void readTecplotValues(const TecplotValues& values, uint64_t first, std::span<Value> to) {
   thread_local std::vector<std::byte> buffer;

@@ -63,6 +63,10 @@ struct TecplotData {
 /// dimensions. `file`: for messages.
 void shareTecplotValues(const std::string& file, TecplotData& data, size_t from, size_t to, size_t variable);
 
+/// Throws Error if there are more variables than 65,536, or more than four million in all zones together: each has a
+/// place in memory, whatever a damaged file says.
+void checkTecplotCounts(const std::string& file, size_t zones, uint64_t variables);
+
 /// Throws Error if the zone's dimensions are not positive, or if it has more than `most` nodes.
 void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most);
 

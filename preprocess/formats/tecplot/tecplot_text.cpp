@@ -206,7 +206,8 @@ class Reader {
 
   void readZone(TecplotTokens& tokens) {
     if (data_.variables.empty()) fail("has no VARIABLES before its first zone");
-    // Each variable of each zone needs memory; a zone has one number or more of each that it does not share.
+    checkTecplotCounts(file_->name(), data_.zones.size() + 1, data_.variables.size());
+    // A zone has one number or more of each variable that it does not share.
     if ((data_.zones.size() + 1) * data_.variables.size() > std::max<uint64_t>(file_->size(), 1024))
       fail("has more zones and variables than a file of its size can hold");
     TextZone& text = zones_.emplace_back();

@@ -7,7 +7,7 @@
 //       <Attribute Name="p" Center="Node"> <DataItem ...>grid.h5:/p</DataItem> </Attribute>
 //
 // Parsed as a whole: at most 16 MiB. Elements may refer to others by a simple path (Reference="/Xdmf/Domain/..."). XInclude
-// and computed items (Function, Coordinates) are refused.
+// and items by Coordinates are refused; attributes computed by a Function other than JOIN are left out.
 #pragma once
 
 #include <array>

@@ -114,6 +114,50 @@ class SlabValues final : public XdmfValues {
   XdmfSlab slab_;
 };
 
+std::vector<uint64_t> joinedDims(const std::vector<std::shared_ptr<const XdmfValues>>& parts) {
+  std::vector<uint64_t> dims = parts.at(0)->dims();
+  dims.push_back(parts.size());
+  return dims;
+}
+
+class JoinedValues final : public XdmfValues {
+ public:
+  JoinedValues(std::vector<std::shared_ptr<const XdmfValues>> parts, const std::string& where)
+      : XdmfValues(joinedDims(parts), where), parts_(std::move(parts)) {
+    for (const auto& part : parts_)
+      if (part->size() != parts_[0]->size())
+        throw Error("{}: joins {} numbers and {}; expected as many of each", where, parts_[0]->size(),
+                    part->size());
+  }
+
+  int valueBytes() const override {
+    int bytes = 0;
+    for (const auto& part : parts_) bytes = std::max(bytes, part->valueBytes());
+    return bytes;
+  }
+
+  void read(uint64_t first, std::span<double> to) const override {
+    constexpr uint64_t kTuples = 8 << 10;
+    const uint64_t count = parts_.size(), end = first + to.size();
+    std::vector<double> values;
+    for (uint64_t at = first; at < end;) {
+      const uint64_t tuple = at / count, tuples = std::min(kTuples, (end - 1) / count + 1 - tuple);
+      const uint64_t next = std::min(end, (tuple + tuples) * count);
+      values.resize(static_cast<size_t>(tuples));
+      for (uint64_t part = 0; part < count; ++part) {
+        parts_[part]->read(tuple, values);
+        for (uint64_t n = 0; n < tuples; ++n)
+          if (const uint64_t place = (tuple + n) * count + part; place >= at && place < next)
+            to[place - first] = values[n];
+      }
+      at = next;
+    }
+  }
+
+ private:
+  std::vector<std::shared_ptr<const XdmfValues>> parts_;
+};
+
 }  // namespace
 
 XdmfValues::XdmfValues(std::vector<uint64_t> dims, const std::string& where) : dims_(std::move(dims)) {
@@ -208,6 +252,11 @@ std::shared_ptr<const XdmfValues> openXdmfBinary(const XdmfBinary& binary, std::
 std::shared_ptr<const XdmfValues> xdmfInline(std::vector<double> numbers, std::vector<uint64_t> dims,
                                              const std::string& where) {
   return std::make_shared<InlineValues>(std::move(numbers), std::move(dims), where);
+}
+
+std::shared_ptr<const XdmfValues> xdmfJoined(std::vector<std::shared_ptr<const XdmfValues>> parts,
+                                             const std::string& where) {
+  return std::make_shared<JoinedValues>(std::move(parts), where);
 }
 
 std::shared_ptr<const XdmfValues> xdmfHyperslab(std::shared_ptr<const XdmfValues> all, XdmfSlab slab,

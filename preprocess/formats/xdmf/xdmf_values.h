@@ -65,6 +65,11 @@ std::shared_ptr<const XdmfValues> openXdmfBinary(const XdmfBinary& binary, std::
 std::shared_ptr<const XdmfValues> xdmfInline(std::vector<double> numbers, std::vector<uint64_t> dims,
                                              const std::string& where);
 
+/// Tuples of one number of each of the parts (XDMF's JOIN): a further dimension, the fastest. Throws Error unless the
+/// parts, one at least, have the same size.
+std::shared_ptr<const XdmfValues> xdmfJoined(std::vector<std::shared_ptr<const XdmfValues>> parts,
+                                             const std::string& where);
+
 /// A part of another item. Throws Error if it does not have it.
 std::shared_ptr<const XdmfValues> xdmfHyperslab(std::shared_ptr<const XdmfValues> all, XdmfSlab slab,
                                                 const std::string& where);

@@ -31,21 +31,22 @@ class Report(NamedTuple):
 def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory: Union[str, int, None], threads: int,
              title: str) -> dict:
     return {"overwrite": overwrite, "resume": resume, "blank_value": blank_value, "threads": threads, "title": title,
-            "memory": "" if memory is None else str(memory)}
+            "memory": "" if memory is None else str(memory), "value_precision": "normal"}
 
 
 def convert(output: Path, grid: Path, solutions: Sequence[Path] = (), *, scalars: Sequence[str] = (),
             time_step: Optional[int] = None, blank_value: Optional[float] = None, overwrite: bool = False,
             resume: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
-            progress: Optional[Progress] = None) -> Report:
+            value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
     """Converts grid files (PLOT3D, VTK, CGNS, NetCDF) to the cache `output`, as `curvisplat convert` does.
 
     scalars: names (default: all that the files store). blank_value: samples with this value are not drawn. resume: go on from an
-    interrupted conversion. memory: the limit of this process, in bytes or as "2G". progress: called with (phase, done,
-    total, unit). Raises Error, UsageError and, after Ctrl-C, KeyboardInterrupt; then no partial cache is left unless
+    interrupted conversion. memory: the limit of this process, in bytes or as "2G". value_precision: "normal" (16 bits for
+    the range of a brick) or "fine" (24). progress: called with (phase, done, total, unit). Raises Error, UsageError and, after Ctrl-C, KeyboardInterrupt; then no partial cache is left unless
     `resume` was given.
     """
     options = _options(overwrite, resume, blank_value, memory, threads, title)
+    options["value_precision"] = value_precision
     options["time_step"] = time_step
     names = [scalars] if isinstance(scalars, str) else list(scalars)
     return Report(**_core.convert_files(os.fspath(output), os.fspath(grid), [os.fspath(path) for path in solutions], names,
@@ -72,14 +73,15 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
 
 def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, overwrite: bool = False,
                    memory: Union[str, int, None] = None, threads: int = 0, title: str = "", time: Optional[float] = None,
-                   progress: Optional[Progress] = None) -> Report:
+                   value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
     """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
 
-    time: of this step, if others are to follow by append_arrays(). Raises as convert() does; UsageError for arrays whose types or
-    shapes do not fit.
+    time: of this step, if others are to follow by append_arrays(), with the same value_precision. Raises as convert() does;
+    UsageError for arrays whose types or shapes do not fit.
     """
     tuples, units = _tuples(blocks)
     options = _options(overwrite, False, blank_value, memory, threads, title)
+    options["value_precision"] = value_precision
     options["time"] = None if time is None else float(time)
     return Report(**_core.convert_arrays(os.fspath(output), tuples, units, options, progress))
 
@@ -100,7 +102,7 @@ def append_arrays(cache: Path, *blocks: Block, time: Optional[float] = None, bla
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
                      scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None,
                      overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
-                     progress: Optional[Progress] = None) -> Report:
+                     value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
     """Converts a grid larger than memory that `read` hands out piece by piece.
 
     shapes: (nk, nj, ni) of each block. scalars: names, or units by name. read(block, k0, k1, j0, j1, names) returns (x, y, z, [values of
@@ -109,5 +111,6 @@ def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read:
     """
     units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in scalars]
     options = _options(overwrite, False, blank_value, memory, threads, title)
+    options["value_precision"] = value_precision
     return Report(**_core.convert_callable(os.fspath(output), [tuple(shape) for shape in shapes], units, read, options,
                                            progress))

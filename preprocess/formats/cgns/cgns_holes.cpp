@@ -1,0 +1,109 @@
+#include "preprocess/formats/cgns/cgns_holes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+/// The index from 0 that a number from 1 stands for. Throws Error if there is no such sample.
+uint64_t indexOf(double number, uint64_t count) {
+  if (!(number >= 1 && number <= static_cast<double>(count)) || number != std::floor(number))
+    throw Error("a hole has the index {:g}; expected 1 to {}", number, count);
+  return static_cast<uint64_t>(number) - 1;
+}
+
+}  // namespace
+
+void CgnsHoles::addRange(const std::vector<double>& ends, const std::array<uint64_t, 3>& counts, Holes& to) {
+  if (ends.size() != 6) throw Error("a hole's range has {} numbers; expected 6", ends.size());
+  Hole hole;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const auto [low, high] = std::minmax(ends[axis], ends[axis + 3]);
+    hole.first[axis] = indexOf(low, counts[axis]);
+    hole.last[axis] = indexOf(high, counts[axis]);
+  }
+  to.push_back(hole);
+}
+
+void CgnsHoles::addList(const std::vector<double>& points, const std::array<uint64_t, 3>& counts, Holes& to) {
+  if (points.size() % 3 != 0) throw Error("a hole's list has {} numbers; expected triples", points.size());
+  for (size_t n = 0; n < points.size(); n += 3) {
+    std::array<uint64_t, 3> at{};
+    for (size_t axis = 0; axis < 3; ++axis) at[axis] = indexOf(points[n + axis], counts[axis]);
+    if (n > 0 && to.back().last == std::array<uint64_t, 3>{at[0] - 1, at[1], at[2]})
+      to.back().last = at;
+    else
+      to.push_back({at, at});
+  }
+}
+
+void CgnsHoles::add(const CgnsFile& file, const CgnsNode& holes, const std::array<uint64_t, 3>& nodes) {
+  const std::vector<CgnsNode> children = file.children(holes);
+  bool of_cells = false;
+  for (const CgnsNode& child : children)
+    if (child.label == "GridLocation_t") {
+      const std::string location = file.text(child);
+      of_cells = location == "CellCenter";
+      if (!of_cells && location != "Vertex")
+        throw Error("a hole's GridLocation is {}; expected Vertex or CellCenter", location);
+    }
+  std::array<uint64_t, 3> counts = nodes;
+  for (uint64_t& count : counts) count -= of_cells ? 1 : 0;
+  Holes found;
+  for (const CgnsNode& child : children) {
+    if (child.label == "IndexRange_t") addRange(file.numbers(child), counts, found);
+    if (child.label == "IndexArray_t") addList(file.numbers(child), counts, found);
+  }
+  Holes& all = of_cells ? cells_ : nodes_;
+  all.insert(all.end(), found.begin(), found.end());
+}
+
+template <typename Use>
+void CgnsHoles::forEachIn(const Holes& holes, uint64_t ni, const NodeBox& box, const Use& use) {
+  for (const Hole& hole : holes)
+    for (uint64_t k = std::max(hole.first[2], box.k0); k < std::min(hole.last[2] + 1, box.k1); ++k)
+      for (uint64_t j = std::max(hole.first[1], box.j0); j < std::min(hole.last[1] + 1, box.j1); ++j)
+        for (uint64_t i = hole.first[0]; i <= hole.last[0]; ++i)
+          use(i + ni * (j - box.j0 + (box.j1 - box.j0) * (k - box.k0)));
+}
+
+void CgnsHoles::blankNodes(const std::array<uint64_t, 3>& nodes, const NodeBox& box,
+                           std::vector<uint8_t>& blank) const {
+  const uint64_t ni = nodes[0];
+  forEachIn(nodes_, ni, box, [&](uint64_t n) { blank[n] = 1; });
+  if (cells_.empty()) return;
+  // The cells around the box's nodes.
+  const NodeBox around{box.j0 - std::min<uint64_t>(box.j0, 1), box.j1, box.k0 - std::min<uint64_t>(box.k0, 1),
+                       box.k1};
+  const uint64_t rows = around.j1 - around.j0;
+  std::vector<uint8_t> hidden(ni * rows * (around.k1 - around.k0));
+  forEachIn(cells_, ni, around, [&](uint64_t n) { hidden[n] = 1; });
+  const auto allHidden = [&](const std::array<uint64_t, 3>& node) {
+    std::array<uint64_t, 3> first = node, last = node;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      first[axis] -= std::min<uint64_t>(first[axis], 1);
+      last[axis] = std::min(last[axis], nodes[axis] - 2);
+    }
+    for (uint64_t k = first[2]; k <= last[2]; ++k)
+      for (uint64_t j = first[1]; j <= last[1]; ++j)
+        for (uint64_t i = first[0]; i <= last[0]; ++i)
+          if (!hidden[i + ni * (j - around.j0 + rows * (k - around.k0))]) return false;
+    return true;
+  };
+  size_t n = 0;
+  for (uint64_t k = box.k0; k < box.k1; ++k)
+    for (uint64_t j = box.j0; j < box.j1; ++j)
+      for (uint64_t i = 0; i < ni; ++i, ++n)
+        if (!blank[n] && allHidden({i, j, k})) blank[n] = 1;
+}
+
+void CgnsHoles::blankCells(const std::array<uint64_t, 3>& nodes, const NodeBox& box,
+                           std::vector<float>& values) const {
+  forEachIn(cells_, nodes[0], box, [&](uint64_t n) { values[n] = std::numeric_limits<float>::quiet_NaN(); });
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,19 @@
+#include "preprocess/formats/netcdf/open_netcdf.h"
+
+#include <utility>
+
+#include "preprocess/formats/netcdf/closed_grid.h"
+#include "preprocess/formats/netcdf/joined_faces.h"
+#include "preprocess/formats/netcdf/netcdf_source.h"
+
+namespace curvisplat {
+
+std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options) {
+  auto source = std::make_unique<NetcdfSource>(options);
+  if (source->description().blocks.size() > 1) return joinFaces(std::move(source));
+  if (const auto closure = source->closure())
+    return std::make_unique<ClosedGrid>(std::move(source), *closure);
+  return source;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,14 @@
+// Opens a curvilinear grid by the CF conventions, without the gaps that models leave in grids around the Earth.
+#pragma once
+
+#include <memory>
+
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+/// Opens the files, and closes a grid that runs around the Earth (closed_grid.h, joined_faces.h). Throws Error.
+std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options);
+
+}  // namespace curvisplat

@@ -1,0 +1,56 @@
+// The arrays that an XDMF file names: data items in its XML, in HDF5 or in binary files, and HyperSlabs of others.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "preprocess/formats/common/open_files.h"
+#include "preprocess/formats/xdmf/xdmf_document.h"
+#include "preprocess/formats/xdmf/xdmf_hdf5.h"
+#include "preprocess/formats/xdmf/xdmf_values.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+
+/// An item whose numbers would have to be computed.
+class XdmfComputedItem : public Error {
+ public:
+  using Error::Error;
+};
+
+class XdmfItems {
+ public:
+  /// `document` must outlive the object, but not the arrays.
+  explicit XdmfItems(const XdmfDocument& document);
+
+  /// The array of a DataItem. One that many elements refer to is kept once. Throws Error with the element; XdmfComputedItem for
+  /// functions other than JOIN.
+  std::shared_ptr<const XdmfValues> read(const pugi::xml_node& item) { return readItem(item, 0); }
+
+  /// Of the arrays that were read: each once.
+  const std::vector<std::string>& files() const { return files_; }
+
+ private:
+  std::shared_ptr<const XdmfValues> readItem(const pugi::xml_node& given, int depth);
+  std::shared_ptr<const XdmfValues> readNewItem(const pugi::xml_node& item, int depth);
+  std::shared_ptr<const XdmfValues> readFunction(const pugi::xml_node& item, int depth);
+  std::shared_ptr<const XdmfValues> readSlab(const pugi::xml_node& item, int depth);
+  void addFile(const std::filesystem::path& path);
+  std::filesystem::path existing(const pugi::xml_node& item, const std::string& text) const;
+  std::shared_ptr<const XdmfValues> readHdf5(const pugi::xml_node& item, const std::string& text,
+                                             std::vector<uint64_t> dims);
+  std::shared_ptr<const XdmfValues> readBinary(const pugi::xml_node& item, const std::string& text,
+                                               std::vector<uint64_t> dims);
+
+  const XdmfDocument& document_;
+  const std::filesystem::path folder_;
+  const std::shared_ptr<OpenFiles> pool_ = std::make_shared<OpenFiles>();
+  const std::shared_ptr<XdmfHdf5Sets> hdf5_sets_ = std::make_shared<XdmfHdf5Sets>();
+  std::map<pugi::xml_node, std::shared_ptr<const XdmfValues>> items_;
+  std::vector<std::string> files_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,17 @@
+#include "tools/commands/written_precision.h"
+
+#include <fmt/format.h>
+
+#include "stream/cache/stored_precision.h"
+
+namespace curvisplat {
+
+void printStoredPrecision(const CacheReader& cache) {
+  const auto& variables = cache.manifest().variables;
+  for (size_t n = 0; n < variables.size(); ++n)
+    fmt::print("{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}\n", variables[n].name, variables[n].min,
+               variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
+               storedWithin(cache, n));
+}
+
+}  // namespace curvisplat

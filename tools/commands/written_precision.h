@@ -1,0 +1,11 @@
+// What `convert` prints of the precision of the values that it has written.
+#pragma once
+
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+
+/// One line for each scalar, of the reader's step: "p: 0.1 .. 2.5 Pa, rounded within 1.8e-05".
+void printStoredPrecision(const CacheReader& cache);
+
+}  // namespace curvisplat
