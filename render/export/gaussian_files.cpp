@@ -84,7 +84,8 @@ std::vector<std::byte> spzBytes(std::span<const GaussianSplat> splats) {
       for (int byte = 0; byte < 3; ++byte) out.push_back(static_cast<std::byte>(fixed >> (8 * byte) & 0xff));
     }
   }
-  for (const GaussianSplat& splat : splats) append(out, byteOf(255 * splat.opacity));
+  // Rounded down, as viewers round those of other files: they draw footprints wider than they are (README.md).
+  for (const GaussianSplat& splat : splats) append(out, byteOf(std::floor(255 * splat.opacity)));
   for (const GaussianSplat& splat : splats) {
     const glm::vec3 coefficient = coefficientOf(splat.colour);
     for (int c = 0; c < 3; ++c) append(out, byteOf((coefficient[c] * 0.15f + 0.5f) * 255));

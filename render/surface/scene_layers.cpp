@@ -257,7 +257,7 @@ class PixelSlices {
  public:
   PixelSlices(const SurfaceScene& scene, const ScreenView& view,
               std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look)
-      : scene_(scene), view_(view), slices_(slices), look_(look), light_(look.light, view) {}
+      : scene_(scene), view_(view), slices_(slices), look_(look) {}
 
   bool empty() const { return slices_.empty(); }
 
@@ -269,10 +269,7 @@ class PixelSlices {
       const double pixel = pixelSide(view_, view_.viewFromData(sample->at).z);
       const float alpha = sample->coverage * coverageAt(look_.clip_planes, sample->at, pixel) *
                           static_cast<float>(scene_.slice_opacity) * opacityOf(n, *sample, x, y);
-      glm::vec3 colour = look_.colours.at(sample->scalar);
-      if (look_.light)
-        colour = light_.lit(colour, glm::vec3(slice->plane().normal),
-                            towardsViewer(view_, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+      const glm::vec3 colour = look_.colours.at(sample->scalar);  // unlit: to be compared with the scalar bar
       layers.push_back({sample->depth, glm::vec4(alpha * colour, alpha), static_cast<float>(sample->scalar)});
     }
   }
@@ -290,7 +287,6 @@ class PixelSlices {
   const ScreenView& view_;
   const std::span<const std::unique_ptr<SliceSampler>> slices_;
   const SceneLook& look_;
-  const SurfaceLight light_;
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace curvisplat {
 
 struct SceneLook {
   const ColourTable& colours;              // of scalars
-  std::optional<Light> light;              // none: surfaces have a light at the viewer, slices none
+  std::optional<Light> light;              // of surfaces; none: a light at the viewer
   std::span<const ClipPlane> clip_planes;  // of slices
   double depth_origin = 0;
   // Of slices and surfaces whose opacities are the picture's function's: it, and where it is of another scalar, that one's

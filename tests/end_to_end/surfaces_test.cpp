@@ -163,6 +163,17 @@ TEST_F(SurfaceOptions, VolumeOffLeavesSurfacesAndSlices) {
   EXPECT_GT(statistics()["bytes_read"], 0);
 }
 
+TEST_F(SurfaceOptions, SlicesKeepTheColoursOfTheScalarBarInLight) {
+  const std::vector<std::string> slice{"--volume", "off", "--slice", "4,0,0,0,0,1", "--view", "+z"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.end(), slice.begin(), slice.end());
+    return picture(more);
+  };
+  const Image unlit = with({});
+  EXPECT_EQ(with({"--shade"}).rgba, unlit.rgba);
+  EXPECT_EQ(with({"--shade", "--light-direction", "1,1,1"}).rgba, unlit.rgba);
+}
+
 /// A surface that fills the picture with one colour is what was asked for: no option of the volume changes it.
 TEST_F(SurfaceOptions, WarningsOfSurfacesAloneDoNotMentionTheVolume) {
   const ProgramResult wall = render({"--view", "+z", "--surface", file("wall.obj")});

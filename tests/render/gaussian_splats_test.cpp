@@ -1,6 +1,7 @@
 #include "render/export/gaussian_splats.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cmath>
 #include <cstring>
@@ -117,6 +118,46 @@ TEST(GaussianFiles, OfPlyHaveTheirNumbersInTheirPlaces) {
   const std::array<float, 17> expected{
       1, 2, 3, 0, 0, 0, 0, 1.7724539f, -1.7724539f, 0, std::log(0.5f), 0, std::log(2.0f), 1, 0, 0, 0};
   for (size_t n = 0; n < 17; ++n) EXPECT_NEAR(numbers[n], expected[n], 1e-6) << n;
+}
+
+TEST(GaussianFiles, OfSpzHaveEachQuantityOfAllSplatsInBytes) {
+  const TemporaryFolder folder;
+  std::vector<GaussianSplat> splats(2);
+  splats[0].position = {1, 2, 3};
+  splats[1].position = {5, 2, 3};
+  for (GaussianSplat& splat : splats) {
+    splat.deviation = {0.004f, 0.04f, 0.4f};
+    splat.rotation = {0.5f, 0.5f, -0.5f, 0.5f};
+    splat.colour = {0.5f, 1, 0};
+  }
+  splats[0].opacity = 4.9f / 255;
+  splats[1].opacity = 0.5f;
+  writeGaussians(splats, folder / "two.spz");
+  std::vector<uint8_t> bytes(1000);
+  gzFile file = gzopen((folder / "two.spz").c_str(), "rb");
+  bytes.resize(static_cast<size_t>(gzread(file, bytes.data(), static_cast<unsigned>(bytes.size()))));
+  gzclose(file);
+  ASSERT_EQ(bytes.size(), 16u + 2 * 19);
+  const std::vector<uint8_t> header(bytes.begin(), bytes.begin() + 16);
+  EXPECT_EQ(header, (std::vector<uint8_t>{0x4e, 0x47, 0x53, 0x50, 2, 0, 0, 0, 2, 0, 0, 0, 0, 12, 0, 0}));
+  // 1,000 units wide: 250 units of the file to one of the data. x is -500 and 500, to 1/4096.
+  const auto fixed = [&](size_t at) {
+    const int bits = bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16;
+    return (bits < 1 << 23 ? bits : bits - (1 << 24)) / 4096.0;
+  };
+  EXPECT_EQ(fixed(16), -500);
+  EXPECT_EQ(fixed(16 + 9), 500);
+  EXPECT_EQ(fixed(16 + 3), 0);
+  EXPECT_EQ(bytes[34], 4) << "rounded down, as viewers round the opacities of other files";
+  EXPECT_EQ(bytes[35], 127);
+  const double span = 0.5 / 0.28209479177387814 * 0.15;
+  EXPECT_EQ(bytes[36], 128);
+  EXPECT_EQ(bytes[37], std::lround((0.5 + span) * 255));
+  EXPECT_EQ(bytes[38], std::lround((0.5 - span) * 255));
+  for (size_t axis = 0; axis < 3; ++axis)
+    EXPECT_EQ(bytes[42 + axis], std::lround((std::log(std::pow(10.0, static_cast<double>(axis))) + 10) * 16));
+  EXPECT_EQ(bytes[48], std::lround(0.5 * 127.5 + 127.5));
+  EXPECT_EQ(bytes[49], std::lround(-0.5 * 127.5 + 127.5));
 }
 
 /// The attribute of a .glb, as floats.
