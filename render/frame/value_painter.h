@@ -1,5 +1,5 @@
 // Finds, for each pixel, the depth at which it has half of its opacity, and the values at that depth. Draws on the
-// processor, front to back, splat by splat: some ten times as slow as CpuPainter, except for what lies behind that depth.
+// processor, front to back, splat by splat, in vectors (render/cpu/half_depths.h); not what lies behind that depth.
 //
 // The splats have to have ScreenDepths, all of them: their picture has layers (everywhere()) that lie before everything.
 // The real layers, if there are any, take their part of the opacity where their depth is reached.
