@@ -105,7 +105,7 @@ TEST_F(WindowPlayback, OpensAtAStep) {
   expectDraws(commands[0], picture);
 }
 
-/// A grid that moves: a shown face of it moves too.
+/// A grid that moves: a shown face of it moves too, and the outline.
 TEST_F(WindowPlayback, FacesMoveWithTheGrid) {
   constexpr int kNodes[3] = {16, 12, 8};
   for (int step = 0; step < 3; ++step) {
@@ -137,6 +137,7 @@ TEST_F(WindowPlayback, FacesMoveWithTheGrid) {
   EXPECT_LT(difference(first, second), 30);
   EXPECT_GT(difference(first, again), 60);
   expectDraws(commands[0], first);
+  expectDraws(commands[1], second);  // with the outline of that step's data
 }
 
 }  // namespace
