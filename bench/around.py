@@ -5,8 +5,8 @@
 
 Grids and caches are made in FOLDER and reused. Variants of one picture take turns, round after round, as orbits of --frames
 frames; a ratio is the median over the rounds of a variant's processor time a frame over the plain picture's in the same
-round. What the process takes to start is measured by an orbit of one frame and left out. Frames of surfaces are wall time,
-without the first.
+round. What the process takes to start is measured by an orbit of one frame and left out. What the body hides is counted in
+one picture of a fresh process. Behind each ratio: what it may be at most.
 """
 import argparse
 import json
@@ -37,6 +37,18 @@ def processor_seconds(command):
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def processor_seconds_of_frame(command, frames):
+    return (processor_seconds([*command, "--frames", str(frames + 1)]) - processor_seconds([*command, "--frames", "1"])) / frames
+
+
+def counts(program, cache, folder, options):
+    """Of one picture, in a process of its own."""
+    stats = folder / "stats.json"
+    command = [program, "render", cache, "-o", folder / "c_%02d.pfm", *options, "--frames", "1", "--stats", stats]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return json.loads(stats.read_text())["frames"][0]
 
 
 def main():
@@ -73,30 +85,35 @@ def main():
     variants = {"plain": [], "lit": ["--shade"], "six clip planes": [f"--clip-plane={plane}" for plane in planes],
                 "opaque body": ["--surface", body],
                 "two scalars": ["--scalar", names[1], "--opacity-by", names[0], "--opacity-range", "0,1"],
-                "depth (.exr)": []}
+                "no depth (.exr)": ["--channels", "none"], "depth (.exr)": []}
+    most = {"lit": 1.1, "six clip planes": 1.3, "opaque body": 1}
     ratios = {name: [] for name in variants}
     for _ in range(arguments.rounds):
         times = {}
         for name, options in variants.items():
             output = folder / ("a_%02d.exr" if name.endswith("(.exr)") else "a_%02d.pfm")
             command = [program, "render", wake, "-o", output, *picture, *options]
-            times[name] = (processor_seconds([*command, "--frames", str(arguments.frames + 1)]) -
-                           processor_seconds([*command, "--frames", "1"])) / arguments.frames
+            times[name] = processor_seconds_of_frame(command, arguments.frames)
         for name in variants:
             # A frame of --smoke takes less than the clock's tick.
             ratios[name].append(times[name] / times["plain"] if times["plain"] > 0 else math.nan)
     for name in variants:
+        allowed = f", at most {most[name]}" if name in most else ""
         print(f"{name:16} {statistics.median(ratios[name]):.2f} of the plain picture "
-              f"({min(ratios[name]):.2f} to {max(ratios[name]):.2f})")
-    stats = folder / "stats.json"
+              f"({min(ratios[name]):.2f} to {max(ratios[name]):.2f}{allowed})")
+    counted = {name: counts(program, wake, folder, [*picture, *variants[name]]) for name in ("plain", "opaque body")}
+    for count in ("bytes_read", "splats_drawn"):
+        plain, behind = (counted[name][count] for name in ("plain", "opaque body"))
+        print(f"{'opaque body':16} {count.replace('_', ' ')}: {behind} of {plain}")
     command = [program, "render", plate, "-o", folder / "b_%02d.pfm", "--size", pixels, "--surface", "kmax", "--volume", "off",
-               "--lod-pixels", "0", "--orbit", "40", "--frames", str(arguments.frames + 1), "--stats", stats]
-    seconds = []
-    processor = processor_seconds(command)
-    seconds = [frame["seconds"]["total"] for frame in json.loads(stats.read_text())["frames"]][1:]
-    quads = (int(quads.split("x")[0]) - 1) ** 2
-    print(f"{f'{quads} quads':16} {1000 * statistics.median(seconds):.0f} ms a frame ({1000 * min(seconds):.0f} to "
-          f"{1000 * max(seconds):.0f}), {1000 * processor / len(seconds):.0f} ms of processor time with the start")
+               "--orbit", "40"]
+    sides = (int(quads.split("x")[0]) - 1) ** 2
+    for what, options in (("", []), (", by a scalar", ["--surface-by", "f"]), (", finest", ["--lod-pixels", "0"]),
+                          (", finest, by a scalar", ["--lod-pixels", "0", "--surface-by", "f"])):
+        times = [1000 * processor_seconds_of_frame([*command, *options], 4 * arguments.frames)
+                 for _ in range(arguments.rounds)]
+        print(f"{sides} quads{what}: {statistics.median(times):.0f} ms of processor time a frame ({min(times):.0f} to "
+              f"{max(times):.0f}; at most 100, which two cores do in 50)")
 
 
 if __name__ == "__main__":

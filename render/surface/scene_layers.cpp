@@ -21,7 +21,7 @@ namespace {
 // Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and by no
 // more than this many pixels.
 constexpr double kSteepest = 4, kNear = 0.25;
-constexpr size_t kMaxShaded = 3;  // triangles of a pixel and layer
+constexpr size_t kMaxShaded = 3;  // of a pixel and layer: triangles that do not meet
 constexpr float kSmooth = 0.97f;  // of the cosine between normals: what is in a pixel is lit once
 
 /// Colours of the surfaces' triangles at the pixels.
@@ -69,6 +69,19 @@ class Shader {
   }
   glm::vec3 lit(const Point& point, float x, float y) const {
     return light_.lit(point.colour, point.normal, towardsViewer(triangles_.view(), x, y));
+  }
+
+  /// Whether two triangles share a vertex. There a surface is smooth, since vertices are doubled at edges, and each of
+  /// them tells what it looks like on the other.
+  bool meet(uint32_t a, uint32_t b) const {
+    const auto [surface, triangle] = triangles_.placeOf(a);
+    const auto [other_surface, other_triangle] = triangles_.placeOf(b);
+    if (surface != other_surface) return false;
+    const TriangleMesh& mesh = *triangles_.scene().surfaces[surface].mesh;
+    const auto &x = mesh.triangles[triangle], &y = mesh.triangles[other_triangle];
+    bool any = false;
+    for (size_t n = 0; n < 3; ++n) any |= (x[n] == y[0]) | (x[n] == y[1]) | (x[n] == y[2]);
+    return any;
   }
 
   /// How much the depth changes over a pixel, at most.
@@ -189,8 +202,9 @@ class PixelSurfaces {
     const float part_of =
         static_cast<float>(seen.size()) / static_cast<float>(opaque == seen.size() ? left : kSamples);
     left -= opaque;
+    // Samples whose triangles meet the first one's: this one is shaded in the middle of them all.
     struct Part {
-      uint32_t number;
+      uint32_t number, last;  // the first triangle, and the last that was taken
       float x, y, count;
     };
     std::array<Part, kMaxShaded> parts;
@@ -199,9 +213,14 @@ class PixelSurfaces {
     for (const Seen& sample : seen) {
       value += double{sample.value};
       size_t n = 0;
-      while (n < count && parts[n].number != sample.number) ++n;
-      if (n == kMaxShaded) continue;
-      if (n == count) parts[count++] = {sample.number, 0, 0, 0};
+      while (n < count && parts[n].number != sample.number && parts[n].last != sample.number) ++n;
+      if (n == count) {
+        n = 0;
+        while (n < count && !shader_.meet(parts[n].number, sample.number)) ++n;
+        if (n == kMaxShaded) continue;
+        if (n == count) parts[count++] = {sample.number, sample.number, 0, 0, 0};
+        parts[n].last = sample.number;
+      }
       parts[n].x += static_cast<float>(kSampleOffsets[sample.place][0]);
       parts[n].y += static_cast<float>(kSampleOffsets[sample.place][1]);
       ++parts[n].count;

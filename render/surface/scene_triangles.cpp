@@ -74,7 +74,7 @@ float SceneTriangles::depthOf(float value, float x, float y) const {
   return static_cast<float>(-1 / static_cast<double>(value) * std::sqrt(1 + across * across + down * down));
 }
 
-SceneTriangles::Place SceneTriangles::placeOf(uint32_t number) const {
+SceneTriangles::Place SceneTriangles::placeOfSeveral(uint32_t number) const {
   const auto after = std::upper_bound(begins_.begin(), begins_.end(), number);
   const auto surface = static_cast<size_t>(after - begins_.begin()) - 1;
   return {surface, number - begins_[surface]};

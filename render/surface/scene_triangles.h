@@ -38,7 +38,9 @@ class SceneTriangles {
     size_t surface;
     uint32_t triangle;
   };
-  Place placeOf(uint32_t number) const;
+  Place placeOf(uint32_t number) const {
+    return begins_.size() == 2 ? Place{0, number} : placeOfSeveral(number);
+  }
   uint32_t firstOf(size_t surface) const { return begins_[surface]; }
   const ScreenVertex& vertex(size_t surface, uint32_t vertex) const { return vertices_[surface][vertex]; }
   /// Perspective: the value of a vertex before the near plane is NaN.
@@ -48,6 +50,7 @@ class SceneTriangles {
   float depthOf(float value, float x, float y) const;
 
  private:
+  Place placeOfSeveral(uint32_t number) const;
   glm::dvec3 inView(size_t surface, uint32_t vertex) const;
   ScreenVertex project(const glm::dvec3& in_view) const;
 

@@ -78,13 +78,17 @@ bool between(double a, double b, double c, int& first, int& last) {
 }  // namespace
 
 SliceSampler::SliceSampler(const ScreenView& view, const ClipPlane& plane, double low, double high,
-                           const BorderStyle& borders)
+                           const BorderStyle& borders, const SliceCorrections& corrections)
     : view_(view),
       plane_{plane.point, glm::normalize(plane.normal)},
       low_(low),
       per_range_(high > low ? 1 / (high - low) : 0),
       per_length_(perLengthOf(view, plane.point)),
       borders_(borders),
+      own_(!corrections.slopes           ? 0
+           : corrections.common_gradient ? kOwn
+                                         : 1),
+      common_(corrections.slopes && corrections.common_gradient ? 1 - kOwn : 0),
       sums_(view.size.pixels()) {
   const Hit middle = hitOf(0.5 * view.size.width, 0.5 * view.size.height);
   // In perspective some pixels may see a plane that the middle sees edge-on.
@@ -206,7 +210,7 @@ void SliceSampler::addPiece(const glm::dvec3& cell_min, const SplatPiece& piece)
       }
       addTo(sums->weight, weight);
       addTo(sums->scalar,
-            weight * std::clamp((double{piece.mean} + kOwn * change - low_) * per_range_, -1.0, 2.0));
+            weight * std::clamp((double{piece.mean} + own_ * change - low_) * per_range_, -1.0, 2.0));
       for (int axis = 0; axis < 3; ++axis) {
         const auto n = static_cast<size_t>(axis);
         addTo(sums->moved[n], weight * std::clamp(moved[axis], -kMost, kMost));
@@ -238,7 +242,7 @@ std::optional<SliceSampler::Sample> SliceSampler::at(int x, int y, double depth_
   };
   double scalar = meanOf(sums.scalar);
   for (size_t axis = 0; axis < 3; ++axis)
-    scalar += (1 - kOwn) * meanOf(sums.gradient[axis]) * meanOf(sums.moved[axis]);
+    scalar += common_ * meanOf(sums.gradient[axis]) * meanOf(sums.moved[axis]);
   return Sample{low_ + (per_range_ > 0 ? scalar / per_range_ : 0), static_cast<float>(coverage),
                 static_cast<float>(depth), at};
 }

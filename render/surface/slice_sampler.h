@@ -33,11 +33,17 @@
 
 namespace curvisplat {
 
+/// Each can be left out, to see what it is worth.
+struct SliceCorrections {
+  bool slopes = true;           // else a splat has its mean everywhere
+  bool common_gradient = true;  // else the gradient is each splat's own alone
+};
+
 class SliceSampler {
  public:
   /// `low`, `high`: the scalar's range. `borders`: how cells at borders are drawn.
   SliceSampler(const ScreenView& view, const ClipPlane& plane, double low, double high,
-               const BorderStyle& borders);
+               const BorderStyle& borders, const SliceCorrections& corrections = {});
 
   const ClipPlane& plane() const { return plane_; }
   /// Whether the plane is seen from a side: if not, no pixel has a point of it.
@@ -74,6 +80,7 @@ class SliceSampler {
   const double low_, per_range_;
   const double per_length_;  // about a pixel's side at the slice: the unit of what is moved
   const BorderStyle borders_;
+  const double own_, common_;  // how much of each gradient counts
   bool seen_ = false;
   struct Sums {
     int64_t weight = 0, outside = 0;

@@ -61,6 +61,13 @@ struct GridSurface {
   std::optional<size_t> opacity_scalar = std::nullopt;
   std::string opacity_name = {};  // in the cache
 
+  /// Takes what does not change the mesh: colours and opacities' factors.
+  void takeLookOf(const GridSurface& other) {
+    colour = other.colour;
+    colours = other.colours;
+    function = other.function;
+    opacity = other.opacity;
+  }
   /// Whether the same patches make the same mesh.
   bool hasMeshOf(const GridSurface& other) const {
     return faces == other.faces && parts == other.parts && scalar == other.scalar &&

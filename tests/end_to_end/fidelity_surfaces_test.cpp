@@ -172,18 +172,60 @@ TEST_F(Surfaces, SlicesHaveTheScalarsColours) {
   scene->slices = {kPlane};
   scene->volume = false;
   const struct {
-    double pixels, most_rms;
+    double pixels, least_db;  // of the root of the mean squared difference inside, in the scalar's range
     int margin;
-  } levels[] = {{0, 3.5e-4, 1}, {4, 1.3e-3, 4}, {8, 4.5e-3, 8}};  // by own gradients: 0.02, 0.15 and 0.6 %
+  } levels[] = {{0, 69.1, 1}, {4, 57.7, 4}, {8, 46.9, 8}};
   for (const auto& level : levels) {
     DirectOptions options;
     options.scene = scene;
     options.voxel = voxelOf(level.pixels);
     const SceneGridSource source(annulus_, {128, 64, 64}, 4);
-    const Image picture = drawDirectly(source, 0, options, function, camera_, kSize);
-    const double rms = rmsInside(picture, reference, slice, camera_, level.margin);
-    fmt::print("slice, {} pixels: rms {:.3f} % of the range\n", level.pixels, 100 * rms);
-    EXPECT_LT(rms, level.most_rms) << level.pixels;
+    const auto db = [&] {
+      const Image picture = drawDirectly(source, 0, options, function, camera_, kSize);
+      return -20 * std::log10(rmsInside(picture, reference, slice, camera_, level.margin));
+    };
+    const double all = db();
+    options.slices.common_gradient = false;
+    const double own = db();
+    options.slices.slopes = false;
+    const double means = db();
+    fmt::print("slice, {} pixels: {:.1f} dB, by own gradients {:.1f} dB, by means {:.1f} dB\n", level.pixels,
+               all, own, means);
+    EXPECT_GE(all, level.least_db) << level.pixels;
+    EXPECT_LT(means, level.least_db) << level.pixels;
+    if (level.pixels == 0) continue;
+    EXPECT_LT(own, level.least_db) << level.pixels;
+  }
+}
+
+TEST_F(Surfaces, IsosurfacesAreOfOneField) {
+  constexpr double kValue = 0.5;
+  const KnownFunction function = KnownFunction::of("smooth");
+  const OpticalFunction nothing = [](double) { return OpticalProperties{}; };
+  const auto layer = isoLayer(*annulus_, kValue, function.table.at(kValue).colour);
+  const Image reference = marched({nothing, function.table}, layer, 2);
+  const auto scene = std::make_shared<SurfaceScene>();
+  scene->isovalues = {kValue};
+  scene->volume = false;
+  const SceneGridSource source(annulus_, {128, 64, 64}, 4);
+  const struct { double pixels, least_db; } levels[] = {{0, 39}, {4, 39}, {8, 37}};
+  for (const auto& level : levels) {
+    const auto db = [&](const IsoCorrections& corrections) {
+      DirectOptions options;
+      options.scene = scene;
+      options.voxel = voxelOf(level.pixels);
+      options.isosurfaces = corrections;
+      return compareImages(drawDirectly(source, 0, options, function.table, camera_, kSize), reference)
+          .psnr_db;
+    };
+    const double all = db({}), own = db({.common_field = false}), unended = db({.ended = false}),
+                 rough = db({.smooth = false});
+    fmt::print(
+        "isosurface, {} pixels: {:.1f} dB; by own fields {:.1f}, without ends {:.1f}, with one ray {:.1f} "
+        "dB\n",
+        level.pixels, all, own, unended, rough);
+    EXPECT_GE(all, level.least_db) << level.pixels;
+    for (const double without : {own, unended, rough}) EXPECT_LT(without, level.least_db) << level.pixels;
   }
 }
 

@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <memory>
 
 #include "preprocess/scenes/scenes.h"
@@ -20,40 +18,6 @@ namespace {
 constexpr ImageSize kSize{256, 256};
 constexpr double kValue = 0.5;
 
-glm::dvec3 gradientAt(const Scene& scene, const glm::dvec3& at) {
-  glm::dvec3 gradient;
-  for (int axis = 0; axis < 3; ++axis) {
-    glm::dvec3 step(0.0);
-    step[axis] = 1e-5;
-    gradient[axis] = scene.scalar(at + step) - scene.scalar(at - step);
-  }
-  return gradient;
-}
-
-/// Where the scalar crosses the value, found by bisection.
-std::vector<ReferenceLayer> crossings(const Scene& scene, const glm::dvec3& colour, double opacity,
-                                      const glm::dvec3& origin, const glm::dvec3& direction) {
-  std::vector<ReferenceLayer> found;
-  const auto [lower, upper] = scene.bounds();
-  const double middle = glm::dot(0.5 * (lower + upper) - origin, direction);
-  const double reach = 0.5 * glm::distance(lower, upper);
-  constexpr double kStep = 0.008;
-  const auto at = [&](double t) { return origin + t * direction; };
-  for (double t = middle - reach; t < middle + reach; t += kStep) {
-    const auto value = [&](double x) { return scene.scalar(at(x)) - kValue; };
-    if (!scene.contains(at(t)) || !scene.contains(at(t + kStep)) || (value(t) < 0) == (value(t + kStep) < 0))
-      continue;
-    double low = t, high = t + kStep;
-    for (int n = 0; n < 40; ++n)
-      ((value(0.5 * (low + high)) < 0) == (value(low) < 0) ? low : high) = 0.5 * (low + high);
-    const double facing = std::abs(glm::dot(glm::normalize(gradientAt(scene, at(low))), direction));
-    const glm::dvec3 lit =
-        glm::min((0.3 + 0.7 * facing) * colour + glm::dvec3(0.25 * std::pow(facing, 32)), glm::dvec3(1.0));
-    found.push_back({low, lit, opacity});
-  }
-  return found;
-}
-
 class Isosurfaces : public testing::Test {
  protected:
   Isosurfaces() { convertGrid(SceneGridSource(annulus_, {128, 64, 64}), folder_ / "a.splats"); }
@@ -65,9 +29,7 @@ class Isosurfaces : public testing::Test {
     steps.step = 0.012;
     const Image fine =
         toImage(referenceMarch(field, exact, halfAnnulusCamera(), {2 * kSize.width, 2 * kSize.height}, steps,
-                               {nullptr, [&](const glm::dvec3& origin, const glm::dvec3& direction) {
-                                  return crossings(*annulus_, colour, opacity, origin, direction);
-                                }}));
+                               {nullptr, isoLayer(*annulus_, kValue, colour, opacity)}));
     Image image(kSize);
     for (int y = 0; y < kSize.height; ++y)
       for (int x = 0; x < kSize.width; ++x)

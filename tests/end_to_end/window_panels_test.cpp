@@ -134,6 +134,33 @@ TEST_F(WindowPanels, OpacitiesOfAnotherScalar) {
   expectDraws(commands[0], two);
 }
 
+/// Faces with the opacity "function": alone, so that nothing else changes.
+TEST_F(WindowPanels, FacesHaveTheOpacitiesOfTheOtherScalar) {
+  open({"--surface", "kmin", "--surface-by", "f", "--surface-opacity", "function", "--volume", "off"});
+  const Image one = saveAndCopy();
+  click("opacity by");
+  click("opacity by volume");
+  const Image two = saveAndCopy();
+  EXPECT_LT(difference(one, two), 40);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  expectDraws(commands[0], one);
+  expectDraws(commands[1], two);
+}
+
+/// Faces that are coloured by f have the picture's colours as long as it shows f, then their own and a bar for them.
+TEST_F(WindowPanels, FacesKeepTheirScalar) {
+  open({"--surface", "kmin", "--surface-by", "f"});
+  const Image of_f = saveAndCopy();
+  chooseScalar("volume");
+  const Image of_volume = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_EQ(valueOf(commands[1], "--scalar"), "volume");
+  expectDraws(commands[0], of_f);
+  expectDraws(commands[1], of_volume);
+}
+
 TEST_F(WindowPanels, UndoAndRedo) {
   open();
   const Image first = save();

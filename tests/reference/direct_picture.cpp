@@ -75,32 +75,59 @@ std::vector<DirectSplat> mergedIntoVoxels(const std::vector<DirectSplat>& splats
   return merged;
 }
 
-/// In the arrays that are projected, from `origin` on.
-void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, SplatGeometry& geometry,
-              SplatVariable& variable) {
-  geometry.resize(splats.size());
-  variable.resize(splats.size());
+/// Splats in the arrays that are projected.
+struct ProjectedArrays {
+  glm::dvec3 origin;
+  SplatGeometry geometry;
+  SplatVariable variable;
+};
+
+ProjectedArrays projectedArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin) {
+  ProjectedArrays arrays{origin, {}, {}};
+  arrays.geometry.resize(splats.size());
+  arrays.variable.resize(splats.size());
   for (size_t n = 0; n < splats.size(); ++n)
-    setSplat({geometry, variable}, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
-             splats[n].codes);
+    setSplat({arrays.geometry, arrays.variable}, n, splats[n].splat.position - origin, splats[n].splat,
+             splats[n].value, splats[n].codes);
+  return arrays;
 }
 
-/// The layers of the scene, its slices through these splats.
-PixelLayers sceneLayers(const SurfaceScene& scene, const ProjectionSettings& settings,
-                        const TransferFunction& function, const glm::dvec3& origin,
-                        const SplatGeometry& geometry, const SplatVariable& variable) {
-  const auto [low, high] = std::minmax_element(variable.mean.begin(), variable.mean.end());
+/// The layers of the scene, its slices and isosurfaces those of these splats.
+PixelLayers sceneLayers(const DirectOptions& options, const ProjectionSettings& settings,
+                        const TransferFunction& function, const ProjectedArrays& splats) {
+  constexpr uint64_t kEnough = uint64_t{1} << 32;
+  const SurfaceScene& scene = *options.scene;
+  const std::vector<float>& means = splats.variable.mean;
+  const auto [low, high] = std::minmax_element(means.begin(), means.end());
   std::vector<std::unique_ptr<SliceSampler>> slices;
-  const SplatRange all{0, static_cast<uint32_t>(geometry.size())};
+  const SplatRange all{0, static_cast<uint32_t>(splats.geometry.size())};
   for (const ClipPlane& plane : scene.slices) {
-    slices.push_back(std::make_unique<SliceSampler>(settings.view, plane, *low, *high, settings.borders));
-    slices.back()->add(origin, arraysOf(geometry), arraysOf(variable), {&all, 1});
+    slices.push_back(
+        std::make_unique<SliceSampler>(settings.view, plane, *low, *high, settings.borders, options.slices));
+    slices.back()->add(splats.origin, arraysOf(splats.geometry), arraysOf(splats.variable), {&all, 1});
   }
   const double depth_origin =
-      settings.view.projection == Projection::kPerspective ? 0 : settings.view.viewFromData(origin).z;
+      settings.view.projection == Projection::kPerspective ? 0 : settings.view.viewFromData(splats.origin).z;
   const ColourTable colours(function);
-  return layersOf(scene, settings.view, slices,
-                  {colours, settings.light, settings.clip_planes, depth_origin, &colours});
+  std::optional<IsoLayers> isosurfaces;
+  if (!scene.isovalues.empty()) {
+    isosurfaces.emplace(settings.view.size);
+    IsoSplats of_values({settings.view,
+                         scene.isovalues,
+                         settings.borders,
+                         settings.clip_planes,
+                         depth_origin,
+                         {0, isosurfaces->tiles()},
+                         kEnough,
+                         options.isosurfaces},
+                        1);
+    of_values.add(0, splats.origin, arraysOf(splats.geometry), arraysOf(splats.variable), nullptr, {&all, 1});
+    of_values.sort();
+    isosurfaces->draw(of_values, {colours, settings.light, {scene.iso_opacity.factor}}, kEnough);
+  }
+  SceneLook look{colours, settings.light, settings.clip_planes, depth_origin, &colours};
+  look.isosurfaces = isosurfaces ? &*isosurfaces : nullptr;
+  return layersOf(scene, settings.view, slices, look);
 }
 
 /// Whether the layers of its pixel hide a splat's centre; depths from the layers' origin.
@@ -134,10 +161,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
     low = std::min(low, value.mean);
     high = std::max(high, value.mean);
   }
-  SplatGeometry geometry;
-  SplatVariable variable;
-  toArrays(splats, origin, geometry, variable);
-
+  const ProjectedArrays arrays = projectedArrays(splats, origin);
   const ClassificationTable table = ClassificationTable::of(function, low, high);
   settings.view = ScreenView::of(camera, size, glm::dvec3(1), options.low_pass_px2, options.near);
   settings.view.slope_low_pass_px2 = options.slope_low_pass_px2;
@@ -146,11 +170,10 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   settings.light = options.light;
   settings.light_g0 = options.light_g0;
   std::optional<PixelLayers> layers;
-  if (options.scene)
-    layers.emplace(sceneLayers(*options.scene, settings, function, origin, geometry, variable));
+  if (options.scene) layers.emplace(sceneLayers(options, settings, function, arrays));
   if (layers && options.cut_splats) settings.layers = &*layers;
   BrickProjector projector;
-  projector.project(settings, table, origin, geometry, variable);
+  projector.project(settings, table, origin, arrays.geometry, arrays.variable);
 
   std::vector<ScreenSplat> sorted;
   sorted.reserve(projector.splats().size());

@@ -16,6 +16,8 @@
 #include "render/project/clip_planes.h"
 #include "render/project/light.h"
 #include "render/project/screen_view.h"
+#include "render/surface/iso_splats.h"
+#include "render/surface/slice_sampler.h"
 #include "render/surface/surface_scene.h"
 
 namespace curvisplat {
@@ -35,6 +37,8 @@ struct DirectOptions {
       true;  // else splats whose centre is outside of a clip plane, or behind a surface, are left
              // out, and no others
   std::shared_ptr<const SurfaceScene> scene;
+  SliceCorrections slices;
+  IsoCorrections isosurfaces;
 
   std::optional<Light> light;
   double light_g0 = 1;

@@ -353,6 +353,34 @@ ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& f
   };
 }
 
+ReferenceLayers isoLayer(const Scene& scene, double value, const glm::dvec3& colour, double opacity) {
+  return [=, &scene](const glm::dvec3& origin, const glm::dvec3& direction) {
+    std::vector<ReferenceLayer> found;
+    const auto [lower, upper] = scene.bounds();
+    const double middle = glm::dot(0.5 * (lower + upper) - origin, direction);
+    const double reach = 0.5 * glm::distance(lower, upper);
+    constexpr double kStep = 0.008;
+    const auto at = [&](double t) { return origin + t * direction; };
+    const auto above = [&](double t) { return scene.scalar(at(t)) - value; };
+    for (double t = middle - reach; t < middle + reach; t += kStep) {
+      if (!scene.contains(at(t)) || !scene.contains(at(t + kStep)) ||
+          (above(t) < 0) == (above(t + kStep) < 0))
+        continue;
+      double low = t, high = t + kStep;
+      for (int n = 0; n < 40; ++n)
+        ((above(0.5 * (low + high)) < 0) == (above(low) < 0) ? low : high) = 0.5 * (low + high);
+      glm::dvec3 gradient;
+      for (int axis = 0; axis < 3; ++axis) {
+        glm::dvec3 step(0.0);
+        step[axis] = 1e-5;
+        gradient[axis] = scene.scalar(at(low) + step) - scene.scalar(at(low) - step);
+      }
+      found.push_back({low, litAtViewer(colour, glm::normalize(gradient), direction), opacity});
+    }
+    return found;
+  };
+}
+
 OpticalProperties smoothFunction(double scalar) {
   return {sectionNineColour(scalar), 8 * scalar * scalar};
 }

@@ -78,6 +78,8 @@ ReferenceLayers sphereLayer(const glm::dvec3& centre, double radius, const glm::
 /// A slice through the field, in the colours of the function.
 ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& function,
                            const glm::dvec3& point, const glm::dvec3& normal, double opacity = 1);
+/// Where the scene's scalar crosses a value, found by bisection; lit as a sphere is.
+ReferenceLayers isoLayer(const Scene& scene, double value, const glm::dvec3& colour, double opacity = 1);
 
 /// What a picture has besides the field: light on it, and layers in it.
 struct ReferenceExtras {

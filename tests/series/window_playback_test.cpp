@@ -170,7 +170,7 @@ TEST_F(WindowPlayback, InterpolatesBetweenSteps) {
   expectDraws(commands[1], step);
 }
 
-/// A grid that moves: a shown face of it moves too.
+/// A grid that moves: a shown face of it moves too, and the outline.
 TEST_F(WindowPlayback, FacesMoveWithTheGrid) {
   constexpr int kNodes[3] = {16, 12, 8};
   for (int step = 0; step < 3; ++step) {
@@ -202,6 +202,7 @@ TEST_F(WindowPlayback, FacesMoveWithTheGrid) {
   EXPECT_LT(difference(first, second), 30);
   EXPECT_GT(difference(first, again), 60);
   expectDraws(commands[0], first);
+  expectDraws(commands[1], second);  // with the outline of that step's data
 }
 
 }  // namespace

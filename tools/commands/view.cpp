@@ -42,7 +42,7 @@ struct ViewArguments {
 
 /// The surfaces and slices of the command line.
 void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerOptions& options) {
-  // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
+  // The scalar changes in the window: faces that are coloured by another one have colours of their own.
   options.scene = sceneOf(arguments.surfaces, cache, {});
   for (const std::string& surface : arguments.surfaces.surfaces)
     if (isSurfaceFile(surface))
@@ -50,7 +50,7 @@ void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerO
     else
       options.face_names.emplace_back(surface);
   options.faces_by = arguments.surfaces.surface_by;
-  if (cache.series().steps.size() > 1 && hasFaces(arguments.surfaces))
+  if (hasFaces(arguments.surfaces))
     options.faces_at = [surfaces = arguments.surfaces](const CacheReader& at_step,
                                                        const std::vector<GridSurface>& first) {
       return facesAt(surfaces, at_step, first);

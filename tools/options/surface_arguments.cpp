@@ -220,10 +220,10 @@ bool hasFaces(const SurfaceArguments& arguments) {
 std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheReader& cache,
                                  const std::vector<GridSurface>& first) {
   const bool moves = cache.series().geometries() > 1;
-  const bool has_opacities = std::any_of(first.begin(), first.end(), [](const GridSurface& surface) {
-    return surface.opacity_scalar.has_value();
-  });
-  if (first.empty() || (!moves && arguments.surface_by.empty() && !has_opacities)) return first;
+  const bool has_values = !arguments.surface_by.empty() && cache.series().steps.size() > 1;
+  const bool has_opacities = std::any_of(
+      first.begin(), first.end(), [](const GridSurface& surface) { return !surface.opacity_name.empty(); });
+  if (first.empty() || (!moves && !has_values && !has_opacities)) return first;
   std::vector<GridSurface> surfaces = first;
   const auto faces = facesWith(arguments.surface_by, cache);
   size_t of_grid = 0;
@@ -233,7 +233,7 @@ std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheR
     surface.faces = faces;
     surface.parts = gridSurfaceNamed(text, cache, faces).parts;
     if (surface.scalar) surface.scalar = scalarOfFaces(*faces, arguments.surface_by, cache);
-    if (surface.opacity_scalar) takeOpacities(surface, surface.opacity_name, cache);
+    if (!surface.opacity_name.empty()) takeOpacities(surface, surface.opacity_name, cache);
   }
   return surfaces;
 }

@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Draws what lies around a volume beside VTK's picture of the same data, with the same camera, functions and colours.
+"""Draws what lies around a volume beside VTK's picture of the same data, with the same camera, functions, colours and light.
 
-    xvfb-run tools/pictures/around_pairs.py DATA FOLDER [--program curvisplat]
+    xvfb-run tools/pictures/around_pairs.py DATA FOLDER [--program curvisplat] [--only NAME]
 
-DATA is a folder like shared/data. Writes FOLDER/around_NAME.png: ours at the left, VTK's at the right. Scenes: the delta
-wing with its vortex, the blunt fin with fin and plate, a duct with a slice, a globe with a cut. VTK draws volumes from a
-resampled image (128^3 points), surfaces and slices from the grid itself, smooth, with eight samples a pixel. Needs Debian's
-python3-vtk9 and xvfb.
+DATA is a folder like shared/data. Writes FOLDER/around_NAME.png: ours at the left, VTK's at the right, and each alone as
+NAME_ours.png and NAME_vtk.png. Scenes: the delta wing with its vortex, the blunt fin with fin and plate, a duct with a slice, a
+globe with a cut. VTK draws the best that a patient user gets of it: no resampled volume, but the grid's own cells, cut into
+tetrahedra (vtkProjectedTetrahedraMapper) and clipped as such, with the same extinction per length; surfaces and slices from the
+grid itself, blocks joined, smooth, with our light; all of it at twice the size and averaged. Needs Debian's python3-vtk9, and xvfb.
 """
 import argparse
+import math
 import pathlib
 import struct
 import subprocess
@@ -18,25 +20,29 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-WIDTH, HEIGHT = 420, 300
+import vtk_grids
+
+WIDTH, HEIGHT = 480, 360
+FINER = 2  # VTK's picture, before it is averaged
 GREY = (0.69, 0.69, 0.69)
 VIRIDIS = [(0, 0.267, 0.005, 0.329), (0.125, 0.279, 0.175, 0.483), (0.25, 0.230, 0.322, 0.546), (0.375, 0.173, 0.449, 0.558),
            (0.5, 0.128, 0.567, 0.551), (0.625, 0.157, 0.684, 0.502), (0.75, 0.369, 0.789, 0.383), (0.875, 0.678, 0.864, 0.190),
            (1, 0.993, 0.906, 0.144)]
 
-# volume: opacity points over the range, and their unit. faces: (axis, index, range of i), index -1: the last.
+# volume: opacity points over the range, and their unit. faces: (axis, index, range of i); none: the outer surface. Lengths of the
+# globe are in its radii.
 SCENES = {
     "wing": dict(files=["delta_wing/delta_vertex.cgns"], scalar="Density", vtk="Density", range=(0.86, 0.985),
                  volume=([(0, 0.8), (0.5, 0.2), (1, 0)], 0.02), faces=[(2, 0, (0, 23))], surface="kmin:i=0-23", opacity=1,
-                 position=(-0.75, 1.5, 1.25), focal=(0.5, 0.45, 0.0), scale=0.52),
+                 position=(-0.75, 1.5, 1.25), focal=(0.62, 0.22, 0.02), scale=0.42),
     "fin": dict(files=["bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin"], scalar="density", vtk="Density", range=(1.1, 4),
                 volume=([(0, 0), (0.3, 0.1), (1, 0.8)], 0.1), faces=[(1, 0, None), (2, 0, None)], surface="jmin,kmin", opacity=1,
                 position=(-16, 24, 17), focal=(1.2, 2.5, 2), scale=5),
     "duct": dict(files=["cgns/sqnz_s.hdf.cgns"], scalar="Density", vtk="Density", range=(0.16, 0.97), surface="all", opacity=0.25,
                  slice=(0, 0.5, 0, 0, 1, 0), position=(-3, -4, 2.5), focal=(-0.1, 0.5, 0.5), scale=1.1),
     "globe": dict(generate="globe", scalar="f", vtk="Function0", slice=(0, 0, 0, 0, 1, 0), cut=(0, 0, 0, 0, 1, 0), surface="kmin",
-                  opacity=1, faces=[(2, 0, None)], volume=([(0, 0.02), (0.5, 0.05), (1, 0.9)], None), position=(3, 9, 4),
-                  focal=(0, 0, 0), scale=None),
+                  opacity=1, faces=[(2, 0, None)], volume=([(0, 0.02), (0.5, 0.05), (1, 0.9)], 0.05), position=(3, 9, 4),
+                  focal=(0, 0, 0), scale=1.15, of_radius=True),
 }
 
 
@@ -65,55 +71,7 @@ def ours(program, cache, scene, picture):
     for option in ("slice", "cut"):
         if option in scene:
             words += [f"--{'clip-plane' if option == 'cut' else 'slice'}={commas(scene[option])}"]
-    if scene.get("shade"):
-        words += ["--shade"]
     run(program, *words)
-
-
-def grids_of(files):
-    if files[0].suffix == ".cgns":
-        reader = vtk.vtkCGNSReader()
-        reader.SetFileName(str(files[0]))
-        reader.UpdateInformation()
-        reader.EnableAllBases()
-        for n in range(reader.GetNumberOfPointArrays()):
-            reader.SetPointArrayStatus(reader.GetPointArrayName(n), 1)
-        for n in range(reader.GetNumberOfCellArrays()):
-            reader.SetCellArrayStatus(reader.GetCellArrayName(n), 1)
-    else:
-        reader = vtk.vtkMultiBlockPLOT3DReader()
-        reader.AutoDetectFormatOn()
-        reader.SetXYZFileName(str(files[0]))
-        (reader.SetFunctionFileName if files[1].suffix == ".fun" else reader.SetQFileName)(str(files[1]))
-    reader.Update()
-    grids, at = [], reader.GetOutput().NewIterator()
-    at.InitTraversal()
-    while not at.IsDoneWithTraversal():
-        grid = at.GetCurrentDataObject()
-        if grid.GetCellData().GetNumberOfArrays() and not grid.GetPointData().GetNumberOfArrays():
-            to_points = vtk.vtkCellDataToPointData()
-            to_points.SetInputData(grid)
-            to_points.Update()
-            grid = to_points.GetOutput()
-        grids.append(grid)
-        at.GoToNextItem()
-    return grids
-
-
-def lit(mapper, scene, colour=None, opacity=1.0):
-    """Colour none: by the scalar, unlit."""
-    actor = vtk.vtkActor()
-    actor.SetMapper(mapper)
-    mapper.SetScalarVisibility(colour is None)
-    if colour is None:
-        mapper.SetLookupTable(colours(scene))
-        mapper.SelectColorArray(scene["vtk"])
-        mapper.SetScalarModeToUsePointFieldData()
-        actor.GetProperty().LightingOff()
-    else:
-        actor.GetProperty().SetColor(*colour)
-    actor.GetProperty().SetOpacity(opacity)
-    return actor
 
 
 def colours(scene):
@@ -124,92 +82,125 @@ def colours(scene):
     return function
 
 
-def faces_of(grid, scene):
-    """Extracts of index planes; of `all`, the outer surface."""
-    last = np.array(grid.GetExtent()).reshape(3, 2)
-    if "faces" not in scene:
-        geometry = vtk.vtkGeometryFilter()
-        geometry.SetInputData(grid)
-        return [geometry]
-    extracts = []
-    for axis, index, along_i in scene["faces"]:
-        extent = last.copy()
-        extent[axis] = last[axis][0] + index
-        if along_i:
-            extent[0] = along_i
-        extract, geometry = vtk.vtkExtractGrid(), vtk.vtkGeometryFilter()
-        extract.SetInputData(grid)
-        extract.SetVOI(*extent.flatten().tolist())
-        geometry.SetInputConnection(extract.GetOutputPort())
-        extracts.append(geometry)
-    return extracts
+def actor_of(port, scene, colour=None, opacity=1.0):
+    """Colour none: by the scalar, unlit. Light as ours."""
+    actor, mapper = vtk.vtkActor(), vtk.vtkPolyDataMapper()
+    mapper.SetInputConnection(port)
+    actor.SetMapper(mapper)
+    mapper.SetScalarVisibility(colour is None)
+    look = actor.GetProperty()
+    if colour is None:
+        mapper.SetLookupTable(colours(scene))
+        mapper.SelectColorArray(scene["vtk"])
+        mapper.SetScalarModeToUsePointFieldData()
+        mapper.InterpolateScalarsBeforeMappingOn()
+        look.LightingOff()
+    else:
+        look.SetColor(*colour)
+        look.SetInterpolationToPhong()
+        look.SetAmbient(0.3)
+        look.SetDiffuse(0.7)
+        look.SetSpecular(0.25)
+        look.SetSpecularPower(32)
+    look.SetOpacity(opacity)
+    return actor
 
 
-def volume_of(grids, scene):
+def joined(grids, scene):
+    """The blocks as one grid of cells, whose points are shared where blocks meet."""
     append = vtk.vtkAppendFilter()
+    append.MergePointsOn()
     for grid in grids:
         append.AddInputData(grid)
     append.Update()
-    sampler = vtk.vtkResampleToImage()
-    sampler.SetInputDataObject(append.GetOutput())
-    sampler.SetSamplingDimensions(128, 128, 128)
-    sampler.Update()
-    image = sampler.GetOutput()
-    image.GetPointData().SetActiveScalars(scene["vtk"])
+    append.GetOutput().GetPointData().SetActiveScalars(scene["vtk"])
+    return append.GetOutput()
+
+
+def faces_of(grids, scene):
+    """Ports with the outer surface, or with index planes."""
+    if "faces" not in scene:
+        outside = vtk.vtkDataSetSurfaceFilter()
+        outside.SetInputData(joined(grids, scene))
+        return [outside]
+    faces = []
+    for grid in grids:
+        last = np.array(grid.GetExtent()).reshape(3, 2)
+        for axis, index, along_i in scene["faces"]:
+            extent = last.copy()
+            extent[axis] = last[axis][0] + index
+            if along_i:
+                extent[0] = along_i
+            extract, geometry = vtk.vtkExtractGrid(), vtk.vtkGeometryFilter()
+            extract.SetInputData(grid)
+            extract.SetVOI(*extent.flatten().tolist())
+            geometry.SetInputConnection(extract.GetOutputPort())
+            faces.append(geometry)
+    return faces
+
+
+def volume_of(grids, scene):
+    """Tetrahedra of what the cut leaves. The mapper takes what it calls opacity for the extinction over the unit, in bytes."""
+    cells = joined(grids, scene)
+    if "cut" in scene:
+        clip = vtk.vtkTableBasedClipDataSet()
+        clip.SetInputData(cells)
+        clip.SetClipFunction(plane_of(scene["cut"]))
+        clip.Update()
+        cells = clip.GetOutput()
+    cutter = vtk.vtkDataSetTriangleFilter()
+    cutter.TetrahedraOnlyOn()
+    cutter.SetInputData(cells)
+    cutter.Update()
+    tetrahedra = cutter.GetOutput()
+    tetrahedra.GetPointData().SetActiveScalars(scene["vtk"])
     low, high = scene["range"]
     points, unit = scene["volume"]
+    extinctions = [(low + x * (high - low), -math.log1p(-a)) for x, a in points]
+    largest = max(extinction for _, extinction in extinctions)
     opacity = vtk.vtkPiecewiseFunction()
-    for x, a in points:
-        opacity.AddPoint(low + x * (high - low), a)
-    mapper, volume = vtk.vtkSmartVolumeMapper(), vtk.vtkVolume()
-    mapper.SetInputData(image)
-    if "cut" in scene:
-        plane = vtk.vtkPlane()
-        plane.SetOrigin(scene["cut"][:3])
-        plane.SetNormal(scene["cut"][3:])
-        mapper.AddClippingPlane(plane)
+    for x, extinction in extinctions:
+        opacity.AddPoint(x, extinction / largest)
+    mapper, volume = vtk.vtkProjectedTetrahedraMapper(), vtk.vtkVolume()
+    mapper.SetInputData(tetrahedra)
     volume.SetMapper(mapper)
     volume.GetProperty().SetScalarOpacity(opacity)
     volume.GetProperty().SetColor(colours(scene))
     volume.GetProperty().SetInterpolationTypeToLinear()
-    volume.GetProperty().SetScalarOpacityUnitDistance(unit)
-    if scene.get("shade"):
-        volume.GetProperty().ShadeOn()
-        volume.GetProperty().SetAmbient(0.3)
-        volume.GetProperty().SetSpecular(0.25)
-        volume.GetProperty().SetSpecularPower(32)
+    volume.GetProperty().SetScalarOpacityUnitDistance(unit / largest)
     return volume
+
+
+def plane_of(numbers):
+    plane = vtk.vtkPlane()
+    plane.SetOrigin(numbers[:3])
+    plane.SetNormal(numbers[3:])
+    return plane
 
 
 def by_vtk(grids, scene, picture):
     renderer, window = vtk.vtkRenderer(), vtk.vtkRenderWindow()
     renderer.SetBackground(1, 1, 1)
     if "surface" in scene:
-        for grid in grids:
-            for face in faces_of(grid, scene):
-                normals, mapper = vtk.vtkPolyDataNormals(), vtk.vtkPolyDataMapper()
-                normals.SetInputConnection(face.GetOutputPort())
-                mapper.SetInputConnection(normals.GetOutputPort())
-                renderer.AddActor(lit(mapper, scene, GREY, scene["opacity"]))
+        for face in faces_of(grids, scene):
+            normals = vtk.vtkPolyDataNormals()
+            normals.SetInputConnection(face.GetOutputPort())
+            renderer.AddActor(actor_of(normals.GetOutputPort(), scene, GREY, scene["opacity"]))
     if "slice" in scene:
-        for grid in grids:
-            plane, cutter, mapper = vtk.vtkPlane(), vtk.vtkCutter(), vtk.vtkPolyDataMapper()
-            plane.SetOrigin(scene["slice"][:3])
-            plane.SetNormal(scene["slice"][3:])
-            cutter.SetCutFunction(plane)
-            cutter.SetInputData(grid)
-            mapper.SetInputConnection(cutter.GetOutputPort())
-            renderer.AddActor(lit(mapper, scene))
+        cutter = vtk.vtkCutter()
+        cutter.SetCutFunction(plane_of(scene["slice"]))
+        cutter.SetInputData(joined(grids, scene))
+        renderer.AddActor(actor_of(cutter.GetOutputPort(), scene))
     if "volume" in scene:
         renderer.AddVolume(volume_of(grids, scene))
     window.SetOffScreenRendering(1)
-    window.SetMultiSamples(8)
-    window.SetSize(WIDTH, HEIGHT)
+    window.SetMultiSamples(0)
+    window.SetSize(FINER * WIDTH, FINER * HEIGHT)
     if scene.get("opacity", 1) < 1:
         window.SetAlphaBitPlanes(1)
-        window.SetMultiSamples(0)
         renderer.SetUseDepthPeeling(1)
-        renderer.SetMaximumNumberOfPeels(8)
+        renderer.SetMaximumNumberOfPeels(16)
+        renderer.SetOcclusionRatio(0)
     window.AddRenderer(renderer)
     camera = renderer.GetActiveCamera()
     camera.ParallelProjectionOn()
@@ -219,20 +210,19 @@ def by_vtk(grids, scene, picture):
     camera.SetParallelScale(scene["scale"])
     renderer.ResetCameraClippingRange()
     window.Render()
-    grab, writer = vtk.vtkWindowToImageFilter(), vtk.vtkPNGWriter()
-    grab.SetInput(window)
-    writer.SetFileName(str(picture))
-    writer.SetInputConnection(grab.GetOutputPort())
-    writer.Write()
+    vtk_grids.write_picture(window, picture)
 
 
 def pixels_of(path):
+    """Averaged down to the pair's size."""
     reader = vtk.vtkPNGReader()
     reader.SetFileName(str(path))
     reader.Update()
     image = reader.GetOutput()
-    values = vtk_to_numpy(image.GetPointData().GetScalars())
-    return values.reshape(HEIGHT, WIDTH, -1)[::-1, :, :3]
+    width, height, _ = image.GetDimensions()
+    values = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, -1)[::-1, :, :3]
+    values = values.reshape(HEIGHT, height // HEIGHT, WIDTH, width // WIDTH, 3).mean(axis=(1, 3))
+    return np.round(values).astype(np.uint8)
 
 
 def write_png(path, pixels):
@@ -257,31 +247,37 @@ def prepared(name, scene, data, folder, program):
     return files, cache
 
 
+def in_radii(scene, grids):
+    """Lengths and range from the data."""
+    bounds = np.array([grid.GetBounds() for grid in grids])
+    radius = 0.5 * (bounds[:, 1].max() - bounds[:, 0].min())
+    scalars = np.array([grid.GetPointData().GetArray(scene["vtk"]).GetRange() for grid in grids])
+    points, unit = scene["volume"]
+    scene.update(scale=radius * scene["scale"], range=(scalars[:, 0].min(), scalars[:, 1].max()), volume=(points, unit * radius),
+                 position=tuple(radius * x for x in scene["position"]), focal=tuple(radius * x for x in scene["focal"]))
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("data", type=pathlib.Path)
     arguments.add_argument("folder", type=pathlib.Path)
     arguments.add_argument("--program", default="curvisplat")
+    arguments.add_argument("--only", choices=SCENES)
     given = arguments.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
-    for name, scene in SCENES.items():
+    for name in [given.only] if given.only else SCENES:
+        scene = SCENES[name]
         files, cache = prepared(name, scene, given.data, given.folder, given.program)
-        grids = grids_of(files)
-        if scene["scale"] is None:
-            bounds = np.array(grids[0].GetBounds())
-            for grid in grids:
-                other = np.array(grid.GetBounds())
-                bounds[::2], bounds[1::2] = np.minimum(bounds[::2], other[::2]), np.maximum(bounds[1::2], other[1::2])
-            radius = 0.5 * (bounds[1] - bounds[0])
-            scalars = [grid.GetPointData().GetArray(scene["vtk"]).GetRange() for grid in grids]
-            scene.update(scale=1.15 * radius, range=(min(s[0] for s in scalars), max(s[1] for s in scalars)),
-                         volume=(scene["volume"][0], 0.05 * radius),
-                         position=tuple(radius * x for x in scene["position"]))
+        grids = vtk_grids.blocks_of(files)
+        if "of_radius" in scene:
+            in_radii(scene, grids)
         ours(given.program, cache, scene, given.folder / f"{name}_ours.png")
         by_vtk(grids, scene, given.folder / f"{name}_vtk.png")
         left, right = (pixels_of(given.folder / f"{name}_{of}.png") for of in ("ours", "vtk"))
         gap = np.full((HEIGHT, 8, 3), 128, np.uint8)
         write_png(given.folder / f"around_{name}.png", np.concatenate([left, gap, right], axis=1))
+        away = left.astype(float) - right
+        print(f"{name}: {10 * math.log10(255**2 / max(1e-9, (away**2).mean())):.1f} dB between the two")
 
 
 main()

@@ -9,46 +9,15 @@ camera looks along -z. The background is white, as in curvisplat's pictures. SCA
 NAME:mag; mach_number and vorticity_magnitude are computed from density, momentum and energy.
 Needs Debian's python3-vtk9.
 """
-import pathlib
 import sys
 
 import numpy as np
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
+import vtk_grids
+
 SAMPLES = 128
-
-
-def read(files):
-    """A list of structured grids."""
-    ending = pathlib.Path(files[0]).suffix
-    if ending in (".vtk", ".vts"):
-        reader = vtk.vtkStructuredGridReader() if ending == ".vtk" else vtk.vtkXMLStructuredGridReader()
-        reader.SetFileName(files[0])
-        reader.Update()
-        return [reader.GetOutput()]
-    if ending == ".cgns":
-        reader = vtk.vtkCGNSReader()
-        reader.SetFileName(files[0])
-        reader.UpdateInformation()
-        reader.EnableAllBases()
-        for n in range(reader.GetNumberOfPointArrays()):
-            reader.SetPointArrayStatus(reader.GetPointArrayName(n), 1)
-        for n in range(reader.GetNumberOfCellArrays()):
-            reader.SetCellArrayStatus(reader.GetCellArrayName(n), 1)
-    else:
-        reader = vtk.vtkMultiBlockPLOT3DReader()
-        reader.AutoDetectFormatOn()
-        reader.SetXYZFileName(files[0])
-        if len(files) > 1:
-            (reader.SetFunctionFileName if files[1].endswith(".fun") else reader.SetQFileName)(files[1])
-    reader.Update()
-    grids, at = [], reader.GetOutput().NewIterator()
-    at.InitTraversal()
-    while not at.IsDoneWithTraversal():
-        grids.append(at.GetCurrentDataObject())
-        at.GoToNextItem()
-    return grids
 
 
 def array(grid, name):
@@ -112,7 +81,7 @@ def one_grid(grids, name):
 
 def main():
     picture, side, name, files = sys.argv[1], int(sys.argv[2]), sys.argv[3], sys.argv[4:]
-    grids = read(files)
+    grids = vtk_grids.blocks_of(files)
     grid = one_grid(grids, name) if len(grids) > 1 else grids[0]
     if len(grids) == 1:
         scalar = numpy_to_vtk(np.nan_to_num(values_of(grid, name)).astype(np.float32), deep=1)
@@ -149,11 +118,7 @@ def main():
     window.AddRenderer(renderer)
     renderer.ResetCamera()
     window.Render()
-    grab, writer = vtk.vtkWindowToImageFilter(), vtk.vtkPNMWriter()
-    grab.SetInput(window)
-    writer.SetFileName(picture)
-    writer.SetInputConnection(grab.GetOutputPort())
-    writer.Write()
+    vtk_grids.write_picture(window, picture)
 
 
 main()

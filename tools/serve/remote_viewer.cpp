@@ -184,8 +184,7 @@ class RemoteViewer::Work {
   void send(const Asked& asked, const ShownFrame& frame) {
     const Manifest& manifest = caches_.reader(cache_).manifest();
     const ShownFunctions functions(asked.state, manifest);
-    const AnnotatedScene scene = sceneOf(asked.state, manifest, functions, asked.state.camera,
-                                         asked.state.frameOptions(asked.data), asked.picture);
+    const AnnotatedScene scene = sceneOf(asked.state, functions, frame, asked.picture);
     const Image picture = annotated(frame.image, asked.state.annotations, scene);
     PictureHeader header;
     header.picture = ++pictures_;

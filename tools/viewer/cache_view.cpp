@@ -208,8 +208,7 @@ void CacheView::restartFrames() {
 void CacheView::annotate() {
   if (!same(shown_->options.size, data_size_)) return;  // the window or the bars have changed meanwhile
   const ShownFunctions functions(state_, manifest());
-  const AnnotatedScene scene =
-      sceneOf(state_, manifest(), functions, shown_->camera, shown_->options, picture_size_);
+  const AnnotatedScene scene = sceneOf(state_, functions, *shown_, picture_size_);
   overlay_.set(annotationLayer(state_.annotations, scene), picture_size_);
   shown_strip_ = 1 - static_cast<double>(data_size_.width) / picture_size_.width;
 }

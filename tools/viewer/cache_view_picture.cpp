@@ -9,7 +9,6 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
-#include "render/frame/frame_plan.h"
 #include "render/image/image_file.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
@@ -54,7 +53,7 @@ void CacheView::showPicture(const WindowLayout& layout) {
 /// By the picture that is shown.
 std::optional<glm::dvec2> CacheView::placeOf(const glm::dvec3& point, const WindowLayout& layout) const {
   if (!shown_) return std::nullopt;
-  const ScreenView view = screenViewOf(manifest(), shown_->camera, shown_->options, shown_->options.size);
+  const ScreenView& view = shown_->view;
   const glm::dvec3 seen = view.viewFromData(point);
   if (view.projection == Projection::kPerspective && seen.z < view.near) return std::nullopt;
   const glm::dvec2 pixel = view.pixelFromView(seen);
@@ -203,8 +202,7 @@ void CacheView::savePictureIfFinal() {
     file = fmt::format("{}_{:04}.png", cache_.cachePath().stem().string(), number);
   try {
     const ShownFunctions functions(state_, manifest());
-    const AnnotatedScene scene =
-        sceneOf(state_, manifest(), functions, shown_->camera, shown_->options, picture_size_);
+    const AnnotatedScene scene = sceneOf(state_, functions, *shown_, picture_size_);
     writeImage(annotated(shown_->image, state_.annotations, scene), file);
     say("saved " + fs::absolute(file).string() +
         (preview_ ? fmt::format(", of the preview ({})", preview_->what) : "") + lacks());

@@ -68,7 +68,9 @@ struct FrameLoop::Drawing {
 void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& request) {
   const auto& scene = request.options.scene;
   if (!request.faces_at || !scene || scene->grid_surfaces.empty()) return;
-  const auto same_mesh = [](const GridSurface& a, const GridSurface& b) { return a.hasMeshOf(b); };
+  const auto same_mesh = [](const GridSurface& a, const GridSurface& b) {
+    return a.hasMeshOf(b) && a.opacity_name == b.opacity_name;
+  };
   if (faces.step != request.step || !std::ranges::equal(faces.given, scene->grid_surfaces, same_mesh)) {
     faces = {};  // if it throws
     const auto at_step = [&](const CacheReader& its) { return request.faces_at(its, scene->grid_surfaces); };
@@ -83,6 +85,7 @@ void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& reque
   }
   auto moved = std::make_shared<SurfaceScene>(*scene);
   moved->grid_surfaces = faces.there;
+  for (size_t n = 0; n < faces.there.size(); ++n) moved->grid_surfaces[n].takeLookOf(scene->grid_surfaces[n]);
   request.options.scene = std::move(moved);
 }
 
@@ -234,6 +237,8 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
     frame.step = request.step;
     frame.camera = request.camera;
     frame.options = request.options;
+    frame.view = renderer.screenView(request.camera, request.options);
+    frame.data = {cache_.manifest().lower, cache_.manifest().upper};
     frame.image = renderer.renderQuickly(request.camera, request.options,
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
                                          frame.is_final);

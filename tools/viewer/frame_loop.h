@@ -39,8 +39,8 @@
 
 namespace curvisplat {
 
-/// The faces of the grid at the cache's step, in the place of those of another step. Called on the loop's thread; an Error ends
-/// the request only.
+/// The faces of the grid at the cache's step, in the place of those of another step, with the opacities of the scalar
+/// that their opacity_name names. Called on the loop's thread; an Error ends the request only.
 using FacesAtStep =
     std::function<std::vector<GridSurface>(const CacheReader&, const std::vector<GridSurface>&)>;
 
@@ -67,6 +67,8 @@ struct ShownFrame {
   bool is_final = false;  // the same picture as FrameRenderer::render() draws
   Camera camera;          // of the request
   FrameOptions options;
+  ScreenView view;  // with the size of the options
+  WorldBox data;    // where the step's data lie
 };
 
 /// What lies under each pixel of a picture that is shown, for the mouse. Of half as many pixels each way.

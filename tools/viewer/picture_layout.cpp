@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "render/frame/frame_plan.h"
-
 namespace curvisplat {
 namespace {
 
@@ -17,6 +15,9 @@ std::string titleOf(const Manifest& manifest, const std::string& name) {
 
 ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
     : colours_(state.function.function()), title_(titleOf(manifest, state.variable)) {
+  for (const NamedFaces& named : state.faces)
+    if (!of_faces_ && state.faces_by != state.variable) of_faces_ = named.surface.function;
+  if (of_faces_) faces_title_ = titleOf(manifest, state.faces_by);
   if (!state.opacity_by) return;
   opacities_ = state.opacity_by->function.function();
   if (state.volume) opacity_title_ = titleOf(manifest, state.opacity_by->variable) + " (opacity)";
@@ -32,6 +33,7 @@ DrawnScalars ShownFunctions::scalars(const CacheReader& cache, const ViewState& 
 std::vector<ShownFunction> ShownFunctions::bars() const {
   std::vector<ShownFunction> bars{{&colours_, title_}};
   if (opacities_ && !opacity_title_.empty()) bars.push_back({&*opacities_, opacity_title_, true});
+  if (of_faces_) bars.push_back({of_faces_.get(), faces_title_});
   return bars;
 }
 
@@ -40,11 +42,9 @@ ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize
   return dataSize(state.annotations, picture, functions.bars());
 }
 
-AnnotatedScene sceneOf(const ViewState& state, const Manifest& manifest, const ShownFunctions& functions,
-                       const Camera& camera, const FrameOptions& options, ImageSize picture) {
-  return {picture,          screenViewOf(manifest, camera, options, options.size),
-          functions.bars(), manifest.lower,
-          manifest.upper,   state.background()};
+AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
+                       ImageSize picture) {
+  return {picture, frame.view, functions.bars(), frame.data.lower, frame.data.upper, state.background()};
 }
 
 }  // namespace curvisplat

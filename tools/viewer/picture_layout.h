@@ -2,10 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "render/annotate/annotations.h"
 #include "stream/cache/manifest.h"
+#include "tools/viewer/frame_loop.h"
 #include "tools/viewer/view_state.h"
 
 namespace curvisplat {
@@ -22,13 +25,15 @@ class ShownFunctions {
   TransferFunction colours_;
   std::optional<TransferFunction> opacities_;
   std::string title_, opacity_title_;
+  std::shared_ptr<const TransferFunction> of_faces_;  // that have a scalar of their own
+  std::string faces_title_;
 };
 
 /// The part of a picture that shows the data.
 ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize picture);
 
-/// What is annotated in a picture that was drawn with this camera and these options.
-AnnotatedScene sceneOf(const ViewState& state, const Manifest& manifest, const ShownFunctions& functions,
-                       const Camera& camera, const FrameOptions& options, ImageSize picture);
+/// What is annotated in a frame that was drawn for this state.
+AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
+                       ImageSize picture);
 
 }  // namespace curvisplat

@@ -189,7 +189,12 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     for (const SurfaceFile& surface : surfaces)
       if (surface.mesh)
         scene->surfaces.push_back({surface.mesh, surface.colour, false, nullptr, {surface.opacity}});
-    for (const NamedFaces& named : faces) scene->grid_surfaces.push_back(named.surface);
+    for (const NamedFaces& named : faces) {
+      GridSurface& surface = scene->grid_surfaces.emplace_back(named.surface);
+      if (faces_by == variable) surface.colours = nullptr;  // the picture's
+      if (surface.opacity.by_function && opacity_by && opacity_by->variable != variable)
+        surface.opacity_name = opacity_by->variable;
+    }
     scene->slices = slices;
     scene->slice_opacity = slice_opacity.factor;
     scene->slices_by_function = slice_opacity.by_function;
