@@ -15,7 +15,7 @@ using Row = std::vector<glm::dvec3>;
 constexpr std::array<Side, 4> kSides{Side::kFirstI, Side::kLastI, Side::kFirstJ, Side::kLastJ};
 // Nodes of two edges are a step apart if their distance is this many of the face's own steps. At the corners of a
 // cube, steps differ from their neighbours'.
-constexpr double kMinStep = 0.3, kMostSteps = 2;
+constexpr double kMinStep = 0.3, kMaxSteps = 2;
 // Share of an edge's nodes that may lie elsewhere, since land may have no coordinates.
 constexpr double kMayMiss = 0.1;
 
@@ -34,7 +34,7 @@ std::optional<double> apart(const Edge& a, const Edge& b, bool reversed) {
   double sum = 0;
   for (size_t m = 0; m < n; ++m) {
     const double steps = glm::distance(a.row[m], b.row[reversed ? n - 1 - m : m]) / a.steps[m];
-    if (steps > kMinStep && steps < kMostSteps)
+    if (steps > kMinStep && steps < kMaxSteps)
       sum += steps;
     else if (++missed > may_miss)
       return std::nullopt;
