@@ -1,6 +1,5 @@
 #include "preprocess/addition/add_scalar.h"
 
-#include <malloc.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -20,6 +19,7 @@
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scratch_folder.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
@@ -101,7 +101,7 @@ class Addition {
     progress_.begin(name, steps, unit);
     (this->*work)();
     // What a pass has freed goes back to the system: the next one counts on it.
-    malloc_trim(0);
+    returnFreedMemory();
   }
 
   void scan() {

@@ -1,6 +1,5 @@
 #include "preprocess/addition/add_step.h"
 
-#include <malloc.h>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_reduce.h>
@@ -23,6 +22,7 @@
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
@@ -136,7 +136,7 @@ class StepAddition {
     progress_.begin(name, steps, unit);
     work();
     // What a pass has freed goes back to the system: the next one counts on it.
-    malloc_trim(0);
+    returnFreedMemory();
   }
 
   /// Most steps have the geometry of the step before: its checksum is computed while the values are scattered.

@@ -1,7 +1,5 @@
 #include "preprocess/convert/conversion.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -26,6 +24,7 @@
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/paths.h"
 #include "stream/base/trace.h"
 #include "stream/cache/cache_writer.h"
@@ -135,7 +134,7 @@ class Conversion {
       progress_.begin(pass.name, pass.steps / (ranks_ ? ranks_->count() : 1), pass.unit);
       (this->*pass.run)();
       // What a pass has freed goes back to the system: the next one counts on it.
-      malloc_trim(0);
+      returnFreedMemory();
     }
     progress_.end();
   }
