@@ -291,7 +291,7 @@ void CacheView::run(Command command) {
       return dialog_.open(FileDialog::Purpose::kSavePicture, cache_.cachePath().stem().string() + ".png");
     case Command::kSaveTurnMovie:
     case Command::kSaveStepsMovie:
-      movie_kind_ = command == Command::kSaveTurnMovie ? MovieKind::kTurn : MovieKind::kSteps;
+      movie_kind_ = command == Command::kSaveTurnMovie ? MovieKind::kOneTurn : MovieKind::kAllSteps;
       return dialog_.open(FileDialog::Purpose::kSaveMovie, cache_.cachePath().stem().string() + ".mp4");
     case Command::kCopyCommand:
     case Command::kCopyMovieCommand:

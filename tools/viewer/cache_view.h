@@ -161,7 +161,7 @@ class CacheView {
   FurtherScalarList further_;
   bool adds_scalar_ = false;  // one is being added
   std::optional<std::string> wanted_scalar_;
-  MovieKind movie_kind_ = MovieKind::kTurn;  // for which a file is being chosen
+  MovieKind movie_kind_ = MovieKind::kOneTurn;  // for which a file is being chosen
   std::optional<MovieRequest> wanted_movie_;
 
   bool changed_ = true;  // since the newest request

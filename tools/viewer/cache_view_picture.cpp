@@ -222,7 +222,7 @@ std::string CacheView::timeOption() const {
 /// What is shown now, whatever is changed while it is drawn.
 void CacheView::saveMovieTo(const fs::path& file) {
   MovieRequest movie{movie_kind_, file, cache_.atStep(playback_.step()), state_, picture_size_};
-  if (movie_kind_ == MovieKind::kSteps) movie.frames_per_s = playback_.stepsPerSecond();
+  if (movie_kind_ == MovieKind::kAllSteps) movie.frames_per_s = playback_.stepsPerSecond();
   movie.backend = backend_;
   movie.faces_at = faces_at_;
   movie.keep_going = !damaged_.empty();

@@ -22,7 +22,7 @@ ImageSize evenSize(ImageSize size) {
 }  // namespace
 
 uint64_t framesOf(const MovieRequest& movie) {
-  return movie.kind == MovieKind::kTurn ? kFramesOfTurn : movie.cache.series().steps.size();
+  return movie.kind == MovieKind::kOneTurn ? kFramesOfTurn : movie.cache.series().steps.size();
 }
 
 std::filesystem::path movieNameOf(const std::filesystem::path& file) {
@@ -50,11 +50,11 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
   };
   const std::unique_ptr<MovieOutput> output = open(file, size, movie.frames_per_s);
   StepPlayer player(movie.cache, functions.scalars(movie.cache, state), movie.backend);
-  if (movie.kind == MovieKind::kTurn) faces_at(shown_step);
+  if (movie.kind == MovieKind::kOneTurn) faces_at(shown_step);
   progress.begin("drawing frames", frames, "frames");
   for (uint64_t frame = 0; frame < frames; ++frame) {
     Camera camera = state.camera;
-    if (movie.kind == MovieKind::kTurn) {
+    if (movie.kind == MovieKind::kOneTurn) {
       camera = orbited(camera, 360.0 * static_cast<double>(frame) / static_cast<double>(frames));
     } else {
       player.goTo({frame});

@@ -16,7 +16,7 @@
 
 namespace curvisplat {
 
-enum class MovieKind { kTurn, kSteps };
+enum class MovieKind { kOneTurn, kAllSteps };
 
 /// Takes the pictures 0, 1, 2, ...; unless finish() is called, nothing is left of a movie. Throws Error.
 class MovieOutput {
@@ -32,7 +32,7 @@ using OpenMovieOutput = std::function<std::unique_ptr<MovieOutput>(const std::fi
                                                                    ImageSize size, double frames_per_s)>;
 
 struct MovieRequest {
-  MovieKind kind = MovieKind::kTurn;
+  MovieKind kind = MovieKind::kOneTurn;
   std::filesystem::path file;
   CacheReader cache;  // at the step that is shown
   ViewState state;
