@@ -68,7 +68,9 @@ HWY_INLINE V integralTo(const MeanExtinction& extinction, V x) {
   const Doubles d;
   const hn::RebindToSigned<Doubles> di;
   constexpr double kCells = ClassificationTable::kCells, kShift = 6755399441055744.0;  // 1.5 * 2^52
-  const V cell = hn::Max(hn::Set(d, -1.0), hn::Min(hn::Set(d, kCells), hn::Floor(x)));
+  const V minus_one = hn::Set(d, -1.0);
+  // What is not a number is before the first cell: the places to gather from exist for any splat of a damaged cache.
+  const V cell = hn::IfThenElse(hn::Ge(x, minus_one), hn::Min(hn::Set(d, kCells), hn::Floor(x)), minus_one);
   // Numbers from -1 on as the lowest bits of a double.
   const auto number =
       hn::Sub(hn::BitCast(di, hn::Add(cell, hn::Set(d, kShift))), hn::BitCast(di, hn::Set(d, kShift)));
