@@ -114,7 +114,11 @@ def compare(arguments):
     """Returns the number of grids with a difference."""
     differing = 0
     grids = grids_in(arguments.folder, arguments.old)
-    for name in arguments.only.split(",") if arguments.only else grids:
+    names = arguments.only.split(",") if arguments.only else list(grids)
+    unknown = [name for name in names if name not in grids]
+    if unknown:
+        sys.exit(f"same_bytes: --only {unknown[0]}: no such grid; there are {', '.join(grids)}")
+    for name in names:
         grid = grids[name]
         cache = arguments.folder / "same.splats"
         convert(arguments.old, grid, cache, [])

@@ -31,11 +31,15 @@ class ShortForms(unittest.TestCase):
         FOLDER.mkdir(parents=True)
 
     def test_around(self):
-        lines = run("around.py", FOLDER / "around", "--smoke").splitlines()[-7:]
-        for n, name in enumerate(["plain", "lit", "six clip planes", "opaque body", "two scalars", "depth (.exr)"]):
-            self.assertTrue(lines[n].startswith(name), lines)
-            self.assertIn("of the plain picture", lines[n])
-        self.assertRegex(lines[6], r"^1024 quads +\d+ ms a frame")
+        lines = run("around.py", FOLDER / "around", "--smoke").splitlines()[-13:]
+        for line, name in zip(lines, ["plain", "lit", "six clip planes", "opaque body", "two scalars", "no depth (.exr)",
+                                      "depth (.exr)"]):
+            self.assertTrue(line.startswith(name), lines)
+            self.assertIn("of the plain picture", line)
+        self.assertRegex(lines[7], r"^opaque body +bytes read: [1-9]\d* of [1-9]\d*$")
+        self.assertRegex(lines[8], r"^opaque body +splats drawn: [1-9]\d* of [1-9]\d*$")
+        for line, what in zip(lines[9:], ["", ", by a scalar", ", finest", ", finest, by a scalar"], strict=True):
+            self.assertRegex(line, rf"^1024 quads{what}: -?\d+ ms of processor time a frame")
 
     def test_window_times(self):
         for needed in ("Xvfb", "xdotool"):
