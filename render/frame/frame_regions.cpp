@@ -15,7 +15,7 @@ constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
 constexpr double kLayerShare = 0.7;
 // What a slab has of it, on average, where the layer does not fit.
 constexpr double kSlabShare = 0.6;
-// Between regions threads wait for one another: as long as preparing so many splats takes.
+// Between regions threads wait for one another: as long as preparing this number of splats takes.
 constexpr double kSplatsARegion = 100e3;
 
 /// [region] its box of tiles.
