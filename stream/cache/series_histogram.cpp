@@ -15,7 +15,9 @@ void addStep(const ValueHistogram& step, double lower, double upper,
              std::array<double, kHistogramBins>& volumes) {
   const double width = (upper - lower) / kHistogramBins;
   const auto placeOf = [&](double value) {
-    return width > 0 ? std::clamp((value - lower) / width, 0.0, double{kHistogramBins}) : 0.0;
+    // Not std::clamp: a manifest's range may be so wide that the quotient is no number.
+    const double place = width > 0 ? (value - lower) / width : 0.0;
+    return place > 0 ? std::min(place, double{kHistogramBins}) : 0.0;
   };
   for (size_t bin = 0; bin < kHistogramBins; ++bin) {
     const double volume = step.shares[bin] * step.volume;

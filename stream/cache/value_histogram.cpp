@@ -27,8 +27,8 @@ uint64_t checksumOfRecord(const HistogramRecord& record) {
 
 bool isValid(const HistogramRecord& record) {
   bool fine = record.version == 1 && record.bins == kHistogramBins && std::isfinite(record.lower) &&
-              std::isfinite(record.upper) && record.lower <= record.upper && std::isfinite(record.volume) &&
-              record.volume > 0 && record.checksum == checksumOfRecord(record);
+              std::isfinite(record.upper) && record.lower <= record.upper &&
+              std::isfinite(record.upper - record.lower) && std::isfinite(record.volume) && record.volume > 0 && record.checksum == checksumOfRecord(record);
   for (const float share : record.shares) fine &= share >= 0 && share <= 1;
   return fine;
 }
@@ -49,7 +49,8 @@ double ValueHistogram::percentile(double part) const {
 
 size_t histogramBin(double mean, double lower, double upper) {
   const double part = upper > lower ? (mean - lower) * (kHistogramBins / (upper - lower)) : 0.0;
-  return static_cast<size_t>(std::clamp(part, 0.0, double{kHistogramBins - 1}));
+  // Not std::clamp: a manifest's range may be so wide or so narrow that the product is no number.
+  return part > 0 ? static_cast<size_t>(std::min(part, double{kHistogramBins - 1})) : 0;
 }
 
 HistogramRecord recordOf(const ValueHistogram& histogram) {
