@@ -18,6 +18,9 @@ constexpr std::array<Side, 4> kSides{Side::kFirstI, Side::kLastI, Side::kFirstJ,
 constexpr double kMinStep = 0.3, kMaxSteps = 2;
 // Share of an edge's nodes that may lie elsewhere, since land may have no coordinates.
 constexpr double kMayMiss = 0.1;
+// Edges of one face are a step or two apart if it has fewer nodes across. They are neighbours only if it runs around the
+// Earth.
+constexpr size_t kMinNodesAround = 5;
 
 struct Edge {
   FaceEdge edge;
@@ -43,7 +46,8 @@ std::optional<double> apart(const Edge& a, const Edge& b, bool reversed) {
 }
 
 /// Joints by increasing distance, each edge in one at most.
-std::vector<FaceJoint> nearestJoints(const std::vector<Edge>& edges) {
+std::vector<FaceJoint> nearestJoints(const std::vector<Edge>& edges, const FaceShape& shape) {
+  const bool joins_itself = std::min(shape.ni, shape.nj) >= kMinNodesAround;
   struct Candidate {
     double distance;
     size_t a, b;
@@ -51,10 +55,12 @@ std::vector<FaceJoint> nearestJoints(const std::vector<Edge>& edges) {
   };
   std::vector<Candidate> candidates;
   for (size_t a = 0; a < edges.size(); ++a)
-    for (size_t b = a + 1; b < edges.size(); ++b)
+    for (size_t b = a + 1; b < edges.size(); ++b) {
+      if (edges[a].edge.face == edges[b].edge.face && !joins_itself) continue;
       for (const bool reversed : {false, true})
         if (const auto distance = apart(edges[a], edges[b], reversed))
           candidates.push_back({*distance, a, b, reversed});
+    }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& one, const Candidate& two) { return one.distance < two.distance; });
   std::vector<FaceJoint> joints;
@@ -114,7 +120,7 @@ FaceJoints jointsOf(const FaceShape& shape, const EdgePoints& points) {
       edges.push_back(std::move(edge));
     }
   FaceJoints found;
-  found.joints = nearestJoints(edges);
+  found.joints = nearestJoints(edges, shape);
   found.holes = holesBetween(found.joints, shape.faces);
   return found;
 }
