@@ -124,7 +124,7 @@ class Fuse(unittest.TestCase):
         while not os.path.ismount(cls.folder / "mounted"):
             if cls.server.poll() is not None or time.monotonic() > end:
                 why = cls.server.communicate()[1] if cls.server.poll() is not None else "not mounted within 10 s"
-                print(f"skipped: FUSE cannot be mounted here: {why.strip()[-200:]}")
+                print(f"skipped: FUSE cannot be mounted here: {why.strip()[-200:]}", flush=True)
                 cls.temporary.cleanup()
                 os._exit(77)
             time.sleep(0.02)
