@@ -28,7 +28,8 @@ uint64_t checksumOfRecord(const HistogramRecord& record) {
 bool isValid(const HistogramRecord& record) {
   bool fine = record.version == 1 && record.bins == kHistogramBins && std::isfinite(record.lower) &&
               std::isfinite(record.upper) && record.lower <= record.upper &&
-              std::isfinite(record.upper - record.lower) && std::isfinite(record.volume) && record.volume > 0 && record.checksum == checksumOfRecord(record);
+              std::isfinite(record.upper - record.lower) && std::isfinite(record.volume) &&
+              record.volume > 0 && record.checksum == checksumOfRecord(record);
   for (const float share : record.shares) fine &= share >= 0 && share <= 1;
   return fine;
 }
