@@ -34,10 +34,13 @@ class WindowMovie : public WindowTest {
   static size_t filesIn(const fs::path& folder) {
     return static_cast<size_t>(std::distance(fs::directory_iterator(folder), {}));
   }
-  /// The frames of a command as render draws them into movie/r_NNNN.png.
+  /// The frames of a command as render draws them into movie/r_NNNN.png, in the size of the window's.
   static void draw(std::vector<std::string> command, const std::vector<std::string>& more) {
-    for (size_t n = 0; n + 1 < command.size(); ++n)
+    const ImageSize size = readImage("movie/m_0000.png").size;
+    for (size_t n = 0; n + 1 < command.size(); ++n) {
       if (command[n] == "-o") command[n + 1] = "movie/r_%04d.png";
+      if (command[n] == "--size") command[n + 1] = fmt::format("{}x{}", size.width, size.height);
+    }
     command.insert(command.end(), more.begin(), more.end());
     run(command);
   }

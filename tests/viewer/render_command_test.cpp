@@ -106,6 +106,12 @@ TEST(RenderCommand, OnlySettingsWithoutAnOptionNeedAFile) {
 TEST(RenderCommand, OfAMovieTurns) {
   const ViewState state = firstViewOf(manifest(), {300, 200});
   expectParts(renderCommand(state, {"a.splats", {300, 200}, {}, {}, true}), {"-o movie.mp4", "--orbit 360"});
+  // Without an even size render refuses to write an .mp4.
+  expectParts(renderCommand(state, {"a.splats", {301, 201}, {}, {}, true}), {"--size 300x200"});
+  expectParts(renderCommand(state, {"a.splats", {301, 201}, {}, {}}), {"--size 301x201"});
+  CommandOptions fine{"a.xyz", {300, 200}, {}, {}};
+  fine.fine_values = true;
+  expectParts(renderCommand(state, fine), {"--value-precision fine"});
 }
 
 TEST(RenderCommand, PathsInTheFolderAreShort) {

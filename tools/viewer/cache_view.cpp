@@ -60,7 +60,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
                      Reports& reports, FileDialog& dialog, std::shared_future<void> after)
     : cache_(prepared.cache.atStep(prepared.cache.step())),
       target_s_(options.target_s),
-      faces_at_(options.faces_at),
+      faces_at_(options.carried ? options.carried->faces_at : options.faces_at),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
@@ -413,7 +413,7 @@ void CacheView::restore(const ViewState* state) {
 
 std::shared_ptr<const CarriedView> CacheView::carried() const {
   if (isUntouchedPreview()) return nullptr;
-  return std::make_shared<const CarriedView>(CarriedView{state_, history_});
+  return std::make_shared<const CarriedView>(CarriedView{state_, history_, faces_at_});
 }
 
 bool CacheView::isOf(const CacheReader& cache) const {

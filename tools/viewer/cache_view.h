@@ -42,6 +42,7 @@ struct WindowLayout {
 struct CarriedView {
   ViewState state;
   History history;
+  FacesAtStep faces_at;
 };
 
 class CacheView {
@@ -184,7 +185,7 @@ class CacheView {
     glm::dvec2 pixel{0.0};  // of the picture; a marker is to come there
     Camera camera;          // that it was seen with
     ImageSize size;
-    uint64_t step = 0;
+    StepPosition at;
   };
   std::optional<Click> clicked_;
   std::optional<PointProbe::Question> marker_question_;

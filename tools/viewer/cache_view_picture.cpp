@@ -13,6 +13,7 @@
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/codec/values_codec.h"
 #include "tools/viewer/cache_view.h"
 #include "tools/viewer/first_view.h"
 #include "tools/viewer/marker_panel.h"
@@ -83,7 +84,7 @@ void CacheView::probe(const WindowLayout& layout) {
                       (at.y - layout.picture.y) / layout.picture.height * data_size_.height);
   };
   for (const glm::dvec2& click : window_.takeClicks()) {
-    clicked_ = {pixelAt(click), shown_ ? shown_->camera : state_.camera, data_size_, playback_.step()};
+    clicked_ = {pixelAt(click), shown_ ? shown_->camera : state_.camera, data_size_, playback_.position()};
     if (!std::exchange(values_failed_, false)) continue;
     values_asked_for_ = 0;  // tries again
     changed_ |= frames_failed_ || !isShown();
@@ -155,7 +156,7 @@ bool CacheView::isSeenAt(const Click& click) const {
          then.view_up == now.view_up && then.projection == now.projection &&
          then.parallel_scale == now.parallel_scale && then.view_angle_deg == now.view_angle_deg &&
          click.size.width == data_size_.width && click.size.height == data_size_.height &&
-         click.step == playback_.step();
+         click.at == playback_.position();
 }
 
 void CacheView::drawStatus(const WindowLayout& layout) {
@@ -221,7 +222,7 @@ std::string CacheView::timeOption() const {
 
 /// What is shown now, whatever is changed while it is drawn.
 void CacheView::saveMovieTo(const fs::path& file) {
-  MovieRequest movie{movie_kind_, file, cache_.atStep(playback_.step()), state_, picture_size_};
+  MovieRequest movie{movie_kind_, file, cache_.at(playback_.position()), state_, picture_size_};
   if (movie_kind_ == MovieKind::kAllSteps) movie.frames_per_s = playback_.stepsPerSecond();
   movie.backend = backend_;
   movie.faces_at = faces_at_;
@@ -236,6 +237,7 @@ void CacheView::copyCommand(bool turns) {
     if (!grid_files_.empty() && grid_files_.size() <= kMaxNamedFiles) {
       options.cache = shortPath(grid_files_.front());
       for (size_t n = 1; n < grid_files_.size(); ++n) options.solutions.push_back(shortPath(grid_files_[n]));
+      options.fine_values = cache_.seriesManifest().hasFeature(kFineValues);
     }
     const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
       if (!needsFile(function)) return;

@@ -14,8 +14,14 @@ namespace {
 
 constexpr uint64_t kFramesOfTurn = 90;
 
-/// H.264 asks for it.
-ImageSize evenSize(ImageSize size) {
+bool isPictureName(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  return ending == ".png" || ending == ".exr" || ending == ".pfm";
+}
+
+/// H.264 needs an even width and height.
+ImageSize sizeFor(const std::filesystem::path& file, ImageSize size) {
+  if (file.extension() == ".gif" || isPictureName(file)) return size;
   return {std::max(2, size.width / 2 * 2), std::max(2, size.height / 2 * 2)};
 }
 
@@ -26,20 +32,19 @@ uint64_t framesOf(const MovieRequest& movie) {
 }
 
 std::filesystem::path movieNameOf(const std::filesystem::path& file) {
-  const std::string ending = file.extension().string();
-  const bool is_pictures = ending == ".png" || ending == ".exr" || ending == ".pfm";
-  if (!is_pictures || file.filename().string().find('%') != std::string::npos) return file;
-  return file.parent_path() / (file.stem().string() + "_%04d" + ending);
+  if (!isPictureName(file) || file.filename().string().find('%') != std::string::npos) return file;
+  return file.parent_path() / (file.stem().string() + "_%04d" + file.extension().string());
 }
 
 std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open, Progress& progress) {
   const std::filesystem::path file = movieNameOf(movie.file);
-  const ImageSize size = evenSize(movie.size);
+  const ImageSize size = sizeFor(file, movie.size);
   const ViewState& state = movie.state;
-  const Manifest manifest = movie.cache.manifest();
-  const uint64_t shown_step = movie.cache.step(), frames = framesOf(movie);
-  const ShownFunctions functions(state, manifest);
-  FrameOptions options = state.frameOptions(dataSizeOf(state, manifest, size));
+  const StepPosition shown_at = movie.cache.position();
+  movie.cache = movie.cache.atStep(shown_at.step);
+  const uint64_t frames = framesOf(movie);
+  const ShownFunctions functions(state, movie.cache.manifest());
+  FrameOptions options = state.frameOptions(dataSizeOf(state, movie.cache.manifest(), size));
   options.keep_going = movie.keep_going;
   const std::shared_ptr<const SurfaceScene> scene = options.scene;
   const auto faces_at = [&](uint64_t step) {
@@ -62,10 +67,12 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
     }
     Progress of_frame;
     of_frame.stopWith(progress);
-    FrameStatistics statistics;
-    const Image image = player.renderer().render(camera, options, statistics, &of_frame);
-    output->write(frame, annotated(image, state.annotations,
-                                   sceneOf(state, manifest, functions, camera, options, size)));
+    ShownFrame drawn;
+    drawn.view = player.renderer().screenView(camera, options);
+    drawn.data = {movie.cache.manifest().lower, movie.cache.manifest().upper};
+    drawn.image = player.renderer().render(camera, options, drawn.statistics, &of_frame);
+    output->write(frame,
+                  annotated(drawn.image, state.annotations, sceneOf(state, functions, drawn, size)));
     progress.advance(1);
   }
   output->finish();

@@ -34,9 +34,9 @@ using OpenMovieOutput = std::function<std::unique_ptr<MovieOutput>(const std::fi
 struct MovieRequest {
   MovieKind kind = MovieKind::kOneTurn;
   std::filesystem::path file;
-  CacheReader cache;  // at the step that is shown
+  CacheReader cache;  // at the time that is shown
   ViewState state;
-  ImageSize size;  // of the picture in the window; the movie has an even width and height
+  ImageSize size;  // of the picture in the window; an .mp4 has the next smaller even one
   double frames_per_s = 25;
   Backend backend = Backend::kAutomatic;
   FacesAtStep faces_at = {};               // of the state's faces; none: they are those of every step

@@ -158,7 +158,10 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   for (const std::filesystem::path& file : options.solutions)
     files += fmt::format(" {}", quoted(file.string()));
   Words words(fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
-  words.add("--size", fmt::format("{}x{}", options.size.width, options.size.height));
+  if (options.fine_values) words.add("--value-precision", "fine");
+  const int multiple = options.turns ? 2 : 1;  // an .mp4 has an even width and height
+  words.add("--size", fmt::format("{}x{}", options.size.width / multiple * multiple,
+                                  options.size.height / multiple * multiple));
   words.add("--scalar", state.variable);
   addFunctions(state, options, words);
   addCamera(state.camera, words);

@@ -17,6 +17,7 @@ struct CommandOptions {
   std::filesystem::path function_file, opacity_file;  // those that needFile() asks for
   bool turns = false;                                 // a movie: once around the focal point
   std::vector<std::filesystem::path> solutions = {};  // where `cache` is a grid: its further files
+  bool fine_values = false;                           // of such a grid: --value-precision fine
 };
 
 /// Whether options cannot state the function: it has to be in a file (toParaViewPreset()).
