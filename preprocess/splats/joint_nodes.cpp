@@ -34,7 +34,7 @@ enum class Neighbourhood {
   kOther,     // of no face
 };
 
-Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
+Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b, double most_of_elements) {
   const InwardAxes of_a = inwardAxes(a.border_code), of_b = inwardAxes(b.border_code);
   int opposite = 0;
   bool unlike = false;
@@ -48,7 +48,7 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
       // Directions are coded to 0.01 of the cell, which is many times a thin cell's thickness: a joint across
       // such cells would look unlike. Weights are exact, and halves of one face differ in them as in thickness.
       const bool of_elements = (a.ends_of_elements >> n & b.ends_of_elements >> m & 1) != 0;
-      const double most = of_elements ? kMaxElementJointRatio : kMaxJointRatio;
+      const double most = of_elements ? most_of_elements : kMaxJointRatio;
       unlike |= isUnlike(thickness(a.splat, inward), thickness(b.splat, other), most) &&
                 isUnlike(a.splat.weight, b.splat.weight, most);
     }
@@ -59,13 +59,13 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
 
 /// The group of each part, numbered by its first part: parts on two sides of an unlike joint are in two. All zero if no
 /// joint is unlike.
-std::vector<size_t> groupsAtJoints(std::span<const SplatWithValues> parts) {
+std::vector<size_t> groupsAtJoints(std::span<const SplatWithValues> parts, double most_of_elements) {
   std::vector<size_t> group(parts.size());
   std::iota(group.begin(), group.end(), size_t{0});
   bool any_unlike = false;
   for (size_t a = 0; a < parts.size(); ++a)
     for (size_t b = a + 1; b < parts.size(); ++b) {
-      const Neighbourhood lie = neighbourhood(parts[a].splat, parts[b].splat);
+      const Neighbourhood lie = neighbourhood(parts[a].splat, parts[b].splat, most_of_elements);
       any_unlike |= lie == Neighbourhood::kUnlike;
       if (lie == Neighbourhood::kUnlike || lie == Neighbourhood::kDiagonal) continue;
       const size_t to = std::min(group[a], group[b]), from = std::max(group[a], group[b]);
@@ -144,7 +144,8 @@ void JointNodes::mergeAll() {
 std::vector<MergedParts> JointNodes::groups() const {
   if (merged_) return {*merged_};
   std::vector<size_t> group(parts_.size(), 0);
-  if (unlike_ == UnlikeHalves::kApart && parts_.size() <= kMaxParts) group = groupsAtJoints(parts_);
+  if (unlike_ != UnlikeHalves::kMerged && parts_.size() <= kMaxParts)
+    group = groupsAtJoints(parts_, unlike_ == UnlikeHalves::kApart ? kMaxElementJointRatio : kMaxJointRatio);
   std::vector<MergedParts> groups;
   std::vector<size_t> place(parts_.size());  // in `groups`, of the group that begins with a part
   for (size_t n = 0; n < parts_.size(); ++n) {

@@ -295,6 +295,27 @@ TEST_F(Seams, HalvesOfUnlikeThicknessStayApartAndEndAtTheFace) {
   }
 }
 
+TEST_F(Seams, HalvesAtTheEndsOfElementsMergeUpToALargerRatio) {
+  // A spectral element of third order along i: Gauss-Lobatto nodes, whose half cells are shorter than those behind them.
+  const auto element = [](double first, double length, uint64_t first_node) {
+    MappedBlock block(4, 4, 4, [&](double i, double j, double k) {
+      const double at[] = {0, 0.5 - 0.5 / std::sqrt(5.0), 0.5 + 0.5 / std::sqrt(5.0), 1};
+      return glm::dvec3(first + length * at[static_cast<size_t>(i)], j, k);
+    });
+    block.addScalar(field);
+    block.first_node = first_node;
+    return block;
+  };
+  for (const double ratio : {1.42, 2.0}) {
+    std::vector<Piece> faces = facesOf(element(0, 3, 0));
+    for (const Piece& face : facesOf(element(3, 3 * ratio, 64))) faces.push_back(face);
+    const bool merges = ratio < kMaxElementJointRatio;
+    EXPECT_EQ(piecesAt(merge(faces), {3, 1, 1}).size(), merges ? 1u : 2u) << ratio;
+    // Added variables have to match caches that were made before.
+    EXPECT_EQ(piecesAt(merge(faces, 64 << 20, 8, UnlikeHalves::kApartByOneRatio), {3, 1, 1}).size(), 2u);
+  }
+}
+
 TEST_F(Seams, AcrossAWallLayerAreAlikeIfTheirCellsAre) {
   // Cells 500 times as long, across the joint, as they are high; at an angle, so that codes of directions are rounded.
   const auto sheet = [](double first, uint64_t first_node) {
