@@ -55,7 +55,10 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
   };
   const std::unique_ptr<MovieOutput> output = open(file, size, movie.frames_per_s);
   StepPlayer player(movie.cache, functions.scalars(movie.cache, state), movie.backend);
-  if (movie.kind == MovieKind::kOneTurn) faces_at(shown_at.step);
+  if (movie.kind == MovieKind::kOneTurn) {
+    player.goTo(shown_at);
+    faces_at(shown_at.step);
+  }
   progress.begin("drawing frames", frames, "frames");
   for (uint64_t frame = 0; frame < frames; ++frame) {
     Camera camera = state.camera;
