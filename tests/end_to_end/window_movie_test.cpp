@@ -54,7 +54,7 @@ class WindowMovie : public WindowTest {
 TEST_F(WindowMovie, OnceAroundIsWhatRenderDraws) {
   open({"--scalar", "volume"}, {600, 420});
   press("h");  // without the panels
-  eventually([] { return !hasWidget("curve"); });
+  ASSERT_TRUE(eventually([] { return !hasWidget("curve"); }));
   saveMovie("Save movie: once around...", "movie/m.png");
   placeOf("stop movie");
   press("x");  // the movie is of what was shown then

@@ -79,12 +79,14 @@ TEST_P(MeshLattice, HasTheMeshsShapeAndValues) {
   const double cell = 2 - 2 * std::pow(29.0 / 30, 2);  // the largest
   for (size_t n = 0; n < arrays.x.size(); ++n) {
     const glm::dvec3 at(arrays.x[n], arrays.y[n], arrays.z[n]);
-    if (has(at))
+    if (has(at)) {
       EXPECT_EQ(arrays.blank[n], 0) << at.x << ' ' << at.y;
-    else if (at.x > hole + cell && at.y > 0.5 + 1.0 / 30)
+    } else if (at.x > hole + cell && at.y > 0.5 + 1.0 / 30) {
       EXPECT_EQ(arrays.blank[n], 1) << at.x << ' ' << at.y;
-    if (!arrays.blank[n])
+    }
+    if (!arrays.blank[n]) {
       EXPECT_NEAR(static_cast<double>(arrays.scalars[0][n]), at.x + 10 * at.y, cell + 10.0 / 30) << n;
+    }
   }
 }
 

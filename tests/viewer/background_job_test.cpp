@@ -72,7 +72,9 @@ class BackgroundJobTest : public testing::Test {
 /// Whoever used TBB's threads first.
 TEST_F(BackgroundJobTest, AllOfItsThreadsHaveLowPriorityAndThoseThatDrawHaveNot) {
   for (const bool draws_first : {false, true}) {
-    if (draws_first) EXPECT_EQ(threadsOfALoop().nices, std::set{nice_});
+    if (draws_first) {
+      EXPECT_EQ(threadsOfALoop().nices, std::set{nice_});
+    }
     const Threads converting = threadsOfAJob();
     EXPECT_EQ(converting.nices, std::set{std::max(nice_, 10)});
     EXPECT_EQ(converting.ids.size(), 2u);
