@@ -429,6 +429,7 @@ TEST_F(WindowOpening, AScalarIsAddedToASeries) {
   const auto commands = close();
   cache_ = "a";
   EXPECT_EQ(valueOf(commands.at(0), "--scalar"), further);
+  EXPECT_EQ(valueOf(commands.at(0), "--step"), "1");  // as before
   run({"convert", "s.xyz", "s_%04d.fun", "-o", "both.splats", "--scalar", "f", "--scalar", further,
        "--overwrite"});
   for (const char* const step : {"0", "2"}) {

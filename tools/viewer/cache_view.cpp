@@ -105,6 +105,7 @@ void CacheView::takeRequestsOf(CacheView& before) {
   copies_movie_ = before.copies_movie_;
   wanted_scalar_ = std::exchange(before.wanted_scalar_, std::nullopt);
   chooser_.takeQuestionsOf(before.chooser_);
+  if (before.playback_.steps() == playback_.steps()) playback_ = before.playback_;
 }
 
 /// As the view before has it now. Reads only where the user has chosen another scalar since the view was prepared.
