@@ -21,7 +21,8 @@ class NoSink : public SplatSink {
 
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   const bool first_version = manifest.requirements.empty();
-  return first_version ? UnlikeHalves::kMerged : UnlikeHalves::kApart;
+  if (first_version) return UnlikeHalves::kMerged;
+  return manifest.hasFeature(kFaceLayers) ? UnlikeHalves::kApart : UnlikeHalves::kApartByOneRatio;
 }
 
 CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {

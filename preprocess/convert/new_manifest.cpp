@@ -1,5 +1,7 @@
 #include "preprocess/convert/new_manifest.h"
 
+#include "stream/cache/border_style.h"
+
 namespace curvisplat {
 
 std::vector<VariableInfo> variablesOf(const GridDescription& description, std::span<const uint32_t> scalars,
@@ -26,10 +28,11 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.upper = survey.upper;
   for (const GridBlock& block : origin.blocks())
     manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
-  manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders};
+  manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers};
   if (options.precision == ValuePrecision::kFine) manifest.requirements.push_back(kFineValues);
   manifest.overlap = splats.overlap;
   manifest.cells = origin.centring() == Centring::kCell;
+  if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);
   manifest.nodes = survey.nodes;
   manifest.blanked_nodes = survey.blanked.total();
   manifest.grid_checksum = survey.grid_checksum;

@@ -110,8 +110,7 @@ class SplatStream {
     if (!has_faces) return;
     const TraceScope trace("add to seams");
     const MutexLock lock(adding_to_seams_);
-    for (size_t n = 0; n < splats.splats.size(); ++n)
-      if (splats.splats[n].isForSeams()) seams_->add(splats.splats[n], valuesOf(splats, n));
+    seams_->add(splats, variables_);
   }
 
   const Progress* progress_;

@@ -305,6 +305,7 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnd
                    std::min(box.k1 + kCellSplatHalo.after, block.nk) <= window.k1);
   out.splats.clear();
   out.values.clear();
+  out.probes.clear();
   out.degenerate = out.right_handed = out.left_handed = 0;
   if (block.ni < 2 || block.nj < 2 || block.nk < 2) return;  // a sheet has no cells
   const NodeBox cells{box.j0, std::min(box.j1, block.nj - 1), box.k0, std::min(box.k1, block.nk - 1)};

@@ -5,6 +5,9 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "stream/model/border_code.h"
+#include "stream/model/layers_code.h"
+
 namespace curvisplat {
 namespace {
 
@@ -32,7 +35,10 @@ void MergedFaces::clear() {
 
 void MergedFaces::add(size_t voxel, const glm::dvec3& position, const Splat& splat, uint32_t border_code) {
   const InwardAxes inward = inwardAxes(border_code);
-  for (int a = 0; a < inward.count; ++a) {
+  const uint32_t layers = layersOf(border_code);
+  for (int a = 0; a < 3; ++a) {
+    const bool is_layer = (layers >> a & 1) != 0;
+    if (a >= inward.count && !is_layer) continue;
     const glm::dvec3 q(inward.axis[static_cast<size_t>(a)]);
     const glm::dvec3 per_length = gradientOf(splat, q);
     const double thickness = 1 / glm::length(per_length);
@@ -50,10 +56,11 @@ void MergedFaces::add(size_t voxel, const glm::dvec3& position, const Splat& spl
       first_[voxel] = static_cast<uint32_t>(sums_.size() - 1);
     }
     sums->inward += section * normal;
-    sums->point += section * (position - static_cast<double>(inward.distance) * (splat.factor() * q));
+    const double distance = is_layer ? layerDistance(0) : inward.distance;
+    sums->point += section * (position - distance * (splat.factor() * q));
     sums->section += section;
-    sums->face &= inward.hasFace(a);
-    if (inward.behind) continue;
+    sums->face &= is_layer || inward.hasFace(a);
+    if (is_layer || inward.behind) continue;
     sums->area += section;
     sums->thickest = std::max(sums->thickest, thickness);
   }

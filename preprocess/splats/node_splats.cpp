@@ -32,6 +32,17 @@ NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
           std::max(window.k0, box.k0 - std::min(box.k0, kReach)), std::min(window.k1, box.k1 + kReach)};
 }
 
+/// The faces of a block that a node is one away from: along i, j and k 1 from the lower one, -1 from the upper one, or 0.
+using Layers = std::array<int, 3>;
+
+/// A face of the block, at the node of it next to a node in the layer behind.
+struct FaceBehind {
+  ptrdiff_t node;            // element of NodeArrays
+  Neighbours beside;         // its own
+  glm::dvec3 position{0.0};  // of the plane, with the
+  glm::dvec3 normal{0.0};    // inwards; zero where the face has collapsed
+};
+
 /// What the nodes of a box of a window have in common.
 class Window {
  public:
@@ -71,8 +82,12 @@ class Window {
   Stretch stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
   void takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at);
-  void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer);
-  void cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neighbours, int layer) const;
+  void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, const Layers& layers);
+  FaceBehind faceBehind(ptrdiff_t at, const Neighbours& neighbours, int axis, int side) const;
+  void cutBehindFace(NodeSplat& node, const FaceBehind& face) const;
+  template <typename Rotate>
+  void cutBehindFaces(ptrdiff_t at, const Neighbours& neighbours, const Layers& layers,
+                      const std::array<double, 3>& inwards, const Rotate& rotate);
   glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
   double spacing(ptrdiff_t at, const Neighbours& neighbours) const;
   /// Leaves of the last splat what other blocks do not cover. Returns false if that is nothing.
@@ -118,12 +133,9 @@ bool isFace(uint64_t index, uint64_t count) {
   return index == 0 || index + 1 == count;
 }
 
-// The face that a node is in the layer behind of: 2 axis, + 1 for the block's upper end.
-constexpr int kNoLayer = -1;
-
-int layerOf(int axis, uint64_t index, uint64_t count) {
-  if (count < 4) return kNoLayer;
-  return index == 1 ? 2 * axis : index + 2 == count ? 2 * axis + 1 : kNoLayer;
+int layerOf(uint64_t index, uint64_t count) {
+  if (count < 4) return 0;
+  return index == 1 ? 1 : index + 2 == count ? -1 : 0;
 }
 
 void Window::findBlanks() {
@@ -145,11 +157,10 @@ void Window::addRow(uint64_t j, uint64_t k) {
                         static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
   first_node_of_row_ = in_.first_node + (k * block.nj + j) * ni_;
   const bool on_face = isFace(j, block.nj) || isFace(k, block.nk);
-  const int layer_j = on_face ? kNoLayer : layerOf(1, j, block.nj);
-  const int layer = layer_j != kNoLayer || on_face ? layer_j : layerOf(2, k, block.nk);
-  const auto layer_at = [&](uint64_t i) {
-    return layer != kNoLayer || on_face || isFace(i, ni_) ? layer : layerOf(0, i, ni_);
+  const auto layers_at = [&, layer_j = layerOf(j, block.nj), layer_k = layerOf(k, block.nk)](uint64_t i) {
+    return Layers{layerOf(i, ni_), layer_j, layer_k};
   };
+  const bool has_layer = layers_at(0)[1] != 0 || layers_at(0)[2] != 0;
 
   Neighbours inner;
   inner.before = {-1, j > 0 ? -row_stride_ : 0, k > 0 ? -plane_stride_ : 0};
@@ -163,21 +174,21 @@ void Window::addRow(uint64_t j, uint64_t k) {
 
   if (corrections_.stretch) stretchRow(j, k);
   if (!anyBlankAround(j, k)) {
-    if (i0_ == 0) addNode(0, row, at_i(0), true, kNoLayer);
+    if (i0_ == 0) addNode(0, row, at_i(0), true, layers_at(0));
     // Those that are neither at a face nor behind one.
     const uint64_t inner_begin = std::max<uint64_t>(2, i0_), inner_end = ni_ < 4 ? 0 : std::min(i1_, ni_ - 2);
-    const bool at_once = !on_face && layer == kNoLayer && !in_.covered && corrections_.all() &&
+    const bool at_once = !on_face && !has_layer && !in_.covered && corrections_.all() &&
                          inner_end >= inner_begin + kInnerNodesAtOnce;
     for (uint64_t i = std::max<uint64_t>(1, i0_); i < std::min(i1_, ni_ - 1); ++i) {
       if (at_once && i == inner_begin) {
         addInnerNodes(inner_begin, inner_end, row, inner);
         i = inner_end - 1;
       } else {
-        addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face, layer_at(i));
+        addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face, layers_at(i));
       }
     }
     if (ni_ > 1 && i1_ == ni_)
-      addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, kNoLayer);
+      addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, layers_at(ni_ - 1));
     return;
   }
   for (uint64_t i = i0_; i < i1_; ++i) {
@@ -188,8 +199,7 @@ void Window::addRow(uint64_t j, uint64_t k) {
       if (blank_[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
       if (blank_[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
     }
-    const bool at_end = on_face || isFace(i, ni_);
-    addNode(i, at, neighbours, at_end, at_end ? kNoLayer : layer_at(i));
+    addNode(i, at, neighbours, on_face || isFace(i, ni_), layers_at(i));
   }
 }
 
@@ -287,7 +297,7 @@ void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighb
       if (splats.is_plain[n])
         takeInnerNode(splats, n, i, at + static_cast<ptrdiff_t>(begin + n));
       else
-        addNode(i, at + static_cast<ptrdiff_t>(begin + n), neighbours, false, kNoLayer);
+        addNode(i, at + static_cast<ptrdiff_t>(begin + n), neighbours, false, {});
     }
     done = begin + kInnerNodesAtOnce;
   }
@@ -316,12 +326,14 @@ void Window::takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrd
   node.growth_code = growthCode(
       {scratch_.growth[0][in_part], scratch_.growth[1][in_part], scratch_.growth[2][in_part]}, rotate);
   node.on_block_face = node.behind_face = false;
+  node.layers = node.ends_of_elements = 0;
   node.node_position = position(at);
   node.spacing = 0;
   (splats.determinant[n] < 0 ? out_.left_handed : out_.right_handed) += 1;
 }
 
-inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer) {
+inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face,
+                            const Layers& layers) {
   const uint64_t in_part = i - i0_;
   const glm::dvec3 stretch(scratch_.stretch[0][in_part], scratch_.stretch[1][in_part],
                            scratch_.stretch[2][in_part]);
@@ -330,6 +342,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   node.node_position = position(at);
   node.on_block_face = on_face;
   node.behind_face = false;
+  node.layers = node.ends_of_elements = 0;
   node.spacing = on_face ? spacing(at, neighbours) : 0.0;
 
   glm::dmat3 jacobian;  // columns along i, j, k
@@ -345,6 +358,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
   std::array<float, 3> growth{};
   double weight_factor = 1;
+  int ends = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const glm::dvec3 to_before = node.node_position - position(at + neighbours.before[axis]);
     const glm::dvec3 to_after = position(at + neighbours.after[axis]) - node.node_position;
@@ -361,7 +375,11 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       continue;
     }
     if (corrections_.border_codes) {
-      if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
+      if (a + b > 0) {
+        inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
+        if (stretch[axis] > kElementStretch) node.ends_of_elements |= static_cast<uint8_t>(1 << ends);
+        ++ends;
+      }
       middle[axis] *= stretch[axis];
     } else {
       jacobian[axis] *= 2.0;
@@ -415,60 +433,101 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         (frame.floored()           ? out_.degenerate
          : frame.determinant() < 0 ? out_.left_handed
                                    : out_.right_handed) += 1;
-        if (frame.kIsPlain && layer != kNoLayer && node.border_code == kNoBorder)
-          cutBehindFace(node, at, neighbours, layer);
+        if (frame.kIsPlain && corrections_.faces && layers != Layers{}) {
+          // Of one face that the node is behind, or of one of several without that correction, the code has the exact plane.
+          const int first = layers[1] != 0 ? 1 : layers[2] != 0 ? 2 : 0;
+          const auto several =
+              std::count_if(layers.begin(), layers.end(), [](int side) { return side != 0; });
+          if (node.border_code == kNoBorder && (several == 1 || !corrections_.layers))
+            cutBehindFace(node, faceBehind(at, neighbours, first, layers[first]));
+          else if (corrections_.layers)
+            cutBehindFaces(at, neighbours, layers, inwards, rotate);
+        }
         set_values(frame);
         is_left = keepPart(at, rotate);
+        while (!is_left && !out_.probes.empty() && out_.probes.back().splat == count_) out_.probes.pop_back();
       });
   count_ += is_left;
 }
 
-/// Sets the code of a node whose neighbour along an axis is on the block's face, for the plane through that
-/// neighbour along the face.
-void Window::cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neighbours, int layer) const {
-  if (!corrections_.faces) return;
-  const int axis = layer / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
-  const bool upper = layer % 2 != 0;
-  const ptrdiff_t on_face = at + (upper ? neighbours.after[axis] : neighbours.before[axis]);
-  Neighbours beside = neighbours;  // of the node on the face
+/// Of a node whose neighbours along the axis are both there.
+FaceBehind Window::faceBehind(ptrdiff_t at, const Neighbours& neighbours, int axis, int side) const {
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  FaceBehind face{at + (side < 0 ? neighbours.after[axis] : neighbours.before[axis]), neighbours};
+  Neighbours& beside = face.beside;
   for (int other : {u, v}) {
-    if (blank_[on_face + beside.before[other]]) beside.before[other] = 0;
-    if (blank_[on_face + beside.after[other]]) beside.after[other] = 0;
+    if (blank_[face.node + beside.before[other]]) beside.before[other] = 0;
+    if (blank_[face.node + beside.after[other]]) beside.after[other] = 0;
   }
-  if (upper) {
-    beside.before[axis] = at - on_face;
-    beside.after[axis] = 0;
-  } else {
-    beside.before[axis] = 0;
-    beside.after[axis] = at - on_face;
-  }
+  beside.before[axis] = side < 0 ? at - face.node : 0;
+  beside.after[axis] = side < 0 ? 0 : at - face.node;
   const auto along = [&](int other) {
-    return position(on_face + beside.after[other]) - position(on_face + beside.before[other]);
+    return position(face.node + beside.after[other]) - position(face.node + beside.before[other]);
   };
-  const glm::dvec3 inward = position(at) - position(on_face);
-  glm::dvec3 face_position = position(on_face);
+  const glm::dvec3 inward = position(at) - position(face.node);
+  face.position = position(face.node);
   glm::dvec3 normal = glm::cross(along(u), along(v));
   if (corrections_.middles) {
     for (int other : {u, v}) {
       if (beside.before[other] == 0 || beside.after[other] == 0) continue;
-      const glm::dvec3 to_before = position(on_face) - position(on_face + beside.before[other]);
-      const glm::dvec3 to_after = position(on_face + beside.after[other]) - position(on_face);
-      face_position += asideOf(to_before, to_after, glm::length(to_before), glm::length(to_after));
+      const glm::dvec3 to_before = position(face.node) - position(face.node + beside.before[other]);
+      const glm::dvec3 to_after = position(face.node + beside.after[other]) - position(face.node);
+      face.position += asideOf(to_before, to_after, glm::length(to_before), glm::length(to_after));
     }
   }
   const double across = glm::dot(normal, inward);
-  if (!(std::abs(across) > kMinAcross * glm::length(normal) * glm::length(inward))) return;
-  if (across < 0) normal = -normal;
+  if (!(std::abs(across) > kMinAcross * glm::length(normal) * glm::length(inward))) return face;
+  face.normal = across < 0 ? -normal : normal;
+  return face;
+}
+
+/// Sets the code of a node that is behind one face.
+void Window::cutBehindFace(NodeSplat& node, const FaceBehind& face) const {
+  if (face.normal == glm::dvec3(0.0)) return;
   // Of a plane n · (x - X0) = 0, A⁻¹ (x - X0) is at right angles to Aᵀ n.
-  const glm::dvec3 in_frame = normal * node.splat.factor();
+  const glm::dvec3 in_frame = face.normal * node.splat.factor();
   const double length = glm::length(in_frame);
   const uint32_t code =
-      packLayerCode(in_frame / length, glm::dot(normal, node.splat.position - face_position) / length);
+      packLayerCode(in_frame / length, glm::dot(face.normal, node.splat.position - face.position) / length);
   if (code == kNoBorder) return;
   node.border_code = code;
   node.behind_face = true;
-  node.node_position = position(on_face);
-  node.spacing = spacing(on_face, beside);
+  node.node_position = position(face.node);
+  node.spacing = spacing(face.node, face.beside);
+}
+
+/// Sets the code of the last node, which ends at faces (`inwards`, as borderCode() takes it) or is behind several.
+template <typename Rotate>
+void Window::cutBehindFaces(ptrdiff_t at, const Neighbours& neighbours, const Layers& layers,
+                            const std::array<double, 3>& inwards, const Rotate& rotate) {
+  constexpr double kAlong = 0.8;                     // cosine of the lattice's axis with the face's normal
+  constexpr double kNearest = 0.6, kFarthest = 1.6;  // face, in cells
+  NodeSplat& node = out_.splats[count_];
+  std::array<glm::dvec3, 3> ends{};
+  std::array<LayerAxis, 3> behind{};
+  size_t end_count = 0, count = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dvec3 along(0.0);
+    along[axis] = inwards[axis] != 0 ? inwards[axis] : layers[axis];
+    if (inwards[axis] != 0) {
+      ends[end_count++] = rotate(along);
+      continue;
+    }
+    if (layers[axis] == 0 || neighbours.before[axis] == 0 || neighbours.after[axis] == 0) continue;
+    const FaceBehind face = faceBehind(at, neighbours, axis, layers[axis]);
+    const glm::dvec3 in_frame = face.normal * node.splat.factor(), inward = rotate(along);
+    const double length = glm::length(in_frame);
+    const double distance = glm::dot(face.normal, node.splat.position - face.position) / length;
+    if (!(glm::dot(in_frame, inward) > kAlong * length && distance > kNearest && distance < kFarthest))
+      continue;
+    behind[count++] = {inward, static_cast<uint8_t>(axis), distance};
+    out_.probes.push_back(
+        {count_, {static_cast<uint8_t>(axis), position(face.node), spacing(face.node, face.beside)}});
+  }
+  if (count == 0) return;
+  const LayeredBorder border = layeredBorder({ends.data(), end_count}, {behind.data(), count});
+  node.border_code = border.code;
+  node.layers = border.layers;
 }
 
 double Window::spacing(ptrdiff_t at, const Neighbours& neighbours) const {
@@ -507,6 +566,7 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& s
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);
+  out.probes.clear();
   out.degenerate = out.right_handed = out.left_handed = 0;
 
   Window rows(in, box, corrections, scratch, out);

@@ -25,8 +25,7 @@
 // inwards. Without any neighbour along an axis the column is zero. The border is a face that the splat is to
 // be cut at (stream/model/border_code.h), but where the cell has collapsed: at poles, and on singular lines.
 // The splats of the next layer of nodes reach beyond a face at the block's end by a hundredth of a cell's
-// weight, and are cut there; not in blocks of three nodes or fewer along that axis, nor on another of the
-// block's faces.
+// weight, and are cut there; not in blocks of three nodes or fewer along that axis.
 #pragma once
 
 #include <algorithm>
@@ -39,6 +38,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/stretch.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
@@ -91,12 +91,20 @@ struct NodeSplat {
   // is none; the seams' tolerance. Elsewhere 0.
   double spacing = 0;
 
-  bool isForSeams() const { return on_block_face || behind_face; }
+  // LayeredBorder's: layers behind faces that SeamMerger may find to be closed, where the code has several directions.
+  uint8_t layers = 0;
+  uint8_t ends_of_elements =
+      0;  // bit n: along direction n of the code, a half cell much shorter than those behind it (stretch.h)
+  bool is_probe =
+      false;  // no splat, but a FaceProbe of the node: node_position and spacing are of the face; see SeamMerger
+
+  bool isForSeams() const { return on_block_face || behind_face || layers != 0; }
   /// After keepUncovered() (covered_part.h), which has left a part of the cell that has this code.
   void becomePart(uint32_t code) {
     border_code = code;
     growth_code = kNoGrowth;
     regular = behind_face = false;
+    layers = 0;
   }
 };
 
@@ -104,10 +112,18 @@ struct NodeSplat {
 struct NodeSplats {
   std::vector<NodeSplat> splats;  // in node order
   std::vector<SplatScalar> values;
+  struct Probe {
+    size_t splat;  // its number
+    FaceProbe probe;
+  };
+  std::vector<Probe> probes;  // of the splats that have layers, in their order
   uint64_t degenerate = 0;    // splats with a floored axis
   uint64_t right_handed = 0;  // of the others: det J > 0
   uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
 };
+
+/// Half cells that are longer than their cells by more than this are those at the ends of spectral elements.
+inline constexpr double kElementStretch = 1.08;
 
 /// What is read around the nodes of a box.
 inline constexpr Halo kNodeSplatHalo{kStretchReach, kStretchReach};
@@ -130,12 +146,14 @@ struct BlockWindow {
 struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
   bool faces = true;         // to be cut at; else cells at borders are drawn in parts
-  bool middles = true;       // else splats sit at nodes, but for half cells
-  bool bends = true;         // of the scalar
-  bool stretch = true;       // else splats are as long as their cells
-  bool growth = true;        // else kernels are symmetric; takes stretch
+  bool layers =
+      true;  // behind several faces; else nodes on a face are cut there alone, others at one face behind them
+  bool middles = true;  // else splats sit at nodes, but for half cells
+  bool bends = true;    // of the scalar
+  bool stretch = true;  // else splats are as long as their cells
+  bool growth = true;   // else kernels are symmetric; takes stretch
 
-  bool all() const { return border_codes && faces && middles && bends && stretch && growth; }
+  bool all() const { return border_codes && faces && layers && middles && bends && stretch && growth; }
 };
 
 /// What computeNodeSplats() needs for a while; keeps its capacity.

@@ -32,7 +32,7 @@ void OpenBorders::add(const Splat& part, uint32_t border_code) {
   ++parts_;
 }
 
-uint32_t OpenBorders::of(const Splat& merged) const {
+LayeredBorder OpenBorders::of(const Splat& merged, std::span<const Layer> layers) const {
   std::vector<glm::dvec3> directions;
   for (const Inward& inward : inward_) directions.push_back(glm::normalize(inFrameOf(merged, inward.along)));
 
@@ -68,7 +68,23 @@ uint32_t OpenBorders::of(const Splat& merged) const {
     if (border.face) faces |= 1u << count;
     axes[count++] = glm::normalize(axis);
   }
-  return packBorderCode({axes.data(), count}, faces);
+  if (faces != (1u << count) - 1) return {packBorderCode({axes.data(), count}, faces), 0};
+  std::array<LayerAxis, 3> behind{};
+  size_t behind_count = 0;
+  for (const Layer& layer : layers) {
+    glm::dvec3 axis = glm::normalize(inFrameOf(merged, layer.inward));
+    if (std::any_of(directions.begin(), directions.end(), [&](const glm::dvec3& direction) {
+          return std::abs(glm::dot(direction, axis)) > kSimilar;
+        }))
+      continue;
+    for (size_t n = 0; n < count; ++n) axis -= glm::dot(axis, axes[n]) * axes[n];
+    for (size_t n = 0; n < behind_count; ++n) axis -= glm::dot(axis, behind[n].inward) * behind[n].inward;
+    if (count + behind_count == 3 || !(glm::length(axis) > kSimilar)) continue;
+    axis = glm::normalize(axis);
+    behind[behind_count++] = {axis, layer.axis,
+                              glm::dot(axis, inFrameOf(merged, merged.position - layer.face))};
+  }
+  return layeredBorder({axes.data(), count}, {behind.data(), behind_count});
 }
 
 }  // namespace curvisplat

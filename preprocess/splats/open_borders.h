@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
+#include "preprocess/splats/face_layers.h"
 #include "stream/model/border_code.h"
 #include "stream/model/splats.h"
 
@@ -21,7 +23,16 @@ class OpenBorders {
   /// The half cell of `merged`, the parts' splat. A direction inwards is closed by another part's opposite
   /// one, and several parts' similar ones are one, with a face to be cut at if all have; angles are measured
   /// in the merged cell's own frame, where thin cells are round.
-  uint32_t of(const Splat& merged) const;
+  uint32_t of(const Splat& merged) const { return of(merged, {}).code; }
+
+  /// A face that one of the parts lies in the layer behind of.
+  struct Layer {
+    glm::dvec3 inward{0.0};  // world units, as long as the cell
+    glm::dvec3 face{0.0};    // a point of it
+    uint8_t axis = 0;        // LayerAxis'
+  };
+  /// The same with such faces, but for those across directions in which any of the parts ends.
+  LayeredBorder of(const Splat& merged, std::span<const Layer> layers) const;
 
  private:
   struct Inward {

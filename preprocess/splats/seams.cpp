@@ -1,6 +1,7 @@
 #include "preprocess/splats/seams.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -9,26 +10,110 @@
 
 namespace curvisplat {
 
+namespace {
+
+constexpr uint64_t kWaitingShare = 8;  // of the memory: of the splats that wait for probes
+
+/// Splats that have layers, and answers: probes of faces that are seams.
+class WaitingSplats {
+ public:
+  WaitingSplats(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder)
+      : sorter_(variables, memory_bytes, std::move(temporary_folder)) {}
+
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values) {
+    sorter_.add({static_cast<double>(splat.node), 0, splat}, values);
+  }
+
+  /// Gives out all splats, without the layers behind seams.
+  void finish(const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
+    std::optional<SplatWithValues> waiting;
+    uint64_t node = 0;
+    uint32_t seams = 0;  // bit n: across axis n of the lattice
+    const auto release = [&] {
+      if (waiting) {
+        NodeSplat& splat = waiting->splat;
+        const LayeredBorder left = withoutSeams({splat.border_code, splat.layers}, seams);
+        splat.border_code = left.code;
+        splat.layers = left.layers;
+        sink(splat, waiting->values);
+      }
+      waiting.reset();
+      seams = 0;
+    };
+    sorter_.drain([&](const SeamNode& next, std::span<const SplatScalar> values) {
+      if (next.splat.node != node) release();
+      node = next.splat.node;
+      if (next.splat.is_probe)
+        seams |= 1u << next.splat.layers;
+      else
+        waiting = SplatWithValues{next.splat, {values.begin(), values.end()}};
+    });
+    release();
+  }
+
+ private:
+  SeamSorter sorter_;
+};
+
+}  // namespace
+
 struct SeamMerger::State {
   UnlikeHalves unlike;
   SeamSorter sorter;
+  WaitingSplats waiting;
 
+  State(size_t variables, uint64_t memory_bytes, const std::filesystem::path& folder, UnlikeHalves how)
+      : unlike(how),
+        sorter(variables, memory_bytes - memory_bytes / kWaitingShare, folder),
+        waiting(variables, memory_bytes / kWaitingShare, folder) {}
+
+  /// `sink` does not get what waits.
   void sweep(int coordinate_bytes, const JointNodes::Sink& sink) {
-    CoincidenceSweep sweep(coordinate_bytes, unlike, [&](JointNodes& joint) { joint.finish(sink); });
-    sorter.drain([&](const SeamNode& node, std::span<const SplatScalar> values) { sweep.add(node, values); });
+    const JointNodes::Sink sink_or_wait = [&](const NodeSplat& splat, std::span<const SplatScalar> values,
+                                              std::span<const uint64_t> nodes) {
+      if (splat.is_probe) {
+        if (splat.border_code == kNoBorder) waiting.add(splat, values);
+      } else {
+        sink(splat, values, nodes);
+      }
+    };
+    CoincidenceSweep sweep(coordinate_bytes, unlike, [&](JointNodes& joint) { joint.finish(sink_or_wait); });
+    sorter.drain([&](const SeamNode& node, std::span<const SplatScalar> values) {
+      if (node.splat.on_block_face || node.splat.behind_face)
+        sweep.add(node, values);
+      else
+        waiting.add(node.splat, values);
+    });
     sweep.finish();
   }
 };
 
 SeamMerger::SeamMerger(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder,
                        UnlikeHalves unlike)
-    : state_(new State{unlike, SeamSorter(variables, memory_bytes, std::move(temporary_folder))}) {}
+    : state_(new State(variables, memory_bytes, temporary_folder, unlike)) {}
 SeamMerger::~SeamMerger() = default;
 SeamMerger::SeamMerger(SeamMerger&&) noexcept = default;
 SeamMerger& SeamMerger::operator=(SeamMerger&&) noexcept = default;
 
 void SeamMerger::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
   state_->sorter.add(seamNodeOf(splat), values);
+}
+
+void SeamMerger::add(const NodeSplats& splats, size_t variables) {
+  const auto values_of = [&](size_t n) { return std::span(splats.values).subspan(n * variables, variables); };
+  for (size_t n = 0; n < splats.splats.size(); ++n)
+    if (splats.splats[n].isForSeams()) add(splats.splats[n], values_of(n));
+  for (const auto& [splat, probe] : splats.probes) {
+    if (splats.splats[splat].layers == 0) continue;  // a part of the cell is left
+    NodeSplat asks = splats.splats[splat];
+    asks.on_block_face = false;
+    asks.behind_face = asks.is_probe = true;
+    asks.layers = probe.axis;
+    asks.border_code = ~kNoBorder;  // kNoBorder once the face turns out to be a seam
+    asks.node_position = probe.face_node;
+    asks.spacing = probe.spacing;
+    add(asks, values_of(splat));
+  }
 }
 
 void SeamMerger::sendToFirst(Ranks& ranks) {
@@ -66,8 +151,12 @@ uint64_t SeamMerger::finish(int coordinate_bytes,
   state_->sweep(coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values,
                                       std::span<const uint64_t> nodes) {
     if (!nodes.empty()) merged += nodes.size() - 1;
-    sink(splat, values);
+    if (splat.layers == 0)
+      sink(splat, values);
+    else
+      state_->waiting.add(splat, values);
   });
+  state_->waiting.finish(sink);
   return merged;
 }
 

@@ -21,6 +21,9 @@ namespace curvisplat {
 /// them back, the former merged, in an order and with sums that depend on the splats alone. The latter lose
 /// their border codes where the face before them is a seam. Bounded memory: an external sort by the position
 /// along one generic direction, in sorted runs on disk once `memory_bytes` are full, and a sweep over them.
+///
+/// Splats with layers (face_layers.h) lose those whose face is a seam: they wait, in a second external sort by number, for what
+/// becomes of their probes at the faces' nodes. Without probes all faces count as borders.
 class SeamMerger {
  public:
   /// The temporary file, if one is needed, has no name in `temporary_folder` once it is open: it vanishes
@@ -33,6 +36,8 @@ class SeamMerger {
 
   /// One thread at a time. Every splat is one that isForSeams(). Throws Error if the disk fails.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
+  /// All splats that isForSeams(), and the probes.
+  void add(const NodeSplats& splats, size_t variables);
 
   /// Brings what the mergers of all ranks were given to rank 0's, a bounded amount at a time. All have to call it.
   void sendToFirst(Ranks& ranks);

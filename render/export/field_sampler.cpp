@@ -15,6 +15,7 @@
 #include "render/project/border_parts.h"
 #include "render/project/kernel.h"
 #include "stream/base/error.h"
+#include "stream/cache/border_style.h"
 
 namespace curvisplat {
 namespace {
@@ -254,7 +255,7 @@ unsigned FieldSampler::threadsWithin(uint64_t bytes, const SampleLattice& lattic
 FieldSamples FieldSampler::planes(uint32_t k_begin, uint32_t k_end, const Progress& progress) const {
   const Manifest& manifest = cache_.manifest();
   Sums sums(lattice_, k_begin, k_end, manifest.variables.at(variable_));
-  const BorderStyle& borders = manifest.cells ? kWholeCellStyle : kHalfCellStyle;
+  const BorderStyle borders = borderStyleOf(manifest);
   // The blur widens supports by √3 h / (√12 σ_K) of their radius.
   const glm::dvec3 margin = kKernelSupport / (std::sqrt(12.0) * kKernelSigma) * lattice_.spacing;
   const glm::dvec3 size(lattice_.size[0] - 1, lattice_.size[1] - 1, 0);

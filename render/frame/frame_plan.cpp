@@ -10,6 +10,7 @@
 #include "render/project/kernel.h"
 #include "render/project/screen_view.h"
 #include "stream/base/error.h"
+#include "stream/cache/border_style.h"
 
 namespace curvisplat {
 namespace {
@@ -112,7 +113,7 @@ ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOp
   ProjectionSettings settings{screenView(camera, options, size),
                               options.classification == Classification::kPixel,
                               clipPlanesOf(options.clip_planes, options.clip_box), options.light};
-  settings.borders = cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle;
+  settings.borders = borderStyleOf(cache_.manifest());
   const double diagonal = glm::length(options.scale * (cache_.manifest().upper - cache_.manifest().lower));
   const double range = std::abs(scalar_range_.second - scalar_range_.first);
   if (diagonal > 0 && range > 0) settings.light_g0 = range / diagonal;

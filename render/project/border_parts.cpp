@@ -4,6 +4,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "stream/model/border_pairs.h"
+#include "stream/model/layers_code.h"
+
 namespace curvisplat {
 namespace {
 
@@ -58,6 +61,16 @@ BorderPart cutOfGrowing(const BorderPart& cut, float g) {
           cut.share + 0.065f * less};
 }
 
+/// Number `n`, 0 or 1, of the two splats that a whole cell at a face is cut as: the next cell beyond the face, as long as the
+/// cells' growth makes it, and the cell itself. They are as in the middle of the grid: drifted (preprocess/splats/stretch.h).
+BorderPart pairOfGrowing(size_t n, float g) {
+  constexpr float kDriftOfGrowth = 0.14f;
+  g = std::clamp(g, -0.5f, 0.5f);
+  if (n != 0) return {kDriftOfGrowth * g, 1, 1};
+  const float next = std::exp(-g);
+  return {-0.5f - 0.5f * next + kDriftOfGrowth * g * next, next, next};
+}
+
 /// The growth along q.
 float growthAlong(const GrowthAxes& growth, const glm::vec3& q) {
   float along = 0;
@@ -69,14 +82,14 @@ float growthAlong(const GrowthAxes& growth, const glm::vec3& q) {
 }
 
 /// Lengthens what the growth's axes have along A q by the part's size. Half cells that are cut are skewed by less along
-/// that axis, by least squares in one dimension; cells that are drawn in two parts are not skewed along it.
-void resize(GrowthAxes& growth, const Shape& shape, const glm::vec3& q, const BorderPart& part, bool cut) {
-  constexpr float kSkewOfCut = 0.6f;
+/// that axis, by least squares in one dimension; cells that are drawn in two parts are not skewed along it. `skew`: the
+/// factor.
+void resize(GrowthAxes& growth, const Shape& shape, const glm::vec3& q, const BorderPart& part, float skew) {
   const glm::vec3 along = inSpace(shape, q);
   for (size_t n = 0; n < growth.count; ++n) {
     const float share = glm::dot(growth.unit[n], q);
     growth.along[n] += (part.size - 1) * share * along;
-    if (std::abs(share) > kAlong) growth.growth[n] *= cut ? kSkewOfCut : 0;
+    if (std::abs(share) > kAlong) growth.growth[n] *= skew;
   }
 }
 
@@ -90,9 +103,11 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     pieces[0].faces.add({inward.axis[0], inward.distance, true});
     return 1;
   }
+  const bool pairs = isOfPairs(style) && inward.ratio == 0;
+  const uint32_t layers = layersOf(border_code);
   size_t count = 1;
   for (int a = 0; a < inward.count; ++a)
-    if (!inward.hasFace(a)) count *= 2;
+    if (pairs || !inward.hasFace(a)) count *= 2;
   for (size_t n = 0; n < count; ++n) {
     glm::vec3 offset(0.0f);
     GrowthAxes growth = whole.growth;
@@ -104,9 +119,11 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
       const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
       const BorderPart part = !cut               ? style.parts[choice & 1]
                               : inward.ratio > 0 ? mergedPart(inward)
+                              : pairs            ? pairOfGrowing(choice & 1, growthAlong(whole.growth, q))
                                                  : cutOfGrowing(style.cut, growthAlong(whole.growth, q));
-      if (!cut) choice >>= 1;
-      resize(growth, whole.shape, q, part, cut);
+      if (pairs || !cut) choice >>= 1;
+      constexpr float kSkewOfCut = 0.6f;
+      resize(growth, whole.shape, q, part, !cut ? 0 : pairs ? 1 : kSkewOfCut);
       offset += part.offset * q;
       share *= part.share;
       const float less = 1 - part.size * part.size;
@@ -132,6 +149,14 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
       const glm::vec3 normal = transposed(l, q);
       const float inverse = 1 / glm::length(normal);
       piece.faces.add({inverse * normal, inverse * (inward.distance + glm::dot(q, offset))});
+    }
+    for (int a = 0; a < 3; ++a) {
+      if ((layers >> a & 1) == 0) continue;
+      const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
+      const glm::vec3 normal = transposed(l, q);
+      const float inverse = 1 / glm::length(normal);
+      const float distance = layerDistance(growthAlong(whole.growth, q));
+      piece.faces.add({inverse * normal, inverse * (distance + glm::dot(q, offset)), true});
     }
   }
   return count;

@@ -18,7 +18,9 @@
 #include "render/project/splat_maps.h"
 #include "stream/base/check.h"
 #include "stream/model/border_code.h"
+#include "stream/model/border_pairs.h"
 #include "stream/model/growth_code.h"
+#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {
@@ -149,7 +151,8 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   auto best = SplatChooser::Fate::kOffScreen;
   // A splat that is cut has a record of its own, as any splat; what it takes beyond that counts.
   const size_t least = brick.colours ? 2 : 1;
-  size_t own = how.clipped || how.layered || inwardAxes(border_code).faces != 0 ? least : 0;
+  const bool has_faces = inwardAxes(border_code).faces != 0 || layersOf(border_code) != 0;
+  size_t own = how.clipped || how.layered || has_faces ? least : 0;
   const SplatPiece* coloured = nullptr;  // the part that is placed, with the scalar of the colours
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
@@ -316,17 +319,21 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   };
   // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
   constexpr float kCoarsest = 1e30f;
-  bool complete = false;
-  // Beyond a few hundred it is for splats that are in no grid.
-  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= coarseness < 256 ? 2 : 16) {
+  const auto attempt = [&](const BorderStyle* borders, float coarseness) {
     splats_.clear();
     depths_.clear();
     counts_ = {};
-    cutting.borders = coarseness == 1 ? &settings.borders : nullptr;
-    complete = settings.view.projection == Projection::kOrthographic
-                   ? projectAll(OrthographicMap(settings.view, cell_min))
-                   : projectAll(PerspectiveMap(settings.view, cell_min, coarseness));
-  }
+    cutting.borders = borders;
+    return settings.view.projection == Projection::kOrthographic
+               ? projectAll(OrthographicMap(settings.view, cell_min))
+               : projectAll(PerspectiveMap(settings.view, cell_min, coarseness));
+  };
+  const bool pairs = isOfPairs(settings.borders);
+  const BorderStyle& single = pairs ? kWholeCellStyle : settings.borders;
+  bool complete = pairs && attempt(&settings.borders, 1);
+  // Beyond a few hundred it is for splats that are in no grid.
+  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= coarseness < 256 ? 2 : 16)
+    complete = attempt(coarseness == 1 ? &single : nullptr, coarseness);
   for (const SplatRange& range : ranges) counts_.read += range.size();
   counts_.pieces = splats_.size();
 }

@@ -72,9 +72,9 @@ struct BrickValues {
 class BrickProjector {
  public:
   /// A brick gives at most kMaxBrickSplats splats, each with a ScreenColour in pictures of two scalars, plus this many
-  /// records of pieces. If borders and
-  /// perspective would make more, cells at borders are drawn like any cell, clip planes keep or drop whole
-  /// splats instead of cutting them, and perspective cuts more coarsely and drops more of the splats that are
+  /// records of pieces. If borders and perspective would make more, cells at borders are drawn as one splat instead
+  /// of two; if that is too many as well, like any cell, clip planes keep or drop whole splats instead of cutting
+  /// them, and perspective cuts more coarsely and drops more of the splats that are
   /// close to the eye.
   static constexpr size_t kMaxPieces = 65536;
   static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;

@@ -53,6 +53,10 @@ inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut 
 inline constexpr const char* kCellGrowth = "cell-growth";    // kernels are skewed (growth_code.h)
 inline constexpr const char* kMergedBorders =
     "merged-borders";  // merged splats are cut at faces (border_code.h), and have an even blur
+inline constexpr const char* kFaceLayers =
+    "face-layers";  // cells are cut at more faces that they are behind (layers_code.h)
+inline constexpr const char* kBorderPairs =
+    "border-pairs";                             // cells at faces are drawn as two splats (border_pairs.h)
 inline constexpr const char* kSteps = "steps";  // a series of time steps (steps_file.h)
 
 // Manifest::overlap.

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "stream/model/kernel.h"
+#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {
@@ -34,6 +35,8 @@ constexpr uint32_t kRatioBits = 0x1f;
 constexpr double kSmallestRatio = 0.75, kRatioSteps = 10;  // to a factor of 2
 constexpr uint32_t kMaxRatio = 21;                         // of 3
 constexpr double kLongestNext = 3;                         // splats behind, to a merged one's length
+// In the place of a ratio: of layers behind several faces.
+constexpr uint32_t kLayers = 24, kThreeLayers = 4;
 
 /// In 16 bits: the octahedron |x| + |y| + |z| = 1, its lower half folded outwards.
 uint32_t packDirection(const glm::dvec3& q) {
@@ -62,6 +65,42 @@ glm::vec3 unpackDirection(uint32_t bits) {
   return glm::normalize(q);
 }
 
+struct PackedRotation {
+  uint32_t largest;  // which number is left out
+  uint32_t others;   // bits 8-31 of a code
+};
+
+PackedRotation packRotation(const glm::dquat& rotation) {
+  const std::array<double, 4> numbers{rotation.w, rotation.x, rotation.y, rotation.z};
+  PackedRotation packed{0, 0};
+  for (uint32_t n = 1; n < 4; ++n)
+    if (std::abs(numbers[n]) > std::abs(numbers[packed.largest])) packed.largest = n;
+  const double sign = numbers[packed.largest] < 0 ? -1 : 1;
+  int shift = 8;
+  for (uint32_t n = 0; n < 4; ++n) {
+    if (n == packed.largest) continue;
+    const double unit = std::clamp(0.5 + 0.5 * sign * numbers[n] / kLargest, 0.0, 1.0);
+    packed.others |= static_cast<uint32_t>(unit * kSteps + 0.5) << shift;
+    shift += 8;
+  }
+  return packed;
+}
+
+/// Number `largest` of the quaternion is left out of the code.
+glm::mat3 unpackRotation(uint32_t code, uint32_t largest) {
+  std::array<float, 4> numbers{};
+  float sum = 0;
+  int shift = 8;
+  for (uint32_t n = 0; n < 4; ++n) {
+    if (n == largest) continue;
+    numbers[n] = static_cast<float>(((code >> shift & 0xff) / kSteps * 2 - 1) * kLargest);
+    sum += numbers[n] * numbers[n];
+    shift += 8;
+  }
+  numbers[largest] = std::sqrt(std::max(0.0f, 1 - sum));
+  return glm::mat3_cast(glm::normalize(glm::quat(numbers[0], numbers[1], numbers[2], numbers[3])));
+}
+
 }  // namespace
 
 uint32_t packLayerCode(const glm::dvec3& inward, double distance) {
@@ -80,67 +119,61 @@ uint32_t packMergedCode(const glm::dvec3& inward, double distance, double ratio)
 
 uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
   if (inward.empty()) return kNoBorder;
-  const glm::dquat rotation = rotationOf(inward);
-  std::array<double, 4> numbers{rotation.w, rotation.x, rotation.y, rotation.z};
-  uint32_t largest = 0;
-  for (uint32_t n = 1; n < 4; ++n)
-    if (std::abs(numbers[n]) > std::abs(numbers[largest])) largest = n;
-  const double sign = numbers[largest] < 0 ? -1 : 1;
-  auto code = static_cast<uint32_t>(inward.size()) | largest << 3 | faces << kFacesShift;
+  const PackedRotation rotation = packRotation(rotationOf(inward));
+  auto code = static_cast<uint32_t>(inward.size()) | rotation.largest << 3 | faces << kFacesShift;
   if (inward.size() == 3 && glm::dot(glm::cross(inward[0], inward[1]), inward[2]) < 0) code |= kReversed;
-  int shift = 8;
-  for (uint32_t n = 0; n < 4; ++n) {
-    if (n == largest) continue;
-    const double unit = std::clamp(0.5 + 0.5 * sign * numbers[n] / kLargest, 0.0, 1.0);
-    code |= static_cast<uint32_t>(unit * kSteps + 0.5) << shift;
-    shift += 8;
+  return code | rotation.others;
+}
+
+uint32_t packLayersCode(std::span<const glm::dvec3> inward, size_t count) {
+  if (count > 0) {
+    const uint32_t code = packBorderCode(inward, (1u << inward.size()) - 1);
+    return (code & ~3u) | static_cast<uint32_t>(count);
   }
-  return code;
+  const PackedRotation rotation = packRotation(rotationOf(inward));
+  const uint32_t form = kLayers + rotation.largest + (inward.size() == 3 ? kThreeLayers : 0);
+  return kLayer | form << kRatioShift | rotation.others;
 }
 
 InwardAxes inwardAxes(uint32_t border_code) {
   InwardAxes inward;
   inward.count = static_cast<int>(border_code & 3);
+  const uint32_t ratio = border_code >> kRatioShift & kRatioBits;
+  if (inward.count == 0 && ratio >= kLayers) {
+    const glm::mat3 frame = unpackRotation(border_code, ratio & 3);
+    inward.axis = {frame[0], frame[1], frame[2]};
+    return inward;
+  }
   if (inward.count == 0) {
     if (border_code == kNoBorder) return inward;
     inward.count = 1;
     inward.axis[0] = unpackDirection(border_code >> kInwardShift & 0xffff);
     inward.faces = 1;
     inward.distance = static_cast<float>((border_code >> kDistanceShift) / kDistanceSteps);
-    const uint32_t ratio = border_code >> kRatioShift & kRatioBits;
     inward.behind = ratio == 0;
     if (ratio != 0)
       inward.ratio = static_cast<float>(std::min(kSmallestRatio * std::exp2((ratio - 1) / kRatioSteps),
                                                  kLongestNext / (2.0 * inward.distance)));
     return inward;
   }
-  inward.faces = border_code >> kFacesShift & 7;
-  const uint32_t largest = border_code >> 3 & 3;
-  std::array<float, 4> numbers{};
-  float sum = 0;
-  int shift = 8;
-  for (uint32_t n = 0; n < 4; ++n) {
-    if (n == largest) continue;
-    numbers[n] = static_cast<float>(((border_code >> shift & 0xff) / kSteps * 2 - 1) * kLargest);
-    sum += numbers[n] * numbers[n];
-    shift += 8;
-  }
-  numbers[largest] = std::sqrt(std::max(0.0f, 1 - sum));
-  const glm::mat3 frame =
-      glm::mat3_cast(glm::normalize(glm::quat(numbers[0], numbers[1], numbers[2], numbers[3])));
+  inward.faces = border_code >> kFacesShift & ((1u << inward.count) - 1);
+  const glm::mat3 frame = unpackRotation(border_code, border_code >> 3 & 3);
   inward.axis = {frame[0], frame[1], border_code & kReversed ? -frame[2] : frame[2]};
   return inward;
 }
 
+uint32_t layersOf(uint32_t border_code) {
+  const uint32_t own = (1u << (border_code & 3)) - 1, ratio = border_code >> kRatioShift & kRatioBits;
+  if (own != 0) return border_code >> kFacesShift & 7 & ~own;
+  return ratio < kLayers ? 0 : (ratio & kThreeLayers) != 0 ? 7 : 3;
+}
+
 bool isPossibleBorderCode(uint32_t border_code) {
-  if (border_code == kNoBorder) return true;
-  const uint32_t count = border_code & 3, faces = border_code >> kFacesShift & 7;
-  if (count == 0) {
-    const uint32_t ratio = border_code >> kRatioShift & kRatioBits, distance = border_code >> kDistanceShift;
-    return (border_code & 7) == kLayer && ratio <= kMaxRatio && distance != 0 &&
-           (ratio == 0 || distance <= kDistanceSteps);
-  }
-  return faces >> count == 0;
+  if (border_code == kNoBorder || (border_code & 3) != 0) return true;
+  if ((border_code & 7) != kLayer) return false;
+  const uint32_t ratio = border_code >> kRatioShift & kRatioBits, distance = border_code >> kDistanceShift;
+  if (ratio >= kLayers) return true;
+  return ratio <= kMaxRatio && distance != 0 && (ratio == 0 || distance <= kDistanceSteps);
 }
 
 BorderPart mergedPart(const InwardAxes& inward) {
@@ -153,8 +186,10 @@ BorderPart mergedPart(const InwardAxes& inward) {
 
 double borderReach(uint32_t border_code) {
   if (border_code == kNoBorder) return 0;
-  if ((border_code & 3) != 0) return (border_code >> kFacesShift & 7) != 0 ? kCutReach : kPartsReach;
-  if ((border_code >> kRatioShift & kRatioBits) == 0) return 0;
+  const uint32_t own = (1u << (border_code & 3)) - 1;
+  if (own != 0) return (border_code >> kFacesShift & own) != 0 ? kCutReach : kPartsReach;
+  const uint32_t ratio = border_code >> kRatioShift & kRatioBits;
+  if (ratio == 0 || ratio >= kLayers) return 0;
   const BorderPart part = mergedPart(inwardAxes(border_code));
   return std::max(0.0, part.offset + kKernelSupport * (part.size - 1));
 }

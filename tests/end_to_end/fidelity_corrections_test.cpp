@@ -105,6 +105,41 @@ TEST_F(Corrections, FacesOfBorders) {
               {source, SceneField(*constant), "smooth", halfAnnulusCamera()}, 57, {}, without);
 }
 
+/// What is drawn more than one pixel outside of the middle `side` x `side` pixels, of the whole.
+double shareOutside(const Image& over_white, int side) {
+  double outside = 0, all = 0;
+  for (int y = 0; y < over_white.size.height; ++y)
+    for (int x = 0; x < over_white.size.width; ++x) {
+      const auto beyond = [&](int at, int size) { return std::abs(at + 0.5 - 0.5 * size) > 0.5 * side + 1; };
+      const double drawn = 1 - static_cast<double>(over_white.pixel(x, y)[0]);
+      all += drawn;
+      if (beyond(x, over_white.size.width) || beyond(y, over_white.size.height)) outside += drawn;
+    }
+  return outside / all;
+}
+
+TEST_F(Corrections, LayersBehindSeveralFaces) {
+  // A uniform cube of few cells, along an axis: nodes on the face towards the viewer, and behind it, are behind others, too.
+  const FunctionGridSource cube({gridBlock(6, 6, 6)}, 1, [](const GridNode& n) {
+    const glm::dvec3 at(static_cast<double>(n.i), static_cast<double>(n.j), static_cast<double>(n.k));
+    return NodeValues{at / 5.0, {0.5f}, false};
+  });
+  Camera camera;
+  camera.position = {0.5, 0.5, 4};
+  camera.focal_point = {0.5, 0.5, 0.5};
+  camera.parallel_scale = 0.8;
+  const KnownFunction thin = KnownFunction::of("smooth", 0, 1, 30);
+  const auto outside = [&](bool layers) {
+    DirectOptions options;
+    options.nodes.layers = layers;
+    const double share = shareOutside(drawDirectly(cube, 0, options, thin.table, camera, kSize), 80);
+    fmt::print("layers behind several faces{}: {:.4f} % outside\n", layers ? "" : ", without", 100 * share);
+    return share;
+  };
+  EXPECT_LT(outside(true), 1e-4);
+  EXPECT_GT(outside(false), 1e-3) << "is not needed";
+}
+
 /// Through the middle of the half-annulus: across the view, along it, and both.
 const ClipPlane kAcross{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
 const ClipPlane kAlong{{-0.5, 0.1, 0.4}, {0.1, -0.9, -0.6}};

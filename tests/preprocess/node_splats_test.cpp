@@ -2,12 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <random>
 
 #include "preprocess/splats/shape.h"
+#include "stream/model/border_code.h"
+#include "stream/model/layers_code.h"
 #include "tests/reference/mapped_block.h"
 
 namespace curvisplat {
@@ -156,6 +160,53 @@ TEST(NodeSplats, BehindABlocksFaceKnowHowFarItIs) {
   EXPECT_EQ(out.splats[grid.at(2, 2, 1)].border_code, kNoBorder);
   EXPECT_FALSE(out.splats[grid.at(2, 2, 1)].behind_face);
   EXPECT_FALSE(inwardAxes(out.splats[grid.at(0, 1, 1)].border_code).behind);
+}
+
+TEST(NodeSplats, BehindSeveralFacesKnowAllOfThem) {
+  const glm::dmat3 jacobian(glm::dvec3(2, 0.3, 0), glm::dvec3(-0.5, 0.1, 0.2), glm::dvec3(0.1, 0, 1));
+  MappedBlock grid(6, 5, 4, [&](double i, double j, double k) { return jacobian * glm::dvec3(i, j, k); });
+  const NodeSplats out = grid.splats();
+  // Where the node is, and along i, j and k: 2 at a face, 1 behind one.
+  const struct {
+    std::array<uint64_t, 3> node;
+    std::array<int, 3> along;
+  } cases[] = {{{1, 1, 2}, {1, 1, -1}},  {{0, 1, 1}, {2, 1, 1}},  {{5, 0, 2}, {-2, 2, -1}},
+               {{2, 3, 2}, {0, -1, -1}}, {{2, 4, 1}, {0, -2, 1}}, {{0, 2, 0}, {2, 0, 2}},
+               {{4, 2, 0}, {-1, 0, 2}}};
+  for (const auto& at : cases) {
+    const size_t n = grid.at(at.node[0], at.node[1], at.node[2]);
+    const NodeSplat& node = out.splats[n];
+    const InwardAxes inward = inwardAxes(node.border_code);
+    const uint32_t all_layers = layersOf(node.border_code);
+    int found = 0, layers = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (at.along[axis] == 0) continue;
+      const bool is_layer = std::abs(at.along[axis]) == 1;
+      const double side = at.along[axis] < 0 ? -1 : 1;
+      const glm::dvec3 expected = glm::normalize(glm::inverse(node.splat.factor()) * (side * jacobian[axis]));
+      for (int m = 0; m < 3; ++m) {
+        if (is_layer ? (all_layers >> m & 1) == 0 : m >= inward.count || !inward.hasFace(m)) continue;
+        if (glm::distance(glm::dvec3(inward.axis[m]), expected) > 0.02) continue;
+        ++found;
+        EXPECT_EQ(latticeAxis(node.layers, m), is_layer ? axis : -1);
+      }
+      if (!is_layer) continue;
+      ++layers;
+      std::array<uint64_t, 3> beside = at.node;
+      beside[axis] = side < 0 ? beside[axis] + 1 : beside[axis] - 1;
+      const NodeSplat& face = out.splats[grid.at(beside[0], beside[1], beside[2])];
+      EXPECT_TRUE(std::any_of(out.probes.begin(), out.probes.end(), [&](const NodeSplats::Probe& probe) {
+        return probe.splat == n && probe.probe.axis == axis && probe.probe.face_node == face.node_position &&
+               probe.probe.spacing == face.spacing;
+      }));
+    }
+    EXPECT_EQ(found, std::count_if(at.along.begin(), at.along.end(), [](int along) { return along != 0; }))
+        << n;
+    EXPECT_EQ(std::popcount(all_layers), layers);
+    EXPECT_EQ(std::count_if(out.probes.begin(), out.probes.end(),
+                            [&](const auto& probe) { return probe.splat == n; }),
+              layers);
+  }
 }
 
 TEST(NodeSplats, AwayFromABlankAreAsWithoutIt) {

@@ -45,12 +45,10 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
     NodeSplats splats;
     computeNodeSplats({blocks[b], first_node, all, &nodes}, all, scratch, splats, options.nodes);
     for (size_t n = 0; n < splats.splats.size(); ++n) {
-      const std::span<const SplatScalar> values(&splats.values[n], 1);
-      if (splats.splats[n].isForSeams() && options.merge_seams)
-        seams.add(splats.splats[n], values);
-      else
-        take(splats.splats[n], values);
+      if (!splats.splats[n].isForSeams() || !options.merge_seams)
+        take(splats.splats[n], {&splats.values[n], 1});
     }
+    if (options.merge_seams) seams.add(splats, 1);
     first_node += blocks[b].nodes();
   }
   seams.finish(source.description().coordinate_bytes, take);

@@ -2,13 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <glm/glm.hpp>
+#include <numbers>
 #include <random>
 #include <vector>
 
 #include "render/colour/transfer_function.h"
 #include "render/project/projection.h"
 #include "stream/model/border_code.h"
+#include "stream/model/border_pairs.h"
+#include "stream/model/kernel.h"
+#include "stream/model/layers_code.h"
 #include "tests/reference/splat_arrays.h"
 
 namespace curvisplat {
@@ -116,6 +122,94 @@ TEST(BorderParts, AtFacesAreOneThatIsCutThere) {
   }
 }
 
+/// Of Crawfis and Max (1993), along two axes, at x spacings from the middle.
+double marginal(double x) {
+  constexpr int kSamples = 200;
+  double sum = 0;
+  for (int n = 0; n < kSamples; ++n) {
+    const double across = kKernelSupport * (n + 0.5) / kSamples, r = std::hypot(x, across);
+    const double left = std::max(0.0, 1.556228 - r);
+    sum += across * (r < 0.889392 ? 0.557526 + r * r * (-1.157743 + 0.671033 * r)
+                                  : left * left * (0.067599 + 0.282474 * left));
+  }
+  return 2 * std::numbers::pi * sum * kKernelSupport / kSamples;
+}
+
+/// The largest error of the density of a uniform medium of whole cells that grow by e^growth from a face inwards, along a line of
+/// them: drawn in the given style.
+double worstBehindFace(const BorderStyle& style, double growth) {
+  const glm::dvec3 along(0, 0, 1);
+  const uint32_t code = packBorderCode({&along, 1}, 1);
+  double worst = 0;
+  for (double x = 0.005; x < 2.5; x += 0.01) {
+    double density = 0, start = 0;
+    for (int cell = 0; cell < 8; ++cell) {
+      const double length = std::exp(growth * cell);
+      SplatPiece whole{{0, 0, static_cast<float>(start + 0.5 * length)},
+                       {1, 1, static_cast<float>(length), 0, 0, 0},
+                       {},
+                       0,
+                       static_cast<float>(length)};
+      whole.growth.count = 1;
+      whole.growth.unit[0] = glm::vec3(along);
+      whole.growth.growth[0] = static_cast<float>(growth);
+      BorderPieces pieces;
+      size_t count = 1;
+      if (cell == 0) {
+        count = partsAtBorder(whole, code, style, pieces);
+      } else {
+        pieces[0] = whole;
+        pieces[0].position.z += static_cast<float>(0.14 * growth * length);  // the drift
+      }
+      for (size_t n = 0; n < count; ++n) {
+        const SplatPiece& piece = pieces[n];
+        const double size = static_cast<double>(piece.shape.axis2),
+                     u = (x - static_cast<double>(piece.position.z)) / size;
+        const double v = u / kKernelSigma;
+        const double skew = 0.9 * static_cast<double>(piece.growth.growth[0]) * (v * v * v - 3 * v) / 6;
+        if (std::abs(u) < kKernelSupport)
+          density += static_cast<double>(piece.weight) / size * marginal(u) * std::max(0.0, 1 + skew);
+      }
+      start += length;
+    }
+    worst = std::max(worst, std::abs(density - 1));
+  }
+  return worst;
+}
+
+TEST(BorderParts, InPairsLeaveNoBandsBehindAFace) {
+  for (const double growth : {-0.25, -0.145, 0.0, 0.1, 0.25}) {
+    EXPECT_LT(worstBehindFace(kWholeCellPairs, growth), growth == 0 ? 0.003 : 0.01) << growth;
+    EXPECT_GT(worstBehindFace(kWholeCellStyle, growth), 0.05) << growth;
+  }
+}
+
+TEST(BorderParts, InPairsAreCutAtTheFaceBoth) {
+  const glm::dmat3 a = factorOf(kWhole.shape);
+  for (size_t axes = 1; axes <= 3; ++axes) {
+    const uint32_t code = packBorderCode({kInward, axes}, (1u << axes) - 1);
+    const InwardAxes inward = inwardAxes(code);
+    BorderPieces pieces;
+    ASSERT_EQ(partsAtBorder(kWhole, code, kWholeCellPairs, pieces), size_t{1} << axes);
+    for (size_t n = 0; n < size_t{1} << axes; ++n) {
+      const SplatPiece& piece = pieces[n];
+      EXPECT_NEAR(piece.weight, kWhole.weight, 1e-6);  // a cell beyond the face is as large
+      const glm::dmat3 to_frame = glm::inverse(factorOf(piece.shape));
+      ASSERT_EQ(piece.faces.count, static_cast<int>(axes));
+      for (size_t axis = 0; axis < axes; ++axis) {
+        const CutFace& face = piece.faces.face[axis];
+        const glm::dvec3 on_face = glm::dvec3(kWhole.position) - a * (0.5 * glm::dvec3(inward.axis[axis]));
+        EXPECT_NEAR(glm::dot(glm::dvec3(face.inward), to_frame * (on_face - glm::dvec3(piece.position))),
+                    -face.distance, 1e-4);
+        EXPECT_NEAR(face.distance, (n >> axis & 1) != 0 ? 0.5 : -0.5, 1e-4);
+      }
+    }
+  }
+  // Merged splats stay one.
+  BorderPieces pieces;
+  EXPECT_EQ(partsAtBorder(kWhole, packMergedCode(kInward[0], 0.5, 1), kWholeCellPairs, pieces), 1u);
+}
+
 TEST(BorderParts, InTheLayerBehindAFaceAreItselfCutThere) {
   BorderPieces pieces;
   ASSERT_EQ(partsAtBorder(kWhole, packLayerCode(kInward[0], 0.75), kHalfCellStyle, pieces), 1u);
@@ -125,6 +219,43 @@ TEST(BorderParts, InTheLayerBehindAFaceAreItselfCutThere) {
   ASSERT_EQ(pieces[0].faces.count, 1);
   EXPECT_EQ(pieces[0].faces.face[0].distance, 0.75f);
   EXPECT_LT(glm::distance(glm::dvec3(pieces[0].faces.face[0].inward), kInward[0]), 0.02);
+}
+
+TEST(BorderParts, AreCutAtTheFacesThatTheyLieBehind) {
+  const glm::dmat3 a = factorOf(kWhole.shape);
+  for (size_t ends = 0; ends <= 2; ++ends) {
+    const uint32_t code = packLayersCode({kInward, 3}, ends);
+    const InwardAxes inward = inwardAxes(code);
+    for (const float growth : {0.0f, 0.5f}) {
+      SplatPiece whole = kWhole;
+      if (growth != 0) {
+        whole.growth.count = 1;
+        whole.growth.unit[0] = -inward.axis[2];
+        whole.growth.growth[0] = -growth;
+      }
+      BorderPieces pieces;
+      ASSERT_EQ(partsAtBorder(whole, code, kHalfCellStyle, pieces), 1u);
+      const SplatPiece& piece = pieces[0];
+      ASSERT_EQ(piece.faces.count, 3);
+      const glm::dmat3 to_frame = glm::inverse(factorOf(piece.shape));
+      for (size_t n = 0; n < 3; ++n) {
+        const CutFace& face = piece.faces.face[n];
+        const bool is_layer = n >= ends;
+        EXPECT_EQ(face.edge_on, is_layer);
+        const double distance = !is_layer ? 0.5 : n == 2 ? layerDistance(growth) : 1;
+        const glm::dvec3 q(inward.axis[n]), other(inward.axis[(n + 1) % 3]);
+        for (const double away : {-1.0, 0.0, 2.0}) {
+          const glm::dvec3 on_face = glm::dvec3(kWhole.position) + a * (-distance * q + away * other);
+          const glm::dvec3 u = to_frame * (on_face - glm::dvec3(piece.position));
+          EXPECT_NEAR(glm::dot(glm::dvec3(face.inward), u), -face.distance, 1e-4);
+        }
+      }
+      if (ends > 0) continue;
+      EXPECT_EQ(piece.position, kWhole.position);
+      EXPECT_EQ(factorOf(piece.shape), factorOf(kWhole.shape));
+      EXPECT_EQ(piece.weight, kWhole.weight);
+    }
+  }
 }
 
 TEST(BorderParts, KeepTheirFacesWhereTheyAreHalved) {
@@ -163,13 +294,15 @@ struct Brick {
   }
 };
 
-ProjectionCounts project(const Brick& brick, Projection projection) {
+ProjectionCounts project(const Brick& brick, Projection projection,
+                         const BorderStyle& borders = kHalfCellStyle) {
   Camera camera;
   camera.position = {0.5, 0.5, 4};
   camera.focal_point = {0.5, 0.5, 0};
   camera.projection = projection;
   ProjectionSettings settings;
   settings.view = ScreenView::of(camera, {64, 64}, glm::dvec3(1), kLowPass, 0.01);
+  settings.borders = borders;
   const auto table = ClassificationTable::of(TransferFunction::preset("grey", 0, 1, 1), 0, 1);
   BrickProjector projector;
   projector.project(settings, table, glm::dvec3(0), brick.geometry, brick.variable);
@@ -200,6 +333,17 @@ TEST(BorderParts, AreNotDrawnWhereABrickHasTooMany) {
   const size_t count = BrickProjector::kMaxPieces / 8;
   EXPECT_EQ(project(Brick(count, corner), Projection::kOrthographic).pieces, 8 * count);
   EXPECT_EQ(project(Brick(count + 1, corner), Projection::kOrthographic).pieces, count + 1);
+}
+
+TEST(BorderParts, AreOneInsteadOfAPairWhereABrickHasTooMany) {
+  const uint32_t face = packBorderCode({kInward, 1}, 1);
+  const size_t count = BrickProjector::kMaxPieces /
+                       3;  // two splats with a cut each, one of which is in the place of the whole
+  EXPECT_EQ(project(Brick(count, face), Projection::kOrthographic, kWholeCellPairs).pieces, 4 * count);
+  EXPECT_EQ(project(Brick(count + 1, face), Projection::kOrthographic, kWholeCellPairs).pieces,
+            2 * (count + 1));
+  EXPECT_EQ(project(Brick(count + 1, face), Projection::kOrthographic, kWholeCellStyle).pieces,
+            2 * (count + 1));
 }
 
 }  // namespace

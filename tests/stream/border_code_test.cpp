@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "stream/model/kernel.h"
+#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {
@@ -63,8 +64,32 @@ TEST(BorderCode, IsRefusedWhereNothingPacksToIt) {
   EXPECT_FALSE(isPossibleBorderCode(0x00000004));  // reversed, but no axis
   EXPECT_FALSE(isPossibleBorderCode(0x01000000));
   EXPECT_TRUE(isPossibleBorderCode(0x00000021));
-  EXPECT_FALSE(isPossibleBorderCode(0x00000041));  // a face of the second axis, but one axis
-  EXPECT_FALSE(isPossibleBorderCode(0x00000082));
+  EXPECT_FALSE(isPossibleBorderCode(0x010000b4));  // neither a ratio nor layers
+  EXPECT_FALSE(isPossibleBorderCode(0x010000bc));
+  EXPECT_TRUE(isPossibleBorderCode(0x000000c4));
+}
+
+TEST(LayersBehindFaces, KeepTheirDirections) {
+  std::mt19937 random(4);
+  for (int n = 0; n < 3000; ++n) {
+    glm::dmat3 axes = randomAxes(random);
+    const size_t ends = static_cast<size_t>(n % 3), layers = 1 + static_cast<size_t>(n / 3 % (3 - n % 3));
+    if (ends == 0 && layers == 1) continue;  // of the other form
+    if (ends == 0 && glm::dot(glm::cross(axes[0], axes[1]), axes[2]) < 0) axes[2] = -axes[2];
+    const uint32_t code = packLayersCode({&axes[0], ends + layers}, ends);
+    ASSERT_TRUE(isPossibleBorderCode(code));
+    const InwardAxes kept = inwardAxes(code);
+    ASSERT_EQ(kept.count, static_cast<int>(ends));
+    EXPECT_EQ(kept.faces, (1u << ends) - 1);
+    EXPECT_EQ(layersOf(code), ((1u << (ends + layers)) - 1) & ~kept.faces);
+    EXPECT_FALSE(kept.behind);
+    for (size_t a = 0; a < ends + layers; ++a)
+      ASSERT_LT(glm::distance(glm::dvec3(kept.axis[a]), axes[static_cast<int>(a)]), 0.012) << code;
+    EXPECT_EQ(borderReach(code), ends > 0 ? kCutReach : 0);
+    if (ends == 0) {
+      EXPECT_DOUBLE_EQ(drawnSlope({1, 2, 2}, code), 3);
+    }
+  }
 }
 
 TEST(BorderCode, OfAnyBytesHasFiniteUnitAxes) {
@@ -93,7 +118,6 @@ TEST(LayerBehindAFace, KeepsItsDirectionAndDistance) {
   }
   for (const double outside : {-1.0, 0.0, 2.5, 1e300, std::nan("")})
     EXPECT_EQ(packLayerCode({0, 0, 1}, outside), kNoBorder) << outside;
-  EXPECT_FALSE(isPossibleBorderCode(0x800000fc));
   EXPECT_FALSE(isPossibleBorderCode(0x00000104));
 }
 
