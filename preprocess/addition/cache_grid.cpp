@@ -21,8 +21,7 @@ class NoSink : public SplatSink {
 
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   const bool first_version = manifest.requirements.empty();
-  if (first_version) return UnlikeHalves::kMerged;
-  return manifest.hasFeature(kFaceLayers) ? UnlikeHalves::kApart : UnlikeHalves::kApartByOneRatio;
+  return first_version ? UnlikeHalves::kMerged : UnlikeHalves::kApart;
 }
 
 CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {

@@ -24,16 +24,11 @@ namespace curvisplat {
 /// What is done with coincident halves of unlike thickness.
 enum class UnlikeHalves {
   kApart,
-  kApartByOneRatio,  // by kMaxJointRatio, at ends of elements as well: caches without kFaceLayers
-  kMerged,           // caches of version 1
+  kMerged,  // caches of version 1
 };
 
 /// Halves are unlike if one is more than this many times as thick as the other.
 inline constexpr double kMaxJointRatio = 1.3;
-/// The same for two halves that are both at the ends of spectral elements. Cut at the joint, they are drawn too thin: the cells
-/// behind them are longer, and the fit for even cells leaves the density 6 to 9 % too low in one dimension. Merged halves are off
-/// by 2 % at a ratio of 1.42, and by 4 % at 1.7.
-inline constexpr double kMaxElementJointRatio = 1.7;
 
 /// A splat with its values.
 struct SplatWithValues {

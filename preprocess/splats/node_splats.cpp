@@ -326,7 +326,7 @@ void Window::takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrd
   node.growth_code = growthCode(
       {scratch_.growth[0][in_part], scratch_.growth[1][in_part], scratch_.growth[2][in_part]}, rotate);
   node.on_block_face = node.behind_face = false;
-  node.layers = node.ends_of_elements = 0;
+  node.layers = 0;
   node.node_position = position(at);
   node.spacing = 0;
   (splats.determinant[n] < 0 ? out_.left_handed : out_.right_handed) += 1;
@@ -342,7 +342,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   node.node_position = position(at);
   node.on_block_face = on_face;
   node.behind_face = false;
-  node.layers = node.ends_of_elements = 0;
+  node.layers = 0;
   node.spacing = on_face ? spacing(at, neighbours) : 0.0;
 
   glm::dmat3 jacobian;  // columns along i, j, k
@@ -358,7 +358,6 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
   std::array<float, 3> growth{};
   double weight_factor = 1;
-  int ends = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const glm::dvec3 to_before = node.node_position - position(at + neighbours.before[axis]);
     const glm::dvec3 to_after = position(at + neighbours.after[axis]) - node.node_position;
@@ -375,11 +374,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       continue;
     }
     if (corrections_.border_codes) {
-      if (a + b > 0) {
-        inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
-        if (stretch[axis] > kElementStretch) node.ends_of_elements |= static_cast<uint8_t>(1 << ends);
-        ++ends;
-      }
+      if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
       middle[axis] *= stretch[axis];
     } else {
       jacobian[axis] *= 2.0;

@@ -93,10 +93,8 @@ struct NodeSplat {
 
   // LayeredBorder's: layers behind faces that SeamMerger may find to be closed, where the code has several directions.
   uint8_t layers = 0;
-  uint8_t ends_of_elements =
-      0;  // bit n: along direction n of the code, a half cell much shorter than those behind it (stretch.h)
-  bool is_probe =
-      false;  // no splat, but a FaceProbe of the node: node_position and spacing are of the face; see SeamMerger
+  // No splat, but a FaceProbe of the node: node_position and spacing are of the face. See SeamMerger.
+  bool is_probe = false;
 
   bool isForSeams() const { return on_block_face || behind_face || layers != 0; }
   /// After keepUncovered() (covered_part.h), which has left a part of the cell that has this code.
@@ -122,9 +120,6 @@ struct NodeSplats {
   uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
 };
 
-/// Half cells that are longer than their cells by more than this are those at the ends of spectral elements.
-inline constexpr double kElementStretch = 1.08;
-
 /// What is read around the nodes of a box.
 inline constexpr Halo kNodeSplatHalo{kStretchReach, kStretchReach};
 
@@ -146,8 +141,8 @@ struct BlockWindow {
 struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
   bool faces = true;         // to be cut at; else cells at borders are drawn in parts
-  bool layers =
-      true;  // behind several faces; else nodes on a face are cut there alone, others at one face behind them
+  // Behind several faces; else nodes on a face are cut there alone, others at one face behind them.
+  bool layers = true;
   bool middles = true;  // else splats sit at nodes, but for half cells
   bool bends = true;    // of the scalar
   bool stretch = true;  // else splats are as long as their cells

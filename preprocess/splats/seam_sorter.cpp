@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kNodeSize = 19;
 constexpr size_t kScalarSize = 5;
 constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4, kProbe = 8;  // of the flags
-constexpr int kLayersShift = 8, kElementsShift = 16, kBorderCodeShift = 32;
+constexpr int kLayersShift = 8, kBorderCodeShift = 32;
 
 constexpr size_t kWriteSize = 32 << 10;  // doubles
 
@@ -83,8 +83,7 @@ void SeamSorter::pack(const SeamNode& node, std::span<const SplatScalar> values,
   const Splat& s = n.splat;
   const uint64_t flags = (n.regular ? kRegular : 0) | (n.on_block_face ? kOnBlockFace : 0) |
                          (n.behind_face ? kBehindFace : 0) | (n.is_probe ? kProbe : 0) |
-                         uint64_t{n.layers} << kLayersShift | uint64_t{n.ends_of_elements} << kElementsShift |
-                         uint64_t{n.border_code} << kBorderCodeShift;
+                         uint64_t{n.layers} << kLayersShift | uint64_t{n.border_code} << kBorderCodeShift;
   put(node.along, node.across, std::bit_cast<double>(n.node), std::bit_cast<double>(flags),
       std::bit_cast<double>(uint64_t{n.growth_code}));
   put(s.position.x, s.position.y, s.position.z, s.axis[0], s.axis[1], s.axis[2]);
@@ -109,7 +108,6 @@ void SeamSorter::unpack(const double* record, SeamNode& node, std::span<SplatSca
   n.behind_face = (flags & kBehindFace) != 0;
   n.is_probe = (flags & kProbe) != 0;
   n.layers = static_cast<uint8_t>(flags >> kLayersShift);
-  n.ends_of_elements = static_cast<uint8_t>(flags >> kElementsShift);
   n.border_code = static_cast<uint32_t>(flags >> kBorderCodeShift);
   n.growth_code = static_cast<uint32_t>(std::bit_cast<uint64_t>(get()));
   n.splat.position = get_vector();

@@ -84,7 +84,7 @@ TEST(LayersBehindFaces, KeepTheirDirections) {
     EXPECT_EQ(layersOf(code), ((1u << (ends + layers)) - 1) & ~kept.faces);
     EXPECT_FALSE(kept.behind);
     for (size_t a = 0; a < ends + layers; ++a)
-      ASSERT_LT(glm::distance(glm::dvec3(kept.axis[a]), axes[static_cast<int>(a)]), 0.012) << code;
+      ASSERT_LT(glm::distance(glm::dvec3(kept.axis[a]), axes[static_cast<int>(a)]), 0.013) << code;
     EXPECT_EQ(borderReach(code), ends > 0 ? kCutReach : 0);
     if (ends == 0) {
       EXPECT_DOUBLE_EQ(drawnSlope({1, 2, 2}, code), 3);
