@@ -422,8 +422,9 @@ TEST_F(WindowOpening, AScalarIsAddedToASeries) {
   click("scalar");
   click("further scalar " + further);
   ASSERT_TRUE(eventually([&] {
-    const bool is_there = runProgram({"info", "street.splats", "--json"})
-                              .out.find(fmt::format("\"name\": \"{}\"", further)) != std::string::npos;
+    const bool is_there =
+        runProgram({"info", "street.splats", "--json"}).out.find(fmt::format("\"name\": \"{}\"", further)) !=
+        std::string::npos;
     return is_there && !hasWidget("opening");
   }));
   saveAndCopy();
