@@ -55,6 +55,18 @@ void GatheredCells::clear() {
   cell_values.clear();
 }
 
+uint64_t halfBesideChunks(uint64_t memory_bytes, uint64_t chunk_bytes) {
+  return (memory_bytes - std::min(2 * chunk_bytes, memory_bytes / 2)) / 2;
+}
+
+uint64_t gatherBytes(const MeshReader& reader, size_t scalars, uint64_t memory_bytes) {
+  // Of hexahedra whose points do not fit: references and corners, then cells that wait for their sums.
+  constexpr uint64_t kUsualCorners = 8;
+  const uint64_t corner_bytes = sizeof(glm::dvec3) + sizeof(uint64_t) + scalars * sizeof(float);
+  const bool fit = reader.points() * corner_bytes <= memory_bytes / 2;
+  return fit ? 0 : reader.cells() * kUsualCorners * 2 * corner_bytes;
+}
+
 CornerGather::CornerGather(const MeshReader& reader, const PointNumbers& numbers, uint64_t memory_bytes,
                            std::filesystem::path folder, Progress& progress)
     : reader_(&reader),

@@ -43,6 +43,14 @@ struct GatheredCells {
   void clear();
 };
 
+/// How the memory of a pass over a mesh is shared: two chunks of cells (one is read ahead; of polyhedra they are
+/// seven times as large as of hexahedra), and of the rest a half each for the corners and for what is made of them.
+uint64_t halfBesideChunks(uint64_t memory_bytes, uint64_t chunk_bytes);
+
+/// Bytes of temporary files that a gather, and sums or slopes of its cells, need at the most; 0 where the points
+/// fit. `scalars`: of points or cells, whichever there are.
+uint64_t gatherBytes(const MeshReader& reader, size_t scalars, uint64_t memory_bytes);
+
 class CornerGather {
  public:
   /// Reads the cells and the points unless the latter fit. Keeps to `memory_bytes` besides a few chunks. All
