@@ -43,6 +43,17 @@ CellView GatheredCells::view(size_t n, size_t corner_fields) const {
           std::span(faces).subspan(face_begin[n], face_begin[n + 1] - face_begin[n])};
 }
 
+bool GatheredCells::areFourAlike(size_t n, size_t end, size_t corner_fields) const {
+  if (end - n < kCellsAtOnce || !isTakenAtOnce(shapes[n], corner_fields)) return false;
+  const auto first = shapes.begin() + static_cast<ptrdiff_t>(n);
+  return std::count(first, first + kCellsAtOnce, shapes[n]) == kCellsAtOnce;
+}
+
+std::array<CellView, kCellsAtOnce> GatheredCells::viewsOfFour(size_t n, size_t corner_fields) const {
+  return {view(n, corner_fields), view(n + 1, corner_fields), view(n + 2, corner_fields),
+          view(n + 3, corner_fields)};
+}
+
 void GatheredCells::clear() {
   numbers.clear();
   shapes.clear();
