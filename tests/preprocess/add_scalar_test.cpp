@@ -7,14 +7,17 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
+#include "stream/cache/cell_octants.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
@@ -206,6 +209,34 @@ TEST(AddScalar, LeavesOutWhatTheGridBlanks) {
     if (values.blank) values.scalars.assign(3, kNotANumber);
     return values;
   }));
+}
+
+TEST(AddScalar, CutsOctantsInCachesThatHaveThemOnly) {
+  GridBlock block = gridBlock(12, 11, 10);
+  block.has_blanking = true;
+  const FunctionGridSource source({block}, 2, [&](const GridNode& node) {
+    NodeValues values = bentBox(node, block);
+    values.scalars = {values.scalars[0], values.scalars[0]};
+    values.blank = node.i > 3 && node.i < 8 && node.j > 3 && node.j < 8 && node.k > 3 && node.k < 8;
+    return values;
+  });
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  convertTo(cache, source, {0});
+  ASSERT_TRUE(CacheReader(cache).manifest().hasFeature(kCellOctants));
+  addQuietly(source, adding(cache, {1}));
+  const Files files = filesOf(cache);
+  EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
+
+  // Of a cache without the feature, whole pieces are expected: they lie elsewhere.
+  convertTo(folder / "older.splats", source, {0});
+  const fs::path manifest = folder / "older.splats/manifest.json";
+  auto json = nlohmann::ordered_json::parse(readTextFile(manifest));
+  json.erase("checksum");
+  std::erase(json["requires"].get_ref<nlohmann::ordered_json::array_t&>(), kCellOctants);
+  writeFileAtomically(manifest, json.dump());
+  EXPECT_NE(refusal(source, adding(folder / "older.splats", {1})).find("another position"),
+            std::string::npos);
 }
 
 TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {

@@ -26,7 +26,7 @@ class Cache:
         self.manifest = json.loads(text)
         version, requires = self.manifest["version"], self.manifest.get("requires", [])
         need(self.manifest["format"] == "curvisplat splat cache" and version == (2 if requires else 1), "format version")
-        need(set(requires) <= {"border-faces", "cell-growth", "merged-borders", "face-layers", "border-pairs", "steps", "fine-values"}, "required feature")
+        need(set(requires) <= {"border-faces", "cell-growth", "merged-borders", "face-layers", "border-pairs", "steps", "fine-values", "cell-octants"}, "required feature")
         self.files = {file["name"]: file for file in self.manifest["files"]}
         if "steps" in requires:
             self.open_step(text)
