@@ -412,7 +412,7 @@ TEST_F(ToAnExistingCache, ClearsWhatAKilledOneLeft) {
 }
 
 TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
-  using testing::FaultySystemCalls;
+  using faults::FaultySystemCalls;
   AddScalarOptions options = adding(cache, {1, 2});
   options.bucket_splats = 20000;
   FaultySystemCalls counting;
