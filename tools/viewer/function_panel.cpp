@@ -127,7 +127,7 @@ void paintNumbers(const EditedFunction& function) {
     largest = std::max(largest, std::abs(scalar(n)));
     if (n > 0) closest = std::min(closest, std::abs(scalar(n) - scalar(n - 1)));
   }
-  const double ratio = closest > 0 ? largest / closest : 1;
+  const double ratio = closest > 0 ? std::min(largest / closest, 1e6) : 1;
   const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(ratio))) + 1, 3, 5);
   for (int n = 0; n <= kNumbers; ++n) {
     const float part = static_cast<float>(n) / kNumbers;
