@@ -151,7 +151,7 @@ void FileDialog::drawEntries(bool& accepts) {
   const float below = 2.6f * ImGui::GetFrameHeightWithSpacing();
   ImGui::BeginChild("entries", {0, -below}, true);
   std::optional<fs::path> entered;
-  if (entries_.empty()) ImGui::TextDisabled("There is no such file in this folder.");
+  if (entries_.empty()) ImGui::TextDisabled("No file in this folder is of a kind that can be chosen here.");
   for (const FolderEntry& entry : entries_) {
     const std::string shown = entry.is_folder ? entry.name + "/" : entry.name;
     const bool chosen =
