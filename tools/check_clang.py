@@ -35,14 +35,9 @@ AT_A_TIME = 16
 
 def commands(chosen):
     """(file, its compiler's arguments) of each source of ours, or of those chosen."""
-    cache, path = BUILD / "CMakeCache.txt", BUILD / "compile_commands.json"
+    path = BUILD / "compile_commands.json"
     if not path.exists():
         sys.exit("check_clang: build/release is not configured; run tools/build.sh first")
-    if "CURVISPLAT_UNITY:UNINITIALIZED=ON" in cache.read_text() or "CURVISPLAT_UNITY:BOOL=ON" in cache.read_text():
-        # It compiles sources together: the commands of each alone are those of a folder that is only configured.
-        path = ROOT / "build/clang/compile_commands.json"
-        subprocess.run(["cmake", "--preset", "release", "-B", path.parent, "-DCURVISPLAT_UNITY=OFF"], cwd=ROOT, check=True,
-                       stdout=subprocess.DEVNULL)
     ours = {}
     for entry in json.loads(path.read_text()):
         file = pathlib.Path(entry["file"])
