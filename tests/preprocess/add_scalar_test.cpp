@@ -10,14 +10,17 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "preprocess/convert/conversion_journal.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/cache/brick_log.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/cell_octants.h"
+#include "stream/cache/partial_folder.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
@@ -410,6 +413,18 @@ TEST_F(ToAnExistingCache, ClearsWhatAKilledOneLeft) {
   const Files after = filesOf(cache);
   EXPECT_EQ(after.size(), before.size() + 1);
   EXPECT_TRUE(after.contains("var.1.bin"));
+}
+
+TEST_F(ToAnExistingCache, ClearsAConversionKilledAtItsEnd) {
+  const fs::path scratch = folder / "a.splats.tmp.7.0";
+  fs::create_directory(scratch);
+  std::ofstream(scratch / "splats.bin") << "rest";
+  writeJournal(cache, {{}, scratch, std::nullopt});
+  std::ofstream(cache / kBrickLogName) << "rest";
+  std::ofstream(cache / kPartialLock) << kPartialMark;
+  addQuietly(source, adding(cache, {1}));
+  EXPECT_EQ(filesOf(cache).size(), before.size() + 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
