@@ -101,6 +101,7 @@ def draw(simple, image, points, pictures):
     """Both sources in a view, coloured by t, which runs from 0 to 20; tests that the pictures have the colours' ends."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOImage import vtkPNGReader
+    pathlib.Path(pictures).mkdir(parents=True, exist_ok=True)
     view = simple.CreateView("RenderView")
     view.ViewSize = [640, 480]
     view.OrientationAxesVisibility = 0
