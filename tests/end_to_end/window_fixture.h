@@ -87,6 +87,14 @@ class WindowTest : public testing::Test {
     act({"click", "1"});
   }
   void click(const std::string& widget) { click(placeOf(widget)); }
+  /// Chooses an item of a menu. The first click may come before the window hears.
+  void choose(const std::string& menu, const std::string& item) {
+    EXPECT_TRUE(eventually([&] {
+      click("menu " + menu);
+      return eventually([&] { return hasWidget("item " + item); }, 5);
+    })) << menu;
+    click("item " + item);
+  }
   void addPoint() { click(placeOf("curve", 0.28, 0.2)); }
   void chooseScalar(const std::string& name) {
     click("scalar");

@@ -21,8 +21,7 @@ class WindowMovie : public WindowTest {
 
   /// Chooses it from the menu and types the name; waits until it is saved, or does not.
   void saveMovie(const std::string& item, const std::string& name) {
-    click("menu File");
-    click("item " + item);
+    choose("File", item);
     placeOf("file name");
     press("ctrl+a");
     act({"type", name});

@@ -28,11 +28,6 @@ class WindowPanels : public WindowTest {
     })) << begin;
     return name;
   }
-  /// Chooses an item of a menu.
-  void choose(const std::string& menu, const std::string& item) {
-    click("menu " + menu);
-    click("item " + item);
-  }
   /// Unfolds the list of markers, below others that make room.
   void openMarkers() {
     click("Colours and opacities");
