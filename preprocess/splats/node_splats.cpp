@@ -9,21 +9,15 @@
 #include <limits>
 
 #include "preprocess/splats/covered_part.h"
+#include "preprocess/splats/faces_behind.h"
 #include "preprocess/splats/inner_nodes.h"
 #include "preprocess/splats/lq.h"
+#include "preprocess/splats/node_lattice.h"
 #include "preprocess/splats/shape.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {
-
-constexpr double kMinAcross = 1e-5;  // sine of an inward direction's angle with its face
-
-/// Where a node's neighbours are, counted in elements of NodeArrays. A missing neighbour is the node itself:
-/// half the difference of the two is then the Jacobian's column in every case.
-struct Neighbours {
-  std::array<ptrdiff_t, 3> before{}, after{};  // along i, j, k; <= 0 and >= 0
-};
 
 /// The rows of `window` that the splats of `box` may depend on.
 NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
@@ -31,17 +25,6 @@ NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
   return {std::max(window.j0, box.j0 - std::min(box.j0, kReach)), std::min(window.j1, box.j1 + kReach),
           std::max(window.k0, box.k0 - std::min(box.k0, kReach)), std::min(window.k1, box.k1 + kReach)};
 }
-
-/// The faces of a block that a node is one away from: along i, j and k 1 from the lower one, -1 from the upper one, or 0.
-using Layers = std::array<int, 3>;
-
-/// A face of the block, at the node of it next to a node in the layer behind.
-struct FaceBehind {
-  ptrdiff_t node;            // element of NodeArrays
-  Neighbours beside;         // its own
-  glm::dvec3 position{0.0};  // of the plane, with the
-  glm::dvec3 normal{0.0};    // inwards; zero where the face has collapsed
-};
 
 /// What the nodes of a box of a window have in common.
 class Window {
@@ -51,10 +34,8 @@ class Window {
       : in_(in),
         near_(rowsAround(box, in.window)),
         corrections_(corrections),
-        x_(in.nodes->x.data()),
-        y_(in.nodes->y.data()),
-        z_(in.nodes->z.data()),
-        blank_(in.nodes->blank.data()),
+        lattice_{in.nodes->x.data(), in.nodes->y.data(), in.nodes->z.data(), in.nodes->blank.data()},
+        faces_(lattice_, corrections.middles),
         ni_(in.block.ni),
         i0_(in.i0),
         i1_(in.endOfPart(in.block.ni)),
@@ -84,13 +65,6 @@ class Window {
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
   void takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at);
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, const Layers& layers);
-  FaceBehind faceBehind(ptrdiff_t at, const Neighbours& neighbours, int axis, int side) const;
-  void cutBehindFace(NodeSplat& node, const FaceBehind& face) const;
-  template <typename Rotate>
-  void cutBehindFaces(ptrdiff_t at, const Neighbours& neighbours, const Layers& layers,
-                      const std::array<double, 3>& inwards, const Rotate& rotate);
-  glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
-  double spacing(ptrdiff_t at, const Neighbours& neighbours) const;
   /// Leaves of the last splat what neither other blocks nor blanked cells cover. Returns false if that is nothing.
   template <typename Rotate>
   bool keepPart(ptrdiff_t at, const Rotate& rotate) {
@@ -110,8 +84,8 @@ class Window {
   const BlockWindow& in_;
   const NodeBox near_;
   const NodeSplatCorrections corrections_;
-  const double *x_, *y_, *z_;
-  const uint8_t* blank_;
+  const NodeLattice lattice_;
+  const FacesBehind faces_;
   std::vector<const float*> scalars_;
   uint64_t ni_, i0_, i1_;  // of a row; its part
   ptrdiff_t row_stride_, plane_stride_;
@@ -122,23 +96,8 @@ class Window {
   size_t count_ = 0;
 };
 
-/// How far a cell's middle lies beside the line through its column, where the grid line bends at the node: the
-/// cell's two halves go straight to either neighbour, `before` and `after` away, and weigh as much as they are
-/// long.
-inline glm::dvec3 asideOf(const glm::dvec3& to_before, const glm::dvec3& to_after, double before,
-                          double after) {
-  if (!(before + after > 0)) return glm::dvec3(0.0);
-  const double share = before / (before + after);
-  return 0.25 * (share * to_after - (1 - share) * to_before);
-}
-
 bool isFace(uint64_t index, uint64_t count) {
   return index == 0 || index + 1 == count;
-}
-
-int layerOf(uint64_t index, uint64_t count) {
-  if (count < 4) return 0;
-  return index == 1 ? 1 : index + 2 == count ? -1 : 0;
 }
 
 void Window::findBlanks() {
@@ -149,7 +108,7 @@ void Window::findBlanks() {
   for (uint64_t k = near_.k0; k < near_.k1; ++k) {
     for (uint64_t j = near_.j0; j < near_.j1; ++j) {
       const uint64_t row = (k - in_.window.k0) * rows_a_plane + (j - in_.window.j0);
-      scratch_.has_blank.push_back(std::memchr(blank_ + row * ni_ + first, 1, count) != nullptr);
+      scratch_.has_blank.push_back(std::memchr(lattice_.blank + row * ni_ + first, 1, count) != nullptr);
     }
   }
 }
@@ -196,11 +155,11 @@ void Window::addRow(uint64_t j, uint64_t k) {
   }
   for (uint64_t i = i0_; i < i1_; ++i) {
     const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
-    if (blank_[at]) continue;
+    if (lattice_.blank[at]) continue;
     Neighbours neighbours = at_i(i);
     for (int axis = 0; axis < 3; ++axis) {
-      if (blank_[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
-      if (blank_[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
+      if (lattice_.blank[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
+      if (lattice_.blank[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
     }
     if (corrections_.octants) octants_of_blanks_ = octantsOfBlanks(at, neighbours);
     addNode(i, at, neighbours, on_face || isFace(i, ni_), layers_at(i));
@@ -220,8 +179,8 @@ uint64_t Window::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) con
       step[axis] = (is_below && before != 0) || after == 0 ? before : after;
     }
     const ptrdiff_t ij = step[0] + step[1];
-    if (blank_[at + ij] || blank_[at + step[0] + step[2]] || blank_[at + step[1] + step[2]] ||
-        blank_[at + ij + step[2]])
+    if (lattice_.blank[at + ij] || lattice_.blank[at + step[0] + step[2]] ||
+        lattice_.blank[at + step[1] + step[2]] || lattice_.blank[at + ij + step[2]])
       points |= octantPoints(octant);
   }
   return points == kAllCovered ? 0 : points;
@@ -249,7 +208,7 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
     const auto one_by_one = [&](uint64_t begin, uint64_t end) {
       for (uint64_t i = begin; i < end; ++i) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
-        if (blank_[at]) continue;
+        if (lattice_.blank[at]) continue;
         const Stretch stretch = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
         out[i - i0_] = stretch.factor;
         growth[i - i0_] = stretch.growth;
@@ -258,8 +217,8 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
     };
     const auto at_once = [&](uint64_t begin, uint64_t end) {
       if (begin >= end) return;
-      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(begin), strides[axis], end - begin,
-                   {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)});
+      stretchNodes({lattice_.x, lattice_.y, lattice_.z}, row + static_cast<ptrdiff_t>(begin), strides[axis],
+                   end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)});
     };
     bool whole = true;
     if (axis == 0) {
@@ -285,11 +244,12 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
 Stretch Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
   const auto neighbours = [&](uint64_t most, ptrdiff_t step) {
     int found = 0;
-    while (found < kStretchReach && static_cast<uint64_t>(found) < most && !blank_[at + (found + 1) * step])
+    while (found < kStretchReach && static_cast<uint64_t>(found) < most &&
+           !lattice_.blank[at + (found + 1) * step])
       ++found;
     return found;
   };
-  return stretchOnLine({x_, y_, z_}, at, stride, neighbours(index, -stride),
+  return stretchOnLine({lattice_.x, lattice_.y, lattice_.z}, at, stride, neighbours(index, -stride),
                        neighbours(count - 1 - index, stride));
 }
 
@@ -298,7 +258,7 @@ void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighb
   const uint64_t in_part = i0 - i0_, count = i1 - i0;
   const ptrdiff_t at = row + static_cast<ptrdiff_t>(i0);
   InnerRow nodes;
-  nodes.positions = {x_, y_, z_};
+  nodes.positions = {lattice_.x, lattice_.y, lattice_.z};
   nodes.at = at;
   nodes.scalars = scalars_;
   nodes.bend = kBend;
@@ -353,9 +313,21 @@ void Window::takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrd
       {scratch_.growth[0][in_part], scratch_.growth[1][in_part], scratch_.growth[2][in_part]}, rotate);
   node.on_block_face = node.behind_face = false;
   node.layers = 0;
-  node.node_position = position(at);
+  node.node_position = lattice_.position(at);
   node.spacing = 0;
   (splats.determinant[n] < 0 ? out_.left_handed : out_.right_handed) += 1;
+}
+
+/// Columns: the images of the directions inwards from the faces that a cell ends at, or is behind.
+template <typename Rotate>
+glm::dmat3 alongFaces(const std::array<double, 3>& inwards, const Layers& layers, const Rotate& rotate) {
+  glm::dmat3 along;
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dvec3 inward(0.0);
+    inward[axis] = inwards[axis] != 0 ? inwards[axis] : layers[axis];
+    along[axis] = rotate(inward);
+  }
+  return along;
 }
 
 inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face,
@@ -365,15 +337,16 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
                            scratch_.stretch[2][in_part]);
   NodeSplat& node = out_.splats[count_];
   node.node = first_node_of_row_ + i;
-  node.node_position = position(at);
+  node.node_position = lattice_.position(at);
   node.on_block_face = on_face;
   node.behind_face = false;
   node.layers = 0;
-  node.spacing = on_face ? spacing(at, neighbours) : 0.0;
+  node.spacing = on_face ? lattice_.spacing(at, neighbours) : 0.0;
 
   glm::dmat3 jacobian;  // columns along i, j, k
   for (int axis = 0; axis < 3; ++axis)
-    jacobian[axis] = 0.5 * (position(at + neighbours.after[axis]) - position(at + neighbours.before[axis]));
+    jacobian[axis] = 0.5 * (lattice_.position(at + neighbours.after[axis]) -
+                            lattice_.position(at + neighbours.before[axis]));
 
   // Where the middle of the cell is from the node along its columns, in cells. The cell reaches half way to
   // either neighbour, at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one
@@ -385,8 +358,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   std::array<float, 3> growth{};
   double weight_factor = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const glm::dvec3 to_before = node.node_position - position(at + neighbours.before[axis]);
-    const glm::dvec3 to_after = position(at + neighbours.after[axis]) - node.node_position;
+    const glm::dvec3 to_before = node.node_position - lattice_.position(at + neighbours.before[axis]);
+    const glm::dvec3 to_after = lattice_.position(at + neighbours.after[axis]) - node.node_position;
     const double a = glm::length(to_before), b = glm::length(to_after);
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
     if (whole) {
@@ -456,13 +429,14 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
                                    : out_.right_handed) += 1;
         if (frame.kIsPlain && corrections_.faces && layers != Layers{}) {
           // Of one face that the node is behind, or of one of several without that correction, the code has the exact plane.
+          const NodeBehind behind{at, neighbours, layers};
           const int first = layers[1] != 0 ? 1 : layers[2] != 0 ? 2 : 0;
           const auto several =
               std::count_if(layers.begin(), layers.end(), [](int side) { return side != 0; });
           if (node.border_code == kNoBorder && (several == 1 || !corrections_.layers))
-            cutBehindFace(node, faceBehind(at, neighbours, first, layers[first]));
+            faces_.cutAtOne(behind, first, node);
           else if (corrections_.layers)
-            cutBehindFaces(at, neighbours, layers, inwards, rotate);
+            faces_.cutAtSeveral(behind, inwards, alongFaces(inwards, layers, rotate), count_, out_);
         }
         set_values(frame);
         is_left = keepPart(at, rotate);
@@ -471,100 +445,9 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   count_ += is_left;
 }
 
-/// Of a node whose neighbours along the axis are both there.
-FaceBehind Window::faceBehind(ptrdiff_t at, const Neighbours& neighbours, int axis, int side) const {
-  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-  FaceBehind face{at + (side < 0 ? neighbours.after[axis] : neighbours.before[axis]), neighbours};
-  Neighbours& beside = face.beside;
-  for (int other : {u, v}) {
-    if (blank_[face.node + beside.before[other]]) beside.before[other] = 0;
-    if (blank_[face.node + beside.after[other]]) beside.after[other] = 0;
-  }
-  beside.before[axis] = side < 0 ? at - face.node : 0;
-  beside.after[axis] = side < 0 ? 0 : at - face.node;
-  const auto along = [&](int other) {
-    return position(face.node + beside.after[other]) - position(face.node + beside.before[other]);
-  };
-  const glm::dvec3 inward = position(at) - position(face.node);
-  face.position = position(face.node);
-  glm::dvec3 normal = glm::cross(along(u), along(v));
-  if (corrections_.middles) {
-    for (int other : {u, v}) {
-      if (beside.before[other] == 0 || beside.after[other] == 0) continue;
-      const glm::dvec3 to_before = position(face.node) - position(face.node + beside.before[other]);
-      const glm::dvec3 to_after = position(face.node + beside.after[other]) - position(face.node);
-      face.position += asideOf(to_before, to_after, glm::length(to_before), glm::length(to_after));
-    }
-  }
-  const double across = glm::dot(normal, inward);
-  if (!(std::abs(across) > kMinAcross * glm::length(normal) * glm::length(inward))) return face;
-  face.normal = across < 0 ? -normal : normal;
-  return face;
-}
-
-/// Sets the code of a node that is behind one face.
-void Window::cutBehindFace(NodeSplat& node, const FaceBehind& face) const {
-  if (face.normal == glm::dvec3(0.0)) return;
-  // Of a plane n · (x - X0) = 0, A⁻¹ (x - X0) is at right angles to Aᵀ n.
-  const glm::dvec3 in_frame = face.normal * node.splat.factor();
-  const double length = glm::length(in_frame);
-  const uint32_t code =
-      packLayerCode(in_frame / length, glm::dot(face.normal, node.splat.position - face.position) / length);
-  if (code == kNoBorder) return;
-  node.border_code = code;
-  node.behind_face = true;
-  node.node_position = position(face.node);
-  node.spacing = spacing(face.node, face.beside);
-}
-
-/// Sets the code of the last node, which ends at faces (`inwards`, as borderCode() takes it) or is behind several.
-template <typename Rotate>
-void Window::cutBehindFaces(ptrdiff_t at, const Neighbours& neighbours, const Layers& layers,
-                            const std::array<double, 3>& inwards, const Rotate& rotate) {
-  constexpr double kAlong = 0.8;                     // cosine of the lattice's axis with the face's normal
-  constexpr double kNearest = 0.6, kFarthest = 1.6;  // face, in cells
-  NodeSplat& node = out_.splats[count_];
-  std::array<glm::dvec3, 3> ends{};
-  std::array<LayerAxis, 3> behind{};
-  size_t end_count = 0, count = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    glm::dvec3 along(0.0);
-    along[axis] = inwards[axis] != 0 ? inwards[axis] : layers[axis];
-    if (inwards[axis] != 0) {
-      ends[end_count++] = rotate(along);
-      continue;
-    }
-    if (layers[axis] == 0 || neighbours.before[axis] == 0 || neighbours.after[axis] == 0) continue;
-    const FaceBehind face = faceBehind(at, neighbours, axis, layers[axis]);
-    const glm::dvec3 in_frame = face.normal * node.splat.factor(), inward = rotate(along);
-    const double length = glm::length(in_frame);
-    const double distance = glm::dot(face.normal, node.splat.position - face.position) / length;
-    if (!(glm::dot(in_frame, inward) > kAlong * length && distance > kNearest && distance < kFarthest))
-      continue;
-    behind[count++] = {inward, static_cast<uint8_t>(axis), distance};
-    out_.probes.push_back(
-        {count_, {static_cast<uint8_t>(axis), position(face.node), spacing(face.node, face.beside)}});
-  }
-  if (count == 0) return;
-  const LayeredBorder border = layeredBorder({ends.data(), end_count}, {behind.data(), count});
-  node.border_code = border.code;
-  node.layers = border.layers;
-}
-
-double Window::spacing(ptrdiff_t at, const Neighbours& neighbours) const {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const auto& offsets : {neighbours.before, neighbours.after}) {
-    for (const ptrdiff_t offset : offsets) {
-      const double distance = glm::distance(position(at + offset), position(at));
-      if (distance > 0) smallest = std::min(smallest, distance);
-    }
-  }
-  return std::isfinite(smallest) ? smallest : 0.0;
-}
-
 double Window::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
-  const glm::dvec3 here = glm::abs(position(at));
-  for (const double length : {spacing(at, neighbours), std::max({here.x, here.y, here.z})})
+  const glm::dvec3 here = glm::abs(lattice_.position(at));
+  for (const double length : {lattice_.spacing(at, neighbours), std::max({here.x, here.y, here.z})})
     if (length > 0) return std::max(kAxisFloor * length, std::numeric_limits<double>::min());
   return kAxisFloor;
 }
