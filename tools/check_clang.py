@@ -17,6 +17,7 @@ import concurrent.futures
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
@@ -33,6 +34,13 @@ FLAGS = ["-Wthread-safety", "-Werror", "-Wno-unknown-warning-option", "-Wno-bitw
 AT_A_TIME = 16
 
 
+def sources_of(file):
+    """What a file of the build compiles: itself, or those that it includes (tools/cmake/unity.cmake)."""
+    if file.parent.name != "Unity":
+        return [file]
+    return [pathlib.Path(source) for source in re.findall(r'#include "(.*)"', file.read_text(encoding="utf-8"))]
+
+
 def commands(chosen):
     """(file, its compiler's arguments) of each source of ours, or of those chosen."""
     path = BUILD / "compile_commands.json"
@@ -40,9 +48,9 @@ def commands(chosen):
         sys.exit("check_clang: build/release is not configured; run tools/build.sh first")
     ours = {}
     for entry in json.loads(path.read_text()):
-        file = pathlib.Path(entry["file"])
-        if not file.is_relative_to(ROOT / "build") and (not chosen or file in chosen):
-            ours[file] = shlex.split(entry["command"])
+        for file in sources_of(pathlib.Path(entry["file"])):
+            if not file.is_relative_to(ROOT / "build") and (not chosen or file in chosen):
+                ours[file] = shlex.split(entry["command"])
     missing = chosen - ours.keys()
     if missing:
         sys.exit(f"check_clang: {min(missing)}: no target compiles this file; name a .cpp file of the build")

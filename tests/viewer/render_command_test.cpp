@@ -13,7 +13,7 @@ Manifest manifest() {
   return made;
 }
 
-std::string commandOf(const ViewState& state, const std::string& cache = "a.splats") {
+std::string commandText(const ViewState& state, const std::string& cache = "a.splats") {
   return renderCommand(state, {cache, {300, 200}, "f.json", "o.json"});
 }
 
@@ -26,7 +26,7 @@ TEST(RenderCommand, LeavesDefaultsOut) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   state.annotations = {};
   state.camera = {{3, 1.0 / 3, 2}, {1, 0.5, 0.5}, {0, 0, 1}, Projection::kOrthographic, 0.7, 30};
-  EXPECT_EQ(commandOf(state, "a b.splats"),
+  EXPECT_EQ(commandText(state, "a b.splats"),
             "curvisplat render 'a b.splats' -o picture.png --size 300x200 --scalar density --tf viridis "
             "--range 0.5,3 --opacity-unit 0.0244949 --position 3,0.333333,2 --focal-point 1,0.5,0.5 "
             "--parallel-scale 0.7");
@@ -48,7 +48,7 @@ TEST(RenderCommand, HasEveryOption) {
   state.lit = state.dark = true;
   state.annotations.axes = false;
   state.classification = Classification::kFlat;
-  expectParts(commandOf(state, "it's.splats"), {"'it'\\''s.splats'",
+  expectParts(commandText(state, "it's.splats"), {"'it'\\''s.splats'",
                                                 "--scalar 'u v'",
                                                 "--tf viridis",
                                                 "--range=-1,1",
@@ -76,7 +76,7 @@ TEST(RenderCommand, OfTwoScalarsHasBothFunctions) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   state.opacity_by = OpacityScalar{"u v", EditedFunction("grey", -1, 0.5, 0.25)};
   state.opacity_by->function.addPoint(0.5, 0.25);
-  expectParts(commandOf(state), {"--tf viridis", "--range 0.5,3", "--opacity-by 'u v'",
+  expectParts(commandText(state), {"--tf viridis", "--range 0.5,3", "--opacity-by 'u v'",
                                  "--opacity-range=-1,0.5", "0.5:0.25", "--opacity-unit 0.25"});
 }
 
@@ -85,7 +85,7 @@ TEST(RenderCommand, OfAnAutomaticFunctionHasItsScale) {
   state.function = EditedFunction::automatic(
       {"inferno", {0.5, 3}, AsinhScale{1, 0.25}, {{0, 0.5}, {0.25, 0}, {1, 0.75}}, 0.5});
   EXPECT_FALSE(needsFile(state.function));
-  expectParts(commandOf(state), {"--tf inferno", "--asinh 1,0.25", "--opacity 0:0.5,0.25:0,1:0.75"});
+  expectParts(commandText(state), {"--tf inferno", "--asinh 1,0.25", "--opacity 0:0.5,0.25:0,1:0.75"});
 }
 
 TEST(RenderCommand, OnlySettingsWithoutAnOptionNeedAFile) {
@@ -96,8 +96,8 @@ TEST(RenderCommand, OnlySettingsWithoutAnOptionNeedAFile) {
   EXPECT_TRUE(needsFile(function));
   ViewState state = firstViewOf(manifest(), {300, 200});
   state.function = function;
-  expectParts(commandOf(state), {"--tf f.json"});
-  EXPECT_EQ(commandOf(state).find("--range"), std::string::npos);
+  expectParts(commandText(state), {"--tf f.json"});
+  EXPECT_EQ(commandText(state).find("--range"), std::string::npos);
   EditedFunction logarithmic("viridis", 1, 2, 1);
   ASSERT_TRUE(logarithmic.setLogScale(true));
   EXPECT_TRUE(needsFile(logarithmic));

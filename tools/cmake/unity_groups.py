@@ -1,9 +1,14 @@
-"""Which sources can be compiled together, as one that includes them (tools/check_clang.py). None of a group declares a name for
-itself that another one declares, too: a static function, or one in a namespace without name, say. One that has a type of the name
-of a header's is alone. What is declared is read from the layout: our formatter puts declarations of a namespace at the beginning
-of a line, and nothing else."""
+#!/usr/bin/env python3
+"""Which sources can be compiled together, as one that includes them (tools/check_clang.py, unity.cmake).
+
+    unity_groups.py SIZE FILE ...    prints the number of each file's group, one a line
+
+A group has at most SIZE files. None of them declares a name for itself that another one declares, too: a static function, or one in a
+namespace without name, say. One that has a type of the name of a header's is alone. What is declared is read from the layout: our
+formatter puts declarations of a namespace at the beginning of a line, and nothing else."""
 import pathlib
 import re
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -52,3 +57,12 @@ def groups(texts, size, taken=frozenset()):
         known[at] = [size if own & taken else known[at][0] + 1, known[at][1] | own]
         numbers.append(at)
     return numbers
+
+
+def main(size, *files):
+    for number in groups([pathlib.Path(file).read_text(encoding="utf-8") for file in files], int(size), types_of_headers()):
+        print(number)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

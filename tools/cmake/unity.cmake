@@ -1,0 +1,52 @@
+# Compiles sources of tests together, up to ten at a time: most of a source's time is its headers'. unity_groups.py says which
+# can be. Those with options of their own stay alone.
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+
+function(curvisplat_together target)
+  get_target_property(all ${target} SOURCES)
+  get_target_property(folder ${target} SOURCE_DIR)
+  set(sources)
+  foreach(source ${all})
+    get_filename_component(source ${source} ABSOLUTE BASE_DIR ${folder})
+    set(own)
+    foreach(property COMPILE_OPTIONS COMPILE_DEFINITIONS GENERATED)
+      get_source_file_property(value ${source} TARGET_DIRECTORY ${target} ${property})
+      if(value)
+        list(APPEND own ${property})
+      endif()
+    endforeach()
+    if(source MATCHES "\\.cpp$" AND NOT own)
+      list(APPEND sources ${source})
+    endif()
+  endforeach()
+  if(NOT sources)
+    return()
+  endif()
+  execute_process(
+    COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tools/cmake/unity_groups.py 10 ${sources}
+    OUTPUT_VARIABLE groups OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+  string(REPLACE "\n" ";" groups "${groups}")
+  foreach(source group IN ZIP_LISTS sources groups)
+    set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES UNITY_GROUP group_${group})
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  # GCC takes the sources for headers of the file that includes them; and what is local in one may have the name of another's.
+  target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-shadow)
+endfunction()
+
+function(curvisplat_together_in folder)
+  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  foreach(target ${targets})
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL "EXECUTABLE")
+      curvisplat_together(${target})
+    endif()
+  endforeach()
+  get_property(folders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
+  foreach(inner ${folders})
+    curvisplat_together_in(${inner})
+  endforeach()
+endfunction()
+
+# The libraries and the program are compiled as everyone compiles them.
+curvisplat_together_in(${PROJECT_SOURCE_DIR}/tests)
