@@ -148,7 +148,8 @@ class PixelSurfaces {
     if (count == 0) return;
     size_t left = kSamples - static_cast<size_t>(std::popcount(hidden));
     // Most pixels have one layer: its samples need not be in order.
-    if (double{farthest} - double{seen[nearest].value} <= toleranceOf(seen[nearest])) {
+    const double spread = double{farthest} - double{seen[nearest].value};
+    if (spread <= kNear * pixelOf(seen[nearest].value) || spread <= toleranceOf(seen[nearest])) {
       layers.push_back(layerOf(std::span(seen).first(count), x, y, left, hidden));
       return;
     }
@@ -311,8 +312,10 @@ class PixelSlices {
 }  // namespace
 
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
-                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look) {
-  const SceneTriangles triangles(scene, view, look.depth_origin);
+                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,
+                     ScreenVertices* memory) {
+  SceneTriangles triangles(scene, view, look.depth_origin,
+                           memory ? std::exchange(*memory, {}) : ScreenVertices());
   const TriangleBins bins(triangles);
   const Shader shader(triangles, look);
   const PixelSurfaces pixel_surfaces(triangles, shader);
@@ -352,6 +355,7 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
       }
     }
   });
+  if (memory) *memory = triangles.takeMemory();
   return {view.size, std::move(rows), look.depth_origin};
 }
 
