@@ -182,7 +182,7 @@ TEST_F(SurfaceOptions, AClipPlaneKeepsTheSliceInIt) {
   };
   const Image whole = with("4,0,-900,0,0,1");
   float brightest = 0;
-  for (const float value : whole.rgba) brightest = std::max(brightest, value);
+  for (size_t n = 0; n < whole.rgba.size(); n += 4) brightest = std::max(brightest, whole.rgba[n]);
   EXPECT_GT(brightest, 0.3f);
   const auto farthest = [&](const Image& other) {
     float most = 0;
@@ -194,7 +194,9 @@ TEST_F(SurfaceOptions, AClipPlaneKeepsTheSliceInIt) {
     EXPECT_LT(farthest(with(in_it)), 0.02f) << in_it;
   const Image nothing = with("4,0,0.4,0,0,1");
   for (size_t n = 0; n < nothing.rgba.size(); ++n)
-    if (n % 4 != 3) ASSERT_EQ(nothing.rgba[n], 0) << n;
+    if (n % 4 != 3) {
+      ASSERT_EQ(nothing.rgba[n], 0) << n;
+    }
 }
 
 /// A surface that fills the picture with one colour is what was asked for: no option of the volume changes it.
