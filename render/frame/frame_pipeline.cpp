@@ -60,7 +60,7 @@ uint64_t sceneBytes(const FrameOptions& options) {
   const bool peels =
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
       std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
-  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 12, kTriangleBytes = 8;
+  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8;
   uint64_t bytes = kSampleTileBytes * (peels ? PixelLayers::kMaxLayers : 1) * threadsOf(options) +
                    options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
@@ -167,6 +167,7 @@ void FramePipeline::makePools(const FrameOptions& options) {
 
 void FramePipeline::release() {
   endPrefetch();
+  surface_memory_ = {};
   dropPools();
 }
 
@@ -200,7 +201,10 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameRegion& region, 
 }
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
-  if (!options.scene || (options.scene->empty() && options.scene->volume)) return;
+  if (!options.scene || (options.scene->empty() && options.scene->volume)) {
+    surface_memory_ = {};
+    return;
+  }
   const ScreenView& view = plan.settings.view;
   const auto samplerOf = [&](const SlicePlan& slice, size_t variable) {
     const VariableInfo& info = cache_.manifest().variables[variable];
@@ -239,7 +243,7 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
   std::shared_ptr<const PixelLayers> layers;
   arenaOf(options).execute([&] {
     const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
-    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look));
+    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, &surface_memory_));
   });
   planner_.addLayers(plan, std::move(layers), options);
 }

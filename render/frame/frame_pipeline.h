@@ -26,6 +26,7 @@
 #include "render/frame/hidden_bricks.h"
 #include "render/surface/face_meshes.h"
 #include "render/surface/iso_layers.h"
+#include "render/surface/scene_triangles.h"
 #include "render/surface/slice_sampler.h"
 #include "stream/base/mutex.h"
 #include "stream/base/progress.h"
@@ -93,6 +94,7 @@ class FramePipeline {
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;
   FaceMeshes face_meshes_;
+  ScreenVertices surface_memory_;   // of the last picture's surfaces, for the next one's
   uint64_t least_pager_bytes_ = 0;  // that the largest brick of any step so far needs
 
   Mutex mutex_;  // a stop comes from another thread

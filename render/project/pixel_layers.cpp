@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/base/huge_pages.h"
 
 namespace curvisplat {
 namespace {
@@ -44,6 +45,8 @@ PixelLayers::PixelLayers(ImageSize size, std::vector<Row> rows, double depth_ori
   }
   CURVISPLAT_CHECK_OP(first_pixel.back(), ==, size.pixels());
   begins_.resize(size.pixels() + 1);
+  layers_.reserve(first_layer.back());
+  preferHugePages(layers_.data(), layers_.capacity() * sizeof(PixelLayer));
   layers_.resize(first_layer.back());
   tbb::parallel_for(size_t{0}, rows.size(), [&](size_t n) {
     auto begin = static_cast<uint32_t>(first_layer[n]);

@@ -18,7 +18,8 @@ constexpr double kFinestPixels = 0.5;
 // is to be seen only by their number. Beyond, smooth normals would suffer.
 constexpr double kFreeEdges = 2;
 constexpr size_t kMinNodes = 1 << 16;
-constexpr uint64_t kBytesANode = 148;  // while a mesh is made: nodes, triangles, and the mesh itself
+// While a mesh is made: nodes, triangles, the mesh itself, and the last picture's vertices on the screen.
+constexpr uint64_t kBytesANode = 164;
 
 size_t mostNodes(uint64_t pixels) {
   return std::max<size_t>(kMinNodes, pixels);

@@ -46,8 +46,8 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
   y1_ = std::min(y0_ + kSampleTileHeight, triangles.view().size.height) - 1;
   before_ = before;
   bool cleared = false;
-  std::array<uint32_t, kLeftAtOnce> left;
-  const bool any = bins.forTile(column, row, [&](size_t surface, std::span<const uint32_t> seen) {
+  std::array<uint32_t, kLeftAtOnce> numbers, left;
+  const bool any = bins.forTile(column, row, [&](size_t surface, std::span<const TriangleRun> seen) {
     if (!std::exchange(cleared, true)) {
       PixelSamples nothing;
       nothing.values.fill(INFINITY);
@@ -56,9 +56,10 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
     }
     const TriangleMesh& mesh = *triangles.scene().surfaces[surface].mesh;
     const std::vector<ScreenVertex>& vertices = triangles.verticesOf(surface);
-    for (; !seen.empty(); seen = seen.subspan(std::min(kLeftAtOnce, seen.size()))) {
+    size_t taken = 0;
+    const auto drawTaken = [&] {
       const size_t count = drawSmallTriangles(
-          {vertices.data(), mesh.triangles.data(), seen.first(std::min(kLeftAtOnce, seen.size())),
+          {vertices.data(), mesh.triangles.data(), std::span(numbers).first(std::exchange(taken, 0)),
            triangles.firstOf(surface)},
           {samples_.data(), before ? before->samples_.data() : nullptr, x0_, y0_, x1_, y1_}, left.data());
       for (size_t n = 0; n < count; ++n) {
@@ -74,7 +75,13 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
         for (size_t v = 2; v < polygon.count; ++v)
           drawTriangle({polygon.vertices[0], polygon.vertices[v - 1], polygon.vertices[v]}, number);
       }
-    }
+    };
+    for (const TriangleRun& run : seen)
+      for (uint32_t n = 0; n < run.count; ++n) {
+        numbers[taken++] = run.first + n;
+        if (taken == kLeftAtOnce) drawTaken();
+      }
+    if (taken > 0) drawTaken();
   });
   // All of it may lie before what is asked for.
   return any && (!before || std::any_of(samples_.begin(), samples_.end(), [](const PixelSamples& pixel) {

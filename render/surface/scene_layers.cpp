@@ -148,7 +148,8 @@ class PixelSurfaces {
     if (count == 0) return;
     size_t left = kSamples - static_cast<size_t>(std::popcount(hidden));
     // Most pixels have one layer: its samples need not be in order.
-    if (double{farthest} - double{seen[nearest].value} <= toleranceOf(seen[nearest])) {
+    const double spread = double{farthest} - double{seen[nearest].value};
+    if (spread <= kNear * pixelOf(seen[nearest].value) || spread <= toleranceOf(seen[nearest])) {
       layers.push_back(layerOf(std::span(seen).first(count), x, y, left, hidden));
       return;
     }
@@ -286,7 +287,7 @@ class PixelSlices {
       const auto sample = slice->at(x, y, look_.depth_origin);
       if (!sample) continue;
       const double pixel = pixelSide(view_, view_.viewFromData(sample->at).z);
-      const float alpha = sample->coverage * coverageAt(look_.clip_planes, sample->at, pixel) *
+      const float alpha = sample->coverage * leftOf(n, sample->at, pixel) *
                           static_cast<float>(scene_.slice_opacity) * opacityOf(n, *sample, x, y);
       const glm::vec3 colour = look_.colours.at(sample->scalar);  // unlit: to be compared with the scalar bar
       layers.push_back({sample->depth, glm::vec4(alpha * colour, alpha), static_cast<float>(sample->scalar)});
@@ -294,6 +295,22 @@ class PixelSlices {
   }
 
  private:
+  /// What clip planes leave of a slice at a point. They keep what lies in them: a slice in a clip plane shows the cut, and
+  /// coverageAt() would leave half of it.
+  float leftOf(size_t slice, const glm::dvec3& at, double pixel) const {
+    constexpr double kParallel = 1e-6, kInPlane = 0.01;  // of an angle; pixels
+    const glm::dvec3 normal = glm::normalize(scene_.slices[slice].normal);
+    float left = 1;
+    for (const ClipPlane& plane : look_.clip_planes) {
+      const glm::dvec3 inwards = glm::normalize(plane.normal);
+      if (glm::length(glm::cross(normal, inwards)) > kParallel)
+        left *= coverageAt(std::span(&plane, 1), at, pixel);
+      else if (glm::dot(inwards, at - plane.point) < -kInPlane * pixel)
+        return 0;
+    }
+    return left;
+  }
+
   /// By the function.
   float opacityOf(size_t slice, const SliceSampler::Sample& sample, int x, int y) const {
     if (!scene_.slices_by_function || !look_.opacities) return 1;
@@ -311,8 +328,10 @@ class PixelSlices {
 }  // namespace
 
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
-                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look) {
-  const SceneTriangles triangles(scene, view, look.depth_origin);
+                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,
+                     ScreenVertices* memory) {
+  SceneTriangles triangles(scene, view, look.depth_origin,
+                           memory ? std::exchange(*memory, {}) : ScreenVertices());
   const TriangleBins bins(triangles);
   const Shader shader(triangles, look);
   const PixelSurfaces pixel_surfaces(triangles, shader);
@@ -352,6 +371,7 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
       }
     }
   });
+  if (memory) *memory = triangles.takeMemory();
   return {view.size, std::move(rows), look.depth_origin};
 }
 

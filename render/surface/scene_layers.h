@@ -11,6 +11,7 @@
 #include "render/project/screen_view.h"
 #include "render/surface/colour_table.h"
 #include "render/surface/iso_layers.h"
+#include "render/surface/scene_triangles.h"
 #include "render/surface/slice_sampler.h"
 #include "render/surface/surface_scene.h"
 
@@ -29,10 +30,11 @@ struct SceneLook {
 };
 
 /// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread (with
-/// translucent surfaces 1 MiB), and 12
-/// bytes a vertex and some 6 a triangle of surfaces. Parallel on the caller's TBB arena; the same bits for any number
-/// of threads.
+/// translucent surfaces 1 MiB), and 12 bytes a vertex and at most some 8 a triangle of surfaces; the vertices' stay in
+/// `memory`, if there is one, for the next picture. Parallel on the caller's TBB arena; the same bits for any number of
+/// threads.
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
-                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look);
+                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,
+                     ScreenVertices* memory = nullptr);
 
 }  // namespace curvisplat

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "stream/base/huge_pages.h"
+
 namespace curvisplat {
 namespace {
 
@@ -14,25 +16,52 @@ constexpr size_t kVerticesAtOnce = 4096;
 
 }  // namespace
 
-SceneTriangles::SceneTriangles(const SurfaceScene& scene, const ScreenView& view, double depth_origin)
-    : scene_(scene), view_(view), depth_origin_(depth_origin), begins_{0} {
-  for (const Surface& surface : scene.surfaces) {
-    const TriangleMesh& mesh = *surface.mesh;
+SceneTriangles::SceneTriangles(const SurfaceScene& scene, const ScreenView& view, double depth_origin,
+                               ScreenVertices memory)
+    : scene_(scene), view_(view), depth_origin_(depth_origin), begins_{0}, vertices_(std::move(memory)) {
+  vertices_.resize(scene.surfaces.size());
+  for (size_t n = 0; n < scene.surfaces.size(); ++n) {
+    const TriangleMesh& mesh = *scene.surfaces[n].mesh;
     begins_.push_back(begins_.back() + static_cast<uint32_t>(mesh.triangles.size()));
-    std::vector<ScreenVertex>& out = vertices_.emplace_back(mesh.positions.size());
-    // Affine in the mesh's positions.
-    const glm::dvec3 origin = view_.viewFromData(mesh.origin);
-    const glm::dvec3 right = view_.right * view_.scale, down = view_.down * view_.scale,
-                     forward = view_.forward * view_.scale;
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kVerticesAtOnce), [&](const auto& range) {
-      for (size_t n = range.begin(); n < range.end(); ++n) {
-        const double x = mesh.positions[n].x, y = mesh.positions[n].y, z = mesh.positions[n].z;
-        out[n] = project({origin.x + (right.x * x + right.y * y + right.z * z),
-                          origin.y + (down.x * x + down.y * y + down.z * z),
-                          origin.z + (forward.x * x + forward.y * y + forward.z * z)});
-      }
-    });
+    std::vector<ScreenVertex>& out = vertices_[n];
+    if (out.capacity() > mesh.positions.size() / 3 * 4 + 1) out = {};  // kept for what needs about as much
+    if (out.capacity() < mesh.positions.size()) {
+      out = {};
+      out.reserve(mesh.positions.size());
+      preferHugePages(out.data(), out.capacity() * sizeof(ScreenVertex));
+    }
+    out.resize(mesh.positions.size());
+    projectAll(mesh, out);
   }
+}
+
+/// Affine in the mesh's positions, and the perspective divide.
+void SceneTriangles::projectAll(const TriangleMesh& mesh, std::vector<ScreenVertex>& out) const {
+  const bool perspective = view_.projection == Projection::kPerspective;
+  const glm::dvec3 origin = view_.viewFromData(mesh.origin);
+  const glm::dvec3 right = view_.right * view_.scale, down = view_.down * view_.scale,
+                   forward = view_.forward * view_.scale;
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kVerticesAtOnce), [&](const auto& range) {
+    const auto inView = [&](size_t n) {
+      const double x = mesh.positions[n].x, y = mesh.positions[n].y, z = mesh.positions[n].z;
+      return glm::dvec3(origin.x + (right.x * x + right.y * y + right.z * z),
+                        origin.y + (down.x * x + down.y * y + down.z * z),
+                        origin.z + (forward.x * x + forward.y * y + forward.z * z));
+    };
+    if (perspective) {
+      for (size_t n = range.begin(); n < range.end(); ++n) out[n] = project(inView(n));
+      return;
+    }
+    // As project(), without its branch, so that compilers make vectors of it.
+    const double pixels = view_.focal_px, middle_x = 0.5 * view_.size.width,
+                 middle_y = 0.5 * view_.size.height, depth_origin = depth_origin_;
+    ScreenVertex* const to = out.data();
+    for (size_t n = range.begin(); n < range.end(); ++n) {
+      const glm::dvec3 at = inView(n);
+      to[n] = {static_cast<float>(middle_x + pixels * at.x), static_cast<float>(middle_y + pixels * at.y),
+               static_cast<float>(at.z - depth_origin)};
+    }
+  });
 }
 
 glm::dvec3 SceneTriangles::inView(size_t surface, uint32_t vertex) const {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <utility>
 #include <vector>
 
 #include "render/project/screen_view.h"
@@ -18,6 +19,9 @@ struct ScreenVertex {
   float x, y, value;
 };
 
+/// The vertices of each surface.
+using ScreenVertices = std::vector<std::vector<ScreenVertex>>;
+
 /// What of a triangle lies behind the near plane: a polygon of 3 or 4 vertices, or none.
 struct NearPolygon {
   std::array<ScreenVertex, 4> vertices;
@@ -27,8 +31,12 @@ struct NearPolygon {
 /// Numbers of triangles count through all surfaces. Immutable; any thread.
 class SceneTriangles {
  public:
-  /// The scene outlives it. Transforms all vertices, in parallel: 12 bytes each.
-  SceneTriangles(const SurfaceScene& scene, const ScreenView& view, double depth_origin);
+  /// The scene outlives it. Transforms all vertices, in parallel: 12 bytes each, in `memory` that another one gave back.
+  SceneTriangles(const SurfaceScene& scene, const ScreenView& view, double depth_origin,
+                 ScreenVertices memory = {});
+
+  /// For the next picture's. Nothing may be asked of this one afterwards.
+  ScreenVertices takeMemory() { return std::move(vertices_); }
 
   uint32_t count() const { return begins_.back(); }
   const ScreenView& view() const { return view_; }
@@ -53,12 +61,13 @@ class SceneTriangles {
   Place placeOfSeveral(uint32_t number) const;
   glm::dvec3 inView(size_t surface, uint32_t vertex) const;
   ScreenVertex project(const glm::dvec3& in_view) const;
+  void projectAll(const TriangleMesh& mesh, std::vector<ScreenVertex>& out) const;
 
   const SurfaceScene& scene_;
   const ScreenView view_;
   const double depth_origin_;
   std::vector<uint32_t> begins_;  // [surfaces + 1]
-  std::vector<std::vector<ScreenVertex>> vertices_;
+  ScreenVertices vertices_;
 };
 
 }  // namespace curvisplat

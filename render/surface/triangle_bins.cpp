@@ -52,48 +52,72 @@ TriangleBins::TileBox TriangleBins::tilesOf(const ScreenVertex* vertices, size_t
           tile(x1, width, kSampleTileWidth), tile(y1, height, kSampleTileHeight)};
 }
 
-void TriangleBins::sort(const SceneTriangles& triangles, Batch& batch) const {
+std::vector<TriangleBins::Piece> TriangleBins::piecesOf(const SceneTriangles& triangles,
+                                                        const Batch& batch) const {
   const TriangleMesh& mesh = *triangles.scene().surfaces[batch.surface].mesh;
   const std::vector<ScreenVertex>& vertices = triangles.verticesOf(batch.surface);
-  std::vector<TileBox> boxes(batch.count);
-  TileBox all{static_cast<int16_t>(columns_), static_cast<int16_t>(rows_), -1, -1};
-  for (uint32_t n = 0; n < batch.count; ++n) {
-    const auto& corners = mesh.triangles[batch.first + n];
+  std::vector<Piece> pieces;
+  // The last piece's tile in pixels, where it is one tile: most triangles lie in their predecessor's.
+  float left = 0, top = 0, right = 0, bottom = 0;
+  uint32_t end = 0;  // of the last piece
+  for (uint32_t n = batch.first; n < batch.first + batch.count; ++n) {
+    const auto& corners = mesh.triangles[n];
     const ScreenVertex at[3] = {vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]};
-    if (std::isnan(at[0].value + at[1].value + at[2].value)) {
-      const NearPolygon polygon = triangles.behindNear(batch.surface, corners);
-      boxes[n] = polygon.count < 3 ? TileBox() : tilesOf(polygon.vertices.data(), polygon.count);
-    } else {
-      boxes[n] = tilesOf(at, 3);
+    const bool before_near = std::isnan(at[0].value + at[1].value + at[2].value);
+    const bool within =
+        std::min({at[0].x, at[1].x, at[2].x}) >= left && std::max({at[0].x, at[1].x, at[2].x}) < right &&
+        std::min({at[0].y, at[1].y, at[2].y}) >= top && std::max({at[0].y, at[1].y, at[2].y}) < bottom;
+    if (within && !before_near && end == n) {
+      ++pieces.back().run.count;
+      ++end;
+      continue;
     }
-    if (boxes[n].empty()) continue;
-    all.x0 = std::min(all.x0, boxes[n].x0);
-    all.y0 = std::min(all.y0, boxes[n].y0);
-    all.x1 = std::max(all.x1, boxes[n].x1);
-    all.y1 = std::max(all.y1, boxes[n].y1);
+    TileBox box;
+    if (before_near) {
+      const NearPolygon polygon = triangles.behindNear(batch.surface, corners);
+      if (polygon.count >= 3) box = tilesOf(polygon.vertices.data(), polygon.count);
+    } else {
+      box = tilesOf(at, 3);
+    }
+    if (box.empty()) continue;
+    if (end == n && !pieces.empty() && pieces.back().box == box) {
+      ++pieces.back().run.count;
+    } else {
+      pieces.push_back({box, {n, 1}});
+      const bool one = box.x0 == box.x1 && box.y0 == box.y1;
+      left = static_cast<float>(box.x0 * kSampleTileWidth);
+      top = static_cast<float>(box.y0 * kSampleTileHeight);
+      right = one ? static_cast<float>(std::min((box.x0 + 1) * kSampleTileWidth, size_.width)) : left;
+      bottom = static_cast<float>(std::min((box.y0 + 1) * kSampleTileHeight, size_.height));
+    }
+    end = n + 1;
   }
-  if (all.empty()) return;
+  return pieces;
+}
+
+void TriangleBins::sort(const SceneTriangles& triangles, Batch& batch) const {
+  const std::vector<Piece> pieces = piecesOf(triangles, batch);
+  if (pieces.empty()) return;
+  TileBox all = pieces.front().box;
+  for (const Piece& piece : pieces) {
+    all.x0 = std::min(all.x0, piece.box.x0);
+    all.y0 = std::min(all.y0, piece.box.y0);
+    all.x1 = std::max(all.x1, piece.box.x1);
+    all.y1 = std::max(all.y1, piece.box.y1);
+  }
   batch.box = all;
   const auto width = static_cast<size_t>(all.x1 - all.x0 + 1);
-  const auto tileAt = [&](int x, int y) {
-    return static_cast<size_t>(y - all.y0) * width + static_cast<size_t>(x - all.x0);
-  };
   const auto forEach = [&](const auto& visit) {
-    for (uint32_t n = 0; n < batch.count; ++n) {
-      const TileBox& box = boxes[n];
-      if (box.x0 == box.x1 && box.y0 == box.y1) {
-        visit(tileAt(box.x0, box.y0), batch.first + n);
-        continue;
-      }
-      for (int y = box.y0; y <= box.y1; ++y)
-        for (int x = box.x0; x <= box.x1; ++x) visit(tileAt(x, y), batch.first + n);
-    }
+    for (const Piece& piece : pieces)
+      for (int y = piece.box.y0; y <= piece.box.y1; ++y)
+        for (int x = piece.box.x0; x <= piece.box.x1; ++x)
+          visit(static_cast<size_t>(y - all.y0) * width + static_cast<size_t>(x - all.x0), piece.run);
   };
   batch.begins.assign(width * static_cast<size_t>(all.y1 - all.y0 + 1) + 2, 0);
-  forEach([&](size_t tile, uint32_t) { ++batch.begins[tile + 2]; });
+  forEach([&](size_t tile, const TriangleRun&) { ++batch.begins[tile + 2]; });
   for (size_t n = 2; n < batch.begins.size(); ++n) batch.begins[n] += batch.begins[n - 1];
-  batch.numbers.resize(batch.begins.back());
-  forEach([&](size_t tile, uint32_t number) { batch.numbers[batch.begins[tile + 1]++] = number; });
+  batch.runs.resize(batch.begins.back());
+  forEach([&](size_t tile, const TriangleRun& run) { batch.runs[batch.begins[tile + 1]++] = run; });
   batch.begins.pop_back();
 }
 

@@ -174,6 +174,31 @@ TEST_F(SurfaceOptions, SlicesKeepTheColoursOfTheScalarBarInLight) {
   EXPECT_EQ(with({"--shade", "--light-direction", "1,1,1"}).rgba, unlit.rgba);
 }
 
+/// The usual way to show a cut: the slice lies in the clip plane, which keeps it whole.
+TEST_F(SurfaceOptions, AClipPlaneKeepsTheSliceInIt) {
+  const auto with = [&](const std::string& plane) {
+    return picture({"--volume", "off", "--slice", "4,0,0.3,0,0,1", "--view", "+z", "--background", "black",
+                    "--clip-plane", plane});
+  };
+  const Image whole = with("4,0,-900,0,0,1");
+  float brightest = 0;
+  for (size_t n = 0; n < whole.rgba.size(); n += 4) brightest = std::max(brightest, whole.rgba[n]);
+  EXPECT_GT(brightest, 0.3f);
+  const auto farthest = [&](const Image& other) {
+    float most = 0;
+    for (size_t n = 0; n < whole.rgba.size(); ++n)
+      most = std::max(most, std::abs(whole.rgba[n] - other.rgba[n]));
+    return most;
+  };
+  for (const char* in_it : {"4,0,0.3,0,0,1", "1,2,0.3,0,0,-3"})
+    EXPECT_LT(farthest(with(in_it)), 0.02f) << in_it;
+  const Image nothing = with("4,0,0.4,0,0,1");
+  for (size_t n = 0; n < nothing.rgba.size(); ++n)
+    if (n % 4 != 3) {
+      ASSERT_EQ(nothing.rgba[n], 0) << n;
+    }
+}
+
 /// A surface that fills the picture with one colour is what was asked for: no option of the volume changes it.
 TEST_F(SurfaceOptions, WarningsOfSurfacesAloneDoNotMentionTheVolume) {
   const ProgramResult wall = render({"--view", "+z", "--surface", file("wall.obj")});

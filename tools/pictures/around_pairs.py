@@ -156,7 +156,10 @@ def volume_of(grids, scene):
     tetrahedra.GetPointData().SetActiveScalars(scene["vtk"])
     low, high = scene["range"]
     points, unit = scene["volume"]
-    extinctions = [(low + x * (high - low), -math.log1p(-a)) for x, a in points]
+    # Between the points it is the opacity that is linear.
+    finer = np.unique(np.concatenate([np.linspace(0, 1, 129), [x for x, _ in points]]))
+    opacities = np.interp(finer, [x for x, _ in points], [a for _, a in points])
+    extinctions = list(zip(low + finer * (high - low), -np.log1p(-opacities)))
     largest = max(extinction for _, extinction in extinctions)
     opacity = vtk.vtkPiecewiseFunction()
     for x, extinction in extinctions:
