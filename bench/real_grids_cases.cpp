@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <numbers>
 #include <utility>
 
@@ -22,6 +24,32 @@ std::unique_ptr<GridSource> uniformCube(uint64_t n) {
     const glm::dvec3 at(static_cast<double>(node.i) / last, static_cast<double>(node.j) / last,
                         static_cast<double>(node.k) / last);
     return NodeValues{at, {static_cast<float>(at.z)}};
+  });
+}
+
+/// Patches of cells in one another, each half as large as those around it (AMR). Nodes of a coarser patch inside of a finer
+/// one are blanked.
+std::unique_ptr<GridSource> nestedPatches() {
+  constexpr uint64_t kCells = 32, kLevels = 3;
+  struct Patch {
+    glm::dvec3 lower{0.0};
+    double cell = 1;
+  };
+  static const std::array<Patch, kLevels> patches{{{{0, 0, 0}, 1}, {{6, 8, 10}, 0.5}, {{11, 10, 13}, 0.25}}};
+  GridBlock block = gridBlock(kCells + 1, kCells + 1, kCells + 1);
+  block.has_blanking = true;
+  return std::make_unique<FunctionGridSource>(std::vector(kLevels, block), 1, [](const GridNode& node) {
+    const Patch& patch = patches[node.block];
+    const glm::dvec3 at =
+        patch.lower + patch.cell * glm::dvec3(static_cast<double>(node.i), static_cast<double>(node.j),
+                                              static_cast<double>(node.k));
+    bool is_blank = false;
+    if (node.block + 1 < kLevels) {
+      const Patch& finer = patches[node.block + 1];
+      const glm::dvec3 upper = finer.lower + finer.cell * static_cast<double>(kCells);
+      is_blank = glm::all(glm::lessThan(finer.lower, at)) && glm::all(glm::lessThan(at, upper));
+    }
+    return NodeValues{at, {static_cast<float>(at.x + 0.5 * at.y + 0.25 * at.z)}, is_blank};
   });
 }
 
@@ -85,6 +113,7 @@ std::vector<RealGrid> realGrids(const std::filesystem::path& data) {
   scene("dome", {41, 25, 21});
   scene("globe", {33, 33, 6});
   scene("duct", {21, 17, 17});
+  grids.push_back({"nested", nestedPatches, "s0"});
   if (data.empty()) return grids;
 
   const auto add = [&](const std::string& name, const std::string& scalar, const std::vector<File>& files) {

@@ -8,7 +8,8 @@ by clang-tidy (.clang-tidy) as well. Takes the commands of build/release, which 
 
 Headers take most of the time. So sources with the same macros are checked several at a time, as one that includes them, and
 what most include (tools/cmake/common_headers.h, and GoogleTest) is parsed once. Names that two of them have for themselves
-collide there: if the compiler finds anything in several, each half of them is checked again, down to single ones.
+would collide there: tools/cmake/unity_groups.py keeps these apart. Should it miss some, and the compiler finds anything in several,
+each half of them is checked again, down to single ones.
 """
 
 import argparse
@@ -22,11 +23,14 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tools/cmake"))
+import unity_groups  # noqa: E402
+
 BUILD = ROOT / "build/release"
 # GCC's commands name warnings and pragmas that Clang does not know; and Clang warns of & between cheap conditions.
 FLAGS = ["-Wthread-safety", "-Werror", "-Wno-unknown-warning-option", "-Wno-bitwise-instead-of-logical",
          "-Wno-unknown-pragmas"]
-AT_A_TIME = 8
+AT_A_TIME = 16
 
 
 def commands(chosen):
@@ -78,9 +82,9 @@ class Group:
         self.precompiled = ["-include-pch", output]
 
     def batches(self):
-        """Neighbours, which have most names in common, are in different ones."""
-        count = -(-len(self.files) // AT_A_TIME)
-        return [(self, self.files[n::count]) for n in range(count)]
+        numbers = unity_groups.groups([file.read_text(encoding="utf-8") for file in self.files], AT_A_TIME,
+                                      unity_groups.types_of_headers())
+        return [(self, [file for file, of in zip(self.files, numbers) if of == n]) for n in range(max(numbers) + 1)]
 
     def findings(self, files):
         """What is found in these files, or ""."""

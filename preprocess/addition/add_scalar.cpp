@@ -12,6 +12,7 @@
 #include "preprocess/addition/further_faces.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
+#include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/mesh_origin.h"
@@ -250,6 +251,7 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& opt
 
   checkWritable(options.cache, "; name a splat cache that you may change");
   checkWritable(temporaryFolder(options), "; name another folder with --tmp");
+  ConversionWorkspace::clearKilled(options.cache);
 
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
   AddScalarReport report = Addition(source, options, plan, progress).run();

@@ -13,6 +13,7 @@
 #include "preprocess/addition/step_references.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
+#include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/mesh_origin.h"
@@ -222,6 +223,7 @@ class StepAddition {
     options.planes = planesOf(cache_);
     options.output = options_.cache / geometryFolderName(cache_.series().geometries());
     // A kill between the two steps below leaves a geometry that the series does not have.
+    ConversionWorkspace::clearKilled(options.output);
     if (std::filesystem::exists(options.output)) removeAll(options.output);
     options.check_disk_space = options_.check_disk_space;
     options.resume = options_.resume;

@@ -7,6 +7,7 @@
 #include "preprocess/convert/scatter.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/splats/seams.h"
+#include "stream/cache/cell_octants.h"
 
 namespace curvisplat {
 namespace {
@@ -34,6 +35,7 @@ CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
 
 void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                            const std::filesystem::path& temporary_folder, Progress& progress) {
+  cuts_octants_ = cache.manifest().hasFeature(kCellOctants);
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
 
@@ -42,9 +44,11 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
   all_faces_ = true;
   SeamMerger seams(0, plan.seam_bytes, temporary_folder, unlike);
   NoSink none;
+  SlabPass pass(progress);
+  pass.octants = cuts_octants_;
   streamSplats(
       NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },
-      seams, progress);
+      seams, pass);
   // The splat of a set has the number of the lowest node in it that is drawn.
   seams.forEachSet(description().coordinate_bytes, [&](std::span<const uint64_t> nodes) {
     bool merges = false;

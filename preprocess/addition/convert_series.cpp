@@ -9,6 +9,7 @@
 
 #include "preprocess/addition/shared_series.h"
 #include "preprocess/addition/step_references.h"
+#include "preprocess/convert/conversion_workspace.h"
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
@@ -152,6 +153,8 @@ class SeriesConversion {
   }
 
   void openCache() {
+    const Ranks* const ranks = options_.convert.ranks;
+    if (!ranks || ranks->isFirst()) ConversionWorkspace::clearKilled(options_.convert.output);
     const CacheReader cache(options_.convert.output);
     for (const SeriesStep& step : cache.series().steps) times_.push_back(step.time);
     const std::vector<std::string>& sources = cache.seriesManifest().sources;

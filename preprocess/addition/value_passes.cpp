@@ -8,6 +8,7 @@
 #include "preprocess/addition/build_values.h"
 #include "preprocess/addition/cache_grid.h"
 #include "preprocess/convert/scatter.h"
+#include "stream/cache/cell_octants.h"
 
 namespace curvisplat {
 
@@ -48,6 +49,7 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
   if (!overlaps_.empty()) owners.emplace(ownersReader(reader, true), overlaps_, plan_.owner_bytes);
   SlabPass pass(*progress_, std::move(see));
   pass.owners = owners ? &*owners : nullptr;
+  pass.octants = cache_->manifest().hasFeature(kCellOctants);
   streamSplats(
       reader, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, pass);
   for (ValueSink& sink : sinks) sink.flush();

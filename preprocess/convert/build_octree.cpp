@@ -48,7 +48,8 @@ uint64_t OctreeBuilder::bricksOf(uint32_t node) const {
 }
 
 /// Notes which nodes the writer's bricks are of. Those behind the last that completes a node are of one that
-/// is to be built again. The histograms lack those that stay.
+/// is to be built again. The histograms become those of the bricks that stay: a build that was given up may have
+/// added others.
 void OctreeBuilder::takeUpBricks() {
   built_.resize(tree_->size());
   const std::span<const Brick> bricks = writer_->bricks();
@@ -64,6 +65,7 @@ void OctreeBuilder::takeUpBricks() {
   for (Built& built : built_)
     if (built.first_brick + built.bricks > complete) built = {};
   writer_->keep(complete);
+  writer_->histograms().clear();
   tbb::parallel_for(uint64_t{0}, complete, [&](uint64_t id) {
     const BrickSplats brick = writer_->readBack(id);
     const bool is_leaf = !brick.runs.empty();

@@ -120,17 +120,17 @@ ConversionWorkspace::~ConversionWorkspace() {
   if (partial_->isInPlace()) clearFinished();
 }
 
-bool ConversionWorkspace::clearIfFinished(const fs::path& output, const std::vector<ConversionFact>& facts) {
-  const std::optional<ConversionJournal> journal = readJournal(output);
-  if (!journal || !fs::exists(output / "manifest.json") || !differenceOf(journal->facts, facts).empty())
-    return false;
+std::optional<std::vector<ConversionFact>> ConversionWorkspace::clearKilled(const fs::path& output) {
+  if (!fs::exists(output / "manifest.json")) return std::nullopt;
+  std::optional<ConversionJournal> journal = readJournal(output);
+  if (!journal) return std::nullopt;
   // In the partial folder may be what is left of the cache that was replaced, or a conversion that is newer.
   PartialFolder replaced(output, true, PartialFolder::Rest::kKeep);
-  if (readJournal(replaced.path())) return false;
+  if (readJournal(replaced.path())) return std::nullopt;
   replaced.clear();
   removeScratch(*journal, output);
-  for (const char* name : {kBrickLogName, "lock", kJournalName}) removeAll(output / name);
-  return true;
+  for (const char* name : {kBrickLogName, kPartialLock, kJournalName}) removeAll(output / name);
+  return std::move(journal->facts);
 }
 
 }  // namespace curvisplat

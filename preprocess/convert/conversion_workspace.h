@@ -65,8 +65,8 @@ class ConversionWorkspace {
   /// Leaves the folders for a later conversion if they are worth it. Returns whether they are.
   bool leaveForResuming();
   /// If a conversion was killed after its cache was in place and before clearFinished(): removes its files
-  /// and returns true. Facts as above.
-  static bool clearIfFinished(const std::filesystem::path& output, const std::vector<ConversionFact>& facts);
+  /// and returns the facts of that conversion.
+  static std::optional<std::vector<ConversionFact>> clearKilled(const std::filesystem::path& output);
 
  private:
   bool worthResuming() const;

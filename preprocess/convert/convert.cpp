@@ -36,7 +36,10 @@ uint64_t bucketSplatsOfRanks(const DataSource& source, const Ranks& ranks) {
 /// Rank 0 finds out, for all.
 bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>& facts) {
   const auto found = [&] {
-    if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) return true;
+    if (options.resume) {
+      const auto killed = ConversionWorkspace::clearKilled(options.output);
+      if (killed && differenceOf(*killed, facts).empty()) return true;
+    }
     if (options.resume && !options.overwrite && std::filesystem::exists(options.output / "manifest.json") &&
         !hasUnfinished(options.output))
       throw Error("{}: is complete, so there is nothing to resume; to replace it, add --overwrite",

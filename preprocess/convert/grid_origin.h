@@ -36,6 +36,7 @@ class GridOrigin final : public SplatOrigin {
   std::vector<std::string> warnings() override;
   std::vector<std::string> notes() override;
   std::string overlap() const override;
+  bool cutsOctants() const override { return centring() == Centring::kNode; }
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
   uint64_t finish(SplatSink& sink, Progress& progress) override;

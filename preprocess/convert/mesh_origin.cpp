@@ -29,11 +29,7 @@ MeshOrigin::MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars,
 }
 
 uint64_t MeshOrigin::temporaryBytes() const {
-  // Of hexahedra whose points do not fit: references and corners, then cells that wait for their sums.
-  constexpr uint64_t kUsualCorners = 8;
-  const uint64_t corner_bytes = sizeof(glm::dvec3) + sizeof(uint64_t) + reader_.scalars() * sizeof(float);
-  const bool fit = reader_.points() * corner_bytes <= plan_.mesh_bytes / 2;
-  return fit ? 0 : reader_.cells() * kUsualCorners * 2 * corner_bytes;
+  return gatherBytes(reader_, reader_.scalars(), plan_.mesh_bytes);
 }
 
 GridSurvey MeshOrigin::survey(Progress& progress) {
@@ -87,8 +83,7 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
 
 ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
   used_ = {};
-  // A chunk of polyhedra takes seven times as much as one of hexahedra. Two are in memory, as one is read ahead.
-  const uint64_t half = (plan_.mesh_bytes - std::min(2 * chunk_bytes_, plan_.mesh_bytes / 2)) / 2;
+  const uint64_t half = halfBesideChunks(plan_.mesh_bytes, chunk_bytes_);
   CornerGather gather(reader_, *numbers_, half, scratch_, progress);
   const TakeSplat take = [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
     sink_of_thread().add(splat, values);

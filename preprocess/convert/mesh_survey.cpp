@@ -15,13 +15,6 @@ void addBytes(Checksum& checksum, const std::vector<T>& values) {
   checksum.add(std::as_bytes(std::span(values)));
 }
 
-uint64_t bytesOf(const MeshCells& cells) {
-  return cells.shapes.size() + cells.hidden.size() +
-         (cells.corner_begin.size() + cells.face_begin.size()) * sizeof(size_t) +
-         cells.corners.size() * sizeof(uint64_t) + cells.faces.size() * sizeof(uint32_t) +
-         cells.scalars.size() * cells.size() * sizeof(float);
-}
-
 void widen(ScalarRange& range, float value) {
   range.min = std::min<double>(range.min, value);
   range.max = std::max<double>(range.max, value);

@@ -1,6 +1,7 @@
 #include "preprocess/convert/new_manifest.h"
 
 #include "stream/cache/border_style.h"
+#include "stream/cache/cell_octants.h"
 
 namespace curvisplat {
 
@@ -30,6 +31,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
     manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
   manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers};
   if (options.precision == ValuePrecision::kFine) manifest.requirements.push_back(kFineValues);
+  if (origin.cutsOctants() && survey.blanked.total() > 0) manifest.requirements.push_back(kCellOctants);
   manifest.overlap = splats.overlap;
   manifest.cells = origin.centring() == Centring::kCell;
   if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);

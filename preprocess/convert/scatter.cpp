@@ -27,8 +27,8 @@ struct Handedness {
 class SplatStream {
  public:
   SplatStream(const NodeReader& reader, const AbuttingFaces* faces, const SinkOfThread& sink_of_thread,
-              SeamMerger& seams, const Progress& progress)
-      : progress_(&progress),
+              SeamMerger& seams, const SlabPass& pass)
+      : progress_(&pass.progress),
         blocks_(&reader.source().description().blocks),
         variables_(reader.scalars()),
         centring_(reader.centring()),
@@ -37,7 +37,9 @@ class SplatStream {
         seams_(&seams),
         workers_([this] {
           return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size())};
-        }) {}
+        }) {
+    corrections_.octants = pass.octants;
+  }
 
   /// `covered`: of the slab, as BlockOwners::cover() sets it.
   void add(const LoadedSlab& loaded, std::span<const uint64_t> covered) {
@@ -56,7 +58,7 @@ class SplatStream {
       if (centring_ == Centring::kCell)
         computeCellSplats(window, box, {slab.block, faces_}, worker.cells, worker.splats);
       else
-        computeNodeSplats(window, box, worker.nodes, worker.splats);
+        computeNodeSplats(window, box, worker.nodes, worker.splats, corrections_);
       worker.degenerate += worker.splats.degenerate;
       worker.handedness[slab.block].right += worker.splats.right_handed;
       worker.handedness[slab.block].left += worker.splats.left_handed;
@@ -119,6 +121,7 @@ class SplatStream {
   const Centring centring_;
   const AbuttingFaces* faces_;
   const SinkOfThread* sink_of_thread_;
+  NodeSplatCorrections corrections_;
   Mutex adding_to_seams_;
   SeamMerger* seams_ PT_GUARDED_BY(adding_to_seams_);
   tbb::enumerable_thread_specific<Worker> workers_;
@@ -170,7 +173,7 @@ void RecordRouter::flush() {
 
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const SinkOfThread& sink_of_thread, SeamMerger& seams, const SlabPass& pass) {
-  SplatStream splats(reader, faces, sink_of_thread, seams, pass.progress);
+  SplatStream splats(reader, faces, sink_of_thread, seams, pass);
   SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo,
                    shareOf(pass.ranks));
   std::vector<uint64_t> covered;

@@ -55,6 +55,7 @@ struct SlabPass {
       see;                        // each slab, in order, before its splats are made; may be empty
   BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
   Ranks* ranks = nullptr;         // of which each makes the splats of a share; the counts are the whole's
+  bool octants = true;            // NodeSplatCorrections::octants
 };
 
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go

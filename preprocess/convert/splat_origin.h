@@ -72,6 +72,8 @@ class SplatOrigin {
   virtual std::vector<std::string> notes() { return {}; }
   /// Manifest::overlap.
   virtual std::string overlap() const { return ""; }
+  /// Whether splats lose what reaches into blanked cells (kCellOctants).
+  virtual bool cutsOctants() const { return false; }
   /// Counts the splats by cells of `root`, about: a wrong count makes buckets of uneven sizes, no other cache.
   virtual void count(const RootCube& root, CountingGrid& counts, Progress& progress) = 0;
   virtual ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) = 0;

@@ -12,6 +12,7 @@ namespace curvisplat {
 struct CellFace {
   size_t cell = 0;                    // among the gathered ones
   std::span<const uint32_t> corners;  // places among the cell's
+  bool of_plain_cell = false;         // which is no polyhedron, and whose corners are different points
   glm::dvec3 inward{0.0};             // at right angles to it, as long as its area, into the cell
   glm::dvec3 centre{0.0};             // the mean of its corners
 };
@@ -20,5 +21,20 @@ struct CellFace {
 /// `record_bytes`. Collapsed faces, with fewer than three corners, are left out.
 void facesOfCells(const GatheredCells& cells, size_t record_bytes,
                   const std::function<void(const CellFace&, std::span<std::byte>)>& put, FaceRecords& out);
+
+/// The same faces in the same order, without records.
+struct FaceList {
+  /// Which face.
+  struct Place {
+    uint32_t cell, at;  // among the gathered ones; where it begins in facesOf() the cell
+    bool of_plain_cell;
+  };
+  std::vector<FaceCorners> corners;
+  std::vector<Place> places;
+
+  void assign(const GatheredCells& cells);  // in parallel; keeps the capacity
+  /// Face n, measured. Any thread.
+  CellFace face(const GatheredCells& cells, size_t n) const;
+};
 
 }  // namespace curvisplat

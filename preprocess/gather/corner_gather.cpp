@@ -43,6 +43,17 @@ CellView GatheredCells::view(size_t n, size_t corner_fields) const {
           std::span(faces).subspan(face_begin[n], face_begin[n + 1] - face_begin[n])};
 }
 
+bool GatheredCells::areFourAlike(size_t n, size_t end, size_t corner_fields) const {
+  if (end - n < kCellsAtOnce || !isTakenAtOnce(shapes[n], corner_fields)) return false;
+  const auto first = shapes.begin() + static_cast<ptrdiff_t>(n);
+  return std::count(first, first + kCellsAtOnce, shapes[n]) == kCellsAtOnce;
+}
+
+std::array<CellView, kCellsAtOnce> GatheredCells::viewsOfFour(size_t n, size_t corner_fields) const {
+  return {view(n, corner_fields), view(n + 1, corner_fields), view(n + 2, corner_fields),
+          view(n + 3, corner_fields)};
+}
+
 void GatheredCells::clear() {
   numbers.clear();
   shapes.clear();
@@ -53,6 +64,18 @@ void GatheredCells::clear() {
   face_begin.assign(1, 0);
   faces.clear();
   cell_values.clear();
+}
+
+uint64_t halfBesideChunks(uint64_t memory_bytes, uint64_t chunk_bytes) {
+  return (memory_bytes - std::min(2 * chunk_bytes, memory_bytes / 2)) / 2;
+}
+
+uint64_t gatherBytes(const MeshReader& reader, size_t scalars, uint64_t memory_bytes) {
+  // Of hexahedra whose points do not fit: references and corners, then cells that wait for their sums.
+  constexpr uint64_t kUsualCorners = 8;
+  const uint64_t corner_bytes = sizeof(glm::dvec3) + sizeof(uint64_t) + scalars * sizeof(float);
+  const bool fit = reader.points() * corner_bytes <= memory_bytes / 2;
+  return fit ? 0 : reader.cells() * kUsualCorners * 2 * corner_bytes;
 }
 
 CornerGather::CornerGather(const MeshReader& reader, const PointNumbers& numbers, uint64_t memory_bytes,

@@ -8,6 +8,7 @@
 // memory instead, and nothing is written. What comes out is the same.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -16,7 +17,7 @@
 
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/gather/point_numbers.h"
-#include "preprocess/moments/cell_moments.h"
+#include "preprocess/moments/four_cells.h"
 
 namespace curvisplat {
 
@@ -37,11 +38,22 @@ struct GatheredCells {
 
   size_t size() const { return shapes.size(); }
   CellView view(size_t n, size_t corner_fields) const;
+  /// Whether the four cells from n on come before `end`, and have one shape that isTakenAtOnce().
+  bool areFourAlike(size_t n, size_t end, size_t corner_fields) const;
+  std::array<CellView, kCellsAtOnce> viewsOfFour(size_t n, size_t corner_fields) const;
   std::span<const uint64_t> cornersOfCell(size_t n) const {
     return std::span(corners).subspan(corner_begin[n], corner_begin[n + 1] - corner_begin[n]);
   }
   void clear();
 };
+
+/// How the memory of a pass over a mesh is shared: two chunks of cells (one is read ahead; of polyhedra they are
+/// seven times as large as of hexahedra), and of the rest a half each for the corners and for what is made of them.
+uint64_t halfBesideChunks(uint64_t memory_bytes, uint64_t chunk_bytes);
+
+/// Bytes of temporary files that a gather, and sums or slopes of its cells, need at the most; 0 where the points
+/// fit. `scalars`: of points or cells, whichever there are.
+uint64_t gatherBytes(const MeshReader& reader, size_t scalars, uint64_t memory_bytes);
 
 class CornerGather {
  public:

@@ -82,15 +82,22 @@ uint32_t FaceMatcher::newEntry() {
   return entry;
 }
 
-void FaceMatcher::add(const FaceRecords& faces, const TakePair& pair) {
-  for (size_t n = 0; n < faces.corners.size(); ++n) {
-    const FaceCorners& corners = faces.corners[n];
-    const auto record = std::span(faces.records).subspan(n * record_bytes_, record_bytes_);
+/// Calls pair(waiting entry, n) for a face that has a like one, put(n, to) for one that is to wait.
+template <typename Pair, typename Put>
+void FaceMatcher::addEach(std::span<const FaceCorners> faces, const Pair& pair, const Put& put) {
+  constexpr size_t kAhead = 8;  // faces whose places in the table are fetched before they are looked up
+  for (size_t n = 0; n < faces.size(); ++n) {
+    if (n + 2 * kAhead < faces.size()) __builtin_prefetch(&buckets_[bucketOf(faces[n + 2 * kAhead])]);
+    if (n + kAhead < faces.size()) {
+      const uint32_t entry = buckets_[bucketOf(faces[n + kAhead])];
+      if (entry != kNone) __builtin_prefetch(&waiting_[entry]);
+    }
+    const FaceCorners& corners = faces[n];
     const uint64_t bucket = bucketOf(corners);
     uint32_t same = buckets_[bucket];
     while (same != kNone && !areSame(waiting_[same].corners, corners)) same = waiting_[same].next;
     if (same != kNone) {
-      pair(recordOf(same), record);
+      pair(same, n);
       unlink(same);
       free_.push_back(same);
       continue;
@@ -98,8 +105,23 @@ void FaceMatcher::add(const FaceRecords& faces, const TakePair& pair) {
     const uint32_t entry = newEntry();
     waiting_[entry] = {corners, buckets_[bucket], true};
     buckets_[bucket] = entry;
-    std::memcpy(recordOf(entry).data(), record.data(), record_bytes_);
+    put(n, recordOf(entry));
   }
+}
+
+void FaceMatcher::add(const FaceRecords& faces, const TakePair& pair) {
+  const auto recordOfFace = [&](size_t n) {
+    return std::span(faces.records).subspan(n * record_bytes_, record_bytes_);
+  };
+  addEach(
+      faces.corners, [&](uint32_t same, size_t n) { pair(recordOf(same), recordOfFace(n)); },
+      [&](size_t n, std::span<std::byte> to) { std::ranges::copy(recordOfFace(n), to.begin()); });
+}
+
+void FaceMatcher::add(std::span<const FaceCorners> faces,
+                      const std::function<void(size_t, std::span<std::byte>)>& put) {
+  addEach(
+      faces, [](uint32_t, size_t) {}, put);
 }
 
 void FaceMatcher::matchStream(size_t stream, const TakePair& pair, const TakeSingle& single) const {

@@ -49,6 +49,9 @@ class FaceMatcher {
 
   /// Calls pair(earlier, later) for some of the pairs, in this thread.
   void add(const FaceRecords& faces, const TakePair& pair);
+  /// Leaves the pairs out. put(n, to) makes the record of face n, in this thread; of most faces that have one before
+  /// them it is not called.
+  void add(std::span<const FaceCorners> faces, const std::function<void(size_t, std::span<std::byte>)>& put);
   /// The others, and those without another. Once, after all faces.
   void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
 
@@ -63,6 +66,8 @@ class FaceMatcher {
     uint32_t next;  // of the same bucket
     bool single;
   };
+  template <typename Pair, typename Put>
+  void addEach(std::span<const FaceCorners> faces, const Pair& pair, const Put& put);
   uint32_t newEntry();
   void spill(uint32_t entry);
   void unlink(uint32_t entry);

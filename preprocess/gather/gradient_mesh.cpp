@@ -261,13 +261,15 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
     if (run.values.empty()) run.first = splat.node;
     run.values.push_back(static_cast<float>(flowQuantity(quantity.quantity, flow, of_flow, gas_, 0)));
   };
-  CornerGather gather(reader, numbers, memory_bytes / 2, folder_, progress);
+  if (!chunk_bytes_) chunk_bytes_ = MeshReader(*source_, {}, std::nullopt).largestChunk();
+  const uint64_t half = halfBesideChunks(memory_bytes, *chunk_bytes_);
+  CornerGather gather(reader, numbers, half, folder_, progress);
   if (cells) {
-    CellSlopes slopes(reader.cells(), fields, memory_bytes / 2, folder_);
+    CellSlopes slopes(reader.cells(), fields, half, folder_);
     gather.forEach([&](const GatheredCells& some) { slopes.add(some); });
     slopes.finish(take, progress);
   } else {
-    PointSums sums(reader.points(), reader.cells(), fields, memory_bytes / 2, folder_);
+    PointSums sums(reader.points(), reader.cells(), fields, half, folder_);
     gather.forEach([&](const GatheredCells& some) { sums.add(some); });
     sums.finish(take, progress);
   }

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -48,7 +49,7 @@ class GradientMesh final : public MeshSource {
               std::vector<std::vector<float>>& values) const;
   const Values& valuesOf(uint32_t quantity) const;
   std::unique_ptr<Values> compute(const QuantityInfo& quantity, uint64_t memory_bytes,
-                                  const Progress& progress) const;
+                                  const Progress& progress) const REQUIRES(mutex_);
 
   std::unique_ptr<MeshSource> source_;
   GridDescription description_;
@@ -60,6 +61,7 @@ class GradientMesh final : public MeshSource {
   std::vector<uint64_t> first_points_, first_cells_;  // [piece]
   mutable Mutex mutex_;
   mutable std::map<uint32_t, std::unique_ptr<Values>> values_ GUARDED_BY(mutex_);
+  mutable std::optional<uint64_t> chunk_bytes_ GUARDED_BY(mutex_);  // of the largest chunk; once computed
 };
 
 }  // namespace curvisplat

@@ -32,6 +32,13 @@ Centring centringOf(const GridDescription& description, const std::vector<uint32
 
 }  // namespace
 
+uint64_t bytesOf(const MeshCells& cells) {
+  return cells.shapes.size() + cells.hidden.size() +
+         (cells.corner_begin.size() + cells.face_begin.size()) * sizeof(size_t) +
+         cells.corners.size() * sizeof(uint64_t) + cells.faces.size() * sizeof(uint32_t) +
+         cells.scalars.size() * cells.size() * sizeof(float);
+}
+
 MeshReader::MeshReader(const MeshSource& source, std::vector<uint32_t> scalars,
                        std::optional<double> blank_value)
     : source_(&source),
@@ -133,6 +140,12 @@ void MeshReader::readPoints(uint64_t first, uint64_t count,
 
 void MeshReader::forEachCells(const std::function<void(const LoadedCells&)>& use) const {
   forEach<LoadedCells>(cellRanges(), use);
+}
+
+uint64_t MeshReader::largestChunk() const {
+  uint64_t largest = 0;
+  forEachCells([&](const LoadedCells& loaded) { largest = std::max(largest, bytesOf(loaded.cells)); });
+  return largest;
 }
 
 void MeshReader::forEachCells(const std::vector<MeshRange>& ranges,

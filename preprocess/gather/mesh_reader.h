@@ -31,6 +31,9 @@ struct LoadedCells {
   BlankCounts blanked;
 };
 
+/// What a chunk of cells takes in memory.
+uint64_t bytesOf(const MeshCells& cells);
+
 /// Any number of threads may read concurrently.
 class MeshReader {
  public:
@@ -63,6 +66,8 @@ class MeshReader {
   void forEachCells(const std::function<void(const LoadedCells&)>& use) const;
   void forEachCells(const std::vector<MeshRange>& ranges,
                     const std::function<void(const LoadedCells&)>& use) const;
+  /// Reads all cells: bytes of the largest chunk. Most of them where cells are polyhedra.
+  uint64_t largestChunk() const;
   /// The chunks in which all cells are read.
   std::vector<MeshRange> cellRanges() const;
 

@@ -19,6 +19,20 @@ static_assert(sizeof(FaceRecord) == 120);
 FaceRecord recordOf(const GatheredCells& cells, const CellFace& face) {
   FaceRecord record{};
   const std::span<const uint64_t> corners = cells.cornersOfCell(face.cell);
+  record.inward = face.inward;
+  record.centre = face.centre;
+  if (face.of_plain_cell) {
+    uint32_t in_face = 0;  // bits of places
+    for (const uint32_t place : face.corners) {
+      record.corners[record.of_face++] = corners[place];
+      in_face |= 1u << place;
+    }
+    record.count = record.of_face;
+    for (size_t place = 0; place < corners.size(); ++place)
+      if ((in_face >> place & 1) == 0) record.corners[record.count++] = corners[place];
+    record.inward /= static_cast<double>(record.of_face);
+    return record;
+  }
   const auto put = [&](uint64_t corner) {
     bool known = record.count == kMaxCorners;
     for (uint32_t n = 0; n < record.count; ++n) known |= record.corners[n] == corner;
@@ -27,8 +41,7 @@ FaceRecord recordOf(const GatheredCells& cells, const CellFace& face) {
   for (const uint32_t place : face.corners) put(corners[place]);
   record.of_face = record.count;
   for (const uint64_t corner : corners) put(corner);
-  record.inward = face.inward / static_cast<double>(record.of_face);
-  record.centre = face.centre;
+  record.inward /= static_cast<double>(record.of_face);
   return record;
 }
 
@@ -44,18 +57,15 @@ uint64_t PointBorders::waitingBytes(uint64_t cells) {
 }
 
 void PointBorders::add(const GatheredCells& cells) {
-  facesOfCells(
-      cells, sizeof(FaceRecord),
-      [&](const CellFace& face, std::span<std::byte> to) {
-        const FaceRecord record = recordOf(cells, face);
-        std::memcpy(to.data(), &record, sizeof record);
-      },
-      records_);
-  faces_.add(records_, [](std::span<const std::byte>, std::span<const std::byte>) {});
+  list_.assign(cells);
+  faces_.add(list_.corners, [&](size_t n, std::span<std::byte> to) {
+    const FaceRecord record = recordOf(cells, list_.face(cells, n));
+    std::memcpy(to.data(), &record, sizeof record);
+  });
 }
 
 void PointBorders::finish(const Progress& progress) {
-  records_ = {};
+  list_ = {};
   uint64_t face = 0;
   faces_.finish([](std::span<const std::byte>, std::span<const std::byte>) {},
                 [&](std::span<const std::byte> bytes) {

@@ -29,7 +29,7 @@ class PointBorders {
  private:
   FaceMatcher faces_;
   OuterPlanes planes_;
-  FaceRecords records_;
+  FaceList list_;
 };
 
 }  // namespace curvisplat

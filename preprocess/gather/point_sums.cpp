@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -42,6 +43,28 @@ const std::byte* takeBytes(const std::byte* from, size_t count, std::vector<T>& 
   out.resize(at + count);
   if (count > 0) std::memcpy(static_cast<void*>(out.data() + at), from, count * sizeof(T));
   return from + count * sizeof(T);
+}
+
+/// The moments of cells [begin, end); `out`: [corner of the first cell ...][moment].
+void momentsOf(const GatheredCells& cells, size_t begin, size_t end, size_t fields, DualScratch& scratch,
+               std::span<double> out) {
+  const size_t stride = momentCount(fields);
+  const auto outOf = [&](size_t first, size_t last) {
+    const size_t from = cells.corner_begin[first] - cells.corner_begin[begin];
+    return out.subspan(from * stride, (cells.corner_begin[last] - cells.corner_begin[first]) * stride);
+  };
+  for (size_t n = begin; n < end;) {
+    if (cells.areFourAlike(n, end, fields) &&
+        dualMomentsOfFour(cells.viewsOfFour(n, fields), fields, outOf(n, n + kCellsAtOnce))) {
+      n += kCellsAtOnce;
+      continue;
+    }
+    if (cells.shapes[n] == CellKind::kNone)
+      std::ranges::fill(outOf(n, n + 1), 0.0);
+    else
+      dualMoments(cells.view(n, fields), fields, scratch, outOf(n, n + 1));
+    ++n;
+  }
 }
 
 }  // namespace
@@ -116,7 +139,8 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
   const size_t most_corners = std::max<size_t>(1, kMomentBytes / (stride * sizeof(double)));
   const uint64_t end_point = sums.first + sums.at.size();
   const auto threads = static_cast<size_t>(tbb::this_task_arena::max_concurrency());
-  const size_t stripes = threads == 1 ? 1 : 2 * threads;  // each looks at all corners
+  // Each looks at all corners. A power of two: dividing by another number takes as long as adding moments.
+  const size_t stripes = threads == 1 ? 1 : std::bit_ceil(2 * threads);
   tbb::enumerable_thread_specific<DualScratch> scratch;
   for (size_t begin = 0; begin < cells.size();) {
     size_t end = begin + 1;
@@ -126,16 +150,9 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
     moments_.resize(std::max(moments_.size(), corners * stride));
     tbb::parallel_for(tbb::blocked_range<size_t>(begin, end, kCellsPerTask),
                       [&](const tbb::blocked_range<size_t>& part) {
-                        DualScratch& own = scratch.local();
-                        for (size_t n = part.begin(); n < part.end(); ++n) {
-                          const size_t from = cells.corner_begin[n] - first_corner;
-                          const size_t count = cells.corner_begin[n + 1] - cells.corner_begin[n];
-                          const auto out = std::span(moments_).subspan(from * stride, count * stride);
-                          if (cells.shapes[n] == CellKind::kNone)
-                            std::fill(out.begin(), out.end(), 0.0);
-                          else
-                            dualMoments(cells.view(n, fields_), fields_, own, out);
-                        }
+                        const size_t from = cells.corner_begin[part.begin()] - first_corner;
+                        momentsOf(cells, part.begin(), part.end(), fields_, scratch.local(),
+                                  std::span(moments_).subspan(from * stride));
                       });
     // Each point's sum has the order of the cells, whoever adds them.
     tbb::parallel_for(size_t{0}, stripes, [&](size_t stripe) {
@@ -143,7 +160,8 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
         if (cells.shapes[n] == CellKind::kNone) continue;
         for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner) {
           const uint64_t point = cells.corners[corner];
-          if (point / kStripe % stripes != stripe || point < sums.first || point >= end_point) continue;
+          if ((point / kStripe & (stripes - 1)) != stripe || point < sums.first || point >= end_point)
+            continue;
           const size_t to = point - sums.first;
           if (std::isnan(sums.at[to].x)) {
             sums.at[to] = cells.at[corner];

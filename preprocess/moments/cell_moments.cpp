@@ -195,7 +195,6 @@ void dualMoments(const CellView& cell, size_t fields, DualScratch& scratch, std:
 
 CellBody bodyOf(const CellView& cell) {
   if (cell.shape == CellKind::kTetrahedron) return bodyOfTetrahedron(cell.corners);
-  CellBody body;
   const glm::dvec3 middle = meanOf(cell.corners);
   std::array<double, 10> sums{};
   const auto add = [&](const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& f) {
@@ -211,6 +210,11 @@ CellBody bodyOf(const CellView& cell) {
       add(cell.corners[face[edge]] - middle,
           cell.corners[face[edge + 1 == face.size() ? 0 : edge + 1]] - middle, middle_of_face);
   }
+  return bodyFrom(middle, sums);
+}
+
+CellBody bodyFrom(const glm::dvec3& middle, std::span<const double, 10> sums) {
+  CellBody body;
   body.volume = sums[0];
   body.centre = middle;
   if (!(body.volume > 0)) return body;

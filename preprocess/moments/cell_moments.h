@@ -52,5 +52,7 @@ struct CellBody {
 
 /// Of a cell without volume the centre is the mean of its corners, and the covariance 0.
 CellBody bodyOf(const CellView& cell);
+/// From the moments 0 to 9 of the whole cell about `middle`, the mean of its corners.
+CellBody bodyFrom(const glm::dvec3& middle, std::span<const double, 10> moments);
 
 }  // namespace curvisplat

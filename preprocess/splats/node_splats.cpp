@@ -78,6 +78,7 @@ class Window {
   }
   void findBlanks();
   bool anyBlankAround(uint64_t j, uint64_t k) const;
+  uint64_t octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const;
   void stretchRow(uint64_t j, uint64_t k);
   Stretch stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
@@ -90,14 +91,15 @@ class Window {
                       const std::array<double, 3>& inwards, const Rotate& rotate);
   glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
   double spacing(ptrdiff_t at, const Neighbours& neighbours) const;
-  /// Leaves of the last splat what other blocks do not cover. Returns false if that is nothing.
+  /// Leaves of the last splat what neither other blocks nor blanked cells cover. Returns false if that is nothing.
   template <typename Rotate>
   bool keepPart(ptrdiff_t at, const Rotate& rotate) {
-    if (!in_.covered || in_.covered[at] == 0) return true;
+    const uint64_t covered = octants_of_blanks_ | (in_.covered ? in_.covered[at] : 0);
+    if (covered == 0) return true;
     const glm::dmat3 axes(rotate({1, 0, 0}), rotate({0, 1, 0}), rotate({0, 0, 1}));
     NodeSplat& node = out_.splats[count_];
     const auto code =
-        keepUncovered({in_.covered[at], axes, node.border_code, 2}, node.splat,
+        keepUncovered({covered, axes, node.border_code, 2}, node.splat,
                       std::span(out_.values).subspan(count_ * scalars_.size(), scalars_.size()));
     if (code) node.becomePart(*code);
     return code.has_value();
@@ -114,6 +116,7 @@ class Window {
   uint64_t ni_, i0_, i1_;  // of a row; its part
   ptrdiff_t row_stride_, plane_stride_;
   uint64_t first_node_of_row_ = 0;
+  uint64_t octants_of_blanks_ = 0;  // of the next node: points (covered_part.h) in cells that are not there
   NodeScratch& scratch_;
   NodeSplats& out_;
   size_t count_ = 0;
@@ -199,14 +202,37 @@ void Window::addRow(uint64_t j, uint64_t k) {
       if (blank_[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
       if (blank_[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
     }
+    if (corrections_.octants) octants_of_blanks_ = octantsOfBlanks(at, neighbours);
     addNode(i, at, neighbours, on_face || isFace(i, ni_), layers_at(i));
   }
+  octants_of_blanks_ = 0;
+}
+
+/// The points of the node's cell that lie in cells with a blanked node; none if all do. Along an axis with one
+/// neighbour only, both halves of the cell are towards that one.
+uint64_t Window::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const {
+  uint64_t points = 0;
+  for (size_t octant = 0; octant < kCellOctantCount; ++octant) {
+    std::array<ptrdiff_t, 3> step{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const ptrdiff_t before = neighbours.before[axis], after = neighbours.after[axis];
+      const bool is_below = (octant >> axis & 1) != 0;
+      step[axis] = (is_below && before != 0) || after == 0 ? before : after;
+    }
+    const ptrdiff_t ij = step[0] + step[1];
+    if (blank_[at + ij] || blank_[at + step[0] + step[2]] || blank_[at + step[1] + step[2]] ||
+        blank_[at + ij + step[2]])
+      points |= octantPoints(octant);
+  }
+  return points == kAllCovered ? 0 : points;
 }
 
 bool Window::anyBlankAround(uint64_t j, uint64_t k) const {
   const GridBlock& block = in_.block;
-  return hasBlank(j, k) || (j > 0 && hasBlank(j - 1, k)) || (j + 1 < block.nj && hasBlank(j + 1, k)) ||
-         (k > 0 && hasBlank(j, k - 1)) || (k + 1 < block.nk && hasBlank(j, k + 1));
+  for (uint64_t row_k = k - std::min<uint64_t>(k, 1); row_k < std::min(k + 2, block.nk); ++row_k)
+    for (uint64_t row_j = j - std::min<uint64_t>(j, 1); row_j < std::min(j + 2, block.nj); ++row_j)
+      if (hasBlank(row_j, row_k)) return true;
+  return false;
 }
 
 /// Fills the scratch with the stretch of the nodes of a row's part.

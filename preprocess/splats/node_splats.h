@@ -22,7 +22,9 @@
 //
 // A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
 // axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
-// inwards. Without any neighbour along an axis the column is zero. The border is a face that the splat is to
+// inwards. Without any neighbour along an axis the column is zero. A node with its neighbours beside it, but
+// without one across an edge or a corner of its cell, loses that octant of the cell: a cell of the grid is
+// there only if all of its nodes are (covered_part.h). The border is a face that the splat is to
 // be cut at (stream/model/border_code.h), but where the cell has collapsed: at poles, and on singular lines.
 // The splats of the next layer of nodes reach beyond a face at the block's end by a hundredth of a cell's
 // weight, and are cut there; not in blocks of three nodes or fewer along that axis.
@@ -147,6 +149,7 @@ struct NodeSplatCorrections {
   bool bends = true;    // of the scalar
   bool stretch = true;  // else splats are as long as their cells
   bool growth = true;   // else kernels are symmetric; takes stretch
+  bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
 
   bool all() const { return border_codes && faces && layers && middles && bends && stretch && growth; }
 };

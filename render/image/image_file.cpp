@@ -36,15 +36,25 @@ constexpr std::array<Format, 4> kFormats{{
 constexpr size_t kLongestMagic = 4;
 constexpr uint64_t kLargestFile = uint64_t{8} << 30;  // 16384 x 16384 pixels of four floats are 4 GiB
 
+/// nullptr: none has this ending.
+const Format* findFormat(const std::string& ending) {
+  for (const Format& format : kFormats)
+    if (format.encode != nullptr && ending == format.ending) return &format;
+  return nullptr;
+}
+
 const Format& formatByName(const std::filesystem::path& path) {
   const std::string ending = extensionOf(path);
-  for (const Format& format : kFormats)
-    if (format.encode != nullptr && ending == format.ending) return format;
+  if (const Format* const format = findFormat(ending)) return *format;
   throw UsageError("{}: unknown image format{}; the name must end in .png, .exr or .pfm", path.string(),
                    didYouMean(ending, std::vector<std::string>{".png", ".exr", ".pfm"}));
 }
 
 }  // namespace
+
+bool isImageName(const std::filesystem::path& path) {
+  return findFormat(extensionOf(path)) != nullptr;
+}
 
 void writeImage(const Image& image, const std::filesystem::path& path) {
   CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);

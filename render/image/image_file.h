@@ -22,6 +22,8 @@ void writeExr(const Image& image, std::span<const ImageChannel> more, const std:
 inline constexpr uint64_t kChannelBytes = 8;
 /// The channels of an EXR file but for its colours. Throws Error.
 std::vector<ImageChannel> readChannels(const std::filesystem::path& path);
+/// Whether writeImage() takes the name: .png, .exr or .pfm.
+bool isImageName(const std::filesystem::path& path);
 /// Throws UsageError for a name that writeImage() would refuse. For checking before long work.
 void checkImageName(const std::filesystem::path& path);
 /// Memory that writeImage() needs for an image of `size`, beside the image itself.

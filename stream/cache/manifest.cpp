@@ -12,6 +12,7 @@
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
 #include "stream/cache/cache_format.h"
+#include "stream/cache/cell_octants.h"
 #include "stream/codec/values_codec.h"
 
 namespace curvisplat {
@@ -21,7 +22,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
 constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers,
-                                          kBorderPairs, kSteps,      kFineValues};
+                                          kBorderPairs, kSteps,      kFineValues,    kCellOctants};
 constexpr const char* kFormat = "curvisplat splat cache";
 // 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;

@@ -94,6 +94,11 @@ void HistogramSums::add(const BrickSplats& leaf) {
   }
 }
 
+void HistogramSums::clear() {
+  const MutexLock lock(summing_);
+  std::fill(sums_.begin(), sums_.end(), Sum());
+}
+
 std::optional<ValueHistogram> HistogramSums::of(size_t variable) const {
   const MutexLock lock(summing_);
   const auto sums = std::span(sums_).subspan(variable * kHistogramBins, kHistogramBins);

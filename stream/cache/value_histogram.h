@@ -65,6 +65,8 @@ class HistogramSums {
 
   /// Adds a leaf's splats, as decoded. Each leaf once.
   void add(const BrickSplats& leaf);
+  /// As if no leaf had been added.
+  void clear();
   /// Nothing if no leaf was added, or if their weights are 4 million times the root's volume.
   std::optional<ValueHistogram> of(size_t variable) const;
 

@@ -75,7 +75,7 @@ TEST_P(AroundBackends, DrawWhatTheProcessorDraws) {
     for (const Options& options : kAround) {
       const Image cpu = drawn("cpu", view, options), image = drawn(GetParam(), view, options);
       if (HasFatalFailure()) return;
-      EXPECT_LT(compareImages(cpu, plain).psnr_db, 45)
+      EXPECT_LT(compareImages(cpu, plain).psnr_db, 60)  // a nearly transparent face: 57.5
           << "changes nothing: " << testing::PrintToString(options);
       EXPECT_GE(compareImages(image, cpu).psnr_db, 50) << testing::PrintToString(options);
     }

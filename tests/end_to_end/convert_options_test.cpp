@@ -43,8 +43,9 @@ class ConvertOptionsTest : public testing::Test {
 TEST_F(ConvertOptionsTest, PrintsWhatItDid) {
   const ProgramResult result = convert({"--stats", file("stats.json")});
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_EQ(lineCount(result.out), 2) << result.out;
+  EXPECT_EQ(lineCount(result.out), 3) << result.out;
   EXPECT_NE(result.out.find("120000 samples, 118000 splats"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("rounded within"), std::string::npos) << result.out;
   EXPECT_NE(result.err.find("2000 nodes on block faces coincide"), std::string::npos) << result.err;
 
   const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));

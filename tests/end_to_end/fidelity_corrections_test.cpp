@@ -287,7 +287,7 @@ TEST_F(Corrections, Seams) {
   expectWorth("seams",
               {RearrangedGridSource(SceneGridSource(constant, {64, 32, 32}, 4), how), SceneField(*constant),
                "smooth", camera},
-              64, {}, without);
+              70, {}, without);
 }
 
 TEST_F(Corrections, SeamsOfUnlikeBlocks) {

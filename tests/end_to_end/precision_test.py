@@ -64,7 +64,7 @@ class Precision(StructuredFormats):
             self.assertIn(f", rounded within {bound:.1e}\n", self.said)
             cache = self.convert(*paths, "--value-precision", precision)
             bound = json.loads(self.run_program("info", cache, "--json", "--step", 1).stdout)["stored_within"][0]
-            self.assertIn("last step:\np: ", self.said)
+            self.assertIn("\np at the last step: ", self.said)
             self.assertIn(f", rounded within {bound:.1e}\n", self.said)
 
     def test_grids_that_are_opened_directly(self):

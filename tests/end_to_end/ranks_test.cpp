@@ -120,7 +120,7 @@ TEST_F(RanksCommand, ConvertTogether) {
         runAsRanks(count, {"convert", file("g.xyz"), file("g.fun"), "-o", file("shared.splats"), "--threads",
                            "1", "--memory", "256M", "--stats", file("c.json")});
     EXPECT_EQ(shared.status, 0) << shared.err;
-    EXPECT_EQ(lineCount(shared.out), 2) << shared.out;
+    EXPECT_EQ(lineCount(shared.out), 3) << shared.out;
     const Files found = filesOf(file("shared.splats"));
     ASSERT_EQ(found.size(), expected.size());
     for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
@@ -143,7 +143,7 @@ TEST_F(RanksCommand, ConvertASeriesTogether) {
   const Files expected = filesOf(file("s1.splats"));
   const ProgramResult shared = runAsRanks(2, to("s2.splats", {"--stats", file("s.json")}));
   EXPECT_EQ(shared.status, 0) << shared.err;
-  EXPECT_EQ(lineCount(shared.out), 2) << shared.out;
+  EXPECT_EQ(lineCount(shared.out), 3) << shared.out;
   EXPECT_TRUE(filesOf(file("s2.splats")) == expected);
   const auto json = nlohmann::json::parse(readTextFile(file("s.json")));
   EXPECT_EQ(json["ranks"], 2);

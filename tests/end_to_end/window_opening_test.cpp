@@ -422,8 +422,10 @@ TEST_F(WindowOpening, AScalarIsAddedToASeries) {
   click("scalar");
   click("further scalar " + further);
   ASSERT_TRUE(eventually([&] {
-    return runProgram({"info", "street.splats"}).out.find(further) != std::string::npos &&
-           !hasWidget("opening");
+    const bool is_there =
+        runProgram({"info", "street.splats", "--json"}).out.find(fmt::format("\"name\": \"{}\"", further)) !=
+        std::string::npos;
+    return is_there && !hasWidget("opening");
   }));
   saveAndCopy();
   const auto commands = close();

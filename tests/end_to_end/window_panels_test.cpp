@@ -117,6 +117,33 @@ TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
   expectDraws(commands[1], moved);
 }
 
+TEST_F(WindowPanels, WhatTheMenuAddsIsUnfolded) {
+  open();
+  widget("Clip planes");
+  EXPECT_FALSE(hasWidget("remove clip plane"));
+  choose("Picture", "Add a clip plane");
+  EXPECT_EQ(widget("remove clip plane"), "remove clip plane 1");
+  EXPECT_FALSE(hasWidget("remove slice"));
+  for (const char* const above : {"Colours and opacities", "Picture", "View"})
+    click(above);        // out of the way
+  click("Clip planes");  // what the user folds stays folded
+  EXPECT_TRUE(gone("remove clip plane"));
+  close();
+}
+
+TEST_F(WindowPanels, EscapeClosesListsAndMenus) {
+  open();
+  click("scalar");
+  widget("scalar volume");
+  press("Escape");
+  EXPECT_TRUE(gone("scalar volume"));
+  click("menu File");
+  widget("item Open...");
+  press("Escape");
+  EXPECT_TRUE(gone("item Open..."));
+  close();
+}
+
 TEST_F(WindowPanels, OpacitiesOfAnotherScalar) {
   open();
   const Image one = save();

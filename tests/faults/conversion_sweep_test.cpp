@@ -13,14 +13,14 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::Fault;
-using testing::FaultOutcome;
-using testing::kFaults;
+using faults::Fault;
+using faults::FaultOutcome;
+using faults::kFaults;
 
 class ConversionSweep : public SmallConversion {
  protected:
-  testing::FaultSweep converting(Words words) {
-    testing::FaultSweep sweep;
+  faults::FaultSweep converting(Words words) {
+    faults::FaultSweep sweep;
     sweep.in_message = folder_.path().parent_path().string();
     sweep.to_be_cut = input_.path().string();
     sweep.prepare = [this] { startAnew(); };
@@ -28,8 +28,8 @@ class ConversionSweep : public SmallConversion {
     sweep.check = [this](const FaultOutcome& outcome) { expectWholeOrNothing(outcome); };
     return sweep;
   }
-  testing::FaultSweep adding() {
-    testing::FaultSweep sweep = converting({});
+  faults::FaultSweep adding() {
+    faults::FaultSweep sweep = converting({});
     sweep.prepare = [this] { startWithOne(); };
     sweep.job = [this] { addNow(); };
     sweep.check = [this](const FaultOutcome& outcome) { expectOneOrBoth(outcome); };
@@ -90,7 +90,7 @@ TEST_F(ConversionSweep, AConversionIsWholeOrNothing) {
 
 TEST_F(ConversionSweep, AnOldCacheIsReplacedOrAsItWas) {
   setUp(twoBlocks(10));
-  testing::FaultSweep sweep = converting({true, false});
+  faults::FaultSweep sweep = converting({true, false});
   sweep.prepare = [this] { startWithOne(); };
   sweep.check = [this](const FaultOutcome& outcome) {
     expectNoneWrong();
@@ -99,7 +99,7 @@ TEST_F(ConversionSweep, AnOldCacheIsReplacedOrAsItWas) {
     EXPECT_TRUE(is_done || (!outcome.error.empty() && holdsAllOf(files, one_))) << outcome.error;
     if (!outcome.has_refused_removal) expectOnly(outcome.error.empty() ? both_ : one_);
   };
-  for (const Fault& fault : {testing::kFailsOnce, testing::kFailsToSync, testing::kFailsToRename}) {
+  for (const Fault& fault : {faults::kFailsOnce, faults::kFailsToSync, faults::kFailsToRename}) {
     sweep.run(fault);
     if (HasFailure()) return;
   }
@@ -126,7 +126,7 @@ TEST_F(ConversionSweep, ATextIsConvertedOrNot) {
   grid_ = input_ / "text.xyz";
   writeFileAtomically(grid_, text);
   setUp(grid);
-  for (const Fault& fault : {testing::kFailsOnce, testing::kIsFull, testing::kIsCutOff}) {
+  for (const Fault& fault : {faults::kFailsOnce, faults::kIsFull, faults::kIsCutOff}) {
     converting({}).run(fault);
     if (HasFailure()) return;
   }
@@ -137,18 +137,18 @@ TEST_F(ConversionSweep, ALargerOneIsWholeOrNothing) {
   setUp(twoBlocks(33));
   writeFiles(output_, both_);
   ASSERT_GT(CacheReader(output_).manifest().levels, 1u);
-  testing::FaultSweep conversion = converting({}), addition = adding();
+  faults::FaultSweep conversion = converting({}), addition = adding();
   conversion.stride = addition.stride = 37;
-  EXPECT_GE(conversion.run(testing::kFailsOnce), 20);
+  EXPECT_GE(conversion.run(faults::kFailsOnce), 20);
   ASSERT_FALSE(HasFailure());
-  EXPECT_GE(addition.run(testing::kFailsOnce), 14);
+  EXPECT_GE(addition.run(faults::kFailsOnce), 14);
 }
 
 TEST_F(ConversionSweep, ShortInterruptedAndSlowTransfersChangeNothing) {
   setUp(twoBlocks(10));
   for (const bool is_slow : {false, true}) {
     startAnew();
-    testing::FaultySystemCalls faulty;
+    faults::FaultySystemCalls faulty;
     faulty.is_unsynced = true;
     faulty.is_slow = is_slow;
     faulty.largest_transfer = 777;

@@ -13,9 +13,9 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::DiskState;
-using testing::forEachPowerLoss;
-using testing::RecordingSystemCalls;
+using faults::DiskState;
+using faults::forEachPowerLoss;
+using faults::RecordingSystemCalls;
 
 class PowerLoss : public SmallConversion {
  protected:
@@ -89,7 +89,7 @@ TEST_F(PowerLoss, AConversionIsResumedFromWhateverIsLeft) {
     const ScopedSystemCalls scope(recording);
     convertNow({0, 1}, {});
   }
-  testing::FaultySystemCalls unsynced;
+  faults::FaultySystemCalls unsynced;
   unsynced.is_unsynced = true;
   const ScopedSystemCalls scope(unsynced);
   int states = 0;

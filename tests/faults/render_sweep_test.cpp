@@ -16,9 +16,9 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::Fault;
-using testing::FaultOutcome;
-using testing::kFaults;
+using faults::Fault;
+using faults::FaultOutcome;
+using faults::kFaults;
 
 class RenderSweep : public ::testing::Test {
  protected:
@@ -47,8 +47,8 @@ class RenderSweep : public ::testing::Test {
     writeImage(image, pictures_ / "a.png");
   }
 
-  testing::FaultSweep drawing() {
-    testing::FaultSweep sweep;
+  faults::FaultSweep drawing() {
+    faults::FaultSweep sweep;
     sweep.in_message = folder_.path().string();
     sweep.to_be_cut = cache_.string();
     sweep.prepare = [this] {
@@ -84,8 +84,8 @@ TEST_F(RenderSweep, APictureIsRightOrNotThere) {
 /// What cannot be read is not taken for a damaged brick; what has been cut off is.
 TEST_F(RenderSweep, KeepGoingIsForDamageNotForAFailingDisk) {
   keep_going_ = true;
-  for (const Fault& fault : {testing::kFailsOnce, testing::kFailsFromThenOn}) {
-    testing::FaultSweep sweep = drawing();
+  for (const Fault& fault : {faults::kFailsOnce, faults::kFailsFromThenOn}) {
+    faults::FaultSweep sweep = drawing();
     sweep.check = [&, check = sweep.check](const FaultOutcome& outcome) {
       check(outcome);
       EXPECT_TRUE(!outcome.error.empty() || statistics_.bricks_unreadable.empty());
@@ -94,18 +94,18 @@ TEST_F(RenderSweep, KeepGoingIsForDamageNotForAFailingDisk) {
     if (HasFailure()) return;
   }
   int64_t stood_in_for = 0;
-  testing::FaultSweep sweep = drawing();
+  faults::FaultSweep sweep = drawing();
   sweep.check = [&](const FaultOutcome& outcome) {
     if (outcome.error.empty()) stood_in_for += !statistics_.bricks_unreadable.empty();
   };
-  sweep.run(testing::kIsCutOff);
+  sweep.run(faults::kIsCutOff);
   EXPECT_GT(stood_in_for, 0);
 }
 
 TEST_F(RenderSweep, ShortInterruptedAndSlowReadsGiveTheSamePicture) {
   for (const bool is_slow : {false, true}) {
     writeFiles(pictures_, {});
-    testing::FaultySystemCalls faulty;
+    faults::FaultySystemCalls faulty;
     faulty.is_slow = is_slow;
     faulty.largest_transfer = 777;
     faulty.interrupt_every = 3;

@@ -48,7 +48,7 @@ class SmallConversion : public ::testing::Test {
   }
   void setUp() {
     inputs_ = filesOf(input_.path());
-    testing::FaultySystemCalls unsynced;
+    faults::FaultySystemCalls unsynced;
     unsynced.is_unsynced = true;
     const ScopedSystemCalls scope(unsynced);
     convertNow({0}, {});

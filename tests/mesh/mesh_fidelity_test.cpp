@@ -94,7 +94,7 @@ TEST_F(MeshFidelity, CoarseLevels) {
 }
 
 TEST_F(MeshFidelity, FinerTetrahedra) {
-  if (!testing::isWholeSweep()) GTEST_SKIP() << "two minutes of processor time; see tests/support/sweep.h";
+  if (!faults::isWholeSweep()) GTEST_SKIP() << "two minutes of processor time; see tests/support/sweep.h";
   const ArrayMesh mesh({tetrahedraOf(*scene_, 100, 50, 50)});
   const double least_points[] = {66, 67, 56}, least_cells[] = {64, 64.5, 56};
   for (size_t n = 0; n < 3; ++n) {

@@ -93,19 +93,43 @@ def inside(folder, pictures):
         pass
 
     if pictures:
-        view = simple.CreateView("RenderView")
-        view.ViewSize = [640, 480]
-        glyphs = simple.TensorGlyph(Input=points, Tensors=["POINTS", "shape"], GlyphType="Sphere", ScaleFactor=0.9)
-        simple.ColorBy(simple.Show(glyphs, view), ("POINTS", "t"))
-        simple.ResetCamera(view)
-        simple.SaveScreenshot(f"{pictures}/paraview_points.png", view)
-        simple.Hide(glyphs, view)
-        image.Box, image.Resolution = [0.0] * 6, 40
-        cut = simple.Threshold(Input=image, Scalars=["POINTS", "density"], LowerThreshold=0.5, UpperThreshold=2.0)
-        simple.ColorBy(simple.Show(cut, view), ("POINTS", "t"))
-        simple.ResetCamera(view)
-        simple.SaveScreenshot(f"{pictures}/paraview_image.png", view)
+        draw(simple, image, points, pictures)
     print("plugin: all right")
+
+
+def draw(simple, image, points, pictures):
+    """Both sources in a view, coloured by t, which runs from 0 to 20; tests that the pictures have the colours' ends."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOImage import vtkPNGReader
+    view = simple.CreateView("RenderView")
+    view.ViewSize = [640, 480]
+    view.OrientationAxesVisibility = 0
+    points.Level = 0
+    image.Box, image.Resolution = [0.0] * 6, 40
+    # A sphere of ParaView's has a radius of 1/2.
+    glyphs = simple.TensorGlyph(Input=points, Tensors=["POINTS", "shape"], Scalars=["POINTS", "t"], GlyphType="Sphere", ScaleFactor=1.0)
+    cut = simple.Threshold(Input=image, Scalars=["POINTS", "density"], LowerThreshold=0.5, UpperThreshold=2.0)
+    for name, shown in (("points", glyphs), ("image", cut)):
+        shown.UpdatePipeline()
+        display = simple.Show(shown, view)
+        simple.ColorBy(display, ("POINTS", "t"))
+        display.RescaleTransferFunctionToDataRange(False, True)
+        display.SetScalarBarVisibility(view, True)
+        view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [9, -12, 9], [1.3, 1.7, 2], [0, 0, 1]
+        simple.ResetCamera(view)
+        file = f"{pictures}/paraview_{name}.png"
+        simple.SaveScreenshot(file, view)
+        simple.Hide(shown, view)
+        display.SetScalarBarVisibility(view, False)
+        reader = vtkPNGReader()
+        reader.SetFileName(file)
+        reader.Update()
+        colours = vtk_to_numpy(reader.GetOutput().GetPointData().GetScalars()).astype(int)[:, :3]
+        # ParaView's colours run from blue over grey to red.
+        reddish = colours[:, 0] - colours[:, 2]
+        red, blue = (reddish > 60).mean(), (reddish < -60).mean()
+        print(f"picture of {name}: red {red:.0%}, blue {blue:.0%}")
+        assert red > 0.03 and blue > 0.03, f"{file} has not the colours of t"
 
 
 def make_caches(folder):
@@ -133,8 +157,16 @@ def main():
     sys.path.insert(0, sys.argv[2])
     with tempfile.TemporaryDirectory() as folder:
         make_caches(folder)
-        environment = {**os.environ, "PYTHONPATH": str(pathlib.Path(sys.argv[2]).resolve()), "QT_QPA_PLATFORM": "offscreen"}
-        run = subprocess.run([pvpython, "--force-offscreen-rendering", __file__, "--inside", folder, *sys.argv[3:]], env=environment,
+        # What PYTHONPATH has stays: a ParaView that is unpacked, not installed, finds its own modules by it.
+        paths = [str(pathlib.Path(sys.argv[2]).resolve()), *filter(None, [os.environ.get("PYTHONPATH")])]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "QT_QPA_PLATFORM": "offscreen"}
+        # Debian's ParaView draws through X even off the screen, and without an X server it crashes there.
+        draws = len(sys.argv) > 3
+        if draws and "DISPLAY" not in os.environ and not shutil.which("xvfb-run"):
+            print("wrong: pictures need an X server: set DISPLAY or install xvfb")
+            return 1
+        screen = ["xvfb-run", "-a"] if draws and "DISPLAY" not in os.environ else []
+        run = subprocess.run([*screen, pvpython, "--force-offscreen-rendering", __file__, "--inside", folder, *sys.argv[3:]], env=environment,
                              capture_output=True, text=True, timeout=500)
     print(run.stdout, run.stderr, sep="", end="")
     if run.returncode != 0 and "No module named 'paraview" in run.stderr:

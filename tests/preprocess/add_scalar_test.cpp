@@ -7,14 +7,20 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "preprocess/convert/conversion_journal.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/brick_log.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
+#include "stream/cache/cell_octants.h"
+#include "stream/cache/partial_folder.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
@@ -208,6 +214,34 @@ TEST(AddScalar, LeavesOutWhatTheGridBlanks) {
   }));
 }
 
+TEST(AddScalar, CutsOctantsInCachesThatHaveThemOnly) {
+  GridBlock block = gridBlock(12, 11, 10);
+  block.has_blanking = true;
+  const FunctionGridSource source({block}, 2, [&](const GridNode& node) {
+    NodeValues values = bentBox(node, block);
+    values.scalars = {values.scalars[0], values.scalars[0]};
+    values.blank = node.i > 3 && node.i < 8 && node.j > 3 && node.j < 8 && node.k > 3 && node.k < 8;
+    return values;
+  });
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  convertTo(cache, source, {0});
+  ASSERT_TRUE(CacheReader(cache).manifest().hasFeature(kCellOctants));
+  addQuietly(source, adding(cache, {1}));
+  const Files files = filesOf(cache);
+  EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
+
+  // Of a cache without the feature, whole pieces are expected: they lie elsewhere.
+  convertTo(folder / "older.splats", source, {0});
+  const fs::path manifest = folder / "older.splats/manifest.json";
+  auto json = nlohmann::ordered_json::parse(readTextFile(manifest));
+  json.erase("checksum");
+  std::erase(json["requires"].get_ref<nlohmann::ordered_json::array_t&>(), kCellOctants);
+  writeFileAtomically(manifest, json.dump());
+  EXPECT_NE(refusal(source, adding(folder / "older.splats", {1})).find("another position"),
+            std::string::npos);
+}
+
 TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
   // The added ones have values in some of these nodes, and none in others.
   const auto blanked = [](const GridNode& node, NodeValues values) {
@@ -328,11 +362,12 @@ TEST_F(ToAnExistingCache, RefusesOtherNodesInTheSamePlace) {
       values.blank = node.i == missing && node.j == 5 && node.k == 5;
     });
   };
+  // Cells that touch the blanked node and have no volume are not drawn, so the first one that differs is its neighbour.
   fs::remove_all(cache);
   convertTo(cache, allButOne(9), {0});
   before = filesOf(cache);
   expectRefused(allButOne(10), adding(cache, {1}),
-                "it has node 10 5 5 of block 1, but the grid has node 9 5 5");
+                "it has node 8 4 4 of block 1, but the grid has node 9 4 4");
 }
 
 TEST_F(ToAnExistingCache, RefusesMissingValues) {
@@ -380,8 +415,20 @@ TEST_F(ToAnExistingCache, ClearsWhatAKilledOneLeft) {
   EXPECT_TRUE(after.contains("var.1.bin"));
 }
 
+TEST_F(ToAnExistingCache, ClearsAConversionKilledAtItsEnd) {
+  const fs::path scratch = folder / "a.splats.tmp.7.0";
+  fs::create_directory(scratch);
+  std::ofstream(scratch / "splats.bin") << "rest";
+  writeJournal(cache, {{}, scratch, std::nullopt});
+  std::ofstream(cache / kBrickLogName) << "rest";
+  std::ofstream(cache / kPartialLock) << kPartialMark;
+  addQuietly(source, adding(cache, {1}));
+  EXPECT_EQ(filesOf(cache).size(), before.size() + 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
 TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
-  using testing::FaultySystemCalls;
+  using faults::FaultySystemCalls;
   AddScalarOptions options = adding(cache, {1, 2});
   options.bucket_splats = 20000;
   FaultySystemCalls counting;

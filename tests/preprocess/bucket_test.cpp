@@ -126,7 +126,7 @@ TEST(BucketFile, IsGoneAfterwards) {
 
 TEST(BucketFile, ReportsAFullDisk) {
   const TemporaryFolder folder;
-  testing::FaultySystemCalls disk;
+  faults::FaultySystemCalls disk;
   disk.fail_write_at = 5;
   const ScopedSystemCalls scope(disk);
   BucketFile file(folder / "buckets.bin", 2, 4096);

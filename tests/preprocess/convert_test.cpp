@@ -340,7 +340,7 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.overwrite = true;
   options.bucket_splats = 20000;
-  testing::FaultySystemCalls disk;
+  faults::FaultySystemCalls disk;
   {
     const ScopedSystemCalls scope(disk);
     options.output = folder / "b.splats";
@@ -351,15 +351,15 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   const int64_t writes = disk.writes;
   ASSERT_GT(writes, 20);
   for (int64_t at = 0; at < writes; at += std::max<int64_t>(1, writes / 12)) {
-    testing::FaultySystemCalls full;
+    faults::FaultySystemCalls full;
     full.fail_write_at = at;
     const ScopedSystemCalls scope(full);
     EXPECT_THROW(convertQuietly(source, options), Error) << "write " << at << " of " << writes;
     EXPECT_TRUE(filesOf(options.output) == before);
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "at write " << at;
   }
-  for (auto call : {&testing::FaultySystemCalls::fail_sync_at, &testing::FaultySystemCalls::fail_read_at}) {
-    testing::FaultySystemCalls failing;
+  for (auto call : {&faults::FaultySystemCalls::fail_sync_at, &faults::FaultySystemCalls::fail_read_at}) {
+    faults::FaultySystemCalls failing;
     failing.*call = 2;
     failing.error = EIO;
     const ScopedSystemCalls scope(failing);

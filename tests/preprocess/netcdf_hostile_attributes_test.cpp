@@ -91,7 +91,7 @@ TEST_F(NetcdfHostileAttributes, NoAttributeOfAnyObjectEndsTheProgram) {
                                   "_FillValue", "units", "coordinates", "scale_factor"})
       for (int kind = 0; kind < kHostileAttributes; ++kind) {
         if (place++ < next) continue;
-        next = testing::nextInSweep(next, 7);
+        next = faults::nextInSweep(next, 7);
         SCOPED_TRACE(fmt::format("{} {} {}", object, attribute, kind));
         const std::filesystem::path file = copy();
         try {
@@ -105,7 +105,7 @@ TEST_F(NetcdfHostileAttributes, NoAttributeOfAnyObjectEndsTheProgram) {
         ++(error.empty() ? read : refused);
       }
   const int tried = read + refused + unwritten;
-  EXPECT_GT(tried, testing::isWholeSweep() ? 1000 : 150);
+  EXPECT_GT(tried, faults::isWholeSweep() ? 1000 : 150);
   EXPECT_GT(read, tried / 12);
   EXPECT_GT(refused, tried / 12);
   EXPECT_LT(unwritten, tried / 10);

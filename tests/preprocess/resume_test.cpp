@@ -191,7 +191,7 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
   const std::optional<uint64_t> bucket_splats[] = {kBucketSplats, std::nullopt, 3000};
   int resumed = 0;
   int64_t call = 0;
-  for (; !killedAt(call); call = testing::nextInSweep(call, 5)) {
+  for (; !killedAt(call); call = faults::nextInSweep(call, 5)) {
     SCOPED_TRACE(call);
     expectUnfinishedOrWhole(partial());
     expectUnfinishedOrWhole(output_);
@@ -201,7 +201,7 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
     fs::remove_all(output_);
   }
   EXPECT_GT(call, 60);
-  EXPECT_GT(resumed, testing::isWholeSweep() ? 30 : 6);
+  EXPECT_GT(resumed, faults::isWholeSweep() ? 30 : 6);
   expectWhole();
 }
 
@@ -212,7 +212,7 @@ TEST_F(Resume, ContinuesOrDropsTheBricksOfALargeCell) {
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
   for (int64_t call = calls - kCallsToFinish - 34; call < calls - kCallsToFinish;
-       call += testing::isWholeSweep() ? 2 : 5) {
+       call += faults::isWholeSweep() ? 2 : 5) {
     SCOPED_TRACE(call);
     killedAt(call);
     if (readJournal(partial())->splats) most = std::max(most, readBrickLog(partial(), 1).size());
@@ -271,7 +271,7 @@ TEST_F(Resume, WritesFacesAnew) {
   EXPECT_TRUE(expected_.contains("faces.bin"));
   fs::remove_all(output_);
   const int64_t calls = callsOfAll({"writes"});
-  for (int64_t call = calls - 50; call < calls; call += testing::isWholeSweep() ? 2 : 7) {
+  for (int64_t call = calls - 50; call < calls; call += faults::isWholeSweep() ? 2 : 7) {
     SCOPED_TRACE(call);
     killedAt(call);
     convertNow({true, false, std::nullopt});
@@ -398,7 +398,7 @@ TEST_F(Resume, WorksWithoutAnInterruptedConversion) {
 }
 
 TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
-  testing::FaultySystemCalls counting;
+  faults::FaultySystemCalls counting;
   {
     const ScopedSystemCalls scope(counting);
     convertNow({false, false, kBucketSplats});
@@ -429,7 +429,7 @@ TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
 
 TEST_F(Resume, KeepsWhatIsDoneOnAFullDiskIfAskedTo) {
   killInBuild();
-  testing::FaultySystemCalls full;
+  faults::FaultySystemCalls full;
   full.fail_write_at = 10;
   {
     const ScopedSystemCalls scope(full);

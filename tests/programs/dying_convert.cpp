@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
     options.overwrite = says("overwrite");
     const auto source = openGrid(grid);
 
-    testing::DyingSystemCalls calls;
+    faults::DyingSystemCalls calls;
     calls.die_at = std::stoll(words[5]);
     calls.count_reads = says("all");
     const ScopedSystemCalls scope(calls);

@@ -3,11 +3,12 @@
 //    make_version_caches tests/data/caches/version_<n>
 //
 // To be run once for each version, by the program that is the first to write it; never again for an older
-// one.
+// one. A cache of a feature that came later (octants) is added beside the others, which stay.
 //
 //    blocks.splats   three blocks, two of which share a face, and a hole; levels, two scalars
 //    cells.splats    a block with a scalar in its cells
 //    faces.splats    a block whose faces have levels of detail and a hole
+//    octants.splats  a block with a box of blanked nodes, at whose edges cells lose octants
 //    *.json, *.png   what a reader must get out of them (tests/support/cache_summary.h)
 #include <fmt/format.h>
 
@@ -86,6 +87,16 @@ void makeAll(const fs::path& folder) {
     return NodeValues{at, {static_cast<float>(angle)}, node.i > 40 && node.i < 46 && node.j > 2};
   });
   make(tube, {0}, folder / "faces.splats");
+  GridBlock with_box = gridBlock(10, 9, 8);
+  with_box.has_blanking = true;
+  const FunctionGridSource around_box({with_box}, 1, [](const GridNode& node) {
+    const auto inside = [](uint64_t index) { return index > 2 && index < 6; };
+    const glm::dvec3 at(static_cast<double>(node.i) + 0.25 * static_cast<double>(node.j),
+                        static_cast<double>(node.j), 0.5 * static_cast<double>(node.k));
+    return NodeValues{
+        at, {static_cast<float>(at.x * at.y)}, inside(node.i) && inside(node.j) && inside(node.k)};
+  });
+  make(around_box, {0}, folder / "octants.splats");
 }
 
 }  // namespace

@@ -337,8 +337,8 @@ TEST(BorderParts, AreNotDrawnWhereABrickHasTooMany) {
 
 TEST(BorderParts, AreOneInsteadOfAPairWhereABrickHasTooMany) {
   const uint32_t face = packBorderCode({kInward, 1}, 1);
-  const size_t count = BrickProjector::kMaxPieces /
-                       3;  // two splats with a cut each, one of which is in the place of the whole
+  // A pair is two cut splats, and room is kept for the whole that the first of them replaces.
+  const size_t count = BrickProjector::kMaxPieces / 3;
   EXPECT_EQ(project(Brick(count, face), Projection::kOrthographic, kWholeCellPairs).pieces, 4 * count);
   EXPECT_EQ(project(Brick(count + 1, face), Projection::kOrthographic, kWholeCellPairs).pieces,
             2 * (count + 1));

@@ -21,7 +21,7 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FaultySystemCalls;
+using faults::FaultySystemCalls;
 using Way = PagerOptions::Way;
 
 /// With each backend.

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "preprocess/addition/add_scalar.h"
+#include "preprocess/convert/conversion_journal.h"
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
@@ -160,6 +161,35 @@ TEST(ConvertSeries, ResumesAfterTheStepsThatAreDone) {
     const Conversion run = convertQuietly(inputOf(kinds), options);
     EXPECT_EQ(run.report.converted, kinds.size() - stop);
     EXPECT_TRUE(allFilesOf(output) == wanted) << stop;
+  }
+}
+
+/// It was killed before it had removed its own files, which are in the cache and in the temporary folder.
+TEST(ConvertSeries, ClearsAConversionKilledAtTheEndOfAStep) {
+  for (const double shift : {0.0, 0.5}) {  // the second step's geometry is a conversion of its own
+    const std::vector<StepKind> kinds{{0}, {1, shift}, {2, shift}};
+    const TemporaryFolder folder;
+    SeriesOptions options = optionsFor(folder / "a.splats");
+    convertQuietly(inputOf(kinds), options);
+    const auto wanted = allFilesOf(folder.path());
+    fs::remove_all(options.convert.output);
+
+    convertQuietly(inputOf({kinds[0]}), options);
+    const auto leave = [&](const fs::path& cache) {
+      const fs::path scratch = folder / (cache.filename().string() + ".tmp.7.0");
+      fs::create_directory(scratch);
+      std::ofstream(scratch / "splats.bin") << "rest";
+      writeJournal(cache, {{}, scratch, std::nullopt});
+    };
+    leave(options.convert.output);
+    if (shift != 0) {
+      const fs::path geometry = options.convert.output / "geometry.1";
+      fs::copy(options.convert.output, geometry);
+      leave(geometry);
+    }
+    options.convert.resume = true;
+    convertQuietly(inputOf(kinds), options);
+    EXPECT_TRUE(allFilesOf(folder.path()) == wanted) << shift;
   }
 }
 

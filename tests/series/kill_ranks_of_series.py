@@ -65,7 +65,7 @@ class RanksOfSeries(Series):
                 raise SystemExit("the other ranks did not end within a minute") from None
 
 
-def main(program, kills=20, size="40x32x16", steps=8):
+def main(program, kills=20, size="28x24x12", steps=8):
     if not shutil.which("mpirun") or not (pathlib.Path(program).parent / "curvisplat-mpi.so").exists():
         print("skipped: no mpirun (Debian: openmpi-bin), or built without MPI")
         sys.exit(77)

@@ -64,7 +64,7 @@ class Series:
         return len(json.loads(self.run("info", self.cache, "--json").stdout).get("steps", [0]))
 
 
-def main(program, moments=4, size="40x32x16", steps=5):
+def main(program, moments=4, size="28x24x12", steps=5):
     random.seed(5)
     failed = killed = 0
     for moving in (False, True):

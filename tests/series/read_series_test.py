@@ -36,13 +36,13 @@ def main(program, dump_cache):
             run(program, "convert", grid, folder / "w_%04d.fun", "-o", cache)
             for step in range(5):
                 ours = read_cache.Cache(cache, step)
-                if ours.steps[step][0] != step or ours.steps[step][1] != (step if moving else 0):
+                if ours.steps[step]["time"] != step or ours.steps[step]["geometry"] != (step if moving else 0):
                     sys.exit(f"{cache}: step {step} has another time or geometry")
                 dump = run(dump_cache, cache, step)
                 read_cache_test.compare(ours, io.BytesIO(dump), set())
                 for number, table in ours.tables.items():
                     for brick in table:
-                        header = ours.stream(ours.values_name(number, step), brick["extent"])[:40]
+                        header = ours.stream(ours.values_name(number, step), brick)[:40]
                         back.add(tuple(header[38:40]))
     if back != {(0, 0), (1, 0), (1, 2)}:
         sys.exit(f"streams have references {sorted(back)}; expected none, one and two")

@@ -60,7 +60,7 @@ TEST_F(SeriesCommand, EachStepDrawsAsACacheOfThatStepAlone) {
     const std::string grid = moving ? file(name + "_%04d.xyz") : file(name + ".xyz");
     const ProgramResult converted =
         run({"convert", grid, file(name + "_%04d.fun"), "-o", file(name + ".splats")});
-    EXPECT_EQ(lineCount(converted.out), 2) << converted.out;
+    EXPECT_EQ(lineCount(converted.out), 3) << converted.out;
     EXPECT_EQ(CacheReader(file(name + ".splats")).series().geometries(), moving ? 5u : 1u);
     run({"info", file(name + ".splats"), "--verify"});
 

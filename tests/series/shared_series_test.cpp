@@ -339,7 +339,7 @@ TEST(SeriesParts, OfOtherOptionsAreRefused) {
 }
 
 /// A file system that cannot exchange names, so that a manifest that could not be synced stays.
-class WithoutExchange : public testing::FaultySystemCalls {
+class WithoutExchange : public faults::FaultySystemCalls {
  public:
   int exchange(const char*, const char*) override {
     errno = EINVAL;

@@ -19,7 +19,7 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FaultySystemCalls;
+using faults::FaultySystemCalls;
 
 bool same(const SplatGeometry& a, const GeometryArrays<const float>& b) {
   const auto equal = [&](const std::vector<float>& x, const float* y) {

@@ -284,12 +284,12 @@ TEST(Cache, AFullDiskLosesNothing) {
   const fs::path path = folder / "a.splats";
   SmallCache().write(path);
   const std::string old = bytesOfFile(path / "manifest.json") + bytesOfFile(path / "geometry.bin");
-  for (int64_t testing::FaultySystemCalls::*const failing :
-       {&testing::FaultySystemCalls::fail_write_at, &testing::FaultySystemCalls::fail_sync_at,
-        &testing::FaultySystemCalls::fail_rename_at}) {
+  for (int64_t faults::FaultySystemCalls::*const failing :
+       {&faults::FaultySystemCalls::fail_write_at, &faults::FaultySystemCalls::fail_sync_at,
+        &faults::FaultySystemCalls::fail_rename_at}) {
     int64_t number = 0;
     for (bool failed = true; failed; ++number) {
-      testing::FaultySystemCalls calls;
+      faults::FaultySystemCalls calls;
       calls.*failing = number;
       const ScopedSystemCalls scoped(calls);
       const std::string error = errorOf([&] { SmallCache().write(path, true, 2); });

@@ -16,7 +16,7 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FaultySystemCalls;
+using faults::FaultySystemCalls;
 
 /// As on file systems that cannot swap two names.
 class WithoutExchange : public FaultySystemCalls {

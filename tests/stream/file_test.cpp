@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-using testing::FaultySystemCalls;
+using faults::FaultySystemCalls;
 
 class FileTest : public ::testing::Test {
  protected:

@@ -24,8 +24,8 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::FaultyAsyncReads;
-using testing::FaultySystemCalls;
+using faults::FaultyAsyncReads;
+using faults::FaultySystemCalls;
 using Way = PagerOptions::Way;
 
 bool uringWorks() {

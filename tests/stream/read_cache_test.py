@@ -3,10 +3,13 @@
 
 Decodes caches with read_cache.py and compares every number with what the program decodes, to float rounding:
 the caches named, and those that `DUMP_CACHE --make` makes. These must use every predictor and every flag of the format.
+The reader stays small: at most 250 lines, and no code but Python's own and the three packages.
 Exit status 77 (skipped) without the packages that read_cache.py needs.
 """
+import ast
 import io
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
@@ -15,7 +18,6 @@ try:
     import numpy as np
 
     import read_cache
-    import read_faces
 except ModuleNotFoundError as error:
     print(f"skipped: {error}; install python3-numpy, python3-zstandard and python3-xxhash")
     sys.exit(77)
@@ -67,25 +69,40 @@ def compare(cache, dump, seen):
                 theirs = np.frombuffer(dump.read(4 * int(splats)), "<f4")
                 same(n, name, rounded(name, values[name], size), theirs, f"variable {number}, ")
 
-        header = cache.stream(cache.geometry_name, brick["extent"])[:80]
+        header = cache.stream(cache.geometry_name, brick)[:80]
         seen |= {f"geometry predictor {predictor}" for predictor in header[32:74:2]}
         seen |= {f"flag {flag}" for flag in (1, 2, 4) if header[1] & flag}
         for number, table in cache.tables.items():
-            header = cache.stream(cache.values_name(number, cache.step), table[n]["extent"])[:40]
+            header = cache.stream(cache.values_name(number, cache.step), table[n])[:40]
             seen |= {f"values predictor {predictor}" for predictor in header[28:38:2]}
             seen |= {"values with rows" if any(header[24:28]) else "values without rows"}
     if dump.read(1):
         sys.exit(f"{cache.folder}: the program decodes more bricks")
     for number in cache.tables:
-        if cache.histogram(number):
+        if has_histogram(cache, number):
             compare_histogram(cache, number)
             seen.add("histogram")
     print(f"{cache.folder}: {len(cache.bricks)} bricks, {numbers} numbers agree")
 
 
+def histogram(cache, number):
+    """The last 2096 bytes before the table of a variable, which may be a histogram."""
+    data = cache.data[cache.values_name(number, cache.step)]
+    end = struct.unpack_from("<Q", data, 24)[0]
+    return data[max(0, end - 2096):end]
+
+
+def has_histogram(cache, number):
+    return histogram(cache, number).startswith(b"CVShisto")
+
+
 def compare_histogram(cache, number):
     """The shares that the program has written, with those of the leaves that were decoded here."""
-    lower, upper, volume, shares = cache.histogram(number)
+    record = histogram(cache, number)
+    _, version, bins, lower, upper, volume, checksum = struct.unpack_from("<8sIIdddQ", record)
+    if (version, bins) != (1, 512) or read_cache.checksum(record[:40] + record[48:]) != checksum:
+        sys.exit(f"{cache.folder}: the histogram of variable {number} has another header or checksum")
+    shares = np.frombuffer(record, "<f4", bins, 48)
     volumes = np.zeros(len(shares))
     for n, brick in enumerate(cache.bricks):
         if brick["children"][1] == 0:
@@ -98,11 +115,19 @@ def compare_histogram(cache, number):
         sys.exit(f"{cache.folder}: the histogram of variable {number} is not that of its leaves")
 
 
+def lattice(cache, n):
+    """The nodes of the face that a patch has, along u and v."""
+    patch = cache.patches[n]
+    return [np.minimum(f + s * np.arange(count), last - 1) for f, s, count, last in
+            zip(patch["first"], patch["stride"], patch["nodes"], cache.faces[patch["face"]]["nodes"])]
+
+
 def compare_faces(cache, dump):
-    faces, numbers = read_faces.Faces(cache), 0
-    for n, patch in enumerate(faces.patches):
+    cache.open_faces()
+    numbers = 0
+    for n, patch in enumerate(cache.patches):
         nodes, quads, scalars = (int(count) for count in np.frombuffer(dump.read(24), "<u8"))
-        positions, drawn, values = faces.patch(n)
+        positions, drawn, values = cache.patch(n)
         theirs = [np.frombuffer(dump.read(24 * nodes), "<f8").reshape(-1, 3), np.frombuffer(dump.read(quads), "u1")]
         theirs += [np.frombuffer(dump.read(4 * nodes), "<f4") for _ in range(scalars)]
         if not np.allclose(positions, theirs[0], rtol=1e-15, atol=1e-14) or (drawn != theirs[1]).any():
@@ -113,30 +138,43 @@ def compare_faces(cache, dump):
         numbers += positions.size + drawn.size + scalars * nodes
         # Nodes lie where the lattice says: a parent's are among its children's.
         for c in range(patch["children"][0], patch["children"][0] + patch["children"][1]):
-            u, v = np.intersect1d(faces.lattice(n)[0], faces.lattice(c)[0]), np.intersect1d(faces.lattice(n)[1], faces.lattice(c)[1])
-            place = [[np.searchsorted(lattice, along) for lattice, along in zip(faces.lattice(p), (u, v))] for p in (n, c)]
-            ours, of_child = (nodes_at(faces, p, *at) for p, at in zip((n, c), place))
+            u, v = np.intersect1d(lattice(cache, n)[0], lattice(cache, c)[0]), np.intersect1d(lattice(cache, n)[1], lattice(cache, c)[1])
+            place = [[np.searchsorted(lattice, along) for lattice, along in zip(lattice(cache, p), (u, v))] for p in (n, c)]
+            ours, of_child = (nodes_at(cache, p, *at) for p, at in zip((n, c), place))
             if not len(u) or not len(v) or not np.array_equal(ours, of_child):
                 sys.exit(f"{cache.folder}: patch {n} of the faces: a node is elsewhere in its child {c}")
-    if dump.read(1) or not faces.patches:
+    if dump.read(1) or not cache.patches:
         sys.exit(f"{cache.folder}: the program decodes other patches")
-    print(f"{cache.folder}: {len(faces.faces)} faces, {len(faces.patches)} patches, {numbers} numbers agree")
+    print(f"{cache.folder}: {len(cache.faces)} faces, {len(cache.patches)} patches, {numbers} numbers agree")
 
 
-def nodes_at(faces, patch, u, v):
-    columns, rows = faces.patches[patch]["nodes"]
-    return faces.patch(patch)[0].reshape(rows, columns, 3)[np.ix_(v, u)]
+def nodes_at(cache, patch, u, v):
+    columns, rows = cache.patches[patch]["nodes"]
+    return cache.patch(patch)[0].reshape(rows, columns, 3)[np.ix_(v, u)]
+
+
+def check_reader():
+    text = pathlib.Path(read_cache.__file__).read_text()
+    if len(text.splitlines()) > 250:
+        sys.exit(f"{read_cache.__file__}: {len(text.splitlines())} lines; a reader of the format has at most 250")
+    nodes = list(ast.walk(ast.parse(text)))
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
+    if names - sys.stdlib_module_names - {"numpy", "xxhash", "zstandard"}:
+        sys.exit(f"{read_cache.__file__}: imports {sorted(names)}; it is to be a single file")
 
 
 def main(program, *caches):
+    check_reader()
     seen = set()
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([program, "--make", folder], check=True)
         made = sorted(pathlib.Path(folder).glob("*.splats"))
         for path in [*caches, *made]:
-            dump = subprocess.run([program, path], check=True, stdout=subprocess.PIPE).stdout
             cache = read_cache.Cache(path)
-            compare(cache, io.BytesIO(dump), seen)
+            for step in range(len(cache.steps) or 1):
+                dump = subprocess.run([program, path, str(step)], check=True, stdout=subprocess.PIPE).stdout
+                compare(read_cache.Cache(path, step), io.BytesIO(dump), seen)
             if "faces.bin" in cache.files:
                 dump = subprocess.run([program, "--faces", path], check=True, stdout=subprocess.PIPE).stdout
                 compare_faces(cache, io.BytesIO(dump))

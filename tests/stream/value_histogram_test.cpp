@@ -83,7 +83,7 @@ TEST(ValueHistogram, TakesThinDataAndOneValueAndRefusesAbsurdWeights) {
 
 class StoredHistogram : public ::testing::Test {
  protected:
-  /// A file of values with a stream of so many bytes.
+  /// A file of values whose stream has `stream` bytes.
   uint64_t write(size_t stream, const std::optional<ValueHistogram>& histogram) const {
     OutputFile file(path);
     beginVariableFile(file);

@@ -81,7 +81,7 @@ TEST_F(AddedVariable, IsNotThereIfAnySyncFails) {
   const std::string manifest = bytesOfFile(path / "manifest.json");
   const size_t files = filesInCache();
   for (int64_t sync = 0;; ++sync) {
-    curvisplat::testing::FaultySystemCalls faulty;
+    curvisplat::faults::FaultySystemCalls faulty;
     faulty.fail_sync_at = sync;
     bool failed = false;
     try {

@@ -3,7 +3,7 @@
 #include <signal.h>
 #include <unistd.h>
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 namespace {
 
 [[noreturn]] void die() {
@@ -65,4 +65,4 @@ int DyingSystemCalls::remove(const char* path) {
   return SystemCalls::remove(path);
 }
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

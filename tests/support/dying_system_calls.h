@@ -7,7 +7,7 @@
 
 #include "stream/base/file.h"
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 
 /// Put in place with ScopedSystemCalls. The call number `die_at` (counted from 0; opening, writing, cutting,
 /// syncing, renaming, removing and making folders, and reading if `count_reads`) sends SIGKILL to the process
@@ -33,4 +33,4 @@ class DyingSystemCalls : public SystemCalls {
   void dieIfLast();
 };
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

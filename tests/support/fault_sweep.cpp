@@ -9,7 +9,7 @@
 #include "stream/base/error.h"
 #include "tests/support/sweep.h"
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 namespace {
 
 /// Whether the line gives the system's reason. Of a file that is cut off there are many things to say.
@@ -49,4 +49,4 @@ int64_t FaultSweep::run(const Fault& fault) const {
   }
 }
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

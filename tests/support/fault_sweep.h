@@ -7,7 +7,7 @@
 
 #include "tests/support/faulty_system_calls.h"
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 
 /// What goes wrong at the n-th call of a kind.
 struct Fault {
@@ -45,4 +45,4 @@ struct FaultSweep {
   int64_t run(const Fault& fault) const;
 };
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

@@ -6,7 +6,7 @@
 
 #include "stream/paging/async_reads.h"
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 
 /// Does reads by others, and passes their ends through `change`.
 class FaultyAsyncReads : public AsyncReads {
@@ -32,4 +32,4 @@ class FaultyAsyncReads : public AsyncReads {
   uint64_t number_ = 0;
 };
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 
 bool FaultySystemCalls::callFails() {
   const int64_t number = calls++;
@@ -125,4 +125,4 @@ size_t openDescriptors() {
   return count;
 }
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

@@ -9,7 +9,7 @@
 
 #include "stream/base/file.h"
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 
 /// Put in place with ScopedSystemCalls. Counts may be read and set while no I/O is under way.
 class FaultySystemCalls : public SystemCalls {
@@ -60,4 +60,4 @@ class FaultySystemCalls : public SystemCalls {
 /// How many descriptors this process has open.
 size_t openDescriptors();
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 namespace {
 
 using Kind = DiskCall::Kind;
@@ -237,4 +237,4 @@ void forEachPowerLoss(const std::filesystem::path& root, const DiskState& before
   }
 }
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

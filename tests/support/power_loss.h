@@ -20,7 +20,7 @@
 #include "stream/base/file.h"
 #include "tests/support/folder_files.h"
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 
 /// One call that changes the disk.
 struct DiskCall {
@@ -63,4 +63,4 @@ void forEachPowerLoss(const std::filesystem::path& root, const DiskState& before
                       const std::vector<DiskCall>& calls,
                       const std::function<void(const DiskState&, size_t call)>& check);
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

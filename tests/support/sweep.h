@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-namespace curvisplat::testing {
+namespace curvisplat::faults {
 
 /// Whether all places are to be tried: CURVISPLAT_WHOLE_SWEEPS is set, as tools/test.sh --whole does.
 inline bool isWholeSweep() {
@@ -19,4 +19,4 @@ inline int64_t nextInSweep(int64_t place, int64_t stride) {
   return place + (place < kFirstOnes || isWholeSweep() ? 1 : stride);
 }
 
-}  // namespace curvisplat::testing
+}  // namespace curvisplat::faults

@@ -124,7 +124,7 @@ SMOOTH = HERE.parent / "data" / "half_annulus_smooth.json"  # DESIGN.md, "Fideli
 FUNCTIONS = {"smooth": ["--tf", SMOOTH, "--range", "0,1", "--opacity-unit", "0.01"],
              "a ramp": ["--tf", "viridis", "--range", "0,1", "--opacity", "0:0,1:0.5", "--opacity-unit", "0.5"]}
 CASES = [(what, ending, FUNCTIONS[what], least) for what, ending, least in (
-    ("smooth", "ply", 35), ("a ramp", "ply", 42), ("smooth", "spz", 34), ("a ramp", "spz", 42),
+    ("smooth", "ply", 35), ("a ramp", "ply", 42), ("smooth", "spz", 36.8), ("a ramp", "spz", 45.9),
     ("smooth", "glb", 35), ("a ramp", "glb", 42))]
 
 if __name__ == "__main__":

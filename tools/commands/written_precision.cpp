@@ -6,11 +6,11 @@
 
 namespace curvisplat {
 
-void printStoredPrecision(const CacheReader& cache) {
+void printStoredPrecision(const CacheReader& cache, std::string_view where) {
   const auto& variables = cache.manifest().variables;
   for (size_t n = 0; n < variables.size(); ++n)
-    fmt::print("{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}\n", variables[n].name, variables[n].min,
-               variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
+    fmt::print("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}\n", variables[n].name, where,
+               variables[n].min, variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
                storedWithin(cache, n));
 }
 

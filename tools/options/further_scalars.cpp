@@ -1,8 +1,10 @@
 #include "tools/options/further_scalars.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <set>
+#include <string_view>
 #include <system_error>
 
 #include "preprocess/addition/add_scalar.h"
@@ -22,6 +24,12 @@ ConvertArguments argumentsFor(const std::vector<fs::path>& files, const fs::path
   arguments.grid.solutions.assign(files.begin() + 1, files.end());
   arguments.to = cache;
   return arguments;
+}
+
+/// Computed from the nodes without a solution; few look for these.
+bool isOfGridAlone(const std::string& name) {
+  constexpr std::array<std::string_view, 5> kNames{"i", "j", "k", "jacobian", "volume"};
+  return std::ranges::find(kNames, name) != kNames.end();
 }
 
 bool isSeries(const CacheReader& cache) {
@@ -54,6 +62,8 @@ std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::ve
   for (const GridScalar& scalar : source->description().scalars)
     if (scalar.centring == centring && names.insert(scalar.name).second)
       further.push_back({scalar.name, scalar.unit, scalar.derived});
+  std::stable_partition(further.begin(), further.end(),
+                        [](const FurtherScalar& one) { return !one.derived || !isOfGridAlone(one.name); });
   return further;
 }
 

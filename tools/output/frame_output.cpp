@@ -91,7 +91,12 @@ FrameNames::FrameNames(const std::filesystem::path& pattern_path) : folder_(patt
       at = end;
     }
   }
-  if (numbers == 0) refusePattern(pattern, "all frames would have the same name");
+  if (numbers > 0) return;
+  const std::string ending = pattern_path.extension().string();
+  if (!ending.empty() && !isImageName(pattern_path))
+    refusePattern(pattern,
+                  fmt::format("'{}' is the ending of no picture and no movie that is written", ending));
+  refusePattern(pattern, "all frames would have the same name");
 }
 
 std::filesystem::path FrameNames::of(uint64_t frame) const {

@@ -147,7 +147,7 @@ class CacheView {
   FileDialog& dialog_;
   ViewState state_;
   const EditedFunction first_function_;
-  const std::string first_state_;
+  const std::string first_state_;  // as JSON; empty if it was another view's, which somebody had changed
   History history_;
   Panels panels_;
   PlaneHandles handles_;

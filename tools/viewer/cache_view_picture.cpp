@@ -70,8 +70,9 @@ void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   list->PushClipRect(toImGui(whole.x, whole.y),
                      toImGui(whole.x + (1 - shown_strip_) * whole.width, whole.y + whole.height));
-  changed_ |= handles_.draw(state_, manifest(), place, window_);
   drawMarkerSigns(state_, place);
+  changed_ |=
+      handles_.draw(state_, manifest(), place, window_);  // over the signs: they are what one takes hold of
   list->PopClipRect();
 }
 

@@ -13,9 +13,21 @@
 
 namespace curvisplat {
 
+namespace {
+
+/// What has been added, by the menu or by a saved view, is shown. `seen`: how many there were.
+void unfoldIfMore(size_t& seen, size_t number) {
+  if (number > seen) ImGui::SetNextItemOpen(true);
+  seen = number;
+}
+
+}  // namespace
+
 void CutPanel::draw(ViewState& state, PanelActions& actions) {
   if (section("Clip box", false)) drawClipBox(state, actions);
+  unfoldIfMore(planes_seen_, state.clip_planes.size());
   if (section("Clip planes", false)) drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
+  unfoldIfMore(slices_seen_, state.slices.size());
   if (section("Slices", false)) drawSlices(state, actions);
 }
 

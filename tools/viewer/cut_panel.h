@@ -20,6 +20,7 @@ class CutPanel {
   void drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state, PanelActions& actions);
 
   const CacheReader& cache_;
+  size_t planes_seen_ = 0, slices_seen_ = 0;  // in the frame before
 };
 
 /// A plane in the middle of the data that faces the viewer.

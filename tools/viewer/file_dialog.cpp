@@ -132,6 +132,8 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
   else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
     ImGui::TextDisabled(".mp4 or .gif; .png: a numbered picture of each frame");
+  else if (error_.empty() && *purpose_ == Purpose::kSavePicture)
+    ImGui::TextDisabled("As large as in the window. For another size: copy command, change --size.");
   else
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
@@ -149,6 +151,7 @@ void FileDialog::drawEntries(bool& accepts) {
   const float below = 2.6f * ImGui::GetFrameHeightWithSpacing();
   ImGui::BeginChild("entries", {0, -below}, true);
   std::optional<fs::path> entered;
+  if (entries_.empty()) ImGui::TextDisabled("No file in this folder is of a kind that can be chosen here.");
   for (const FolderEntry& entry : entries_) {
     const std::string shown = entry.is_folder ? entry.name + "/" : entry.name;
     const bool chosen =

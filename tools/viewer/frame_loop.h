@@ -39,7 +39,7 @@
 
 namespace curvisplat {
 
-/// The faces of the grid at the cache's step, in the place of those of another step, with the opacities of the scalar
+/// Replaces the faces of another step by those of the grid at the cache's step, with the opacities of the scalar
 /// that their opacity_name names. Called on the loop's thread; an Error ends the request only.
 using FacesAtStep =
     std::function<std::vector<GridSurface>(const CacheReader&, const std::vector<GridSurface>&)>;

@@ -120,9 +120,18 @@ void paintNumbers(const EditedFunction& function) {
   const ImVec2 lower = ImGui::GetCursorScreenPos();
   const float width = ImGui::GetContentRegionAvail().x;
   constexpr int kNumbers = 4;
+  const auto scalar = [&](int n) { return function.scalarAt(static_cast<double>(n) / kNumbers); };
+  // As many digits as tell neighbours apart: 0.999, 1.001 and not 0.999, 1.
+  double closest = std::abs(scalar(1) - scalar(0)), largest = 0;
+  for (int n = 0; n <= kNumbers; ++n) {
+    largest = std::max(largest, std::abs(scalar(n)));
+    if (n > 0) closest = std::min(closest, std::abs(scalar(n) - scalar(n - 1)));
+  }
+  const double ratio = closest > 0 ? std::min(largest / closest, 1e6) : 1;
+  const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(ratio))) + 1, 3, 5);
   for (int n = 0; n <= kNumbers; ++n) {
     const float part = static_cast<float>(n) / kNumbers;
-    const std::string text = fmt::format("{:.3g}", function.scalarAt(static_cast<double>(part)));
+    const std::string text = fmt::format("{:.{}g}", scalar(n), digits);
     const float own = ImGui::CalcTextSize(text.c_str()).x;
     ImGui::GetWindowDrawList()->AddText({lower.x + part * (width - own), lower.y},
                                         ImGui::GetColorU32(ImGuiCol_Text), text.c_str());

@@ -17,7 +17,10 @@ bool JobDisplay::draw(const BackgroundJob& job, const std::string& name, const s
   window_.coverCurrent();
   ImGui::TextUnformatted(job.title().c_str());
   if (!note.empty()) ImGui::TextDisabled("%s", note.c_str());
+  // Dear ImGui's yellow leaves white letters unread.
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
   ImGui::ProgressBar(job.part(), {-1, 0}, job.phase().c_str());
+  ImGui::PopStyleColor();
   nameWidget(name);
   const bool stops = ImGui::Button("stop");
   nameWidget("stop " + name);

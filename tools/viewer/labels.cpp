@@ -20,6 +20,13 @@ void commandButton(Command command, PanelActions& actions, const char* text) {
   if (*info.key_name) hint(info.key_name);
 }
 
+void commandOption(Command command, PanelActions& actions, const char* text, bool on) {
+  const CommandInfo& info = infoOf(command);
+  if (ImGui::Checkbox(text, &on)) actions.run(command);
+  nameWidget(info.label);
+  if (*info.key_name) hint(info.key_name);
+}
+
 bool option(const char* text, bool& value) {
   const bool changed = ImGui::Checkbox(text, &value);
   nameWidget(text);

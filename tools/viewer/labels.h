@@ -11,6 +11,8 @@ namespace curvisplat {
 void label(const char* text);
 /// A button of a command, with its key. It is named as the command's label.
 void commandButton(Command command, PanelActions& actions, const char* text = nullptr);
+/// A checkbox of a command that switches something; `on` is how it is now. Named as the command's label.
+void commandOption(Command command, PanelActions& actions, const char* text, bool on);
 /// A checkbox; named by its label. Returns whether it changed.
 bool option(const char* text, bool& value);
 /// A heading that folds what is below. Named by its text. Returns whether it is unfolded.

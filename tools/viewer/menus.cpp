@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <imgui.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <array>
@@ -122,6 +123,13 @@ MenuChoice drawMenus(const MenuFacts& facts, Window& window) {
   }
   ImGui::EndMainMenuBar();
   return choice;
+}
+
+/// Dear ImGui closes them by Escape only together with its own keyboard navigation, whose keys are others than ours.
+bool closeLists() {
+  if (!ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup)) return false;
+  ImGui::ClosePopupToLevel(0, true);
+  return true;
 }
 
 void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& window) {

@@ -33,6 +33,9 @@ struct MenuChoice {
 /// Draws the bar over the window's whole width. Its height is that of a frame of Dear ImGui's.
 MenuChoice drawMenus(const MenuFacts& facts, Window& window);
 
+/// Closes the menus and the lists that are open, as Escape does. False if there were none.
+bool closeLists();
+
 /// Draws the messages in the corner of the picture; a click removes one.
 void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& window);
 /// Draws windows that close by a button or Escape: `open` is set to false then.

@@ -7,6 +7,7 @@
 #include "render/annotate/annotations.h"
 #include "render/camera/camera_path.h"
 #include "render/frame/step_player.h"
+#include "render/image/image_file.h"
 #include "tools/viewer/picture_layout.h"
 
 namespace curvisplat {
@@ -14,14 +15,9 @@ namespace {
 
 constexpr uint64_t kFramesOfTurn = 90;
 
-bool isPictureName(const std::filesystem::path& file) {
-  const std::string ending = file.extension().string();
-  return ending == ".png" || ending == ".exr" || ending == ".pfm";
-}
-
 /// H.264 needs an even width and height.
 ImageSize sizeFor(const std::filesystem::path& file, ImageSize size) {
-  if (file.extension() == ".gif" || isPictureName(file)) return size;
+  if (file.extension() == ".gif" || isImageName(file)) return size;
   return {std::max(2, size.width / 2 * 2), std::max(2, size.height / 2 * 2)};
 }
 
@@ -32,7 +28,7 @@ uint64_t framesOf(const MovieRequest& movie) {
 }
 
 std::filesystem::path movieNameOf(const std::filesystem::path& file) {
-  if (!isPictureName(file) || file.filename().string().find('%') != std::string::npos) return file;
+  if (!isImageName(file) || file.filename().string().find('%') != std::string::npos) return file;
   return file.parent_path() / (file.stem().string() + "_%04d" + file.extension().string());
 }
 

@@ -164,9 +164,9 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   const bool perspective = state.camera.projection == Projection::kPerspective;
   commandButton(Command::kFit, actions, "fit");
   ImGui::SameLine();
-  commandButton(Command::kOtherProjection, actions, perspective ? "orthographic" : "perspective ");
+  commandOption(Command::kOtherProjection, actions, "perspective", perspective);
   ImGui::SameLine();
-  commandButton(Command::kFly, actions, facts.flies ? "orbit" : "fly  ");
+  commandOption(Command::kFly, actions, "fly", facts.flies);
   constexpr std::pair<Command, const char*> kSides[]{
       {Command::kLookPlusX, "+x"},  {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
       {Command::kLookMinusY, "-y"}, {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"}};
@@ -213,16 +213,20 @@ void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string
 
 void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   const float column = 0.5f * ImGui::GetContentRegionAvail().x;
-  actions.changed |= option("light", state.lit);
+  // Not "light" beside "dark", which reads as a choice of two.
+  actions.changed |= ImGui::Checkbox("lighting", &state.lit);
+  nameWidget("light");
   ImGui::SameLine(column);
-  actions.changed |= option("dark", state.dark);
-  hint("a dark background");
+  actions.changed |= ImGui::Checkbox("dark background", &state.dark);
+  nameWidget("dark");
   actions.changed |= option("scalar bar", state.annotations.scalar_bar);
   ImGui::SameLine(column);
   actions.changed |= option("outline", state.annotations.outline);
   actions.changed |= option("axes", state.annotations.axes);
+  hint("arrows that show the directions of x, y and z");
   ImGui::SameLine(column);
-  actions.changed |= option("axes grid", state.annotations.axes_grid);
+  actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
+  nameWidget("axes grid");
   commandButton(Command::kSavePicture, actions, "save picture");
   ImGui::SameLine(column);
   commandButton(Command::kSaveTurnMovie, actions, "save movie...");

@@ -183,6 +183,8 @@ class Viewer {
     ImGui::TextUnformatted("Drop a cache or a grid with its solution here, or");
     if (ImGui::Button("open...")) run(Command::kOpen);
     nameWidget("open");
+    ImGui::TextDisabled(
+        "%s", "caches: NAME.splats; grids: PLOT3D, CGNS, VTK, NetCDF, OpenFOAM, Tecplot, EnSight, XDMF, ...");
     if (!settings_.recent.empty()) ImGui::TextUnformatted("\nopened before:");
     for (size_t n = 0; n < settings_.recent.size(); ++n) {
       std::string label;
@@ -253,7 +255,7 @@ class Viewer {
         messages_shown_ = !messages_shown_;
         return;
       case Command::kDismissMessages:
-        toasts_.removeAll();
+        if (!closeLists()) toasts_.removeAll();
         return;
       case Command::kLightTheme:
         settings_.light_theme = !settings_.light_theme;

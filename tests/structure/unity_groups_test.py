@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Tests tools/cmake/unity_groups.py: which names a source declares, and which sources it puts together."""
+import pathlib
+import sys
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools/cmake"))
+import unity_groups  # noqa: E402
+
+SOURCE = """\
+#include "stream/base/error.h"
+#define LIMIT 3
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using Words = std::vector<std::string>;
+constexpr double kRatio = 2;
+const std::vector<int> kSides{1, 2};
+std::array<int, 3> table[2];
+thread_local Counter counter;
+enum class Kind { kFirst };
+struct Part;
+template <typename T>
+std::vector<T> sorted(std::vector<T> values) {
+  const int inner = 1;
+  return values;
+}
+
+class Reader final : public Source {
+  int member_ = 0;
+};
+
+TEST(Suite, Holds) {
+}
+TEST_P(Other, Holds) {}
+INSTANTIATE_TEST_SUITE_P(All, Other, testing::Values(1));
+
+}  // namespace
+
+Reader::Reader(int at) : at_(at) {
+}
+void Reader::open() {
+}
+
+}  // namespace curvisplat
+"""
+
+
+class UnityGroups(unittest.TestCase):
+    def test_names_are_those_that_a_source_declares_in_its_namespaces(self):
+        self.assertEqual(unity_groups.names(SOURCE), {
+            "LIMIT", "Words", "kRatio", "kSides", "table", "counter", "Kind", "sorted", "Reader", "Suite_Holds", "Other_Holds",
+            "All_Other"})
+
+    def test_sources_with_a_name_in_common_are_apart(self):
+        a, b, c = "int first() {", "int second() {", "bool first(double x) {"
+        self.assertEqual(unity_groups.groups([a, b, c, b], 10), [0, 0, 1, 1])
+
+    def test_a_source_with_a_type_of_a_name_that_a_header_has_is_alone(self):
+        taken = unity_groups.types("struct Brick {\nclass Forward;\ninline int size() {\n")
+        self.assertEqual(taken, {"Brick"})
+        self.assertEqual(unity_groups.groups(["int a() {", "struct Brick {", "int b() {"], 10, taken), [0, 1, 0])
+        self.assertIn("CacheReader", unity_groups.types_of_headers())
+
+    def test_neighbours_are_together_in_groups_of_the_same_size(self):
+        texts = [f"int f{n}() {{" for n in range(12)]
+        self.assertEqual(unity_groups.groups(texts, 10), [0] * 6 + [1] * 6)
+        self.assertEqual(unity_groups.groups([], 10), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
