@@ -17,6 +17,7 @@
 #include "render/frame/sweep_buffer.h"
 #include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/interrupted.h"
 #include "stream/base/stage_timer.h"
 #include "stream/paging/brick_source.h"
@@ -26,6 +27,8 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
+// Splats that are exchanged lie in blocks of other sizes at each step. What malloc kept of them was 27 MiB of 256.
+constexpr size_t kLargeBlock = size_t{1} << 20;
 
 PaintResources resourcesOf(const FrameOptions& options) {
   return {.threads = options.threads};
@@ -237,6 +240,7 @@ bool FramePipeline::beginExchangedSlab(const FrameRegion* region) {
 
 /// The numbers in plan.shared of the plan's parts, which are some of those in the same order.
 void FramePipeline::beginExchange(const FramePlan& plan, const FrameOptions& options) {
+  returnFreedMemory(kLargeBlock);
   exchange_ = std::make_unique<SplatExchange>(*options.ranks, *plan.shared, exchangeBytes(options));
   shared_numbers_.clear();
   uint32_t number = 0;

@@ -202,6 +202,7 @@ void SplatExchange::findReceivers(Prepared& part, std::span<const ScreenSplat> s
     first_record = n + 1;
     part.all = entries > most;
   }
+  if (!part.all) part.entries.reserve(entries);
   for (size_t n = 0; n < part.receivers.size(); ++n) {
     Receiver& receiver = part.receivers[n];
     if (receiver.done) continue;
@@ -303,8 +304,10 @@ void SplatExchange::finish(Prepared& part, Receiver& receiver) {
   if (!part.ready) return;
   for (const Receiver& other : part.receivers)
     if (!other.done) return;
-  part.splats = {};
-  part.keys = part.entries = {};
+  // Assigning {} would keep the memory.
+  std::vector<ScreenSplat>().swap(part.splats);
+  std::vector<uint32_t>().swap(part.keys);
+  std::vector<uint32_t>().swap(part.entries);
   const MutexLock lock(mutex_);
   prepared_bytes_ -= std::exchange(part.bytes, 0);
 }
