@@ -21,6 +21,8 @@
 namespace curvisplat {
 namespace {
 
+static_assert(kSharedTileSide % kBlockSide == 0);
+
 // Of most scenes' splats, one in four touches a second tile. Where they touch more, batches are smaller.
 constexpr size_t kEntriesASplat = 4;
 
@@ -87,6 +89,7 @@ struct CpuPainter::State {
     });
   }
   BlockMask inImage(size_t number) const;
+  BlockMask blocksIn(const TileSet& wanted, size_t number) const;
   void clear(size_t number);
   void allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_);
   void paintBatch();
@@ -119,9 +122,9 @@ void CpuPainter::drawOnly(const TileSet& tiles) {
   State& state = *state_;
   if (!state.bins->empty()) state.paintBatch();
   for (size_t number = 0; number < tileCount(state.size); ++number) {
-    const bool drawn = tiles.has(number);
-    state.open[number].store(drawn ? state.inImage(number) : 0, std::memory_order_relaxed);
-    if (drawn)
+    const BlockMask open = state.inImage(number) & state.blocksIn(tiles, number);
+    state.open[number].store(open, std::memory_order_relaxed);
+    if (open != 0)
       state.bins->open(static_cast<int>(number));
     else
       state.bins->close(static_cast<int>(number));
@@ -135,6 +138,18 @@ BlockMask CpuPainter::State::inImage(size_t number) const {
             y0 = static_cast<int>(number / columns) * kTileSide;
   return blocksOf(blocksAlong(0, static_cast<float>(size.width - 1 - x0), kTileSide).inTile(0),
                   blocksAlong(0, static_cast<float>(size.height - 1 - y0), kTileSide).inTile(0));
+}
+
+/// The blocks of a tile that lie in shared tiles of the set.
+BlockMask CpuPainter::State::blocksIn(const TileSet& wanted, size_t number) const {
+  const auto columns = static_cast<size_t>(bins->columns());
+  const int x0 = static_cast<int>(number % columns) * kTileSide,
+            y0 = static_cast<int>(number / columns) * kTileSide;
+  BlockMask blocks = 0;
+  for (int block = 0; block < kTileBlocks * kTileBlocks; ++block)
+    if (wanted.hasPixel(x0 + block % kTileBlocks * kBlockSide, y0 + block / kTileBlocks * kBlockSide))
+      blocks |= BlockMask{1} << block;
+  return blocks;
 }
 
 /// Nothing in it; what lies outside of the image is saturated from the beginning.

@@ -62,7 +62,9 @@ HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, con
   return saturated;
 }
 
-HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visit& visit,
+/// `several`: the splat touches more than one block, be they open or not: how a block is painted must not depend on others,
+/// of which another process may know.
+HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool several, const Visit& visit,
                                 const float* footprint) {
   const auto& [visits, fits, n] = visit;
   const Ellipse e = visit.ellipse();
@@ -83,8 +85,7 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Vi
   // A polyline's error is a 25th of a parabola's or so, where it does not fall much faster; and it is as much
   // work as a block looked up.
   Polyline line;
-  if (fits.excess.at[n] < 25 && std::popcount(blocks) > 1 &&
-      fitPolyline(work.table, visits.pieces, n, line)) {
+  if (fits.excess.at[n] < 25 && several && fitPolyline(work.table, visits.pieces, n, line)) {
     if (work.shading.lit) line.light(visits.lit(work, n));
     return paintPolyline(work, blocks, e, line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
                          footprint);
@@ -121,7 +122,7 @@ BlockMask paintTile(const TileWork& work) {
       fits.light(visits.diffuse, visits.specular);
     for (size_t n = 0; n < count; ++n) {
       if (fits.fit.at[n] == kNothing) continue;
-      const BlockMask blocks = blocksOf(visits, n) & open;
+      const BlockMask touched = blocksOf(visits, n), blocks = touched & open;
       if (blocks == 0) continue;
       if (work.colours) {
         open &= ~paintColoured(work, blocks, {visits, fits, colours, n}, static_cast<size_t>(numbers.at[n]),
@@ -131,7 +132,7 @@ BlockMask paintTile(const TileWork& work) {
       const Visit visit{visits, fits, n};
       open &= ~(visits.cut.at[n] != 0
                     ? paintCut(work, blocks, visit, static_cast<size_t>(numbers.at[n]), footprint)
-                    : paintVisit(work, blocks, visit, footprint));
+                    : paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint));
     }
   }
   return open;

@@ -33,11 +33,10 @@ struct FrameRenderer::State {
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan =
         timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options, pipeline.order()); });
-    std::vector<uint32_t> owners;
-    if (options.ranks) owners = planner.share(plan, options);
+    if (options.ranks) planner.share(plan, options);
     pipeline.drawLayers(plan, options, statistics);
     Image image = pipeline.draw(plan, options, statistics, progress);
-    if (options.ranks) joinTiles(image, owners, *options.ranks);
+    if (options.ranks) joinTiles(image, plan.shared->owners, *options.ranks);
     return image;
   }
 
@@ -49,15 +48,14 @@ struct FrameRenderer::State {
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan =
         timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear, pipeline.order()); });
-    std::vector<uint32_t> owners;
-    if (options.ranks) owners = planner.share(plan, clear);
+    if (options.ranks) planner.share(plan, clear);
     pipeline.drawLayers(plan, clear, statistics);
     Image image = pipeline.draw(plan, clear, statistics, progress);
     pipeline.release();
     Image painted = paintValues(camera, clear, plan, image, progress);
     if (options.ranks) {
-      joinTiles(image, owners, *options.ranks);
-      joinTiles(painted, owners, *options.ranks);
+      joinTiles(image, plan.shared->owners, *options.ranks);
+      joinTiles(painted, plan.shared->owners, *options.ranks);
     }
     if (!options.ranks || options.ranks->isFirst())
       values = pixelValuesOf(painted, plan.settings.view, depthOrigin(plan));

@@ -17,6 +17,7 @@
 #include "render/frame/sweep_buffer.h"
 #include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/interrupted.h"
 #include "stream/base/stage_timer.h"
 #include "stream/paging/brick_source.h"
@@ -26,6 +27,8 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
+// Splats that are exchanged lie in blocks of other sizes at each step. What malloc kept of them was 27 MiB of 256.
+constexpr size_t kLargeBlock = size_t{1} << 20;
 
 PaintResources resourcesOf(const FrameOptions& options) {
   return {.threads = options.threads};
@@ -142,14 +145,16 @@ void FramePipeline::makePools(const FrameOptions& options) {
   // Steps differ in this; the pools stay.
   least_pager_bytes_ =
       std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, {variable_, coloured_by_}));
-  const FrameBudget::Fixed fixed{planner_.bytes(),
-                                 least_pager_bytes_,
-                                 backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options),
-                                 options.output_bytes,
-                                 planner_.mostSplats(),
-                                 options.size,
-                                 cache_.series().steps.size() > 1,
-                                 coloured_by_.has_value()};
+  const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
+  const FrameBudget::Fixed fixed{
+      planner_.bytes(),
+      least_pager_bytes_,
+      backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options) + exchange_bytes,
+      options.output_bytes,
+      planner_.mostSplats(),
+      options.size,
+      cache_.series().steps.size() > 1,
+      coloured_by_.has_value()};
   const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
@@ -182,13 +187,26 @@ void FramePipeline::dropPools() {
   old.swap(pools_);
 }
 
-/// Starts the stages on the next slab. False if no slab of the region is left.
-bool FramePipeline::beginSlab(const FramePlan& plan, const FrameRegion& region, const FrameOptions& options) {
+/// Begins the next slab of the sweep's region. False if none is left.
+bool FramePipeline::sweepNext(const FramePlan& plan, const FrameOptions& options) {
   const MutexLock lock(mutex_);
   throwIfStopped(options.stop);
-  if (!pools_->sweep.beginSlab(plan.parts)) return false;
+  return pools_->sweep.beginSlab(plan.parts);
+}
+
+/// Starts the stages on the sweep's slab, of `region`; null: there is none. False if no rank has one.
+bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, const FrameOptions& options) {
+  if (exchange_ ? !beginExchangedSlab(region) : region == nullptr) return false;
+  const MutexLock lock(mutex_);
+  throwIfStopped(options.stop);
   pools_->ring.resume();
   std::vector<BrickPart> parts;
+  if (exchange_) {
+    for (const uint32_t number : exchange_->toPrepare()) parts.push_back(exchange_->parts()[number].part);
+    pools_->source.start(parts, [this](uint32_t brick) { return exchange_->isUnneeded(brick); });
+    pools_->workers.startExchange();
+    return true;
+  }
   for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
   // Nothing is hidden when drawing back to front. With keep_going, see FrameWorkers::prepare().
   const bool may_hide = order() == DrawingOrder::kFrontToBack && !options.keep_going;
@@ -196,8 +214,50 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameRegion& region, 
     return (may_hide && hidden_.hides(brick)) ||
            pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
   });
-  pools_->workers.start(region.tiles.get());
+  pools_->workers.start(region->tiles.get());
   return true;
+}
+
+/// Starts the stages on the next slab, of the current region or of the next that has one. False if none is left, of other
+/// ranks either.
+bool FramePipeline::nextSlab(const FramePlan& plan, std::span<const FrameRegion> regions,
+                             const FrameOptions& options, Painter& painter) {
+  while (!sweepNext(plan, options)) {
+    if (region_ + 1 == regions.size()) return startSlab(plan, nullptr, options);
+    ++region_;
+    painter.drawOnly(*regions[region_].tiles);
+    pools_->sweep.beginRegion(regions[region_].left_out);
+  }
+  return startSlab(plan, &regions[region_], options);
+}
+
+/// Tells the other ranks what this one needs for its slab. False if no rank has a slab.
+bool FramePipeline::beginExchangedSlab(const FrameRegion* region) {
+  if (!region) return exchange_->beginSlab({});
+  SplatExchange::Request request{region->tiles->box(), {}};
+  for (const uint32_t number : pools_->sweep.parts()) request.parts.push_back(shared_numbers_[number]);
+  return exchange_->beginSlab(std::move(request));
+}
+
+/// The numbers in plan.shared of the plan's parts, which are some of those in the same order.
+void FramePipeline::beginExchange(const FramePlan& plan, const FrameOptions& options) {
+  returnFreedMemory(kLargeBlock);
+  exchange_ = std::make_unique<SplatExchange>(*options.ranks, *plan.shared, exchangeBytes(options));
+  shared_numbers_.clear();
+  uint32_t number = 0;
+  for (const SweptPart& part : plan.parts) {
+    while (plan.shared->parts[number].part.brick != part.part.brick) ++number;
+    shared_numbers_.push_back(number++);
+  }
+}
+
+/// Of each of the exchange's three buffers.
+uint64_t FramePipeline::exchangeBytes(const FrameOptions& options) const {
+  const uint64_t least =
+      SplatExchange::leastBytes(BrickProjector::kMaxSplats + (coloured_by_ ? kMaxBrickSplats : 0));
+  // Where several bricks a worker are under way, none waits for the others.
+  const uint64_t most = 4 * least * (threadsOf(options) + 1);
+  return std::clamp(options.memory_bytes / 16, least, most);
 }
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
@@ -318,9 +378,11 @@ void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
-  const FrameWork work{cache_,    plan.parts, plan.settings,     planner_.table(),
-                       plan.keys, hidden_,    options.keep_going};
   makePools(options);
+  exchange_.reset();
+  if (plan.shared) beginExchange(plan, options);
+  const FrameWork work{cache_,    plan.parts, plan.settings,      planner_.table(),
+                       plan.keys, hidden_,    options.keep_going, exchange_.get()};
   // With keep_going, what replaces a damaged brick may reach into any region.
   const std::vector<FrameRegion> regions =
       options.keep_going ? std::vector<FrameRegion>{{plan.tiles, {}}}
@@ -337,8 +399,9 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   if (progress) progress->begin("drawing", plan.parts.size(), "bricks");
   Image image;
   try {
+    region_ = 0;
     pools_->sweep.beginRegion(regions.front().left_out);
-    beginSlab(plan, regions.front(), options);
+    startSlab(plan, sweepNext(plan, options) ? &regions.front() : nullptr, options);
     image = paint(plan, regions, options, statistics, progress);
   } catch (...) {
     pools_->workers.stop();
@@ -358,6 +421,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.sweep_peak_bytes = SweepBuffer::bytes(pools_->sweep.peakSplats());
   statistics.regions = regions.size();
   statistics.slabs = pools_->sweep.slabs();
+  if (exchange_) statistics.exchanged_bytes = exchange_->sentBytes();
   statistics.bricks_hidden = pools_->workers.partsHidden() + plan.parts_hidden;
   statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden - plan.parts_elsewhere;
   statistics.bricks_out_of_image = cut.out_of_image;
@@ -373,7 +437,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 
 /// The stage "draw"; the first slab is begun. No picture where the ring was closed: a worker has failed, or a stop was
 /// requested.
-Image FramePipeline::paint(const FramePlan& plan, const std::vector<FrameRegion>& regions,
+Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
                            const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
   Image image;
   backend_->run([&](Painter& painter) {
@@ -391,21 +455,13 @@ Image FramePipeline::paint(const FramePlan& plan, const std::vector<FrameRegion>
       if (progress) progress->advance(now - seen);
       seen = now;
     };
-    for (size_t number = 0; number < regions.size(); ++number) {
-      const FrameRegion& region = regions[number];
-      if (number > 0) {
-        painter.drawOnly(*region.tiles);
-        pools_->sweep.beginRegion(region.left_out);
-        if (!beginSlab(plan, region, options)) return;
-      }
-      do {
-        while (drawer.drawNext()) advance();
-        pools_->workers.finish(statistics);
-        pools_->source.finish(statistics);
-        advance();
-        if (pools_->ring.isClosed()) return;
-      } while (beginSlab(plan, region, options));
-    }
+    do {
+      while (drawer.drawNext()) advance();
+      pools_->workers.finish(statistics);
+      pools_->source.finish(statistics);
+      advance();
+      if (pools_->ring.isClosed()) return;
+    } while (nextSlab(plan, regions, options, painter));
     image = painter.end();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();

@@ -17,6 +17,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "render/frame/backend.h"
 #include "render/frame/frame_options.h"
@@ -24,6 +26,7 @@
 #include "render/frame/frame_regions.h"
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
+#include "render/frame/splat_exchange.h"
 #include "render/surface/face_meshes.h"
 #include "render/surface/iso_layers.h"
 #include "render/surface/scene_triangles.h"
@@ -80,11 +83,17 @@ class FramePipeline {
   };
   std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
                                        const IsoInput& input, FrameStatistics& statistics);
-  bool beginSlab(const FramePlan& plan, const FrameRegion& region, const FrameOptions& options);
+  bool sweepNext(const FramePlan& plan, const FrameOptions& options);
+  bool startSlab(const FramePlan& plan, const FrameRegion* region, const FrameOptions& options);
+  bool nextSlab(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
+                Painter& painter);
+  bool beginExchangedSlab(const FrameRegion* region);
+  void beginExchange(const FramePlan& plan, const FrameOptions& options);
+  uint64_t exchangeBytes(const FrameOptions& options) const;
   void stopStages();
   void makePools(const FrameOptions& options);
   void dropPools();
-  Image paint(const FramePlan& plan, const std::vector<FrameRegion>& regions, const FrameOptions& options,
+  Image paint(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
               FrameStatistics& statistics, Progress* progress);
 
   const CacheReader& cache_;
@@ -94,8 +103,11 @@ class FramePipeline {
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;
   FaceMeshes face_meshes_;
-  ScreenVertices surface_memory_;   // of the last picture's surfaces, for the next one's
-  uint64_t least_pager_bytes_ = 0;  // that the largest brick of any step so far needs
+  ScreenVertices surface_memory_;            // of the last picture's surfaces, for the next one's
+  std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone
+  std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
+  size_t region_ = 0;                        // that is being drawn
+  uint64_t least_pager_bytes_ = 0;           // that the largest brick of any step so far needs
 
   Mutex mutex_;  // a stop comes from another thread
   // Replaced with the mutex held; the thread that draws, which replaces them, reads them without it.

@@ -210,20 +210,26 @@ FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, 
   return plan;
 }
 
-std::vector<uint32_t> FramePlanner::share(FramePlan& plan, const FrameOptions& options) const {
+void FramePlanner::share(FramePlan& plan, const FrameOptions& options) const {
   Ranks& ranks = *options.ranks;
-  std::vector<uint32_t> owners;
-  if (ranks.isFirst())
-    owners = dealTiles(
-        partCosts(plan.parts, cache_.bricks(), cache_.brickVariables(variable_), plan.settings.view),
-        options.size, ranks.count());
-  owners = fromBytes<uint32_t>(ranks.broadcast(toBytes(owners)));
-  plan.tiles = std::make_shared<TileSet>(options.size, owners, ranks.rank());
-  if (options.keep_going) return owners;  // an ancestor that replaces a damaged brick reaches out of its box
+  auto shared = std::make_shared<SharedParts>();
+  shared->parts = plan.parts;
+  shared->elements = BrickProjector::kMaxSplats + (coloured_by_ ? kMaxBrickSplats : 0);
+  shared->size = options.size;
+  if (ranks.isFirst()) {
+    const std::vector<PartCost> costs =
+        partCosts(plan.parts, cache_.bricks(), cache_.brickVariables(variable_), plan.settings.view);
+    shared->owners = dealTiles(costs, options.size, ranks.count());
+    shared->preparers = dealParts(costs, ranks.count());
+  }
+  shared->owners = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared->owners)));
+  shared->preparers = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared->preparers)));
+  plan.shared = shared;
+  plan.tiles = std::make_shared<TileSet>(options.size, shared->owners, ranks.rank());
+  if (options.keep_going) return;  // an ancestor that replaces a damaged brick reaches out of its box
   plan.parts_elsewhere = std::erase_if(plan.parts, [&](const SweptPart& part) {
     return !plan.tiles->touches(screenBoxOf(cache_.bricks()[part.part.brick], plan.settings.view));
   });
-  return owners;
 }
 
 void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers> layers,

@@ -14,9 +14,11 @@
 #include "render/frame/drawn_scalars.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
+#include "render/frame/splat_exchange.h"
 #include "render/frame/sweep_buffer.h"
 #include "render/project/depth_keys.h"
 #include "render/project/projection.h"
+#include "render/project/tile_set.h"
 #include "render/surface/colour_table.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/paging/cut.h"
@@ -46,6 +48,7 @@ struct FramePlan {
   std::shared_ptr<const PixelLayers> layers = nullptr;  // those of settings, where there are some
   uint64_t parts_hidden = 0;                            // of the cut, behind opaque layers: not in `parts`
   std::shared_ptr<const TileSet> tiles = nullptr;       // of this rank; null: all
+  std::shared_ptr<const SharedParts> shared = nullptr;  // with other ranks; null: alone
   uint64_t parts_elsewhere = 0;                         // of the cut, in others' tiles: not in `parts`
 };
 
@@ -83,9 +86,9 @@ class FramePlanner {
     return screenViewOf(cache_.manifest(), camera, options, size);
   }
 
-  /// Deals the picture out to options.ranks, and leaves out what lies in the tiles of others. Nothing is left out
-  /// if `keep_going`. Returns [tile] its rank. All ranks have to call it.
-  std::vector<uint32_t> share(FramePlan& plan, const FrameOptions& options) const;
+  /// Deals the picture and the parts to be prepared out to options.ranks, and leaves out of plan.parts what lies in the
+  /// tiles of others. Nothing is left out if `keep_going`. All ranks have to call it.
+  void share(FramePlan& plan, const FrameOptions& options) const;
 
   /// Puts the layers of its scene into a plan. What is behind opaque ones everywhere is left out, unless
   /// `keep_going`; all is without a volume.

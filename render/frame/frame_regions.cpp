@@ -17,10 +17,13 @@ constexpr double kLayerShare = 0.7;
 constexpr double kSlabShare = 0.6;
 // Between regions threads wait for one another: as long as preparing this number of splats takes.
 constexpr double kSplatsARegion = 100e3;
+// Shared tiles: regions are made of whole painters' tiles, as far as those are this rank's.
+constexpr int kUnit = kTileSide / kSharedTileSide;
 
 /// [region] its box of tiles.
 std::vector<TileBox> boxesOf(const std::vector<uint32_t>& owners, ImageSize size, uint32_t regions) {
-  const int columns = TileSet::tilesAlong(size.width), rows = TileSet::tilesAlong(size.height);
+  const int columns = TileSet::tilesAlong(size.width, kSharedTileSide),
+            rows = TileSet::tilesAlong(size.height, kSharedTileSide);
   std::vector<TileBox> boxes(regions, {columns, rows, 0, 0});
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) {
@@ -34,7 +37,8 @@ std::vector<TileBox> boxesOf(const std::vector<uint32_t>& owners, ImageSize size
 
 /// How much of from .. to lies in tiles first .. last - 1; of a point: 1 or 0.
 double shareOf(float from, float to, int first, int last) {
-  const double low = std::max<double>(from, first * kTileSide), high = std::min<double>(to, last * kTileSide);
+  const double low = std::max<double>(from, first * kSharedTileSide),
+               high = std::min<double>(to, last * kSharedTileSide);
   if (!(high >= low)) return 0;
   return to > from && std::isfinite(to - from) ? (high - low) / (double{to} - from) : 1;
 }
@@ -92,9 +96,9 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
   const ImageSize size = plan.settings.view.size;
   const std::vector<PartCost> costs =
       partCosts(plan.parts, cache.bricks(), cache.brickVariables(variable), plan.settings.view);
-  const TileBox all = plan.tiles
-                          ? plan.tiles->box()
-                          : TileBox{0, 0, TileSet::tilesAlong(size.width), TileSet::tilesAlong(size.height)};
+  const TileBox all = plan.tiles ? plan.tiles->box()
+                                 : TileBox{0, 0, TileSet::tilesAlong(size.width, kSharedTileSide),
+                                           TileSet::tilesAlong(size.height, kSharedTileSide)};
   const auto partsIn = [&](const TileBox& box) {
     std::vector<PartInRegion> parts;
     for (size_t n = 0; n < costs.size(); ++n) {
@@ -108,8 +112,8 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
   std::vector<uint32_t> owners;
   uint32_t regions = 1;
   for (const uint32_t number : kNumbers) {
-    if (number > all.tiles()) break;
-    std::vector<uint32_t> dealt = dealTiles(costs, size, all, number);
+    if (number > std::max<size_t>(1, all.tiles() / (kUnit * kUnit))) break;
+    std::vector<uint32_t> dealt = dealTiles(costs, size, {all, kUnit, true}, number);
     double work = 0;
     bool fits = true;
     for (const TileBox& box : boxesOf(dealt, size, number)) {
@@ -128,6 +132,7 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
   std::vector<FrameRegion> made;
   for (uint32_t region = 0; region < regions; ++region) {
     FrameRegion one{std::make_shared<TileSet>(size, owners, region), std::vector<uint8_t>(plan.parts.size())};
+    if (one.tiles->box().tiles() == 0) continue;  // more regions than could be cut
     for (size_t n = 0; n < costs.size(); ++n) one.left_out[n] = !one.tiles->touches(costs[n].box);
     made.push_back(std::move(one));
   }

@@ -1,6 +1,6 @@
 // Divides a picture into regions that are drawn one after the other, where the memory of the sweep cannot hold a layer of
-// the whole cut (sweep_buffer.h). A region is a rectangle of whole tiles, whose layer is as much smaller as the region is. A
-// brick on a border between regions is prepared for each of them; without regions, one that reaches through several slabs of
+// the whole cut (sweep_buffer.h). Where ranks draw a picture together, each divides its own tiles. A region is a rectangle of
+// whole tiles of the painters (except where a rank's tiles end), whose layer is as much smaller as the region is. A brick on a border between regions is prepared for each of them; without regions, one that reaches through several slabs of
 // depth would be prepared for each slab, which are many more: a brick is deep compared with a slab, and small compared
 // with the picture.
 //
@@ -23,7 +23,7 @@
 namespace curvisplat {
 
 struct FrameRegion {
-  std::shared_ptr<const TileSet> tiles;  // null: all of the picture
+  std::shared_ptr<const TileSet> tiles;  // null: all of the picture, drawn by one process
   std::vector<uint8_t> left_out;  // [part of the plan] 1: touches none of them; empty: no part is left out
 };
 

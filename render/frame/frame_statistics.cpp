@@ -41,10 +41,11 @@ constexpr Fields<FetchStatistics, 16> kFetch{{
     {"pager_peak_bytes", &FetchStatistics::pager_peak_bytes},
 }};
 
-constexpr Fields<PrepareStatistics, 17> kPrepare{{
+constexpr Fields<PrepareStatistics, 19> kPrepare{{
     {"project", &PrepareStatistics::project_s, Combined::kSum, kSeconds},
     {"sort", &PrepareStatistics::sort_s, Combined::kSum, kSeconds},
     {"workers_waited", &PrepareStatistics::workers_waited_s, Combined::kSum, kSeconds},
+    {"exchange", &PrepareStatistics::exchange_s, Combined::kSum, kSeconds},
     {"workers", &PrepareStatistics::workers},
     {"bricks_drawn", &PrepareStatistics::bricks_drawn},
     {"bricks_hidden", &PrepareStatistics::bricks_hidden},
@@ -55,6 +56,7 @@ constexpr Fields<PrepareStatistics, 17> kPrepare{{
     {"splats_off_screen", &PrepareStatistics::splats_off_screen},
     {"splats_transparent", &PrepareStatistics::splats_transparent},
     {"splats_behind", &PrepareStatistics::splats_behind},
+    {"exchanged_bytes", &PrepareStatistics::exchanged_bytes},
     {"regions", &PrepareStatistics::regions, Combined::kLargest},
     {"slabs", &PrepareStatistics::slabs, Combined::kLargest},
     {"ring_peak_bytes", &PrepareStatistics::ring_peak_bytes},

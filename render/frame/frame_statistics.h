@@ -33,6 +33,7 @@ struct PlanStatistics {
 struct PrepareStatistics {
   double project_s = 0, sort_s = 0;
   double workers_waited_s = 0;  // for space in the ring, if the painter is slower; for reads: read_waited_s
+  double exchange_s = 0;        // of splats with other ranks: copying, and waiting for them
   uint64_t workers = 0;
   uint64_t bricks_drawn = 0;  // in whole or in part
   /// Parts that were left out because splats in front hide them. How many depends on how far the stages are ahead of
@@ -43,6 +44,7 @@ struct PrepareStatistics {
   uint64_t splats_clipped = 0, splats_off_screen = 0,
            splats_transparent = 0;  // read but not drawn: the reason
   uint64_t splats_behind = 0;       // read but not drawn: behind opaque surfaces or slices
+  uint64_t exchanged_bytes = 0;     // of projected splats, sent to other ranks
   // Drawn one by one: more than one if memory is short.
   uint64_t regions = 0;  // of the picture
   uint64_t slabs = 0;    // of depth, of all regions

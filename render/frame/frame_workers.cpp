@@ -36,6 +36,8 @@ void FrameWorkers::stop() {
 void FrameWorkers::beginFrame(const FrameWork& work) {
   work_ = &work;
   seen_.assign(work.parts.size(), Seen::kNo);
+  prepared_.assign(work.exchange ? work.exchange->parts().size() : 0, 0);
+  if (work.exchange && !exchanging_) exchanging_ = std::make_unique<WorkerTeam>(1, "exchange");
   parts_seen_ = 0;
 }
 
@@ -43,6 +45,12 @@ void FrameWorkers::start(const TileSet* tiles) {
   begin();
   tiles_ = tiles;
   team_.start([this](unsigned number) { loop(*workers_[number]); });
+}
+
+void FrameWorkers::startExchange() {
+  begin();
+  tiles_ = nullptr;  // splats are chosen by the tiles of all ranks
+  exchanging_->start([this](unsigned) { exchangeLoop(); });
 }
 
 void FrameWorkers::startSampling(const SamplingWork& work) {
@@ -64,6 +72,7 @@ void FrameWorkers::begin() {
 }
 
 void FrameWorkers::finish(FrameStatistics& statistics) {
+  if (exchanging_) exchanging_->wait();
   team_.wait();
   for (const auto& worker : workers_) {
     combine(statistics, worker->statistics);
@@ -102,19 +111,105 @@ void FrameWorkers::loop(Worker& worker) {
       if (sequence >= sweep_.parts().size()) break;
       if (!prepare(worker, sequence)) return;
     }
-    while (true) {
-      std::optional<SweepBuffer::Batch> batch;
-      {
-        const StageTimer timer(worker.statistics.workers_waited_s, "wait for a batch", TraceKind::kWait);
-        batch = sweep_.awaitNext();
-      }
-      if (!batch) break;
-      if (!hand(worker, *batch)) return;
-    }
-    ring_.pauseAfter(sweep_.batches());
+    endSlab(worker);
   } catch (...) {
     fail();
   }
+}
+
+/// Hands on what is left of a slab that has all its parts.
+void FrameWorkers::endSlab(Worker& worker) {
+  while (true) {
+    std::optional<SweepBuffer::Batch> batch;
+    {
+      const StageTimer timer(worker.statistics.workers_waited_s, "wait for a batch", TraceKind::kWait);
+      batch = sweep_.awaitNext();
+    }
+    if (!batch) break;
+    if (!hand(worker, *batch)) return;
+  }
+  ring_.pauseAfter(sweep_.batches());
+}
+
+/// The thread that exchanges splats. Between two steps all workers enter what has arrived, and prepare more.
+void FrameWorkers::exchangeLoop() {
+  try {
+    const auto step = [this] {
+      const StageTimer timer(workers_[0]->statistics.exchange_s, "exchange splats");
+      return work_->exchange->step([this](uint64_t sequence) { return isUnneeded(sequence); });
+    };
+    while (step()) {
+      team_.start([this](unsigned number) { sharedLoop(*workers_[number]); });
+      team_.wait();
+      if (ring_.isClosed()) return;
+    }
+    team_.start([this](unsigned number) {
+      try {
+        endSlab(*workers_[number]);
+      } catch (...) {
+        fail();
+      }
+    });
+    team_.wait();
+  } catch (...) {
+    fail();
+  }
+}
+
+void FrameWorkers::sharedLoop(Worker& worker) {
+  try {
+    while (true) {
+      if (const auto batch = sweep_.next()) {
+        if (!hand(worker, *batch)) return;
+      } else if (const auto sequence = work_->exchange->nextReceived()) {
+        if (!enterReceived(worker, *sequence)) return;
+      } else if (const auto index = work_->exchange->nextToPrepare()) {
+        if (!prepareShared(worker, *index)) return;
+      } else {
+        return;
+      }
+    }
+  } catch (...) {
+    fail();
+  }
+}
+
+/// For the ranks that need it, this one or others.
+bool FrameWorkers::prepareShared(Worker& worker, size_t index) {
+  SplatExchange& exchange = *work_->exchange;
+  const uint32_t number = exchange.toPrepare()[index];
+  const SweptPart& part = exchange.parts()[number];
+  if (exchange.isUnneeded(part.part.brick)) {
+    source_.pass(index);
+    exchange.skip(index);
+    return true;
+  }
+  const std::optional<BrickSource::Splats> fetched = fetch(worker, index, part.part, work_->keep_going);
+  if (!fetched) return false;
+  project(worker, *fetched, part.keys);
+  count(worker, prepared_[number] != 0);
+  prepared_[number] = 1;
+  exchange.give(index, worker.projector.splats(), worker.keys);
+  return true;
+}
+
+bool FrameWorkers::enterReceived(Worker& worker, uint64_t sequence) {
+  const uint32_t number = sweep_.parts()[sequence];
+  const SweptPart& part = work_->parts[number];
+  const auto received = work_->exchange->received(sequence);
+  if (!received || isUnneeded(sequence)) return passOver(sequence);
+  markSeen(number, Seen::kProjected);
+  return enter(worker, sequence, part.rank, {received->splats, received->keys});
+}
+
+/// Whether a part of this slab is hidden, or lies behind the slab's end.
+bool FrameWorkers::isUnneeded(uint64_t sequence) {
+  const uint32_t number = sweep_.parts()[sequence];
+  const SweptPart& part = work_->parts[number];
+  if (sweep_.isBehind(part)) return true;
+  if (work_->keep_going || !work_->hidden.hides(part.part.brick)) return false;
+  markSeen(number, Seen::kHidden);
+  return true;
 }
 
 /// In a handler: keeps the exception, if it is the first, and stops all workers.
@@ -175,16 +270,21 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
       markSeen(number, Seen::kHidden);
       return passOver(sequence);
     }
-    const StageTimer timer(worker.statistics.project_s, "project brick");
-    const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched->cell);
-    worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry,
-                             {fetched->values, fetched->second}, fetched->ranges);
-    if (tiles_) worker.projector.keepTouching(*tiles_);
-    worker.keys.resize(worker.projector.depths().size());
-    work_->keys.keysOf(worker.projector.depths(), cell_min, part.keys, worker.keys);
+    project(worker, *fetched, part.keys);
   }
-  count(worker, number);
-  return enter(worker, sequence, part.rank);
+  count(worker, seen_[number] == Seen::kProjected);
+  markSeen(number, Seen::kProjected);
+  return enter(worker, sequence, part.rank, {worker.projector.splats(), worker.keys});
+}
+
+void FrameWorkers::project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys) {
+  const StageTimer timer(worker.statistics.project_s, "project brick");
+  const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched.cell);
+  worker.projector.project(work_->settings, work_->table, cell_min, fetched.geometry,
+                           {fetched.values, fetched.second}, fetched.ranges);
+  if (tiles_) worker.projector.keepTouching(*tiles_);
+  worker.keys.resize(worker.projector.depths().size());
+  work_->keys.keysOf(worker.projector.depths(), cell_min, keys, worker.keys);
 }
 
 void FrameWorkers::markSeen(uint32_t number, Seen seen) {
@@ -197,13 +297,12 @@ uint64_t FrameWorkers::partsHidden() const {
 }
 
 /// Adds a projected part to the statistics, in the first slab that it is in only.
-void FrameWorkers::count(Worker& worker, uint32_t number) {
+void FrameWorkers::count(Worker& worker, bool again) {
   PrepareStatistics& statistics = worker.statistics;
-  if (seen_[number] == Seen::kProjected) {
+  if (again) {
     ++statistics.bricks_again;
     return;
   }
-  markSeen(number, Seen::kProjected);
   const ProjectionCounts& counts = worker.projector.counts();
   statistics.splats_read += counts.read;
   statistics.splats_clipped += counts.clipped;
@@ -220,13 +319,13 @@ bool FrameWorkers::passOver(uint64_t sequence) {
   return true;
 }
 
-/// Enters the splats that the worker has projected into the sweep.
-bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
+/// Enters a part's splats into the sweep.
+bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank, const Projected& projected) {
   PrepareStatistics& statistics = worker.statistics;
   std::span<const DepthItem> sorted;
   {
     const StageTimer timer(statistics.sort_s, "sort brick");
-    sorted = worker.sorter.sort(worker.keys, work_->keys.order());
+    sorted = worker.sorter.sort(projected.keys, work_->keys.order());
   }
   {
     const StageTimer timer(statistics.workers_waited_s, "wait for its turn", TraceKind::kWait);
@@ -242,7 +341,7 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
     if (!sweep_.awaitSpace(rank, sorted)) return false;
   }
   const StageTimer timer(statistics.sort_s, "fill sweep");
-  sweep_.fill(*run, sorted, worker.projector.splats());
+  sweep_.fill(*run, sorted, projected.splats);
   return true;
 }
 

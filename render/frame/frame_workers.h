@@ -1,6 +1,9 @@
 // The workers of a frame. They take the decoded bricks of the cut, or parts of them, in the sweep's order;
 // project and sort each, and enter it into the sweep. Splats whose order is final there they sort into
 // segments of the ring. Between frames they can fill the cache of decoded bricks.
+//
+// If several ranks draw the picture, the workers prepare the bricks that this rank has to prepare for all of them, and
+// enter the splats that it receives. A thread of its own exchanges them.
 #pragma once
 
 #include <atomic>
@@ -14,6 +17,7 @@
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
 #include "render/frame/segment_ring.h"
+#include "render/frame/splat_exchange.h"
 #include "render/frame/sweep_buffer.h"
 #include "render/project/depth_keys.h"
 #include "render/project/projection.h"
@@ -33,6 +37,7 @@ struct FrameWork {
   const DepthKeys& keys;
   const HiddenBricks& hidden;
   bool keep_going = false;
+  SplatExchange* exchange = nullptr;  // among the ranks that draw the picture together; null: there is one
 };
 
 /// The same for what is found from splats before the picture is drawn: slices and isosurfaces.
@@ -57,6 +62,9 @@ class FrameWorkers {
   /// Starts the workers on the sweep's current slab. The source must have the slab's parts, and the ring must
   /// be open. `tiles`: what is drawn of the picture, borrowed until finish(); null: all.
   void start(const TileSet* tiles);
+  /// The same where ranks draw the picture together: the source must have the parts that this one prepares for all, and the
+  /// exchange must have begun the slab, which may have no parts.
+  void startExchange();
   /// Waits until the workers have ended. Either the whole slab is in the ring, which pauses after it; or the
   /// sweep, ring or source was stopped; or a worker failed, which stops all of them. Rethrows the first
   /// failure. Adds the workers' times and counts to `statistics`.
@@ -83,16 +91,27 @@ class FrameWorkers {
 
   void loop(Worker& worker);
   void sample(Worker& worker, const SamplingWork& work);
+  void endSlab(Worker& worker);
+  void exchangeLoop();
+  void sharedLoop(Worker& worker);
+  bool prepareShared(Worker& worker, size_t index);
+  bool enterReceived(Worker& worker, uint64_t sequence);
+  bool isUnneeded(uint64_t sequence);
   void begin();
   void fail();
   // Return false if the sweep, the ring or the source was stopped.
   bool prepare(Worker& worker, uint64_t sequence);
   bool passOver(uint64_t sequence);
-  bool enter(Worker& worker, uint64_t sequence, uint32_t rank);
+  struct Projected {
+    std::span<const ScreenSplat> splats;
+    std::span<const uint32_t> keys;
+  };
+  bool enter(Worker& worker, uint64_t sequence, uint32_t rank, const Projected& projected);
+  void project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys);
   bool hand(Worker& worker, const SweepBuffer::Batch& batch);
   std::optional<BrickSource::Splats> fetch(Worker& worker, uint64_t sequence, const BrickPart& part,
                                            bool keep_going);
-  void count(Worker& worker, uint32_t number);
+  void count(Worker& worker, bool again);
   void markSeen(uint32_t number, Seen seen);
 
   BrickSource& source_;
@@ -100,13 +119,15 @@ class FrameWorkers {
   SegmentRing& ring_;
   const FrameWork* work_ = nullptr;
   const TileSet* tiles_ = nullptr;
-  std::vector<Seen> seen_;  // [part of the frame]; each is one worker's at a time
+  std::vector<Seen> seen_;         // [part of the frame]; each is one worker's at a time
+  std::vector<uint8_t> prepared_;  // [part of all ranks' frame], for others, too
   std::atomic<uint64_t> parts_seen_ = 0;
   std::atomic<uint64_t> next_ = 0;  // sequence number of the slab's first part that no worker has taken
   Mutex failing_;
   std::exception_ptr first_failure_ GUARDED_BY(failing_);
   std::vector<std::unique_ptr<Worker>> workers_;  // [thread]
   WorkerTeam team_;
+  std::unique_ptr<WorkerTeam> exchanging_;  // one thread
 };
 
 }  // namespace curvisplat

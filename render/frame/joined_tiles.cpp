@@ -11,13 +11,14 @@ namespace {
 /// Calls use(first float, count) for each row of pixels of each tile of `rank`, in order.
 template <typename Use>
 void forRowsOf(uint32_t rank, const std::vector<uint32_t>& owners, Image& image, const Use& use) {
-  const auto columns = static_cast<size_t>(TileSet::tilesAlong(image.size.width));
+  const auto columns = static_cast<size_t>(TileSet::tilesAlong(image.size.width, kSharedTileSide));
   for (size_t tile = 0; tile < owners.size(); ++tile) {
     if (owners[tile] != rank) continue;
-    const int x0 = static_cast<int>(tile % columns) * kTileSide,
-              y0 = static_cast<int>(tile / columns) * kTileSide;
-    const auto floats = 4 * static_cast<size_t>(std::min(kTileSide, image.size.width - x0));
-    for (int y = y0; y < std::min(y0 + kTileSide, image.size.height); ++y) use(image.pixel(x0, y), floats);
+    const int x0 = static_cast<int>(tile % columns) * kSharedTileSide,
+              y0 = static_cast<int>(tile / columns) * kSharedTileSide;
+    const auto floats = 4 * static_cast<size_t>(std::min(kSharedTileSide, image.size.width - x0));
+    for (int y = y0; y < std::min(y0 + kSharedTileSide, image.size.height); ++y)
+      use(image.pixel(x0, y), floats);
   }
 }
 

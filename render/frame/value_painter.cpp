@@ -114,7 +114,7 @@ class ValuePainter final : public Painter {
   void drawOnly(const TileSet& tiles) override {
     if (!bins_->empty()) paintBatch();
     for (size_t number = 0; number < TileSet::tilesOf(size_); ++number)
-      if (tiles.has(number))
+      if (tiles.hasAnyOf(number))
         bins_->open(static_cast<int>(number));
       else
         bins_->close(static_cast<int>(number));

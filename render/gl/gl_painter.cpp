@@ -296,8 +296,8 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
 
 void GlPainter::drawOnly(const TileSet& tiles) {
   const TileBox box = tiles.box();
-  state_->gl.Scissor(box.x0 * kTileSide, box.y0 * kTileSide, box.columns() * kTileSide,
-                     box.rows() * kTileSide);
+  state_->gl.Scissor(box.x0 * kSharedTileSide, box.y0 * kSharedTileSide, box.columns() * kSharedTileSide,
+                     box.rows() * kSharedTileSide);
 }
 
 std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {

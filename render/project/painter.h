@@ -46,8 +46,8 @@ class Painter {
   /// larger than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      PixelShading shading, const PaintResources& resources = {}) = 0;
-  /// After begin(): from now on only `tiles` are drawn, which fill their box. All splats of a tile are drawn before
-  /// another call leaves it out; tiles that no call has named show nothing that matters.
+  /// After begin(): from now on only `tiles` are drawn, which fill their box. No two calls name pixels of the same square of
+  /// kTileSide, and all splats of one are drawn before the next; what no call has named shows nothing that matters.
   virtual void drawOnly(const TileSet& tiles) = 0;
   /// Blends `splats` into the frame in their order: behind all splats drawn so far, or in front of them, as
   /// order() says. The memory may be used again when the call returns, unless drawsUnderWay() counts the

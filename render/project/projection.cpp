@@ -7,6 +7,7 @@
 #include "render/project/clip_planes.h"
 #include "render/project/colour_scalar.h"
 #include "render/project/face_cut.h"
+#include "render/project/footprint_box.h"
 #include "render/project/footprint_skew.h"
 #include "render/project/kernel.h"
 #include "render/project/light.h"
@@ -339,14 +340,11 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
 }
 
 void BrickProjector::keepTouching(const TileSet& tiles) {
-  constexpr auto kSupport = static_cast<float>(kKernelSupport);
   size_t kept = 0, first_record = 0;  // the records of a splat come before it
   for (size_t n = 0; n < splats_.size(); ++n) {
     const ScreenSplat& splat = splats_[n];
     if (isRecord(splat)) continue;
-    const float reach_x = kSupport * splat.l11;
-    const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
-    if (tiles.touches({splat.x - reach_x, splat.y - reach_y, splat.x + reach_x, splat.y + reach_y}))
+    if (tiles.touches(footprintBox(splat)))
       for (size_t from = first_record; from <= n; ++from, ++kept) {
         splats_[kept] = splats_[from];
         depths_[kept] = depths_[from];

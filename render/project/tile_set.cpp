@@ -1,27 +1,15 @@
 #include "render/project/tile_set.h"
 
-#include <algorithm>
-
 #include "stream/base/check.h"
 
 namespace curvisplat {
-namespace {
-
-constexpr float kMargin = 1;  // pixels: between corners and centres, and rounding
-
-/// The tile of a coordinate, and the outermost one of what lies outside.
-int tileAt(float pixel, int tiles) {
-  return static_cast<int>(std::clamp(pixel / kTileSide, 0.0f, static_cast<float>(tiles - 1)));
-}
-
-}  // namespace
 
 TileSet::TileSet(ImageSize size, const std::vector<uint32_t>& owners, uint32_t owner)
-    : columns_(tilesAlong(size.width)),
-      rows_(tilesAlong(size.height)),
+    : columns_(tilesAlong(size.width, kSharedTileSide)),
+      rows_(tilesAlong(size.height, kSharedTileSide)),
       has_(owners.size()),
       sums_(static_cast<size_t>((columns_ + 1) * (rows_ + 1))) {
-  CURVISPLAT_CHECK_OP(owners.size(), ==, tilesOf(size));
+  CURVISPLAT_CHECK_OP(owners.size(), ==, tilesOf(size, kSharedTileSide));
   for (size_t tile = 0; tile < owners.size(); ++tile) has_[tile] = owners[tile] == owner;
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column)
@@ -37,6 +25,15 @@ TileBox TileSet::box() const {
       if (has(static_cast<size_t>(y * columns_ + x)))
         box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
   return box.x0 < box.x1 ? box : TileBox{0, 0, 0, 0};
+}
+
+bool TileSet::hasAnyOf(size_t painters_tile) const {
+  constexpr int kInTile = kTileSide / kSharedTileSide;
+  const int tiles_along = (columns_ + kInTile - 1) / kInTile;
+  const int x0 = static_cast<int>(painters_tile) % tiles_along * kInTile,
+            y0 = static_cast<int>(painters_tile) / tiles_along * kInTile;
+  const int x1 = std::min(x0 + kInTile, columns_), y1 = std::min(y0 + kInTile, rows_);
+  return before(x1, y1) - before(x0, y1) - before(x1, y0) + before(x0, y0) > 0;
 }
 
 bool TileSet::touches(const ScreenBox& box) const {

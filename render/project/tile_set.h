@@ -1,7 +1,8 @@
-// Some of a picture's tiles: those that one of several processes draws, or that are drawn at a time. A tile is a square of
-// kTileSide pixels.
+// Some of a picture's shared tiles: those that one of several processes draws, or that are drawn at a time. They are smaller
+// than the painters' tiles, so that a few pixels with many splats can be divided.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -11,9 +12,13 @@
 
 namespace curvisplat {
 
-inline constexpr int kTileSide = 32;  // pixels
+inline constexpr int kTileSide = 32;       // pixels: of painters
+inline constexpr int kSharedTileSide = 8;  // of TileSet
+static_assert(kTileSide % kSharedTileSide == 0);
 
-/// The tiles of columns x0 .. x1 - 1 in rows y0 .. y1 - 1.
+inline constexpr uint32_t kNobody = UINT32_MAX;  // an owner of tiles
+
+/// The shared tiles of columns x0 .. x1 - 1 in rows y0 .. y1 - 1.
 struct TileBox {
   int x0, y0, x1, y1;
   int columns() const { return x1 - x0; }
@@ -24,12 +29,21 @@ struct TileBox {
 /// Immutable; any thread.
 class TileSet {
  public:
-  /// `owners` [tile], in rows from the top: the set has those of `owner`.
+  /// Boxes touch tiles that are this close, in pixels: between corners and centres, and rounding.
+  static constexpr float kMargin = 1;
+
+  /// `owners` [shared tile], in rows from the top: the set has those of `owner`.
   TileSet(ImageSize size, const std::vector<uint32_t>& owners, uint32_t owner);
 
-  static int tilesAlong(int pixels) { return (pixels + kTileSide - 1) / kTileSide; }
-  static size_t tilesOf(ImageSize size) {
-    return static_cast<size_t>(tilesAlong(size.width)) * static_cast<size_t>(tilesAlong(size.height));
+  /// Painters' tiles, or others.
+  static int tilesAlong(int pixels, int side = kTileSide) { return (pixels + side - 1) / side; }
+  static size_t tilesOf(ImageSize size, int side = kTileSide) {
+    return static_cast<size_t>(tilesAlong(size.width, side)) *
+           static_cast<size_t>(tilesAlong(size.height, side));
+  }
+  /// The shared tile of a coordinate, of `tiles` along it; the outermost one of what lies outside.
+  static int tileAt(float pixel, int tiles) {
+    return static_cast<int>(std::clamp(pixel / kSharedTileSide, 0.0f, static_cast<float>(tiles - 1)));
   }
 
   int columns() const { return columns_; }
@@ -37,6 +51,13 @@ class TileSet {
   bool has(size_t tile) const { return has_[tile] != 0; }
   /// The smallest box around its tiles; without tiles if it has none.
   TileBox box() const;
+  /// Whether the set has the pixel, which may lie outside of the picture.
+  bool hasPixel(int x, int y) const {
+    const int column = x / kSharedTileSide, row = y / kSharedTileSide;
+    return column < columns_ && row < rows_ && has(static_cast<size_t>(row * columns_ + column));
+  }
+  /// Whether the set has any pixel of a painter's tile, by its number in rows.
+  bool hasAnyOf(size_t painters_tile) const;
   /// Whether a rectangle lies in one of the tiles at least in part, or within a pixel of one.
   bool touches(const ScreenBox& box) const;
 

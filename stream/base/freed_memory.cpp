@@ -4,8 +4,8 @@
 
 namespace curvisplat {
 
-void returnFreedMemory() {
-  mallopt(M_MMAP_THRESHOLD, 4 << 20);
+void returnFreedMemory(size_t large) {
+  mallopt(M_MMAP_THRESHOLD, static_cast<int>(large));
   malloc_trim(0);
 }
 

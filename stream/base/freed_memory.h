@@ -1,13 +1,15 @@
 // Gives memory that was freed back to the system, so that the next pass of a conversion has all of its budget.
 //
 // glibc keeps freed blocks for later ones, of up to 32 MiB if blocks of that size were freed once. Between buffers of different
-// sizes that left 30 MiB unused where 256 were allowed; from the first call on, blocks of 4 MiB and more are the system's again
-// as soon as they are freed.
+// sizes that left 30 MiB unused where 256 were allowed; from the first call on, large blocks are the system's again as soon as
+// they are freed.
 #pragma once
+
+#include <cstddef>
 
 namespace curvisplat {
 
-/// For the whole process. Any thread.
-void returnFreedMemory();
+/// For the whole process. `large`: bytes of a large block; the last call's holds. Any thread.
+void returnFreedMemory(size_t large = size_t{4} << 20);
 
 }  // namespace curvisplat

@@ -4,7 +4,7 @@
 // All ranks make the same calls in the same order, and each call waits for the others. A rank that fails announces
 // it and does not call any more (tools/output/launched_ranks.h); others that wait then fail as well.
 //
-// One thread a rank. A message may be of any size; it is in memory at both ends.
+// One thread of a rank at a time. A message may be of any size; it is in memory at both ends.
 #pragma once
 
 #include <chrono>

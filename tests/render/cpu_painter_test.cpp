@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "render/cpu/tile.h"
 #include "render/project/footprint_skew.h"
 #include "render/project/kernel.h"
+#include "render/project/tile_set.h"
 #include "tests/reference/painted_splats.h"
 #include "tests/reference/splat_compositor.h"
 
@@ -89,6 +91,37 @@ TEST_P(OnEveryTarget, IsTheSameForAnyThreadsAndBatches) {
       for (const size_t batch : {size_t{1}, size_t{100}, size_t{1024}, size_t{65536}})
         EXPECT_EQ(paint(splats, lively(), true, size, kWhite, {threads, batch}).rgba, first.rgba)
             << threads << " threads, batches of " << batch << ", opacity " << opacity;
+  }
+}
+
+// Ranks that draw a picture together share tiles: no pixel's bits depend on whether others are drawn.
+TEST_P(OnEveryTarget, DrawsPartsOfTilesAsTheWhole) {
+  const ImageSize size{70, 50};
+  const int columns = TileSet::tilesAlong(size.width, kSharedTileSide);
+  const auto table = lively();
+  for (const float opacity : {0.5f, 50.0f}) {
+    auto splats = cutSome(randomSplats(3000, 3, size, 0.3f, opacity), 1);
+    const Image whole = paint(splats, table, true, size);
+    std::reverse(splats.begin(), splats.end());
+    for (int border = 1; border < columns; ++border) {
+      std::vector<uint32_t> owners(TileSet::tilesOf(size, kSharedTileSide));
+      for (size_t tile = 0; tile < owners.size(); ++tile)
+        owners[tile] = static_cast<int>(tile) % columns >= border;
+      for (const uint32_t owner : {0u, 1u}) {
+        const TileSet tiles(size, owners, owner);
+        CpuPainter painter;
+        painter.begin(size, kWhite, table, {true});
+        painter.drawOnly(tiles);
+        painter.draw(splats);
+        const Image part = painter.end();
+        size_t different = 0;
+        for (int y = 0; y < size.height; ++y)
+          for (int x = 0; x < size.width; ++x)
+            different += tiles.hasPixel(x, y) &&
+                         !std::equal(part.pixel(x, y), part.pixel(x, y) + 4, whole.pixel(x, y));
+        EXPECT_EQ(different, 0u) << opacity << ", border " << border << ", owner " << owner;
+      }
+    }
   }
 }
 

@@ -93,11 +93,11 @@ TEST_F(FrameRegionsTest, ThereIsOneWhereALayerFits) {
 TEST_F(FrameRegionsTest, TheyHaveEveryTileOnceAndEveryPartThatTouchesThem) {
   for (const ImageSize size : {ImageSize{400, 300}, ImageSize{1000, 40}, ImageSize{300, 300}}) {
     FramePlan whole = plan(size);
-    std::vector<uint32_t> owners(TileSet::tilesOf(size), 1);
+    std::vector<uint32_t> owners(TileSet::tilesOf(size, kSharedTileSide), 1);
     for (const bool of_a_rank : {false, true}) {
       if (of_a_rank) {
         for (size_t tile = 0; tile < owners.size(); ++tile)
-          owners[tile] = tile % static_cast<size_t>(TileSet::tilesAlong(size.width)) > 0;
+          owners[tile] = tile % static_cast<size_t>(TileSet::tilesAlong(size.width, kSharedTileSide)) > 0;
         whole.tiles = std::make_shared<TileSet>(size, owners, 1);
       }
       const auto regions = frameRegions(whole, *cache_, 0, whole.cut.splats / 20);

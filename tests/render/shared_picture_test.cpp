@@ -14,6 +14,7 @@
 #include "render/frame/frame.h"
 #include "render/frame/tile_dealer.h"
 #include "render/project/tile_set.h"
+#include "stream/base/error.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"
@@ -125,6 +126,33 @@ TEST_F(SharedPicture, HasTheBitsUnderALimitAndInLittleMemory) {
   expectSameBits({scene_.get(), camera(*scene_), small});
 }
 
+// In the least memory that is enough, ranks divide their tiles into regions, each another number of them.
+TEST_F(SharedPicture, HasTheBitsWhereRanksDrawRegions) {
+  Case what{scene_.get(), camera(*scene_), options()};
+  what.options.size = {400, 300};
+  what.options.lod_pixels = 0;
+  what.options.threads = 1;
+  const Image whole = draw(what, 1).image;
+  for (const unsigned count : {2u, 3u, 16u}) {
+    Drawn shared;
+    for (uint64_t mib = 32; shared.image.rgba.empty(); mib += 2) {
+      ASSERT_LT(mib, 256u);
+      what.options.memory_bytes = mib << 20;
+      try {
+        shared = draw(what, count);
+      } catch (const UsageError&) {
+        // There has to be more.
+      }
+    }
+    uint64_t regions = 0;
+    for (const FrameStatistics& of_rank : shared.statistics) regions = std::max(regions, of_rank.regions);
+    if (count == 2) {
+      EXPECT_GT(regions, 1u);
+    }
+    EXPECT_TRUE(shared.image.rgba == whole.rgba) << count << " ranks";
+  }
+}
+
 TEST_F(SharedPicture, HasTheBitsWithLightCutsSurfacesAndSlices) {
   FrameOptions with = options();
   with.light = Light{};
@@ -157,19 +185,25 @@ TEST_F(SharedPicture, HasTheBitsWhereARankHasNothingToDo) {
   expectSameBits({scene_.get(), camera(*scene_), tiny}, {2, 3, 7});
 }
 
-TEST_F(SharedPicture, ARankReadsOnlyWhatItsTilesNeed) {
+TEST_F(SharedPicture, EachBrickIsReadByOneRank) {
   FrameOptions fine = options();
   fine.lod_pixels = 0;
   const Case what{random_.get(), camera(*random_), fine};
-  const uint64_t whole = draw(what, 1).statistics[0].bytes_read;
-  uint64_t largest = 0, sum = 0;
+  const FrameStatistics whole = draw(what, 1).statistics[0];
+  uint64_t bricks = 0, splats = 0, drawn = 0, largest = 0, exchanged = 0;
   for (const FrameStatistics& of_rank : draw(what, 4).statistics) {
-    largest = std::max(largest, of_rank.bytes_read);
-    sum += of_rank.bytes_read;
+    bricks += of_rank.bricks_read;
+    splats += of_rank.splats_read;
+    drawn += of_rank.splats_drawn;
+    largest = std::max(largest, of_rank.splats_read);
+    exchanged += of_rank.exchanged_bytes;
   }
-  EXPECT_LT(largest, whole);
-  EXPECT_GE(sum, whole);
-  EXPECT_LT(sum, 4 * whole);
+  EXPECT_EQ(bricks, whole.bricks_read);
+  EXPECT_EQ(splats, whole.splats_read);
+  EXPECT_EQ(drawn, whole.splats_drawn);
+  EXPECT_LT(largest, whole.splats_read / 2);
+  EXPECT_GT(exchanged, 0u);
+  EXPECT_LT(static_cast<double>(exchanged), 1.2 * sizeof(ScreenSplat) * static_cast<double>(drawn));
 }
 
 TEST_F(SharedPicture, AFailureOfOneRankReachesAll) {
@@ -197,46 +231,71 @@ std::vector<PartCost> somePartCosts(ImageSize size, unsigned seed) {
   for (int n = 0; n < 400; ++n) {
     const auto x = static_cast<float>(random(size.width)), y = static_cast<float>(random(size.height));
     const auto side = static_cast<float>(20 + random(60));
-    parts.push_back({{x, y, x + side, y + side}, 1000, 1500, 100});
+    parts.push_back({{x, y, x + side, y + side}, 1000, 1500, 100, 1000, 2});
   }
   return parts;
 }
 
-TEST(TileDealer, DealsEveryTileOnceAndEvenly) {
+TEST(TileDealer, DealsEveryTileAndPartOnceAndEvenly) {
   const ImageSize size{640, 480};
   const std::vector<PartCost> parts = somePartCosts(size, 7);
-  for (const uint32_t ranks : {1u, 2u, 3u, 7u, 16u, 300u, 1000u}) {
-    const std::vector<uint32_t> owners = dealTiles(parts, size, ranks);
-    ASSERT_EQ(owners.size(), 300u);
+  for (const uint32_t ranks : {1u, 2u, 3u, 7u, 16u, 300u, 5000u}) {
+    const std::vector<uint32_t> owners = dealTiles(parts, size, ranks), preparers = dealParts(parts, ranks);
+    ASSERT_EQ(owners.size(), 4800u);
     for (const uint32_t owner : owners) ASSERT_LT(owner, ranks);
-    const std::vector<RankWork> work = workOfRanks(parts, size, owners, ranks);
-    uint64_t pixels = 0;
-    double sum = 0, largest = 0;
-    for (const RankWork& one : work) {
+    ASSERT_EQ(preparers.size(), parts.size());
+    for (const uint32_t preparer : preparers) ASSERT_LT(preparer, ranks);
+    const SharedWork work = workOfRanks(parts, size, ranks);
+    uint64_t pixels = 0, bricks = 0, bytes = 0;
+    double prepare = 0, paint = 0, largest_prepare = 0, largest_paint = 0;
+    for (const RankWork& one : work.ranks) {
       pixels += one.pixels;
-      sum += one.cost;
-      largest = std::max(largest, one.cost);
+      bricks += one.bricks;
+      bytes += one.bytes;
+      prepare += one.prepare;
+      paint += one.paint;
+      largest_prepare = std::max(largest_prepare, one.prepare);
+      largest_paint = std::max(largest_paint, one.paint);
     }
     EXPECT_EQ(pixels, size.pixels());
+    EXPECT_EQ(bricks, parts.size());
+    EXPECT_EQ(bytes, 100 * parts.size());
+    EXPECT_GE(work.longest, largest_prepare + largest_paint);
     if (ranks <= 16) {
-      EXPECT_GT(sum / ranks / largest, 0.7) << ranks;
+      EXPECT_GT(prepare / ranks / largest_prepare, 0.9) << ranks;
+      EXPECT_GT(paint / ranks / largest_paint, 0.7) << ranks;
     }
   }
 }
 
 TEST(TileDealer, WorkOfOneRankIsTheSumOfItsParts) {
   const ImageSize size{640, 480};
-  const std::vector<PartCost> parts{{{10, 10, 100, 100}, 5, 7, 11}, {{-100, 10, 100, 90}, 5, 8, 13}};
-  const RankWork work = workOfRanks(parts, size, dealTiles(parts, size, 1), 1)[0];
-  const double tiles = workOfRanks({}, size, dealTiles({}, size, 1), 1)[0].cost;
-  EXPECT_NEAR(work.cost - tiles, 5 + 7 + 5 + 0.5 * 8, 1e-9);  // half of the second lies in the picture
-  EXPECT_EQ(work.bytes, 24u);
-  EXPECT_EQ(work.bricks, 2u);
+  const std::vector<PartCost> parts{{{16, 16, 96, 96}, 5, 7, 11, 5, 2}, {{-96, 16, 96, 96}, 5, 8, 13, 5, 2}};
+  const SharedWork work = workOfRanks(parts, size, 1), nothing = workOfRanks({}, size, 1);
+  EXPECT_NEAR(work.longest - nothing.longest, 5 + 7 + 5 + 0.5 * 8,
+              1e-6);  // half of the second lies in the picture
+  EXPECT_EQ(work.ranks[0].bytes, 24u);
+  EXPECT_EQ(work.ranks[0].bricks, 2u);
+  EXPECT_NEAR(work.ranks[0].splats, 7.5, 1e-9);
+  EXPECT_EQ(work.ranks[0].splats_received, 0);
+}
+
+TEST(TileDealer, SplatsNearABorderArePaintedTwice) {
+  const ImageSize size{640, 480};
+  const std::vector<PartCost> parts{{{0, 0, 640, 480}, 1000, 1500, 1, 1000, 3}};
+  double splats = 0, received = 0;
+  for (const RankWork& one : workOfRanks(parts, size, 2).ranks) {
+    splats += one.splats;
+    received += one.splats_received;
+  }
+  // Four pixels, with the margin, on both sides of a line of 480 pixels, or one of 640.
+  EXPECT_NEAR(splats, 1000 * (1 + 8.0 / 640), 1e-6);
+  EXPECT_NEAR(received, 0.5 * splats, 1);
 }
 
 TEST(TileSet, TouchesWhatALookAtEveryTileFinds) {
   const ImageSize size{300, 200};
-  std::vector<uint32_t> owners(TileSet::tilesOf(size));
+  std::vector<uint32_t> owners(TileSet::tilesOf(size, kSharedTileSide));
   for (size_t n = 0; n < owners.size(); ++n) owners[n] = (n * 7 / 3) % 5;
   const TileSet tiles(size, owners, 2);
   for (float x = -70; x < 370; x += 13)
@@ -245,10 +304,11 @@ TEST(TileSet, TouchesWhatALookAtEveryTileFinds) {
         bool touches = false;
         for (int row = 0; row < tiles.rows(); ++row)
           for (int column = 0; column < tiles.columns(); ++column) {
-            const auto left = static_cast<float>(column * kTileSide),
-                       top = static_cast<float>(row * kTileSide);
+            const auto left = static_cast<float>(column * kSharedTileSide),
+                       top = static_cast<float>(row * kSharedTileSide);
             touches |= tiles.has(static_cast<size_t>(row * tiles.columns() + column)) &&
-                       x <= left + kTileSide && x + side >= left && y <= top + kTileSide && y + side >= top;
+                       x <= left + kSharedTileSide && x + side >= left && y <= top + kSharedTileSide &&
+                       y + side >= top;
           }
         if (touches) {
           EXPECT_TRUE(tiles.touches({x, y, x + side, y + side})) << x << " " << y << " " << side;

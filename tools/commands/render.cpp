@@ -17,8 +17,10 @@
 #include "render/image/image_file.h"
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
+#include "stream/base/process_usage.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
@@ -136,6 +138,12 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
   return bytes;
 }
 
+/// What the program and MPI take before anything is drawn. On a cluster the limit of a rank is the job's, which includes it.
+uint64_t programBytes() {
+  returnFreedMemory();
+  return ProcessUsage::now().memory_bytes;
+}
+
 /// What a stopped run has done, and left.
 std::string howFar(const RenderReport& report, uint64_t frames, bool several) {
   const std::string output = report.output.string();
@@ -242,6 +250,7 @@ void render(const RenderArguments& given) {
       (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
   // A rank has a picture to itself where there are enough of them.
   if (!ranks.alone() && numbers.size() < ranks.count()) options.ranks = &ranks;
+  if (!ranks.alone()) options.output_bytes += programBytes();
   requireThreads(options.threads);
   Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);

@@ -5,6 +5,7 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -24,9 +25,14 @@ constexpr size_t kMaxMessage = size_t{1} << 30;
 class MpiTransport final : public RankTransport {
  public:
   MpiTransport() {
-    // Only the thread that runs the job calls MPI.
+    // A picture's splats are exchanged by a thread of their own, while the one that runs the job calls nothing.
     int granted = 0;
-    MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &granted);
+    MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &granted);
+    if (granted < MPI_THREAD_SERIALIZED) {
+      std::fprintf(stderr,
+                   "curvisplat: this MPI does not support MPI_THREAD_SERIALIZED, which curvisplat needs\n");
+      MPI_Abort(MPI_COMM_WORLD, 1);
+    }
     int rank = 0, count = 1;
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     MPI_Comm_size(MPI_COMM_WORLD, &count);

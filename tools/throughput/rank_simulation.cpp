@@ -7,6 +7,7 @@
 
 #include "render/frame/frame_plan.h"
 #include "render/frame/tile_dealer.h"
+#include "render/project/screen_splat.h"
 #include "tools/throughput/text_table.h"
 
 namespace curvisplat {
@@ -15,14 +16,18 @@ namespace {
 SimulatedRanks simulate(const std::vector<PartCost>& parts, ImageSize size, uint32_t ranks) {
   SimulatedRanks result;
   result.ranks = ranks;
-  const std::vector<RankWork> work = workOfRanks(parts, size, dealTiles(parts, size, ranks), ranks);
-  for (const RankWork& of_rank : work) {
-    result.largest_work = std::max(result.largest_work, of_rank.cost);
-    result.mean_work += of_rank.cost / ranks;
+  constexpr double kSplatBytes = sizeof(ScreenSplat) + sizeof(uint32_t);  // with its key
+  const SharedWork work = workOfRanks(parts, size, ranks);
+  result.largest_work = work.longest;
+  for (const RankWork& of_rank : work.ranks) {
+    result.mean_work += (of_rank.prepare + of_rank.paint) / ranks;
     result.largest_bytes = std::max(result.largest_bytes, of_rank.bytes);
     result.all_bytes += of_rank.bytes;
+    result.painted_splats += of_rank.splats;
+    result.sent_splats += of_rank.splats_received;
   }
-  result.exchanged_bytes = 4 * sizeof(float) * (size.pixels() - work[0].pixels);
+  result.pixel_bytes = 4 * sizeof(float) * (size.pixels() - work.ranks[0].pixels);
+  result.splat_bytes = static_cast<uint64_t>(kSplatBytes * result.sent_splats);
   return result;
 }
 
@@ -55,14 +60,16 @@ RankSimulation simulateRanks(const SimulatedPicture& picture, const Camera& came
 }
 
 std::string rankTable(const RankSimulation& simulation) {
-  TextTable table({"ranks", "largest work", "mean work", "balance", "speed-up", "efficiency", "read, largest",
-                   "read, all", "exchanged"});
+  TextTable table({"ranks", "work", "mean work", "balance", "speed-up", "efficiency", "read, largest",
+                   "read, all", "splats sent", "of all", "pixels sent"});
   for (const SimulatedRanks& one : simulation.counts)
     table.add({std::to_string(one.ranks), shortCount(one.largest_work), shortCount(one.mean_work),
                fmt::format("{:.2f}", one.balance()), fmt::format("{:.1f}", one.speed_up),
                fmt::format("{:.2f}", one.efficiency()), shortBytes(static_cast<double>(one.largest_bytes)),
                shortBytes(static_cast<double>(one.all_bytes)),
-               shortBytes(static_cast<double>(one.exchanged_bytes))});
+               shortBytes(static_cast<double>(one.splat_bytes)),
+               fmt::format("{:.2f}", one.exchange(simulation.splats)),
+               shortBytes(static_cast<double>(one.pixel_bytes))});
   return table.text();
 }
 
@@ -77,7 +84,9 @@ nlohmann::ordered_json toJson(const RankSimulation& simulation) {
                               {"efficiency", one.efficiency()},
                               {"largest_bytes", one.largest_bytes},
                               {"all_bytes", one.all_bytes},
-                              {"exchanged_bytes", one.exchanged_bytes}});
+                              {"splat_bytes", one.splat_bytes},
+                              {"painted_splats", one.painted_splats},
+                              {"pixel_bytes", one.pixel_bytes}});
   return json;
 }
 
@@ -91,14 +100,15 @@ Plots rankPlots(const RankSimulation& simulation) {
        lineOf(simulation, "efficiency: speed-up over ranks",
               [](const auto& one) { return one.efficiency(); })},
       label};
-  LinePanel bytes{"Bytes (simulated)",
-                  "ranks",
-                  "MB",
-                  {lineOf(simulation, "read by a rank, largest",
-                          [](const auto& one) { return 1e-6 * static_cast<double>(one.largest_bytes); }),
-                   lineOf(simulation, "read by all",
-                          [](const auto& one) { return 1e-6 * static_cast<double>(one.all_bytes); })},
-                  label};
+  LinePanel bytes{
+      "Bytes (simulated)",
+      "ranks",
+      "MB",
+      {lineOf(simulation, "read by a rank, largest",
+              [](const auto& one) { return 1e-6 * static_cast<double>(one.largest_bytes); }),
+       lineOf(simulation, "splats sent by a rank, mean",
+              [](const auto& one) { return 1e-6 * static_cast<double>(one.splat_bytes) / one.ranks; })},
+      label};
   const std::vector<std::byte> png = drawPlot(std::vector<LinePanel>{std::move(shares), std::move(bytes)});
   if (png.empty()) return {};
   return {{"ranks.png", png}};

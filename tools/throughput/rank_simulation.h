@@ -20,16 +20,22 @@ inline constexpr uint32_t kMaxSimulatedRanks = 65536;
 /// Work is in units of preparing one splat.
 struct SimulatedRanks {
   uint32_t ranks = 1;
-  double largest_work = 0, mean_work = 0;
-  double speed_up = 1;  // one rank's work over the largest
-  uint64_t largest_bytes = 0,
-           all_bytes = 0;        // read from the cache; bricks that several ranks read count for each
-  uint64_t exchanged_bytes = 0;  // pixels on their way to rank 0
+  double largest_work = 0, mean_work = 0;     // largest: until the last rank is done
+  double speed_up = 1;                        // one rank's work over the largest
+  uint64_t largest_bytes = 0, all_bytes = 0;  // read from the cache
+  double sent_splats = 0;                     // to other ranks
+  uint64_t splat_bytes = 0;                   // of those, projected, with their keys
+  double painted_splats = 0;                  // a splat that several ranks paint counts for each
+  uint64_t pixel_bytes = 0;                   // on their way to rank 0
 
   /// How even the shares are: the mean over the largest.
   double balance() const { return largest_work > 0 ? mean_work / largest_work : 1; }
-  /// Speed-up by the number of ranks: less than the balance, since some bricks are prepared by several ranks.
+  /// Speed-up by the number of ranks: less than the balance, since some splats are painted by several ranks.
   double efficiency() const { return speed_up / ranks; }
+  /// What is sent, in parts of what `splats` take.
+  double exchange(uint64_t splats) const {
+    return splats == 0 ? 0 : sent_splats / static_cast<double>(splats);
+  }
 };
 
 struct RankSimulation {
