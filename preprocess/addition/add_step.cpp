@@ -105,7 +105,10 @@ class StepAddition {
       origin_ = std::make_unique<MeshOrigin>(dynamic_cast<const MeshSource&>(source), scalars_,
                                              options.blank_value, plan_, scratch_->path());
     }
-    checkBlocks(grid_ ? source.description().blocks : origin_->blocks(), cache_);
+    if (grid_)
+      checkBlocksOfStep(source.description().blocks, cache_.seriesManifest());
+    else
+      checkBlocks(origin_->blocks(), cache_);
     if ((centring() == Centring::kCell) != cache_.manifest().cells)
       throw Error("its scalars are {}-centred; those of the steps before it are {}-centred",
                   cache_.manifest().cells ? "node" : "cell", cache_.manifest().cells ? "cell" : "node");

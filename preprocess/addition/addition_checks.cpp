@@ -1,5 +1,8 @@
 #include "preprocess/addition/addition_checks.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <span>
 
 #include "preprocess/convert/scratch_folder.h"
@@ -18,7 +21,41 @@ std::string scratchName(const std::filesystem::path& cache) {
                      checksumOf(std::as_bytes(std::span(place))));
 }
 
+constexpr size_t kNamesListed = 3;
+
+/// Names in `some` that are not in `others`: " (without A, B and 2 more)"; empty if there are none.
+template <typename Some, typename Others>
+std::string lacking(const char* words, const std::vector<Some>& some, const std::vector<Others>& others) {
+  std::vector<std::string> names;
+  for (const Some& one : some)
+    if (std::none_of(others.begin(), others.end(),
+                     [&](const Others& other) { return other.name == one.name; }))
+      names.push_back(one.name);
+  if (names.empty()) return "";
+  const size_t listed = std::min(kNamesListed, names.size());
+  std::string text = fmt::format(
+      " ({}{}", words, fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(listed), ", "));
+  if (names.size() > listed) text += fmt::format(" and {} more", names.size() - listed);
+  return text + ")";
+}
+
 }  // namespace
+
+void checkBlocksOfStep(const std::vector<GridBlock>& grid, const Manifest& series) {
+  const std::vector<BlockInfo>& blocks = series.blocks;
+  constexpr const char* kAdvice =
+      "a cache holds steps of the same blocks: convert the others to a cache of their own";
+  if (grid.size() != blocks.size())
+    throw Error("it has {}{}; the steps before it have {}{}; {}", countText(grid.size(), "block"),
+                lacking("new: ", grid, blocks), blocks.size(), lacking("now gone: ", blocks, grid), kAdvice);
+  for (size_t n = 0; n < blocks.size(); ++n) {
+    const GridBlock& found = grid[n];
+    const BlockInfo& expected = blocks[n];
+    if (found.ni != expected.ni || found.nj != expected.nj || found.nk != expected.nk)
+      throw Error("its block {} ({}) has {}x{}x{} nodes; in the steps before it {}x{}x{}; {}", n + 1,
+                  found.name, found.ni, found.nj, found.nk, expected.ni, expected.nj, expected.nk, kAdvice);
+  }
+}
 
 void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache) {
   const std::vector<BlockInfo>& blocks = cache.manifest().blocks;

@@ -12,6 +12,9 @@ namespace curvisplat {
 /// Throws Error if number or sizes of the grid's blocks differ from the cache's: then it is a different grid.
 void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache);
 
+/// The same of a time step's grid: the message names the blocks that the steps before it lack, or have besides.
+void checkBlocksOfStep(const std::vector<GridBlock>& grid, const Manifest& series);
+
 /// The overlaps of the grid's blocks where `cache` draws each point once; else none. Throws Error if the grid cannot be
 /// read.
 std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid, uint64_t slab_bytes,

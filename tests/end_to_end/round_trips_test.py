@@ -5,55 +5,12 @@ One grid through the libraries that people write with: h5py in the layout of CGN
 xarray, VTK, meshio, and column-major writers as MATLAB and Fortran have them. The caches of structured files are byte for byte
 that of VTK's file. Exit status 77 (skipped) without python3-vtk9 or python3-h5py; a library that is missing skips its test.
 """
-import importlib
 import json
 import unittest
 
 import cgns_library as cg
+from cgns_layout import CgnsLayout, library
 from structured_formats import RANDOM, Block, StructuredFormats, np, vtk
-
-
-def library(name):
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError:
-        raise unittest.SkipTest(f"{name} is not installed") from None
-
-
-class CgnsLayout:
-    """CGNS by h5py alone: groups with a name, a label and a type, and data sets named " data" in the order of C."""
-
-    def __init__(self, path):
-        self.file = library("h5py").File(path, "w")
-        self.label(self.file, "HDF5 MotherNode", "Root Node of HDF5 File", "MT")
-        self.node(self.file, "CGNSLibraryVersion", "CGNSLibraryVersion_t", np.array([4.2], "f4"))
-
-    @staticmethod
-    def label(group, name, label, kind):
-        for key, text, size in (("name", name, 33), ("label", label, 33), ("type", kind, 3)):
-            group.attrs.create(key, np.array(text.encode(), f"S{size}"))
-
-    def node(self, parent, name, label, data=None):
-        group = parent.create_group(name)
-        kinds = {"f4": "R4", "f8": "R8", "i4": "I4", "i8": "I8", "i1": "C1"}
-        if isinstance(data, str):
-            data = np.frombuffer(data.encode(), "i1")
-        self.label(group, name, label, "MT" if data is None else kinds[data.dtype.str[1:]])
-        if data is not None:
-            group.create_dataset(" data", data=data)
-        return group
-
-    def zone(self, base, name, block):
-        shape = np.array(block.shape[::-1])
-        zone = self.node(base, name, "Zone_t", np.array([shape, shape - 1, 0 * shape], "i4"))
-        self.node(zone, "ZoneType", "ZoneType_t", "Structured")
-        coordinates = self.node(zone, "GridCoordinates", "GridCoordinates_t")
-        for axis, values in zip("XYZ", block.places):
-            self.node(coordinates, f"Coordinate{axis}", "DataArray_t", values)
-        for name, location, values in (("nodes", "Vertex", block.p), ("cells", "CellCenter", block.c)):
-            solution = self.node(zone, name, "FlowSolution_t")
-            self.node(solution, "GridLocation", "GridLocation_t", location)
-            self.node(solution, "p" if location == "Vertex" else "c", "DataArray_t", values)
 
 
 class RoundTrips(StructuredFormats):

@@ -72,9 +72,9 @@ def grid(writer, block, name="a", time=None, **options):
 
 
 class Xdmf(StructuredFormats):
-    def write(self, grids, version="3.0"):
+    def write(self, grids, version="3.0", entities=""):
         path = self.folder / "a.xmf"
-        path.write_text(f'<?xml version="1.0"?>\n<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>\n<Xdmf Version="{version}"><Domain>\n'
+        path.write_text(f'<?xml version="1.0"?>\n<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" [{entities}]>\n<Xdmf Version="{version}"><Domain>\n'
                         f"{grids}\n</Domain></Xdmf>\n")
         return path
 
@@ -252,6 +252,30 @@ class Xdmf(StructuredFormats):
         text = self.new("XML").item(block.p.round(3))
         path = self.write(f'{text}<Grid>{geometry(self.new("Binary"), block)}{fields}</Grid>')
         self.assertLess(self.peak_memory(path, "p7", "144M"), 144 << 20)
+
+    def test_entities(self):
+        """Names of files and dimensions that the XML's own DTD defines."""
+        block = Block()
+        shape = dims(block.shape)
+        text = grid(self.new(), block)
+        entities = (f"""<!-- <!ENTITY HeavyData "wrong"> "unpaired --><!ENTITY HeavyData "a.h5">\n<!ENTITY HeavyData 'later.h5'>"""
+                    f"""<!ELEMENT Xdmf (Domain)><!ENTITY nodes '{shape}'><!ENTITY path "&HeavyData;:/group">"""
+                    """<!ENTITY other SYSTEM "other.xml"><!ENTITY % parameter "a.h5"><?word "?>""")
+        text = text.replace("a.h5:/group/1", "&path;/1").replace("a.h5", "&HeavyData;").replace(f'"{shape}"', '"&nodes;"')
+        for reference in ("&path;", "&HeavyData;", "&nodes;"):
+            self.assertIn(reference, text)
+        path = self.write(text.replace("<Grid", '<Information Name="R&amp;D &#60;&undefined;"/><Grid', 1), entities=entities)
+        self.expect_same([path], [block])
+        self.expect_harmless(path)
+        first, *rest = (f'<!ENTITY a{n} "{10 * f"&a{n + 1};"}">' for n in range(7))
+        for defined, word, told in (
+                (entities, "&other;", "is in another file"),
+                ('<!ENTITY a "&b;"><!ENTITY b "&a;">', "&a;", "refer to one another"),
+                (first + "".join(rest) + '<!ENTITY a7 "0123456789">', "&a0;", "longer by more than 1 MiB"),
+                (first + "".join(rest) + '<!ENTITY a7 "">', "&a0;", "more than 1048576 times"),
+                ('<!ENTITY a "b.h5">', "&a;", "b.h5, which does not exist"),
+                ('<!ENTITY a "b.h5', "&a;", "not valid XML")):
+            self.expect_line(self.write(grid(self.new(), block).replace("a.h5", word, 1), entities=defined), words=told)
 
     def test_attributes_that_some_grids_lack(self):
         a, b = Block(), Block((4, 3, 5), 9)

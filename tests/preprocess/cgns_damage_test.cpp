@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/support/cgns_writer.h"
 #include "tests/support/damaged_files.h"
 #include "tests/support/temporary_folder.h"
@@ -46,6 +47,22 @@ TEST_P(CgnsDamage, TruncatedFilesAreRefusedOrRead) {
   const DamageReport report = openTruncated(path_, 100, open);
   EXPECT_EQ(harm("truncated", report), "");
   EXPECT_GT(report.refused, 50);
+}
+
+TEST_P(CgnsDamage, TruncatedFilesAreNamedBeforeALibrarySeesThem) {
+  if (GetParam() == CgnsFileType::kHdf5) GTEST_SKIP() << "by HDF5, which checks it";
+  const auto whole = std::filesystem::file_size(path_);
+  // The end of the file that its header names is in its last block.
+  for (const auto bytes : {whole - 4096, whole / 2, uintmax_t{400}, uintmax_t{200}}) {
+    std::filesystem::resize_file(path_, bytes);
+    try {
+      open(path_);
+      ADD_FAILURE() << bytes;
+    } catch (const Error& error) {
+      const std::string told = "is truncated (found " + std::to_string(bytes) + " bytes, expected ";
+      EXPECT_NE(std::string(error.what()).find(told), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST_P(CgnsDamage, FilesWithAWrongByteAreRefusedOrRead) {

@@ -171,6 +171,62 @@ TEST_F(SeriesFormats, BaseIterativeDataOfCgns) {
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps[2].time, 1.5);
 }
 
+TEST_F(SeriesFormats, ZonesOfCgnsThatChangeAreNamedOrLeftOut) {
+  const auto write = [&](const std::vector<std::vector<std::string>>& zones) {
+    CgnsWriter writer(file("a.cgns"), CgnsFileType::kHdf5);
+    const auto field = [](const char* name, double i, double j, double k) {
+      return CgnsWriterField{name, [=](int64_t at_i, int64_t at_j, int64_t at_k) {
+                               return i * static_cast<double>(at_i) + j * static_cast<double>(at_j) +
+                                      k * static_cast<double>(at_k);
+                             }};
+    };
+    writer.base("base");
+    writer.baseSteps({0.5, 1, 1.5, 2}, zones);
+    for (const char* name : {"Always", "Later", "Other"}) {
+      writer.zone(name, {6, 5, name[0] == 'O' ? 3 : 4});
+      writer.coordinates("GridCoordinates", {field("CoordinateX", 1, 0, 0), field("CoordinateY", 0, 1, 0),
+                                             field("CoordinateZ", 0, 0, 1)});
+      writer.solution("Only", "Vertex", {field("Density", 1, 2, 3)});
+    }
+  };
+  const std::vector<std::string> words{"convert",        file("a.cgns"), "--steps",  "all",    "-o",
+                                       file("a.splats"), "--overwrite",  "--scalar", "Density"};
+  const std::string other =
+      "a cache holds steps of the same blocks: convert the others to a cache of their own";
+  const std::vector<std::string> always{"Always", "Null"}, both{"Always", "Later"};
+  struct Case {
+    std::vector<std::vector<std::string>> zones;
+    std::string told;
+  };
+  for (const auto& [zones, told] :
+       {Case{{always, always, both, always}, "it has 2 blocks (new: Later); the steps before it have 1; "},
+        Case{{both, both, always, both}, "it has 1 block; the steps before it have 2 (now gone: Later); "},
+        Case{{{"Later"}, {"Later"}, {"Other"}, {"Later"}},
+             "its block 1 (Other) has 6x5x3 nodes; in the steps before it 6x5x4; "}}) {
+    SCOPED_TRACE(told);
+    write(zones);
+    const ProgramResult refused = runProgram(words);
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
+    for (const std::string& part :
+         {std::string("step 2 (") + file("a.cgns") + ", time step 2) cannot be converted: ", told, other,
+          std::string("; the cache has 2 steps; --keep-going leaves out such steps")})
+      EXPECT_NE(refused.err.find(part), std::string::npos) << refused.err;
+    EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
+
+    std::vector<std::string> kept = words;
+    kept.emplace_back("--keep-going");
+    const ProgramResult result = runProgram(kept);
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_NE((result.out + result.err).find("step 2"), std::string::npos) << result.out << result.err;
+    EXPECT_NE((result.out + result.err).find(told), std::string::npos) << result.out << result.err;
+    const CacheReader cache(file("a.splats"));
+    ASSERT_EQ(cache.series().steps.size(), 3u);
+    EXPECT_EQ(cache.series().steps[2].time, 2);
+    EXPECT_TRUE(verifyCache(cache.atStep(2)).findings.empty());
+  }
+}
+
 TEST_F(SeriesFormats, CellCentredFilesAndTheirCollections) {
   std::string pvd = "<VTKFile type=\"Collection\" version=\"0.1\"><Collection>";
   std::string series = R"({"file-series-version": "1.0", "files": [)";

@@ -3,6 +3,7 @@
 #include <cgns_io.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstring>
 #include <limits>
 #include <span>
@@ -79,6 +80,26 @@ bool isHdf5(const InputFile& file) {
   return beginOf(file).starts_with(kHdf5Mark);
 }
 
+/// Throws Error if an ADF file is shorter than its header says: libcgns reads text without an end from blocks that are
+/// not there. The header's bytes 146 to 157 are the position of the file's last byte: a block of 4,096 bytes in eight
+/// hexadecimal digits, and the byte in it in four.
+void requireAllOfAdf(const InputFile& file) {
+  constexpr size_t kHeader = 186, kEnd = 146, kBlockDigits = 8, kDigits = 12;
+  std::string header(kHeader, '\0');
+  if (file.size() >= kHeader) file.readAt(0, std::span(header.data(), header.size()));
+  uint64_t block = 0, byte = 0;
+  const char* const at = header.data() + kEnd;
+  const auto [block_end, block_error] = std::from_chars(at, at + kBlockDigits, block, 16);
+  const auto [byte_end, byte_error] = std::from_chars(at + kBlockDigits, at + kDigits, byte, 16);
+  if (block_end != at + kBlockDigits || byte_end != at + kDigits)
+    throw Error("{}: its ADF header has no position of its end; the file is damaged: copy or write it again",
+                file.path().string());
+  const uint64_t bytes = 4096 * block + byte + 1;
+  if (bytes > file.size())
+    throw Error("{}: is truncated (found {} bytes, expected {}); copy or write it again",
+                file.path().string(), file.size(), bytes);
+}
+
 struct Selection {
   std::array<cgsize_t, 3> start, end, stride{1, 1, 1};
 };
@@ -136,6 +157,7 @@ CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)) {
     hdf5_ = std::make_unique<CgnsHdf5>(path_);
     return;
   }
+  requireAllOfAdf(file);
   const MutexLock lock(dataLibraryMutex());
   if (cgio_open_file(path_.c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &file_) != CGIO_ERR_NONE) fail("");
   if (cgio_get_root_id(file_, &root_) != CGIO_ERR_NONE) {

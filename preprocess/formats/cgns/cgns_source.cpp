@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "preprocess/formats/cgns/adf_trial.h"
 #include "preprocess/formats/cgns/cgns_mesh_source.h"
 #include "stream/base/check.h"
 
@@ -104,6 +105,7 @@ void CgnsSource::readScalar(const CgnsZone& zone, const NodeBox& box, const Cgns
 }
 
 std::unique_ptr<DataSource> openCgns(const OpenGridOptions& options) {
+  tryAdf(options.grid);
   auto file = std::make_shared<const CgnsFile>(options.grid);
   const uint32_t step = options.time_step.value_or(0);
   CgnsTree tree = readCgnsTree(*file, step);

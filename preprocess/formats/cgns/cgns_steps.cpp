@@ -1,6 +1,8 @@
 #include "preprocess/formats/cgns/cgns_steps.h"
 
 #include <algorithm>
+#include <charconv>
+#include <map>
 #include <set>
 
 #include "stream/base/error.h"
@@ -110,6 +112,45 @@ std::vector<std::vector<CgnsNode>> inOrder(const CgnsFile& file, const std::vect
   return steps;
 }
 
+/// The step that IOSS writes into a solution, from 1: as a descriptor, and at the end of its name. Its files have no
+/// pointers if the run has not come to its end.
+std::optional<size_t> stepOfIoss(const CgnsFile& file, const CgnsNode& solution) {
+  static const std::string at_step = "AtStep";
+  std::string text;
+  for (const CgnsNode& child : file.children(solution))
+    if (child.label == "Descriptor_t" && (child.name == "Step" || child.name == "step"))
+      text = file.text(child);
+  if (const size_t found = solution.name.rfind(at_step); text.empty() && found != std::string::npos)
+    text = solution.name.substr(found + at_step.size());
+  size_t step = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), step);
+  if (error != std::errc{} || end != text.data() + text.size() || step < 1 || step > kMaxSteps)
+    return std::nullopt;
+  return step;
+}
+
+/// By the steps of IOSS, the first of `count` or, where there is no count, the first that there is; empty if a solution
+/// has none.
+std::vector<std::vector<CgnsNode>> asIossNumbers(const CgnsFile& file, const std::vector<CgnsNode>& zone,
+                                                 size_t count) {
+  std::map<size_t, std::vector<CgnsNode>> numbered;
+  for (const CgnsNode& solution : zone) {
+    if (solution.label != "FlowSolution_t") continue;
+    const auto step = stepOfIoss(file, solution);
+    if (!step) return {};
+    numbered[*step].push_back(solution);
+  }
+  if (numbered.empty()) return {};
+  std::vector<std::vector<CgnsNode>> steps;
+  if (numbered.rbegin()->first <= count) {
+    steps.resize(count);
+    for (auto& [step, solutions] : numbered) steps[step - 1] = std::move(solutions);
+  } else {
+    for (auto& [step, solutions] : numbered) steps.push_back(std::move(solutions));
+  }
+  return steps;
+}
+
 }  // namespace
 
 bool CgnsSteps::has(const std::string& zone, uint32_t step) const {
@@ -153,7 +194,8 @@ CgnsZoneStep readCgnsZoneStep(const CgnsFile& file, const std::vector<CgnsNode>&
   if (grid) result.grid = *grid;
 
   if (pointedSolutions(file, zone, data, {steps.count, step}, result.solutions)) return result;
-  std::vector<std::vector<CgnsNode>> order = inOrder(file, zone);
+  std::vector<std::vector<CgnsNode>> order = asIossNumbers(file, zone, steps.count);
+  if (order.empty()) order = inOrder(file, zone);
   result.implied_steps = std::max<size_t>(1, order.size());
   if (order.size() == 1)
     result.solutions = std::move(order[0]);

@@ -26,7 +26,7 @@ CgnsSteps readCgnsSteps(const CgnsFile& file, const std::vector<CgnsNode>& base)
 struct CgnsZoneStep {
   std::optional<CgnsNode> grid;     // GridCoordinates_t
   std::vector<CgnsNode> solutions;  // FlowSolution_t
-  size_t implied_steps = 1;         // inferred from the order of its solutions without ZoneIterativeData
+  size_t implied_steps = 1;  // without ZoneIterativeData: by IOSS' numbers, else the order of solutions
 };
 
 /// `zone`: the child nodes of a zone. A zone with a single step is the same at every step. Throws Error.

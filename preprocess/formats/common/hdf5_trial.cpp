@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/hdf5_handle.h"
+#include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -184,7 +185,37 @@ pid_t forkTrial() {
   return ::fork();
 }
 
+/// Throws Error if the work crashes or takes too long, else notes the file `before`.
+void tryWork(const char* library, const std::filesystem::path& path, const struct stat& before,
+             const std::function<void()>& work, TriedFiles& tried) {
+  const rlim_t most_seconds = kSeconds + static_cast<rlim_t>(before.st_size) / kBytesPerSecond;
+  const pid_t parent = ::getpid(), trial = forkTrial();
+  if (trial == 0) runTrial(work, most_seconds, parent);
+  if (trial < 0) return;
+  int status = 0;
+  while (::waitpid(trial, &status, 0) < 0)
+    if (errno != EINTR) return;  // somebody else has waited for it
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
+    throw Error("{}: {} does not finish reading it within {} s; the file is damaged: copy or write it again",
+                path.string(), library, most_seconds);
+  const bool stopped =
+      WIFSIGNALED(status) && std::find(kStops.begin(), kStops.end(), WTERMSIG(status)) != kStops.end();
+  if (stopped) return;  // the caller is told, too
+  if (WIFSIGNALED(status) || (WIFEXITED(status) && WEXITSTATUS(status) != 0))
+    throw Error("{}: {} crashes on its structures ({}); the file is damaged: copy or write it again",
+                path.string(), library,
+                WIFSIGNALED(status) ? ::strsignal(WTERMSIG(status)) : "an error of memory");
+  tried.add(before);
+}
+
 }  // namespace
+
+void tryLibrary(const char* library, const std::filesystem::path& path, const std::function<void()>& work) {
+  static TriedFiles tried;
+  struct stat before {};
+  if (in_trial || ::stat(path.c_str(), &before) != 0 || tried.has(before)) return;
+  tryWork(library, path, before, work, tried);
+}
 
 void tryHdf5(const std::filesystem::path& path, const std::function<void()>& more) {
   static TriedFiles walked, with_more;
@@ -196,24 +227,7 @@ void tryHdf5(const std::filesystem::path& path, const std::function<void()>& mor
     if (walks) walk(path);
     if (more) more();
   };
-  const rlim_t most_seconds = kSeconds + static_cast<rlim_t>(before.st_size) / kBytesPerSecond;
-  const pid_t parent = ::getpid(), trial = forkTrial();
-  if (trial == 0) runTrial(work, most_seconds, parent);
-  if (trial < 0) return;
-  int status = 0;
-  while (::waitpid(trial, &status, 0) < 0)
-    if (errno != EINTR) return;  // somebody else has waited for it
-  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
-    throw Error(
-        "{}: HDF5 does not finish reading it within {} s; the file is damaged: copy or write it again",
-        path.string(), most_seconds);
-  const bool stopped =
-      WIFSIGNALED(status) && std::find(kStops.begin(), kStops.end(), WTERMSIG(status)) != kStops.end();
-  if (stopped) return;  // the caller is told, too
-  if (WIFSIGNALED(status) || (WIFEXITED(status) && WEXITSTATUS(status) != 0))
-    throw Error("{}: HDF5 crashes on its structures ({}); the file is damaged: copy or write it again",
-                path.string(), WIFSIGNALED(status) ? ::strsignal(WTERMSIG(status)) : "an error of memory");
-  tried.add(before);
+  tryWork("HDF5", path, before, work, tried);
 }
 
 }  // namespace curvisplat

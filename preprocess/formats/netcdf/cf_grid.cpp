@@ -11,6 +11,7 @@
 
 #include "preprocess/formats/netcdf/cf_roles.h"
 #include "preprocess/formats/netcdf/foreign_netcdf.h"
+#include "preprocess/formats/netcdf/tile_number.h"
 #include "preprocess/grid/calendar.h"
 
 namespace curvisplat {
@@ -80,7 +81,8 @@ std::string describe(const NetcdfFiles& file, const CfDimensions& dims) {
 
 /// The variable's coordinate of a role. Candidates in order: variables in its `coordinates` attribute,
 /// variables named like its dimensions, all others; last those of other files whose dimensions have other
-/// names and the same lengths.
+/// names and the same lengths. In files of tiles (FV3), 1-D coordinates hold indices or are for GrADS: those of two
+/// dimensions come first, at the nodes or at the corners of the cells around them.
 std::optional<CfTerm> coordinateOf(const NetcdfFiles& file, const NetcdfVariable& variable,
                                    const CfDimensions& dims, CfRole role) {
   std::vector<const NetcdfVariable*> candidates;
@@ -91,6 +93,13 @@ std::optional<CfTerm> coordinateOf(const NetcdfFiles& file, const NetcdfVariable
     if (const NetcdfVariable* const named = file.find(file.dimensions()[dim].name))
       candidates.push_back(named);
   for (const NetcdfVariable& other : file.variables()) candidates.push_back(&other);
+  if (tileNumber(file.path()))
+    for (const bool corners : {false, true})
+      for (const NetcdfVariable* candidate : candidates) {
+        if (cfRole(file, *candidate) != role) continue;
+        const auto term = CfTerm::of(file, *candidate, dims);
+        if (term && term->axes() == 2 && (corners ? term->ofCorners() : term->onNodes())) return term;
+      }
   for (const bool exact : {true, false})
     for (const NetcdfVariable* candidate : candidates) {
       if (cfRole(file, *candidate) != role || (!exact && candidate->file == variable.file)) continue;
@@ -234,7 +243,7 @@ class GridFinder {
       grid.latitude = *latitude;
       return true;
     };
-    if (set(CfRole::kLongitude, CfRole::kLatitude)) return true;
+    if (set(CfRole::kLongitude, CfRole::kLatitude)) return !stacksFaces(grid, reason);
     auto [projection, words] = MapProjection::of(file_, variable);
     if (set(CfRole::kGridLongitude, CfRole::kGridLatitude)) {
       if (projection && projection->degrees()) {
@@ -260,6 +269,23 @@ class GridFinder {
     grid.indices = true;
     grid.longitude = CfTerm::ofIndex(0, indexSpacing(file_, 0));
     grid.latitude = CfTerm::ofIndex(1, indexSpacing(file_, 1));
+    return true;
+  }
+
+  /// GCHP's restart files: lat is six times lon, and both count from 1.
+  bool stacksFaces(const CfGrid& grid, std::string& reason) const {
+    if (grid.longitude.axes() != 1 || grid.latitude.axes() != 1) return false;
+    const NetcdfVariable& latitude = grid.latitude.variable();
+    const uint64_t rows = file_.dimension(latitude, 0).length;
+    if (rows != 6 * file_.dimension(grid.longitude.variable(), 0).length) return false;
+    double last = 0;
+    file_.read(latitude, {{rows - 1}, {1}}, std::span<double>(&last, 1));
+    if (!(last > 90 || last == static_cast<double>(rows))) return false;
+    reason = fmt::format(
+        "{} is six times {} and has no latitudes: the faces of a cubed sphere are stacked along it; write "
+        "them with "
+        "a dimension of faces (nf) and their lons and lats, as GEOS' and GCHP's history files have them",
+        latitude.name, grid.longitude.variable().name);
     return true;
   }
 

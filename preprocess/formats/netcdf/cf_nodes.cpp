@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/trigonometric.hpp>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
 #include "stream/base/check.h"
@@ -84,6 +85,8 @@ void CfNodes::readBlank(const CfRange& range, std::vector<uint8_t>& blank) const
 
 /// The columns of the box's nodes; those of its first plane only where one column serves all levels.
 void CfNodes::readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const {
+  if (grid_.degrees && grid_.longitude.ofCorners() && grid_.latitude.ofCorners())
+    return readMiddles(range, columns);
   const CfValues east = grid_.longitude.read(files_, range), north = grid_.latitude.read(files_, range);
   const double scale = !grid_.degrees && !projects() ? length_ : 1;
   const bool upright = !grid_.longitude.varies(2) && !grid_.latitude.varies(2);
@@ -103,6 +106,28 @@ void CfNodes::readColumns(const CfRange& range, std::vector<GlobeColumn>& column
   }
   columns.clear();
   for (size_t n = 0; n < x.size(); ++n) columns.push_back(globe_.column(x[n], y[n]));
+}
+
+/// Columns in the middle of their cells' corners: on the sphere, since longitudes have no mean around a pole.
+void CfNodes::readMiddles(const CfRange& range, std::vector<GlobeColumn>& columns) const {
+  const NetcdfBox box = grid_.longitude.boxOf(range);
+  std::vector<double> longitudes(box.values()), latitudes(box.values());
+  files_.read(grid_.longitude.variable(), box, longitudes);
+  files_.read(grid_.latitude.variable(), grid_.latitude.boxOf(range), latitudes);
+  const uint64_t row = lengthOf(range, 0) + 1;
+  std::vector<glm::dvec3> corners;
+  for (size_t n = 0; n < longitudes.size(); ++n) {
+    const double east = glm::radians(longitudes[n]), north = glm::radians(latitudes[n]);
+    corners.push_back({std::cos(north) * std::cos(east), std::cos(north) * std::sin(east), std::sin(north)});
+  }
+  columns.clear();
+  for (uint64_t j = 0; j < lengthOf(range, 1); ++j)
+    for (uint64_t i = 0; i < lengthOf(range, 0); ++i) {
+      const size_t n = i + row * j;
+      const glm::dvec3 middle = corners[n] + corners[n + 1] + corners[n + row] + corners[n + row + 1];
+      columns.push_back(globe_.column(glm::degrees(std::atan2(middle.y, middle.x)),
+                                      glm::degrees(std::atan2(middle.z, std::hypot(middle.x, middle.y)))));
+    }
 }
 
 std::vector<glm::dvec3> CfNodes::points(const CfRange& range) const {

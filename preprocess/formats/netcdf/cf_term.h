@@ -60,6 +60,10 @@ class CfTerm {
   bool exact() const { return exact_; }
   /// Whether its points are the block's nodes: nothing is interpolated.
   bool onNodes() const { return longer_ == std::array<int, 3>{}; }
+  /// Whether the nodes are in the middle of four of its points, along i and j.
+  bool ofCorners() const {
+    return longer_ == std::array<int, 3>{1, 1, 0} && axes() == 2 && *along_[1] < *along_[0];
+  }
   /// Whether the nodes are half-way between its points along `axis`.
   bool surrounds(size_t axis) const { return longer_[axis] > 0; }
   /// Whether it differs between the faces of the grid. read() takes the values of one, at first of the first.

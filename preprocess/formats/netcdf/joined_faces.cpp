@@ -28,7 +28,7 @@ using Hole = std::array<Column, 4>;
 
 class JoinedFaces final : public GridSource {
  public:
-  explicit JoinedFaces(std::unique_ptr<NetcdfSource> source)
+  explicit JoinedFaces(std::unique_ptr<FaceSource> source)
       : source_(std::move(source)), description_(source_->description()) {
     const GridBlock& first = description_.blocks[0];
     shape_ = {static_cast<uint32_t>(description_.blocks.size()), first.ni, first.nj};
@@ -163,7 +163,7 @@ class JoinedFaces final : public GridSource {
       }
   }
 
-  std::unique_ptr<NetcdfSource> source_;
+  std::unique_ptr<FaceSource> source_;
   FaceShape shape_;
   std::vector<FaceJoint> joints_;
   std::vector<Hole> holes_;
@@ -172,7 +172,7 @@ class JoinedFaces final : public GridSource {
 
 }  // namespace
 
-std::unique_ptr<GridSource> joinFaces(std::unique_ptr<NetcdfSource> source) {
+std::unique_ptr<GridSource> joinFaces(std::unique_ptr<FaceSource> source) {
   if (!source->onSphere()) return source;
   return std::make_unique<JoinedFaces>(std::move(source));
 }

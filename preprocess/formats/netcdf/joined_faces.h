@@ -5,13 +5,13 @@
 
 #include <memory>
 
-#include "preprocess/formats/netcdf/netcdf_source.h"
+#include "preprocess/formats/netcdf/face_source.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
 
 /// `source` has a block for each face, all of the same dimensions. Where its nodes are not on a sphere, the faces stay
 /// apart. Throws Error as the source does.
-std::unique_ptr<GridSource> joinFaces(std::unique_ptr<NetcdfSource> source);
+std::unique_ptr<GridSource> joinFaces(std::unique_ptr<FaceSource> source);
 
 }  // namespace curvisplat

@@ -63,10 +63,10 @@ std::vector<std::filesystem::path> filesOf(const OpenGridOptions& options) {
 
 }  // namespace
 
-NetcdfSource::NetcdfSource(const OpenGridOptions& options)
+NetcdfSource::NetcdfSource(const OpenGridOptions& options, const NetcdfSource* beside)
     : file_(filesOf(options)),
       grid_(chooseGrid(file_, options, description_, mask_)),
-      globe_(globeOf(options.globe)) {
+      globe_(beside ? beside->globe_ : globeOf(options.globe)) {
   const uint64_t faces = grid_.dims.face ? file_.dimensions()[*grid_.dims.face].length : 1;
   for (uint64_t face = 0; face < faces; ++face) {
     CfGrid grid = grid_;

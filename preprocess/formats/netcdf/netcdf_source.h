@@ -17,29 +17,28 @@
 #include "preprocess/formats/netcdf/cf_grid.h"
 #include "preprocess/formats/netcdf/cf_nodes.h"
 #include "preprocess/formats/netcdf/closed_grid.h"
+#include "preprocess/formats/netcdf/face_source.h"
 #include "preprocess/formats/netcdf/globe.h"
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
 
-class NetcdfSource final : public GridSource {
+class NetcdfSource final : public FaceSource {
  public:
-  /// Throws Error.
-  explicit NetcdfSource(const OpenGridOptions& options);
+  /// `beside`: a source that this one lies beside on the same map; null if there is none. Throws Error.
+  explicit NetcdfSource(const OpenGridOptions& options, const NetcdfSource* beside = nullptr);
 
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
 
-  /// As read(), of a box that begins and ends anywhere along i.
   void readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
-                NodeArrays& out) const;
-
-  /// Whether the nodes are on a sphere, with their levels along k.
-  bool onSphere() const { return globe_.sphere() && grid_.levels == 2; }
-  /// On the unit sphere, of the nodes of a range with a single level.
-  std::vector<glm::dvec3> pointsOf(uint32_t block, const CfRange& range) const;
+                NodeArrays& out) const override;
+  bool onSphere() const override { return globe_.sphere() && grid_.levels == 2; }
+  std::vector<glm::dvec3> pointsOf(uint32_t block, const CfRange& range) const override;
+  /// Whether longitude and latitude are given for each column of nodes.
+  bool placesColumns() const { return grid_.longitude.axes() == 2 && grid_.latitude.axes() == 2; }
 
   /// How the grid closes if it runs around the Earth; of grids of one block on a sphere.
   std::optional<GridClosure> closure() const;

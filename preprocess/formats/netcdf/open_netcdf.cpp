@@ -5,10 +5,13 @@
 #include "preprocess/formats/netcdf/closed_grid.h"
 #include "preprocess/formats/netcdf/joined_faces.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
+#include "preprocess/formats/netcdf/tile_source.h"
 
 namespace curvisplat {
 
 std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options) {
+  if (const auto tiles = tilesOf(options); !tiles.empty())
+    return joinFaces(std::make_unique<TileSource>(tiles));
   auto source = std::make_unique<NetcdfSource>(options);
   if (source->description().blocks.size() > 1) return joinFaces(std::move(source));
   if (const auto closure = source->closure())

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <map>
 
+#include "preprocess/formats/netcdf/tile_number.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/su2/su2_source.h"
 #include "stream/base/error.h"
@@ -53,7 +54,15 @@ void sortNaturally(std::vector<fs::path>& paths) {
   paths.erase(std::unique(paths.begin(), paths.end()), paths.end());
 }
 
-/// The path with '#' for each number in its file name: equal for the files of a series.
+/// Whether the path is that of a NetCDF file, perhaps compressed, by its name.
+bool isCalledNetcdf(fs::path path) {
+  for (const char* compressed : {".gz", ".xz", ".zst"})
+    if (path.extension() == compressed) path = path.stem();
+  return path.extension() == ".nc" || path.extension() == ".nc4";
+}
+
+/// The path with '#' for each number in its file name: equal for the files of a series. The number of a tile stays: the
+/// tiles of a cubed sphere are parts of one step.
 std::string shapeOf(const fs::path& path) {
   const std::string name = path.filename().string();
   std::string shape = path.parent_path().string() + "/";
@@ -62,6 +71,7 @@ std::string shapeOf(const fs::path& path) {
       shape += name[n];
     else if (n == 0 || !isDigit(name[n - 1]))
       shape += '#';
+  if (const auto tile = tileNumber(path); tile && isCalledNetcdf(path)) shape += fmt::format("/{}", *tile);
   return shape;
 }
 

@@ -6,7 +6,8 @@
 //   one file              .pvd, .vtk.series and the like, .p3d, CGNS, NetCDF: its time steps
 //   several such files    the steps of one after those of the other
 //
-// As many restart files as a SU2 mesh has zones are one step.
+// As many restart files as a SU2 mesh has zones are one step, and so are the tiles of a cubed sphere (a.tile1.nc to
+// a.tile6.nc): of two such sets, those of the same number are the steps.
 #pragma once
 
 #include <cstdint>

@@ -7,6 +7,7 @@
 
 #include "preprocess/formats/common/ascii_spool.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/xdmf/xml_entities.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 
@@ -31,7 +32,7 @@ std::string xdmfAttribute(const pugi::xml_node& node, std::initializer_list<cons
 }
 
 XdmfDocument::XdmfDocument(std::filesystem::path path) : path_(std::move(path)) {
-  const std::string text = readTextFile(path_);
+  const std::string text = withEntities(name(), readTextFile(path_));
   const pugi::xml_parse_result parsed = document_.load_buffer(text.data(), text.size());
   if (!parsed) throw Error("{}: byte {}: is not valid XML ({})", name(), parsed.offset, parsed.description());
   domain_ = document_.child("Xdmf").child("Domain");
