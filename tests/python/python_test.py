@@ -8,6 +8,7 @@ interrupts and memory are as its pages say.
 import json
 import os
 import pathlib
+import shlex
 import signal
 import subprocess
 import sys
@@ -450,6 +451,28 @@ class Arrays(PythonTest):
         with curvisplat.open(steps) as cache:
             self.assertEqual(len(cache.times), 3)
 
+    def test_of_xarray_say_what_is_missing(self):
+        try:
+            import xarray
+        except ImportError:
+            self.skipTest("xarray is not installed")
+        x, y, z, t = bent_duct()
+        spatial = ("k", "j", "i")
+        dataset = xarray.Dataset({"t": (("time", *spatial), t[None])}, {"x": (spatial, x.astype("f4")), "y": (spatial, y), "z": (spatial, z)})
+        for wrong, words in (({}, "isel.time=0."), ({"scalars": ["t"]}, "isel.time=0."), ({"scalars": ["u"]}, "no variable 'u'"),
+                             ({"coordinates": ("lon", "y", "z")}, "no variable 'lon'")):
+            with self.assertRaisesRegex(curvisplat.UsageError, words):
+                curvisplat.from_xarray(dataset, **wrong)
+        block = curvisplat.from_xarray(dataset.isel(time=0))
+        self.assertTrue(np.shares_memory(block.x, dataset.x.values) and np.shares_memory(block.y, dataset.y.values))
+
+    def test_of_the_example_are_drawn_by_the_command_it_prints(self):
+        example = pathlib.Path(__file__).resolve().parents[2] / "tools" / "python" / "examples" / "arrays.py"
+        run = subprocess.run([sys.executable, example, "duct"], cwd=self.folder, check=True, capture_output=True, text=True)
+        words = shlex.split(run.stdout.split("by hand: ")[1])
+        subprocess.run([PROGRAM, *words[1:]], cwd=self.folder, check=True, capture_output=True)
+        self.assertEqual((self.folder / "again.png").read_bytes(), (self.folder / "duct.png").read_bytes())
+
     def test_of_a_solver_that_runs(self):
         package = pathlib.Path(__file__).resolve().parents[2] / "tools" / "python" / "examples" / "solver.py"
         name = self.folder / "heat"
@@ -502,6 +525,27 @@ class Errors(PythonTest):
             self.expect_error(curvisplat.UsageError, "memory", cache.render, memory="1K")
             cache.render(size=(32, 32))  # still works
 
+    def test_name_the_argument(self):
+        wrong = curvisplat.UsageError
+        with curvisplat.open(self.cache) as cache:
+            scalar = cache.scalars[0].name
+            for name, value, words in (("step", -1, "from 0"), ("threads", -1, "from 0"), ("step", 1.5, "whole number"),
+                                       ("shade", "yes", "neither True nor False"), ("size", 300, "(width, height)"),
+                                       ("size", (10.5, 10), "whole numbers"), ("function", "viridis", "colours='viridis'"),
+                                       ("camera", "+z", "view='+z'"), ("slices", (0, 0, 0, 0, 0, 1), "several in a list"),
+                                       ("clip_planes", [(0, 0, 1)], "(px, py, pz, nx, ny, nz)")):
+                self.expect_error(wrong, f"{name}: {value if name == 'step' else ''}", cache.render, **{name: value})
+                self.expect_error(wrong, words, cache.render, **{name: value})
+            for bins in (0, -1, 10**9):
+                self.expect_error(wrong, "bins", cache.histogram, scalar, bins=bins)
+            self.expect_error(wrong, "finite", cache.histogram, scalar, range=(1, np.inf))
+            self.expect_error(wrong, "(x, y, z)", cache.probe, (1, 2))
+            self.expect_error(wrong, "level: -1", cache.sample, level=-1)
+            self.expect_error(wrong, "frames: -1", cache.orbit, frames=-1)
+            whole = cache.render(size=(64, 48), surfaces="kmin", slices=[(0, 0, 0.5, 0, 0, 1)], slice_opacity="function")
+            np.testing.assert_array_equal(whole, cache.render(size=(64, 48), surfaces=["kmin"], slices=[(0, 0, 0.5, 0, 0, 1)],
+                                                              slice_opacity="function"))
+
     def test_of_arrays_say_which(self):
         x, y, z, t = bent_duct()
         out = self.folder / "never.splats"
@@ -512,6 +556,8 @@ class Errors(PythonTest):
         self.expect_error(curvisplat.UsageError, "2 dimensions", make, out,
                           curvisplat.Block(x[0], y, z, {"t": t}))
         self.expect_error(curvisplat.UsageError, "no block", make, out)
+        self.expect_error(curvisplat.UsageError, "dict is no Block", make, out, {"t": t})
+        self.expect_error(curvisplat.UsageError, "expected bool", make, out, curvisplat.Block(x, y, z, {"t": t}, blank=t * 0))
         self.expect_error(curvisplat.UsageError, "has no scalar 't'", make, out, curvisplat.Block(x, y, z, {"t": t}),
                           curvisplat.Block(x, y, z, {"u": t}))
         self.assertFalse(out.exists())

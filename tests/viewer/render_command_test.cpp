@@ -49,27 +49,27 @@ TEST(RenderCommand, HasEveryOption) {
   state.annotations.axes = false;
   state.classification = Classification::kFlat;
   expectParts(commandText(state, "it's.splats"), {"'it'\\''s.splats'",
-                                                "--scalar 'u v'",
-                                                "--tf viridis",
-                                                "--range=-1,1",
-                                                "--opacity 0:",
-                                                "0.3:0.7",
-                                                "--scale 1,1,50",
-                                                "--clip-box 0,1,-0.5,1,0.25,1",
-                                                "--clip-plane 0,0.5,0,1,0,-2",
-                                                "--clip-plane 0.25,0,0,0,1,0",
-                                                "--shade",
-                                                "--background black",
-                                                "--classify flat",
-                                                "--lod-pixels 2.5",
-                                                "--scalar-bar --outline",
-                                                "--position 0.1,-3,0.66667",
-                                                "--surface /a/wing.stl",
-                                                "--surface-colour '#ff8000'",
-                                                "--slice 0,0.25,0,0,-1,2",
-                                                "--surface-opacity 0.25",
-                                                "--slice-opacity 'function*0.5'",
-                                                "--volume off"});
+                                                  "--scalar 'u v'",
+                                                  "--tf viridis",
+                                                  "--range=-1,1",
+                                                  "--opacity 0:",
+                                                  "0.3:0.7",
+                                                  "--scale 1,1,50",
+                                                  "--clip-box 0,1,-0.5,1,0.25,1",
+                                                  "--clip-plane 0,0.5,0,1,0,-2",
+                                                  "--clip-plane 0.25,0,0,0,1,0",
+                                                  "--shade",
+                                                  "--background black",
+                                                  "--classify flat",
+                                                  "--lod-pixels 2.5",
+                                                  "--scalar-bar --outline",
+                                                  "--position 0.1,-3,0.66667",
+                                                  "--surface /a/wing.stl",
+                                                  "--surface-colour '#ff8000'",
+                                                  "--slice 0,0.25,0,0,-1,2",
+                                                  "--surface-opacity 0.25",
+                                                  "--slice-opacity 'function*0.5'",
+                                                  "--volume off"});
 }
 
 TEST(RenderCommand, OfTwoScalarsHasBothFunctions) {
@@ -77,7 +77,7 @@ TEST(RenderCommand, OfTwoScalarsHasBothFunctions) {
   state.opacity_by = OpacityScalar{"u v", EditedFunction("grey", -1, 0.5, 0.25)};
   state.opacity_by->function.addPoint(0.5, 0.25);
   expectParts(commandText(state), {"--tf viridis", "--range 0.5,3", "--opacity-by 'u v'",
-                                 "--opacity-range=-1,0.5", "0.5:0.25", "--opacity-unit 0.25"});
+                                   "--opacity-range=-1,0.5", "0.5:0.25", "--opacity-unit 0.25"});
 }
 
 TEST(RenderCommand, OfAnAutomaticFunctionHasItsScale) {

@@ -1,6 +1,7 @@
 #include "tools/python/open_cache.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "stream/base/error.h"
@@ -61,9 +62,13 @@ void OpenCache::goTo(uint64_t step) {
 
 std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) const {
   const size_t variable = reader_.variableNamed(arguments.scalar);
-  if (!(arguments.low < arguments.high) || (arguments.log && !(arguments.low > 0)))
-    throw UsageError("a histogram from {} to {}: expected a range that increases{}", arguments.low,
+  if (!(arguments.low < arguments.high) || !std::isfinite(arguments.high - arguments.low) ||
+      (arguments.log && !(arguments.low > 0)))
+    throw UsageError("a histogram from {} to {}: expected a finite range that increases{}", arguments.low,
                      arguments.high, arguments.log ? " and is above zero" : "");
+  constexpr size_t kMaxBins = 1 << 20;
+  if (arguments.bins == 0 || arguments.bins > kMaxBins)
+    throw UsageError("a histogram of {} bins: expected from 1 to {}", arguments.bins, kMaxBins);
   EditedFunction function("viridis", arguments.low, arguments.high, 1);
   function.setLogScale(arguments.log);
   return histogramOf(reader_, variable, function, arguments.bins);

@@ -7,6 +7,8 @@ from typing import Any, Mapping, Optional, Sequence
 
 import numpy as np
 
+from . import _core
+
 
 @dataclasses.dataclass
 class Block:
@@ -44,14 +46,22 @@ def from_xarray(dataset: Any, coordinates: Sequence[str] = ("x", "y", "z"),
     names = [name for name in dataset.data_vars if name not in coordinates]
     if scalars is None:
         scalars = [name for name in names if dataset[name].ndim == 3]
+    for name in [*coordinates, *scalars]:
+        if name not in dataset:
+            raise _core.UsageError(f"the dataset has no variable '{name}'; it has {', '.join(map(str, dataset.variables))}")
+    more = next((name for name in scalars or names if dataset[name].ndim > 3), None)
+    if more is not None and (scalars or not any(dataset[name].ndim == 3 for name in names)):
+        first = dataset[more].dims[0]
+        raise _core.UsageError(f"'{more}' has the dimensions {', '.join(map(str, dataset[more].dims))}; "
+                               f"choose one of them first, as dataset.isel({first}=0)")
     if not scalars:
-        raise ValueError("the dataset has no variable of three dimensions; name one of " + ", ".join(map(str, names)))
+        raise _core.UsageError("the dataset has no variable of three dimensions, but " + ", ".join(map(str, names)))
     dimensions = dataset[scalars[0]].dims
     like = dataset[scalars[0]]
 
     def spread(name: str) -> np.ndarray:
-        array = dataset[name].broadcast_like(like).transpose(*dimensions)
-        return np.asarray(array.values, dtype=np.float64)
+        array = dataset[name].broadcast_like(like).transpose(*dimensions).values
+        return array if array.dtype.kind == "f" and array.dtype.itemsize in (4, 8) else array.astype(np.float64)
 
     x, y, z = (spread(name) for name in coordinates)
     values = {str(name): _values(dataset[name].transpose(*dimensions).values) for name in scalars}

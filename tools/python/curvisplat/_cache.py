@@ -9,7 +9,7 @@ from typing import Any, Callable, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from . import _core
+from . import _arguments, _core
 from ._camera import Camera
 from ._function import TransferFunction
 from ._view import View
@@ -108,6 +108,11 @@ def _given(**options: Any) -> dict:
 
 def _instead(whole: Any, name: str, **parts: Any) -> dict:
     """The options of a Camera or TransferFunction, or those given one by one."""
+    kind = {"camera": Camera, "function": TransferFunction}[name]
+    if whole is not None and not isinstance(whole, kind):
+        instead = "colours" if name == "function" else "view"
+        raise _core.UsageError(f"{name}: {whole!r} is no {kind.__name__}; a name is passed as {instead}={whole!r}"
+                               if isinstance(whole, str) else f"{name}: expected a {kind.__name__}, not {type(whole).__name__}")
     given = {part: value for part, value in parts.items() if value is not None}
     if whole is None:
         return given
@@ -121,6 +126,10 @@ def _function_texts(colours: Any = None, opacity: Any = None, **others: Any) -> 
     if opacity is not None:
         texts["opacity"] = _opacities(opacity)
     return texts
+
+
+def _level(level: Optional[int]) -> Optional[int]:
+    return None if level is None else _arguments.whole("level", level)
 
 
 class Cache:
@@ -208,7 +217,8 @@ class Cache:
         low, high = range if range is not None else (of.min, of.max) if of else (0, 1)  # no such scalar: said below
         if not low < high and range is None:
             low, high = low - 0.5, low + 0.5
-        shares = np.array(self._core.histogram(scalar, (float(low), float(high)), log, int(bins)))
+        bins = _arguments.whole("bins", bins, 1)
+        shares = np.array(self._core.histogram(scalar, (float(low), float(high)), log, bins))
         return shares, np.geomspace(low, high, bins + 1) if log else np.linspace(low, high, bins + 1)
 
     def view(self, *, height: int = 600, program: Optional[str] = None) -> View:
@@ -217,9 +227,9 @@ class Cache:
         return View(self.path, height, program)
 
     def probe(self, point: Vector) -> Optional[dict]:
-        """The sample at a point: {"values": {scalar: value}, "block": from 1, "index": (i, j, k) from 0, "position": of the
-        sample}. None if the point is outside of the grid."""
-        return self._core.probe([float(x) for x in point])
+        """The sample that a point (x, y, z) lies in: {"values": {scalar: value}, "block": from 1, "index": (i, j, k) from 0, "position": of
+        the sample's splat, the middle of its cell, where it has these values}. None if the point is outside of the grid."""
+        return self._core.probe(_arguments.numbers("point", point, "(x, y, z)", 3))
 
     def _box(self, box: Optional[Vector]) -> Tuple[list, list]:
         if box is None:
@@ -250,7 +260,7 @@ class Cache:
         spacing[extent == 0] = spacing.max()
         middle, half = np.add(lower, upper) / 2, np.asarray(size) * spacing / 2
         corners = [np.where(extent == 0, middle + side * half, end) for side, end in ((-1, lower), (1, upper))]
-        choice = _core.DataChoice(scalar, *map(list, corners), level, int(step))
+        choice = _core.DataChoice(scalar, *map(list, corners), _level(level), _arguments.whole("step", step))
         value, density = self._core.sample(choice, [int(n) for n in size], progress)
         return Samples(value, density, corners[0] + spacing / 2, spacing)
 
@@ -262,7 +272,7 @@ class Cache:
         this raises as, too.
         """
         lower, upper = self._box(box)
-        return Points(*self._core.points(_core.DataChoice(scalar, lower, upper, level, int(step)), progress))
+        return Points(*self._core.points(_core.DataChoice(scalar, lower, upper, _level(level), _arguments.whole("step", step)), progress))
 
     def camera(self, view: str = "iso", *, size: Tuple[int, int] = (600, 600), scale: Vector = (1, 1, 1),
                view_angle: Optional[float] = None) -> Camera:
@@ -274,7 +284,8 @@ class Cache:
               scale: Vector = (1, 1, 1), view_angle: Optional[float] = None) -> Sequence[Camera]:
         """The cameras of `curvisplat render --orbit`, one a frame, which all have all of the data in the picture."""
         options = _given(view=view, view_angle=view_angle, orbit=degrees)
-        cameras = self._core.cameras(options, "{}x{}".format(*size), _numbers(scale), int(frames))
+        cameras = self._core.cameras(options, _arguments.picture_size(size), _numbers(scale),
+                                     _arguments.whole("frames", frames))
         return [Camera(position, focal_point, view_up, None if view_angle else half, view_angle)
                 for position, focal_point, view_up, half in cameras]
 
@@ -287,7 +298,8 @@ class Cache:
                view_angle: Optional[float] = None, scale: Vector = (1, 1, 1), clip_box: Optional[Vector] = None,
                clip_planes: Sequence[Vector] = (), step: int = 0, surfaces: Sequence[str] = (),
                surface_colours: Sequence[str] = (), surface_by: str = "", slices: Sequence[Vector] = (),
-               slice_opacity: float = 1, isovalues: Sequence[float] = (), iso_opacity: Optional[float] = None,
+               slice_opacity: Union[float, str] = 1, isovalues: Sequence[float] = (),
+               iso_opacity: Union[float, str, None] = None,
                volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
                light_direction: Optional[Vector] = None, background: str = "white", lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
@@ -306,10 +318,12 @@ class Cache:
         scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny, nz)
         each; nothing is drawn where n does not point. step: of a series. surfaces: files, or faces of the grid such as "kmin";
         surface_by: the scalar that colours them, or surface_colours. slices: (px, py, pz, nx, ny, nz) each. isovalues of the
-        scalar. volume: False leaves the volume out. shade: light level surfaces from the viewer; light: (ambient, diffuse,
+        scalar. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer function. volume: False leaves the volume
+        out. background: a colour, or "transparent". shade: light level surfaces from the viewer; light: (ambient, diffuse,
         specular), and light_direction turn it on, too.
-        lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level. memory: the limit, in
-        bytes or as "512M". progress: called with (phase, done, total, unit).
+        lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws the best that has
+        no more. memory: the limit, in bytes or as "512M"; threads: 0 for all cores; backend: "auto", "cpu", "egl" or "osmesa".
+        keep_going: draw coarser where bricks are damaged. progress: called with (phase, done, total, unit).
 
         Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after
         Ctrl-C.
@@ -318,17 +332,20 @@ class Cache:
                                opacity_unit=opacity_unit)
         of_camera = _instead(camera, "camera", view=view, position=position, focal_point=focal_point, view_up=view_up,
                              parallel_scale=parallel_scale, view_angle=view_angle)
-        frame = _given(size="{}x{}".format(*size), background=background, scale=scale, memory=str(memory),
+        frame = _given(size=_arguments.picture_size(size), background=background, scale=scale, memory=str(memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
                        max_splats=None if max_splats is None else str(max_splats))
-        others = {"clip_planes": [_numbers(plane) for plane in clip_planes], "step": int(step),
-                  "surfaces": [os.fspath(surface) for surface in surfaces], "surface_colours": list(surface_colours),
-                  "surface_by": surface_by, "slices": [_numbers(plane) for plane in slices],
-                  "slice_opacity": _number(slice_opacity), "isovalues": [_number(value) for value in isovalues],
-                  "volume": bool(volume), "shade": shade, "threads": threads,
-                  "keep_going": keep_going, "backend": backend}
+        others = {"clip_planes": _arguments.planes("clip_planes", clip_planes, _numbers),
+                  "step": _arguments.whole("step", step),
+                  "surfaces": [os.fspath(surface) for surface in _arguments.several(surfaces, (str, os.PathLike))],
+                  "surface_colours": _arguments.several(surface_colours), "surface_by": surface_by,
+                  "slices": _arguments.planes("slices", slices, _numbers), "slice_opacity": _text(slice_opacity),
+                  "isovalues": [_number(value) for value in _arguments.several(isovalues, (int, float))],
+                  "volume": _arguments.flag("volume", volume), "shade": _arguments.flag("shade", shade),
+                  "threads": _arguments.whole("threads", threads),
+                  "keep_going": _arguments.flag("keep_going", keep_going), "backend": backend}
         if iso_opacity is not None:
-            others["iso_opacity"] = _number(iso_opacity)
+            others["iso_opacity"] = _text(iso_opacity)
         rgba, options, notes, statistics = self._core.render(
             {"scalar": scalar, **_function_texts(**of_function)}, _given(**of_camera), frame, others, progress)
         picture = rgba.view(Picture)

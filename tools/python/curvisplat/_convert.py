@@ -7,7 +7,7 @@ from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import _core
+from . import _arguments, _core
 from ._arrays import Block, _values
 
 Path = Union[str, os.PathLike]
@@ -30,7 +30,8 @@ class Report(NamedTuple):
 
 def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory: Union[str, int, None], threads: int,
              title: str) -> dict:
-    return {"overwrite": overwrite, "resume": resume, "blank_value": blank_value, "threads": threads, "title": title,
+    return {"overwrite": _arguments.flag("overwrite", overwrite), "resume": _arguments.flag("resume", resume),
+            "blank_value": blank_value, "threads": _arguments.whole("threads", threads), "title": title,
             "memory": "" if memory is None else str(memory), "value_precision": "normal"}
 
 
@@ -47,16 +48,19 @@ def convert(output: Path, grid: Path, solutions: Sequence[Path] = (), *, scalars
     """
     options = _options(overwrite, resume, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
-    options["time_step"] = time_step
-    names = [scalars] if isinstance(scalars, str) else list(scalars)
-    return Report(**_core.convert_files(os.fspath(output), os.fspath(grid), [os.fspath(path) for path in solutions], names,
-                                        options, progress))
+    options["time_step"] = None if time_step is None else _arguments.whole("time_step", time_step)
+    files = [os.fspath(path) for path in _arguments.several(solutions, (str, os.PathLike))]
+    return Report(**_core.convert_files(os.fspath(output), os.fspath(grid), files, list(_arguments.several(scalars)), options,
+                                        progress))
 
 
 def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
     """The blocks and the scalars as the module takes them."""
     if not blocks:
         raise _core.UsageError("no block to convert; pass one Block or more")
+    for block in blocks:
+        if not isinstance(block, Block):
+            raise _core.UsageError(f"{type(block).__name__} is no Block; make one by Block() or from_xarray()")
     names = list(blocks[0].scalars)
     units = [(name, blocks[0].units.get(name, "")) for name in names]
     tuples = []
@@ -66,6 +70,8 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
         if missing:
             raise _core.UsageError(f"{name}: has no scalar '{missing[0]}', which the first block has")
         blank = None if block.blank is None else np.asarray(block.blank)
+        if blank is not None and blank.dtype != np.bool_:
+            raise _core.UsageError(f"{name}: blank: its values are {blank.dtype}; expected bool, True where a node is not there")
         values = [_values(block.scalars[scalar]) for scalar in names]
         tuples.append((name, np.asarray(block.x), np.asarray(block.y), np.asarray(block.z), values, blank))
     return tuples, units

@@ -34,6 +34,8 @@ def advanced(t):
     return t
 
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 name = sys.argv[1]
 for number in range(5):
     time = number * 400 * step

@@ -1,0 +1,58 @@
+"""What callers pass, as the module takes it: UsageError in one line that names the argument."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any, Callable, Sequence, Tuple
+
+from . import _core
+
+
+def whole(name: str, value: Any, least: int = 0) -> int:
+    """A whole number, not below `least`."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise _core.UsageError(f"{name}: {value!r} is not a whole number") from None
+    if not least <= number < 1 << 32:
+        raise _core.UsageError(f"{name}: {number}; expected a whole number from {least}")
+    return number
+
+
+def flag(name: str, value: Any) -> bool:
+    """True or False."""
+    if not isinstance(value, bool):
+        raise _core.UsageError(f"{name}: {value!r} is neither True nor False")
+    return value
+
+
+def numbers(name: str, value: Any, what: str, count: int) -> Tuple[float, ...]:
+    """`count` numbers, which are `what`: "(x, y, z)"."""
+    try:
+        found = tuple(float(number) for number in value)
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != count or isinstance(value, str):
+        raise _core.UsageError(f"{name}: {value!r}; expected {what}")
+    return found
+
+
+def picture_size(value: Any) -> str:
+    """(width, height) as the command line writes it."""
+    width, height = numbers("size", value, "(width, height)", 2)
+    if width != int(width) or height != int(height):
+        raise _core.UsageError(f"size: {value!r}; expected whole numbers")
+    return f"{int(width)}x{int(height)}"
+
+
+def several(value: Any, kind: type = str) -> Sequence[Any]:
+    """A sequence, of one where a single one was passed."""
+    return [value] if isinstance(value, kind) else list(value)
+
+
+def planes(name: str, value: Any, text: Callable[[Sequence[float]], str]) -> list:
+    """Planes as text: (px, py, pz, nx, ny, nz) each."""
+    what = "planes (px, py, pz, nx, ny, nz), several in a list"
+    if isinstance(value, str):
+        raise _core.UsageError(f"{name}: {value!r}; expected {what}")
+    return [text(numbers(name, plane, what, 6)) for plane in value]
