@@ -5,9 +5,11 @@ interrupts and memory are as its pages say.
     python_test.py PROGRAM    the curvisplat program; the package is found by PYTHONPATH
 """
 
+import inspect
 import json
 import os
 import pathlib
+import re
 import shlex
 import signal
 import subprocess
@@ -87,6 +89,69 @@ class Pictures(PythonTest):
                 "--view", "iso", "--clip-plane", "4,0,0,1,0,0", "--clip-plane", "0,0,1,0,0,1", "--clip-box",
                 "0,9,-9,9,-9,9", "--scale", "1,1,2")
 
+    def test_have_every_option_of_the_command(self):
+        own_names = {"-o": "", "tf": "colours", "clip-plane": "clip_planes", "surface": "surfaces", "surface-colour": "surface_colours",
+                     "slice": "slices", "iso": "isovalues", "scalar-bar-title": "scalar_bar_titles"}
+        # Of grids, of several frames (orbit() has their cameras), of files.
+        others = {"help", "help-all", "value-precision", "output", "steps", "orbit", "path", "frames", "frame-rate", "part", "first-image",
+                  "stats", "trace"}
+        options = set(re.findall(r"--([a-z-]+)", command("render", "--help").stdout.split("\n", 1)[1]))
+        listed = {name for name in options - others if f"  --{name} " in command("render", "--help").stdout}
+        parameters = set(inspect.signature(curvisplat.Cache.render).parameters)
+        missing = {name for name in listed if own_names.get(name, name.replace("-", "_")) not in parameters}
+        self.assertEqual(missing, set())
+        self.assertGreater(len(listed), 40)
+
+    def test_of_two_scalars_are_the_commands(self):
+        self.cache = self.folder / "two.splats"  # for expect_same()
+        curvisplat.convert(self.cache, self.folder / "wake.xyz", [self.folder / "wake.fun"], scalars=["f", "volume"])
+        with curvisplat.open(self.cache) as cache:
+            two, one = (scalar.name for scalar in cache.scalars[:2])
+            middle = (cache.scalars[0].min + cache.scalars[0].max) / 2
+            self.expect_same(cache.render(one, size=(160, 120), opacity_by=two, opacity_range=(0.1, 0.9), opacity=[(0, 0), (1, 0.7)],
+                                          isovalues=middle, iso_by=two, iso_opacity=0.5, classify="flat"),
+                             "--scalar", one, "--opacity-by", two, "--opacity-range", "0.1,0.9", "--opacity", "0:0,1:0.7", "--iso", repr(middle),
+                             "--iso-by", two, "--iso-opacity", 0.5, "--classify", "flat")
+            both = cache.render(one, size=(160, 120), opacity_by=two)
+            self.expect_same(both, "--scalar", one, "--opacity-by", two)
+            self.expect_same(cache.render(two, size=(160, 120)), "--scalar", two)
+            np.testing.assert_array_equal(cache.render(one, size=(160, 120), opacity_by=two), both)
+            self.expect_same(cache.render(one, size=(160, 120), surfaces=["kmin", "jmax"], surface_opacity=0.25, volume=False),
+                             "--scalar", one, "--surface", "kmin", "--surface", "jmax", "--surface-opacity", 0.25, "--volume", "off")
+
+    def test_are_annotated_as_by_the_command(self):
+        with curvisplat.open(self.cache) as cache:
+            try:
+                picture = cache.render(size=(160, 120), scalar_bar=True, axes=True, outline=True)
+            except curvisplat.Error as error:
+                self.skipTest(str(error))  # built without annotations
+            self.assertEqual(picture.shape, (120, 160, 4))
+            self.expect_same(picture, "--scalar-bar", "--axes", "--outline")
+            self.expect_same(cache.render(size=(160, 120), scalar_bar_titles="speed", axes_titles=("x [m]", "y [m]", "z [m]")),
+                             "--scalar-bar-title", "speed", "--axes-titles", "x [m],y [m],z [m]")
+            self.expect_same(cache.render(size=(160, 120), axes_grid=True, background="black"), "--axes-grid", "--background", "black")
+
+    def test_have_channels_and_are_saved_with_them(self):
+        with curvisplat.open(self.cache) as cache:
+            picture = cache.render(size=(160, 120), channels="depth")
+            self.assertEqual(set(picture.channels), {"Z"})
+            self.assertTrue((picture.channels["Z"][np.asarray(picture)[..., 3] > 0.6] > 0).all())
+            picture.save(self.folder / "ours.exr")
+            command("render", self.cache, "-o", self.folder / "theirs.exr", "--size", "160x120")
+            self.assertEqual((self.folder / "ours.exr").read_bytes(), (self.folder / "theirs.exr").read_bytes())
+            all_of_them = cache.render(size=(160, 120), channels=("depth", "normal", "scalar"))
+            self.assertEqual(set(all_of_them.channels), {"Z", "N.X", "N.Y", "N.Z", "scalar"})
+            self.assertEqual(cache.render(size=(32, 32)).channels, {})
+
+    def test_say_why_they_are_empty(self):
+        with curvisplat.open(self.cache) as cache:
+            with self.assertWarnsRegex(UserWarning, "the picture is empty"):
+                picture = cache.render(size=(64, 64), range=(100, 200), opacity=[(0, 0), (1, 1)], background="transparent")
+            self.assertFalse(np.asarray(picture).any())
+            self.assertTrue(picture.warnings)
+            with self.assertWarnsRegex(UserWarning, "slice"):
+                cache.render(size=(64, 64), slices=[(1e6, 0, 0, 1, 0, 0)])
+
     def test_know_what_was_chosen(self):
         with curvisplat.open(self.cache) as cache:
             picture = cache.render(size=(160, 120))
@@ -135,7 +200,12 @@ class Pictures(PythonTest):
                 path = self.folder / "step.pfm"
                 command("render", self.folder / "steps.splats", "-o", path, "--size", "80x60", "--step", step)
                 np.testing.assert_array_equal(np.asarray(cache.render(size=(80, 60), step=step))[..., :3], read_pfm(path))
-            with self.assertRaisesRegex(curvisplat.UsageError, "the last one is 2"):
+            between = float(cache.times[0] * 0.25 + cache.times[1] * 0.75)
+            for options in ((), ("--interpolate",)):
+                command("render", self.folder / "steps.splats", "-o", path, "--size", "80x60", "--time", repr(between), *options)
+                picture = cache.render(size=(80, 60), time=between, interpolate=bool(options))
+                np.testing.assert_array_equal(np.asarray(picture)[..., :3], read_pfm(path))
+            with self.assertRaisesRegex(curvisplat.UsageError, "steps 0 to 2"):
                 cache.render(size=(16, 12), step=3)
 
     def test_report_progress(self):

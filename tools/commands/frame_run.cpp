@@ -9,7 +9,7 @@
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
-#include "tools/commands/empty_picture.h"
+#include "tools/output/empty_picture.h"
 #include "tools/options/channel_arguments.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/movie_writer.h"

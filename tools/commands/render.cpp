@@ -24,7 +24,6 @@
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
-#include "tools/commands/empty_picture.h"
 #include "tools/commands/frame_run.h"
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
@@ -40,6 +39,7 @@
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
 #include "tools/options/value_precision.h"
+#include "tools/output/empty_picture.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/movie_writer.h"
@@ -191,8 +191,6 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
                      precision);
 }
 
-constexpr double kAxesRoom = 0.17;  // around the data, of its box
-
 void render(const RenderArguments& given) {
   RenderArguments arguments = given;
   arguments.annotations.shown.scalar_bar |= !arguments.annotations.bar_titles.empty();
@@ -209,7 +207,6 @@ void render(const RenderArguments& given) {
   const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step
   const size_t shown = chooseVariable(cache, arguments.scalar);
-  const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
   const ChosenFor drawn = drawnSteps(arguments);
   ScalarChoice choice =
       chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options.scale, drawn);
@@ -241,10 +238,9 @@ void render(const RenderArguments& given) {
   const CameraArguments camera =
       choice.picture.camera(arguments.camera, transfer_function, options.size, has_grid);
   const Series series = cache.series();
-  // Coordinates need room around the data.
-  const glm::dvec3 room = (has_grid ? kAxesRoom : 0.0) * (upper - lower);
+  const ShownBox box = shownBox(manifest, options.scale, arguments.annotations.shown);
   const MotionInTime motion =
-      inTime(chooseCameraMotion(framesOf(camera, steps), lower - room, upper + room, options.size), series,
+      inTime(chooseCameraMotion(framesOf(camera, steps), box.lower, box.upper, options.size), series,
              arguments.steps, steps, arguments.camera.frames);
   const std::vector<uint64_t> numbers =
       (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);

@@ -52,6 +52,13 @@ std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments) {
   return titles;
 }
 
+ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const Annotations& annotations) {
+  constexpr double kAxesRoom = 0.17;  // of the box
+  const glm::dvec3 lower = manifest.lower * scale, upper = manifest.upper * scale;
+  const glm::dvec3 room = (annotations.axes_grid ? kAxesRoom : 0.0) * (upper - lower);
+  return {lower - room, upper + room};
+}
+
 std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, const DrawnScalars& scalars,
                                           const Manifest& manifest, const SurfaceScene* scene,
                                           const std::string& surface_by) {

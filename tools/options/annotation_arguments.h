@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,12 @@ void checkAnnotationArguments(const AnnotationArguments& arguments);
 
 /// Of the axes grid: "x", "y" and "z" unless --axes-titles says otherwise.
 std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments);
+
+/// What a picture has to show, after `scale`: the data's box, and room for the coordinates of the axes grid around it.
+struct ShownBox {
+  glm::dvec3 lower{0.0}, upper{0.0};
+};
+ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const Annotations& annotations);
 
 /// The functions that a picture shows, each once: of its colours, of its opacities if these are another scalar's, and of
 /// surfaces that are coloured by a scalar of their own, `surface_by`. They are borrowed from `scalars` and `scene`,

@@ -21,77 +21,21 @@
 #include "stream/base/error.h"
 #include "stream/cache/probe.h"
 #include "tools/options/convert_arguments.h"
-#include "tools/options/frame_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/value_precision.h"
 #include "tools/python/array_source.h"
 #include "tools/python/cache_arrays.h"
 #include "tools/python/interruptible.h"
 #include "tools/python/open_cache.h"
+#include "tools/python/picture_arguments.h"
 
 namespace py = pybind11;
 
 namespace curvisplat::python {
 namespace {
 
-using Options = std::map<std::string, std::string>;
-
-std::optional<std::string> given(const Options& options, const std::string& name) {
-  const auto found = options.find(name);
-  return found == options.end() ? std::nullopt : std::optional(found->second);
-}
-
-ScalarArguments scalarArguments(const Options& function) {
-  return {function.at("scalar"),      given(function, "tf"),    given(function, "range"),
-          given(function, "opacity"), given(function, "asinh"), given(function, "opacity_unit")};
-}
-
-CameraArguments cameraArguments(const Options& camera) {
-  CameraArguments arguments;
-  arguments.view = given(camera, "view");
-  arguments.position = given(camera, "position");
-  arguments.focal_point = given(camera, "focal_point");
-  arguments.view_up = given(camera, "view_up");
-  arguments.parallel_scale = given(camera, "parallel_scale");
-  arguments.view_angle = given(camera, "view_angle");
-  arguments.orbit = given(camera, "orbit");
-  return arguments;
-}
-
 glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
-}
-
-FrameArguments frameArguments(const Options& frame, const std::vector<std::string>& clip_planes, bool shade,
-                              unsigned threads, bool keep_going) {
-  FrameArguments arguments;
-  arguments.size = frame.at("size");
-  arguments.background = frame.at("background");
-  arguments.scale = frame.at("scale");
-  arguments.memory = frame.at("memory");
-  arguments.lod_pixels = frame.at("lod_pixels");
-  arguments.clip_box = given(frame, "clip_box");
-  arguments.max_splats = given(frame, "max_splats");
-  arguments.clip_planes = clip_planes;
-  arguments.shade = shade;
-  arguments.light = given(frame, "light");
-  arguments.light_direction = given(frame, "light_direction");
-  arguments.threads = threads;
-  arguments.keep_going = keep_going;
-  return arguments;
-}
-
-SurfaceArguments surfaceArguments(const py::dict& others) {
-  SurfaceArguments arguments;
-  arguments.surfaces = py::cast<std::vector<std::string>>(others["surfaces"]);
-  arguments.colours = py::cast<std::vector<std::string>>(others["surface_colours"]);
-  arguments.surface_by = py::cast<std::string>(others["surface_by"]);
-  arguments.slices = py::cast<std::vector<std::string>>(others["slices"]);
-  arguments.slice_opacity = py::cast<std::string>(others["slice_opacity"]);
-  arguments.isovalues = py::cast<std::vector<std::string>>(others["isovalues"]);
-  if (others.contains("iso_opacity")) arguments.iso_opacity = py::cast<std::string>(others["iso_opacity"]);
-  arguments.volume = py::cast<bool>(others["volume"]) ? "on" : "off";
-  return arguments;
 }
 
 py::dict statisticsOf(const FrameStatistics& statistics) {
@@ -109,17 +53,9 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
 /// `function`, `camera`, `frame`: text by option; `others`: lists, flags and numbers.
 py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
                  const py::dict& others, const py::object& progress) {
-  const FrameArguments of_frame = frameArguments(
-      frame, py::cast<std::vector<std::string>>(others["clip_planes"]), py::cast<bool>(others["shade"]),
-      py::cast<unsigned>(others["threads"]), py::cast<bool>(others["keep_going"]));
-  const PictureArguments arguments{scalarArguments(function),
-                                   cameraArguments(camera),
-                                   frameOptions(of_frame),
-                                   surfaceArguments(others),
-                                   py::cast<uint64_t>(others["step"]),
-                                   parseBackend(py::cast<std::string>(others["backend"]))};
-  DrawnPicture picture = cache.render(arguments, progress);
-  return py::make_tuple(picture.rgba, picture.chosen, picture.notes, statisticsOf(picture.statistics));
+  const DrawnPicture picture = cache.render(pictureArguments(function, camera, frame, others), progress);
+  return py::make_tuple(picture.rgba, picture.chosen, picture.notes, picture.warnings, picture.channels,
+                        statisticsOf(picture.statistics));
 }
 
 py::list scalarsOf(const OpenCache& cache) {
@@ -320,6 +256,25 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   return reportOf(report);
 }
 
+using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+/// `more`: further channels by name, of an .exr file.
+void writePicture(const Floats& rgba, const std::filesystem::path& path,
+                  const std::map<std::string, Floats>& more) {
+  if (rgba.ndim() != 3 || rgba.shape(2) != 4)
+    throw UsageError("{}: a picture is an array of shape (height, width, 4)", path.string());
+  Image image({static_cast<int>(rgba.shape(1)), static_cast<int>(rgba.shape(0))});
+  std::copy_n(rgba.data(), image.rgba.size(), image.rgba.data());
+  if (more.empty()) return writeImage(image, path);
+  std::vector<ImageChannel> channels;
+  for (const auto& [name, values] : more) {
+    if (values.ndim() != 2 || values.shape(0) != rgba.shape(0) || values.shape(1) != rgba.shape(1))
+      throw UsageError("{}: channel {} has another shape than the picture", path.string(), name);
+    channels.push_back({name, {values.data(), values.data() + values.size()}});
+  }
+  writeExr(image, channels, path);
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
@@ -378,14 +333,7 @@ PYBIND11_MODULE(_core, module) {
     for (const PublishedMap& map : builtInMaps()) names.emplace_back(map.name);
     return names;
   });
-  module.def("write_image",
-             [](const py::array_t<float, py::array::c_style>& rgba, const std::filesystem::path& path) {
-               if (rgba.ndim() != 3 || rgba.shape(2) != 4)
-                 throw UsageError("{}: a picture is an array of shape (height, width, 4)", path.string());
-               Image image({static_cast<int>(rgba.shape(1)), static_cast<int>(rgba.shape(0))});
-               std::copy_n(rgba.data(), image.rgba.size(), image.rgba.data());
-               writeImage(image, path);
-             });
+  module.def("write_image", &writePicture);
 }
 
 }  // namespace curvisplat::python

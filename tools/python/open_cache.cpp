@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "render/annotate/annotations.h"
 #include "stream/base/error.h"
 #include "tools/options/picture_choice.h"
+#include "tools/output/empty_picture.h"
 #include "tools/python/interruptible.h"
 #include "tools/viewer/histogram.h"
 
@@ -37,27 +39,44 @@ py::array_t<float> arrayOf(Image image) {
   return py::array_t<float>({image.size.height, image.size.width, 4}, data, owner);
 }
 
+/// What the command says of such a picture.
+std::vector<std::string> warningsOf(const PictureArguments& arguments, const Image& image,
+                                    const RenderedScene& scene) {
+  std::vector<std::string> warnings =
+      slicesThatMiss(arguments.surfaces, scene.manifest.lower, scene.manifest.upper);
+  if (std::string missed = rangeMissesScalar(scene.variable, scene.transfer_function); !missed.empty())
+    warnings.push_back(std::move(missed));
+  if (isEmpty(image, scene.options.background)) {
+    for (const std::string& reason : whyEmpty(scene)) warnings.push_back("the picture is empty: " + reason);
+  } else if (std::string poor = poorPictureWarning(image, scene, givenFunctionOptions(arguments.scalar));
+             !poor.empty()) {
+    warnings.push_back(std::move(poor));
+  }
+  return warnings;
+}
+
 }  // namespace
 
-FrameRenderer& OpenCache::rendererOf(size_t variable, Backend backend, const TransferFunction& function) {
-  if (player_ && variable == variable_ && backend == backend_) {
-    player_->setTransferFunction(function);
+FrameRenderer& OpenCache::rendererOf(const DrawnScalars& scalars, Backend backend) {
+  const size_t variable = scalars.opacity.variable;
+  // Of two scalars, the colours' function cannot be replaced.
+  if (player_ && !scalars.colour && !two_scalars_ && variable == variable_ && backend == backend_) {
+    player_->setTransferFunction(scalars.opacity.function);
     return player_->renderer();
   }
   player_.reset();  // its memory is given back before the next one takes some
-  player_ = std::make_unique<StepPlayer>(reader_, DrawnScalars(variable, function), backend);
+  player_ = std::make_unique<StepPlayer>(reader_, scalars, backend);
+  two_scalars_ = scalars.colour.has_value();
   variable_ = variable;
   backend_ = backend;
   return player_->renderer();
 }
 
-void OpenCache::goTo(uint64_t step) {
-  if (const size_t steps = reader_.series().steps.size(); step >= steps)
-    throw UsageError("{}: there is no step {}; the last one is {}", path_.string(), step, steps - 1);
+void OpenCache::goTo(const StepPosition& position) {
   if (player_)
-    player_->goTo({step});
-  else if (step != reader_.step())
-    reader_ = reader_.atStep(step);
+    player_->goTo(position);
+  else if (!(position == reader_.position()))
+    reader_ = reader_.at(position);
 }
 
 std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) const {
@@ -76,27 +95,61 @@ std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) co
 
 DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::object& progress) {
   const Busy busy(busy_);
+  const bool has_opacities = !arguments.opacity.by.scalar.empty();
   checkCameraArguments(arguments.camera);
-  checkSurfaceArguments(arguments.surfaces);
+  checkFunctionArguments(arguments.scalar);
+  checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
+  checkSurfaceArguments(arguments.surfaces, has_opacities);
+  checkAnnotationArguments(arguments.annotations);
   DrawnPicture picture;
   Image image;
+  PixelValues values;
+  const ImageSize size = arguments.frame.size;
   runInterruptibly(progress, [&](Progress& of_work) {
-    goTo(arguments.step);
-    const Manifest& manifest = reader_.manifest();
+    goTo(chosenSteps(arguments.steps, reader_).front());
+    const Manifest manifest = reader_.manifest();
     FrameOptions frame = arguments.frame;
-    const size_t variable = chooseVariable(reader_, arguments.scalar);
-    PictureChoice choice(reader_, variable, frame.scale);
-    const TransferFunction function = choice.function(arguments.scalar);
-    const CameraArguments camera = choice.camera(arguments.camera, function, frame.size);
-    const CameraMotion motion =
-        chooseCameraMotion(camera, manifest.lower * frame.scale, manifest.upper * frame.scale, frame.size);
-    frame.scene = sceneOf(arguments.surfaces, reader_, {variable, variable});
-    image = rendererOf(variable, arguments.backend, function)
-                .render(motion.camera(0), frame, picture.statistics, &of_work);
-    picture.chosen = choice.chosenOptions();
+    const size_t shown = chooseVariable(reader_, arguments.scalar);
+    ScalarChoice choice =
+        chooseScalars(arguments.opacity, arguments.scalar, reader_, shown, frame.scale, ChosenFor::kStep);
+    const DrawnScalars& scalars = choice.scalars;
+    const TransferFunction& function = scalars.opacity.function;
+    frame.scene = sceneOf(
+        arguments.surfaces, reader_,
+        {shown, scalars.opacity.variable, isoOfColours(arguments.opacity, arguments.scalar), has_opacities});
+    const Annotations& annotations = arguments.annotations.shown;
+    const std::vector<ShownFunction> functions = shownFunctions(
+        arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);
+    frame.size = dataSize(annotations, size, functions);
+    if (!(annotations == Annotations{})) frame.output_bytes += annotatedBytes(size);
+    const CameraArguments camera =
+        choice.picture.camera(arguments.camera, function, frame.size, annotations.axes_grid);
+    const ShownBox box = shownBox(manifest, frame.scale, annotations);
+    const Camera at = chooseCameraMotion(camera, box.lower, box.upper, frame.size).camera(0);
+    // The grid of the axes lies behind the data, before the background.
+    if (annotations.axes_grid) frame.background = glm::vec4(0);
+    FrameRenderer& renderer = rendererOf(scalars, arguments.backend);
+    image = arguments.channels.any()
+                ? renderer.renderWithValues(at, frame, picture.statistics, values, &of_work)
+                : renderer.render(at, frame, picture.statistics, &of_work);
+    picture.warnings = warningsOf(
+        arguments, image,
+        {manifest, manifest.variables[scalars.opacity.variable], function, at, frame, picture.statistics});
+    if (!(annotations == Annotations{}))
+      image = annotated(image, annotations,
+                        {size, renderer.screenView(at, frame), functions, manifest.lower, manifest.upper,
+                         arguments.frame.background, axisTitles(arguments.annotations)});
+    picture.chosen = choice.chosen_colours;
+    if (const std::string& more = choice.picture.chosenOptions(); !more.empty())
+      picture.chosen += (picture.chosen.empty() ? "" : " ") + more;
     picture.notes = function.notes();
+    if (scalars.colour)
+      for (const std::string& note : scalars.colour->function.notes()) picture.notes.push_back(note);
   });
   picture.rgba = arrayOf(std::move(image));
+  for (const ImageChannel& channel : imageChannels(arguments.channels, values, size))
+    picture.channels[py::str(channel.name)] =
+        py::array_t<float>({size.height, size.width}, channel.values.data());
   return picture;
 }
 

@@ -8,29 +8,19 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "render/frame/step_player.h"
 #include "stream/cache/cache_reader.h"
-#include "tools/options/camera_motion.h"
-#include "tools/options/scalar_arguments.h"
-#include "tools/options/surface_arguments.h"
+#include "tools/python/picture_arguments.h"
 
 namespace curvisplat::python {
-
-/// Everything a picture is drawn with. What the function and the camera leave out is chosen from the data.
-struct PictureArguments {
-  ScalarArguments scalar;
-  CameraArguments camera;
-  FrameOptions frame;
-  SurfaceArguments surfaces;
-  uint64_t step = 0;
-  Backend backend = Backend::kAutomatic;
-};
 
 struct DrawnPicture {
   pybind11::array_t<float> rgba;  // (height, width, 4), premultiplied
   std::string chosen;             // options of `curvisplat render` that draw the same picture
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, warnings;
+  pybind11::dict channels;  // (height, width) by name
   FrameStatistics statistics;
 };
 
@@ -59,13 +49,14 @@ class OpenCache {
   void release();
 
  private:
-  void goTo(uint64_t step);
-  FrameRenderer& rendererOf(size_t variable, Backend backend, const TransferFunction& function);
+  void goTo(const StepPosition& position);
+  FrameRenderer& rendererOf(const DrawnScalars& scalars, Backend backend);
 
   const std::filesystem::path path_;
   CacheReader reader_;
   std::unique_ptr<StepPlayer> player_;  // of reader_
-  size_t variable_ = 0;
+  size_t variable_ = 0;                 // of the opacities
+  bool two_scalars_ = false;
   Backend backend_ = Backend::kAutomatic;
   bool busy_ = false;  // touched with the interpreter's lock held
 };

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pathlib
 import tempfile
+import warnings
 from typing import Any, Callable, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -54,22 +55,25 @@ class Picture(np.ndarray):
     """An array of shape (height, width, 4): red, green and blue, premultiplied by alpha, and alpha; float32, rows from the top.
 
     `options` are those of `curvisplat render` that were chosen from the data, `notes` what there is to know about the
-    transfer function, `statistics` counts and seconds.
+    transfer function, `warnings` what may be wrong with the picture, such as why it is empty, `statistics` counts and seconds.
+    `channels`: what was asked for by `channels=`, by the names in OpenEXR: Z, N.X, N.Y, N.Z, scalar; arrays of shape (height, width).
     """
 
     options: str = ""
     notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    channels: dict = {}
     statistics: dict = {}
 
     def __array_finalize__(self, other: Any) -> None:
-        if other is not None:
-            self.options = getattr(other, "options", "")
-            self.notes = getattr(other, "notes", ())
-            self.statistics = getattr(other, "statistics", {})
+        for name in ("options", "notes", "warnings", "channels", "statistics"):
+            if hasattr(other, name):
+                setattr(self, name, getattr(other, name))
 
     def save(self, path: Union[str, os.PathLike]) -> None:
-        """Writes the picture as .png (8 bits), .exr or .pfm (float32)."""
-        _core.write_image(np.ascontiguousarray(self, dtype=np.float32), os.fspath(path))
+        """Writes the picture as .png (8 bits), .exr or .pfm (float32); .exr with the channels."""
+        of_exr = self.channels if os.fspath(path).lower().endswith(".exr") else {}
+        _core.write_image(np.ascontiguousarray(self, dtype=np.float32), os.fspath(path), of_exr)
 
     def _repr_png_(self) -> Optional[bytes]:
         """The picture for a notebook; None for an array that is no picture any more, such as one row."""
@@ -293,15 +297,21 @@ class Cache:
                size: Tuple[int, int] = (600, 600), colours: Optional[str] = None, range: Union[str, Tuple[float, float], None] = None,
                opacity: Union[str, Sequence[Tuple[float, float]], None] = None,
                asinh: Optional[Tuple[float, float]] = None, opacity_unit: Optional[float] = None,
-               view: Optional[str] = None, position: Optional[Vector] = None, focal_point: Optional[Vector] = None,
+               opacity_by: str = "", opacity_range: Union[str, Tuple[float, float], None] = None,
+               opacity_asinh: Optional[Tuple[float, float]] = None, opacity_tf: Union[str, os.PathLike, None] = None,
+               classify: str = "pixel", view: Optional[str] = None, position: Optional[Vector] = None, focal_point: Optional[Vector] = None,
                view_up: Optional[Vector] = None, parallel_scale: Optional[float] = None,
                view_angle: Optional[float] = None, scale: Vector = (1, 1, 1), clip_box: Optional[Vector] = None,
-               clip_planes: Sequence[Vector] = (), step: int = 0, surfaces: Sequence[str] = (),
-               surface_colours: Sequence[str] = (), surface_by: str = "", slices: Sequence[Vector] = (),
+               clip_planes: Sequence[Vector] = (), step: Optional[int] = None, time: Optional[float] = None,
+               interpolate: bool = False, surfaces: Union[str, Sequence[str]] = (), surface_colours: Union[str, Sequence[str]] = (),
+               surface_by: str = "", surface_opacity: Union[float, str, Sequence[Union[float, str]]] = (), slices: Sequence[Vector] = (),
                slice_opacity: Union[float, str] = 1, isovalues: Sequence[float] = (),
-               iso_opacity: Union[float, str, None] = None,
+               iso_opacity: Union[float, str, None] = None, iso_by: str = "",
                volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
-               light_direction: Optional[Vector] = None, background: str = "white", lod_pixels: float = 1,
+               light_direction: Optional[Vector] = None, background: str = "white", scalar_bar: bool = False,
+               scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
+               axes_titles: Optional[Sequence[str]] = None, outline: bool = False,
+               channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
                backend: str = "auto", keep_going: bool = False, progress: Optional[Progress] = None) -> Picture:
         """Draws a picture, bit for bit the one of `curvisplat render` with the same options.
@@ -309,47 +319,83 @@ class Cache:
         What is left out is chosen from the data; `Picture.options` says what was.
 
         scalar: a name (default: the first that is not constant). size: (width, height) in pixels.
+
         camera, function: instead of the options that they have.
+
         colours: a colour map (`curvisplat.colour_maps()`; NAME_r is reversed) or the path of a ParaView preset.
-        range: (low, high), "data", or percentiles such as "1%,99%". opacity: points (position 0..1, opacity 0..1), "ramp" or
-        "auto". asinh: (centre, width). opacity_unit: the length over which opacity accumulates.
+
+        range: (low, high), "data", or percentiles such as "1%,99%". opacity: points (position 0..1, opacity 0..1), "ramp"
+        or "auto". asinh: (centre, width). opacity_unit: the length over which opacity accumulates.
+
+        opacity_by: the scalar of the opacities, if that is another one, with opacity_range, opacity_asinh and opacity_tf,
+        the path of a ParaView preset. classify: "pixel", or "flat": one colour for each splat.
+
         view: iso, +x, -x, +y, -y, +z or -z; or a camera by position, focal_point, view_up and parallel_scale (half the
         picture's height) or view_angle (perspective, degrees).
-        scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny, nz)
-        each; nothing is drawn where n does not point. step: of a series. surfaces: files, or faces of the grid such as "kmin";
-        surface_by: the scalar that colours them, or surface_colours. slices: (px, py, pz, nx, ny, nz) each. isovalues of the
-        scalar. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer function. volume: False leaves the volume
-        out. background: a colour, or "transparent". shade: light level surfaces from the viewer; light: (ambient, diffuse,
-        specular), and light_direction turn it on, too.
-        lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws the best that has
-        no more. memory: the limit, in bytes or as "512M"; threads: 0 for all cores; backend: "auto", "cpu", "egl" or "osmesa".
-        keep_going: draw coarser where bricks are damaged. progress: called with (phase, done, total, unit).
+
+        scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny,
+        nz) each; nothing is drawn where n does not point.
+
+        step: of a series; or time: the step nearest to it, with interpolate what lies between two.
+
+        surfaces: files, or faces of the grid such as "kmin"; surface_by: the scalar that colours them, or
+        surface_colours; surface_opacity: of all, or of each.
+
+        slices: (px, py, pz, nx, ny, nz) each.
+
+        isovalues: of the scalar, or of iso_by. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
+        function.
+
+        volume: False leaves the volume out. background: a colour, or "transparent".
+
+        shade: light level surfaces from the viewer; light: (ambient, diffuse, specular), and light_direction turn it on,
+        too.
+
+        scalar_bar, scalar_bar_titles, axes, axes_grid, axes_titles (of x, y and z) and outline are drawn into the
+        picture. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
+
+        lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws
+        the best that has no more. memory: the limit, in bytes or as "512M"; threads: 0 for all cores; backend: "auto",
+        "cpu", "egl" or "osmesa". keep_going: draw coarser where bricks are damaged. progress: called with (phase, done,
+        total, unit).
 
         Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after
-        Ctrl-C.
+        Ctrl-C. Warns (UserWarning) of an empty or poor picture.
         """
         of_function = _instead(function, "function", colours=colours, range=range, opacity=opacity, asinh=asinh,
                                opacity_unit=opacity_unit)
         of_camera = _instead(camera, "camera", view=view, position=position, focal_point=focal_point, view_up=view_up,
                              parallel_scale=parallel_scale, view_angle=view_angle)
-        frame = _given(size=_arguments.picture_size(size), background=background, scale=scale, memory=str(memory),
+        of_two = _given(opacity_by=opacity_by or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh,
+                        opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf), iso_by=iso_by or None)
+        frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
+                       scale=scale, memory=str(memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
-                       max_splats=None if max_splats is None else str(max_splats))
+                       max_splats=None if max_splats is None else str(max_splats),
+                       channels=",".join(_arguments.several(channels)) or "none",
+                       axes_titles=None if axes_titles is None else ",".join(axes_titles))
         others = {"clip_planes": _arguments.planes("clip_planes", clip_planes, _numbers),
-                  "step": _arguments.whole("step", step),
+                  "step": None if step is None else _arguments.whole("step", step),
+                  "interpolate": _arguments.flag("interpolate", interpolate),
                   "surfaces": [os.fspath(surface) for surface in _arguments.several(surfaces, (str, os.PathLike))],
                   "surface_colours": _arguments.several(surface_colours), "surface_by": surface_by,
+                  "surface_opacity": [_text(value) for value in _arguments.several(surface_opacity, (str, int, float))],
                   "slices": _arguments.planes("slices", slices, _numbers), "slice_opacity": _text(slice_opacity),
                   "isovalues": [_number(value) for value in _arguments.several(isovalues, (int, float))],
                   "volume": _arguments.flag("volume", volume), "shade": _arguments.flag("shade", shade),
                   "threads": _arguments.whole("threads", threads),
-                  "keep_going": _arguments.flag("keep_going", keep_going), "backend": backend}
+                  "keep_going": _arguments.flag("keep_going", keep_going), "backend": backend,
+                  "scalar_bar": _arguments.flag("scalar_bar", scalar_bar),
+                  "scalar_bar_titles": _arguments.several(scalar_bar_titles), "axes": _arguments.flag("axes", axes),
+                  "axes_grid": _arguments.flag("axes_grid", axes_grid), "outline": _arguments.flag("outline", outline)}
         if iso_opacity is not None:
             others["iso_opacity"] = _text(iso_opacity)
-        rgba, options, notes, statistics = self._core.render(
-            {"scalar": scalar, **_function_texts(**of_function)}, _given(**of_camera), frame, others, progress)
+        rgba, *about = self._core.render({"scalar": scalar, **_function_texts(**of_function), **of_two}, _given(**of_camera), frame,
+                                         others, progress)
         picture = rgba.view(Picture)
-        picture.options, picture.notes, picture.statistics = options, notes, statistics
+        picture.options, picture.notes, picture.warnings, picture.channels, picture.statistics = about
+        for warning in picture.warnings:
+            warnings.warn(warning, stacklevel=2)
         return picture
 
 

@@ -1,4 +1,4 @@
-#include "tools/commands/empty_picture.h"
+#include "tools/output/empty_picture.h"
 
 #include <fmt/format.h>
 
