@@ -3,8 +3,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "preprocess/splats/face_layers.h"
-
 namespace curvisplat {
 namespace {
 
@@ -46,30 +44,28 @@ FacesBehind::Face FacesBehind::faceOf(const NodeBehind& behind, int axis) const 
   return face;
 }
 
-void FacesBehind::cutAtOne(const NodeBehind& behind, int axis, NodeSplat& node) const {
+std::optional<CutBehindFace> FacesBehind::cutAtOne(const NodeBehind& behind, int axis,
+                                                   const Splat& splat) const {
   const Face face = faceOf(behind, axis);
-  if (face.normal == glm::dvec3(0.0)) return;
+  if (face.normal == glm::dvec3(0.0)) return std::nullopt;
   // Of a plane n · (x - X0) = 0, A⁻¹ (x - X0) is at right angles to Aᵀ n.
-  const glm::dvec3 in_frame = face.normal * node.splat.factor();
+  const glm::dvec3 in_frame = face.normal * splat.factor();
   const double length = glm::length(in_frame);
   const uint32_t code =
-      packLayerCode(in_frame / length, glm::dot(face.normal, node.splat.position - face.position) / length);
-  if (code == kNoBorder) return;
-  node.border_code = code;
-  node.behind_face = true;
-  node.node_position = lattice_.position(face.node);
-  node.spacing = lattice_.spacing(face.node, face.beside);
+      packLayerCode(in_frame / length, glm::dot(face.normal, splat.position - face.position) / length);
+  if (code == kNoBorder) return std::nullopt;
+  return CutBehindFace{code, lattice_.position(face.node), lattice_.spacing(face.node, face.beside)};
 }
 
-void FacesBehind::cutAtSeveral(const NodeBehind& behind, const std::array<double, 3>& inwards,
-                               const glm::dmat3& along, size_t number, NodeSplats& out) const {
+CutBehindFaces FacesBehind::cutAtSeveral(const NodeBehind& behind, const std::array<double, 3>& inwards,
+                                         const glm::dmat3& along, const Splat& splat) const {
   constexpr double kAlong = 0.8;                     // cosine of the lattice's axis with the face's normal
   constexpr double kNearest = 0.6, kFarthest = 1.6;  // face, in cells
-  NodeSplat& node = out.splats[number];
   const Neighbours& neighbours = behind.neighbours;
+  CutBehindFaces cut;
   std::array<glm::dvec3, 3> ends{};
   std::array<LayerAxis, 3> layers{};
-  size_t end_count = 0, count = 0;
+  size_t end_count = 0;
   for (int axis = 0; axis < 3; ++axis) {
     if (inwards[axis] != 0) {
       ends[end_count++] = along[axis];
@@ -77,21 +73,18 @@ void FacesBehind::cutAtSeveral(const NodeBehind& behind, const std::array<double
     }
     if (behind.layers[axis] == 0 || neighbours.before[axis] == 0 || neighbours.after[axis] == 0) continue;
     const Face face = faceOf(behind, axis);
-    const glm::dvec3 in_frame = face.normal * node.splat.factor();
+    const glm::dvec3 in_frame = face.normal * splat.factor();
     const double length = glm::length(in_frame);
-    const double distance = glm::dot(face.normal, node.splat.position - face.position) / length;
+    const double distance = glm::dot(face.normal, splat.position - face.position) / length;
     const bool is_even =
         glm::dot(in_frame, along[axis]) > kAlong * length && distance > kNearest && distance < kFarthest;
     if (!is_even) continue;
-    layers[count++] = {along[axis], static_cast<uint8_t>(axis), distance};
-    out.probes.push_back({number,
-                          {static_cast<uint8_t>(axis), lattice_.position(face.node),
-                           lattice_.spacing(face.node, face.beside)}});
+    layers[cut.count] = {along[axis], static_cast<uint8_t>(axis), distance};
+    cut.probes[cut.count++] = {static_cast<uint8_t>(axis), lattice_.position(face.node),
+                               lattice_.spacing(face.node, face.beside)};
   }
-  if (count == 0) return;
-  const LayeredBorder border = layeredBorder({ends.data(), end_count}, {layers.data(), count});
-  node.border_code = border.code;
-  node.layers = border.layers;
+  if (cut.count > 0) cut.border = layeredBorder({ends.data(), end_count}, {layers.data(), cut.count});
+  return cut;
 }
 
 }  // namespace curvisplat

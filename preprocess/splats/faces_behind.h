@@ -6,9 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/mat3x3.hpp>
+#include <optional>
 
+#include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/node_lattice.h"
-#include "preprocess/splats/node_splats.h"
+#include "stream/model/border_code.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 
@@ -27,19 +30,33 @@ struct NodeBehind {
   Layers layers{};
 };
 
+/// Where the cell of a node ends that is behind one face.
+struct CutBehindFace {
+  uint32_t border_code = kNoBorder;
+  glm::dvec3 face_node{0.0};  // the face's, next to the node
+  double spacing = 0;         // NodeSplat's, of that one
+};
+
+/// The same behind several faces, or where the cell ends at others.
+struct CutBehindFaces {
+  LayeredBorder border;
+  std::array<FaceProbe, 3> probes{};
+  size_t count = 0;  // of the probes; 0: the cell is not cut
+};
+
 /// Pure: any thread.
 class FacesBehind {
  public:
-  /// `middles`: as in NodeSplatCorrections, the face goes through the middles of its cells.
+  /// `middles`: as in NodeSplatCorrections, the face goes through the middles of its cells. The lattice outlives it.
   FacesBehind(const NodeLattice& lattice, bool middles) : lattice_(lattice), middles_(middles) {}
 
-  /// Sets the border code of a node that is behind a face of one axis, whose neighbours along it are both there.
-  void cutAtOne(const NodeBehind& behind, int axis, NodeSplat& node) const;
+  /// Of a node's splat that is behind a face of one axis, whose neighbours along it are both there; none if the face has collapsed.
+  std::optional<CutBehindFace> cutAtOne(const NodeBehind& behind, int axis, const Splat& splat) const;
 
-  /// Sets the border code of splat `number`, which ends at faces (`inwards`, as borderCode() takes it) or is behind several, and
-  /// adds the probes for it. `along`: columns, the frame's images of the directions inwards from these faces along i, j, k.
-  void cutAtSeveral(const NodeBehind& behind, const std::array<double, 3>& inwards, const glm::dmat3& along,
-                    size_t number, NodeSplats& out) const;
+  /// Of a node's splat that ends at faces (`inwards`, as borderCode() takes it) or is behind several. `along`: columns, the
+  /// frame's images of the directions inwards from these faces along i, j, k.
+  CutBehindFaces cutAtSeveral(const NodeBehind& behind, const std::array<double, 3>& inwards,
+                              const glm::dmat3& along, const Splat& splat) const;
 
  private:
   /// A face of the block, at the node of it next to the node behind.

@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <optional>
 
 #include "preprocess/splats/covered_part.h"
 #include "preprocess/splats/faces_behind.h"
@@ -65,6 +66,8 @@ class Window {
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
   void takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at);
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, const Layers& layers);
+  void cutBehindOne(const NodeBehind& behind, NodeSplat& node) const;
+  void cutBehindSeveral(const CutBehindFaces& cut);
   /// Leaves of the last splat what neither other blocks nor blanked cells cover. Returns false if that is nothing.
   template <typename Rotate>
   bool keepPart(ptrdiff_t at, const Rotate& rotate) {
@@ -430,19 +433,38 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         if (frame.kIsPlain && corrections_.faces && layers != Layers{}) {
           // Of one face that the node is behind, or of one of several without that correction, the code has the exact plane.
           const NodeBehind behind{at, neighbours, layers};
-          const int first = layers[1] != 0 ? 1 : layers[2] != 0 ? 2 : 0;
           const auto several =
               std::count_if(layers.begin(), layers.end(), [](int side) { return side != 0; });
           if (node.border_code == kNoBorder && (several == 1 || !corrections_.layers))
-            faces_.cutAtOne(behind, first, node);
+            cutBehindOne(behind, node);
           else if (corrections_.layers)
-            faces_.cutAtSeveral(behind, inwards, alongFaces(inwards, layers, rotate), count_, out_);
+            cutBehindSeveral(
+                faces_.cutAtSeveral(behind, inwards, alongFaces(inwards, layers, rotate), node.splat));
         }
         set_values(frame);
         is_left = keepPart(at, rotate);
         while (!is_left && !out_.probes.empty() && out_.probes.back().splat == count_) out_.probes.pop_back();
       });
   count_ += is_left;
+}
+
+/// Of one face that it is behind: along j before k before i.
+void Window::cutBehindOne(const NodeBehind& behind, NodeSplat& node) const {
+  const int axis = behind.layers[1] != 0 ? 1 : behind.layers[2] != 0 ? 2 : 0;
+  const std::optional<CutBehindFace> cut = faces_.cutAtOne(behind, axis, node.splat);
+  if (!cut) return;
+  node.border_code = cut->border_code;
+  node.behind_face = true;
+  node.node_position = cut->face_node;
+  node.spacing = cut->spacing;
+}
+
+/// Of the last node.
+void Window::cutBehindSeveral(const CutBehindFaces& cut) {
+  if (cut.count == 0) return;
+  for (size_t n = 0; n < cut.count; ++n) out_.probes.push_back({count_, cut.probes[n]});
+  out_.splats[count_].border_code = cut.border.code;
+  out_.splats[count_].layers = cut.border.layers;
 }
 
 double Window::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
