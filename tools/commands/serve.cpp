@@ -108,7 +108,7 @@ void addServe(CLI::App& app) {
                    "Drawing back end: auto, osmesa, egl or cpu; see info --system")
       ->capture_default_str();
   command->add_option("--frame-time", arguments->frame_time,
-                      "Time budget of a picture while the camera moves, in ms (default 50)");
+                      "Time budget of a picture while the camera moves, in ms (default 40)");
   command->callback([arguments] { serve(*arguments); });
 }
 

@@ -28,7 +28,7 @@ namespace curvisplat {
 
 struct ViewerLimits {
   uint64_t memory_bytes = 512 << 20;  // for drawing
-  double target_s = 0.05;             // to draw a picture while the camera moves
+  double target_s = 0.04;             // to draw a picture while the camera moves
   Backend backend = Backend::kAutomatic;
 };
 
