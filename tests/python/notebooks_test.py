@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Runs the example notebooks without a browser, and looks at what they show.
 
-    notebooks_test.py PROGRAM [FOLDER]    FOLDER: keeps their pictures there
+    notebooks_test.py [FOLDER]    FOLDER: keeps their pictures there
 """
 import base64
 import os
@@ -24,9 +24,7 @@ except ImportError as error:
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "tools" / "python" / "examples"
 GRID = ROOT.parent / "shared" / "data" / "bluntfin"
-program = pathlib.Path(sys.argv[1]).resolve()
-kept = pathlib.Path(sys.argv[2]) if len(sys.argv) > 2 else None
-os.environ["PATH"] = f"{program.parent}:{os.environ['PATH']}"
+kept = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else None
 
 with tempfile.TemporaryDirectory() as folder:
     # A kernel of this interpreter, whatever others are installed.

@@ -397,8 +397,15 @@ class Views(PythonTest):
                 self.assertIn(b"<canvas", page.read())
             self.assertTrue(view.is_open)
         self.assertFalse(view.is_open)
+        self.assertNotIn("iframe", view._repr_html_())
         with self.assertRaises(OSError):
             urllib.request.urlopen(view.url)
+
+    def test_know_that_their_server_was_killed(self):
+        with curvisplat.open(self.cache) as cache, cache.view(program=PROGRAM) as view:
+            view._process.kill()
+            view._process.wait()
+            self.assertFalse(view.is_open)
 
     def test_say_what_is_wrong(self):
         with curvisplat.open(self.cache) as cache:
@@ -542,6 +549,18 @@ class Arrays(PythonTest):
         words = shlex.split(run.stdout.split("by hand: ")[1])
         subprocess.run([PROGRAM, *words[1:]], cwd=self.folder, check=True, capture_output=True)
         self.assertEqual((self.folder / "again.png").read_bytes(), (self.folder / "duct.png").read_bytes())
+
+    def test_of_a_dataset_are_plotted(self):
+        try:
+            import matplotlib  # noqa: F401
+            import xarray  # noqa: F401
+        except ImportError as error:
+            self.skipTest(str(error))
+        example = pathlib.Path(__file__).resolve().parents[2] / "tools" / "python" / "examples" / "dataset.py"
+        subprocess.run([sys.executable, example, "wind"], cwd=self.folder, check=True, capture_output=True)
+        self.assertTrue((self.folder / "wind.png").read_bytes().startswith(b"\x89PNG"))
+        with curvisplat.open(self.folder / "wind.splats") as cache:
+            self.assertEqual((cache.samples, cache.scalars[0].name, cache.scalars[0].unit), (60 * 45 * 20, "wind", "m s-1"))
 
     def test_of_a_solver_that_runs(self):
         package = pathlib.Path(__file__).resolve().parents[2] / "tools" / "python" / "examples" / "solver.py"

@@ -16,7 +16,8 @@ from ._convert import Report, append_arrays, convert, convert_arrays, convert_ca
 from ._core import Error, UsageError, colour_maps
 from ._core import version as __version__
 from ._function import TransferFunction
-from ._view import View
+from ._view import View, program
 
 __all__ = ["Block", "Cache", "Camera", "Error", "Picture", "Points", "Report", "Samples", "Scalar", "TransferFunction", "UsageError",
-           "View", "append_arrays", "colour_maps", "convert", "convert_arrays", "convert_callable", "from_xarray", "open", "orbit"]
+           "View", "append_arrays", "colour_maps", "convert", "convert_arrays", "convert_callable", "from_xarray", "open", "orbit",
+           "program"]

@@ -14,16 +14,20 @@ from typing import Any, Optional
 from . import _core
 
 
-def _program() -> str:
-    """The program that belongs to this package: beside it in a build tree, or installed."""
+def program() -> str:
+    """The path of the program `curvisplat` that belongs to this package: beside it in a build tree, or the one in PATH. Raises Error
+    if there is none."""
     here = pathlib.Path(__file__).resolve()
     beside = here.parents[2] / "curvisplat"
     if os.access(beside, os.X_OK) and beside.is_file():
         return str(beside)
     found = shutil.which("curvisplat")
     if found is None:
-        raise _core.Error("the program curvisplat is not in PATH; view() needs it: install it, or give its path as program=")
+        raise _core.Error("the program curvisplat is neither beside the package nor in PATH; install it")
     return found
+
+
+_default_program = program  # View's argument has its name
 
 
 def _end(process: subprocess.Popen) -> None:
@@ -43,7 +47,7 @@ class View:
 
     def __init__(self, path: str, height: int = 600, program: Optional[str] = None):
         self.height = int(height)
-        command = [program or _program(), "serve", path, "--port", "0"]
+        command = [program or _default_program(), "serve", path, "--port", "0"]
         with tempfile.TemporaryFile("w+") as messages:  # of its start; nobody reads later ones
             try:
                 # A session of its own: Ctrl-C in the interpreter is not meant for it.
@@ -56,6 +60,7 @@ class View:
                 _end(process)
                 messages.seek(0)
                 raise _core.Error(messages.read().strip().removeprefix("curvisplat: ") or f"{command[0]} has no server")
+        self._process = process
         self._end = weakref.finalize(self, _end, process)
 
     def close(self) -> None:
@@ -64,8 +69,8 @@ class View:
 
     @property
     def is_open(self) -> bool:
-        """Whether the server has not been ended."""
-        return self._end.alive
+        """Whether the server runs."""
+        return self._end.alive and self._process.poll() is None
 
     def __enter__(self) -> "View":
         return self
@@ -78,5 +83,7 @@ class View:
 
     def _repr_html_(self) -> str:
         """The page in a frame. The browser must be on this machine, or have a tunnel to the port."""
+        if not self.is_open:
+            return "<p>This view is closed; cache.view() opens another one.</p>"
         return (f'<iframe src="{html.escape(self.url)}" width="100%" height="{self.height}" style="border: 0" '
                 'allow="fullscreen" title="curvisplat"></iframe>')
