@@ -388,6 +388,37 @@ class Histograms(PythonTest):
                 cache.histogram("y")
 
 
+class Series(PythonTest):
+    def test_of_files_are_those_of_the_command(self):
+        command("generate", "wake", "--size", "24x20x12", "--steps", "5", "-o", self.folder / "s")
+        theirs, ours = self.folder / "theirs.splats", self.folder / "ours.splats"
+        command("convert", self.folder / "s.xyz", self.folder / "s_*.fun", "--steps", "0:4:2", "-o", theirs)
+        report = curvisplat.convert(ours, self.folder / "s.xyz", self.folder / "s_*.fun", steps="0:4:2")
+        self.assertEqual(self.files_of(ours), self.files_of(theirs))
+        self.assertEqual((report.steps, report.samples), (3, 24 * 20 * 12))
+        self.assertEqual(report.bytes, sum(len(data) for data in self.files_of(ours).values()))
+        later = [self.folder / f"s_{n:04}.fun" for n in (3, 4)]
+        later_times = self.folder / "later.splats"
+        first = curvisplat.convert(later_times, self.folder / "s.xyz", [self.folder / f"s_{n:04}.fun" for n in (0, 1, 2)])
+        self.assertEqual(first.steps, 3)
+        self.assertEqual(curvisplat.append(later_times, self.folder / "s.xyz", later).steps, 5)
+        whole = self.folder / "whole.splats"
+        command("convert", self.folder / "s.xyz", self.folder / "s_*.fun", "-o", whole)
+        with curvisplat.open(later_times) as cache, curvisplat.open(whole) as at_once:
+            self.assertEqual(len(cache.times), 5)
+            np.testing.assert_array_equal(cache.render(size=(64, 48), step=4), at_once.render(size=(64, 48), step=4))
+
+    def test_that_lack_a_step_say_which(self):
+        with self.assertRaisesRegex(curvisplat.Error, "none_"):
+            curvisplat.convert(self.folder / "n.splats", self.folder / "wake.xyz", self.folder / "none_*.fun")
+        with self.assertRaisesRegex(curvisplat.UsageError, "steps"):
+            curvisplat.convert(self.folder / "n.splats", self.folder / "wake.xyz", self.folder / "wake.fun", steps="many")
+        self.assertFalse((self.folder / "n.splats").exists())
+
+    def files_of(self, folder):
+        return {path.name: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
 class Views(PythonTest):
     def test_are_pages_that_end_with_them(self):
         with curvisplat.open(self.cache) as cache, cache.view(program=PROGRAM, height=300) as view:

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
+#include "preprocess/formats/open/series_files.h"
 #include "render/camera/camera_path.h"
 #include "render/colour/published_maps.h"
 #include "render/image/image_file.h"
@@ -22,6 +24,7 @@
 #include "stream/cache/probe.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/series_input.h"
 #include "tools/options/value_precision.h"
 #include "tools/python/array_source.h"
 #include "tools/python/cache_arrays.h"
@@ -169,6 +172,7 @@ py::dict reportOf(const ConvertReport& report) {
   for (const FileReport& file : report.files) bytes += file.bytes;
   out["bytes"] = bytes;
   out["warnings"] = report.warnings;
+  out["steps"] = 1;
   return out;
 }
 
@@ -236,6 +240,54 @@ py::dict convertCallable(const std::filesystem::path& output,
   return convertSource(*source, std::move(options), progress);
 }
 
+/// The steps of the files that "steps" leaves, or none where they are one.
+std::vector<StepFiles> stepsIn(ConvertArguments& arguments) {
+  expandPatterns(arguments.grid);
+  if (!arguments.steps && !arguments.adds_steps && !hasSeveralStepFiles(arguments.grid)) return {};
+  if (arguments.grid.time_step)
+    throw UsageError("time_step: chooses one step, and there are several here; use steps instead");
+  const std::vector<StepFiles> all = stepsOf(arguments.grid);
+  const StepSelection selection = parseSteps("steps", arguments.steps.value_or("all"));
+  std::vector<StepFiles> chosen;
+  for (const uint64_t step : selectedSteps("steps", selection, all.size())) chosen.push_back(all[step]);
+  return chosen;
+}
+
+/// Of the first step, with the number of steps and the bytes of all.
+py::dict convertSteps(const ConvertArguments& arguments, const std::vector<StepFiles>& steps,
+                      ConvertOptions of_each, const py::object& progress) {
+  SeriesOptions options;
+  options.convert = std::move(of_each);
+  options.add = arguments.adds_steps;
+  options.keep_going = arguments.keep_going;
+  const SeriesInput input = seriesInput(arguments, steps);
+  SeriesReport series;
+  ConvertReport first;
+  std::vector<std::string> warnings;
+  runInterruptibly(progress, [&](Progress& of_work) {
+    series = convertSeries(input, options, of_work, [&](const SeriesEvent& event) {
+      if (!event.reason.empty()) warnings.push_back(event.name + " was left out: " + event.reason);
+      if (event.converted) first = *event.converted;
+      if (event.source)
+        warnings.insert(warnings.end(), event.source->warnings.begin(), event.source->warnings.end());
+    });
+  });
+  const CacheReader cache(options.convert.output);
+  uint64_t bytes = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(options.convert.output))
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  first.warnings.insert(first.warnings.end(), warnings.begin(), warnings.end());
+  py::dict out = reportOf(first);
+  out["samples"] = cache.manifest().nodes;
+  out["splats"] = cache.manifest().splats;
+  out["bricks"] = cache.bricks().size();
+  out["levels"] = cache.manifest().levels;
+  out["volume"] = cache.manifest().volume;
+  out["bytes"] = bytes;
+  out["steps"] = series.steps;
+  return out;
+}
+
 py::dict convertFiles(const std::filesystem::path& output, const std::filesystem::path& grid,
                       const std::vector<std::filesystem::path>& solutions,
                       const std::vector<std::string>& scalars, const py::dict& given_options,
@@ -244,8 +296,16 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   arguments.grid.grid = grid;
   arguments.grid.solutions = solutions;
   arguments.grid.time_step = py::cast<std::optional<uint32_t>>(given_options["time_step"]);
+  arguments.grid.globe.vertical_scale = py::cast<double>(given_options["vertical_scale"]);
+  arguments.scalars = scalars;
+  arguments.steps = py::cast<std::optional<std::string>>(given_options["steps"]);
+  arguments.keep_going = py::cast<bool>(given_options["keep_going"]);
+  arguments.adds_steps = py::cast<bool>(given_options["add"]);
   ConvertOptions options = convertOptions(output, given_options);
-  if (options.title.empty()) options.title = grid.stem().string();
+  arguments.output = arguments.to = options.output;
+  const std::vector<StepFiles> steps = stepsIn(arguments);
+  if (options.title.empty()) options.title = arguments.grid.grid.stem().string();
+  if (!steps.empty()) return convertSteps(arguments, steps, std::move(options), progress);
   ConvertReport report;
   runInterruptibly(progress, [&](Progress& of_work) {
     const auto source = openSource(arguments, options.output);

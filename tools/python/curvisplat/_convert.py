@@ -15,7 +15,8 @@ Progress = Callable[[str, int, int, str], None]
 
 
 class Report(NamedTuple):
-    """What a conversion did. `samples`: nodes or cells of the grid, `blanked` of which are not drawn; `volume`: of the cells."""
+    """What a conversion did. `samples`: nodes or cells of the grid, `blanked` of which are not drawn; `volume`: of the cells; `steps`
+    of the cache. Of a series `blanked`, `merged_nodes` and the rest are of its first step, `bytes` of all."""
 
     samples: int
     blanked: int
@@ -26,6 +27,7 @@ class Report(NamedTuple):
     merged_nodes: int
     bytes: int
     warnings: Sequence[str]
+    steps: int = 1
 
 
 def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory: Union[str, int, None], threads: int,
@@ -35,20 +37,48 @@ def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory
             "memory": "" if memory is None else str(memory), "value_precision": "normal"}
 
 
-def convert(output: Path, grid: Path, solutions: Sequence[Path] = (), *, scalars: Sequence[str] = (),
-            time_step: Optional[int] = None, blank_value: Optional[float] = None, overwrite: bool = False,
-            resume: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
-            value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
-    """Converts grid files (PLOT3D, VTK, CGNS, NetCDF) to the cache `output`, as `curvisplat convert` does.
+def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, scalars: Union[str, Sequence[str]] = (),
+            time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False, vertical_scale: float = 1,
+            blank_value: Optional[float] = None, overwrite: bool = False, resume: bool = False,
+            memory: Union[str, int, None] = None, threads: int = 0, title: str = "", value_precision: str = "normal",
+            progress: Optional[Progress] = None) -> Report:
+    """Converts grid files of any kind that `curvisplat convert` reads to the cache `output`, with the same bytes.
 
-    scalars: names (default: all that the files store). blank_value: samples with this value are not drawn. resume: go on from an
-    interrupted conversion. memory: the limit of this process, in bytes or as "2G". value_precision: "normal" (16 bits for
-    the range of a brick) or "fine" (24). progress: called with (phase, done, total, unit). Raises Error, UsageError and, after Ctrl-C, KeyboardInterrupt; then no partial cache is left unless
-    `resume` was given.
+    Several solutions or grids whose names differ in numbers only, patterns such as "q.*" or "q_%04d.fun" among the names, and files
+    with several steps together with `steps` become a series. steps: "all", "FIRST:LAST" or "FIRST:LAST:STRIDE" of them;
+    keep_going: leave out those that cannot be converted; time_step: one of a file's.
+
+    scalars: names (default: all that the files store). vertical_scale: the exaggeration of heights on the globe.
+    blank_value: samples with this value are not drawn. resume: go on from an interrupted conversion. memory: the limit of
+    this process, in bytes or as "2G". value_precision: "normal" (16 bits for the range of a brick) or "fine" (24). progress:
+    called with (phase, done, total, unit).
+
+    Raises Error, UsageError and, after Ctrl-C, KeyboardInterrupt; then no partial cache is left unless `resume` was given,
+    and of a series the steps so far.
     """
     options = _options(overwrite, resume, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
+    return _convert_files(output, grid, solutions, scalars, options, time_step=time_step, steps=steps, keep_going=keep_going,
+                          vertical_scale=vertical_scale, progress=progress)
+
+
+def append(cache: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, steps: Optional[str] = None,
+           keep_going: bool = False, vertical_scale: float = 1, blank_value: Optional[float] = None,
+           memory: Union[str, int, None] = None, threads: int = 0, progress: Optional[Progress] = None) -> Report:
+    """Adds the time steps of further files to a cache, as `curvisplat convert --add-steps` does. Arguments and errors as of convert()."""
+    options = _options(False, False, blank_value, memory, threads, "")
+    return _convert_files(cache, grid, solutions, (), options, add=True, steps=steps, keep_going=keep_going,
+                          vertical_scale=vertical_scale, progress=progress)
+
+
+def _convert_files(output: Path, grid: Path, solutions: Any, scalars: Any, options: dict, *, progress: Optional[Progress],
+                   add: bool = False, time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False,
+                   vertical_scale: float = 1) -> Report:
+    options["add"] = add
     options["time_step"] = None if time_step is None else _arguments.whole("time_step", time_step)
+    options["steps"] = None if steps is None else str(steps)
+    options["keep_going"] = _arguments.flag("keep_going", keep_going)
+    options["vertical_scale"] = _arguments.numbers("vertical_scale", (vertical_scale,), "a number", 1)[0]
     files = [os.fspath(path) for path in _arguments.several(solutions, (str, os.PathLike))]
     return Report(**_core.convert_files(os.fspath(output), os.fspath(grid), files, list(_arguments.several(scalars)), options,
                                         progress))
