@@ -67,16 +67,6 @@ void checkArguments(const ConvertArguments& arguments) {
   refuse(arguments.overwrite, "--overwrite");
 }
 
-/// The steps that --steps and --every leave of those that the files have.
-std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments) {
-  std::vector<StepFiles> all = stepsOf(arguments.grid);
-  StepSelection selection = parseSteps("--steps", arguments.steps.value_or("all"));
-  if (arguments.every) selection.stride *= *arguments.every;
-  std::vector<StepFiles> chosen;
-  for (const uint64_t step : selectedSteps("--steps", selection, all.size())) chosen.push_back(all[step]);
-  return chosen;
-}
-
 std::string titleOf(const OpenGridOptions& files) {
   return files.grid.stem().string();
 }

@@ -289,10 +289,8 @@ void render(const RenderArguments& given) {
   if (!ranks.isFirst()) return;
   writeReport();
   printResult(report);
-  std::string chosen = choice.chosen_colours;
-  if (const std::string& more = choice.picture.chosenOptions(); !more.empty())
-    chosen += (chosen.empty() ? "" : " ") + more;
-  if (!chosen.empty()) fmt::print("chosen from the data: {}\n", chosen);
+  if (const std::string chosen = choice.chosenOptions(); !chosen.empty())
+    fmt::print("chosen from the data: {}\n", chosen);
 }
 
 }  // namespace

@@ -96,6 +96,11 @@ void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArgume
   checkFunctionArguments(opacitiesOf(arguments, scalar));
 }
 
+std::string ScalarChoice::chosenOptions() const {
+  const std::string& more = picture.chosenOptions();
+  return chosen_colours + (chosen_colours.empty() || more.empty() ? "" : " ") + more;
+}
+
 ScalarChoice chooseScalars(const OpacityArguments& arguments, const ScalarArguments& scalar,
                            const CacheReader& cache, size_t shown, const glm::dvec3& scale, ChosenFor what) {
   if (nameOf(arguments).empty()) {

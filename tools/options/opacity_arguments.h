@@ -35,6 +35,9 @@ struct ScalarChoice {
   DrawnScalars scalars;
   PictureChoice picture;
   std::string chosen_colours;  // of two scalars: as PictureChoice::chosenOptions(), of the colours
+
+  /// What was filled in, of all.
+  std::string chosenOptions() const;
 };
 
 /// `shown`: the variable of --scalar. Throws as PictureChoice.

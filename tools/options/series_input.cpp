@@ -2,6 +2,15 @@
 
 namespace curvisplat {
 
+std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std::string& option) {
+  const std::vector<StepFiles> all = stepsOf(arguments.grid);
+  StepSelection selection = parseSteps(option, arguments.steps.value_or("all"));
+  if (arguments.every) selection.stride *= *arguments.every;
+  std::vector<StepFiles> chosen;
+  for (const uint64_t step : selectedSteps(option, selection, all.size())) chosen.push_back(all[step]);
+  return chosen;
+}
+
 SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
   SeriesInput input;
   input.count = steps.size();

@@ -246,11 +246,7 @@ std::vector<StepFiles> stepsIn(ConvertArguments& arguments) {
   if (!arguments.steps && !arguments.adds_steps && !hasSeveralStepFiles(arguments.grid)) return {};
   if (arguments.grid.time_step)
     throw UsageError("time_step: chooses one step, and there are several here; use steps instead");
-  const std::vector<StepFiles> all = stepsOf(arguments.grid);
-  const StepSelection selection = parseSteps("steps", arguments.steps.value_or("all"));
-  std::vector<StepFiles> chosen;
-  for (const uint64_t step : selectedSteps("steps", selection, all.size())) chosen.push_back(all[step]);
-  return chosen;
+  return chosenSteps(arguments, "steps");
 }
 
 /// Of the first step, with the number of steps and the bytes of all.

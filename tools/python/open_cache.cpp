@@ -139,9 +139,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
       image = annotated(image, annotations,
                         {size, renderer.screenView(at, frame), functions, manifest.lower, manifest.upper,
                          arguments.frame.background, axisTitles(arguments.annotations)});
-    picture.chosen = choice.chosen_colours;
-    if (const std::string& more = choice.picture.chosenOptions(); !more.empty())
-      picture.chosen += (picture.chosen.empty() ? "" : " ") + more;
+    picture.chosen = choice.chosenOptions();
     picture.notes = function.notes();
     if (scalars.colour)
       for (const std::string& note : scalars.colour->function.notes()) picture.notes.push_back(note);
