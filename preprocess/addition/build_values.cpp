@@ -155,6 +155,10 @@ void ValueBuilder::decode(uint32_t position, const LoadedValues& loaded, BrickSp
 /// The values of a leaf's splats, in the order in which it stores them: by node. Each must be where it was.
 void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSplats& brick) const {
   constexpr const char* kOtherGrid = "this grid is not the one the cache was made from";
+  constexpr const char* kOtherPlace =
+      "this grid is not the one the cache was made from, or an earlier version of this program, which placed "
+      "some splats elsewhere, "
+      "made it: convert again";
   const RecordSpan records = loaded.records(position);
   if (records.size() != brick.size())
     refuse(position, fmt::format("it has {} splats, but the grid has {} there; {}", brick.size(),
@@ -190,7 +194,7 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
                                      numbers_.nameOf(first + in_run), numbers_.nameOf(node), kOtherGrid));
       if (!isAt(placeInCell(brick.positions[n], brick.cell), valueRecordPlace(record)))
         refuse(position,
-               fmt::format("{} has another position in the grid; {}", numbers_.nameOf(node), kOtherGrid));
+               fmt::format("{} has another position in the grid; {}", numbers_.nameOf(node), kOtherPlace));
       unpackValueRecord(record, values);
       for (size_t v = 0; v < variables_; ++v) brick.variables[v][n] = values[v];
     }

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "preprocess/splats/opposite_halves.h"
 #include "preprocess/splats/shape.h"
 #include "stream/model/border_code.h"
 #include "stream/model/layers_code.h"
@@ -15,15 +16,15 @@ namespace {
 
 // Where more nodes meet than this, the grid has collapsed (a pole), and all of them are merged.
 constexpr size_t kMaxParts = 64;
-constexpr double kOpposite = -0.5;  // cosine of two directions, in the frame of a cell
+constexpr double kStraight = -0.9;  // cosine of halves on about one line
 
 /// How thick a cell is at right angles to the face that q leaves inwards.
 double thickness(const Splat& splat, const glm::dvec3& q) {
   return 1 / glm::length(gradientOf(splat, q));
 }
 
-bool isUnlike(double a, double b) {
-  return std::max(a, b) > kMaxJointRatio * std::min(a, b);
+bool isUnlike(double a, double b, double most) {
+  return std::max(a, b) > most * std::min(a, b);
 }
 
 /// How two parts of one point lie to one another.
@@ -38,18 +39,16 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
   const InwardAxes of_a = inwardAxes(a.border_code), of_b = inwardAxes(b.border_code);
   int opposite = 0;
   bool unlike = false;
-  for (int n = 0; n < of_a.count; ++n)
-    for (int m = 0; m < of_b.count; ++m) {
-      const glm::dvec3 inward(of_a.axis[static_cast<size_t>(n)]), other(of_b.axis[static_cast<size_t>(m)]);
-      const glm::dvec3 seen = inFrameOf(a.splat, b.splat.factor() * other);
-      if (glm::dot(inward, seen) > kOpposite * glm::length(seen)) continue;
-      ++opposite;
-      if (!of_a.hasFace(n) || !of_b.hasFace(m)) continue;
-      // Directions are coded to 0.01 of the cell, which is many times a thin cell's thickness: a joint across
-      // such cells would look unlike. Weights are exact, and halves of one face differ in them as in thickness.
-      unlike |= isUnlike(thickness(a.splat, inward), thickness(b.splat, other)) &&
-                isUnlike(a.splat.weight, b.splat.weight);
-    }
+  forEachOpposite(a, b, [&](int n, int m, double cosine) {
+    ++opposite;
+    if (!of_a.hasFace(n) || !of_b.hasFace(m)) return;
+    const double most = cosine < kStraight ? kMaxJointRatio : kMaxKinkedRatio;
+    const glm::dvec3 inward(of_a.axis[static_cast<size_t>(n)]), other(of_b.axis[static_cast<size_t>(m)]);
+    // Directions are coded to 0.01 of the cell, which is many times a thin cell's thickness: a joint across
+    // such cells would look unlike. Weights are exact, and halves of one face differ in them as in thickness.
+    unlike |= isUnlike(thickness(a.splat, inward), thickness(b.splat, other), most) &&
+              isUnlike(a.splat.weight, b.splat.weight, most);
+  });
   if (opposite == 0) return Neighbourhood::kOther;
   if (opposite > 1) return Neighbourhood::kDiagonal;
   return unlike ? Neighbourhood::kUnlike : Neighbourhood::kLike;
@@ -73,23 +72,43 @@ std::vector<size_t> groupsAtJoints(std::span<const SplatWithValues> parts) {
   return group;
 }
 
+/// A splat of the layer behind a seam. Of a probe, its line alone: it tells the splat that waits for it (seams.h).
+void goOnBehind(std::span<const NodeSplat* const> parts, std::span<const JointSide> sides, NodeSplat& behind,
+                std::span<SplatScalar> values) {
+  for (size_t axis = 0; axis < behind.lines.size(); ++axis) {
+    JointLine& line = behind.lines[axis];
+    if (!line.isThere() || (behind.is_probe && axis != behind.layers)) continue;
+    const std::optional<JointLine> joined = lineBehind(parts, sides, behind, line);
+    if (behind.is_probe)
+      line = joined.value_or(JointLine());
+    else if (joined)
+      goOnAcross(axis, *joined, behind, values);
+  }
+}
+
 }  // namespace
 
-MergedParts::MergedParts(const NodeSplat& first, std::span<const SplatScalar> values)
+MergedParts::MergedParts(const NodeSplat& first, std::span<const SplatScalar> values,
+                         std::span<const JointSide> sides)
     : origin_(first.node_position),
       lowest_{first, {values.begin(), values.end()}},
       merger_(values.size()),
       bend_(values.size()) {
-  add(first, values);
+  add(first, values, sides);
 }
 
-void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values) {
+void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values,
+                      std::span<const JointSide> sides) {
   nodes_.push_back(part.node);
-  merger_.add(part.splat.position, part.splat, values);
-  bend_.add(part.splat, part.splat.position - origin_, values);
+  Splat half = part.splat;
+  std::vector<SplatScalar> of_half(values.begin(), values.end());
+  if (!sides.empty()) unstretchHalves(part, sides, half, of_half);
+  merger_.add(half.position, half, of_half);
+  bend_.add(half, half.position - origin_, of_half);
   borders_.add(part.splat, part.border_code);
-  growth_.add(part);
-  if (part.node < lowest_.splat.node) lowest_.splat = part;
+  if (part.node > lowest_.splat.node) return;
+  lowest_.splat = part;
+  sides_.assign(sides.begin(), sides.end());
 }
 
 /// Its probes tell of them; those of the other parts tell the same of the same faces.
@@ -116,10 +135,7 @@ SplatWithValues MergedParts::finish() const {
   merged.splat.border_code = border.code;
   merged.splat.layers = border.layers;
   merged.splat.regular = false;
-  const JointGrowth::Found growth = growth_.of(merged.splat.splat, lowest_.splat);
-  merged.splat.growth_code = growth.code;
-  merged.splat.splat.position += merged.splat.splat.factor() * growth.drift;
-  for (SplatScalar& value : merged.values) value.mean += glm::dot(value.slope, growth.drift);
+  stretchWhole(lowest_.splat, sides_, merged.splat, merged.values);
   return merged;
 }
 
@@ -127,7 +143,7 @@ void JointNodes::add(const NodeSplat& splat, std::span<const SplatScalar> values
   if (splat.behind_face) {
     behind_.push_back({splat, {values.begin(), values.end()}});
   } else if (merged_) {
-    merged_->add(splat, values);
+    merged_->add(splat, values, {});
   } else {
     parts_.push_back({splat, {values.begin(), values.end()}});
     if (parts_.size() > kMaxParts) mergeAll();
@@ -135,45 +151,57 @@ void JointNodes::add(const NodeSplat& splat, std::span<const SplatScalar> values
 }
 
 void JointNodes::mergeAll() {
-  merged_ = groups().front();
+  merged_.emplace(parts_[0].splat, parts_[0].values, std::span<const JointSide>());
+  for (size_t n = 1; n < parts_.size(); ++n) merged_->add(parts_[n].splat, parts_[n].values, {});
   parts_.clear();
 }
 
-std::vector<MergedParts> JointNodes::groups() const {
-  if (merged_) return {*merged_};
-  std::vector<size_t> group(parts_.size(), 0);
-  if (unlike_ == UnlikeHalves::kApart && parts_.size() <= kMaxParts) group = groupsAtJoints(parts_);
+/// `sides`: by part.
+std::vector<MergedParts> JointNodes::groups(std::span<const size_t> group,
+                                            std::span<const JointSide> sides) const {
   std::vector<MergedParts> groups;
   std::vector<size_t> place(parts_.size());  // in `groups`, of the group that begins with a part
   for (size_t n = 0; n < parts_.size(); ++n) {
     const SplatWithValues& part = parts_[n];
+    const auto of_part =
+        std::equal_range(sides.begin(), sides.end(), JointSide{n},
+                         [](const JointSide& a, const JointSide& b) { return a.part < b.part; });
+    const std::span<const JointSide> own(of_part.first, of_part.second);
     if (group[n] == n) {
       place[n] = groups.size();
-      groups.emplace_back(part.splat, part.values);
+      groups.emplace_back(part.splat, part.values, own);
     } else {
-      groups[place[group[n]]].add(part.splat, part.values);
+      groups[place[group[n]]].add(part.splat, part.values, own);
     }
   }
   return groups;
 }
 
 void JointNodes::finish(const Sink& sink) {
+  std::vector<const NodeSplat*> parts;
+  for (const SplatWithValues& part : parts_) parts.push_back(&part.splat);
+  std::vector<size_t> group(parts_.size(), 0);
+  if (unlike_ == UnlikeHalves::kApart) group = groupsAtJoints(parts_);
+  const std::vector<JointSide> sides = sidesOf(parts, group);
   std::vector<SplatWithValues> merged;
-  if (parts_.size() == 1) {
-    merged = std::move(parts_);
-    sink(merged[0].splat, merged[0].values, {&merged[0].splat.node, 1});
-  } else {
-    for (const MergedParts& group : groups()) {
-      merged.push_back(group.finish());
-      sink(merged.back().splat, merged.back().values, group.nodes());
-    }
-  }
-  for (SplatWithValues& behind : behind_) {
+  const auto give = [&](const MergedParts& of) {
+    merged.push_back(of.finish());
+    sink(merged.back().splat, merged.back().values, of.nodes());
+  };
+  if (merged_)
+    give(*merged_);
+  else
+    for (const MergedParts& of : groups(group, sides)) give(of);
+
+  for (auto& [splat, values] : behind_) {
     const bool open = std::any_of(merged.begin(), merged.end(), [&](const SplatWithValues& face) {
-      return isOpen(face.splat.splat, face.splat.border_code, behind.splat.splat);
+      return isOpen(face.splat.splat, face.splat.border_code, splat.splat);
     });
-    if (!open) behind.splat.border_code = kNoBorder;
-    sink(behind.splat, behind.values, {});
+    if (!open) {
+      splat.border_code = kNoBorder;
+      goOnBehind(parts, sides, splat, values);
+    }
+    sink(splat, values, {});
   }
 }
 

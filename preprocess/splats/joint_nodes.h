@@ -1,8 +1,9 @@
-// The nodes of block faces that coincide at one point, and what becomes of them. Two halves of about the same thickness give
-// back the whole cell. Halves of unlike thickness stay apart, each cut at the face between them: one splat for both would
-// reach too far on the thin side and not far enough on the thick one, which shows as a pair of lines.
+// The nodes of block faces that coincide at one point, and what becomes of them. Two halves give back the whole cell, which is
+// stretched, and skewed, by what both blocks have there (joint_line.h); so are the splats one away from the face. Where one half is
+// more than 2.5 times as thick as the other, they stay apart, each cut at the face between them: one splat for both would
+// reach too far on the thin side and not far enough on the thick one.
 //
-//    block A      |  block B                          like                      unlike
+//    block A      |  block B                          alike                     unlike
 //    o     o     o|o     o     o                  o--[  o  ]--o              o----[o|o]-o-o
 //                half cells                        one splat           two splats, cut at the face
 #pragma once
@@ -14,7 +15,7 @@
 #include <vector>
 
 #include "preprocess/splats/bend_of_parts.h"
-#include "preprocess/splats/joint_growth.h"
+#include "preprocess/splats/joint_sides.h"
 #include "preprocess/splats/merge.h"
 #include "preprocess/splats/node_splats.h"
 #include "preprocess/splats/open_borders.h"
@@ -28,7 +29,9 @@ enum class UnlikeHalves {
 };
 
 /// Halves are unlike if one is more than this many times as thick as the other.
-inline constexpr double kMaxJointRatio = 1.3;
+inline constexpr double kMaxJointRatio = 2.5;
+/// The same where grid lines have a kink at the joint: one splat of two such halves bulges out of both.
+inline constexpr double kMaxKinkedRatio = 1.3;
 
 /// A splat with its values.
 struct SplatWithValues {
@@ -39,8 +42,9 @@ struct SplatWithValues {
 /// Some of the nodes at one point as one splat.
 class MergedParts {
  public:
-  MergedParts(const NodeSplat& first, std::span<const SplatScalar> values);
-  void add(const NodeSplat& part, std::span<const SplatScalar> values);
+  /// `sides`: those of a part.
+  MergedParts(const NodeSplat& first, std::span<const SplatScalar> values, std::span<const JointSide> sides);
+  void add(const NodeSplat& part, std::span<const SplatScalar> values, std::span<const JointSide> sides);
   /// Its node (and node_position) is the lowest of the parts; regular is false unless there is only one, which
   /// comes out as it went in.
   SplatWithValues finish() const;
@@ -55,7 +59,7 @@ class MergedParts {
   SplatMerger merger_;
   BendOfParts bend_;
   OpenBorders borders_;
-  JointGrowth growth_;
+  std::vector<JointSide> sides_;  // of the lowest
   std::vector<uint64_t> nodes_;
 };
 
@@ -74,7 +78,7 @@ class JointNodes {
 
  private:
   void mergeAll();
-  std::vector<MergedParts> groups() const;
+  std::vector<MergedParts> groups(std::span<const size_t> group, std::span<const JointSide> sides) const;
 
   UnlikeHalves unlike_;
   std::vector<SplatWithValues> parts_;

@@ -62,7 +62,9 @@ class Window {
   bool anyBlankAround(uint64_t j, uint64_t k) const;
   uint64_t octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const;
   void stretchRow(uint64_t j, uint64_t k);
-  Stretch stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
+  SquaredExtents extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
+  std::array<JointLine, 3> linesOf(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
+                                   const Layers& layers) const;
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
   void takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at);
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, const Layers& layers);
@@ -92,7 +94,7 @@ class Window {
   std::vector<const float*> scalars_;
   uint64_t ni_, i0_, i1_;  // of a row; its part
   ptrdiff_t row_stride_, plane_stride_;
-  uint64_t first_node_of_row_ = 0;
+  uint64_t first_node_of_row_ = 0, row_j_ = 0, row_k_ = 0;
   uint64_t octants_of_blanks_ = 0;  // of the next node: points (covered_part.h) in cells that are not there
   NodeScratch& scratch_;
   NodeSplats& out_;
@@ -121,6 +123,8 @@ void Window::addRow(uint64_t j, uint64_t k) {
   const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
                         static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
   first_node_of_row_ = in_.first_node + (k * block.nj + j) * ni_;
+  row_j_ = j;
+  row_k_ = k;
   const bool on_face = isFace(j, block.nj) || isFace(k, block.nk);
   const auto layers_at = [&, layer_j = layerOf(j, block.nj), layer_k = layerOf(k, block.nk)](uint64_t i) {
     return Layers{layerOf(i, ni_), layer_j, layer_k};
@@ -212,7 +216,8 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
       for (uint64_t i = begin; i < end; ++i) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
         if (lattice_.blank[at]) continue;
-        const Stretch stretch = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
+        const Stretch stretch =
+            stretchOf(extentsOf(at, strides[axis], axis == 0 ? i : index[axis], count[axis]));
         out[i - i0_] = stretch.factor;
         growth[i - i0_] = stretch.growth;
         drift[i - i0_] = stretch.drift;
@@ -244,7 +249,7 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
 }
 
 /// Of a node that is there, number `index` of `count` along the axis of `stride`.
-Stretch Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
+SquaredExtents Window::extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
   const auto neighbours = [&](uint64_t most, ptrdiff_t step) {
     int found = 0;
     while (found < kStretchReach && static_cast<uint64_t>(found) < most &&
@@ -252,8 +257,31 @@ Stretch Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, ui
       ++found;
     return found;
   };
-  return stretchOnLine({lattice_.x, lattice_.y, lattice_.z}, at, stride, neighbours(index, -stride),
+  return extentsOnLine({lattice_.x, lattice_.y, lattice_.z}, at, stride, neighbours(index, -stride),
                        neighbours(count - 1 - index, stride));
+}
+
+/// Of node `i` of the row.
+std::array<JointLine, 3> Window::linesOf(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
+                                         const Layers& layers) const {
+  const GridBlock& block = in_.block;
+  const std::array<uint64_t, 3> index{i, row_j_, row_k_}, count{ni_, block.nj, block.nk};
+  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
+  std::array<JointLine, 3> lines{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const bool has_before = neighbours.before[axis] != 0, has_after = neighbours.after[axis] != 0;
+    const bool is_half = isFace(index[axis], count[axis]) && has_before != has_after;
+    const bool is_layer = layers[axis] != 0 && has_before && has_after;
+    if (!is_half && !is_layer) continue;
+    const SquaredExtents extents = extentsOf(at, strides[axis], index[axis], count[axis]);
+    CellRow row;
+    for (size_t n = 0; n < row.size(); ++n) row[n] = 0.5 * std::sqrt(extents[n]);
+    if (is_half ? has_before : layers[axis] < 0) std::reverse(row.begin(), row.end());
+    const double extent = glm::length(lattice_.position(at + neighbours.after[axis]) -
+                                      lattice_.position(at + neighbours.before[axis]));
+    lines[axis] = JointLine(row, 0.5 * extent);
+  }
+  return lines;
 }
 
 /// The nodes from i0 to i1 of a row without blanks around it. `row`: the element of its first node.
@@ -336,14 +364,16 @@ glm::dmat3 alongFaces(const std::array<double, 3>& inwards, const Layers& layers
 inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face,
                             const Layers& layers) {
   const uint64_t in_part = i - i0_;
-  const glm::dvec3 stretch(scratch_.stretch[0][in_part], scratch_.stretch[1][in_part],
-                           scratch_.stretch[2][in_part]);
+  glm::dvec3 stretch(scratch_.stretch[0][in_part], scratch_.stretch[1][in_part],
+                     scratch_.stretch[2][in_part]);
   NodeSplat& node = out_.splats[count_];
   node.node = first_node_of_row_ + i;
   node.node_position = lattice_.position(at);
   node.on_block_face = on_face;
   node.behind_face = false;
   node.layers = 0;
+  node.lines = {};
+  if ((on_face || layers != Layers{}) && corrections_.lines) node.lines = linesOf(i, at, neighbours, layers);
   node.spacing = on_face ? lattice_.spacing(at, neighbours) : 0.0;
 
   glm::dmat3 jacobian;  // columns along i, j, k
@@ -376,7 +406,10 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       continue;
     }
     if (corrections_.border_codes) {
-      if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
+      if (a + b > 0) {
+        inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
+        stretch[axis] = stretchAtBorder(stretch[axis]);
+      }
       middle[axis] *= stretch[axis];
     } else {
       jacobian[axis] *= 2.0;
@@ -427,6 +460,13 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         node.regular = !frame.floored() && weight_factor == 1;
         node.border_code = borderCode(inwards, corrections_.faces && !frame.floored(), rotate);
         node.growth_code = frame.floored() ? kNoGrowth : growthCode(growth, rotate);
+        for (int axis = 0; axis < 3; ++axis) {
+          if (frame.floored()) node.lines[axis] = {};
+          if (!node.lines[axis].isThere()) continue;
+          glm::dvec3 inward(0.0);
+          inward[axis] = inwards[axis] != 0 ? inwards[axis] : layers[axis];
+          node.lines[axis].setInward(rotate(inward));
+        }
         (frame.floored()           ? out_.degenerate
          : frame.determinant() < 0 ? out_.left_handed
                                    : out_.right_handed) += 1;
@@ -475,6 +515,13 @@ double Window::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
 }
 
 }  // namespace
+
+const JointLine* NodeSplat::lineAlong(const glm::dvec3& inward) const {
+  constexpr double kSame = 0.9;  // cosine
+  for (const JointLine& line : lines)
+    if (line.isThere() && glm::dot(line.inward(), inward) > kSame) return &line;
+  return nullptr;
+}
 
 void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch, NodeSplats& out,
                        const NodeSplatCorrections& corrections) {

@@ -16,7 +16,7 @@
 // A splat is longer or shorter than the cell along each axis, by a factor near 1, so that uniform data looks
 // uniform where cells of different sizes meet (stretch.h). Its weight stays the volume of the cell, its slope
 // stays the scalar's gradient, and its middle stays; that of a half cell moves with the stretch, since its
-// border stays.
+// border stays, and it is stretched by less (joint_line.h).
 //
 // Where cells grow steadily along an axis the kernel is skewed (stream/model/growth_code.h).
 //
@@ -41,6 +41,7 @@
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/face_layers.h"
+#include "preprocess/splats/joint_line.h"
 #include "preprocess/splats/stretch.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
@@ -93,16 +94,21 @@ struct NodeSplat {
   // is none; the seams' tolerance. Elsewhere 0.
   double spacing = 0;
 
+  // Of the lattice's axes: across faces of the block that the node is on, or one away from.
+  std::array<JointLine, 3> lines{};
   // LayeredBorder's: layers behind faces that SeamMerger may find to be closed, where the code has several directions.
   uint8_t layers = 0;
   // No splat, but a FaceProbe of the node: node_position and spacing are of the face. See SeamMerger.
   bool is_probe = false;
 
   bool isForSeams() const { return on_block_face || behind_face || layers != 0; }
+  /// The line that leads along a direction of the splat's frame; null if there is none.
+  const JointLine* lineAlong(const glm::dvec3& inward) const;
   /// After keepUncovered() (covered_part.h), which has left a part of the cell that has this code.
   void becomePart(uint32_t code) {
     border_code = code;
     growth_code = kNoGrowth;
+    lines = {};
     regular = behind_face = false;
     layers = 0;
   }
@@ -149,9 +155,12 @@ struct NodeSplatCorrections {
   bool bends = true;    // of the scalar
   bool stretch = true;  // else splats are as long as their cells
   bool growth = true;   // else kernels are symmetric; takes stretch
+  bool lines = true;    // else cells at joints know their own block alone; takes growth
   bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
 
-  bool all() const { return border_codes && faces && layers && middles && bends && stretch && growth; }
+  bool all() const {
+    return border_codes && faces && layers && middles && bends && stretch && growth && lines;
+  }
 };
 
 /// What computeNodeSplats() needs for a while; keeps its capacity.

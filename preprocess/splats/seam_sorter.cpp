@@ -1,8 +1,11 @@
 #include "preprocess/splats/seam_sorter.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstring>
 #include <queue>
+#include <type_traits>
 #include <utility>
 
 #include "stream/base/check.h"
@@ -10,8 +13,11 @@
 namespace curvisplat {
 namespace {
 
-// A record: along, across, node, flags, growth code, the splat's 10 numbers, node position, spacing; 5 numbers a variable.
-constexpr size_t kNodeSize = 19;
+// A record: along, across, node, flags, growth code, the splat's 10 numbers, node position, spacing, lines; 5 numbers a
+// variable.
+constexpr size_t kLinesSize = (sizeof(NodeSplat::lines) + sizeof(double) - 1) / sizeof(double);
+constexpr size_t kNodeSize = 19 + kLinesSize;
+static_assert(std::is_trivially_copyable_v<decltype(NodeSplat::lines)>);
 constexpr size_t kScalarSize = 5;
 constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4, kProbe = 8;  // of the flags
 constexpr int kLayersShift = 8, kBorderCodeShift = 32;
@@ -89,6 +95,9 @@ void SeamSorter::pack(const SeamNode& node, std::span<const SplatScalar> values,
   put(s.position.x, s.position.y, s.position.z, s.axis[0], s.axis[1], s.axis[2]);
   put(s.shear[0], s.shear[1], s.shear[2], s.weight);
   put(n.node_position.x, n.node_position.y, n.node_position.z, n.spacing);
+  std::array<double, kLinesSize> lines{};
+  std::memcpy(lines.data(), n.lines.data(), sizeof(n.lines));
+  out.insert(out.end(), lines.begin(), lines.end());
   for (const SplatScalar& v : values) put(v.mean, v.slope.x, v.slope.y, v.slope.z, v.variance);
 }
 
@@ -116,6 +125,8 @@ void SeamSorter::unpack(const double* record, SeamNode& node, std::span<SplatSca
   n.splat.weight = get();
   n.node_position = get_vector();
   n.spacing = get();
+  std::memcpy(static_cast<void*>(n.lines.data()), record, sizeof(n.lines));
+  record += kLinesSize;
   for (SplatScalar& value : values) {
     value.mean = get();
     value.slope = get_vector();

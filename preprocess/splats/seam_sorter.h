@@ -27,7 +27,7 @@ class SeamSorter {
  public:
   using Visit = std::function<void(const SeamNode&, std::span<const SplatScalar>)>;
 
-  /// Keeps to `memory_bytes`, except that it holds a record (184 bytes with one variable) a run at least: 64
+  /// Keeps to `memory_bytes`, except that it holds a record (224 bytes with one variable) a run at least: 64
   /// MiB serve 10^11 nodes.
   SeamSorter(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder);
 

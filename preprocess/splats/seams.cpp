@@ -1,11 +1,13 @@
 #include "preprocess/splats/seams.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "preprocess/splats/coincidence_sweep.h"
+#include "preprocess/splats/joint_sides.h"
 #include "preprocess/splats/seam_sorter.h"
 
 namespace curvisplat {
@@ -29,12 +31,15 @@ class WaitingSplats {
     std::optional<SplatWithValues> waiting;
     uint64_t node = 0;
     uint32_t seams = 0;  // bit n: across axis n of the lattice
+    std::array<JointLine, 3> joined{};
     const auto release = [&] {
       if (waiting) {
         NodeSplat& splat = waiting->splat;
         const LayeredBorder left = withoutSeams({splat.border_code, splat.layers}, seams);
         splat.border_code = left.code;
         splat.layers = left.layers;
+        for (size_t axis = 0; axis < joined.size(); ++axis)
+          if ((seams >> axis & 1) != 0) goOnAcross(axis, joined[axis], splat, waiting->values);
         sink(splat, waiting->values);
       }
       waiting.reset();
@@ -43,10 +48,12 @@ class WaitingSplats {
     sorter_.drain([&](const SeamNode& next, std::span<const SplatScalar> values) {
       if (next.splat.node != node) release();
       node = next.splat.node;
-      if (next.splat.is_probe)
+      if (next.splat.is_probe) {
         seams |= 1u << next.splat.layers;
-      else
+        joined[next.splat.layers] = next.splat.lines[next.splat.layers];
+      } else {
         waiting = SplatWithValues{next.splat, {values.begin(), values.end()}};
+      }
     });
     release();
   }

@@ -59,7 +59,8 @@ class LineEnd {
 
 }  // namespace
 
-Stretch stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before, int after) {
+SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before,
+                             int after) {
   before = std::min(before, kStretchReach);
   after = std::min(after, kStretchReach);
   if (before + after == 0) return {};
@@ -77,7 +78,7 @@ Stretch stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride
   };
   const double before2 = extent(-2, extent), near_before = extent(-1, extent);
   const double near_after = extent(1, extent), after2 = extent(2, extent);
-  return stretchOf(before2, near_before, extent(0, extent), near_after, after2);
+  return {before2, near_before, extent(0, extent), near_after, after2};
 }
 
 }  // namespace curvisplat

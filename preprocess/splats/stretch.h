@@ -36,6 +36,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -120,12 +121,20 @@ struct StretchRow {
 };
 
 /// Of `count` nodes that follow `at` in memory, along the axis of `stride`. Each has three neighbours on either side. The same
-/// bits as stretchOnLine() would give. Any thread; never allocates.
+/// bits as stretchOf(extentsOnLine()) would give. Any thread; never allocates.
 void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count,
                   const StretchRow& out);
 
-/// Of the node `at`, which has `before` neighbours in a row on one side and `after` on the other; more than
-/// kStretchReach count as kStretchReach.
-Stretch stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before, int after);
+/// Twice the extents, squared, of five cells in a row.
+using SquaredExtents = std::array<double, 5>;
+
+/// Around the node `at`, which has `before` neighbours in a row on one side and `after` on the other; more than kStretchReach
+/// count as kStretchReach. All zero if it has none.
+SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before,
+                             int after);
+
+inline Stretch stretchOf(const SquaredExtents& e) {
+  return stretchOf(e[0], e[1], e[2], e[3], e[4]);
+}
 
 }  // namespace curvisplat

@@ -306,6 +306,22 @@ TEST_F(Corrections, SeamsOfUnlikeBlocks) {
   expectWorth("seams of unlike blocks", {source, GridField(source, 0), "smooth", camera}, 56, {}, without);
 }
 
+TEST_F(Corrections, JointsOfUnlikeBlocks) {
+  // Blocks of cells 1 and 2 wide, seen along their joint.
+  const FunctionGridSource source({gridBlock(25, 9, 9), gridBlock(13, 9, 9)}, 1, [](const GridNode& node) {
+    const double x = node.block == 0 ? static_cast<double>(node.i) - 24 : 2 * static_cast<double>(node.i);
+    return NodeValues{{x / 16, static_cast<double>(node.j) / 8, static_cast<double>(node.k) / 8}, {0.5f}};
+  });
+  DirectOptions without;
+  without.nodes.lines = false;
+  Camera camera = edgeOnCamera();
+  camera.focal_point = {0, 0.5, 0.5};
+  camera.position = {0, 0.5, 10};
+  camera.view_up = {0, 1, 0};
+  camera.parallel_scale = 0.3;  // no borders
+  expectWorth("joints of unlike blocks", {source, GridField(source, 0), "smooth", camera}, 58, {}, without);
+}
+
 TEST_F(Corrections, SpreadOfMergedShapes) {
   // Along the voxels of a uniform medium: where they do not add up to one, a lattice shows.
   const auto constant = scene("half-annulus-constant");

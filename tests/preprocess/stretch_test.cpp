@@ -28,8 +28,8 @@ struct Line {
 
   NodePositions nodes() const { return {x.data(), zero.data(), zero.data()}; }
   Stretch at(size_t n) const {
-    return stretchOnLine(nodes(), static_cast<ptrdiff_t>(n), 1, static_cast<int>(n),
-                         static_cast<int>(x.size() - 1 - n));
+    return stretchOf(extentsOnLine(nodes(), static_cast<ptrdiff_t>(n), 1, static_cast<int>(n),
+                                   static_cast<int>(x.size() - 1 - n)));
   }
   float stretch(size_t n) const { return at(n).factor; }
 };
@@ -180,7 +180,7 @@ TEST(Stretch, OfARowIsThatOfItsNodes) {
       const ptrdiff_t at = first + static_cast<ptrdiff_t>(n);
       const auto before = static_cast<int>(at / stride),
                  after = static_cast<int>((static_cast<ptrdiff_t>(x.size()) - 1 - at) / stride);
-      const Stretch alone = stretchOnLine(nodes, at, stride, before, after);
+      const Stretch alone = stretchOf(extentsOnLine(nodes, at, stride, before, after));
       EXPECT_EQ(row[n], alone.factor) << stride << " " << n;
       EXPECT_EQ(growth[n], alone.growth) << stride << " " << n;
       EXPECT_EQ(drift[n], alone.drift) << stride << " " << n;
