@@ -10,9 +10,10 @@
 namespace curvisplat {
 
 uint32_t FootprintSkew::pack() const {
+  constexpr float kShift = 0x1.8p23f;  // rounds as std::nearbyint(), which is a call
   uint32_t skew = 0;
   for (size_t n = 0; n < 4; ++n) {
-    const float steps = std::nearbyint(std::clamp(t[n] * (1 / kSkewStep), -127.0f, 127.0f));
+    const float steps = (std::clamp(t[n] * (1 / kSkewStep), -127.0f, 127.0f) + kShift) - kShift;
     skew |= static_cast<uint32_t>(static_cast<uint8_t>(static_cast<int>(steps))) << 8 * n;
   }
   return skew;

@@ -85,6 +85,27 @@ glm::dquat rotationOfAll(Steps& steps) {
   return rotation.w < 0 ? -rotation : rotation;
 }
 
+/// The axes of every rotation that codes have: 144 KiB, for the root and the divisions that a rotation takes.
+class RotatedAxes {
+ public:
+  RotatedAxes() {
+    for (uint32_t rotation = 0; rotation < axes_.size(); ++rotation) {
+      glm::vec3 q;
+      for (int n = 0; n < 3; ++n)
+        q[n] = static_cast<float>(signedBits(rotation, n * kRotationBits, kRotationBits) * kRotationStep);
+      const float w = std::sqrt(std::max(0.0f, 1 - glm::dot(q, q)));
+      const glm::mat3 frame = glm::mat3_cast(glm::normalize(glm::quat(w, q.x, q.y, q.z)));
+      axes_[rotation] = {frame[0], frame[1], frame[2]};
+    }
+  }
+  const std::array<glm::vec3, 3>& of(uint32_t growth_code) const {
+    return axes_[growth_code >> kRotationShift & (axes_.size() - 1)];
+  }
+
+ private:
+  std::array<std::array<glm::vec3, 3>, 1 << 3 * kRotationBits> axes_;
+};
+
 }  // namespace
 
 uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> growth) {
@@ -115,17 +136,12 @@ uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> gr
 }
 
 CellGrowth cellGrowth(uint32_t growth_code) {
+  static const RotatedAxes axes;
   CellGrowth result;
-  glm::vec3 q;
-  for (int n = 0; n < 3; ++n) {
+  for (int n = 0; n < 3; ++n)
     result.growth[n] =
-        static_cast<float>(signedBits(growth_code, n * kGrowthBits, kGrowthBits) / kGrowthSteps);
-    q[n] = static_cast<float>(signedBits(growth_code, kRotationShift + n * kRotationBits, kRotationBits) *
-                              kRotationStep);
-  }
-  const float w = std::sqrt(std::max(0.0f, 1 - glm::dot(q, q)));
-  const glm::mat3 frame = glm::mat3_cast(glm::normalize(glm::quat(w, q.x, q.y, q.z)));
-  result.axis = {frame[0], frame[1], frame[2]};
+        static_cast<float>(signedBits(growth_code, n * kGrowthBits, kGrowthBits) * (1 / kGrowthSteps));
+  result.axis = axes.of(growth_code);
   return result;
 }
 
