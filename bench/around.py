@@ -6,7 +6,7 @@
 Grids and caches are made in FOLDER and reused. Variants of one picture take turns, round after round, as orbits of --frames
 frames; a ratio is the median over the rounds of a variant's processor time a frame over the plain picture's in the same
 round. What the process takes to start is measured by an orbit of one frame and left out. What the body hides is counted in
-one picture of a fresh process. Behind each ratio: what it may be at most.
+one picture of a fresh process. Behind each ratio: what it may be at most. Frames of quads are timed on the wall, too.
 """
 import argparse
 import json
@@ -40,7 +40,9 @@ def processor_seconds(command):
 
 
 def processor_seconds_of_frame(command, frames):
-    return (processor_seconds([*command, "--frames", str(frames + 1)]) - processor_seconds([*command, "--frames", "1"])) / frames
+    """The run of several frames is the last."""
+    first = processor_seconds([*command, "--frames", "1"])
+    return (processor_seconds([*command, "--frames", str(frames + 1)]) - first) / frames
 
 
 def counts(program, cache, folder, options):
@@ -105,15 +107,20 @@ def main():
     for count in ("bytes_read", "splats_drawn"):
         plain, behind = (counted[name][count] for name in ("plain", "opaque body"))
         print(f"{'opaque body':16} {count.replace('_', ' ')}: {behind} of {plain}")
+    stats = folder / "stats.json"
     command = [program, "render", plate, "-o", folder / "b_%02d.pfm", "--size", pixels, "--surface", "kmax", "--volume", "off",
-               "--orbit", "40"]
+               "--orbit", "40", "--threads", "2"]
     sides = (int(quads.split("x")[0]) - 1) ** 2
     for what, options in (("", []), (", by a scalar", ["--surface-by", "f"]), (", finest", ["--lod-pixels", "0"]),
                           (", finest, by a scalar", ["--lod-pixels", "0", "--surface-by", "f"])):
-        times = [1000 * processor_seconds_of_frame([*command, *options], 4 * arguments.frames)
-                 for _ in range(arguments.rounds)]
+        times, totals = [], []
+        for _ in range(arguments.rounds):
+            times.append(1000 * processor_seconds_of_frame([*command, *options, "--stats", stats], 4 * arguments.frames))
+            further = json.loads(stats.read_text())["frames"][1:]
+            totals.append(1000 * statistics.median(frame["seconds"]["total"] for frame in further))
         print(f"{sides} quads{what}: {statistics.median(times):.0f} ms of processor time a frame ({min(times):.0f} to "
-              f"{max(times):.0f}; at most 100, which two cores do in 50)")
+              f"{max(times):.0f}); {statistics.median(totals):.0f} ms from its beginning to its end on two threads "
+              f"({min(totals):.0f} to {max(totals):.0f}; at most 50 where two cores are idle)")
 
 
 if __name__ == "__main__":

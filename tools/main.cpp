@@ -109,6 +109,18 @@ std::string describe(const CLI::App& app, const CLI::App* command, const CLI::Pa
   return text;
 }
 
+/// CLI11 takes --shade=2 for --shade. A flag that has a value by itself, as --sphere=6371 has one, keeps it.
+void refuseValuesOfFlags(CLI::App& app) {
+  for (CLI::Option* option : app.get_options([](const CLI::Option* each) {
+         return each->get_expected_max() == 0 && each->get_fnames().empty();
+       }))
+    option->check([](const std::string& value) {
+      const bool is_switch = value == "true" || value == "false";
+      return is_switch ? std::string() : fmt::format("takes no value (found '{}')", value);
+    });
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) refuseValuesOfFlags(*command);
+}
+
 /// Reports a failure, as one rank for all where there are several.
 int fail(const std::string& line, int status) {
   endRanksAfter(line, status);
@@ -133,6 +145,7 @@ int run(int argc, char** argv) {
   addColormaps(app);
   addExport(app);
   addManual(app);
+  refuseValuesOfFlags(app);
 
   try {
     app.parse(argc, argv);

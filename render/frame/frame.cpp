@@ -30,6 +30,7 @@ struct FrameRenderer::State {
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress) {
     statistics = {};
+    pipeline.setAside(0, options);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan =
         timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options, pipeline.order()); });
@@ -45,14 +46,17 @@ struct FrameRenderer::State {
     FrameOptions clear = options;
     clear.background = glm::vec4(0.0f);
     statistics = {};
+    // Where the memory has room for both painters, the second draws of the bricks that the first has decoded.
+    const bool beside = pipeline.backend().isSoftware() &&
+                        pipeline.setAside(valueBytes(clear.size, {.threads = clear.threads}), clear);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan =
         timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear, pipeline.order()); });
     if (options.ranks) planner.share(plan, clear);
     pipeline.drawLayers(plan, clear, statistics);
     Image image = pipeline.draw(plan, clear, statistics, progress);
-    pipeline.release();
-    Image painted = paintValues(camera, clear, plan, image, progress);
+    if (!beside) pipeline.release();
+    Image painted = paintValues(camera, clear, {plan, image, beside}, progress);
     if (options.ranks) {
       joinTiles(image, plan.shared->owners, *options.ranks);
       joinTiles(painted, plan.shared->owners, *options.ranks);
@@ -74,17 +78,22 @@ struct FrameRenderer::State {
     return view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
   }
 
-  /// Of the plan's picture.
-  Image paintValues(const Camera& camera, const FrameOptions& options, const FramePlan& drawn,
-                    const Image& picture, Progress* progress) const {
+  struct Drawn {
+    const FramePlan& plan;
+    const Image& picture;
+    bool beside;  // the pipeline has room for the values' painter
+  };
+  Image paintValues(const Camera& camera, const FrameOptions& options, const Drawn& drawn,
+                    Progress* progress) {
     FramePlan plan = planner.plan(camera, options, DrawingOrder::kFrontToBack);
     if (options.ranks) planner.share(plan, options);
-    if (drawn.layers) planner.addLayers(plan, drawn.layers, options);
-    const PixelLayers all = everywhere(picture.size, depthOrigin(drawn));
+    if (drawn.plan.layers) planner.addLayers(plan, drawn.plan.layers, options);
+    const PixelLayers all = everywhere(drawn.picture.size, depthOrigin(drawn.plan));
     plan.settings.layers = &all;
-    const ValueInputs inputs{picture, drawn.layers.get(), plan.settings.view};
-    FramePipeline values(cache, scalars, planner, makeValueBackend(inputs));
+    const ValueInputs inputs{drawn.picture, drawn.plan.layers.get(), plan.settings.view};
     FrameStatistics ignored;
+    if (drawn.beside) return pipeline.drawBy(*makeValueBackend(inputs), plan, options, ignored, progress);
+    FramePipeline values(cache, scalars, planner, makeValueBackend(inputs));
     return values.draw(plan, options, ignored, progress);
   }
 

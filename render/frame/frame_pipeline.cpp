@@ -135,27 +135,32 @@ FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scala
       variable_(scalars.opacity.variable),
       coloured_by_(scalars.colour ? std::optional(scalars.colour->variable) : std::nullopt),
       planner_(planner),
-      backend_(std::move(backend)) {}
+      backend_(std::move(backend)),
+      painting_(backend_.get()) {}
 
 FramePipeline::~FramePipeline() {
   endPrefetch();
+}
+
+FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
+  const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
+  const FrameBudget::Fixed fixed{planner_.bytes(),
+                                 least_pager_bytes_,
+                                 backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options) +
+                                     exchange_bytes + aside_bytes_,
+                                 options.output_bytes,
+                                 planner_.mostSplats(),
+                                 options.size,
+                                 cache_.series().steps.size() > 1,
+                                 coloured_by_.has_value()};
+  return FrameBudget::of(options.memory_bytes, fixed, options.threads);
 }
 
 void FramePipeline::makePools(const FrameOptions& options) {
   // Steps differ in this; the pools stay.
   least_pager_bytes_ =
       std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, {variable_, coloured_by_}));
-  const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
-  const FrameBudget::Fixed fixed{
-      planner_.bytes(),
-      least_pager_bytes_,
-      backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options) + exchange_bytes,
-      options.output_bytes,
-      planner_.mostSplats(),
-      options.size,
-      cache_.series().steps.size() > 1,
-      coloured_by_.has_value()};
-  const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
+  const FrameBudget budget = budgetOf(options);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
   pager.way = options.read_by;
@@ -168,6 +173,30 @@ void FramePipeline::makePools(const FrameOptions& options) {
                                        backend_->splatMemory(budget.ring_splats));
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
+}
+
+bool FramePipeline::setAside(uint64_t bytes, const FrameOptions& options) {
+  aside_bytes_ = bytes;
+  if (bytes == 0) return true;
+  try {
+    least_pager_bytes_ =
+        std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, {variable_, coloured_by_}));
+    budgetOf(options);
+    return true;
+  } catch (const UsageError&) {
+    aside_bytes_ = 0;
+    return false;
+  }
+}
+
+Image FramePipeline::drawBy(PaintingBackend& painter, const FramePlan& plan, const FrameOptions& options,
+                            FrameStatistics& statistics, Progress* progress) {
+  struct Returned {
+    FramePipeline& pipeline;
+    ~Returned() { pipeline.painting_ = pipeline.backend_.get(); }
+  } const returned{*this};
+  painting_ = &painter;
+  return draw(plan, options, statistics, progress);
 }
 
 void FramePipeline::release() {
@@ -440,7 +469,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
                            const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
   Image image;
-  backend_->run([&](Painter& painter) {
+  painting_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
     painter.begin(
         plan.settings.view.size, options.background, planner_.table(),

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "render/frame/backend.h"
+#include "render/frame/frame_budget.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_plan.h"
 #include "render/frame/frame_regions.h"
@@ -56,6 +57,12 @@ class FramePipeline {
   /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
              Progress* progress);
+  /// Frames leave `bytes` of the memory to a further painter, for drawBy(), until it is called again. False, and they leave
+  /// nothing, if the memory is too little for that.
+  bool setAside(uint64_t bytes, const FrameOptions& options);
+  /// draw() by that painter, on the processor: of the bricks that are kept, in the same memory.
+  Image drawBy(PaintingBackend& painter, const FramePlan& plan, const FrameOptions& options,
+               FrameStatistics& statistics, Progress* progress);
   /// Draws the surfaces, slices and isosurfaces of options.scene, if there is one, and puts them into the plan as its layers.
   /// Before draw(), and as draw().
   void drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
@@ -70,7 +77,7 @@ class FramePipeline {
   void stepChanged();
 
   /// The order in which plans must list their parts.
-  DrawingOrder order() const { return backend_->order(); }
+  DrawingOrder order() const { return painting_->order(); }
   const PaintingBackend& backend() const { return *backend_; }
 
  private:
@@ -91,6 +98,7 @@ class FramePipeline {
   void beginExchange(const FramePlan& plan, const FrameOptions& options);
   uint64_t exchangeBytes(const FrameOptions& options) const;
   void stopStages();
+  FrameBudget budgetOf(const FrameOptions& options) const;
   void makePools(const FrameOptions& options);
   void dropPools();
   Image paint(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
@@ -101,6 +109,8 @@ class FramePipeline {
   const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
   const std::unique_ptr<PaintingBackend> backend_;
+  PaintingBackend* painting_;  // backend_, except in drawBy()
+  uint64_t aside_bytes_ = 0;
   HiddenBricks hidden_;
   FaceMeshes face_meshes_;
   ScreenVertices surface_memory_;            // of the last picture's surfaces, for the next one's

@@ -321,11 +321,7 @@ class ValueBackend final : public PaintingBackend {
   const std::string& name() const override { return name_; }
   bool isSoftware() const override { return true; }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
-    const unsigned threads =
-        resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
-    constexpr uint64_t kLayer = sizeof(PixelLayer) + sizeof(uint32_t);  // everywhere()'s
-    return TileSet::tilesOf(size) * (sizeof(HalfTile) + sizeof(FoundTile)) + size.pixels() * kLayer +
-           SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, threads);
+    return valueBytes(size, resources);
   }
 
  private:
@@ -343,6 +339,14 @@ PixelLayers everywhere(ImageSize size, double depth_origin) {
       row.endPixel(row.layers.size() - 1);
     }
   return {size, std::move(rows), depth_origin};
+}
+
+uint64_t valueBytes(ImageSize size, const PaintResources& resources) {
+  const unsigned threads =
+      resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
+  constexpr uint64_t kLayer = sizeof(PixelLayer) + sizeof(uint32_t);  // everywhere()'s
+  return TileSet::tilesOf(size) * (sizeof(HalfTile) + sizeof(FoundTile)) + size.pixels() * kLayer +
+         SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, threads);
 }
 
 std::unique_ptr<PaintingBackend> makeValueBackend(const ValueInputs& inputs) {

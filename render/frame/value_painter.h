@@ -23,6 +23,9 @@ struct ValueInputs {
 /// Layers that make all splats have ScreenDepths.
 PixelLayers everywhere(ImageSize size, double depth_origin);
 
+/// What its backend takes, and the layers everywhere.
+uint64_t valueBytes(ImageSize size, const PaintResources& resources);
+
 /// end() returns an image as pixelValuesOf() takes it.
 std::unique_ptr<PaintingBackend> makeValueBackend(const ValueInputs& inputs);
 

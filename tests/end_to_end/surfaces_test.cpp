@@ -232,6 +232,7 @@ TEST_F(SurfaceOptions, RefusesWrongUsage) {
       {{"--volume", "off"},
        2,
        "--volume off leaves nothing to draw; give a --slice, a --surface or an --iso"},
+      {{"--volume", "off", "--shade=2"}, 2, "--shade: takes no value (found '2')"},
       {{"--volume", "maybe"}, 2, "--volume maybe: expected on or off"},
       {{"--surface-colour", "#ff0000"}, 2, "--surface-colour needs a surface: --surface FILE"},
       {{"--surface", sphere, "--surface-colour", "red"}, 2, "--surface-colour red: expected white, black"},

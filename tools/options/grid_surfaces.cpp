@@ -47,6 +47,10 @@ std::string whatThereIs(const FacesReader& faces) {
   return text;
 }
 
+uint64_t lastIndexOf(const BlockInfo& block, int axis) {
+  return (axis == 0 ? block.ni : axis == 1 ? block.nj : block.nk) - 1;
+}
+
 class FaceFinder {
  public:
   FaceFinder(const FacesReader& faces, const Manifest& manifest, GridSurface& surface)
@@ -90,9 +94,7 @@ class FaceFinder {
   }
 
   uint64_t lastOf(const GridFace& face) const {
-    if (face.block >= manifest_.blocks.size()) return 0;
-    const BlockInfo& block = manifest_.blocks[face.block];
-    return (face.axis == 0 ? block.ni : face.axis == 1 ? block.nj : block.nk) - 1;
+    return face.block < manifest_.blocks.size() ? lastIndexOf(manifest_.blocks[face.block], face.axis) : 0;
   }
 
   void addFace(uint32_t number, const FaceName& name) {
@@ -131,21 +133,49 @@ bool lacksBlock(const FaceName& name, const Manifest& manifest) {
   return name.block && *name.block >= manifest.blocks.size();
 }
 
-/// Whether a conversion can keep this plane: some block of the name reaches so far.
-bool canBeKept(const FaceName& name, const Manifest& manifest) {
-  if (name.at != FaceName::At::kIndex) return false;
-  for (uint32_t n = 0; n < manifest.blocks.size(); ++n) {
-    const BlockInfo& block = manifest.blocks[n];
-    const uint64_t nodes = name.axis == 0 ? block.ni : name.axis == 1 ? block.nj : block.nk;
-    if (name.block.value_or(n) == n && name.index < nodes) return true;
+/// The last index along an axis, and the block that has it: the name's, or the one that reaches farthest.
+struct Reach {
+  uint64_t last = 0;
+  size_t block = 0;
+};
+
+Reach reachOf(const FaceName& name, int axis, const Manifest& manifest) {
+  Reach reach;
+  for (size_t n = 0; n < manifest.blocks.size(); ++n) {
+    if (name.block.value_or(n) != n) continue;
+    const uint64_t last = lastIndexOf(manifest.blocks[n], axis);
+    if (last > reach.last) reach = {last, n};
   }
-  return false;
+  return reach;
 }
 
-/// What is wrong with a name that no face has: a block that there is not, or a letter.
+/// Whether a conversion can keep this plane: some block of the name reaches so far.
+bool canBeKept(const FaceName& name, const Manifest& manifest) {
+  return name.at == FaceName::At::kIndex && !lacksBlock(name, manifest) &&
+         name.index <= reachOf(name, name.axis, manifest).last;
+}
+
+/// How far the grid goes, where an index of the name is beyond it.
+std::string beyondOf(const FaceName& name, const Manifest& manifest) {
+  const auto textOf = [&](int axis) {
+    const Reach reach = reachOf(name, axis, manifest);
+    const bool is_farthest = !name.block && manifest.blocks.size() > 1;
+    return fmt::format(" ({} goes from 0 to {} in block {}{})", "ijk"[axis], reach.last, reach.block + 1,
+                       is_farthest ? ", and no farther in the others" : "");
+  };
+  if (name.at == FaceName::At::kIndex && !canBeKept(name, manifest)) return textOf(name.axis);
+  for (int axis = 0; axis < 3; ++axis)
+    if (const auto& range = name.ranges[static_cast<size_t>(axis)])
+      if (range->first >= reachOf(name, axis, manifest).last) return textOf(axis);
+  return "";
+}
+
+/// What is wrong with a name that no face has: a block that there is not, an index beyond the grid, or a letter.
 std::string meantBy(const std::string& word, const Manifest& manifest, const FacesReader& faces) {
   const auto name = parseFaceName(word);
   const size_t blocks = manifest.blocks.size();
+  if (name && !lacksBlock(*name, manifest))
+    if (const std::string beyond = beyondOf(*name, manifest); !beyond.empty()) return beyond;
   if (word.starts_with("block") && (!name || name->at != FaceName::At::kIndex || lacksBlock(*name, manifest)))
     return blocks == 1 ? " (the grid has one block, block 1)"
                        : fmt::format(" (the grid has blocks 1 to {})", blocks);

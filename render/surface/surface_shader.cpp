@@ -1,0 +1,165 @@
+#include "render/surface/surface_shader.h"
+
+#include <algorithm>
+#include <array>
+#include <cfloat>
+#include <cmath>
+
+namespace curvisplat {
+
+SurfaceShader::SurfaceShader(const SceneTriangles& triangles, const Tables& tables,
+                             const std::optional<Light>& light)
+    : triangles_(triangles), tables_(tables), light_(light, triangles.view()) {
+  for (const Surface& surface : triangles.scene().surfaces) {
+    has_scalars_ = has_scalars_ || (surface.by_scalar && !surface.mesh->scalars.empty());
+    has_others_ = has_others_ || (surface.opacity.by_function && !surface.mesh->opacity_scalars.empty());
+  }
+}
+
+/// Of the triangles of spots.
+struct SurfaceShader::Corners {
+  using Row = std::array<float, kAtOnce>;
+  alignas(64) Row at_x, at_y;  // the spots
+  std::array<Row, 3> x, y, value;
+  std::array<Row, 3> normal_x, normal_y, normal_z;
+  std::array<Row, 3> scalar, other;  // NaN: none
+};
+
+/// What they make together at the spots.
+struct SurfaceShader::Mixed {
+  using Row = std::array<float, kAtOnce>;
+  alignas(64) Row normal_x, normal_y, normal_z;
+  Row scalar, other;
+};
+
+void SurfaceShader::gather(std::span<const Spot> spots, Corners& out) const {
+  const auto take = [&](const std::vector<float>& from, const std::array<uint32_t, 3>& corners, size_t n,
+                        std::array<Corners::Row, 3>& to) {
+    for (size_t c = 0; c < 3; ++c) to[c][n] = from.empty() ? NAN : from[corners[c]];
+  };
+  for (size_t n = 0; n < spots.size(); ++n) {
+    const auto [number, triangle] = triangles_.placeOf(spots[n].number);
+    const Surface& surface = triangles_.scene().surfaces[number];
+    const TriangleMesh& mesh = *surface.mesh;
+    const auto& corners = mesh.triangles[triangle];
+    const std::vector<ScreenVertex>& vertices = triangles_.verticesOf(number);
+    out.at_x[n] = spots[n].x;
+    out.at_y[n] = spots[n].y;
+    for (size_t c = 0; c < 3; ++c) {
+      const ScreenVertex& vertex = vertices[corners[c]];
+      const glm::vec3& normal = mesh.normals[corners[c]];
+      out.x[c][n] = vertex.x;
+      out.y[c][n] = vertex.y;
+      out.value[c][n] = vertex.value;
+      out.normal_x[c][n] = normal.x;
+      out.normal_y[c][n] = normal.y;
+      out.normal_z[c][n] = normal.z;
+    }
+    static const std::vector<float> kNone;
+    if (has_scalars_) take(surface.by_scalar ? mesh.scalars : kNone, corners, n, out.scalar);
+    if (has_others_) take(mesh.opacity_scalars, corners, n, out.other);
+  }
+}
+
+template <bool kPerspective>
+void SurfaceShader::mix(const Corners& __restrict c, size_t count, Mixed& __restrict out) {
+  for (size_t n = 0; n < count; ++n) {
+    const float x = c.at_x[n], y = c.at_y[n];
+    const auto cross = [&](size_t a, size_t b) {
+      return (c.x[a][n] - x) * (c.y[b][n] - y) - (c.y[a][n] - y) * (c.x[b][n] - x);
+    };
+    float a = cross(1, 2), b = cross(2, 0), d = cross(0, 1);
+    const float sign = a + b + d < 0 ? -1.0f : 1.0f;
+    a = std::max(sign * a, 0.0f);
+    b = std::max(sign * b, 0.0f);
+    d = std::max(sign * d, 0.0f);
+    if constexpr (kPerspective) {
+      a *= -c.value[0][n];
+      b *= -c.value[1][n];
+      d *= -c.value[2][n];
+    }
+    const float sum = a + b + d;
+    const bool known = (sum > 0) & (std::abs(sum) <= FLT_MAX);
+    a = known ? a / sum : 1.0f / 3;
+    b = known ? b / sum : 1.0f / 3;
+    d = known ? d / sum : 1.0f / 3;
+    // Normals are of either side: those on the first one's.
+    const auto sideOf = [&](size_t corner) {
+      return c.normal_x[corner][n] * c.normal_x[0][n] + c.normal_y[corner][n] * c.normal_y[0][n] +
+                         c.normal_z[corner][n] * c.normal_z[0][n] <
+                     0
+                 ? -1.0f
+                 : 1.0f;
+    };
+    const float side1 = sideOf(1), side2 = sideOf(2);
+    const auto mean = [&](const std::array<Corners::Row, 3>& of) {
+      return a * of[0][n] + b * (side1 * of[1][n]) + d * (side2 * of[2][n]);
+    };
+    out.normal_x[n] = mean(c.normal_x);
+    out.normal_y[n] = mean(c.normal_y);
+    out.normal_z[n] = mean(c.normal_z);
+    out.scalar[n] = a * c.scalar[0][n] + b * c.scalar[1][n] + d * c.scalar[2][n];
+    out.other[n] = a * c.other[0][n] + b * c.other[1][n] + d * c.other[2][n];
+  }
+}
+
+void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> points) const {
+  Corners corners;
+  const auto clear = [](std::array<Corners::Row, 3>& rows) {
+    for (Corners::Row& row : rows) row.fill(NAN);
+  };
+  if (!has_scalars_) clear(corners.scalar);
+  if (!has_others_) clear(corners.other);
+  gather(spots, corners);
+  Mixed mixed;
+  if (triangles_.view().projection == Projection::kPerspective)
+    mix<true>(corners, spots.size(), mixed);
+  else
+    mix<false>(corners, spots.size(), mixed);
+  for (size_t n = 0; n < spots.size(); ++n) {
+    const Surface& surface = triangles_.scene().surfaces[triangles_.placeOf(spots[n].number).surface];
+    Point& point = points[n];
+    point.normal = {mixed.normal_x[n], mixed.normal_y[n], mixed.normal_z[n]};
+    point.opacity = static_cast<float>(surface.opacity.factor);
+    const ColourTable& colours = surface.colours ? *surface.colours : tables_.colours;
+    const float scalar = mixed.scalar[n];
+    point.colour = std::isnan(scalar) ? surface.colour : colours.at(double{scalar});
+    if (!surface.opacity.by_function) continue;
+    const bool has_other = !surface.mesh->opacity_scalars.empty() && tables_.opacities;
+    const float of_opacity = has_other ? mixed.other[n] : scalar;
+    if (!std::isnan(of_opacity))
+      point.opacity *= (has_other ? *tables_.opacities : colours).opacityAt(double{of_opacity});
+  }
+}
+
+void SurfaceShader::shade(std::span<const Spot> spots, std::span<Point> points) const {
+  for (size_t begin = 0; begin < spots.size(); begin += kAtOnce) {
+    const size_t count = std::min(kAtOnce, spots.size() - begin);
+    shadeBlock(spots.subspan(begin, count), points.subspan(begin, count));
+  }
+}
+
+bool SurfaceShader::meet(uint32_t a, uint32_t b) const {
+  const auto [surface, triangle] = triangles_.placeOf(a);
+  const auto [other_surface, other_triangle] = triangles_.placeOf(b);
+  if (surface != other_surface) return false;
+  const TriangleMesh& mesh = *triangles_.scene().surfaces[surface].mesh;
+  const auto &x = mesh.triangles[triangle], &y = mesh.triangles[other_triangle];
+  bool any = false;
+  for (size_t n = 0; n < 3; ++n) any |= (x[n] == y[0]) | (x[n] == y[1]) | (x[n] == y[2]);
+  return any;
+}
+
+float SurfaceShader::steepness(uint32_t number) const {
+  const auto [surface, triangle] = triangles_.placeOf(number);
+  const auto& corners = triangles_.scene().surfaces[surface].mesh->triangles[triangle];
+  const ScreenVertex &a = triangles_.vertex(surface, corners[0]), &b = triangles_.vertex(surface, corners[1]),
+                     &c = triangles_.vertex(surface, corners[2]);
+  const float area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  const float by_x = (b.value - a.value) * (c.y - a.y) - (c.value - a.value) * (b.y - a.y);
+  const float by_y = (c.value - a.value) * (b.x - a.x) - (b.value - a.value) * (c.x - a.x);
+  const float steep = (std::abs(by_x) + std::abs(by_y)) / std::abs(area);
+  return std::isfinite(steep) ? steep : 1e30f;
+}
+
+}  // namespace curvisplat
