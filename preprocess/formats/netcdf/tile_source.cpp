@@ -60,8 +60,9 @@ void TileSource::add(uint32_t number, std::unique_ptr<NetcdfSource> tile) {
     throw Error("{}: has {} faces in one file; give it alone", file, own.blocks.size());
   if (!tile->placesColumns())
     throw Error(
-        "{}: is one of several tiles, but has no longitude and latitude of each column; give the files that "
-        "have them, too (FV3's grid_lont and grid_latt, in grid_spec.tile{}.nc)",
+        "{0}: is one of several tiles, but has no longitude and latitude of each column; give the files that "
+        "have them, too (FV3's grid_lont and grid_latt, in grid_spec.tile{1}.nc, or x and y, in "
+        "C96_grid.tile{1}.nc)",
         file, number);
   GridBlock block = own.blocks[0];
   block.name = fmt::format("tile {}", number);

@@ -1,6 +1,6 @@
 // A grid whose faces are in files of their own, as FV3 and FMS write a cubed sphere: NAME.tile1.nc to NAME.tile6.nc,
 // with the coordinates (grid_lont and grid_latt, or the corners grid_lon and grid_lat) in the same files or in others
-// (grid_spec.tile1.nc ...). Files whose names have no number belong to every tile.
+// (grid_spec.tile1.nc ..., or supergrids, supergrid.h). Files whose names have no number belong to every tile.
 #pragma once
 
 #include <cstdint>
