@@ -62,8 +62,9 @@ std::vector<std::filesystem::path> withGridsOfMosaics(const std::vector<std::fil
       const std::filesystem::path grid = mosaic.parent_path() / std::filesystem::path(name).filename();
       std::error_code unreadable;
       if (!std::filesystem::is_regular_file(grid, unreadable))
-        throw Error("{}: names the grid file {}, which is not beside it; put it there, or leave the mosaic out",
-                    mosaic.string(), grid.filename().string());
+        throw Error(
+            "{}: names the grid file {}, which is not beside it; put it there, or leave the mosaic out",
+            mosaic.string(), grid.filename().string());
       const bool given = std::any_of(all.begin(), all.end(), [&](const std::filesystem::path& one) {
         std::error_code error;
         return std::filesystem::equivalent(one, grid, error);
