@@ -53,7 +53,7 @@ class FormatMemory(StructuredFormats):
         return grid, function
 
     def test_plot3d(self):
-        self.expect_within("PLOT3D, grid and functions", *self.write_plot3d(), scalar="f1")
+        self.expect_within("PLOT3D, grid and functions", *self.write_plot3d(), scalar="1")
 
     def test_vtk(self):
         for name, mode in (("appended, raw", "Appended"), ("zlib, base64", "Binary"), ("ASCII", "Ascii")):

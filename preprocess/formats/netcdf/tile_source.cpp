@@ -89,24 +89,28 @@ void TileSource::add(uint32_t number, std::unique_ptr<NetcdfSource> tile) {
     description_.coordinate_bytes = std::max(description_.coordinate_bytes, own.coordinate_bytes);
     description_.blocks.push_back(block);
   }
+  tile->release();
   tiles_.push_back(std::move(tile));
+}
+
+const NetcdfSource& TileSource::tileOf(uint32_t block) const {
+  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
+  if (const uint32_t before = open_.exchange(block); before != block) tiles_[before]->release();
+  return *tiles_[block];
 }
 
 void TileSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                       NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
-  tiles_[block]->read(0, box, scalars, out);
+  tileOf(block).read(0, box, scalars, out);
 }
 
 void TileSource::readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
                           NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
-  tiles_[block]->readPart(0, range, scalars, out);
+  tileOf(block).readPart(0, range, scalars, out);
 }
 
 std::vector<glm::dvec3> TileSource::pointsOf(uint32_t block, const CfRange& range) const {
-  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
-  return tiles_[block]->pointsOf(0, range);
+  return tileOf(block).pointsOf(0, range);
 }
 
 }  // namespace curvisplat

@@ -3,6 +3,7 @@
 // (grid_spec.tile1.nc ..., or supergrids, supergrid.h). Files whose names have no number belong to every tile.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -31,9 +32,12 @@ class TileSource final : public FaceSource {
 
  private:
   void add(uint32_t number, std::unique_ptr<NetcdfSource> tile);
+  /// The tile of a block. Closes the files of the one before: the memory of open ones is that of one tile.
+  const NetcdfSource& tileOf(uint32_t block) const;
 
   std::vector<std::unique_ptr<NetcdfSource>> tiles_;  // [block]
   GridDescription description_;
+  mutable std::atomic<uint32_t> open_ = 0;  // the tile read last
 };
 
 }  // namespace curvisplat
