@@ -154,10 +154,12 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
 }
 
 NetcdfFile::~NetcdfFile() {
-  release();
+  const QuietHdf5 quiet;
+  if (file_ >= 0) nc_close(file_);
 }
 
 void NetcdfFile::release() const {
+  if (path_.parent_path().extension() == ".unpacked") return;  // its name goes (unpacked_file.h)
   const QuietHdf5 quiet;
   if (file_ >= 0) nc_close(file_);
   file_ = -1;
