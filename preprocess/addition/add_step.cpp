@@ -20,6 +20,7 @@
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scratch_folder.h"
+#include "preprocess/grid/reordered_source.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
@@ -54,6 +55,16 @@ std::vector<uint32_t> scalarsOf(const GridDescription& description, const Manife
   return positions;
 }
 
+/// The step's blocks in the order of the series, by their names; null if they are in that order, or if names do not tell.
+std::unique_ptr<GridSource> inOrderOf(const Manifest& series, const DataSource& source) {
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  if (!grid) return nullptr;
+  std::vector<std::string> names;
+  for (const BlockInfo& block : series.blocks) names.push_back(block.name);
+  std::vector<uint32_t> order = orderByName(grid->description().blocks, names);
+  return order.empty() ? nullptr : reordered(*grid, std::move(order));
+}
+
 /// What the scatter pass learns about a grid of node-centred scalars on its way.
 struct SlabSurvey {
   uint64_t grid_checksum = 0;
@@ -86,14 +97,15 @@ struct SlabSurvey {
 class StepAddition {
  public:
   StepAddition(const DataSource& source, const AddStepOptions& options, Progress& progress)
-      : source_(source),
-        options_(options),
+      : options_(options),
         progress_(progress),
         lock_(options.cache),
         cache_(openAtLastStep(options.cache)),
+        reordered_(inOrderOf(cache_.seriesManifest(), source)),
+        source_(reordered_ ? *reordered_ : source),
         scalars_(scalarsOf(source.description(), cache_.seriesManifest())),
         plan_(MemoryPlan::ofOptions(options.memory_bytes, scalars_.size(), options.threads)),
-        grid_(dynamic_cast<const GridSource*>(&source)) {
+        grid_(dynamic_cast<const GridSource*>(&source_)) {
     if (grid_) GridOrigin::requireMemory(*grid_, scalars_, plan_);
     if (options.bucket_splats) plan_.limitBuckets(*options.bucket_splats, scalars_.size());
     report_.step = cache_.series().steps.size();
@@ -106,7 +118,7 @@ class StepAddition {
                                              options.blank_value, plan_, scratch_->path());
     }
     if (grid_)
-      checkBlocksOfStep(source.description().blocks, cache_.seriesManifest());
+      checkBlocksOfStep(source_.description().blocks, cache_.seriesManifest());
     else
       checkBlocks(origin_->blocks(), cache_);
     if ((centring() == Centring::kCell) != cache_.manifest().cells)
@@ -257,11 +269,12 @@ class StepAddition {
     return options_.temporary_folder.empty() ? folderOf(options_.cache) : options_.temporary_folder;
   }
 
-  const DataSource& source_;
   const AddStepOptions& options_;
   Progress& progress_;
   const CacheLock lock_;  // before the cache is read
   const CacheReader cache_;
+  const std::unique_ptr<GridSource> reordered_;  // null: the source's blocks are in the cache's order
+  const DataSource& source_;
   const std::vector<uint32_t> scalars_;
   MemoryPlan plan_;
   std::unique_ptr<ScratchFolder> scratch_;  // before what has files in it

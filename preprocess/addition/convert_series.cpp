@@ -1,5 +1,6 @@
 #include "preprocess/addition/convert_series.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -157,8 +158,10 @@ class SeriesConversion {
     if (!ranks || ranks->isFirst()) ConversionWorkspace::clearKilled(options_.convert.output);
     const CacheReader cache(options_.convert.output);
     for (const SeriesStep& step : cache.series().steps) times_.push_back(step.time);
+    for (const BlockInfo& block : cache.seriesManifest().blocks) names_.push_back(block.name);
     const std::vector<std::string>& sources = cache.seriesManifest().sources;
     sources_.insert(sources.begin(), sources.end());
+    first_files_ = sources_;
     sums_.nodes = cache.manifest().nodes;
     expect_new_geometry_ = cache.series().geometries() > 1 &&
                            cache.series().first_steps.back() == cache.series().steps.size() - 1;
@@ -221,6 +224,8 @@ class SeriesConversion {
       options_.before_change();
     }
     const ConvertReport converted = convert(*step.source, options, progress_);
+    for (const GridBlock& block : step.source->description().blocks) names_.push_back(block.name);
+    first_files_.insert(step.source->description().files.begin(), step.source->description().files.end());
     times_.push_back(*options.time);
     next_ = known_ = 1;
     sums_.nodes = converted.nodes;
@@ -250,6 +255,31 @@ class SeriesConversion {
     if (!times_.empty()) options.time = timeFor(number, source.description());
     if (options_.before_change) options_.before_change();
     note(number, addStep(source, options, progress_));
+    sayNewNames(number, source.description());
+  }
+
+  /// Once: names that are others than in the first step, unless they differ only in the numbers of files' steps.
+  void sayNewNames(uint64_t number, const GridDescription& description) {
+    if (names_said_ || names_.size() != description.blocks.size()) return;
+    const bool own_files = std::any_of(description.files.begin(), description.files.end(),
+                                       [&](const std::string& file) { return !first_files_.contains(file); });
+    const auto word = [&](std::string name) {
+      if (own_files) std::erase_if(name, [](char c) { return c >= '0' && c <= '9'; });
+      return name;
+    };
+    const std::vector<GridBlock>& blocks = description.blocks;
+    const auto is_old = [&](const GridBlock& block) {
+      return std::any_of(names_.begin(), names_.end(),
+                         [&](const std::string& name) { return word(name) == word(block.name); });
+    };
+    const auto renamed = std::find_if_not(blocks.begin(), blocks.end(), is_old);
+    if (renamed == blocks.end()) return;
+    names_said_ = true;
+    printMessage(
+        "note: step {} ({}): block {} is called {}, in the first step {}; since names do not tell, blocks of "
+        "equal sizes are taken in their order",
+        numberOf(number), input_.name(number), renamed - blocks.begin() + 1, renamed->name,
+        names_[static_cast<size_t>(renamed - blocks.begin())]);
   }
 
   void note(uint64_t number, const AddStepReport& added) {
@@ -293,10 +323,13 @@ class SeriesConversion {
   const SeriesOptions& options_;
   Progress& progress_;
   const std::function<void(const SeriesEvent&)>& report_event_;
-  std::vector<double> times_;      // of the cache's steps
-  std::set<std::string> sources_;  // of a cache that is there
-  uint64_t known_ = 0;             // steps of the cache that the input has to begin with
-  uint64_t next_ = 0;              // of those, the next one
+  std::vector<double> times_;       // of the cache's steps
+  std::set<std::string> sources_;   // of a cache that is there
+  std::vector<std::string> names_;  // of the first step's blocks
+  std::set<std::string> first_files_;
+  bool names_said_ = false;
+  uint64_t known_ = 0;  // steps of the cache that the input has to begin with
+  uint64_t next_ = 0;   // of those, the next one
   bool expect_new_geometry_ = false;
   Ranks* ranks_ = nullptr;  // null: this process alone
   SeriesReport sums_;

@@ -98,12 +98,19 @@ std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint
     bytes.reset();
     return readAlone(part, scratch);
   }
-  if (auto slot = cached_.makeSlot(part.brick, cache_.bricks()[part.brick].splats)) {
-    decode(part.brick, *bytes, *slot, scratch);
-    return splatsOf(std::move(*slot).keep(), part);
+  try {
+    if (auto slot = cached_.makeSlot(part.brick, cache_.bricks()[part.brick].splats)) {
+      decode(part.brick, *bytes, *slot, scratch);
+      return splatsOf(std::move(*slot).keep(), part);
+    }
+    decode(part.brick, *bytes, scratch);
+    return splatsOf(scratch, part);
+  } catch (const DamagedBrick&) {
+    // io_uring can have given other bytes than the file has (FUSE with direct_io and short reads, Linux 6.18). If not, this
+    // says what is wrong.
   }
-  decode(part.brick, *bytes, scratch);
-  return splatsOf(scratch, part);
+  bytes.reset();
+  return readAlone(part, scratch);
 }
 
 /// The values of a brick whose geometry is there, of this step. They are read by the worker: a few pages, which the
@@ -281,7 +288,11 @@ bool BrickSource::prefetchNext(Scratch& scratch) {
   if (!bytes->readable()) return true;  // the frame will tell
   auto slot = cached_.makeSlot(brick, cache_.bricks()[brick].splats);
   if (!slot) return false;
-  decode(brick, *bytes, *slot, scratch);
+  try {
+    decode(brick, *bytes, *slot, scratch);
+  } catch (const DamagedBrick&) {
+    return true;  // the frame reads it again
+  }
   std::move(*slot).keep();
   return true;
 }

@@ -93,10 +93,10 @@ class FormatCase(unittest.TestCase):
         path.write_bytes(data)
         return refused / len(tried)
 
-    def peak_memory(self, path, scalar, budget):
-        """Peak memory in bytes of a conversion within `budget` ("144M")."""
+    def peak_memory(self, path, scalar, budget, *others):
+        """Peak memory in bytes of a conversion within `budget` ("144M"). `others`: further files of the grid."""
         statistics = self.folder / "stats.json"
-        result = self.run_program("convert", path, "-o", self.folder / "m.splats", "--overwrite", "--scalar", scalar,
+        result = self.run_program("convert", path, *others, "-o", self.folder / "m.splats", "--overwrite", "--scalar", scalar,
                                   "--memory", budget, "--stats", statistics)
         self.assertEqual(result.returncode, 0, result.stderr)
         return json.loads(statistics.read_text())["peak_memory_bytes"]

@@ -351,6 +351,37 @@ class ModelFiles(ModelFileTest):
         print(f"{refused} of {len(tried)} damaged files refused")
         self.assertGreater(refused, len(tried) / 5)
 
+    def test_variables_in_groups_are_named(self):
+        with self.file() as f:
+            f.createGroup("empty")
+            group = f.createGroup("model")
+            for name, length, unit in (("lev", 3, "m"), ("lat", 4, "degrees_north"), ("lon", 5, "degrees_east")):
+                group.createDimension(name, length)
+                group.createVariable(name, "f8", (name,))[:] = np.arange(length)
+                group[name].units = unit
+            group.createVariable("t", "f4", ("lev", "lat", "lon"))[:] = 1
+        line = self.info(fails=True)
+        self.assertIn("its variables are in groups (model), which are not read", line)
+        self.assertIn("ncks -G : -g model file.nc OUT", line)
+        self.assertEqual(line.count("\n"), 1, line)
+
+    def test_levels_without_a_unit(self):
+        with self.file(lev=3, lat=8, lon=12) as f:
+            self.air(f)
+            f.add("lev", "lev", np.arange(3.0), axis="Z")
+            f.add("t", "lev lat lon", np.ones((3, 8, 12)))
+        self.assertIn("lev has no unit; expected a length or a pressure: set it (ncatted -a units,lev,o,c,m FILE)", self.info(fails=True))
+
+    def test_a_grid_without_a_node(self):
+        with self.file(lev=3, lat=8, lon=12) as f:
+            self.air(f)
+            f.add("lev", "lev", np.arange(3.0), units="m")
+            f.add("t", "lev lat lon", np.full((3, 8, 12), np.nan), fill=np.nan)
+        done = subprocess.run([PROGRAM, "info", str(self.folder / "file.nc")], capture_output=True, text=True, check=True)
+        self.assertNotIn("inf", done.stdout.replace("info", ""))
+        for axis in "xyz":
+            self.assertIn(f"\n{axis}         no node\n", done.stdout)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -115,6 +115,84 @@ class ModelTiles(ModelFileTest):
         self.assertIn("grid_spec.tile1.nc", line)
         self.assertEqual(line.count("\n"), 1, line)
 
+    def write_supergrids(self, name="C12_grid.tile{}.nc", units=("degree_east", "degree_north")):
+        """As FRE's make_hgrid writes them: a centre is the middle of the corners on the sphere."""
+        fine = np.full((6, 2 * N + 1, 2 * N + 1, 2), np.nan)
+        for kind, values in ((0, self.corners), (1, self.middles)):
+            for n in (0, 1):
+                fine[:, kind::2, kind::2, n] = values[n]
+        names = []
+        for face in FACES:
+            names.append(name.format(face + 1))
+            with self.file(names[-1], string=255, nx=2 * N, ny=2 * N, nxp=2 * N + 1, nyp=2 * N + 1) as f:
+                f.createVariable("tile", "S1", ("string",)).setncatts({"standard_name": "grid_tile_spec", "geometry": "spherical"})
+                for n, (axis, word) in enumerate((("x", "longitude"), ("y", "latitude"))):
+                    attributes = {"standard_name": f"geographic_{word}"} if units[n] else {}
+                    f.add(axis, "nyp nxp", fine[face, ..., n], units=units[n] or "degrees", **attributes)
+                f.add("area", "ny nx", np.ones((2 * N, 2 * N)), units="m2")
+        return names
+
+    def test_supergrids_beside_the_data(self):
+        """Centres at odd, corners at even indices. What is between them is NaN here, so that nothing else can be read."""
+        expected = self.convert(self.write())[0]
+        names = self.write(kinds=())
+        for units in (("degree_east", "degree_north"), (None, None)):
+            grids = self.write_supergrids(units=units)
+            info = self.info(*names, *grids)
+            self.expect_closed(info)
+            self.assertIn(", x, y on a sphere", info["format"])
+            self.assertEqual(self.convert(names + grids)[0], expected)
+            self.assertEqual(self.convert(grids + names)[0], expected)
+        one = self.info("atmos.tile3.nc", "C12_grid.tile3.nc")
+        self.assertAlmostEqual(abs(one["blocks"][0]["volume"]) / SHELL, (N - 1) ** 2 / N**2 / 6, delta=0.01)
+
+    def test_values_at_the_corners_of_a_supergrid(self):
+        """Six faces of (N + 1)^2 corners, whose edges coincide: nothing is left to join."""
+        names = []
+        for face in FACES:
+            names.append(f"corner.tile{face + 1}.nc")
+            with self.file(names[-1], lev=len(LEVELS), grid_y=N + 1, grid_x=N + 1) as f:
+                f.add("lev", "lev", LEVELS, units="km", positive="up")
+                f.add("vort", "lev grid_y grid_x", np.full((len(LEVELS), N + 1, N + 1), float(face)), "f4")
+        info = self.info(*names, *self.write_supergrids())
+        self.assertEqual([(b["ni"], b["nj"], b["nk"]) for b in info["blocks"]], 6 * [(N + 1, N + 1, 3)])
+        self.assertAlmostEqual(sum(abs(b["volume"]) for b in info["blocks"]) / SHELL, 1, delta=0.01)
+
+    def test_a_mosaic_names_its_grid_files(self):
+        names, grids = self.write(kinds=()), self.write_supergrids()
+        with self.file("C12_mosaic.nc", ntiles=6, string=255) as f:
+            words = np.zeros((6, 255), "S1")
+            for n, grid in enumerate(grids):
+                words[n, : len(grid)] = list(grid)
+            f.createVariable("gridfiles", "S1", ("ntiles", "string"))[:] = words
+        self.expect_closed(self.info(*names, "C12_mosaic.nc"))
+        self.expect_closed(self.info(*names, "C12_mosaic.nc", *grids[:2]))
+        (self.folder / grids[4]).unlink()
+        line = self.info(*names, "C12_mosaic.nc", fails=True)
+        self.assertIn("C12_mosaic.nc: names the grid file C12_grid.tile5.nc, which is not beside it", line)
+        self.assertEqual(line.count("\n"), 1, line)
+
+    def test_a_supergrid_of_a_single_tile(self):
+        """MOM6: nominal longitudes and latitudes of one dimension in the file, the true ones in ocean_hgrid.nc."""
+        ni, nj = 10, 8
+        x, y = np.meshgrid(np.arange(2 * ni + 1) / 2, np.arange(2 * nj + 1) / 2 + 20)
+        x = x + 0.3 * (y - 20)
+        with self.file("ocean.nc", time=None, zl=3, yh=nj, xh=ni) as f:
+            f.add("xh", "xh", np.arange(ni) + 0.5, units="degrees_east", long_name="h point nominal longitude")
+            f.add("yh", "yh", np.arange(nj) + 20.5, units="degrees_north", long_name="h point nominal latitude")
+            f.add("zl", "zl", [10.0, 20, 30], units="m", positive="down")
+            f.add("thetao", "time zl yh xh", np.ones((1, 3, nj, ni)), "f4")
+        with self.file("ocean_hgrid.nc", nyp=2 * nj + 1, nxp=2 * ni + 1) as f:
+            f.add("x", "nyp nxp", x, units="degrees")
+            f.add("y", "nyp nxp", y, units="degrees")
+        nominal, true = self.info("ocean.nc"), self.info("ocean.nc", "ocean_hgrid.nc")
+        self.assertIn("xh, yh", nominal["format"])
+        east, north = np.radians(x[1::2, 1::2]), np.radians(y[1::2, 1::2])
+        places = np.stack([np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], -1)
+        places = np.stack([(6371 - depth) * places for depth in (0.01, 0.02, 0.03)])
+        np.testing.assert_allclose(true["bounds"]["lower"], places.min(axis=(0, 1, 2)), rtol=1e-9)
+        np.testing.assert_allclose(true["bounds"]["upper"], places.max(axis=(0, 1, 2)), rtol=1e-9)
+
     def test_corners_alone_place_the_nodes_in_their_middles(self):
         """The poles are in the middles of two tiles, where longitudes have no mean."""
         corners = self.info(*self.write(kinds=("corners",)))

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Builds libcgns with the address sanitizer from Debian's source package, for the tests and the fuzz target that read ADF files by
-# it: tests/fuzz/sanitized_libcgns.sh FOLDER [COMMAND ...]. Runs the command with that library in place of the system's:
+# Builds libcgns from Debian's source package with the address sanitizer, and so that libFuzzer sees what is reached in it, for the
+# tests and the fuzz target that read ADF files by it: tests/fuzz/sanitized_libcgns.sh FOLDER [COMMAND ...]. Runs the command with
+# that library in place of the system's:
 #
 #   tests/fuzz/sanitized_libcgns.sh /tmp/libcgns build/asan/tests/preprocess_tests --gtest_filter='*Cgns*'
 #   tests/fuzz/sanitized_libcgns.sh /tmp/libcgns tests/fuzz/run.sh 600 cgns_adf
@@ -25,7 +26,7 @@ if [[ ! -e $library ]]; then
   source=$(find "$folder" -maxdepth 1 -type d -name 'libcgns-*' | head -1)
   # As Debian builds it.
   cmake -S "$source" -B "$folder/build" -DCMAKE_C_COMPILER="${CC:-clang}" -DCMAKE_BUILD_TYPE=None \
-    -DCMAKE_C_FLAGS="-g -O1 -w -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize=alignment" \
+    -DCMAKE_C_FLAGS="-g -O1 -w -fno-omit-frame-pointer -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize=alignment" \
     -DCGNS_ENABLE_HDF5=ON -DCGNS_ENABLE_LEGACY=ON -DCGNS_ENABLE_64BIT=OFF -DCGNS_ENABLE_BASE_SCOPE=ON -DCGNS_ENABLE_SCOPING=OFF \
     -DCGNS_BUILD_SHARED=ON -DCGNS_USE_SHARED=ON >build.log 2>&1
   cmake --build "$folder/build" --target cgns_shared >>build.log 2>&1

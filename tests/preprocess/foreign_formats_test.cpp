@@ -119,7 +119,8 @@ TEST_F(ForeignFormats, PlainHdf5IsNamed) {
     editor.replaceAttribute("/", "_NCProperties", HostileAttribute::kMissing);
     editor.group("/results");
   }
-  expectNamed("plain.h5", "an HDF5 file, but neither NetCDF-4 nor CGNS");
+  expectNamed("plain.h5",
+              "an HDF5 file, but neither NetCDF-4 nor CGNS; describe its arrays in an XDMF file (.xmf)");
 }
 
 }  // namespace

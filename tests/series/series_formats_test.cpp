@@ -1,6 +1,7 @@
 // Series of every format that has time steps: each step must be what converting that step alone gives.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -225,6 +226,60 @@ TEST_F(SeriesFormats, ZonesOfCgnsThatChangeAreNamedOrLeftOut) {
     EXPECT_EQ(cache.series().steps[2].time, 2);
     EXPECT_TRUE(verifyCache(cache.atStep(2)).findings.empty());
   }
+}
+
+/// Two zones of the same size: 1 + x and 1 + x + 100, and the second lies 10 further along x.
+void writeTwoZones(const std::string& path, const std::vector<std::string>& names, double time) {
+  CgnsWriter writer(path, CgnsFileType::kHdf5);
+  writer.base("base");
+  writer.baseSteps({time});
+  for (const std::string& name : names) {
+    const double other = name == "b" || name == "right" ? 1 : 0;
+    const auto field = [](const char* called, double start, std::array<double, 3> along) {
+      return CgnsWriterField{called, [=](int64_t i, int64_t j, int64_t k) {
+                               return start + along[0] * static_cast<double>(i) +
+                                      along[1] * static_cast<double>(j) + along[2] * static_cast<double>(k);
+                             }};
+    };
+    writer.zone(name, {6, 5, 4});
+    writer.coordinates("GridCoordinates",
+                       {field("CoordinateX", 10 * other, {1, 0, 0}), field("CoordinateY", 0, {0, 1, 0}),
+                        field("CoordinateZ", 0, {0, 0, 1})});
+    writer.solution("Only", "Vertex", {field("Density", 100 * other + time, {1, 0, 0})});
+  }
+}
+
+TEST_F(SeriesFormats, ZonesInAnotherOrderAreFoundByName) {
+  writeTwoZones(file("a_1.cgns"), {"a", "b"}, 1);
+  writeTwoZones(file("a_2.cgns"), {"b", "a"}, 2);
+  writeTwoZones(file("in_order.cgns"), {"a", "b"}, 2);
+  run({"convert", file("a_*.cgns"), "-o", file("a.splats"), "--scalar", "Density"});
+  run({"convert", file("in_order.cgns"), "-o", file("b.splats"), "--scalar", "Density"});
+  const CacheReader cache(file("a.splats"));
+  ASSERT_EQ(cache.series().steps.size(), 2u);
+  EXPECT_EQ(cache.series().geometries(), 1u) << "the same blocks in another order";
+  expectSame(cache.atStep(1), CacheReader(file("b.splats")));
+}
+
+TEST_F(SeriesFormats, ZonesOfOtherNamesAreTakenInOrderAndSaid) {
+  // The number of a file's step is no other name.
+  writeTwoZones(file("n_1.cgns"), {"a1", "b1"}, 1);
+  writeTwoZones(file("n_2.cgns"), {"a2", "b2"}, 2);
+  const std::vector<std::string> words{"convert",  file("n_*.cgns"), "-o",         file("n.splats"),
+                                       "--scalar", "Density",        "--overwrite"};
+  ProgramResult result = runProgram(words);
+  EXPECT_EQ(result.status, 0);
+  EXPECT_EQ(result.err.find("names do not tell"), std::string::npos) << result.err;
+
+  writeTwoZones(file("n_2.cgns"), {"left", "right"}, 2);
+  writeTwoZones(file("n_3.cgns"), {"left", "right"}, 3);
+  result = runProgram(words);
+  EXPECT_EQ(result.status, 0);
+  const size_t said =
+      result.err.find("block 1 is called left, in the first step a1; since names do not tell");
+  ASSERT_NE(said, std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("names do not tell", said + 70), std::string::npos) << "once: " << result.err;
+  EXPECT_EQ(CacheReader(file("n.splats")).series().steps.size(), 3u);
 }
 
 TEST_F(SeriesFormats, CellCentredFilesAndTheirCollections) {

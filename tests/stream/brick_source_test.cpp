@@ -202,6 +202,18 @@ TEST_F(BrickSourceTest, AReadThatFailsOnceIsTriedAgain) {
   EXPECT_EQ(takeAll(source, order_, 3, statistics), order_.size());
 }
 
+TEST_F(BrickSourceTest, AReadThatGivesWrongBytesOnceIsTriedAgain) {
+  for (const uint64_t cache_bytes : {uint64_t{0}, decoded_bytes_}) {
+    FaultySystemCalls faulty;
+    const ScopedSystemCalls scope(faulty);
+    BrickSource source(*cache_, 0, pagerOptions(), cache_bytes);
+    faulty.wrong_only_read_at = 3;
+    FetchStatistics statistics;
+    EXPECT_EQ(takeAll(source, order_, 3, statistics), order_.size());
+    EXPECT_GT(faulty.reads, 3);
+  }
+}
+
 TEST_F(BrickSourceTest, DamageIsFoundAndReplacedByAnAncestor) {
   const auto bricks = cache_->bricks();
   // A leaf in the middle, one of a cell's two bricks, and an inner brick.

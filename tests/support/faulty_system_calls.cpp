@@ -70,7 +70,10 @@ ssize_t FaultySystemCalls::pread(int fd, void* to, size_t count, int64_t offset)
   if (callFails()) return fail();
   if ((fail_read_at >= 0 && number >= fail_read_at) || number == fail_only_read_at) return fail();
   if (cut_at >= 0) cut(fd);
-  return SystemCalls::pread(fd, to, std::min(count, largest_transfer), offset);
+  const ssize_t got = SystemCalls::pread(fd, to, std::min(count, largest_transfer), offset);
+  if (number == wrong_only_read_at)
+    for (ssize_t n = 0; n < got; ++n) static_cast<char*>(to)[n] ^= 0x55;
+  return got;
 }
 
 ssize_t FaultySystemCalls::pwrite(int fd, const void* from, size_t count, int64_t offset) {

@@ -19,6 +19,7 @@ class FaultySystemCalls : public SystemCalls {
   int64_t fail_write_at = -1;          // this write (counted from 0) and all after it fail with `error`
   int64_t fail_read_at = -1;           // this read and all after it
   int64_t fail_only_read_at = -1;      // this read, and none after it
+  int64_t wrong_only_read_at = -1;     // this read gives other bytes than the file has
   int64_t fail_sync_at = -1;
   int64_t fail_rename_at = -1;
   int64_t fail_call_at = -1;       // this call, of whatever kind, and all after it

@@ -227,8 +227,11 @@ void printAsText(const GridInfo& info) {
   printLine("cells     {}; {} degenerate, {} inverted", info.statistics.cells(), info.statistics.degenerate(),
             info.statistics.inverted());
   for (size_t axis = 0; axis < 3; ++axis)
-    printLine("{}         {:.9g} .. {:.9g}", "xyz"[axis], info.statistics.bounds[axis].min,
-              info.statistics.bounds[axis].max);
+    printLine("{}         {}", "xyz"[axis],
+              isEmpty(info.statistics.bounds[axis])
+                  ? "no node"
+                  : fmt::format("{:.9g} .. {:.9g}", info.statistics.bounds[axis].min,
+                                info.statistics.bounds[axis].max));
   for (const std::string& note : description.notes) printLine("note      {}", note);
   printLine("stored    coordinates in {} precision", description.coordinate_bytes == 8 ? "double" : "single");
   printScalars(info);

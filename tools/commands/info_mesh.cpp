@@ -144,8 +144,11 @@ void printAsText(const MeshInfo& info) {
       printLine("  and {} more", description.pieces.size() - kPiecesListed);
   }
   for (int axis = 0; axis < 3; ++axis)
-    printLine("{}         {:.9g} .. {:.9g}", "xyz"[axis], info.survey.grid.lower[axis],
-              info.survey.grid.upper[axis]);
+    printLine(
+        "{}         {}", "xyz"[axis],
+        info.survey.grid.lower[axis] > info.survey.grid.upper[axis]
+            ? "no point"
+            : fmt::format("{:.9g} .. {:.9g}", info.survey.grid.lower[axis], info.survey.grid.upper[axis]));
   for (const std::string& note : description.notes) printLine("note      {}", note);
   printLine("stored    coordinates in {} precision", description.coordinate_bytes == 8 ? "double" : "single");
   for (size_t n = 0; n < info.ranges.size(); ++n) {

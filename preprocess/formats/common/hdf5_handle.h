@@ -42,7 +42,13 @@ using Hdf5Space = Hdf5Handle<H5Sclose>;
 /// the scope, as libnetcdf leaves it: at the end of the process HDF5 prints what a damaged file left open.
 class QuietHdf5 {
  public:
-  QuietHdf5() : lock_(dataLibraryMutex()) { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+  QuietHdf5() : lock_(dataLibraryMutex()) {
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    // What HDF5 has freed it keeps for itself, up to 16 MiB and more, which no plan of the memory knows.
+    constexpr int kAll = 1 << 20, kList = 1 << 16;
+    static const herr_t limited = H5set_free_list_limits(kAll, kList, kAll, kList, kAll, kList);
+    static_cast<void>(limited);
+  }
   QuietHdf5(const QuietHdf5&) = delete;
   QuietHdf5& operator=(const QuietHdf5&) = delete;
 

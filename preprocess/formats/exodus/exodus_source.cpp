@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "preprocess/grid/time_steps.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -79,7 +80,8 @@ ExodusSource::ExodusSource(const OpenGridOptions& options)
       file_->read(*times, {{0}, {description_.times.size()}}, std::span(description_.times));
   }
   description_.time_step = chosenTimeStep(name, description_.times, options.time_step);
-  description_.format = fmt::format("Exodus ({}), {} element blocks", file_->kind(), blocks_.size());
+  description_.format =
+      fmt::format("Exodus ({}), {}", file_->kind(), countText(blocks_.size(), "element block"));
   description_.files = {name};
   description_.pieces.push_back({"piece 1", name, nodes_, elements_});
   const NetcdfVariable* const x = file_->find(file_->find("coord") ? "coord" : "coordx");

@@ -11,6 +11,7 @@
 
 #include "preprocess/formats/netcdf/cf_roles.h"
 #include "preprocess/formats/netcdf/foreign_netcdf.h"
+#include "preprocess/formats/netcdf/supergrid.h"
 #include "preprocess/formats/netcdf/tile_number.h"
 #include "preprocess/grid/calendar.h"
 
@@ -82,7 +83,8 @@ std::string describe(const NetcdfFiles& file, const CfDimensions& dims) {
 /// The variable's coordinate of a role. Candidates in order: variables in its `coordinates` attribute,
 /// variables named like its dimensions, all others; last those of other files whose dimensions have other
 /// names and the same lengths. In files of tiles (FV3), 1-D coordinates hold indices or are for GrADS: those of two
-/// dimensions come first, at the nodes or at the corners of the cells around them.
+/// dimensions come first, at the nodes or at the corners of the cells around them. A supergrid in another file comes before
+/// any of one dimension.
 std::optional<CfTerm> coordinateOf(const NetcdfFiles& file, const NetcdfVariable& variable,
                                    const CfDimensions& dims, CfRole role) {
   std::vector<const NetcdfVariable*> candidates;
@@ -100,15 +102,18 @@ std::optional<CfTerm> coordinateOf(const NetcdfFiles& file, const NetcdfVariable
         const auto term = CfTerm::of(file, *candidate, dims);
         if (term && term->axes() == 2 && (corners ? term->ofCorners() : term->onNodes())) return term;
       }
+  const bool geographic = role == CfRole::kLongitude || role == CfRole::kLatitude;
+  const std::optional<CfTerm> supergrid =
+      geographic && !dims.face ? supergridOf(file, variable, dims, role) : std::nullopt;
   for (const bool exact : {true, false})
     for (const NetcdfVariable* candidate : candidates) {
       if (cfRole(file, *candidate) != role || (!exact && candidate->file == variable.file)) continue;
       const auto term = CfTerm::of(file, *candidate, dims);
       if (!term || !(exact ? term->exact() : term->onNodes())) continue;
       if (dims.face && !term->ofFaces()) continue;  // GEOS' Xdim, "for GrADS"
-      if (term->axes() == 1 || term->axes() == 2) return term;
+      if (term->axes() == 2 || (term->axes() == 1 && !supergrid)) return term;
     }
-  return std::nullopt;
+  return supergrid;
 }
 
 /// Distance of nodes along `axis` (0 or 1) in metres where the files have no coordinates: WRF's DX and DY.

@@ -53,10 +53,10 @@ CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
   if (standard_name == "grid_longitude") return CfRole::kGridLongitude;
   if (standard_name == "grid_latitude") return CfRole::kGridLatitude;
   if (isOneOf(units, {"degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese"}) ||
-      standard_name == "longitude")
+      isOneOf(standard_name, {"longitude", "geographic_longitude"}))
     return CfRole::kLongitude;
   if (isOneOf(units, {"degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn"}) ||
-      standard_name == "latitude")
+      isOneOf(standard_name, {"latitude", "geographic_latitude"}))
     return CfRole::kLatitude;
   if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::kTime;
 

@@ -86,6 +86,25 @@ std::optional<CfTerm> CfTerm::of(const NetcdfFiles& file, const NetcdfVariable& 
   return term;
 }
 
+std::optional<CfTerm> CfTerm::ofSupergrid(const NetcdfFiles& file, const NetcdfVariable& variable,
+                                          const CfDimensions& block) {
+  if (variable.dims.size() != 2) return std::nullopt;
+  CfTerm term;
+  term.variable_ = &variable;
+  term.start_.assign(2, 0);
+  term.exact_ = false;
+  for (size_t axis = 0; axis < 2; ++axis) {
+    const size_t dim = 1 - axis;
+    const uint64_t points = file.dimension(variable, dim).length,
+                   nodes = file.dimensions()[block.axes[axis]].length;
+    if (points != 2 * nodes + 1 && points + 1 != 2 * nodes) return std::nullopt;
+    term.along_[axis] = dim;
+    term.step_[axis] = 2;
+    term.first_[axis] = points > 2 * nodes ? 1 : 0;
+  }
+  return term;
+}
+
 CfTerm CfTerm::ofIndex(size_t axis, double metres) {
   static const NetcdfVariable index = [] {
     NetcdfVariable variable;
@@ -115,8 +134,8 @@ NetcdfBox CfTerm::boxOf(const CfRange& range) const {
       begin = between(begin, points).first;
       end = std::min(between(end - 1, points).first + 2, points.length);
     }
-    box.start[*along_[axis]] = begin;
-    box.count[*along_[axis]] = end - begin;
+    box.start[*along_[axis]] = first_[axis] + step_[axis] * begin;
+    box.count[*along_[axis]] = step_[axis] * (end - begin - 1) + 1;
   }
   return box;
 }
@@ -140,11 +159,11 @@ CfValues CfTerm::read(const NetcdfFiles& file, const CfRange& range) const {
   std::array<uint64_t, 3> strides{};
   for (size_t axis = 0; axis < 3; ++axis) {
     if (!along_[axis]) continue;
-    values.count[axis] = box.count[*along_[axis]];
-    strides[axis] = 1;
+    values.count[axis] = (box.count[*along_[axis]] - 1) / step_[axis] + 1;
+    strides[axis] = step_[axis];
     for (size_t d = *along_[axis] + 1; d < box.count.size(); ++d) strides[axis] *= box.count[d];
   }
-  values.values.reserve(stored.size());
+  values.values.reserve(values.count[0] * values.count[1] * values.count[2]);
   for (uint64_t k = 0; k < values.count[2]; ++k)
     for (uint64_t j = 0; j < values.count[1]; ++j)
       for (uint64_t i = 0; i < values.count[0]; ++i)

@@ -48,6 +48,12 @@ class CfTerm {
   static std::optional<CfTerm> of(const NetcdfFiles& file, const NetcdfVariable& variable,
                                   const CfDimensions& block);
 
+  /// Of a supergrid (supergrid.h): a variable of two dimensions with 2n + 1 points along j and i, of which the nodes of a block
+  /// of n are every second one from the second (centres of cells), or 2n - 1, of which they are every second one from the first
+  /// (corners). nullopt if it has other lengths.
+  static std::optional<CfTerm> ofSupergrid(const NetcdfFiles& file, const NetcdfVariable& variable,
+                                           const CfDimensions& block);
+
   /// The index along an axis times `metres`: for dimensions without a coordinate. Its variable is called
   /// "index".
   static CfTerm ofIndex(size_t axis, double metres);
@@ -84,6 +90,7 @@ class CfTerm {
   std::array<std::optional<size_t>, 3> along_;  // [axis of the block]: its dimension; nullopt: independent
   std::array<int, 3> longer_{};                 // [axis]: its length minus the block's: -1, 0 or 1
   std::array<uint64_t, 3> length_{};            // [axis]: its length
+  std::array<uint64_t, 3> first_{}, step_{1, 1, 1};  // [axis]: of the points that are nodes, of a supergrid
   bool exact_ = true;
   double index_metres_ = 0;     // above 0: there is no variable, see ofIndex()
   std::optional<size_t> face_;  // its dimension of the faces

@@ -43,8 +43,8 @@ double constant(const NetcdfFiles& file, const std::optional<CfTerm>& term) {
 
 std::string notALength(const NetcdfVariable& variable) {
   const std::string units = variable.text("units");
-  return fmt::format("{} {}; expected a length or a pressure", variable.name,
-                     units.empty() ? "has no unit" : fmt::format("has the unit '{}'", units));
+  return fmt::format("{0} {1}; expected a length or a pressure: set it (ncatted -a units,{0},o,c,m FILE)",
+                     variable.name, units.empty() ? "has no unit" : fmt::format("has the unit '{}'", units));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <netcdf.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -93,6 +94,14 @@ const std::vector<double>& numbersOf(const NetcdfVariable& variable, const char*
   return found == variable.attributes.end() ? none : found->second.numbers;
 }
 
+/// Size, and time of the last change.
+std::pair<uint64_t, int64_t> stateOf(const std::filesystem::path& path) {
+  struct stat state {};
+  if (::stat(path.c_str(), &state) != 0) return {};
+  constexpr int64_t kNanoseconds = 1'000'000'000;
+  return {static_cast<uint64_t>(state.st_size), kNanoseconds * state.st_mtim.tv_sec + state.st_mtim.tv_nsec};
+}
+
 }  // namespace
 
 std::string NetcdfVariable::text(const char* attribute) const {
@@ -123,6 +132,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
     tryHdf5(path, [&] { const NetcdfFile again(path); });
     plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
   }
+  opened_as_ = stateOf(path);
   const QuietHdf5 quiet;
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.
@@ -135,6 +145,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   }
   try {
     readHeader();
+    readGroups();
     if (kind_ == kNetcdf4) checkSizes(bytes);
   } catch (...) {
     nc_close(file_);
@@ -144,7 +155,27 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
 
 NetcdfFile::~NetcdfFile() {
   const QuietHdf5 quiet;
-  nc_close(file_);
+  if (file_ >= 0) nc_close(file_);
+}
+
+void NetcdfFile::release() const {
+  if (path_.parent_path().extension() == ".unpacked") return;  // its name goes (unpacked_file.h)
+  const QuietHdf5 quiet;
+  if (file_ >= 0) nc_close(file_);
+  file_ = -1;
+}
+
+int NetcdfFile::opened() const {
+  if (file_ >= 0) return file_;
+  if (stateOf(path_) != opened_as_)
+    throw Error("{}: was changed while it was read; start again when it is complete", path_.string());
+  nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
+  if (const int status = nc_open(std::filesystem::absolute(path_).c_str(), NC_NOWRITE, &file_);
+      status != NC_NOERR) {
+    file_ = -1;
+    fail("the file", status);
+  }
+  return file_;
 }
 
 void NetcdfFile::fail(const std::string& place, int status) const {
@@ -176,6 +207,20 @@ void NetcdfFile::readHeader() {
     dimensions_[static_cast<size_t>(id)] = {name, length, id == unlimited};
   }
   for (int id = 0; id < variables; ++id) readVariable(id);
+}
+
+void NetcdfFile::readGroups() {
+  int count = 0;
+  if (nc_inq_grps(file_, &count, nullptr) != NC_NOERR || count <= 0) return;
+  std::vector<int> groups(static_cast<size_t>(count));
+  if (nc_inq_grps(file_, &count, groups.data()) != NC_NOERR) return;
+  for (const int group : groups) {
+    int variables = 0, further = 0;
+    char name[NC_MAX_NAME + 1] = {};
+    if (nc_inq_nvars(group, &variables) == NC_NOERR && nc_inq_grps(group, &further, nullptr) == NC_NOERR &&
+        nc_inq_grpname(group, name) == NC_NOERR && variables + further > 0)
+      groups_.emplace_back(name);
+  }
 }
 
 void NetcdfFile::readVariable(int id) {
@@ -344,7 +389,7 @@ std::string NetcdfFile::text(const char* attribute) const {
   const QuietHdf5 quiet;
   nc_type type = NC_NAT;
   size_t length = 0;
-  if (nc_inq_att(file_, NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length > kMaxAttributeValues)
+  if (nc_inq_att(opened(), NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length > kMaxAttributeValues)
     return "";
   std::string text;
   if (type == NC_CHAR) {
@@ -363,7 +408,7 @@ std::string NetcdfFile::text(const char* attribute) const {
 bool NetcdfFile::hasAttribute(const char* attribute) const {
   const QuietHdf5 quiet;
   int id = 0;
-  return nc_inq_attid(file_, NC_GLOBAL, attribute, &id) == NC_NOERR;
+  return nc_inq_attid(opened(), NC_GLOBAL, attribute, &id) == NC_NOERR;
 }
 
 std::optional<double> NetcdfFile::number(const char* attribute) const {
@@ -371,7 +416,7 @@ std::optional<double> NetcdfFile::number(const char* attribute) const {
   nc_type type = NC_NAT;
   size_t length = 0;
   double value = 0;
-  if (nc_inq_att(file_, NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length != 1 ||
+  if (nc_inq_att(opened(), NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length != 1 ||
       bytesOf(type) == 0 || nc_get_att_double(file_, NC_GLOBAL, attribute, &value) != NC_NOERR)
     return std::nullopt;
   return value;
@@ -388,7 +433,7 @@ void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const 
   CURVISPLAT_CHECK_OP(box.values(), <=, to.size());
   {
     const QuietHdf5 quiet;
-    const int status = get(file_, variable.id, box.start.data(), box.count.data(), to.data());
+    const int status = get(opened(), variable.id, box.start.data(), box.count.data(), to.data());
     // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
     if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
   }
@@ -407,7 +452,7 @@ std::string NetcdfFile::readText(const NetcdfVariable& variable) const {
   if (variable.type != NC_CHAR || bytes > kMaxTextBytes) return "";
   std::string text(static_cast<size_t>(bytes), ' ');
   const QuietHdf5 quiet;
-  const int status = nc_get_vara_text(file_, variable.id, start.data(), count.data(), text.data());
+  const int status = nc_get_vara_text(opened(), variable.id, start.data(), count.data(), text.data());
   if (status != NC_NOERR) fail(variable.name, status);
   return text;
 }

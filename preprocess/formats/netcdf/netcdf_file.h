@@ -13,6 +13,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "stream/base/file.h"
@@ -71,6 +72,8 @@ class NetcdfFile {
   const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
   const std::vector<NetcdfVariable>& variables() const { return variables_; }
   const NetcdfVariable* find(std::string_view name) const;
+  /// Names of the root's groups that have variables or groups of their own, which are not read.
+  const std::vector<std::string>& groups() const { return groups_; }
   /// The text of an attribute of the file; empty if there is none, or if it is not text.
   std::string text(const char* attribute) const;
   bool hasAttribute(const char* attribute) const;
@@ -85,6 +88,9 @@ class NetcdfFile {
   /// valid range.
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
+  /// Closes the file until the next call that needs it, which opens it again: an open NetCDF-4 file keeps some MiB.
+  void release() const;
+
   /// The characters of a variable of text (NC_CHAR); empty if it is not one or has more than 16 MiB.
   std::string readText(const NetcdfVariable& variable) const;
 
@@ -98,7 +104,10 @@ class NetcdfFile {
   };
 
   [[noreturn]] void fail(const std::string& place, int status) const;
+  /// Opens the file again if it was released; dataLibraryMutex() must be held. Throws Error if it is another by now.
+  int opened() const;
   void readHeader();
+  void readGroups();
   void readVariable(int id);
   void readAttributes(int id, int count, NetcdfVariable& variable) const;
   static void addRange(const NetcdfVariable& variable, Packing& packing);
@@ -111,11 +120,13 @@ class NetcdfFile {
                 std::span<Value> to) const;
 
   std::filesystem::path path_;
-  int file_ = 0;
+  mutable int file_ = -1;                   // -1: released
+  std::pair<uint64_t, int64_t> opened_as_;  // size, and time of the last change in nanoseconds
   std::string kind_;
   bool plain_hdf5_ = false;
   std::vector<NetcdfDimension> dimensions_;
   std::vector<NetcdfVariable> variables_;
+  std::vector<std::string> groups_;
   std::vector<Packing> packings_;  // [variable]
 };
 

@@ -100,4 +100,8 @@ std::string NetcdfFiles::readText(const NetcdfVariable& variable) const {
   return files_.at(variable.file)->readText(variable);
 }
 
+void NetcdfFiles::release() const {
+  for (const auto& file : files_) file->release();
+}
+
 }  // namespace curvisplat

@@ -38,6 +38,8 @@ class NetcdfFiles {
   std::string text(const char* attribute) const;
   bool hasAttribute(const char* attribute) const;
   std::optional<double> number(const char* attribute) const;
+  /// Of the first file; as NetcdfFile's.
+  const std::vector<std::string>& groups() const { return files_.front()->groups(); }
   bool plainHdf5() const { return files_.front()->plainHdf5(); }
 
   /// As NetcdfFile's.
@@ -45,6 +47,7 @@ class NetcdfFiles {
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
   std::string readText(const NetcdfVariable& variable) const;
+  void release() const;
 
  private:
   void add(const NetcdfFile& file);

@@ -81,11 +81,17 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
   CfGrids found = findCfGrids(file, options.time_step.value_or(0));
   if (found.grids.empty()) {
     if (const auto format = foreignNetcdf(file))
-      throw Error(
-          "{}: is {}; structured grids are read, and UGRID, ICON and MPAS in files that have their faces "
-          "and nodes",
-          file.path().string(), *format);
+      throw Error("{}: is {}; {}", file.path().string(), *format,
+                  file.plainHdf5() ? "describe its arrays in an XDMF file (.xmf), or write NetCDF-4 or CGNS"
+                                   : "structured grids are read, and UGRID, ICON and MPAS in files that have "
+                                     "their faces and nodes");
     std::string why = "no variable has three dimensions in space";
+    if (!file.groups().empty())
+      why = fmt::format(
+          "its variables are in groups ({}), which are not read: write a group to a file of its own (ncks -G "
+          ": "
+          "-g {} {} OUT)",
+          listed(file.groups()), file.groups().front(), file.path().filename().string());
     if (!found.left_out.empty()) {
       const auto reasons = byReason(found.left_out);
       why = fmt::format("{}: {}", listed(reasons.begin()->second), reasons.begin()->first);

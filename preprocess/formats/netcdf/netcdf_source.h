@@ -40,6 +40,9 @@ class NetcdfSource final : public FaceSource {
   /// Whether longitude and latitude are given for each column of nodes.
   bool placesColumns() const { return grid_.longitude.axes() == 2 && grid_.latitude.axes() == 2; }
 
+  /// Closes the files until they are read again.
+  void release() const { file_.release(); }
+
   /// How the grid closes if it runs around the Earth; of grids of one block on a sphere.
   std::optional<GridClosure> closure() const;
 

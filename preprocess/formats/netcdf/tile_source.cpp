@@ -60,8 +60,9 @@ void TileSource::add(uint32_t number, std::unique_ptr<NetcdfSource> tile) {
     throw Error("{}: has {} faces in one file; give it alone", file, own.blocks.size());
   if (!tile->placesColumns())
     throw Error(
-        "{}: is one of several tiles, but has no longitude and latitude of each column; give the files that "
-        "have them, too (FV3's grid_lont and grid_latt, in grid_spec.tile{}.nc)",
+        "{0}: is one of several tiles, but has no longitude and latitude of each column; give the files that "
+        "have them, too (FV3's grid_lont and grid_latt, in grid_spec.tile{1}.nc, or x and y, in "
+        "C96_grid.tile{1}.nc)",
         file, number);
   GridBlock block = own.blocks[0];
   block.name = fmt::format("tile {}", number);
@@ -88,24 +89,28 @@ void TileSource::add(uint32_t number, std::unique_ptr<NetcdfSource> tile) {
     description_.coordinate_bytes = std::max(description_.coordinate_bytes, own.coordinate_bytes);
     description_.blocks.push_back(block);
   }
+  tile->release();
   tiles_.push_back(std::move(tile));
+}
+
+const NetcdfSource& TileSource::tileOf(uint32_t block) const {
+  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
+  if (const uint32_t before = open_.exchange(block); before != block) tiles_[before]->release();
+  return *tiles_[block];
 }
 
 void TileSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                       NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
-  tiles_[block]->read(0, box, scalars, out);
+  tileOf(block).read(0, box, scalars, out);
 }
 
 void TileSource::readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
                           NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
-  tiles_[block]->readPart(0, range, scalars, out);
+  tileOf(block).readPart(0, range, scalars, out);
 }
 
 std::vector<glm::dvec3> TileSource::pointsOf(uint32_t block, const CfRange& range) const {
-  CURVISPLAT_CHECK_OP(block, <, tiles_.size());
-  return tiles_[block]->pointsOf(0, range);
+  return tileOf(block).pointsOf(0, range);
 }
 
 }  // namespace curvisplat

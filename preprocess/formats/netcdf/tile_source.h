@@ -1,8 +1,9 @@
 // A grid whose faces are in files of their own, as FV3 and FMS write a cubed sphere: NAME.tile1.nc to NAME.tile6.nc,
 // with the coordinates (grid_lont and grid_latt, or the corners grid_lon and grid_lat) in the same files or in others
-// (grid_spec.tile1.nc ...). Files whose names have no number belong to every tile.
+// (grid_spec.tile1.nc ..., or supergrids, supergrid.h). Files whose names have no number belong to every tile.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -31,9 +32,12 @@ class TileSource final : public FaceSource {
 
  private:
   void add(uint32_t number, std::unique_ptr<NetcdfSource> tile);
+  /// The tile of a block. Closes the files of the one before: the memory of open ones is that of one tile.
+  const NetcdfSource& tileOf(uint32_t block) const;
 
   std::vector<std::unique_ptr<NetcdfSource>> tiles_;  // [block]
   GridDescription description_;
+  mutable std::atomic<uint32_t> open_ = 0;  // the tile read last
 };
 
 }  // namespace curvisplat

@@ -1,0 +1,189 @@
+#!/usr/bin/python3
+"""format_memory_test.py CURVISPLAT
+
+Converts one grid of two million nodes from every format within 160 MiB, and prints the peak memory of each conversion. Exit status 77 (skipped)
+without python3-vtk9, python3-netcdf4 or python3-h5py.
+"""
+import gzip
+import lzma
+import shutil
+import struct
+import subprocess
+import sys
+import unittest
+
+from structured_formats import Block, StructuredFormats, np, vtk
+from tecplot_files import Binary, write_text
+from cgns_layout import CgnsLayout
+from mesh_ensight_test import EnsightFile
+
+try:
+    import h5py
+    import netCDF4
+except ModuleNotFoundError as error:
+    print(f"skipped: {error}; install python3-netcdf4 and python3-h5py")
+    sys.exit(77)
+
+BUDGET = 160  # MiB
+SHAPE = (120, 120, 151)
+TILE = (60, 76, 76)
+
+
+class FormatMemory(StructuredFormats):
+    """2,174,400 nodes; 2,079,360 in six tiles."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.block = Block(SHAPE, kind="f4")
+
+    def expect_within(self, what, *paths, scalar="p"):
+        peak = self.peak_memory_of(paths, scalar)
+        print(f"{what:<44} {peak:6.1f} MiB of {BUDGET}")
+        self.assertLessEqual(peak, BUDGET, what)
+
+    def peak_memory_of(self, paths, scalar):
+        first, *others = paths
+        return self.peak_memory(first, scalar, f"{BUDGET}M", *others) / (1 << 20)
+
+    def write_plot3d(self):
+        grid, function = self.folder / "a.xyz", self.folder / "a.fun"
+        dims = struct.pack("<3i", *SHAPE[::-1])
+        grid.write_bytes(dims + self.block.places.astype("<f4").tobytes())
+        function.write_bytes(dims + struct.pack("<i", 1) + self.block.p.astype("<f4").tobytes())
+        return grid, function
+
+    def test_plot3d(self):
+        self.expect_within("PLOT3D, grid and functions", *self.write_plot3d(), scalar="1")
+
+    def test_vtk(self):
+        for name, mode in (("appended, raw", "Appended"), ("zlib, base64", "Binary"), ("ASCII", "Ascii")):
+            path = self.folder / "a.vts"
+            writer = vtk.vtkXMLStructuredGridWriter()
+            writer.SetFileName(str(path))
+            writer.SetInputData(self.block.vtk())
+            getattr(writer, f"SetDataModeTo{mode}")()
+            if mode == "Appended":
+                writer.SetCompressorTypeToNone()
+                writer.EncodeAppendedDataOff()
+            writer.Write()
+            self.expect_within(f"VTK .vts, {name}", path)
+
+    def test_cgns(self):
+        path = self.folder / "a.cgns"
+        layout = CgnsLayout(path)
+        base = layout.node(layout.file, "Base", "CGNSBase_t", np.array([3, 3], "i4"))
+        layout.zone(base, "zone", self.block)
+        layout.file.close()
+        self.expect_within("CGNS, HDF5", path)
+
+    def write_netcdf(self, path, form, places=True, values=True, **options):
+        with netCDF4.Dataset(path, "w", format=form) as f:
+            for name, length in zip(("lev", "y", "x"), SHAPE):
+                f.createDimension(name, length)
+            if places:
+                f.createVariable("lev", "f8", ("lev",))[:] = np.arange(SHAPE[0])
+                f["lev"].units, f["lev"].positive = "m", "up"
+                j, i = np.meshgrid(np.arange(SHAPE[1]), np.arange(SHAPE[2]), indexing="ij")
+                for name, array in (("lon", i * 0.1 + 0.01 * j), ("lat", j * 0.1)):
+                    f.createVariable(name, "f8", ("y", "x"))[:] = array
+                f["lon"].units, f["lat"].units = "degrees_east", "degrees_north"
+            if values:
+                f.createVariable("p", "f4", ("lev", "y", "x"), **options)[:] = self.block.p
+        return path
+
+    def test_netcdf(self):
+        classic = self.write_netcdf(self.folder / "a.nc", "NETCDF3_CLASSIC")
+        self.expect_within("NetCDF, classic", classic)
+        deflated = self.write_netcdf(self.folder / "b.nc", "NETCDF4", zlib=True, chunksizes=(16, 60, 76))
+        self.expect_within("NetCDF-4, deflated", deflated)
+        places = self.write_netcdf(self.folder / "c.nc", "NETCDF4", values=False)
+        values = self.write_netcdf(self.folder / "d.nc", "NETCDF3_CLASSIC", places=False)
+        self.expect_within("NetCDF, coordinates in a second file", values, places)
+
+    def test_compressed_files(self):
+        path = self.write_netcdf(self.folder / "a.nc", "NETCDF3_CLASSIC")
+        data = path.read_bytes()
+        path.with_name("a.nc.gz").write_bytes(gzip.compress(data, 1))
+        path.with_name("a.nc.xz").write_bytes(lzma.compress(data, preset=0))
+        kinds = ["gz", "xz"]
+        if shutil.which("zstd"):
+            subprocess.run(["zstd", "-q", "-1", path], check=True)
+            kinds.append("zst")
+        for kind in kinds:
+            self.expect_within(f"NetCDF, compressed as a whole (.{kind})", path.with_name(f"a.nc.{kind}"))
+
+    def test_tiles(self):
+        """The tiles lie side by side; x and y of the grid files are those of a supergrid."""
+        values, grids = [], []
+        nk, nj, ni = TILE
+        fine = np.meshgrid(np.arange(2 * ni + 1) / 2, np.arange(2 * nj + 1) / 2)
+        for n in range(6):
+            values.append(self.folder / f"atmos.tile{n + 1}.nc")
+            with netCDF4.Dataset(values[-1], "w", format="NETCDF4") as f:
+                for name, length in zip(("pfull", "grid_yt", "grid_xt"), TILE):
+                    f.createDimension(name, length)
+                f.createVariable("pfull", "f8", ("pfull",))[:] = np.arange(nk)
+                f["pfull"].units, f["pfull"].positive = "km", "up"
+                f.createVariable("p", "f4", ("pfull", "grid_yt", "grid_xt"), zlib=True)[:] = np.random.default_rng(n).random(TILE)
+            grids.append(self.folder / f"C76_grid.tile{n + 1}.nc")
+            with netCDF4.Dataset(grids[-1], "w", format="NETCDF3_CLASSIC") as f:
+                f.createDimension("nyp", 2 * nj + 1)
+                f.createDimension("nxp", 2 * ni + 1)
+                for name, array, units in (("x", 0.7 * fine[0] + 59 * n, "degree_east"), ("y", 0.7 * fine[1] - 26, "degree_north")):
+                    f.createVariable(name, "f8", ("nyp", "nxp"))[:] = array
+                    f[name].units = units
+        self.expect_within("NetCDF, six tiles with supergrids", *values, *grids)
+
+    def test_several_blocks(self):
+        paths = []
+        for n in range(3):
+            paths.append(self.folder / f"part{'abc'[n]}.vts")
+            writer = vtk.vtkXMLStructuredGridWriter()
+            writer.SetFileName(str(paths[-1]))
+            writer.SetInputData(Block((40, 120, 151), shift=200.0 * n, kind="f4").vtk())
+            writer.Write()
+        self.expect_within("VTK .vts, three files", *paths)
+
+    def test_tecplot(self):
+        text, binary = self.folder / "a.dat", self.folder / "a.plt"
+        small = Block((60, 90, 101), kind="f4")
+        size = " ".join(f"{axis}={n}," for axis, n in zip("IJK", small.shape[::-1]))
+        write_text(text, [(size + " F=POINT", "POINT", [*small.places, small.p])])
+        self.expect_within("Tecplot, text (545,400 nodes)", text)
+        file = Binary(("X", "Y", "Z", "p"))
+        file.zone(SHAPE, [*self.block.places, self.block.p])
+        file.write(binary)
+        self.expect_within("Tecplot, binary", binary)
+
+    def test_ensight(self):
+        geometry, values, case = (self.folder / name for name in ("a.geo", "a.p", "a.case"))
+        file = EnsightFile("<")
+        file.text("C Binary", "a grid", "", "node id off", "element id off", "part")
+        file.ints([1])
+        file.text("block", "block")
+        file.ints(list(SHAPE[::-1]))
+        file.floats(self.block.places)
+        geometry.write_bytes(file.data)
+        file = EnsightFile("<")
+        file.text("p", "part")
+        file.ints([1])
+        file.text("block")
+        file.floats(self.block.p)
+        values.write_bytes(file.data)
+        case.write_text("FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: a.geo\nVARIABLE\nscalar per node: p a.p\n")
+        self.expect_within("EnSight Gold, a structured part", case)
+
+    def test_xdmf(self):
+        path, size = self.folder / "a.xmf", " ".join(map(str, SHAPE))
+        with h5py.File(self.folder / "a.h5", "w") as file:
+            file.create_dataset("xyz", data=np.moveaxis(self.block.places, 0, -1), chunks=(8, 64, 64, 3), compression="gzip", compression_opts=1)
+            file.create_dataset("p", data=self.block.p, chunks=(8, 64, 64), compression="gzip", compression_opts=1)
+        path.write_text(
+            f'<Xdmf><Domain><Grid><Topology TopologyType="3DSMesh" Dimensions="{size}"/><Geometry GeometryType="XYZ">'
+            f'<DataItem Dimensions="{size} 3" Format="HDF">a.h5:/xyz</DataItem></Geometry>'
+            f'<Attribute Name="p"><DataItem Dimensions="{size}" Format="HDF">a.h5:/p</DataItem></Attribute></Grid></Domain></Xdmf>')
+        self.expect_within("XDMF, HDF5 deflated", path)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=0)
