@@ -18,7 +18,8 @@ constexpr double kConstant = 1e-4;
 constexpr double kMeanDepth = 1.05;  // over the silhouette: an absorption of 65 %
 constexpr double kDivergingShare = 0.25;
 constexpr double kUnseenPart = 0.01;  // of the extinction, beyond either side of the zoomed box
-constexpr double kZoomMargin = 1.25, kWholeMargin = 1.1, kWorthZooming = 0.9, kMinZoomed = 1.0 / 3;
+constexpr double kZoomMargin = 1.25, kWholeMargin = 1.15, kWorthZooming = 0.9, kMinZoomed = 1.0 / 3;
+constexpr double kWorthCropping = 0.5;  // what can be seen has less than this part of the whole data's height
 constexpr int kRangeDigits = 3, kUnitDigits = 3, kPlaceDigits = 4;
 
 constexpr const char* kSequential = "viridis";
@@ -147,10 +148,11 @@ ViewChoice FirstChoice::view(const TransferFunction& function, ImageSize size) c
   const auto halfHeight = [&](const glm::dvec2& a, const glm::dvec2& b, double margin) {
     return 0.5 * margin * std::max(b.y - a.y, (b.x - a.x) / aspect);
   };
+  // Either all of the data, whose box may be much larger, or a small part in which there is something to be seen.
+  const double all = halfHeight(lowest, highest, kWholeMargin);
   double needed = halfHeight(from, to, kZoomMargin);
   glm::dvec2 middle = 0.5 * (from + to);
-  // What can be seen may be everywhere, and the box around the data much larger than the data.
-  if (const double all = halfHeight(lowest, highest, kWholeMargin); all < needed) {
+  if (!(needed < kWorthCropping * all)) {
     needed = all;
     middle = 0.5 * (lowest + highest);
   }

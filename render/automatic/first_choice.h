@@ -43,7 +43,7 @@ class FirstChoice {
   double opacityUnitOf(const TransferFunction& function) const;
   /// The value below which `part` (0..1) of the volume lies.
   double percentile(double part) const;
-  /// The view for a picture of `size`.
+  /// The view for a picture of `size`: of all the data, unless what can be seen lies in a small part of it.
   ViewChoice view(const TransferFunction& function, ImageSize size) const;
 
  private:

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <ostream>
 #include <sstream>
@@ -59,6 +60,37 @@ TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
   const ProgramResult again = render(chosenOptions(result.out), "b.png");
   EXPECT_EQ(again.out.find(kChosen), std::string::npos) << "all was given: " << again.out;
   EXPECT_EQ(readTextFile(file("a.png")), readTextFile(file("b.png"))) << result.out;
+}
+
+/// Of grids from thin to long, in pictures from wide to high: nothing is cut off at the sides, with an outline nor without.
+TEST_P(DefaultPictures, HoldTheWholeData) {
+  convert(GetParam(), "48x32x24");
+  const auto touched = [](const Image& image) {
+    int number = 0;
+    const auto count = [&](int x, int y) {
+      const float* const pixel = image.pixel(x, y);
+      number += std::min({pixel[0], pixel[1], pixel[2]}) < 0.95f;
+    };
+    for (int x = 0; x < image.size.width; ++x) {
+      count(x, 0);
+      count(x, image.size.height - 1);
+    }
+    for (int y = 0; y < image.size.height; ++y) {
+      count(0, y);
+      count(image.size.width - 1, y);
+    }
+    return number;
+  };
+  for (const char* const stretched : {"1,1,1", "8,1,1", "1,0.05,1"})
+    for (const char* const size : {"160x160", "240x80", "80x240"})
+      for (const bool outline : {false, true}) {
+        std::vector<std::string> words{"--size", size, "--scale", stretched, "--backend", "cpu"};
+        if (outline) words.push_back("--outline");
+        words.insert(words.begin(), {"render", file("a.splats"), "-o", file("a.png")});
+        const ProgramResult result = run(words);
+        EXPECT_EQ(touched(readImage(file("a.png"))), 0)
+            << stretched << " " << size << (outline ? " outline: " : ": ") << result.out;
+      }
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, DefaultPictures,
                          testing::Values("half-annulus", "shell", "o-grid", "axis", "sheared-waves", "wake",

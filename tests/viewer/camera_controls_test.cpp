@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -91,6 +92,25 @@ TEST_P(CameraControls, RefittingShowsAllOfTheBox) {
   }
   expectNear(glm::normalize(camera.focal_point - camera.position),
              glm::normalize(camera_.focal_point - camera_.position));
+}
+
+/// The corners of one picture are in the other, and those of a side are on its border.
+TEST_P(CameraControls, HoldingShowsAllOfAnotherPicture) {
+  const auto corner = [](const Camera& camera,
+                         ImageSize size) {  // half of what is seen at the focal point's depth
+    const double half_height = camera.projection == Projection::kOrthographic
+                                   ? camera.parallel_scale
+                                   : glm::length(camera.focal_point - camera.position) *
+                                         std::tan(0.5 * camera.view_angle_deg * 3.14159265358979 / 180);
+    return glm::dvec2(half_height * size.width / size.height, half_height);
+  };
+  const glm::dvec2 shown = corner(camera_, kSize);
+  for (const ImageSize size : {ImageSize{600, 400}, ImageSize{100, 400}, ImageSize{900, 100}}) {
+    const glm::dvec2 held = corner(holding(camera_, kSize, size), size);
+    EXPECT_GE(held.x, shown.x - 1e-9) << size.width;
+    EXPECT_GE(held.y, shown.y - 1e-9) << size.width;
+    EXPECT_NEAR(std::min(held.x / shown.x, held.y / shown.y), 1, 1e-9) << size.width;
+  }
 }
 
 TEST_P(CameraControls, FlyingMovesAlongTheView) {

@@ -221,7 +221,7 @@ TEST_F(FrameLoopTest, FacesThatAStepLacksEndTheRequestOnly) {
   SurfaceScene scene;
   scene.grid_surfaces.emplace_back();
   request.options.scene = std::make_shared<const SurfaceScene>(scene);
-  request.faces_at = [](const CacheReader&, const auto&) -> std::vector<GridSurface> {
+  request.faces_at = [](const CacheReader&, const FaceNames&) -> std::vector<GridSurface> {
     throw Error("no such faces");
   };
   loop.request(request);

@@ -42,6 +42,10 @@ TEST(RenderCommand, HasEveryOption) {
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
   state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
   state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25}};
+  state.faces = {{"block 3:k=min", {0, 1, 0.5f}, {0.5, true}}};
+  state.faces_by = FacesScalar{"density", EditedFunction("magma", 0.5, 2, 0.1)};
+  state.isovalues = {0.25, -0.5};
+  state.iso_opacity = {0.75, false};
   state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
   state.slice_opacity = {0.5, true};
   state.volume = false;
@@ -68,6 +72,12 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--surface-colour '#ff8000'",
                                                   "--slice 0,0.25,0,0,-1,2",
                                                   "--surface-opacity 0.25",
+                                                  "--surface 'block 3:k=min'",
+                                                  "--surface-colour '#00ff80'",
+                                                  "--surface-opacity 'function*0.5'",
+                                                  "--surface-by density",
+                                                  "--iso 0.25,-0.5",
+                                                  "--iso-opacity 0.75",
                                                   "--slice-opacity 'function*0.5'",
                                                   "--volume off"});
 }

@@ -32,6 +32,10 @@ ViewState changedState() {
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
   state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
   state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25}};
+  state.faces = {{"block 3:k=min", {0, 1, 0.5f}, {0.5, true}}, {"walls"}};
+  state.faces_by = FacesScalar{"density", EditedFunction("magma", 0.5, 2, 0.1)};
+  state.isovalues = {0.25, -0.5};
+  state.iso_opacity = {0.75, true};
   state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
   state.slice_opacity = {0.5, true};
   state.volume = false;
@@ -60,12 +64,16 @@ TEST(ViewState, ComesBackFromItsText) {
 TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   auto json = nlohmann::json::parse(toJson(changedState()));
   for (const char* field :
-       {"clip_planes", "surfaces", "slices", "slice_opacity", "slices_by_function", "volume"})
+       {"clip_planes", "surfaces", "faces", "faces_by", "isovalues", "iso_opacity", "isosurfaces_by_function",
+        "slices", "slice_opacity", "slices_by_function", "volume"})
     json.erase(field);
   json.erase("lit");
   const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
   EXPECT_TRUE(state.clip_planes.empty());
   EXPECT_TRUE(state.surfaces.empty());
+  EXPECT_TRUE(state.faces.empty());
+  EXPECT_FALSE(state.faces_by);
+  EXPECT_TRUE(state.isovalues.empty());
   EXPECT_TRUE(state.slices.empty());
   EXPECT_TRUE(state.volume);
   EXPECT_FALSE(state.lit);
@@ -104,6 +112,10 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/clip_planes", 3, "clip_planes");
   expectError("/slices/0/normal", nlohmann::json::array({0, 0, 0}), "slices[0].normal");
   expectError("/surfaces/0/colour", nlohmann::json::array({0, 0, 2}), "surfaces[0].colour");
+  expectError("/faces/0/opacity", 2, "faces[0].opacity");
+  expectError("/faces/1/colour", nlohmann::json::array({0, 0, 2}), "faces[1].colour");
+  expectError("/faces_by/variable", "pressure", "faces_by.variable");
+  expectError("/isovalues/1", "high", "isovalues[1]");
   expectError("/slice_opacity", 2, "slice_opacity");
   expectError("/slices_by_function", 2, "slices_by_function");
   expectError("/surfaces/0/opacity", 0, "surfaces[0].opacity");

@@ -235,8 +235,9 @@ void render(const RenderArguments& given) {
   options.size = dataSize(arguments.annotations.shown, picture, functions);
   options.output_bytes = outputBytes(arguments, picture);
   const bool has_grid = arguments.annotations.shown.axes_grid;
+  const bool has_box = has_grid || arguments.annotations.shown.outline;
   const CameraArguments camera =
-      choice.picture.camera(arguments.camera, transfer_function, options.size, has_grid);
+      choice.picture.camera(arguments.camera, transfer_function, options.size, has_box);
   const Series series = cache.series();
   const ShownBox box = shownBox(manifest, options.scale, arguments.annotations.shown);
   const MotionInTime motion =

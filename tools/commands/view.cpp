@@ -17,6 +17,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/further_scalars.h"
 #include "tools/options/grid_first.h"
+#include "tools/options/grid_surfaces.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/step_arguments.h"
@@ -50,11 +51,14 @@ void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerO
     else
       options.face_names.emplace_back(surface);
   options.faces_by = arguments.surfaces.surface_by;
-  if (hasFaces(arguments.surfaces))
-    options.faces_at = [surfaces = arguments.surfaces](const CacheReader& at_step,
-                                                       const std::vector<GridSurface>& first) {
-      return facesAt(surfaces, at_step, first);
-    };
+}
+
+FaceServices faceServices() {
+  return {faceNamesOf, [](const CacheReader& cache, const FaceNames& names) {
+            std::vector<WantedFaces> wanted;
+            for (const FaceNames::Faces& one : names.faces) wanted.push_back({one.name, one.has_opacities});
+            return gridSurfacesNamed(wanted, names.by, names.opacity_by, cache);
+          }};
 }
 
 /// What needs a cache from the beginning.
@@ -138,6 +142,7 @@ void view(const ViewArguments& arguments) {
   std::optional<CacheReader> cache;
   const ValuePrecision precision = parseValuePrecision("--value-precision", arguments.value_precision);
   options.conversion = conversionServices(precision);
+  options.faces = faceServices();
   options.open_movie = [](const std::filesystem::path& file, ImageSize size, double frames_per_s) {
     return std::make_unique<MovieFile>(file, size, frames_per_s);
   };

@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kNamesListed = 8;
+constexpr size_t kNamesListed = 8, kMaxOffered = 400;
 
 std::string listed(const std::vector<std::string>& names) {
   const size_t count = std::min(names.size(), kNamesListed);
@@ -219,6 +219,44 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
                 is_plane ? fmt::format("; convert --surface \"{}\" keeps an index plane", word) : "");
   }
   return surface;
+}
+
+std::vector<GridSurface> gridSurfacesNamed(const std::vector<WantedFaces>& wanted, const std::string& by,
+                                           const std::string& opacity_by, const CacheReader& cache) {
+  const auto faces = facesWith(by, cache);
+  std::vector<GridSurface> surfaces;
+  for (const WantedFaces& one : wanted) {
+    GridSurface& surface = surfaces.emplace_back(gridSurfaceNamed(one.name, cache, faces));
+    if (!by.empty()) surface.scalar = scalarOfFaces(*faces, by, cache);
+    if (one.has_opacities) takeOpacities(surface, opacity_by, cache);
+  }
+  return surfaces;
+}
+
+std::vector<std::string> faceNamesOf(const CacheReader& cache) {
+  const auto faces = FacesReader::open(cache.path(), cache.manifest());
+  if (!faces) return {};
+  std::vector<std::string> names, of_blocks;
+  std::set<std::string> known;
+  const auto add = [&](std::vector<std::string>& list, const std::string& name) {
+    if (known.insert(name).second) list.push_back(name);
+  };
+  for (const GridFace& face : faces->faces()) {
+    const bool is_plane = face.side == FaceSide::kPlane;
+    const std::string name = nameOf(face);
+    add(is_plane ? of_blocks : names, name);
+    if (!is_plane && cache.manifest().blocks.size() > 1)
+      add(of_blocks, fmt::format("block {}:{}={}", face.block + 1, name[0], name.substr(1)));
+  }
+  std::sort(names.begin(), names.end());
+  if (names.size() > 1) names.insert(names.begin(), "all");
+  if (std::any_of(faces->regions().begin(), faces->regions().end(), isWall)) add(names, "walls");
+  // A comma is taken for the end of a name.
+  for (const FaceRegion& region : faces->regions())
+    if (!region.name.empty() && region.name.find(',') == std::string::npos) add(names, region.name);
+  if (names.size() + of_blocks.size() <= kMaxOffered)
+    names.insert(names.end(), of_blocks.begin(), of_blocks.end());
+  return names;
 }
 
 std::shared_ptr<const FacesReader> facesWith(const std::string& name, const CacheReader& cache) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
@@ -18,6 +19,20 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
 /// The faces of the cache's step; those with the values of the scalar `name` there, if one is named. Null if the cache
 /// has no faces. Throws Error if it has, but not with these values.
 std::shared_ptr<const FacesReader> facesWith(const std::string& name, const CacheReader& cache);
+
+/// A name of faces, and whether their opacities are those of a scalar.
+struct WantedFaces {
+  std::string name;
+  bool has_opacities = false;
+};
+/// The faces of these names at the cache's step, with the scalar `by` for their colours and `opacity_by` for their
+/// opacities, where these are named. Colours are not set. Throws Error as gridSurfaceNamed().
+std::vector<GridSurface> gridSurfacesNamed(const std::vector<WantedFaces>& wanted, const std::string& by,
+                                           const std::string& opacity_by, const CacheReader& cache);
+
+/// Names that a list of the cache's faces offers: those that all blocks share first, then walls and boundaries, then the
+/// faces of single blocks. Empty if the cache has no faces.
+std::vector<std::string> faceNamesOf(const CacheReader& cache);
 
 /// Colours the surface, whose faces have it, by the scalar `name`: the picture's colours if it is the scalar `drawn`,
 /// else those that are chosen from its own data.

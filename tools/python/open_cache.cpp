@@ -122,8 +122,8 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);
     frame.size = dataSize(annotations, size, functions);
     if (!(annotations == Annotations{})) frame.output_bytes += annotatedBytes(size);
-    const CameraArguments camera =
-        choice.picture.camera(arguments.camera, function, frame.size, annotations.axes_grid);
+    const CameraArguments camera = choice.picture.camera(arguments.camera, function, frame.size,
+                                                         annotations.outline || annotations.axes_grid);
     const ShownBox box = shownBox(manifest, frame.scale, annotations);
     const Camera at = chooseCameraMotion(camera, box.lower, box.upper, frame.size).camera(0);
     // The grid of the axes lies behind the data, before the background.

@@ -21,6 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMaxIsosurfaces = 16;
 constexpr double kIdleWaitSeconds = 0.5;
 constexpr double kMovingWaitSeconds = 0.03;  // while flying, and until the camera is at rest
 
@@ -60,7 +61,8 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
                      Reports& reports, FileDialog& dialog, std::shared_future<void> after)
     : cache_(prepared.cache.atStep(prepared.cache.step())),
       target_s_(options.target_s),
-      faces_at_(options.carried ? options.carried->faces_at : options.faces_at),
+      faces_at_(options.faces.at),
+      face_names_(prepared.face_names),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
@@ -122,6 +124,7 @@ ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOption
 void CacheView::draw(const WindowLayout& layout) {
   reports_.attempt([&] { takeFrame(); });
   reports_.attempt([&] { takeFunction(); });
+  reports_.attempt([&] { takeSurface(); });
   react(layout);
   const ImageSize size = pixelsOf(layout.picture, window_);
   if (size.width > 0) {
@@ -229,6 +232,7 @@ void CacheView::drawPanels(const WindowLayout& layout) {
   facts.flies = navigation_.flies();
   facts.playback = &playback_;
   facts.views = views_;
+  facts.faces = &face_names_;
   facts.place = layout.panels;
   const FurtherScalars further = furtherScalars();
   facts.further = &further;
@@ -246,6 +250,8 @@ void CacheView::apply(const PanelActions& actions) {
   if (actions.scalar) chooseScalar(*actions.scalar);
   if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
   if (actions.automatic_function) run(Command::kResetFunction);
+  if (actions.add_faces) addFaces(*actions.add_faces);
+  if (actions.colour_faces) colourFaces(*actions.colour_faces);
   if (actions.looks_for_scalars) further_.look();
   if (actions.add_scalar) wanted_scalar_ = actions.add_scalar;
   if (actions.load_function) dialog_.open(FileDialog::Purpose::kLoadFunction);
@@ -271,6 +277,7 @@ void CacheView::ask(bool moving) {
   request.step = playback_.step();
   request.part = playback_.position().part;
   request.next = playback_.next();
+  request.faces = state_.faceNames();
   request.faces_at = faces_at_;
   if (frames_failed_) restartFrames();
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
@@ -289,7 +296,7 @@ void CacheView::run(Command command) {
       saveTo({});
       return;
     case Command::kSavePictureAs:
-      return dialog_.open(FileDialog::Purpose::kSavePicture, cache_.cachePath().stem().string() + ".png");
+      return dialog_.openToSavePicture(cache_.cachePath().stem().string() + ".png", picture_size_);
     case Command::kSaveTurnMovie:
     case Command::kSaveStepsMovie:
       movie_kind_ = command == Command::kSaveTurnMovie ? MovieKind::kOneTurn : MovieKind::kAllSteps;
@@ -326,6 +333,14 @@ void CacheView::run(Command command) {
       changed_ = true;
       return;
     }
+    case Command::kAddSurfaceFile:
+      return dialog_.open(FileDialog::Purpose::kOpenSurface);
+    case Command::kAddIsosurface: {
+      const auto [low, high] = (state_.opacity_by ? state_.opacity_by->function : state_.function).range();
+      state_.isovalues.push_back(0.5 * (low + high));
+      changed_ = true;
+      return;
+    }
     case Command::kRemoveMarkers:
       state_.markers.clear();
       changed_ = true;
@@ -358,6 +373,8 @@ bool CacheView::isEnabled(Command command) const {
       return state_.clip_planes.size() < kMaxClipPlanes;
     case Command::kAddSlice:
       return state_.slices.size() < kMaxSlices;
+    case Command::kAddIsosurface:
+      return state_.isovalues.size() < kMaxIsosurfaces;
     case Command::kRemoveMarkers:
       return !state_.markers.empty();
     default:
@@ -393,7 +410,7 @@ bool CacheView::isChecked(Command command) const {
 double CacheView::wait() const {
   if (playback_.isPlaying() && isShown() && playback_.wait(clockSeconds()) <= 0) return 0;
   const bool short_wait = navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() ||
-                          probe_.busy() || chooser_.busy();
+                          probe_.busy() || chooser_.busy() || reading_surface_.valid();
   return short_wait ? kMovingWaitSeconds : kIdleWaitSeconds;
 }
 
@@ -414,12 +431,12 @@ void CacheView::restore(const ViewState* state) {
 
 std::shared_ptr<const CarriedView> CacheView::carried() const {
   if (isUntouchedPreview()) return nullptr;
-  return std::make_shared<const CarriedView>(CarriedView{state_, history_, faces_at_});
+  return std::make_shared<const CarriedView>(CarriedView{state_, history_});
 }
 
 bool CacheView::isOf(const CacheReader& cache) const {
   const auto same_name = [](const VariableInfo& a, const VariableInfo& b) { return a.name == b.name; };
-  return cache.cachePath() == cache_.cachePath() && state_.faces.empty() &&
+  return cache.cachePath() == cache_.cachePath() &&
          std::ranges::equal(cache.manifest().variables, manifest().variables, same_name);
 }
 

@@ -42,7 +42,6 @@ struct WindowLayout {
 struct CarriedView {
   ViewState state;
   History history;
-  FacesAtStep faces_at;
 };
 
 class CacheView {
@@ -90,8 +89,7 @@ class CacheView {
   std::optional<MovieRequest> takeWantedMovie() { return std::exchange(wanted_movie_, std::nullopt); }
   const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
   const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
-  /// Whether its state can be that of a view of this cache: it shows the same one, and no faces of the command line, which
-  /// are meshes of it.
+  /// Whether its state can be that of a view of this cache: it shows the same one.
   bool isOf(const CacheReader& cache) const;
 
  private:
@@ -101,6 +99,12 @@ class CacheView {
   void reportDamage();
   /// A picture, once it is final; the empty name: the next number.
   void saveTo(const std::filesystem::path& file);
+  void savePictureOf(const std::filesystem::path& file, ImageSize size);
+  void addFaces(const std::string& name);
+  void readSurface(const std::filesystem::path& file);
+  void takeSurface();
+  void colourFaces(const std::string& scalar);
+  void leaveIsosurfaces(const std::string& before);
   void saveMovieTo(const std::filesystem::path& file);
   void giveUpSaving();
   void giveUpRequest();
@@ -140,6 +144,7 @@ class CacheView {
   const CacheReader cache_;
   const std::optional<double> target_s_;
   const FacesAtStep faces_at_;
+  const std::vector<std::string> face_names_;  // that the list of surfaces offers
   const std::optional<Preview> preview_;
   const std::vector<std::filesystem::path> grid_files_;  // that were opened, if the cache is kept for them
   Window& window_;
@@ -177,8 +182,9 @@ class CacheView {
   std::optional<ShownValues> values_;
   PointProbe probe_;
   FunctionChooser chooser_;
-  uint64_t values_asked_for_ = 0;  // request
-  bool values_failed_ = false;     // of the newest request
+  std::future<SurfaceFile> reading_surface_;  // that is to be added
+  uint64_t values_asked_for_ = 0;             // request
+  bool values_failed_ = false;                // of the newest request
   double pointed_since_s_ = 0;
   glm::dvec2 pointed_{-1.0};
   struct Click {

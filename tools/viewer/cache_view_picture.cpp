@@ -2,19 +2,24 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <future>
 #include <utility>
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
 #include "render/image/image_file.h"
+#include "render/mesh/mesh_file.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/thread_name.h"
 #include "stream/codec/values_codec.h"
 #include "tools/viewer/cache_view.h"
+#include "tools/viewer/camera_controls.h"
 #include "tools/viewer/first_view.h"
 #include "tools/viewer/marker_panel.h"
 #include "tools/viewer/picture_layout.h"
@@ -221,6 +226,14 @@ std::string CacheView::timeOption() const {
                       : fmt::format(" --time={} --interpolate", cache_.series().timeAt(at));
 }
 
+/// Of another size than the window's: it is drawn in the background. What is seen in the window is in it.
+void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
+  movie_kind_ = MovieKind::kOnePicture;
+  saveMovieTo(file);
+  wanted_movie_->size = size;
+  wanted_movie_->state.camera = holding(state_.camera, data_size_, dataSizeOf(state_, manifest(), size));
+}
+
 /// What is shown now, whatever is changed while it is drawn.
 void CacheView::saveMovieTo(const fs::path& file) {
   MovieRequest movie{movie_kind_, file, cache_.at(playback_.position()), state_, picture_size_};
@@ -275,7 +288,12 @@ void CacheView::take(const FileDialog::Chosen& chosen) {
         return say(
             fmt::format("saved {}; draw with it: render --tf {}", file.string(), shortPath(file).string()));
       case FileDialog::Purpose::kSavePicture:
+        if (chosen.size &&
+            !(chosen.size->width == picture_size_.width && chosen.size->height == picture_size_.height))
+          return savePictureOf(file, *chosen.size);
         return saveTo(file);
+      case FileDialog::Purpose::kOpenSurface:
+        return readSurface(file);
       case FileDialog::Purpose::kSaveMovie:
         return saveMovieTo(file);
       case FileDialog::Purpose::kOpenData:
@@ -300,10 +318,6 @@ void CacheView::loadView(const std::string& name) {
   try {
     const fs::path file = savedViewOf(whole(), name);
     ViewState state = viewStateFromJson(readTextFile(file), file, manifest());
-    state.faces = state_.faces;  // of the command line
-    state.faces_by = state_.faces_by;
-    state.isovalues = state_.isovalues;
-    state.iso_opacity = state_.iso_opacity;
     loadSurfaces(state);
     restore(&state);
   } catch (const Error& error) {
@@ -324,6 +338,7 @@ void CacheView::addTo(MenuFacts& facts) {
   facts.opacity_scalars = otherScalars();
   facts.opacity_scalar = state_.opacity_by ? state_.opacity_by->variable : facts.opacity_scalars.front();
   facts.views = views_;
+  facts.faces = face_names_;
   facts.further = furtherScalars();
 }
 
@@ -336,6 +351,7 @@ FurtherScalars CacheView::furtherScalars() {
 
 void CacheView::choose(const MenuChoice& choice) {
   if (choice.view) loadView(*choice.view);
+  if (choice.faces) addFaces(*choice.faces);
   if (choice.looks_for_scalars) further_.look();
   if (choice.add_scalar) wanted_scalar_ = choice.add_scalar;
   if (choice.scalar) chooseScalar(*choice.scalar);
@@ -352,8 +368,10 @@ void CacheView::chooseScalar(const std::string& name) {
 }
 
 void CacheView::showScalar(const std::string& name) {
+  const std::string before = state_.isoScalar();
   chooseVariable(state_, manifest(), name);
   if (state_.opacity_by && state_.opacity_by->variable == name) state_.opacity_by.reset();
+  leaveIsosurfaces(before);
   ++function_version_;
   changed_ = true;
 }
@@ -365,8 +383,57 @@ void CacheView::chooseOpacityScalar(const std::string& name) {
   if (!is_shown && !name.empty() && name != state_.variable) return chooser_.ask({For::kOpacities, name});
   chooser_.drop(For::kOpacities);  // one that was chosen before
   if (is_shown) return;
+  const std::string before = state_.isoScalar();
   state_.opacity_by.reset();
+  leaveIsosurfaces(before);
   ++function_version_;
+  changed_ = true;
+}
+
+/// Values of another scalar mean nothing.
+void CacheView::leaveIsosurfaces(const std::string& before) {
+  if (state_.isovalues.empty() || state_.isoScalar() == before) return;
+  say(fmt::format("The isosurfaces of {} were removed: they were at its values.", before));
+  state_.isovalues.clear();
+}
+
+void CacheView::addFaces(const std::string& name) {
+  if (state_.surfaces.size() + state_.faces.size() >= kMaxSurfaces)
+    return say(fmt::format("There are {} surfaces, and no more can be added.", kMaxSurfaces));
+  state_.faces.push_back({name});
+  changed_ = true;
+}
+
+/// An empty name: each has its own colour.
+void CacheView::colourFaces(const std::string& scalar) {
+  chooser_.drop(FunctionChooser::For::kFaces);
+  if (!scalar.empty()) return chooser_.ask({FunctionChooser::For::kFaces, scalar});
+  state_.faces_by.reset();
+  ++function_version_;
+  changed_ = true;
+}
+
+/// On another thread: a file may be large.
+void CacheView::readSurface(const fs::path& file) {
+  if (reading_surface_.valid()) return say("A surface is being read already.");
+  if (state_.surfaces.size() + state_.faces.size() >= kMaxSurfaces)
+    return say(fmt::format("There are {} surfaces, and no more can be added.", kMaxSurfaces));
+  reading_surface_ = std::async(std::launch::async, [file] {
+    nameThisThread("surface");
+    struct Wake {
+      ~Wake() { Window::wake(); }
+    } const at_the_end;
+    SurfaceFile surface{file};
+    surface.mesh = std::make_shared<TriangleMesh>(readMeshFile(file));
+    return surface;
+  });
+}
+
+void CacheView::takeSurface() {
+  if (!reading_surface_.valid() ||
+      reading_surface_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return;
+  state_.surfaces.push_back(reading_surface_.get());
   changed_ = true;
 }
 
@@ -383,7 +450,14 @@ void CacheView::takeFunction() {
       return;
     }
     case FunctionChooser::For::kOpacities:
-      if (question.scalar != state_.variable) state_.opacity_by = OpacityScalar{question.scalar, function};
+      if (question.scalar != state_.variable) {
+        const std::string before = state_.isoScalar();
+        state_.opacity_by = OpacityScalar{question.scalar, function};
+        leaveIsosurfaces(before);
+      }
+      break;
+    case FunctionChooser::For::kFaces:
+      state_.faces_by = FacesScalar{question.scalar, function};
       break;
     case FunctionChooser::For::kSameScalar:
       if (question.scalar == state_.variable) state_.function = function;

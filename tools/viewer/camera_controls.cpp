@@ -106,6 +106,15 @@ Camera withOtherProjection(const Camera& camera) {
   return result;
 }
 
+Camera holding(const Camera& camera, ImageSize from, ImageSize to) {
+  const auto aspect = [](ImageSize size) { return static_cast<double>(size.width) / size.height; };
+  const double factor = std::max(1.0, aspect(from) / aspect(to));  // a narrower one has to be higher
+  Camera result = camera;
+  result.parallel_scale *= factor;
+  result.view_angle_deg = glm::degrees(2 * std::atan(factor * halfAngleTangent(camera)));
+  return result;
+}
+
 Camera refitted(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) {
   const ViewAxes axes = axesOf(camera);
   const double radius = std::max(glm::length(upper - lower) / 2, 1e-300);

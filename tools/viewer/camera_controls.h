@@ -25,6 +25,8 @@ Camera flown(const Camera& camera, const glm::dvec3& step);
 
 /// Switches the projection and keeps the size of objects at the focal point's depth.
 Camera withOtherProjection(const Camera& camera);
+/// The camera at which a picture of the size `to` shows all that one of the size `from` shows.
+Camera holding(const Camera& camera, ImageSize from, ImageSize to);
 /// Keeps the view direction and fits the box [lower, upper] into the image.
 Camera refitted(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size);
 

@@ -13,22 +13,11 @@
 
 namespace curvisplat {
 
-namespace {
-
-/// What has been added, by the menu or by a saved view, is shown. `seen`: how many there were.
-void unfoldIfMore(size_t& seen, size_t number) {
-  if (number > seen) ImGui::SetNextItemOpen(true);
-  seen = number;
-}
-
-}  // namespace
-
 void CutPanel::draw(ViewState& state, PanelActions& actions) {
   if (section("Clip box", false)) drawClipBox(state, actions);
-  unfoldIfMore(planes_seen_, state.clip_planes.size());
-  if (section("Clip planes", false)) drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
-  unfoldIfMore(slices_seen_, state.slices.size());
-  if (section("Slices", false)) drawSlices(state, actions);
+  if (sectionOf("Clip planes", planes_seen_, state.clip_planes.size()))
+    drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
+  if (sectionOf("Slices", slices_seen_, state.slices.size())) drawSlices(state, actions);
 }
 
 /// A plane's normal in data coordinates is its normal after --scale, times the scale.
@@ -123,7 +112,6 @@ void CutPanel::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const Vie
   actions.changed = true;
 }
 
-/// Without a slice or a surface there is nothing to show but the volume.
 void CutPanel::drawSlices(ViewState& state, PanelActions& actions) {
   auto opacity = static_cast<float>(state.slice_opacity.factor);
   label("opacity");
@@ -134,11 +122,6 @@ void CutPanel::drawSlices(ViewState& state, PanelActions& actions) {
   actions.dragging |= ImGui::IsItemActive();
   actions.changed |= ImGui::Checkbox("times the function's", &state.slice_opacity.by_function);
   nameWidget("slices by function");
-  const bool alone =
-      state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty();
-  ImGui::BeginDisabled(alone);
-  actions.changed |= ImGui::Checkbox("volume", &state.volume);
-  ImGui::EndDisabled();
   drawPlanes(state.slices, kMaxSlices, state, actions);
 }
 

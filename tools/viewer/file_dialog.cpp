@@ -18,6 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMaxSide = 16384;  // of a picture, in pixels
+
 struct Look {
   const char *title, *button;
   bool saves = false;
@@ -34,6 +36,8 @@ Look lookOf(FileDialog::Purpose purpose) {
       return {"Save colours and opacities", "save", true, {".json"}};
     case FileDialog::Purpose::kSavePicture:
       return {"Save picture", "save", true, {".png", ".exr", ".pfm"}};
+    case FileDialog::Purpose::kOpenSurface:
+      return {"Add a surface", "add", false, {".stl", ".ply", ".obj"}};
     case FileDialog::Purpose::kSaveMovie:
       return {"Save movie", "save", true, {".mp4", ".gif", ".png"}};
   }
@@ -83,6 +87,11 @@ void FileDialog::open(Purpose purpose, const std::string& name) {
   name_ = name;
 }
 
+void FileDialog::openToSavePicture(const std::string& name, ImageSize size) {
+  open(Purpose::kSavePicture, name);
+  size_ = offered_size_ = size;
+}
+
 void FileDialog::enter(const fs::path& folder) {
   error_.clear();
   overwrites_.clear();
@@ -122,6 +131,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   accepts |= ImGui::InputTextWithHint("##name", look.saves ? "name" : "name, or a path", &name_,
                                       ImGuiInputTextFlags_EnterReturnsTrue);
   nameWidget("file name");
+  if (*purpose_ == Purpose::kSavePicture) drawSize();
   accepts |= ImGui::Button(look.button);
   nameWidget("file accept");
   ImGui::SameLine();
@@ -132,8 +142,6 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
   else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
     ImGui::TextDisabled(".mp4 or .gif; .png: a numbered picture of each frame");
-  else if (error_.empty() && *purpose_ == Purpose::kSavePicture)
-    ImGui::TextDisabled("As large as in the window. For another size: copy command, change --size.");
   else
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
@@ -146,12 +154,46 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   return chosen;
 }
 
+/// Width and height in pixels, and buttons for usual ones.
+void FileDialog::drawSize() {
+  const auto number = [](const char* name, int& value) {
+    ImGui::SetNextItemWidth(5 * ImGui::GetFontSize());
+    ImGui::InputInt(fmt::format("##{}", name).c_str(), &value, 0, 0);
+    nameWidget(name);
+    value = std::clamp(value, 1, kMaxSide);
+    ImGui::SameLine();
+  };
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted("size");
+  ImGui::SameLine();
+  number("picture width", size_.width);
+  ImGui::TextUnformatted("x");
+  ImGui::SameLine();
+  number("picture height", size_.height);
+  ImGui::TextUnformatted("pixels");
+  nameWidget(fmt::format("picture of {} x {}", size_.width, size_.height));
+  const auto offer = [this](const char* text, ImageSize size) {
+    ImGui::SameLine();
+    if (ImGui::Button(text)) size_ = size;
+    nameWidget(fmt::format("picture size {}", text));
+  };
+  offer("as shown", offered_size_);
+  offer("twice that",
+        {std::min(kMaxSide, 2 * offered_size_.width), std::min(kMaxSide, 2 * offered_size_.height)});
+  offer("1920 x 1080", {1920, 1080});
+  offer("3840 x 2160", {3840, 2160});
+}
+
 /// A click takes a name, with Control several; a double click opens.
 void FileDialog::drawEntries(bool& accepts) {
-  const float below = 2.6f * ImGui::GetFrameHeightWithSpacing();
+  const float lines = *purpose_ == Purpose::kSavePicture ? 3.6f : 2.6f;
+  const float below = lines * ImGui::GetFrameHeightWithSpacing();
   ImGui::BeginChild("entries", {0, -below}, true);
   std::optional<fs::path> entered;
-  if (entries_.empty()) ImGui::TextDisabled("No file in this folder is of a kind that can be chosen here.");
+  if (entries_.empty())
+    ImGui::TextDisabled("%s", lookOf(*purpose_).saves
+                                  ? "There is no such file in this folder yet."
+                                  : "No file in this folder is of a kind that can be chosen here.");
   for (const FolderEntry& entry : entries_) {
     const std::string shown = entry.is_folder ? entry.name + "/" : entry.name;
     const bool chosen =
@@ -217,6 +259,7 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
       return std::nullopt;
     }
     chosen.files.push_back(path);
+    if (*purpose_ == Purpose::kSavePicture) chosen.size = size_;
     return chosen;
   }
   if (fs::exists(whole(name_), ignored)) {

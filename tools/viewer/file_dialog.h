@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "render/image/image_size.h"
 #include "tools/viewer/window.h"
 
 namespace curvisplat {
@@ -26,14 +27,17 @@ std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
 
 class FileDialog {
  public:
-  enum class Purpose { kOpenData, kLoadFunction, kSaveFunction, kSavePicture, kSaveMovie };
+  enum class Purpose { kOpenData, kLoadFunction, kSaveFunction, kSavePicture, kSaveMovie, kOpenSurface };
   struct Chosen {
     Purpose purpose;
     std::vector<std::filesystem::path> files;
+    std::optional<ImageSize> size = std::nullopt;  // of a picture
   };
 
   /// Opens it with the next draw(), in the folder it was in last. `name`: the one that is offered.
   void open(Purpose purpose, const std::string& name = "");
+  /// The same, to save a picture; `size` is offered, and can be changed.
+  void openToSavePicture(const std::string& name, ImageSize size);
   bool isOpen() const { return purpose_.has_value(); }
   /// Draws it, if it is open. Returns what was chosen, once.
   std::optional<Chosen> draw(Window& window);
@@ -44,6 +48,7 @@ class FileDialog {
   void take(std::vector<std::string> names);
   bool isTaken(const std::string& name) const;
   std::optional<Chosen> accept();
+  void drawSize();
 
   std::optional<Purpose> purpose_;
   bool opens_ = false;
@@ -52,6 +57,7 @@ class FileDialog {
   std::vector<std::string> taken_;  // names that were clicked
   std::string taken_text_;          // them, as they were put into `name_`
   std::string name_, error_, overwrites_;
+  ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture
 };
 
 }  // namespace curvisplat

@@ -24,7 +24,8 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
   const ImageSize size = dataSize(state.annotations, picture, state.function.function());
   const ViewChoice view = choice.view(state.function.function(), size);
   state.camera = Camera::named(view.view, manifest.lower, manifest.upper, size, Projection::kOrthographic);
-  if (view.focal_point) {
+  // The outline is to be seen whole.
+  if (view.focal_point && !state.annotations.outline) {
     state.camera.position += *view.focal_point - state.camera.focal_point;
     state.camera.focal_point = *view.focal_point;
     state.camera.parallel_scale = view.parallel_scale;

@@ -44,6 +44,12 @@ void Effort::learn(double seconds, double target, bool complete) {
         std::clamp(static_cast<uint64_t>(static_cast<double>(splats_) * factor), min_, std::max(min_, kMax));
 }
 
+std::vector<GridSurface> facesWithLooks(std::vector<GridSurface> faces,
+                                        const std::vector<GridSurface>& looks) {
+  for (size_t n = 0; n < faces.size(); ++n) faces[n].takeLookOf(looks.at(n));
+  return faces;
+}
+
 /// What the loop's thread keeps between requests.
 struct FrameLoop::Drawing {
   explicit Drawing(uint64_t coarsest) : effort(coarsest) {}
@@ -57,7 +63,8 @@ struct FrameLoop::Drawing {
 
   struct Faces {
     uint64_t step = 0;
-    std::vector<GridSurface> given, there;
+    FaceNames names;
+    std::vector<GridSurface> found;
   };
   Faces faces;  // of the last step
 
@@ -68,25 +75,25 @@ struct FrameLoop::Drawing {
 void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& request) {
   const auto& scene = request.options.scene;
   if (!request.faces_at || !scene || scene->grid_surfaces.empty()) return;
-  const auto same_mesh = [](const GridSurface& a, const GridSurface& b) {
-    return a.hasMeshOf(b) && a.opacity_name == b.opacity_name;
-  };
-  if (faces.step != request.step || !std::ranges::equal(faces.given, scene->grid_surfaces, same_mesh)) {
+  const bool change_with_steps =
+      cache.series().geometries() > 1 || !request.faces.by.empty() || !request.faces.opacity_by.empty();
+  const bool same_step = faces.step == request.step || !change_with_steps;
+  if (!same_step || faces.found.empty() || faces.names != request.faces) {
     faces = {};  // if it throws
-    const auto at_step = [&](const CacheReader& its) { return request.faces_at(its, scene->grid_surfaces); };
     try {
-      faces = {request.step, scene->grid_surfaces,
-               cache.step() == request.step ? at_step(cache) : at_step(cache.atStep(request.step))};
+      const auto found = cache.step() == request.step
+                             ? request.faces_at(cache, request.faces)
+                             : request.faces_at(cache.atStep(request.step), request.faces);
+      faces = {request.step, request.faces, found};
     } catch (const Interrupted&) {
       throw;
     } catch (const Error& error) {
       throw UsageError("{}", error.what());  // another step may have them
     }
   }
-  auto moved = std::make_shared<SurfaceScene>(*scene);
-  moved->grid_surfaces = faces.there;
-  for (size_t n = 0; n < faces.there.size(); ++n) moved->grid_surfaces[n].takeLookOf(scene->grid_surfaces[n]);
-  request.options.scene = std::move(moved);
+  auto found = std::make_shared<SurfaceScene>(*scene);
+  found->grid_surfaces = facesWithLooks(faces.found, scene->grid_surfaces);
+  request.options.scene = std::move(found);
 }
 
 FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,

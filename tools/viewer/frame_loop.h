@@ -39,10 +39,25 @@
 
 namespace curvisplat {
 
-/// Replaces the faces of another step by those of the grid at the cache's step, with the opacities of the scalar
-/// that their opacity_name names. Called on the loop's thread; an Error ends the request only.
-using FacesAtStep =
-    std::function<std::vector<GridSurface>(const CacheReader&, const std::vector<GridSurface>&)>;
+/// Faces of a grid, by the names that users give.
+struct FaceNames {
+  struct Faces {
+    std::string name;
+    bool has_opacities = false;  // of the scalar `opacity_by`
+    bool operator==(const Faces&) const = default;
+  };
+  std::vector<Faces> faces;
+  std::string by, opacity_by;  // the scalars of colours and of opacities; empty: none
+  bool operator==(const FaceNames&) const = default;
+};
+
+/// Finds them in the grid at the cache's step, in their order; colours and opacities' factors are not set. Called on the
+/// loop's thread; an Error ends the request only.
+using FacesAtStep = std::function<std::vector<GridSurface>(const CacheReader&, const FaceNames&)>;
+
+/// `faces` with the colours and opacities of `looks`, one for each.
+std::vector<GridSurface> facesWithLooks(std::vector<GridSurface> faces,
+                                        const std::vector<GridSurface>& looks);
 
 struct FrameRequest {
   DrawnScalars scalars;
@@ -55,7 +70,8 @@ struct FrameRequest {
   double part = 0;                        // of the way to the next one: its values, with the faces of `step`
   bool wants_bytes = true;                // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
   std::optional<StepPosition> next = {};  // is likely to be wanted next, with this camera: read ahead
-  FacesAtStep faces_at = {};              // of options.scene; none: they are those of every step
+  FaceNames faces = {};                   // of options.scene's grid surfaces, which have their look only
+  FacesAtStep faces_at = {};              // needed where there are faces
 };
 
 struct ShownFrame {

@@ -18,7 +18,7 @@ class FunctionChooser {
   /// Calls `wake` when an answer has come. `cache` must outlive it.
   FunctionChooser(const CacheReader& cache, void (*wake)()) : cache_(cache), wake_(wake) {}
 
-  enum class For { kScalar, kOpacities, kSameScalar };
+  enum class For { kScalar, kOpacities, kSameScalar, kFaces };
   struct Question {
     For what = For::kScalar;
     std::string scalar;
@@ -46,7 +46,7 @@ class FunctionChooser {
 
   const CacheReader& cache_;
   void (*const wake_)();
-  std::array<std::optional<std::string>, 3>
+  std::array<std::optional<std::string>, 4>
       wanted_;         // for each purpose, the scalar of the answer that is to come
   Question question_;  // that is being answered
   std::future<EditedFunction> answering_;

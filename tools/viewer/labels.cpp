@@ -39,6 +39,13 @@ bool section(const char* text, bool open_at_first) {
   return open;
 }
 
+bool sectionOf(const char* text, size_t& seen, size_t number) {
+  const bool has_more = number > seen;
+  seen = number;
+  if (has_more) ImGui::SetNextItemOpen(true);
+  return section(text, false);
+}
+
 void hint(const char* text) {
   if (ImGui::IsItemHovered() && !ImGui::IsItemActive()) ImGui::SetTooltip("%s", text);
 }

@@ -1,6 +1,7 @@
 // Widgets of the panels with their labels before them, where they are read.
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "tools/viewer/panel_actions.h"
@@ -17,6 +18,9 @@ void commandOption(Command command, PanelActions& actions, const char* text, boo
 bool option(const char* text, bool& value);
 /// A heading that folds what is below. Named by its text. Returns whether it is unfolded.
 bool section(const char* text, bool open_at_first);
+/// The same of a list, which is folded at first: unfolded if it has more than before, by the menu or by a saved view. `seen`: how
+/// many there were.
+bool sectionOf(const char* text, size_t& seen, size_t number);
 /// A line under the widget that the mouse is over, after a moment.
 void hint(const char* text);
 

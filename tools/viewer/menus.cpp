@@ -81,6 +81,7 @@ void drawMenu(std::string_view menu, const MenuFacts& facts, MenuChoice& choice,
     nameWidget(fmt::format("item {}", info.label));
     if (info.command == Command::kOpen) chooseRecent(facts, choice, window);
   }
+  if (menu == "Picture") chooseOne("Add a face of the grid", facts.faces, "", choice.faces, window);
   if (menu == "View") chooseOne("Saved views", facts.views, "", choice.view, window);
 }
 

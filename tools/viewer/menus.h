@@ -17,7 +17,7 @@ namespace curvisplat {
 struct MenuFacts {
   std::function<bool(Command)> is_enabled, is_checked;
   std::vector<std::vector<std::string>> recent;
-  std::vector<std::string> scalars, opacity_scalars, views;
+  std::vector<std::string> scalars, opacity_scalars, views, faces;
   std::string scalar, opacity_scalar;  // those that are shown
   FurtherScalars further;
 };
@@ -26,7 +26,7 @@ struct MenuFacts {
 struct MenuChoice {
   std::vector<Command> commands;
   std::optional<std::vector<std::string>> open;  // files
-  std::optional<std::string> scalar, opacity_scalar, view, add_scalar;
+  std::optional<std::string> scalar, opacity_scalar, view, faces, add_scalar;
   bool looks_for_scalars = false;  // for what the cache's sources have and the cache lacks
 };
 

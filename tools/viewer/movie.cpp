@@ -21,10 +21,28 @@ ImageSize sizeFor(const std::filesystem::path& file, ImageSize size) {
   return {std::max(2, size.width / 2 * 2), std::max(2, size.height / 2 * 2)};
 }
 
+class OnePicture final : public MovieOutput {
+ public:
+  explicit OnePicture(std::filesystem::path file) : file_(std::move(file)) {}
+  void write(uint64_t, const Image& image) override { writeImage(image, file_); }
+  void finish() override {}
+
+ private:
+  const std::filesystem::path file_;
+};
+
 }  // namespace
 
 uint64_t framesOf(const MovieRequest& movie) {
-  return movie.kind == MovieKind::kOneTurn ? kFramesOfTurn : movie.cache.series().steps.size();
+  switch (movie.kind) {
+    case MovieKind::kOneTurn:
+      return kFramesOfTurn;
+    case MovieKind::kAllSteps:
+      return movie.cache.series().steps.size();
+    case MovieKind::kOnePicture:
+      return 1;
+  }
+  return 0;
 }
 
 std::filesystem::path movieNameOf(const std::filesystem::path& file) {
@@ -33,7 +51,8 @@ std::filesystem::path movieNameOf(const std::filesystem::path& file) {
 }
 
 std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open, Progress& progress) {
-  const std::filesystem::path file = movieNameOf(movie.file);
+  const bool is_picture = movie.kind == MovieKind::kOnePicture;
+  const std::filesystem::path file = is_picture ? movie.file : movieNameOf(movie.file);
   const ImageSize size = sizeFor(file, movie.size);
   const ViewState& state = movie.state;
   const StepPosition shown_at = movie.cache.position();
@@ -45,13 +64,15 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
   const std::shared_ptr<const SurfaceScene> scene = options.scene;
   const auto faces_at = [&](uint64_t step) {
     if (!movie.faces_at || !scene || scene->grid_surfaces.empty()) return;
-    auto moved = std::make_shared<SurfaceScene>(*scene);
-    moved->grid_surfaces = movie.faces_at(movie.cache.atStep(step), scene->grid_surfaces);
-    options.scene = std::move(moved);
+    auto found = std::make_shared<SurfaceScene>(*scene);
+    found->grid_surfaces =
+        facesWithLooks(movie.faces_at(movie.cache.atStep(step), state.faceNames()), scene->grid_surfaces);
+    options.scene = std::move(found);
   };
-  const std::unique_ptr<MovieOutput> output = open(file, size, movie.frames_per_s);
+  const std::unique_ptr<MovieOutput> output =
+      is_picture ? std::make_unique<OnePicture>(file) : open(file, size, movie.frames_per_s);
   StepPlayer player(movie.cache, functions.scalars(movie.cache, state), movie.backend);
-  if (movie.kind == MovieKind::kOneTurn) {
+  if (movie.kind != MovieKind::kAllSteps) {
     player.goTo(shown_at);
     faces_at(shown_at.step);
   }
@@ -60,7 +81,7 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
     Camera camera = state.camera;
     if (movie.kind == MovieKind::kOneTurn) {
       camera = orbited(camera, 360.0 * static_cast<double>(frame) / static_cast<double>(frames));
-    } else {
+    } else if (movie.kind == MovieKind::kAllSteps) {
       player.goTo({frame});
       faces_at(frame);
     }

@@ -1,4 +1,5 @@
-// A movie of what the window shows: once around the focal point, or all time steps. Drawn in the background.
+// A movie of what the window shows: once around the focal point, or all time steps; or one picture of another size than the
+// window's. Drawn in the background.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,7 @@
 
 namespace curvisplat {
 
-enum class MovieKind { kOneTurn, kAllSteps };
+enum class MovieKind { kOneTurn, kAllSteps, kOnePicture };
 
 /// Takes the pictures 0, 1, 2, ...; unless finish() is called, nothing is left of a movie. Throws Error.
 class MovieOutput {
@@ -39,12 +40,12 @@ struct MovieRequest {
   ImageSize size;  // of the picture in the window; an .mp4 has the next smaller even one
   double frames_per_s = 25;
   Backend backend = Backend::kAutomatic;
-  FacesAtStep faces_at = {};               // of the state's faces; none: they are those of every step
+  FacesAtStep faces_at = {};               // needed where the state has faces
   bool keep_going = false;                 // past damaged bricks
   std::shared_ptr<const void> keeps = {};  // the folder of a preview
 };
 
-/// Frames of a movie: 90 once around, as `render --orbit 360` draws; or one a time step.
+/// Frames of a movie: 90 once around, as `render --orbit 360` draws; one a time step; or one.
 uint64_t framesOf(const MovieRequest& movie);
 
 /// Where a movie named so is written: as it is, or with the frame's number if it is of pictures: "a.png" -> "a_%04d.png".

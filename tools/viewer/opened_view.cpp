@@ -138,6 +138,7 @@ ViewerOptions OpenedView::viewOptions() const {
   options.target_s = options_.target_s;
   options.memory_bytes = options_.memory_bytes;
   options.conversion = options_.conversion;
+  options.faces = options_.faces;
   return options;
 }
 

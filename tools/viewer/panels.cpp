@@ -35,6 +35,7 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   actions.changed |= actions.function_changed;
   if (section("Picture", true)) drawPicture(state, actions);
   if (section("View", true)) drawView(state, actions, facts);
+  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
   cuts_.draw(state, actions);
   if (section("Markers", false)) drawMarkers(state, actions);
   if (section("Detail and memory", false)) drawDetail(state, actions);
@@ -227,6 +228,9 @@ void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   ImGui::SameLine(column);
   actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
   nameWidget("axes grid");
+  ImGui::BeginDisabled(!state.hasSheets());  // there would be nothing to see
+  actions.changed |= option("volume", state.volume);
+  ImGui::EndDisabled();
   commandButton(Command::kSavePicture, actions, "save picture");
   ImGui::SameLine(column);
   commandButton(Command::kSaveTurnMovie, actions, "save movie...");

@@ -12,6 +12,7 @@
 #include "tools/viewer/panel_actions.h"
 #include "tools/viewer/playback.h"
 #include "tools/viewer/statistics_panel.h"
+#include "tools/viewer/surface_panel.h"
 #include "tools/viewer/view_state.h"
 
 namespace curvisplat {
@@ -24,12 +25,13 @@ struct PanelFacts {
   std::vector<std::string> views;  // saved ones, by name
   Rectangle place;                 // of the panels in the window
   const FurtherScalars* further = nullptr;
+  const std::vector<std::string>* faces = nullptr;  // that can be added as surfaces
 };
 
 class Panels {
  public:
   explicit Panels(const CacheReader& cache)
-      : cache_(cache), cuts_(cache), function_(cache), opacity_function_(cache) {}
+      : cache_(cache), cuts_(cache), surfaces_(cache), function_(cache), opacity_function_(cache) {}
 
   /// Width of the panels in Dear ImGui units, for text of this height.
   static float width(float text_height) { return 26 * text_height; }
@@ -48,6 +50,7 @@ class Panels {
 
   const CacheReader& cache_;
   CutPanel cuts_;
+  SurfacePanel surfaces_;
   FunctionPanel function_, opacity_function_;
   std::string view_name_;
 };

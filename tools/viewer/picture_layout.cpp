@@ -15,9 +15,10 @@ std::string titleOf(const Manifest& manifest, const std::string& name) {
 
 ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
     : colours_(state.function.function()), title_(titleOf(manifest, state.variable)) {
-  for (const NamedFaces& named : state.faces)
-    if (!of_faces_ && state.faces_by != state.variable) of_faces_ = named.surface.function;
-  if (of_faces_) faces_title_ = titleOf(manifest, state.faces_by);
+  if (!state.faces.empty() && state.faces_by && state.faces_by->variable != state.variable) {
+    of_faces_ = state.faces_by->function.function();
+    faces_title_ = titleOf(manifest, state.faces_by->variable);
+  }
   if (!state.opacity_by) return;
   opacities_ = state.opacity_by->function.function();
   if (state.volume) opacity_title_ = titleOf(manifest, state.opacity_by->variable) + " (opacity)";
@@ -33,7 +34,7 @@ DrawnScalars ShownFunctions::scalars(const CacheReader& cache, const ViewState& 
 std::vector<ShownFunction> ShownFunctions::bars() const {
   std::vector<ShownFunction> bars{{&colours_, title_}};
   if (opacities_ && !opacity_title_.empty()) bars.push_back({&*opacities_, opacity_title_, true});
-  if (of_faces_) bars.push_back({of_faces_.get(), faces_title_});
+  if (of_faces_) bars.push_back({&*of_faces_, faces_title_});
   return bars;
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,10 +23,8 @@ class ShownFunctions {
 
  private:
   TransferFunction colours_;
-  std::optional<TransferFunction> opacities_;
-  std::string title_, opacity_title_;
-  std::shared_ptr<const TransferFunction> of_faces_;  // that have a scalar of their own
-  std::string faces_title_;
+  std::optional<TransferFunction> opacities_, of_faces_;  // of faces that have a scalar of their own
+  std::string title_, opacity_title_, faces_title_;
 };
 
 /// The part of a picture that shows the data.

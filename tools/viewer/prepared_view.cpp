@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Surfaces and slices of the command line take the place of those of the state.
-void takeScene(const ViewerOptions& options, ViewState& state) {
+void takeScene(const ViewerOptions& options, const CacheReader& cache, ViewState& state) {
   const SurfaceScene& scene = *options.scene;
   state.surfaces.clear();
   for (size_t n = 0; n < scene.surfaces.size(); ++n)
@@ -22,13 +22,27 @@ void takeScene(const ViewerOptions& options, ViewState& state) {
                               scene.surfaces[n].mesh, scene.surfaces[n].opacity.factor});
   state.faces.clear();
   for (size_t n = 0; n < scene.grid_surfaces.size(); ++n)
-    state.faces.push_back({options.face_names.at(n), scene.grid_surfaces[n]});
-  state.faces_by = options.faces_by;
+    state.faces.push_back(
+        {options.face_names.at(n), scene.grid_surfaces[n].colour, scene.grid_surfaces[n].opacity});
+  state.faces_by.reset();
+  if (!options.faces_by.empty())
+    state.faces_by = FacesScalar{options.faces_by, automaticFunction(cache, options.faces_by)};
   state.isovalues = scene.isovalues;
   state.iso_opacity = scene.iso_opacity;
   state.slices = scene.slices;
   state.slice_opacity = {scene.slice_opacity, scene.slices_by_function};
   state.volume = scene.volume;
+}
+
+/// A state may be of a cache that was converted anew, without these faces.
+void removeMissingFaces(const FaceServices& services, const CacheReader& cache, ViewState& state) {
+  if (state.faces.empty() || !services.at) return;
+  try {
+    services.at(cache, state.faceNames());
+  } catch (const Error& error) {
+    printMessage("warning: {}; the view is shown without surfaces of the grid", error.what());
+    state.faces.clear();
+  }
 }
 
 }  // namespace
@@ -51,9 +65,12 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   }
   if (options.scalar && *options.scalar != state.variable) chooseVariable(state, cache, *options.scalar);
   if (options.memory_bytes) state.memory_bytes = *options.memory_bytes;
-  if (options.scene) takeScene(options, state);
+  if (options.scene) takeScene(options, cache, state);
   loadSurfaces(state);
-  return {std::move(cache), std::move(state), scalar, automatic};
+  removeMissingFaces(options.faces, cache, state);
+  std::vector<std::string> faces;
+  if (options.faces.names) faces = options.faces.names(cache);
+  return {std::move(cache), std::move(state), scalar, automatic, std::move(faces)};
 }
 
 }  // namespace curvisplat

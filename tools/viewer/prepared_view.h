@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/edited_function.h"
@@ -14,8 +15,9 @@ namespace curvisplat {
 struct PreparedView {
   CacheReader cache;
   ViewState state;
-  std::string scalar;        // for which
-  EditedFunction automatic;  // was chosen from the data
+  std::string scalar;                   // for which
+  EditedFunction automatic;             // was chosen from the data
+  std::vector<std::string> face_names;  // that the list of surfaces offers
 };
 
 /// The first view, or the one that was left last time, with what `options` (but `carried`) ask for. `picture`: in pixels.

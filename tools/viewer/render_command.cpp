@@ -110,7 +110,7 @@ std::string text(const SheetOpacity& opacity) {
 void addSurfaceOpacities(const ViewState& state, Words& words) {
   std::vector<SheetOpacity> opacities;
   for (const SurfaceFile& surface : state.surfaces) opacities.push_back({surface.opacity});
-  for (const NamedFaces& named : state.faces) opacities.push_back(named.surface.opacity);
+  for (const NamedFaces& named : state.faces) opacities.push_back(state.opacityOf(named));
   if (std::all_of(opacities.begin(), opacities.end(), [](const SheetOpacity& one) { return one.opaque(); }))
     return;
   for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
@@ -124,19 +124,17 @@ void addSurfaces(const ViewState& state, Words& words) {
   for (const SurfaceFile& surface : state.surfaces) words.add("--surface", shortPath(surface.path).string());
   for (const NamedFaces& named : state.faces) words.add("--surface", named.name);
   for (const SurfaceFile& surface : state.surfaces) add_colour(surface.colour);
-  for (const NamedFaces& named : state.faces) add_colour(named.surface.colour);
+  for (const NamedFaces& named : state.faces) add_colour(named.colour);
   addSurfaceOpacities(state, words);
-  if (!state.faces_by.empty()) words.add("--surface-by", state.faces_by);
+  if (state.faces_by && !state.faces.empty()) words.add("--surface-by", state.faces_by->variable);
   for (const ClipPlane& plane : state.slices) words.add("--slice", text(plane));
   if (!state.slice_opacity.opaque() && !state.slices.empty())
     words.add("--slice-opacity", text(state.slice_opacity));
   if (!state.isovalues.empty()) {
     words.add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
-    words.add("--iso-opacity", text(state.iso_opacity));
+    if (!state.iso_opacity.opaque()) words.add("--iso-opacity", text(state.iso_opacity));
   }
-  if (!state.volume &&
-      !(state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty()))
-    words.add("--volume", "off");
+  if (!state.volume && state.hasSheets()) words.add("--volume", "off");
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kMaxSurfaces = 64, kMaxMarkers = 1000;
+constexpr size_t kMaxIsovalues = 64, kMaxMarkers = 1000;
 
 double positive(const JsonField& field) {
   return field.number(1e-300, 1e300);
@@ -130,6 +130,39 @@ void put(Json& json, const EditedFunction& function) {
   json["function"] = Json::parse(toParaViewPreset(function.definition())).front();
 }
 
+glm::vec3 colourFrom(const JsonField& field) {
+  const glm::dvec3 colour = field.point();
+  for (int c = 0; c < 3; ++c)
+    if (!(colour[c] >= 0 && colour[c] <= 1)) field.fail("three numbers from 0 to 1");
+  return glm::vec3(colour);
+}
+
+void putSurfaces(Json& json, const ViewState& state) {
+  json["surfaces"] = Json::array();
+  for (const SurfaceFile& surface : state.surfaces)
+    json["surfaces"].push_back({{"file", surface.path.string()},
+                                {"colour", jsonOf(glm::dvec3(surface.colour))},
+                                {"opacity", surface.opacity}});
+  json["faces"] = Json::array();
+  for (const NamedFaces& named : state.faces)
+    json["faces"].push_back({{"name", named.name},
+                             {"colour", jsonOf(glm::dvec3(named.colour))},
+                             {"opacity", named.opacity.factor},
+                             {"by_function", named.opacity.by_function}});
+  json["faces_by"] = nullptr;
+  if (state.faces_by) {
+    json["faces_by"] = {{"variable", state.faces_by->variable}};
+    put(json["faces_by"], state.faces_by->function);
+  }
+  json["slices"] = jsonOf(state.slices);
+  json["slice_opacity"] = state.slice_opacity.factor;
+  json["slices_by_function"] = state.slice_opacity.by_function;
+  json["isovalues"] = state.isovalues;
+  json["iso_opacity"] = state.iso_opacity.factor;
+  json["isosurfaces_by_function"] = state.iso_opacity.by_function;
+  json["volume"] = state.volume;
+}
+
 Json jsonOf(const Marker& marker) {
   return {{"name", marker.name},
           {"point", jsonOf(marker.point)},
@@ -173,7 +206,53 @@ double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
   return diagonal > 0 ? diagonal / 100 : 1;
 }
 
+/// States of earlier versions lack some.
+void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, const Manifest& manifest,
+                  ViewState& state) {
+  if (const auto surfaces = fields.find("surfaces"))
+    for (const JsonField& surface : surfaces->elements(kMaxSurfaces)) {
+      SurfaceFile& file = state.surfaces.emplace_back(
+          SurfaceFile{surface.at("file").text(), colourFrom(surface.at("colour"))});
+      if (const auto opacity = surface.find("opacity")) file.opacity = opacity->number(1e-3, 1);
+    }
+  if (const auto faces = fields.find("faces"))
+    for (const JsonField& named : faces->elements(kMaxSurfaces))
+      state.faces.push_back({named.at("name").text(),
+                             colourFrom(named.at("colour")),
+                             {named.at("opacity").number(1e-3, 1), named.at("by_function").flag()}});
+  if (const auto by = fields.find("faces_by")) {
+    const JsonField variable = by->at("variable");
+    if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+    state.faces_by =
+        FacesScalar{variable.text(), functionFrom(*by, path, defaultOpacityUnit(manifest, state.scale))};
+  }
+  state.slices = planesFrom(fields, "slices", kMaxSlices);
+  if (const auto opacity = fields.find("slice_opacity"))
+    state.slice_opacity.factor = opacity->number(1e-3, 1);
+  if (const auto by = fields.find("slices_by_function")) state.slice_opacity.by_function = by->flag();
+  if (const auto values = fields.find("isovalues"))
+    for (const JsonField& value : values->elements(kMaxIsovalues))
+      state.isovalues.push_back(value.number(-1e300, 1e300));
+  if (const auto opacity = fields.find("iso_opacity")) state.iso_opacity.factor = opacity->number(1e-3, 1);
+  if (const auto by = fields.find("isosurfaces_by_function")) state.iso_opacity.by_function = by->flag();
+  if (const auto volume = fields.find("volume")) state.volume = volume->flag();
+}
+
 }  // namespace
+
+SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
+  return {named.opacity.factor, named.opacity.by_function && (faces_by || opacity_by)};
+}
+
+FaceNames ViewState::faceNames() const {
+  FaceNames names{{}, faces_by ? faces_by->variable : "", ""};
+  for (const NamedFaces& named : faces) {
+    const bool has_opacities = named.opacity.by_function && opacity_by && opacity_by->variable != variable;
+    names.faces.push_back({named.name, has_opacities});
+    if (has_opacities) names.opacity_by = opacity_by->variable;
+  }
+  return names;
+}
 
 FrameOptions ViewState::frameOptions(ImageSize size) const {
   FrameOptions options;
@@ -184,16 +263,23 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.clip_box = clip_box;
   options.clip_planes = clip_planes;
   if (lit) options.light = Light{};
-  if (!surfaces.empty() || !faces.empty() || !slices.empty() || !isovalues.empty()) {
+  if (hasSheets()) {
     auto scene = std::make_shared<SurfaceScene>();
     for (const SurfaceFile& surface : surfaces)
       if (surface.mesh)
         scene->surfaces.push_back({surface.mesh, surface.colour, false, nullptr, {surface.opacity}});
+    std::shared_ptr<const TransferFunction> of_faces;
+    std::shared_ptr<const ColourTable> colours;  // none: the picture's
+    if (faces_by && faces_by->variable != variable && !faces.empty()) {
+      of_faces = std::make_shared<TransferFunction>(faces_by->function.function());
+      colours = std::make_shared<ColourTable>(*of_faces);
+    }
     for (const NamedFaces& named : faces) {
-      GridSurface& surface = scene->grid_surfaces.emplace_back(named.surface);
-      if (faces_by == variable) surface.colours = nullptr;  // the picture's
-      if (surface.opacity.by_function && opacity_by && opacity_by->variable != variable)
-        surface.opacity_name = opacity_by->variable;
+      GridSurface& surface = scene->grid_surfaces.emplace_back();
+      surface.colour = named.colour;
+      surface.opacity = opacityOf(named);
+      surface.function = of_faces;
+      surface.colours = colours;
     }
     scene->slices = slices;
     scene->slice_opacity = slice_opacity.factor;
@@ -254,15 +340,7 @@ std::string toJson(const ViewState& state) {
   if (state.clip_box)
     json["clip_box"] = {{"lower", jsonOf(state.clip_box->lower)}, {"upper", jsonOf(state.clip_box->upper)}};
   json["clip_planes"] = jsonOf(state.clip_planes);
-  json["surfaces"] = Json::array();
-  for (const SurfaceFile& surface : state.surfaces)
-    json["surfaces"].push_back({{"file", surface.path.string()},
-                                {"colour", jsonOf(glm::dvec3(surface.colour))},
-                                {"opacity", surface.opacity}});
-  json["slices"] = jsonOf(state.slices);
-  json["slice_opacity"] = state.slice_opacity.factor;
-  json["slices_by_function"] = state.slice_opacity.by_function;
-  json["volume"] = state.volume;
+  putSurfaces(json, state);
   json["lit"] = state.lit;
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
@@ -293,20 +371,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   state.scale = factors;
   if (const auto box = fields.find("clip_box")) state.clip_box = boxFrom(*box);
   state.clip_planes = planesFrom(fields, "clip_planes", kMaxClipPlanes);
-  state.slices = planesFrom(fields, "slices", kMaxSlices);
-  if (const auto surfaces = fields.find("surfaces"))
-    for (const JsonField& surface : surfaces->elements(kMaxSurfaces)) {
-      const glm::dvec3 colour = surface.at("colour").point();
-      for (int c = 0; c < 3; ++c)
-        if (!(colour[c] >= 0 && colour[c] <= 1)) surface.at("colour").fail("three numbers from 0 to 1");
-      SurfaceFile& of_state =
-          state.surfaces.emplace_back(SurfaceFile{surface.at("file").text(), glm::vec3(colour)});
-      if (const auto opacity = surface.find("opacity")) of_state.opacity = opacity->number(1e-3, 1);
-    }
-  if (const auto opacity = fields.find("slice_opacity"))
-    state.slice_opacity.factor = opacity->number(1e-3, 1);
-  if (const auto by = fields.find("slices_by_function")) state.slice_opacity.by_function = by->flag();
-  if (const auto volume = fields.find("volume")) state.volume = volume->flag();
+  takeSurfaces(fields, path, manifest, state);
   if (const auto lit = fields.find("lit")) state.lit = lit->flag();
   state.dark = fields.at("dark").flag();
   state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};

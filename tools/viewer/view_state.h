@@ -15,8 +15,11 @@
 #include "render/frame/frame.h"
 #include "stream/cache/manifest.h"
 #include "tools/viewer/edited_function.h"
+#include "tools/viewer/frame_loop.h"
 
 namespace curvisplat {
+
+inline constexpr size_t kMaxSurfaces = 64;  // of files and of the grid
 
 /// A surface of a file, which loadSurfaces() reads.
 struct SurfaceFile {
@@ -26,10 +29,17 @@ struct SurfaceFile {
   double opacity = 1;
 };
 
-/// Faces of the grid, from the command line. Not saved.
+/// Faces of the grid, by a name that --surface takes.
 struct NamedFaces {
-  std::string name;  // as --surface
-  GridSurface surface;
+  std::string name;
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};
+  SheetOpacity opacity = {};
+};
+
+/// The scalar that colours the grid's faces, and its function, whose colours they have where the picture shows another one.
+struct FacesScalar {
+  std::string variable;
+  EditedFunction function;
 };
 
 /// A place in the data that was clicked, and what was found there.
@@ -60,10 +70,10 @@ struct ViewState {
   std::vector<ClipPlane> clip_planes = {};
   std::vector<SurfaceFile> surfaces = {};
   std::vector<NamedFaces> faces = {};
-  std::string faces_by = {};  // --surface-by
+  std::optional<FacesScalar> faces_by = std::nullopt;  // none: each has its colour
   std::vector<ClipPlane> slices = {};
   SheetOpacity slice_opacity = {};
-  std::vector<double> isovalues = {};  // from the command line; not saved
+  std::vector<double> isovalues = {};  // of isoScalar()
   SheetOpacity iso_opacity = {};
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
@@ -73,6 +83,16 @@ struct ViewState {
   std::vector<Marker> markers = {};
 
   glm::vec4 background() const { return dark ? glm::vec4(0, 0, 0, 1) : glm::vec4(1); }
+  /// The scalar of isosurfaces and of opacities.
+  const std::string& isoScalar() const { return opacity_by ? opacity_by->variable : variable; }
+  /// Whether there is anything but the volume; without it the volume is drawn, whatever `volume` says.
+  bool hasSheets() const {
+    return !(surfaces.empty() && faces.empty() && slices.empty() && isovalues.empty());
+  }
+  /// As it is drawn: without a scalar there is no function.
+  SheetOpacity opacityOf(const NamedFaces& named) const;
+  FaceNames faceNames() const;
+  /// Its grid surfaces have their look; their faces are found by faceNames().
   FrameOptions frameOptions(ImageSize size) const;
 };
 

@@ -82,8 +82,9 @@ class Viewer {
   }
 
   void begin(MovieRequest request) {
-    if (movie_) return reports_.say("A movie is being saved already: stop it, or wait for its end.");
-    const fs::path name = movieNameOf(request.file).filename();
+    if (movie_) return reports_.say("Something is being saved already: stop it, or wait for its end.");
+    saves_picture_ = request.kind == MovieKind::kOnePicture;
+    const fs::path name = (saves_picture_ ? request.file : movieNameOf(request.file)).filename();
     movie_ = std::make_unique<BackgroundJob>(
         fmt::format("saving {}", name.string()), "beginning",
         [movie = std::make_shared<MovieRequest>(std::move(request)),
@@ -107,7 +108,7 @@ class Viewer {
     opened_.drawOpening(display);
     if (!movie_ || !display.draw(*movie_, "movie")) return;
     movie_.reset();
-    reports_.say("Stopped. The movie was not saved.");
+    reports_.say(fmt::format("Stopped. The {} was not saved.", saves_picture_ ? "picture" : "movie"));
   }
 
   WindowLayout layout() const {
@@ -126,9 +127,9 @@ class Viewer {
   /// Draws one frame of the window with the effects of all input so far.
   void update() {
     window_.beginFrame();
+    if (!window_.showsClick()) pressKeys();  // first: this frame shows what they do to the layout, too
     const WindowLayout place = layout();
     window_.setPicture(place.picture);
-    if (!window_.showsClick()) pressKeys();
     attempt([&] { drawMenuBar(); });
     attempt([&] { opened_.view() ? opened_.view()->draw(place) : drawWelcome(place); });
     drawJobs(place.picture);
@@ -297,6 +298,7 @@ class Viewer {
   FileDialog dialog_;
   OpenedView opened_{options_, {window_, reports_, dialog_, settings_, [this] { return pictureSize(); }}};
   std::unique_ptr<BackgroundJob> movie_;  // that is being drawn
+  bool saves_picture_ = false;            // it is one picture
   std::optional<std::vector<std::string>> to_open_;
 };
 

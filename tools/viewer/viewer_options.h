@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,13 @@ namespace curvisplat {
 
 struct CarriedView;
 
+/// Faces of grids are found by the subcommand, which reads their names.
+struct FaceServices {
+  /// The names that a list of surfaces offers; empty if the cache has no faces. Any thread. Throws Error as reading does.
+  std::function<std::vector<std::string>(const CacheReader&)> names;
+  FacesAtStep at;
+};
+
 struct ViewerOptions {
   ImageSize size{1200, 800};
   Backend backend = Backend::kAutomatic;
@@ -28,7 +36,7 @@ struct ViewerOptions {
   std::vector<std::filesystem::path> surface_files;  // of the scene's surfaces
   std::vector<std::string> face_names;               // of its grid surfaces
   std::string faces_by;                              // --surface-by
-  FacesAtStep faces_at;                              // the scene's grid surfaces at other steps
+  FaceServices faces;
   std::optional<uint64_t> memory_bytes;
   ConversionServices conversion;
   OpenMovieOutput open_movie;

@@ -39,6 +39,8 @@ enum class Command {
   kDarkBackground,
   kAddClipPlane,
   kAddSlice,
+  kAddIsosurface,
+  kAddSurfaceFile,
   kRemoveMarkers,
   kPlay,
   kNextStep,

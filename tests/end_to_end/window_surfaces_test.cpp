@@ -1,0 +1,158 @@
+// Surfaces in the window: faces of the grid, files, isosurfaces.
+#include <utility>
+
+#include "tests/end_to_end/window_fixture.h"
+
+namespace curvisplat {
+namespace {
+
+class WindowSurfaces : public WindowTest {
+ protected:
+  static bool gone(const std::string& begin) {
+    return eventually([&] { return !hasWidget(begin); });
+  }
+  /// Opens the window with room for the panels of surfaces.
+  void openWithRoom(const std::vector<std::string>& options = {}) {
+    open(options);
+    for (const auto& [section, inside] :
+         {std::pair("Colours and opacities", "curve"), {"Scalar", "opacity by"}, {"View", "view name"}}) {
+      click(section);
+      EXPECT_TRUE(gone(inside)) << section;
+    }
+  }
+  void unfold(const std::string& section, const std::string& first) {
+    click(section);
+    placeOf(first);
+  }
+  void addFaces(const std::string& name) {
+    click("add surface");
+    click("add surface " + name);
+  }
+  /// Types into the file dialog and accepts.
+  void answer(const std::string& name) {
+    placeOf("file name");
+    press("ctrl+a");
+    act({"type", name});
+    press("Return");
+    EXPECT_TRUE(gone("file name"));
+  }
+};
+
+TEST_F(WindowSurfaces, FacesOfTheGridAreAddedColouredUndoneAndRemoved) {
+  openWithRoom();
+  const Image plain = save();
+  unfold("Surfaces", "add surface");
+  addFaces("kmin");
+  placeOf("remove surface 1");
+  const Image grey = saveAndCopy();
+  EXPECT_LT(difference(plain, grey), 40);
+  click(placeOf("opacity of surface 1", 0.3));
+  const Image clear = saveAndCopy();
+  EXPECT_LT(difference(grey, clear), 45);
+  click("surfaces by");
+  click("surfaces by volume");  // not the scalar that is drawn: with a bar of its own
+  EXPECT_TRUE(gone("colour of surface 1"));
+  const Image coloured = saveAndCopy();
+  EXPECT_LT(difference(clear, coloured), 40);
+  click("surface 1 by function");
+  const Image by_function = saveAndCopy();
+  EXPECT_LT(difference(coloured, by_function), 60);
+  for (const Image* before : {&coloured, &clear, &grey, &plain}) {
+    press("ctrl+z");
+    EXPECT_GE(difference(save(), *before), 50);
+  }
+  EXPECT_TRUE(gone("remove surface 1"));
+  for (int n = 0; n < 4; ++n) press("ctrl+y");
+  EXPECT_GE(difference(save(), by_function), 50);
+  click("remove surface 1");
+  EXPECT_GE(difference(save(), plain), 50);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 4u);
+  EXPECT_EQ(valueOf(commands[0], "--surface"), "kmin");
+  EXPECT_EQ(valueOf(commands[2], "--surface-by"), "volume");
+  EXPECT_TRUE(valueOf(commands[3], "--surface-opacity").starts_with("function*"));
+  expectDraws(commands[0], grey);
+  expectDraws(commands[1], clear);
+  expectDraws(commands[2], coloured);
+  expectDraws(commands[3], by_function);
+}
+
+/// They are there again in the next window, without the volume that was switched off.
+TEST_F(WindowSurfaces, AreRemembered) {
+  openWithRoom();
+  choose("Picture", "Add an isosurface");
+  placeOf("remove isosurface 1");
+  click("Isosurfaces");  // room for the others
+  EXPECT_TRUE(gone("remove isosurface 1"));
+  unfold("Surfaces", "add surface");
+  addFaces("imax");
+  placeOf("remove surface 1");
+  const Image with_volume = save();
+  click("volume");
+  const Image alone = saveAndCopy();
+  EXPECT_LT(difference(with_volume, alone), 40);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_NE(valueOf(commands[0], "--iso"), "");
+  EXPECT_EQ(valueOf(commands[0], "--volume"), "off");
+  expectDraws(commands[0], alone);
+  open();
+  EXPECT_GE(difference(save(), alone), 50);
+  close();
+}
+
+TEST_F(WindowSurfaces, IsosurfacesAreMovedAndLeaveWithTheirScalar) {
+  openWithRoom();
+  const Image plain = save();
+  unfold("Isosurfaces", "Add an isosurface");
+  click("Add an isosurface");
+  placeOf("isosurface 1");
+  const Image middle = saveAndCopy();
+  EXPECT_LT(difference(plain, middle), 45);
+  for (int n = 0; n < 2; ++n) {  // the second changes nothing
+    click(placeOf("isosurface 1", 0.7));
+    save();
+  }
+  const Image higher = saveAndCopy();
+  EXPECT_LT(difference(middle, higher), 45);
+  press("ctrl+z");
+  EXPECT_GE(difference(save(), middle), 50);
+  press("ctrl+y");
+  save();
+  click("Scalar");
+  chooseScalar("volume");
+  EXPECT_TRUE(gone("remove isosurface 1"));
+  EXPECT_TRUE(eventually([] { return hasWidget("message The isosurfaces of f were removed"); }));
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_NE(valueOf(commands[0], "--iso"), valueOf(commands[1], "--iso"));
+  expectDraws(commands[0], middle);
+  expectDraws(commands[1], higher);
+}
+
+TEST_F(WindowSurfaces, OfFilesAreAddedByTheDialog) {
+  {
+    std::ofstream mesh("sheet.obj");
+    mesh << "v -2 0.5 -2\nv 2 0.5 -2\nv 2 0.5 2\nv -2 0.5 2\nf 1 2 3\nf 1 3 4\n";
+    std::ofstream broken("broken.stl");
+    broken << "solid but no triangle";
+  }
+  openWithRoom();
+  const Image plain = save();
+  choose("Picture", "Add a surface from a file...");
+  answer("broken.stl");
+  EXPECT_TRUE(eventually([] { return hasWidget("message broken.stl") || hasWidget("message /"); }));
+  EXPECT_FALSE(hasWidget("remove surface file 1"));
+  choose("Picture", "Add a surface from a file...");
+  answer("sheet.obj");
+  placeOf("remove surface file 1");
+  const Image with_sheet = saveAndCopy();
+  EXPECT_LT(difference(plain, with_sheet), 40);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--surface"), "sheet.obj");
+  expectDraws(commands[0], with_sheet);
+}
+
+}  // namespace
+}  // namespace curvisplat
