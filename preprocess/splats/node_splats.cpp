@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -15,17 +14,11 @@
 #include "preprocess/splats/lq.h"
 #include "preprocess/splats/node_lattice.h"
 #include "preprocess/splats/shape.h"
+#include "preprocess/splats/window_lines.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {
-
-/// The rows of `window` that the splats of `box` may depend on.
-NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
-  constexpr uint64_t kReach = kStretchReach;
-  return {std::max(window.j0, box.j0 - std::min(box.j0, kReach)), std::min(window.j1, box.j1 + kReach),
-          std::max(window.k0, box.k0 - std::min(box.k0, kReach)), std::min(window.k1, box.k1 + kReach)};
-}
 
 /// What the nodes of a box of a window have in common.
 class Window {
@@ -33,9 +26,9 @@ class Window {
   Window(const BlockWindow& in, const NodeBox& box, const NodeSplatCorrections& corrections,
          NodeScratch& scratch, NodeSplats& out)
       : in_(in),
-        near_(rowsAround(box, in.window)),
         corrections_(corrections),
-        lattice_{in.nodes->x.data(), in.nodes->y.data(), in.nodes->z.data(), in.nodes->blank.data()},
+        lines_(in, box, scratch),
+        lattice_(lines_.lattice()),
         faces_(lattice_, corrections.middles),
         ni_(in.block.ni),
         i0_(in.i0),
@@ -45,26 +38,13 @@ class Window {
         scratch_(scratch),
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
-    for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
-    for (auto* rows : {&scratch.growth, &scratch.drift})
-      for (auto& row : *rows) row.assign(i1_ - i0_, 0.0f);
-    findBlanks();
   }
 
   void addRow(uint64_t j, uint64_t k);
   size_t count() const { return count_; }
 
  private:
-  bool hasBlank(uint64_t j, uint64_t k) const {
-    return scratch_.has_blank[(k - near_.k0) * (near_.j1 - near_.j0) + (j - near_.j0)] != 0;
-  }
-  void findBlanks();
-  bool anyBlankAround(uint64_t j, uint64_t k) const;
   uint64_t octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const;
-  void stretchRow(uint64_t j, uint64_t k);
-  SquaredExtents extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
-  std::array<JointLine, 3> linesOf(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
-                                   const Layers& layers) const;
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
   void takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at);
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, const Layers& layers);
@@ -87,9 +67,9 @@ class Window {
   double smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const;
 
   const BlockWindow& in_;
-  const NodeBox near_;
   const NodeSplatCorrections corrections_;
-  const NodeLattice lattice_;
+  const WindowLines lines_;
+  const NodeLattice& lattice_;
   const FacesBehind faces_;
   std::vector<const float*> scalars_;
   uint64_t ni_, i0_, i1_;  // of a row; its part
@@ -100,23 +80,6 @@ class Window {
   NodeSplats& out_;
   size_t count_ = 0;
 };
-
-bool isFace(uint64_t index, uint64_t count) {
-  return index == 0 || index + 1 == count;
-}
-
-void Window::findBlanks() {
-  const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
-  const uint64_t count = std::min(i1_ + kStretchReach, ni_) - first;
-  const uint64_t rows_a_plane = in_.window.j1 - in_.window.j0;
-  scratch_.has_blank.clear();
-  for (uint64_t k = near_.k0; k < near_.k1; ++k) {
-    for (uint64_t j = near_.j0; j < near_.j1; ++j) {
-      const uint64_t row = (k - in_.window.k0) * rows_a_plane + (j - in_.window.j0);
-      scratch_.has_blank.push_back(std::memchr(lattice_.blank + row * ni_ + first, 1, count) != nullptr);
-    }
-  }
-}
 
 void Window::addRow(uint64_t j, uint64_t k) {
   const GridBlock& block = in_.block;
@@ -141,8 +104,8 @@ void Window::addRow(uint64_t j, uint64_t k) {
     return neighbours;
   };
 
-  if (corrections_.stretch) stretchRow(j, k);
-  if (!anyBlankAround(j, k)) {
+  if (corrections_.stretch) lines_.stretchRow(j, k);
+  if (!lines_.anyBlankAround(j, k)) {
     if (i0_ == 0) addNode(0, row, at_i(0), true, layers_at(0));
     // Those that are neither at a face nor behind one.
     const uint64_t inner_begin = std::max<uint64_t>(2, i0_), inner_end = ni_ < 4 ? 0 : std::min(i1_, ni_ - 2);
@@ -191,97 +154,6 @@ uint64_t Window::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) con
       points |= octantPoints(octant);
   }
   return points == kAllCovered ? 0 : points;
-}
-
-bool Window::anyBlankAround(uint64_t j, uint64_t k) const {
-  const GridBlock& block = in_.block;
-  for (uint64_t row_k = k - std::min<uint64_t>(k, 1); row_k < std::min(k + 2, block.nk); ++row_k)
-    for (uint64_t row_j = j - std::min<uint64_t>(j, 1); row_j < std::min(j + 2, block.nj); ++row_j)
-      if (hasBlank(row_j, row_k)) return true;
-  return false;
-}
-
-/// Fills the scratch with the stretch of the nodes of a row's part.
-void Window::stretchRow(uint64_t j, uint64_t k) {
-  constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
-  const GridBlock& block = in_.block;
-  const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
-                        static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
-  const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
-  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data(),
-          *drift = scratch_.drift[axis].data();
-    const auto one_by_one = [&](uint64_t begin, uint64_t end) {
-      for (uint64_t i = begin; i < end; ++i) {
-        const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
-        if (lattice_.blank[at]) continue;
-        const Stretch stretch =
-            stretchOf(extentsOf(at, strides[axis], axis == 0 ? i : index[axis], count[axis]));
-        out[i - i0_] = stretch.factor;
-        growth[i - i0_] = stretch.growth;
-        drift[i - i0_] = stretch.drift;
-      }
-    };
-    const auto at_once = [&](uint64_t begin, uint64_t end) {
-      if (begin >= end) return;
-      stretchNodes({lattice_.x, lattice_.y, lattice_.z}, row + static_cast<ptrdiff_t>(begin), strides[axis],
-                   end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)});
-    };
-    bool whole = true;
-    if (axis == 0) {
-      whole = ni_ > 2 * kWhole && !hasBlank(j, k);
-    } else {
-      whole = index[axis] >= kWhole && index[axis] + kWhole < count[axis];
-      for (uint64_t n = 0; n <= 2 * kWhole && whole; ++n)
-        whole = !(axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole));
-    }
-    if (!whole) {
-      one_by_one(i0_, i1_);
-    } else if (axis == 0) {
-      one_by_one(i0_, std::min(kWhole, i1_));
-      at_once(std::max(kWhole, i0_), std::min(ni_ - kWhole, i1_));
-      one_by_one(std::max(ni_ - kWhole, i0_), i1_);
-    } else {
-      at_once(i0_, i1_);
-    }
-  }
-}
-
-/// Of a node that is there, number `index` of `count` along the axis of `stride`.
-SquaredExtents Window::extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
-  const auto neighbours = [&](uint64_t most, ptrdiff_t step) {
-    int found = 0;
-    while (found < kStretchReach && static_cast<uint64_t>(found) < most &&
-           !lattice_.blank[at + (found + 1) * step])
-      ++found;
-    return found;
-  };
-  return extentsOnLine({lattice_.x, lattice_.y, lattice_.z}, at, stride, neighbours(index, -stride),
-                       neighbours(count - 1 - index, stride));
-}
-
-/// Of node `i` of the row.
-std::array<JointLine, 3> Window::linesOf(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
-                                         const Layers& layers) const {
-  const GridBlock& block = in_.block;
-  const std::array<uint64_t, 3> index{i, row_j_, row_k_}, count{ni_, block.nj, block.nk};
-  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
-  std::array<JointLine, 3> lines{};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const bool has_before = neighbours.before[axis] != 0, has_after = neighbours.after[axis] != 0;
-    const bool is_half = isFace(index[axis], count[axis]) && has_before != has_after;
-    const bool is_layer = layers[axis] != 0 && has_before && has_after;
-    if (!is_half && !is_layer) continue;
-    const SquaredExtents extents = extentsOf(at, strides[axis], index[axis], count[axis]);
-    CellRow row;
-    for (size_t n = 0; n < row.size(); ++n) row[n] = 0.5 * std::sqrt(extents[n]);
-    if (is_half ? has_before : layers[axis] < 0) std::reverse(row.begin(), row.end());
-    const double extent = glm::length(lattice_.position(at + neighbours.after[axis]) -
-                                      lattice_.position(at + neighbours.before[axis]));
-    lines[axis] = JointLine(row, 0.5 * extent);
-  }
-  return lines;
 }
 
 /// The nodes from i0 to i1 of a row without blanks around it. `row`: the element of its first node.
@@ -373,7 +245,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   node.behind_face = false;
   node.layers = 0;
   node.lines = {};
-  if ((on_face || layers != Layers{}) && corrections_.lines) node.lines = linesOf(i, at, neighbours, layers);
+  if ((on_face || layers != Layers{}) && corrections_.lines)
+    node.lines = lines_.atJoints({i, row_j_, row_k_}, at, neighbours, layers);
   node.spacing = on_face ? lattice_.spacing(at, neighbours) : 0.0;
 
   glm::dmat3 jacobian;  // columns along i, j, k

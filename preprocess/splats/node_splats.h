@@ -40,6 +40,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/splats/block_window.h"
 #include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/joint_line.h"
 #include "preprocess/splats/stretch.h"
@@ -128,22 +129,6 @@ struct NodeSplats {
   uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
 };
 
-/// What is read around the nodes of a box.
-inline constexpr Halo kNodeSplatHalo{kStretchReach, kStretchReach};
-
-/// A window of one block: `nodes` holds `window`, which is `box` and its halo (kNodeSplatHalo) in j and k
-/// inside the block.
-struct BlockWindow {
-  GridBlock block;
-  uint64_t first_node = 0;  // of the block in the whole grid
-  NodeBox window;
-  const NodeArrays* nodes = nullptr;  // i fastest; scalars in the order of the cache's variables
-  uint64_t i0 = 0, i1 = UINT64_MAX;   // of each row of the box, splats are made of these nodes only
-  const uint64_t* covered = nullptr;  // [sample]: by other blocks (covered_part.h); null: nothing is
-
-  uint64_t endOfPart(uint64_t count) const { return std::min(i1, count); }
-};
-
 /// Corrections beyond the linear part of the mapping at the node. Conversion makes all of them; tests switch
 /// single ones off to measure what they are worth.
 struct NodeSplatCorrections {
@@ -161,12 +146,6 @@ struct NodeSplatCorrections {
   bool all() const {
     return border_codes && faces && layers && middles && bends && stretch && growth && lines;
   }
-};
-
-/// What computeNodeSplats() needs for a while; keeps its capacity.
-struct NodeScratch {
-  std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
-  std::vector<uint8_t> has_blank;                            // [row around the box]
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

@@ -1,0 +1,138 @@
+#include "preprocess/splats/window_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+
+namespace curvisplat {
+namespace {
+
+/// The rows of `window` that the splats of `box` may depend on.
+NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
+  constexpr uint64_t kReach = kStretchReach;
+  return {std::max(window.j0, box.j0 - std::min(box.j0, kReach)), std::min(window.j1, box.j1 + kReach),
+          std::max(window.k0, box.k0 - std::min(box.k0, kReach)), std::min(window.k1, box.k1 + kReach)};
+}
+
+}  // namespace
+
+WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch)
+    : in_(in),
+      near_(rowsAround(box, in.window)),
+      lattice_{in.nodes->x.data(), in.nodes->y.data(), in.nodes->z.data(), in.nodes->blank.data()},
+      ni_(in.block.ni),
+      i0_(in.i0),
+      i1_(in.endOfPart(in.block.ni)),
+      row_stride_(static_cast<ptrdiff_t>(ni_)),
+      plane_stride_(static_cast<ptrdiff_t>(ni_ * (in.window.j1 - in.window.j0))),
+      scratch_(scratch) {
+  for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
+  for (auto* rows : {&scratch.growth, &scratch.drift})
+    for (auto& row : *rows) row.assign(i1_ - i0_, 0.0f);
+  findBlanks();
+}
+
+void WindowLines::findBlanks() {
+  const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
+  const uint64_t count = std::min(i1_ + kStretchReach, ni_) - first;
+  const uint64_t rows_a_plane = in_.window.j1 - in_.window.j0;
+  scratch_.has_blank.clear();
+  for (uint64_t k = near_.k0; k < near_.k1; ++k) {
+    for (uint64_t j = near_.j0; j < near_.j1; ++j) {
+      const uint64_t row = (k - in_.window.k0) * rows_a_plane + (j - in_.window.j0);
+      scratch_.has_blank.push_back(std::memchr(lattice_.blank + row * ni_ + first, 1, count) != nullptr);
+    }
+  }
+}
+
+bool WindowLines::anyBlankAround(uint64_t j, uint64_t k) const {
+  const GridBlock& block = in_.block;
+  for (uint64_t row_k = k - std::min<uint64_t>(k, 1); row_k < std::min(k + 2, block.nk); ++row_k)
+    for (uint64_t row_j = j - std::min<uint64_t>(j, 1); row_j < std::min(j + 2, block.nj); ++row_j)
+      if (hasBlank(row_j, row_k)) return true;
+  return false;
+}
+
+void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
+  constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
+  const GridBlock& block = in_.block;
+  const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
+                        static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
+  const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
+  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data(),
+          *drift = scratch_.drift[axis].data();
+    const auto one_by_one = [&](uint64_t begin, uint64_t end) {
+      for (uint64_t i = begin; i < end; ++i) {
+        const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
+        if (lattice_.blank[at]) continue;
+        const Stretch stretch =
+            stretchOf(extentsOf(at, strides[axis], axis == 0 ? i : index[axis], count[axis]));
+        out[i - i0_] = stretch.factor;
+        growth[i - i0_] = stretch.growth;
+        drift[i - i0_] = stretch.drift;
+      }
+    };
+    const auto at_once = [&](uint64_t begin, uint64_t end) {
+      if (begin >= end) return;
+      stretchNodes({lattice_.x, lattice_.y, lattice_.z}, row + static_cast<ptrdiff_t>(begin), strides[axis],
+                   end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)});
+    };
+    bool whole = true;
+    if (axis == 0) {
+      whole = ni_ > 2 * kWhole && !hasBlank(j, k);
+    } else {
+      whole = index[axis] >= kWhole && index[axis] + kWhole < count[axis];
+      for (uint64_t n = 0; n <= 2 * kWhole && whole; ++n)
+        whole = !(axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole));
+    }
+    if (!whole) {
+      one_by_one(i0_, i1_);
+    } else if (axis == 0) {
+      one_by_one(i0_, std::min(kWhole, i1_));
+      at_once(std::max(kWhole, i0_), std::min(ni_ - kWhole, i1_));
+      one_by_one(std::max(ni_ - kWhole, i0_), i1_);
+    } else {
+      at_once(i0_, i1_);
+    }
+  }
+}
+
+/// Of a node that is there, number `index` of `count` along the axis of `stride`.
+SquaredExtents WindowLines::extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
+  const auto neighbours = [&](uint64_t most, ptrdiff_t step) {
+    int found = 0;
+    while (found < kStretchReach && static_cast<uint64_t>(found) < most &&
+           !lattice_.blank[at + (found + 1) * step])
+      ++found;
+    return found;
+  };
+  return extentsOnLine({lattice_.x, lattice_.y, lattice_.z}, at, stride, neighbours(index, -stride),
+                       neighbours(count - 1 - index, stride));
+}
+
+std::array<JointLine, 3> WindowLines::atJoints(const std::array<uint64_t, 3>& ijk, ptrdiff_t at,
+                                               const Neighbours& neighbours, const Layers& layers) const {
+  const GridBlock& block = in_.block;
+  const std::array<uint64_t, 3> count{ni_, block.nj, block.nk};
+  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
+  std::array<JointLine, 3> lines{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const bool has_before = neighbours.before[axis] != 0, has_after = neighbours.after[axis] != 0;
+    const bool is_half = isFace(ijk[axis], count[axis]) && has_before != has_after;
+    const bool is_layer = layers[axis] != 0 && has_before && has_after;
+    if (!is_half && !is_layer) continue;
+    const SquaredExtents extents = extentsOf(at, strides[axis], ijk[axis], count[axis]);
+    CellRow row;
+    for (size_t n = 0; n < row.size(); ++n) row[n] = 0.5 * std::sqrt(extents[n]);
+    if (is_half ? has_before : layers[axis] < 0) std::reverse(row.begin(), row.end());
+    const double extent = glm::length(lattice_.position(at + neighbours.after[axis]) -
+                                      lattice_.position(at + neighbours.before[axis]));
+    lines[axis] = JointLine(row, 0.5 * extent);
+  }
+  return lines;
+}
+
+}  // namespace curvisplat

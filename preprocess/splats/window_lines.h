@@ -1,0 +1,51 @@
+// The grid lines through the nodes of a box of a window: how long the cells on them are, and where blanked nodes end them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "preprocess/splats/block_window.h"
+#include "preprocess/splats/faces_behind.h"
+#include "preprocess/splats/joint_line.h"
+#include "preprocess/splats/node_lattice.h"
+#include "preprocess/splats/stretch.h"
+
+namespace curvisplat {
+
+/// Whether a node is on a face of its block across an axis of `count` nodes.
+inline bool isFace(uint64_t index, uint64_t count) {
+  return index == 0 || index + 1 == count;
+}
+
+/// Not for several threads at once. `in` and the scratch outlive it.
+class WindowLines {
+ public:
+  /// Sets the scratch to cells that are not stretched.
+  WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch);
+
+  const NodeLattice& lattice() const { return lattice_; }
+  /// Whether a node of the row's part, or one next to it, is blank; of the rows around it as well.
+  bool anyBlankAround(uint64_t j, uint64_t k) const;
+  /// Fills the scratch with the stretch of the nodes of a row's part.
+  void stretchRow(uint64_t j, uint64_t k) const;
+  /// Of a node: the lines across the faces of the block that it is on, or one away from. `at`: its element.
+  std::array<JointLine, 3> atJoints(const std::array<uint64_t, 3>& ijk, ptrdiff_t at,
+                                    const Neighbours& neighbours, const Layers& layers) const;
+
+ private:
+  bool hasBlank(uint64_t j, uint64_t k) const {
+    return scratch_.has_blank[(k - near_.k0) * (near_.j1 - near_.j0) + (j - near_.j0)] != 0;
+  }
+  void findBlanks();
+  SquaredExtents extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
+
+  const BlockWindow& in_;
+  const NodeBox near_;  // the rows that the splats of the box may depend on
+  const NodeLattice lattice_;
+  uint64_t ni_, i0_, i1_;  // of a row; its part
+  ptrdiff_t row_stride_, plane_stride_;
+  NodeScratch& scratch_;
+};
+
+}  // namespace curvisplat
