@@ -68,8 +68,8 @@ void removeLeftOfRanks(const fs::path& cache, const fs::path& temporary_folder) 
   if (!temporary_folder.empty()) removeAbandonedScratch(temporary_folder, cache);
 }
 
-std::vector<StepRange> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks) {
-  std::vector<StepRange> ranges;
+std::vector<StepSpan> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks) {
+  std::vector<StepSpan> ranges;
   for (unsigned rank = 0; rank < ranks; ++rank) {
     const uint64_t end = std::min(next + kStepGroup - (rank == 0 ? in_group : 0), count);
     ranges.push_back({next, end});
@@ -119,8 +119,8 @@ fs::path SharedSteps::partOf(unsigned rank) const {
 }
 
 ConvertedSteps SharedSteps::convertPart(const Start& start) const {
-  const std::vector<StepRange> ranges = dealSteps(start.next, input_.count, start.in_group, ranks_.count());
-  const StepRange& own = ranges[ranks_.rank()];
+  const std::vector<StepSpan> ranges = dealSteps(start.next, input_.count, start.in_group, ranks_.count());
+  const StepSpan& own = ranges[ranks_.rank()];
   ConvertedSteps converted;
   if (own.begin == own.end) return converted;
   AddStepOptions options = add_;
@@ -152,7 +152,7 @@ ConvertedSteps SharedSteps::convertPart(const Start& start) const {
   return converted;
 }
 
-bool SharedSteps::take(unsigned of, const StepRange& range, const ConvertedSteps& converted,
+bool SharedSteps::take(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
                        const std::function<void(uint64_t number, const AddStepReport&)>& took) const {
   if (range.begin == range.end || converted.steps.empty()) return converted.error.empty();
   const CacheReader part(partOf(of));

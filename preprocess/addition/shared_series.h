@@ -26,7 +26,7 @@
 namespace curvisplat {
 
 /// Steps [begin, end) of an input.
-struct StepRange {
+struct StepSpan {
   uint64_t begin = 0, end = 0;
 };
 
@@ -43,7 +43,7 @@ struct ConvertedSteps {
 
 /// The ranges of all ranks, of the steps from `next` on; the last rank's may be empty. `in_group`: how many steps of its
 /// group the cache has, 0 if the next begins one.
-std::vector<StepRange> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks);
+std::vector<StepSpan> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks);
 
 /// How the names of the ranks' folders for temporary files begin; those of other caches in a shared folder begin
 /// otherwise. The rank's number follows.
@@ -70,7 +70,7 @@ class SharedSteps {
   ConvertedSteps convertPart(const Start& start) const;
   /// At rank 0: takes over what rank `of` has converted; `took` is called after each step with its number of the input.
   /// Returns whether that was all of its range.
-  bool take(unsigned of, const StepRange& range, const ConvertedSteps& converted,
+  bool take(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
             const std::function<void(uint64_t number, const AddStepReport&)>& took) const;
 
  private:

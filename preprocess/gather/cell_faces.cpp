@@ -52,7 +52,7 @@ FaceCorners lowestOf(std::span<const uint64_t> corners, std::span<const uint32_t
   return lowest[2] == UINT64_MAX ? kCollapsed : lowest;
 }
 
-void measure(std::span<const glm::dvec3> at, const glm::dvec3& middle, CellFace& face) {
+void measure(std::span<const glm::dvec3> at, const glm::dvec3& middle, HalfFace& face) {
   const std::span<const uint32_t> corners = face.corners;
   const glm::dvec3 first = at[corners[0]];
   glm::dvec3 sum(0.0), area(0.0);
@@ -122,7 +122,7 @@ size_t leaveOutCollapsed(std::vector<FaceCorners>& corners, const Move& move) {
 }  // namespace
 
 void facesOfCells(const GatheredCells& cells, size_t record_bytes,
-                  const std::function<void(const CellFace&, std::span<std::byte>)>& put, FaceRecords& out) {
+                  const std::function<void(const HalfFace&, std::span<std::byte>)>& put, FaceRecords& out) {
   const auto resize = [&](size_t faces) {
     out.corners.resize(faces);
     out.records.resize(faces * record_bytes);
@@ -132,7 +132,7 @@ void facesOfCells(const GatheredCells& cells, size_t record_bytes,
     const glm::dvec3 middle = middleOf(view.corners);
     const std::span<const uint32_t> faces = facesOfCell(cells, n);
     for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}, ++to) {
-      CellFace face{n, faces.subspan(at + 1, faces[at]), is_plain, {}, {}};
+      HalfFace face{n, faces.subspan(at + 1, faces[at]), is_plain, {}, {}};
       out.corners[to] = lowestOf(cells.cornersOfCell(n), face.corners, is_plain);
       if (out.corners[to][2] == UINT64_MAX) continue;
       measure(view.corners, middle, face);
@@ -161,11 +161,11 @@ void FaceList::assign(const GatheredCells& cells) {
   places.resize(leaveOutCollapsed(corners, [&](size_t from, size_t to) { places[to] = places[from]; }));
 }
 
-CellFace FaceList::face(const GatheredCells& cells, size_t n) const {
+HalfFace FaceList::face(const GatheredCells& cells, size_t n) const {
   const Place& place = places[n];
   const std::span<const uint32_t> faces = facesOfCell(cells, place.cell);
   const CellView view = cells.view(place.cell, 0);
-  CellFace face{
+  HalfFace face{
       place.cell, faces.subspan(place.at + size_t{1}, faces[place.at]), place.of_plain_cell, {}, {}};
   measure(view.corners, middleOf(view.corners), face);
   return face;

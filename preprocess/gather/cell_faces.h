@@ -9,7 +9,7 @@
 namespace curvisplat {
 
 /// A face as one of its cells has it.
-struct CellFace {
+struct HalfFace {
   size_t cell = 0;                    // among the gathered ones
   std::span<const uint32_t> corners;  // places among the cell's
   bool of_plain_cell = false;         // which is no polyhedron, and whose corners are different points
@@ -20,7 +20,7 @@ struct CellFace {
 /// Overwrites `out` with the faces of all cells in their order, in parallel; `put` writes a face's record, of
 /// `record_bytes`. Collapsed faces, with fewer than three corners, are left out.
 void facesOfCells(const GatheredCells& cells, size_t record_bytes,
-                  const std::function<void(const CellFace&, std::span<std::byte>)>& put, FaceRecords& out);
+                  const std::function<void(const HalfFace&, std::span<std::byte>)>& put, FaceRecords& out);
 
 /// The same faces in the same order, without records.
 struct FaceList {
@@ -34,7 +34,7 @@ struct FaceList {
 
   void assign(const GatheredCells& cells);  // in parallel; keeps the capacity
   /// Face n, measured. Any thread.
-  CellFace face(const GatheredCells& cells, size_t n) const;
+  HalfFace face(const GatheredCells& cells, size_t n) const;
 };
 
 }  // namespace curvisplat

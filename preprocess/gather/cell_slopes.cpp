@@ -125,7 +125,7 @@ void CellSlopes::add(const GatheredCells& cells) {
   }
   facesOfCells(
       cells, sizeof(FaceRecord) + fields_ * sizeof(float),
-      [&](const CellFace& face, std::span<std::byte> to) {
+      [&](const HalfFace& face, std::span<std::byte> to) {
         put(to.data(),
             FaceRecord{cells.numbers[face.cell], bodies[face.cell].centre, face.inward, face.centre},
             valuesOf(cells, face.cell));

@@ -16,7 +16,7 @@ struct FaceRecord {
 };
 static_assert(sizeof(FaceRecord) == 120);
 
-FaceRecord recordOf(const GatheredCells& cells, const CellFace& face) {
+FaceRecord recordOf(const GatheredCells& cells, const HalfFace& face) {
   FaceRecord record{};
   const std::span<const uint64_t> corners = cells.cornersOfCell(face.cell);
   record.inward = face.inward;

@@ -218,9 +218,9 @@ TEST(SharedSeries, RemovesOnlyItsOwnTemporaryFiles) {
 }
 
 TEST(DealSteps, GivesEachRankAGroup) {
-  const auto ends = [](const std::vector<StepRange>& ranges) {
+  const auto ends = [](const std::vector<StepSpan>& ranges) {
     std::vector<uint64_t> numbers;
-    for (const StepRange& range : ranges) numbers.push_back(range.end);
+    for (const StepSpan& range : ranges) numbers.push_back(range.end);
     return numbers;
   };
   EXPECT_EQ(ends(dealSteps(1, 100, 1, 4)), (std::vector<uint64_t>{3, 6, 9, 12}));

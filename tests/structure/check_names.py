@@ -7,6 +7,8 @@
   enumerators kUpperCamel
   constants   kUpperCamel: constexpr variables, wherever they are, and const ones of a namespace; limits are kMax and kMin,
               not kMost and kLeast
+  headers     no two of the libraries and the program have a type of one name in one namespace: a source that included both would
+              not compile, and a program that is linked of both is undefined
 
 C++ is read as clang-format leaves it: what a namespace holds is not indented.
 """
@@ -25,6 +27,30 @@ CONST = re.compile(r"^(?:(?:static|inline)\s+)*const\s+" + DECLARED, re.M)
 
 UPPER_CAMEL = re.compile(r"[A-Z][A-Za-z0-9]*")
 CONSTANT = re.compile(r"k(?!(?:Most|Least)[A-Z])[A-Z0-9][A-Za-z0-9]*")
+
+
+NAMESPACE = re.compile(r"^namespace ([\w:]+) \{")
+DEFINED = re.compile(r"^(?:template <[^;{}]*> )?(?:class|struct|enum class|enum|union) (\w+)\b(?!::)(?!.*;$)")
+PRODUCT = ("stream", "preprocess", "render", "tools")
+
+
+def types_of_header(source):
+    """(line, namespace and name) of each type that a header defines in a namespace."""
+    namespace = ""
+    for number, line in enumerate(without_text(source).split("\n"), 1):
+        if match := NAMESPACE.match(line):
+            namespace = match[1]
+        elif match := DEFINED.match(line):
+            yield number, f"{namespace}::{match[1]}"
+
+
+def defined_twice(headers):
+    """`headers`: (path, source). (path, line, name, the path of the first) of each type that an earlier header has, too."""
+    first = {}
+    for path, source in headers:
+        for line, name in types_of_header(source):
+            if first.setdefault(name, path) != path:
+                yield path, line, name, first[name]
 
 
 def is_function(match):
@@ -66,6 +92,10 @@ def main():
                     faults += 1
                     expected = "UpperCamel" if kind == "type" else "kUpperCamel, and of limits kMax or kMin"
                     print(f"{path.relative_to(root).as_posix()}:{line}: {kind} {name}; expected {expected}")
+    headers = [(path.relative_to(root).as_posix(), path.read_text()) for top in PRODUCT for path in sorted((root / top).rglob("*.h"))]
+    for path, line, name, other in defined_twice(headers):
+        faults += 1
+        print(f"{path}:{line}: {name} is also in {other}; give one of them another name")
     if checked == 0:
         print(f"{root}: there are no sources")
         return 1

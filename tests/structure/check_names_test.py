@@ -31,6 +31,13 @@ class Checks(unittest.TestCase):
                          [(1, "type", "brick_t"), (3, "type", "octree")])
         self.assertEqual(self.faults("template <>\nstruct std::hash<curvisplat::A> {\n"), [])
 
+    def test_types_of_two_headers(self):
+        first = ("a.h", "namespace n {\nstruct Face {\n  int x;\n};\nclass Later;\n}\n")
+        again = ("b.h", "namespace n {\n\nclass Face : public Base {\n};\n}\n")
+        self.assertEqual(list(check_names.defined_twice([first, again])), [("b.h", 3, "n::Face", "a.h")])
+        other = ("c.h", "namespace m {\nstruct Face {\n};\n}\nnamespace n {\nclass Face;\nstruct Face::Part {\n};\n}\n")
+        self.assertEqual(list(check_names.defined_twice([first, other])), [])
+
     def test_what_is_none(self):
         self.assertEqual(self.faults("  const int local = 3;\n  struct stat found {};\n  struct stat now;\n"), [])
         self.assertEqual(self.faults("constexpr int twice(int n) {\n  return 2 * n;\n}\n"), [])
