@@ -7,38 +7,20 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
 #include <glm/geometric.hpp>
 #include <map>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "preprocess/splats/seams.h"
-#include "stream/base/error.h"
 #include "tests/reference/mapped_block.h"
+#include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
 
 struct Piece {
   NodeSplat node;
   SplatScalar value;
-};
-
-/// A folder of the test's own, removed with it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "seams_test_XXXXXX").string();
-    if (!mkdtemp(name.data())) throw Error("{}: cannot be made", name);
-    path_ = name;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
 };
 
 class MergedSeams : public testing::Test {

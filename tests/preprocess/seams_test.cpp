@@ -6,6 +6,7 @@
 #include <bit>
 #include <cerrno>
 #include <cmath>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <map>
 #include <random>
