@@ -193,15 +193,15 @@ void JointNodes::finish(const Sink& sink) {
   else
     for (const MergedParts& of : groups(group, sides)) give(of);
 
-  for (auto& [splat, values] : behind_) {
+  for (SplatWithValues& behind : behind_) {
     const bool open = std::any_of(merged.begin(), merged.end(), [&](const SplatWithValues& face) {
-      return isOpen(face.splat.splat, face.splat.border_code, splat.splat);
+      return isOpen(face.splat.splat, face.splat.border_code, behind.splat.splat);
     });
     if (!open) {
-      splat.border_code = kNoBorder;
-      goOnBehind(parts, sides, splat, values);
+      behind.splat.border_code = kNoBorder;
+      goOnBehind(parts, sides, behind.splat, behind.values);
     }
-    sink(splat, values, {});
+    sink(behind.splat, behind.values, {});
   }
 }
 
