@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 constexpr double kRatio = 2;
+constexpr int kLeft = 1, kRight = 2;
 const std::vector<int> kSides{1, 2};
 std::array<int, 3> table[2];
 thread_local Counter counter;
@@ -51,7 +52,7 @@ void Reader::open() {
 class UnityGroups(unittest.TestCase):
     def test_names_are_those_that_a_source_declares_in_its_namespaces(self):
         self.assertEqual(unity_groups.names(SOURCE), {
-            "LIMIT", "Words", "kRatio", "kSides", "table", "counter", "Kind", "sorted", "Reader", "Suite_Holds", "Other_Holds",
+            "LIMIT", "Words", "kRatio", "kLeft", "kRight", "kSides", "table", "counter", "Kind", "sorted", "Reader", "Suite_Holds", "Other_Holds",
             "All_Other"})
 
     def test_sources_with_a_name_in_common_are_apart(self):

@@ -1,5 +1,5 @@
-# Compiles sources of tests together, up to ten at a time: most of a source's time is its headers'. unity_groups.py says which
-# can be. Those with options of their own stay alone.
+# Compiles sources together, up to ten at a time: most of a source's time is its headers'. unity_groups.py says which can be.
+# Those with options of their own stay alone, and those that are compiled once for each instruction set.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 function(curvisplat_together target)
@@ -15,7 +15,8 @@ function(curvisplat_together target)
         list(APPEND own ${property})
       endif()
     endforeach()
-    if(source MATCHES "\\.cpp$" AND NOT own)
+    file(STRINGS ${source} several_targets REGEX "foreach_target" LIMIT_COUNT 1)
+    if(source MATCHES "\\.cpp$" AND NOT own AND NOT several_targets)
       list(APPEND sources ${source})
     endif()
   endforeach()
@@ -30,15 +31,13 @@ function(curvisplat_together target)
     set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES UNITY_GROUP group_${group})
   endforeach()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
-  # GCC takes the sources for headers of the file that includes them; and what is local in one may have the name of another's.
-  target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-shadow)
 endfunction()
 
 function(curvisplat_together_in folder)
   get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
   foreach(target ${targets})
     get_target_property(type ${target} TYPE)
-    if(type STREQUAL "EXECUTABLE")
+    if(type MATCHES "^(EXECUTABLE|STATIC_LIBRARY|OBJECT_LIBRARY)$")
       curvisplat_together(${target})
     endif()
   endforeach()
@@ -48,5 +47,8 @@ function(curvisplat_together_in folder)
   endforeach()
 endfunction()
 
-# The libraries and the program are compiled as everyone compiles them.
-curvisplat_together_in(${PROJECT_SOURCE_DIR}/tests)
+foreach(folder stream preprocess render tools bench tests)
+  if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder})
+    curvisplat_together_in(${PROJECT_SOURCE_DIR}/${folder})
+  endif()
+endforeach()

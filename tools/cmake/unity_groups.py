@@ -18,6 +18,7 @@ ALIAS = re.compile(r"(?:using(?= \w+ =)|#define) (\w+)")
 TEST = re.compile(r"\w*TEST\w*\((\w+), (\w+)[,)]")
 FUNCTION = re.compile(r"[^(=]*?(?<![:\w])(\w+)\(")
 VARIABLE = re.compile(r"[^(={]*?(?<![:\w])(\w+)(?:\[[^\]]*\])*(?: =|\{|;)")
+NEXT = re.compile(r", (\w+)(?: =|\{)")  # of several variables on a line
 
 
 def names(text):
@@ -28,8 +29,10 @@ def names(text):
             continue
         if match := TEST.match(line):
             found.add("_".join(match.groups()))
-        elif match := TYPE.match(line) or ALIAS.match(line) or FUNCTION.match(line) or VARIABLE.match(line):
+        elif match := TYPE.match(line) or ALIAS.match(line) or FUNCTION.match(line):
             found.add(match[1])
+        elif match := VARIABLE.match(line):
+            found.update([match[1], *NEXT.findall(line)])
     return found
 
 
