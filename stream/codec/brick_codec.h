@@ -6,7 +6,7 @@
 //   shape      2 log axes, the log volume and 3 shears: ‖S^-½ S' S^-½ - I‖ <= 0.05 at any aspect ratio
 //   weight     relative to the decoded a0 a1 a2: error at most 1e-3
 //   mean       16 bits over the brick's range, or 24
-//   slope      error at most 2^-14 of the brick's span; √variance: 2^-13 of it (values_codec.h)
+//   slope      error at most 2^-11 of the brick's span; √variance: 2^-13 of it (values_codec.h)
 //
 // The symbols (A, S, axes, shears) are those of stream/model/splats.h; stream/FORMAT.md specifies the bytes.
 // Encoding also returns the decoded splats, because merging and octree membership are computed from what a

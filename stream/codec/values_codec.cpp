@@ -13,7 +13,7 @@ namespace curvisplat {
 namespace {
 
 constexpr double kMeanSteps = 65535, kFineMeanSteps = 16777215;
-constexpr double kSlopeSteps = 8192;
+constexpr double kSlopeSteps = 1024, kFineSlopeSteps = 8192;
 constexpr double kDeviationSteps = 4096;
 constexpr size_t kMaxRowBytes = 10;  // two varints of up to 32 bits
 
@@ -170,7 +170,7 @@ class ValuesEncoder {
     span = std::max(span, upper - lower);
     header_.lower = static_cast<float>(lower);
     header_.upper = static_cast<float>(upper);
-    header_.slope_step = span / kSlopeSteps;
+    header_.slope_step = span / (fine_ ? kFineSlopeSteps : kSlopeSteps);
     header_.deviation_step = span / kDeviationSteps;
     if (fine_) setFine(header_);  // for Scale; encode() overwrites the codes
   }

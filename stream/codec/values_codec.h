@@ -4,8 +4,9 @@
 //
 //   span        the range of the brick's means, or its largest |slope component| or deviation if that is more
 //   mean        16 bits over the range of the brick's means; with ValuePrecision::kFine 24 bits, as floats have
-//   slope       in steps of 2^-13 of the span: at the edge of a splat's support, 1.556 from its centre, the
-//               scalar is wrong by at most 1.7e-4 of the span
+//   slope       in steps of 2^-10 of the span, with kFine 2^-13: at the edge of a splat's support, 1.556 from its
+//               centre, the scalar is wrong by at most 1.3e-3 of the span, or 1.7e-4. Errors of the splats along a ray
+//               even out: DESIGN.md, "The codec", has what is seen of them
 //   deviation   √variance in steps of 2^-12 of the span; 0 stays 0
 //
 // The stream contains the rows if a predictor uses them, so that it decodes without the geometry stream.
