@@ -74,6 +74,6 @@ void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep 
 
 /// Adds the step whose geometry and values the folder geometry.<g> in the cache has, g being the series' next
 /// geometry. `cache`: opened under the lock. Throws Error as StepWriter::finish().
-void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& step);
+void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added);
 
 }  // namespace curvisplat
