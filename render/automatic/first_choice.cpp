@@ -20,7 +20,7 @@ constexpr double kConstant = 1e-4;
 constexpr double kMeanDepth = 1.05;  // over what is seen: an absorption of 65 %
 constexpr double kDivergingShare = 0.25;
 constexpr double kUnseenPart = 0.01;  // of the extinction, beyond either side of the zoomed box
-constexpr double kZoomMargin = 1.25, kWholeMargin = 1.15, kWorthZooming = 0.9, kMinZoomed = 1.0 / 3;
+constexpr double kZoomMargin = 1.25, kWholeMargin = 1.15, kWorthZooming = 0.9, kMinZoomed = 0.25;
 constexpr double kWorthCropping = 0.5;  // what can be seen has less than this part of the whole data's height
 constexpr int kRangeDigits = 3, kUnitDigits = 3, kPlaceDigits = 4;
 
