@@ -121,6 +121,18 @@ void refuseValuesOfFlags(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) refuseValuesOfFlags(*command);
 }
 
+/// CLI11 takes --orbit --size 9x9 for an orbit by "--size", and 9x9 for a file.
+void refuseOptionsAsValues(CLI::App& app) {
+  for (CLI::Option* option :
+       app.get_options([](const CLI::Option* each) { return each->get_expected_max() > 0; }))
+    option->check([&app](const std::string& value) {
+      const bool is_option = value.starts_with("--") && app.get_option_no_throw(value);
+      return is_option ? fmt::format("needs a value (found the option {})", value) : std::string();
+    });
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; }))
+    refuseOptionsAsValues(*command);
+}
+
 /// Reports a failure, as one rank for all where there are several.
 int fail(const std::string& line, int status) {
   endRanksAfter(line, status);
@@ -146,6 +158,7 @@ int run(int argc, char** argv) {
   addExport(app);
   addManual(app);
   refuseValuesOfFlags(app);
+  refuseOptionsAsValues(app);
 
   try {
     app.parse(argc, argv);

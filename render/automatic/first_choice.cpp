@@ -6,19 +6,21 @@
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
+#include <numeric>
 #include <vector>
 
 #include "render/automatic/opacity_rule.h"
 #include "render/automatic/rounded.h"
+#include "render/automatic/seen_area.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr double kConstant = 1e-4;
-constexpr double kMeanDepth = 1.05;  // over the silhouette: an absorption of 65 %
+constexpr double kMeanDepth = 1.05;  // over what is seen: an absorption of 65 %
 constexpr double kDivergingShare = 0.25;
 constexpr double kUnseenPart = 0.01;  // of the extinction, beyond either side of the zoomed box
-constexpr double kZoomMargin = 1.25, kWholeMargin = 1.15, kWorthZooming = 0.9, kMinZoomed = 1.0 / 3;
+constexpr double kZoomMargin = 1.25, kWholeMargin = 1.15, kWorthZooming = 0.9, kMinZoomed = 0.25;
 constexpr double kWorthCropping = 0.5;  // what can be seen has less than this part of the whole data's height
 constexpr int kRangeDigits = 3, kUnitDigits = 3, kPlaceDigits = 4;
 
@@ -103,11 +105,12 @@ FunctionParts FirstChoice::function(const std::string& map) const {
 }
 
 double FirstChoice::opacityUnitOf(const TransferFunction& function) const {
-  double depth = 0;
+  std::vector<double> depths(samples_.size());
   for (size_t n = 0; n < samples_.size(); ++n)
-    depth += samples_.volumes[n] * function.at(samples_.values[n]).extinction;
-  const double unit =
-      silhouette_.area > 0 ? function.opacityUnit() * depth / (kMeanDepth * silhouette_.area) : 0;
+    depths[n] = samples_.volumes[n] * function.at(samples_.values[n]).extinction;
+  const double depth = std::accumulate(depths.begin(), depths.end(), 0.0);
+  const double area = seenArea(samples_, silhouette_.view, depths);
+  const double unit = area > 0 ? function.opacityUnit() * depth / (kMeanDepth * area) : 0;
   if (unit > 0 && std::isfinite(unit)) return roundedTo(unit, unit, kUnitDigits);
   const double diagonal = glm::length(upper_ - lower_);
   return diagonal > 0 ? diagonal / 100 : 1;

@@ -38,7 +38,7 @@ class FirstChoice {
 
   /// Range, opacities and opacity unit; `map`: a preset, or empty to have one chosen.
   FunctionParts function(const std::string& map = "") const;
-  /// The opacity unit at which the function absorbs 65 % on the average over the silhouette. The function's
+  /// The opacity unit at which the function absorbs 65 % on the average over what it shows (seen_area.h). Its
   /// own unit does not matter. A function that is transparent for the data gets 1/100 of its diagonal.
   double opacityUnitOf(const TransferFunction& function) const;
   /// The value below which `part` (0..1) of the volume lies.

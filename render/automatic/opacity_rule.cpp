@@ -35,6 +35,22 @@ double interpolated(const VolumeHistogram& histogram, const BinExtinctions& valu
   return std::lerp(values[bin], values[bin + 1], inside - static_cast<double>(bin));
 }
 
+double opacityOf(double extinction) {
+  return -std::expm1(-kLargestDepth * extinction);
+}
+
+/// The mean opacity of the volume whose coordinates are in [from, to); `none` if there is no volume.
+double meanOpacity(const VolumeHistogram& histogram, const BinExtinctions& extinctions, double from,
+                   double to, double none) {
+  double share = 0, sum = 0;
+  for (size_t bin = 0; bin < kBins; ++bin) {
+    if (histogram.middle(bin) < from || histogram.middle(bin) >= to) continue;
+    share += histogram.shares[bin];
+    sum += histogram.shares[bin] * opacityOf(extinctions[bin]);
+  }
+  return share > 0 ? sum / share : none;
+}
+
 }  // namespace
 
 BinExtinctions extinctionsOf(const VolumeHistogram& histogram) {
@@ -89,15 +105,23 @@ std::vector<OpacityPoint> opacityPoints(const VolumeHistogram& histogram, const 
   constexpr size_t kPlaces = 257;
   std::vector<double> opacities(kPlaces), allowed(kPlaces);
   double mean = 0;
-  for (size_t bin = 0; bin < kBins; ++bin)
-    mean += histogram.shares[bin] * -std::expm1(-kLargestDepth * extinctions[bin]);
+  for (size_t bin = 0; bin < kBins; ++bin) mean += histogram.shares[bin] * opacityOf(extinctions[bin]);
   for (size_t n = 0; n < kPlaces; ++n) {
     const double coordinate = std::lerp(begin, end, static_cast<double>(n) / (kPlaces - 1));
-    opacities[n] = -std::expm1(-kLargestDepth * interpolated(histogram, extinctions, coordinate));
+    opacities[n] = opacityOf(interpolated(histogram, extinctions, coordinate));
     // Values that nothing has may have any opacity.
     const bool empty = interpolated(histogram, histogram.smoothed, coordinate) < kEmptyShare;
     allowed[n] = empty ? 1 : kRelativeError * opacities[n] + kMeanError * mean;
   }
+  // Values beyond the ends are drawn with the opacity of the ends. Where most of the volume lies there and is clear, it
+  // has to stay clear: the far field of a vortex.
+  const auto end_at = [&](size_t place, double from, double to) {
+    opacities[place] =
+        std::min(opacities[place], meanOpacity(histogram, extinctions, from, to, opacities[place]));
+    allowed[place] = kRelativeError * opacities[place] + kMeanError * mean;
+  };
+  end_at(0, -HUGE_VAL, begin);
+  end_at(kPlaces - 1, end, HUGE_VAL);
   std::vector<size_t> kept{0, kPlaces - 1};
   while (kept.size() < kMaxPoints) {
     size_t worst = 0;

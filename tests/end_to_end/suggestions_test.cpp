@@ -66,6 +66,11 @@ TEST_F(Suggestions, Options) {
     expectMeantByRender({wrong, "1"}, fmt::format("unknown option {} (did you mean {}?)", wrong, right));
 }
 
+TEST_F(Suggestions, OptionsWithoutTheirValues) {
+  expectMeantByRender({"--orbit", "--size", "9x9"}, "--orbit: needs a value (found the option --size)");
+  expectMeantByRender({"--scalar", "--size", "9x9"}, "--scalar: needs a value (found the option --size)");
+}
+
 TEST_F(Suggestions, Values) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases{
       {{"--scalar", "volum"}, "(did you mean volume?); it has f, volume"},

@@ -133,6 +133,19 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndLeaveWithTheirScalar) {
   expectDraws(commands[1], higher);
 }
 
+/// In a window that ends above the list.
+TEST_F(WindowSurfaces, WhatTheMenuAddsIsScrolledTo) {
+  open();
+  save();
+  ASSERT_GT(placeOf("Isosurfaces").second, kWindow.height);
+  choose("Picture", "Add an isosurface");
+  EXPECT_TRUE(eventually([] {
+    const auto place = placeNow("isosurface 1", 0.5, 1);
+    return place && place->second < kWindow.height;
+  }));
+  close();
+}
+
 TEST_F(WindowSurfaces, OfFilesAreAddedByTheDialog) {
   {
     std::ofstream mesh("sheet.obj");

@@ -4,11 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "render/automatic/opacity_rule.h"
 #include "render/automatic/rounded.h"
+#include "render/automatic/seen_area.h"
 #include "render/image/contrast.h"
 #include "stream/base/error.h"
 
@@ -82,6 +84,21 @@ TEST(FirstChoice, RareValuesAreMoreOpaqueAndTheModeIsClear) {
   EXPECT_GT(curve.at(0.75), 0.5);
 }
 
+/// What is cleared lies beyond the range, whose end has an opacity of its own: as the far field of a vortex.
+TEST(FirstChoice, WhatIsClearedBeyondTheRangeStaysClear) {
+  CoarseSamples samples;
+  for (int n = 0; n < 200; ++n) add(samples, 0, 50);  // the far field
+  for (int n = 0; n < 10'000; ++n) add(samples, 5 + 95 * static_cast<float>(n) / 10'000, 0.001f);
+  const auto histogram = volumeHistogram(samples, ValueDistribution(samples));
+  ASSERT_TRUE(histogram);
+  const BinExtinctions extinctions = extinctionsOf(*histogram);
+  const auto [begin, end] = seenInterval(*histogram, extinctions);
+  ASSERT_GT(begin, histogram->coordinate(1));
+  const auto points = opacityPoints(*histogram, extinctions, begin, end);
+  EXPECT_LT(points.front().opacity, 0.001);
+  EXPECT_GT(OpacityCurve(points).at(0.02), 0.1);
+}
+
 TEST(FirstChoice, SilhouetteIsThatOfTheSamples) {
   // A square plate in the plane z = 0, in a box that is as high as wide because of two lone samples.
   CoarseSamples samples;
@@ -97,6 +114,27 @@ TEST(FirstChoice, SilhouetteIsThatOfTheSamples) {
   const Silhouette silhouette = widestSilhouette(samples);
   EXPECT_EQ(silhouette.view, "+z");
   EXPECT_NEAR(silhouette.area, 1, 0.03);
+}
+
+/// A bright disc in a far field that is nearly clear: only the disc is seen.
+TEST(FirstChoice, WhatIsSeenMayBeASmallPartOfTheSilhouette) {
+  CoarseSamples samples;
+  std::vector<double> depths;
+  for (int y = 0; y < 400; ++y)
+    for (int x = 0; x < 400; ++x) {
+      add(samples, 1, 1);
+      samples.positions.back() = {x / 400.0, y / 400.0, 0};
+      const bool inside = std::hypot(x / 400.0 - 0.5, y / 400.0 - 0.5) < 0.25;
+      depths.push_back(inside ? 1 : 1e-4);
+    }
+  const Silhouette silhouette = widestSilhouette(samples);
+  ASSERT_EQ(silhouette.view, "+z");
+  EXPECT_NEAR(seenArea(samples, "+z", depths), std::numbers::pi / 16, 0.02);
+  std::fill(depths.begin(), depths.end(), 1e-4);
+  EXPECT_NEAR(seenArea(samples, "+z", depths), silhouette.area, 1e-9);
+  std::fill(depths.begin(), depths.end(), 0);
+  EXPECT_EQ(seenArea(samples, "+z", depths), 0);
+  EXPECT_EQ(seenArea(CoarseSamples(), "+z", {}), 0);
 }
 
 TEST(FirstChoice, ConstantScalarsAreRecognised) {

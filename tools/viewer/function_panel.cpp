@@ -109,8 +109,13 @@ void paintStrip(const ImVec2& lower, const ImVec2& size, const At& at) {
                         toImGui(at(static_cast<double>(x / size.x))));
 }
 
+/// The width of curve, colours and numbers: half a point of the curve's end lies beside it.
+float availableWidth() {
+  return ImGui::GetContentRegionAvail().x - kPointRadius * ImGui::GetFontSize();
+}
+
 void paintColours(const EditedFunction& function) {
-  const ImVec2 size(ImGui::GetContentRegionAvail().x, ImGui::GetTextLineHeight());
+  const ImVec2 size(availableWidth(), ImGui::GetTextLineHeight());
   paintStrip(ImGui::GetCursorScreenPos(), size, [&](double x) { return function.colourAt(x); });
   ImGui::Dummy(size);
 }
@@ -118,7 +123,7 @@ void paintColours(const EditedFunction& function) {
 /// Five scalars under the curve or the colours, each below its place.
 void paintNumbers(const EditedFunction& function) {
   const ImVec2 lower = ImGui::GetCursorScreenPos();
-  const float width = ImGui::GetContentRegionAvail().x;
+  const float width = availableWidth();
   constexpr int kNumbers = 4;
   const auto scalar = [&](int n) { return function.scalarAt(static_cast<double>(n) / kNumbers); };
   // As many digits as tell neighbours apart: 0.999, 1.001 and not 0.999, 1.
@@ -139,15 +144,27 @@ void paintNumbers(const EditedFunction& function) {
   ImGui::Dummy({width, ImGui::GetTextLineHeight()});
 }
 
-/// Opacities at the left of the curve, each at its height.
+constexpr double kHeights[] = {0.05, 0.25, 0.5, 1};  // opacities at the left of the curve
+
+/// Of the numbers beside the curve and of half a point at its end.
+float widthOfHeights() {
+  float width = 0;
+  for (const double opacity : kHeights)
+    width = std::max(width, ImGui::CalcTextSize(fmt::format("{:g}", opacity).c_str()).x);
+  return width + 2 * kPointRadius * ImGui::GetFontSize();
+}
+
+/// Each beside its height, where no point of the curve lies over it.
 void paintHeights(const Canvas& canvas) {
-  const float down = 0.5f * ImGui::GetFontSize();
-  for (const double opacity : {0.05, 0.25, 0.5, 1.0}) {
+  const float down = 0.5f * ImGui::GetFontSize(), away = 1.5f * kPointRadius * ImGui::GetFontSize();
+  for (const double opacity : kHeights) {
     const ImVec2 at = canvas.at(0, heightOf(opacity));
     ImDrawList* const list = ImGui::GetWindowDrawList();
     list->AddLine(at, {at.x + canvas.size.x, at.y}, IM_COL32(255, 255, 255, 28));
+    const std::string text = fmt::format("{:g}", opacity);
     const float y = std::clamp(at.y - down, canvas.lower.y, canvas.lower.y + canvas.size.y - 2 * down);
-    list->AddText({at.x + 3, y}, IM_COL32(190, 190, 190, 255), fmt::format("{:g}", opacity).c_str());
+    list->AddText({at.x - away - ImGui::CalcTextSize(text.c_str()).x, y},
+                  ImGui::GetColorU32(ImGuiCol_Text, 0.7f), text.c_str());
   }
 }
 
@@ -177,9 +194,12 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
   Result result;
   ImGui::PushID(this);
   result.error = updateHistogram(function, variable);
+  const float left = shows == Shows::kColours ? 0 : widthOfHeights();
+  if (left > 0) ImGui::Indent(left);
   if (shows != Shows::kColours) result.changed |= drawCurve(function);
   if (shows != Shows::kOpacities) paintColours(function);
   paintNumbers(function);
+  if (left > 0) ImGui::Unindent(left);
   if (shows != Shows::kOpacities) result.changed |= drawMaps(function, result);
   result.changed |= drawRange(function, info);
   if (shows != Shows::kColours) result.changed |= drawUnit(function);
@@ -213,7 +233,7 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
 
 bool FunctionPanel::drawCurve(EditedFunction& function) {
   const Canvas canvas{ImGui::GetCursorScreenPos(),
-                      {ImGui::GetContentRegionAvail().x, kCurveLines * ImGui::GetTextLineHeight()}};
+                      {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
   ImGui::InvisibleButton("curve", canvas.size,
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
   nameWidget("curve");

@@ -40,10 +40,17 @@ bool section(const char* text, bool open_at_first) {
 }
 
 bool sectionOf(const char* text, size_t& seen, size_t number) {
+  constexpr float kSeenLines = 8;  // of the list below its header
   const bool has_more = number > seen;
   seen = number;
+  const bool was_open = ImGui::GetStateStorage()->GetInt(ImGui::GetID(text)) != 0;
   if (has_more) ImGui::SetNextItemOpen(true);
-  return section(text, false);
+  const bool open = section(text, false);
+  // Only a list that was folded: one that is in use must not move under the mouse.
+  const float end = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
+  if (has_more && !was_open && ImGui::GetItemRectMax().y + kSeenLines * ImGui::GetFrameHeight() > end)
+    ImGui::SetScrollHereY(0);
+  return open;
 }
 
 void hint(const char* text) {

@@ -18,8 +18,8 @@ void commandOption(Command command, PanelActions& actions, const char* text, boo
 bool option(const char* text, bool& value);
 /// A heading that folds what is below. Named by its text. Returns whether it is unfolded.
 bool section(const char* text, bool open_at_first);
-/// The same of a list, which is folded at first: unfolded if it has more than before, by the menu or by a saved view. `seen`: how
-/// many there were.
+/// The same of a list, which is folded at first: unfolded if it has more than before, by the menu or by a saved view, and then
+/// scrolled to if it would lie below the window's end. `seen`: how many there were.
 bool sectionOf(const char* text, size_t& seen, size_t number);
 /// A line under the widget that the mouse is over, after a moment.
 void hint(const char* text);

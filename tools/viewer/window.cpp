@@ -190,14 +190,48 @@ void Window::wake() {
 void Window::showInput() {
   ImGuiIO& io = ImGui::GetIO();
   for (const int key : shown_keys_) io.KeysDown[key] = glfwGetKey(window_, key) == GLFW_PRESS;
-  for (const int key : fresh_keys_) io.KeysDown[key] = true;
-  shown_keys_ = std::exchange(fresh_keys_, {});
+  shown_keys_.clear();
+  shows_click_ = !mouse_events_.empty();
+  showTyped();
   io.KeyCtrl = io.KeysDown[GLFW_KEY_LEFT_CONTROL] || io.KeysDown[GLFW_KEY_RIGHT_CONTROL];
   io.KeyShift = io.KeysDown[GLFW_KEY_LEFT_SHIFT] || io.KeysDown[GLFW_KEY_RIGHT_SHIFT];
-  shows_click_ = !mouse_events_.empty();
   if (!shows_click_) return;
   io.MousePos = {static_cast<float>(mouse_events_.front().x), static_cast<float>(mouse_events_.front().y)};
   mouse_events_.pop_front();
+}
+
+constexpr int kButton = -2;  // among keys: a button event that came between them
+
+/// Keys and letters in their order, however slow the frames are: Dear ImGui takes all keys of a frame before its letters, and
+/// no letters with Control. So what follows a click, letters after Control and other keys after letters wait for the next frame.
+void Window::showTyped() {
+  ImGuiIO& io = ImGui::GetIO();
+  io.InputQueueCharacters.clear();  // they are in typed_
+  const auto isControl = [](int key) {
+    return key == GLFW_KEY_LEFT_CONTROL || key == GLFW_KEY_RIGHT_CONTROL;
+  };
+  bool letters = false, control = false;
+  while (!typed_.empty()) {
+    const Typed next = typed_.front();
+    if (next.key == kButton) {
+      typed_.pop_front();
+      if (shows_click_) break;
+      continue;
+    }
+    const bool writes = typed_.size() > 1 && typed_[1].letter != 0;  // the key of a letter
+    if (next.letter != 0 || writes ? control : letters) break;
+    typed_.pop_front();
+    if (next.letter != 0) {
+      io.AddInputCharacter(next.letter);
+      letters = true;
+      continue;
+    }
+    io.KeysDown[next.key] = true;
+    shown_keys_.push_back(next.key);
+    control |= isControl(next.key);
+  }
+  for (const Typed& later : typed_)
+    if (later.letter == 0 && later.key >= 0) io.KeysDown[later.key] = false;
 }
 
 void Window::beginFrame() {
@@ -250,7 +284,10 @@ void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {
   if (action == GLFW_RELEASE) self->with_control_.erase(key);
   if (action != GLFW_PRESS) return;
   if (mods & GLFW_MOD_CONTROL) self->with_control_.insert(key);
-  if (key >= 0) self->fresh_keys_.push_back(key);  // some keys have no GLFW code
+  // Control and Shift as they were when the key was pressed: a slow frame may come after their release.
+  if (mods & GLFW_MOD_CONTROL) self->typed_.push_back({GLFW_KEY_LEFT_CONTROL});
+  if (mods & GLFW_MOD_SHIFT) self->typed_.push_back({GLFW_KEY_LEFT_SHIFT});
+  if (key >= 0) self->typed_.push_back({key});  // some keys have no GLFW code
   self->keys_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
 }
 
@@ -267,7 +304,10 @@ std::vector<Window::Key> Window::takeKeys() {
 }
 
 void Window::onLetter(GLFWwindow* window, unsigned letter) {
-  if (letter == '?') static_cast<Window*>(glfwGetWindowUserPointer(window))->keys_.push_back({kQuestionMark});
+  auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  self->input_ = true;
+  if (letter != 0) self->typed_.push_back({-1, letter});
+  if (letter == '?') self->keys_.push_back({kQuestionMark});
 }
 
 void Window::onDrop(GLFWwindow* window, int count, const char** paths) {
@@ -277,7 +317,7 @@ void Window::onDrop(GLFWwindow* window, int count, const char** paths) {
 }
 
 bool Window::takeInput() {
-  return std::exchange(input_, false);
+  return std::exchange(input_, false) || !typed_.empty();
 }
 
 bool Window::overPicture() const {
@@ -290,6 +330,7 @@ void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
   self->mouse_events_.push_back(self->mouse_);
+  self->typed_.push_back({kButton});
   if (action == GLFW_PRESS && !self->isDragging()) {
     // mouse_ is still the position of this event.
     if (!self->overPicture()) return;

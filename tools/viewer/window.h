@@ -128,6 +128,7 @@ class Window {
   static void onDrop(GLFWwindow* window, int count, const char** paths);
   bool overPicture() const;
   void showInput();
+  void showTyped();
   void applyLook();
 
   friend WindowReport examineWindow();
@@ -141,8 +142,13 @@ class Window {
   int width_ = 0;  // in units of the mouse
 
   std::vector<Key> keys_;
-  std::set<int> with_control_;           // that are down, and were pressed so
-  std::vector<int> fresh_keys_;          // pressed since the last Dear ImGui frame
+  std::set<int> with_control_;  // that are down, and were pressed so
+  /// A key that was pressed, or a letter that it wrote.
+  struct Typed {
+    int key = -1;
+    unsigned letter = 0;
+  };
+  std::deque<Typed> typed_;              // what Dear ImGui has yet to see, in order
   std::vector<int> shown_keys_;          // reported as down in its last frame
   std::deque<glm::dvec2> mouse_events_;  // positions of button events that it has yet to see
   bool shows_click_ = false;

@@ -1,0 +1,76 @@
+// Pictures that the window saves in another size than it shows.
+#include <csignal>
+#include <functional>
+
+#include "tests/end_to_end/window_fixture.h"
+
+namespace curvisplat {
+namespace {
+
+// Drawing waits for its turn on a busy machine: what is waited for here has no time of its own, only ctest's.
+constexpr double kLong = 400;
+
+class WindowPictures : public WindowTest {
+ protected:
+  static bool isOpen() { return hasWidget("file name"); }
+  /// Clicks until `done`: a click may come before the window hears. Not again before the window has drawn a frame since, so
+  /// that a slow window does not get the second click for something else.
+  void clickUntil(const std::string& widget, const std::function<bool()>& done) {
+    ASSERT_TRUE(eventually(
+        [&] {
+          if (const auto place = placeNow(widget, 0.5, 0.5)) click(*place);
+          return eventually(done, 20);
+        },
+        kLong))
+        << widget;
+  }
+  /// The name has the focus when the dialog appears.
+  void openDialog(const std::string& name) {
+    choose("File", "Save picture as...");
+    ASSERT_TRUE(eventually(isOpen, kLong));
+    press("ctrl+a");
+    act({"type", name});
+  }
+  Image accept(const std::string& name) {
+    clickUntil("file accept", [] { return !isOpen(); });
+    EXPECT_TRUE(eventually([&] { return std::filesystem::exists(name); }, kLong)) << name;
+    return readImage(name);
+  }
+};
+
+/// The same as the command draws in that size.
+TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
+  open();
+  saveAndCopy();
+  const ImageSize shown = pictureSize();
+  openDialog("twice.png");
+  clickUntil("picture size twice that",
+             [&] { return hasWidget(fmt::format("picture of {} x {}", 2 * shown.width, 2 * shown.height)); });
+  const Image twice = accept("twice.png");
+  EXPECT_EQ(twice.size.width, 2 * shown.width);
+  EXPECT_EQ(twice.size.height, 2 * shown.height);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  std::vector<std::string> command = commands[0];
+  for (size_t n = 0; n + 1 < command.size(); ++n)
+    if (command[n] == "--size") command[n + 1] = fmt::format("{}x{}", twice.size.width, twice.size.height);
+  expectDraws(command, twice);
+}
+
+/// As if a frame took so long that all of it came before the next one: Control and A, letters, Return.
+TEST_F(WindowPictures, HaveTheNameThatWasTypedDuringOneFrame) {
+  open();
+  save();
+  openDialog("slow");
+  window_->signal(SIGSTOP);
+  press("ctrl+a");
+  act({"type", "slow xy.png"});
+  press("Return");
+  window_->signal(SIGCONT);
+  EXPECT_TRUE(eventually([] { return !isOpen() && std::filesystem::exists("slow xy.png"); }, kLong));
+  EXPECT_FALSE(std::filesystem::exists("a.png"));
+  close();
+}
+
+}  // namespace
+}  // namespace curvisplat
