@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "render/frame/hidden_bricks.h"
-#include "render/frame/tile_dealer.h"
+#include "render/frame/picture_shares.h"
 #include "render/project/kernel.h"
 #include "render/project/screen_view.h"
 #include "stream/base/error.h"
@@ -219,8 +219,9 @@ void FramePlanner::share(FramePlan& plan, const FrameOptions& options) const {
   if (ranks.isFirst()) {
     const std::vector<PartCost> costs =
         partCosts(plan.parts, cache_.bricks(), cache_.brickVariables(variable_), plan.settings.view);
-    shared->owners = dealTiles(costs, options.size, ranks.count());
-    shared->preparers = dealParts(costs, ranks.count());
+    PictureShares shares = sharePicture(costs, options.size, ranks.count());
+    shared->owners = std::move(shares.owners);
+    shared->preparers = std::move(shares.preparers);
   }
   shared->owners = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared->owners)));
   shared->preparers = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared->preparers)));

@@ -156,10 +156,12 @@ void FrameWorkers::exchangeLoop() {
   }
 }
 
+/// Never waits for the painter while the sweep has space: other ranks wait for what this one prepares.
 void FrameWorkers::sharedLoop(Worker& worker) {
   try {
     while (true) {
-      if (const auto batch = sweep_.next()) {
+      const bool may_hand = ring_.hasSpaceFor(SweepBuffer::kMaxBatch);
+      if (const auto batch = may_hand ? sweep_.next() : std::nullopt) {
         if (!hand(worker, *batch)) return;
       } else if (const auto sequence = work_->exchange->nextReceived()) {
         if (!enterReceived(worker, *sequence)) return;

@@ -31,6 +31,11 @@ std::optional<uint64_t> SegmentRing::placeFor(uint64_t sequence, size_t count) c
   return begin;
 }
 
+bool SegmentRing::hasSpaceFor(size_t count) const {
+  const MutexLock lock(mutex_);
+  return placeFor(first_sequence_ + segments_.size(), count).has_value();
+}
+
 void SegmentRing::commit(uint64_t sequence) {
   const MutexLock lock(mutex_);
   const size_t n = sequence - first_sequence_;

@@ -31,6 +31,8 @@ class SegmentRing {
   /// counted from 0. Returns nullopt once the ring is closed. Any thread. Every sequence number must be
   /// acquired, and only once.
   std::optional<std::span<ScreenSplat>> acquire(uint64_t sequence, size_t count);
+  /// Whether the next segment, of so many splats, would get its space at once. Any thread.
+  bool hasSpaceFor(size_t count) const;
   /// Marks the segment as filled. Any thread.
   void commit(uint64_t sequence);
   /// Announces that no more than the first `segments` will come for now: the painter does not wait for more.

@@ -104,6 +104,7 @@ bool SplatExchange::beginSlab(std::optional<Request> request) {
   wanted_by_ = std::make_unique<std::atomic<uint32_t>[]>(own_.size());
   for (size_t n = 0; n < own_.size(); ++n)
     wanted_by_[n] = static_cast<uint32_t>(prepared_[n].receivers.size());
+  kept_.clear();
   first_open_ = 0;
   offered_bytes_ = 0;
   const MutexLock lock(mutex_);
@@ -218,6 +219,7 @@ bool SplatExchange::step(const std::function<bool(uint64_t sequence)>& unneeded)
   // What was received has been entered.
   const uint64_t begin = available_;
   received_.clear();
+  endKept();
   std::vector<uint32_t> cancelled;
   for (uint64_t n = begin; n < std::min<uint64_t>(needed_.size(), begin + kCancelAhead); ++n) {
     if (arrived_[n].cancelled || !unneeded(n)) continue;
@@ -272,9 +274,7 @@ uint64_t SplatExchange::take(const std::vector<Ranks::Bytes>& offered) {
     std::vector<Offer> offers(header.offers);
     get(offered[rank], at, offers.data(), offers.size());
     for (const Offer& offer : offers) {
-      const auto found = std::lower_bound(needed_.begin(), needed_.end(), offer.part);
-      CURVISPLAT_CHECK(found != needed_.end() && *found == offer.part);
-      Arrived& part = arrived_[static_cast<size_t>(found - needed_.begin())];
+      Arrived& part = arrived(offer.part);
       part.known = true;
       part.count = offer.count;
     }
@@ -312,6 +312,30 @@ void SplatExchange::finish(Prepared& part, Receiver& receiver) {
   prepared_bytes_ -= std::exchange(part.bytes, 0);
 }
 
+SplatExchange::Arrived& SplatExchange::arrived(uint32_t number) {
+  const auto found = std::lower_bound(needed_.begin(), needed_.end(), number);
+  CURVISPLAT_CHECK(found != needed_.end() && *found == number);
+  return arrived_[static_cast<size_t>(found - needed_.begin())];
+}
+
+/// Where this rank itself needs all splats of a part that it has prepared: they arrive where they are.
+bool SplatExchange::keep(Prepared& part, Receiver& receiver, uint32_t number) {
+  if (receiver.rank != ranks_.rank() || receiver.count == 0 || receiver.count != part.splats.size())
+    return false;
+  Arrived& here = arrived(number);
+  CURVISPLAT_CHECK_OP(here.count, ==, receiver.count);
+  here.keys = part.keys.data();
+  here.splats = part.splats.data();
+  return receiver.kept = true;
+}
+
+void SplatExchange::endKept() {
+  for (const size_t n : kept_)
+    for (Receiver& receiver : prepared_[n].receivers)
+      if (std::exchange(receiver.kept, false)) finish(prepared_[n], receiver);
+  kept_.clear();
+}
+
 /// Of the needed parts in their order, as many as there is space for. Each rank may send all up to a number.
 std::vector<Ranks::Bytes> SplatExchange::grants() {
   uint64_t bytes = 0;
@@ -329,7 +353,7 @@ std::vector<Ranks::Bytes> SplatExchange::grants() {
 
 void SplatExchange::send(const std::vector<uint32_t>& granted) {
   const auto isSentNow = [&](size_t n, const Receiver& receiver) {
-    return !receiver.done && receiver.offered && own_[n] < granted[receiver.rank];
+    return !receiver.done && !receiver.kept && receiver.offered && own_[n] < granted[receiver.rank];
   };
   std::vector<uint64_t> bytes_to(ranks_.count());
   for (size_t n = first_open_; n < own_.size() && prepared_[n].ready; ++n)
@@ -340,21 +364,27 @@ void SplatExchange::send(const std::vector<uint32_t>& granted) {
   for (size_t n = first_open_; n < own_.size() && prepared_[n].ready; ++n)
     for (Receiver& receiver : prepared_[n].receivers) {
       if (!isSentNow(n, receiver)) continue;
+      offered_bytes_ -= receiver.bytes();
+      if (keep(prepared_[n], receiver, own_[n])) {
+        kept_.push_back(n);
+        continue;
+      }
       append(prepared_[n], receiver, own_[n], to[receiver.rank]);
       if (receiver.rank != ranks_.rank()) sent_bytes_ += receiver.bytes();
-      offered_bytes_ -= receiver.bytes();
       finish(prepared_[n], receiver);
     }
+  Ranks::Bytes own = std::exchange(to[ranks_.rank()], {});
   received_ = ranks_.exchange(to);
+  received_[ranks_.rank()] = std::move(own);
   for (const Ranks::Bytes& bytes : received_)
     for (size_t at = 0; at < bytes.size();) {
       MessageHeader header;
       get(bytes, at, &header, 1);
-      const auto found = std::lower_bound(needed_.begin(), needed_.end(), header.part);
-      CURVISPLAT_CHECK(found != needed_.end() && *found == header.part);
-      Arrived& part = arrived_[static_cast<size_t>(found - needed_.begin())];
+      Arrived& part = arrived(header.part);
       CURVISPLAT_CHECK_OP(part.count, ==, header.count);
-      part.data = bytes.data() + at;
+      // Messages are made of 4-byte numbers: keys, then splats.
+      part.keys = reinterpret_cast<const uint32_t*>(bytes.data() + at);
+      part.splats = reinterpret_cast<const ScreenSplat*>(bytes.data() + at + header.count * sizeof(uint32_t));
       at += header.count * kElementBytes;
       CURVISPLAT_CHECK_OP(at, <=, bytes.size());
     }
@@ -397,11 +427,8 @@ std::optional<uint64_t> SplatExchange::nextReceived() {
 std::optional<SplatExchange::Received> SplatExchange::received(uint64_t sequence) const {
   const Arrived& part = arrived_[sequence];
   if (part.cancelled) return {};
-  CURVISPLAT_CHECK(part.data != nullptr);
-  // Messages are made of 4-byte numbers.
-  const auto* const keys = reinterpret_cast<const uint32_t*>(part.data);
-  const auto* const splats = reinterpret_cast<const ScreenSplat*>(part.data + part.count * sizeof(uint32_t));
-  return Received{{splats, part.count}, {keys, part.count}};
+  CURVISPLAT_CHECK(part.splats != nullptr);
+  return Received{{part.splats, part.count}, {part.keys, part.count}};
 }
 
 }  // namespace curvisplat

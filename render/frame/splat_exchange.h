@@ -7,6 +7,8 @@
 //                                              |
 //   owner      nextReceived() -> received() -> sort, enter into the sweep      all workers
 //
+// A preparer's own splats are not sent: it takes them from where they are, or, where it needs only some, from a copy.
+//
 // Work and steps alternate. In a step, a preparer offers what it has prepared; an owner grants, in its sweep's order,
 // what it has space for; then splats are sent. An owner may cancel parts that it does not need any more, as long as
 // they have not been sent.
@@ -110,6 +112,8 @@ class SplatExchange {
     uint32_t rank = 0;
     uint32_t first = 0, count = 0;  // entries, or all
     bool offered = false, done = false;
+    bool kept =
+        false;  // this rank, which takes all of the part's splats from where they are until the next step
     uint64_t bytes() const { return kHeaderBytes + count * kElementBytes; }
   };
   struct Prepared {
@@ -123,7 +127,8 @@ class SplatExchange {
   struct Arrived {
     bool known = false, cancelled = false;
     uint32_t count = 0;
-    const std::byte* data = nullptr;  // keys, then splats
+    const uint32_t* keys = nullptr;
+    const ScreenSplat* splats = nullptr;
   };
 
   void findReceivers(Prepared& part, std::span<const ScreenSplat> splats) const;
@@ -135,6 +140,9 @@ class SplatExchange {
   void send(const std::vector<uint32_t>& granted);
   void append(const Prepared& part, const Receiver& receiver, uint32_t number, Ranks::Bytes& to) const;
   void finish(Prepared& part, Receiver& receiver);
+  bool keep(Prepared& part, Receiver& receiver, uint32_t number);
+  void endKept();
+  Arrived& arrived(uint32_t number);
 
   Ranks& ranks_;
   const SharedParts& shared_;
@@ -148,6 +156,7 @@ class SplatExchange {
   std::unordered_map<uint32_t, uint32_t> index_of_brick_;  // in own_
   std::vector<Prepared> prepared_;                         // [own]; each is one worker's until it is ready
   std::unique_ptr<std::atomic<uint32_t>[]> wanted_by_;     // [own] ranks
+  std::vector<size_t> kept_;                               // own parts with a receiver that is kept
   size_t first_open_ = 0;                                  // own parts before it have been sent to all
   uint64_t offered_bytes_ = 0, sent_bytes_ = 0;
   std::vector<Arrived> arrived_;        // [needed]

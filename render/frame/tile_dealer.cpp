@@ -2,60 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <numeric>
-#include <queue>
 #include <utility>
 
 #include "render/frame/hidden_bricks.h"
+#include "render/frame/tile_part.h"
 #include "render/project/kernel.h"
-#include "render/project/tile_set.h"
 
 namespace curvisplat {
 namespace {
-
-// Nanoseconds by nanoseconds of one core, of a brick in memory (curvisplat bench): decoding and projecting a splat
-// take 1, sorting and painting it 1.5; clearing and resolving a tile costs as much as painting 300 splats for each
-// painter's tile of pixels.
-constexpr double kPaintPerPrepare = 1.5;
-constexpr double kTileCost = 300.0 * kSharedTileSide * kSharedTileSide / (kTileSide * kTileSide);
-// Finding out who gets a splat, and copying it four times: 0.47 with two ranks on one machine, 0.62 with four
-// (bench/README.md).
-constexpr double kExchangePerPrepare = 0.5;
-
-/// A part as the tiles see it, in units of tiles, within the picture.
-struct TilePart {
-  double x0, y0, x1, y1;
-  double prepare;
-  double paint, splats;  // of a tile
-
-  static TilePart of(const PartCost& cost, ImageSize size) {
-    const auto tiles = [](float pixel, int pixels) {
-      return std::clamp<double>(pixel / kSharedTileSide, 0, TileSet::tilesAlong(pixels, kSharedTileSide));
-    };
-    const ScreenBox& box = cost.box;
-    TilePart part{tiles(box.x0, size.width),
-                  tiles(box.y0, size.height),
-                  tiles(box.x1, size.width),
-                  tiles(box.y1, size.height),
-                  cost.prepare,
-                  0,
-                  0};
-    // A box without bounds, around the eye: its splats are taken to lie in the picture.
-    double tiles_of_box =
-        (double{box.x1} - box.x0) * (double{box.y1} - box.y0) / (kSharedTileSide * kSharedTileSide);
-    if (!std::isfinite(tiles_of_box)) tiles_of_box = (part.x1 - part.x0) * (part.y1 - part.y0);
-    part.paint = cost.paint / tiles_of_box;
-    part.splats = cost.splats / tiles_of_box;
-    return part;
-  }
-  bool isSeen() const { return x0 < x1 && y0 < y1; }
-
-  double along(bool vertical, double from, double to) const {
-    return std::max(0.0, std::min(to, vertical ? y1 : x1) - std::max(from, vertical ? y0 : x0));
-  }
-};
 
 /// Costs of a box cut at every place along one axis: [n] of what lies before tile n, and of what lies from it on.
 struct CutCosts {
@@ -196,99 +151,6 @@ std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size,
   const TileBox all{0, 0, TileSet::tilesAlong(size.width, kSharedTileSide),
                     TileSet::tilesAlong(size.height, kSharedTileSide)};
   return dealTiles(parts, size, {all}, ranks);
-}
-
-size_t partsARound(uint32_t ranks) {
-  return size_t{8} * ranks;
-}
-
-std::vector<uint32_t> dealParts(std::span<const PartCost> parts, uint32_t ranks) {
-  std::vector<uint32_t> preparers(parts.size());
-  using Load = std::pair<double, uint32_t>;  // and its rank
-  std::priority_queue<Load, std::vector<Load>, std::greater<>> least;
-  for (uint32_t rank = 0; rank < ranks; ++rank) least.push({0, rank});
-  std::vector<uint32_t> round;
-  for (size_t begin = 0; begin < parts.size(); begin += partsARound(ranks)) {
-    round.resize(std::min(partsARound(ranks), parts.size() - begin));
-    std::iota(round.begin(), round.end(), static_cast<uint32_t>(begin));
-    std::stable_sort(round.begin(), round.end(),
-                     [&](uint32_t a, uint32_t b) { return parts[a].prepare > parts[b].prepare; });
-    for (const uint32_t part : round) {
-      const Load load = least.top();
-      least.pop();
-      preparers[part] = load.second;
-      least.push({load.first + parts[part].prepare, load.second});
-    }
-  }
-  return preparers;
-}
-
-namespace {
-
-/// Adds what a part's splats cost the painters of its tiles, and those of the tiles beside them.
-void addPainting(const PartCost& cost, ImageSize size, const std::vector<uint32_t>& owners, uint32_t preparer,
-                 std::vector<RankWork>& work) {
-  const int columns = TileSet::tilesAlong(size.width, kSharedTileSide),
-            rows = TileSet::tilesAlong(size.height, kSharedTileSide);
-  const TilePart part = TilePart::of(cost, size);
-  if (!part.isSeen()) return;
-  const double reach = (cost.reach_px + TileSet::kMargin) / kSharedTileSide;  // in tiles
-  const double exchange = work.size() > 1 ? kExchangePerPrepare : 0;
-  const double paint = cost.paint / cost.splats + exchange;
-  const auto add = [&](uint32_t rank, double splats) {
-    work[rank].paint += paint * splats;
-    work[rank].splats += splats;
-    if (rank != preparer) work[rank].splats_received += splats;
-  };
-  for (int y = static_cast<int>(part.y0); y < part.y1; ++y)
-    for (int x = static_cast<int>(part.x0); x < part.x1; ++x) {
-      const uint32_t owner = owners[static_cast<size_t>(y * columns + x)];
-      const double splats = part.splats * part.along(false, x, x + 1) * part.along(true, y, y + 1);
-      add(owner, splats);
-      for (const auto& [dx, dy] : {std::pair(-1, 0), std::pair(1, 0), std::pair(0, -1), std::pair(0, 1)}) {
-        uint32_t last = owner;
-        for (int n = 1; n - 1 < reach; ++n) {
-          const int column = x + n * dx, row = y + n * dy;
-          if (column < 0 || column >= columns || row < 0 || row >= rows) break;
-          const uint32_t other = owners[static_cast<size_t>(row * columns + column)];
-          if (other != last) add(other, splats * std::min(1.0, reach - (n - 1)));
-          last = other;
-        }
-      }
-    }
-}
-
-}  // namespace
-
-SharedWork workOfRanks(std::span<const PartCost> parts, ImageSize size, uint32_t ranks) {
-  const std::vector<uint32_t> owners = dealTiles(parts, size, ranks), preparers = dealParts(parts, ranks);
-  const int columns = TileSet::tilesAlong(size.width, kSharedTileSide),
-            rows = TileSet::tilesAlong(size.height, kSharedTileSide);
-  SharedWork work{std::vector<RankWork>(ranks), 0};
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) {
-      RankWork& owner = work.ranks[owners[static_cast<size_t>(y * columns + x)]];
-      owner.paint += kTileCost;
-      owner.pixels += static_cast<uint64_t>(std::min(kSharedTileSide, size.width - x * kSharedTileSide)) *
-                      static_cast<uint64_t>(std::min(kSharedTileSide, size.height - y * kSharedTileSide));
-    }
-  std::vector<double> of_round(ranks);
-  for (size_t n = 0; n < parts.size(); ++n) {
-    RankWork& preparer = work.ranks[preparers[n]];
-    preparer.prepare += parts[n].prepare;
-    preparer.bytes += parts[n].bytes;
-    ++preparer.bricks;
-    of_round[preparers[n]] += parts[n].prepare;
-    if ((n + 1) % partsARound(ranks) == 0 || n + 1 == parts.size()) {
-      work.longest += *std::max_element(of_round.begin(), of_round.end());
-      std::fill(of_round.begin(), of_round.end(), 0);
-    }
-    addPainting(parts[n], size, owners, preparers[n], work.ranks);
-  }
-  double longest_paint = 0;
-  for (const RankWork& rank : work.ranks) longest_paint = std::max(longest_paint, rank.paint);
-  work.longest += longest_paint;
-  return work;
 }
 
 }  // namespace curvisplat

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/frame/frame_plan.h"
-#include "render/frame/tile_dealer.h"
+#include "render/frame/picture_shares.h"
 #include "render/project/screen_splat.h"
 #include "tools/throughput/text_table.h"
 

@@ -1,0 +1,51 @@
+// How ranks share a picture that they draw together: each tile has a rank that paints it (tile_dealer.h), and each part of the
+// cut one that prepares it and sends its splats to those that paint them (splat_exchange.h). What that takes each of them is
+// estimated by the same costs.
+//
+// A rank prepares as much as makes its preparing and painting together those of the others: who paints much prepares
+// little. Parts are dealt out in rounds of neighbours in the sweep's order, since what all wait for comes in that order. In a
+// round each rank gets its share, the largest parts first, and each part goes to the rank that paints most of its splats, if that
+// rank's share of the round is not full.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/frame/tile_dealer.h"
+#include "render/image/image_size.h"
+
+namespace curvisplat {
+
+struct PictureShares {
+  std::vector<uint32_t> owners;     // [shared tile] the rank that paints it
+  std::vector<uint32_t> preparers;  // [part] a rank
+};
+
+/// `parts` are in the sweep's order. The same for the same costs on any processor of one instruction set.
+PictureShares sharePicture(std::span<const PartCost> parts, ImageSize size, uint32_t ranks);
+/// How many parts, one after the other, are a round.
+size_t partsARound(uint32_t ranks);
+
+/// What one rank has to do.
+struct RankWork {
+  double prepare = 0;          // and send
+  double paint = 0;            // and receive
+  uint64_t bytes = 0;          // read from the cache
+  uint64_t bricks = 0;         // read
+  uint64_t pixels = 0;         // sent to rank 0
+  double splats = 0;           // painted
+  double splats_received = 0;  // of other ranks
+};
+
+struct SharedWork {
+  std::vector<RankWork> ranks;
+  /// Until the last rank is done, if all wait after each round until all have prepared theirs, and paint what they have got
+  /// while they wait, or afterwards.
+  double longest = 0;
+};
+
+/// Of a picture shared by sharePicture().
+SharedWork workOfRanks(std::span<const PartCost> parts, ImageSize size, uint32_t ranks);
+
+}  // namespace curvisplat
