@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Converts files of any format within one memory budget, and prints time and peak memory of each.
 
-    bench/format_memory.py grid.vts flow.cgns --scalar p --memory 144M
+    bench/format_memory.py grid.vts flow.cgns --scalar p --memory 160M
 
 Each file is converted by a process of its own into a temporary folder. Exit status 1 if any exceeds the budget.
 """
@@ -19,7 +19,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="+")
     parser.add_argument("--scalar", required=True)
-    parser.add_argument("--memory", default="144M", help="budget, a number with K, M or G")
+    parser.add_argument("--memory", default="160M", help="budget, a number with K, M or G")
     parser.add_argument("--program", default="build/release/tools/curvisplat")
     words = parser.parse_args()
     budget = int(words.memory[:-1]) * UNITS[words.memory[-1]]

@@ -23,7 +23,7 @@ import sys
 
 SCENES = {"wake": "96x64x48", "half-annulus": "120x60x40", "dome": "60x60x40", "spectral": "73x60x41",
           "globe": "90x45x20", "axis": "60x40x50", "o-grid": "200x100x40"}
-WAYS = {"all threads": [], "one thread": ["--threads", "1"], "144 MiB": ["--memory", "144M"]}
+WAYS = {"all threads": [], "one thread": ["--threads", "1"], "160 MiB": ["--memory", "160M"]}
 
 
 def run(*command):

@@ -18,9 +18,9 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// The program with its libraries, thread stacks and index records; and of the cap what the allocator holds
-// back.
-constexpr uint64_t kProgramBytes = 64 * kMiB;
+// The program, thread stacks and index records; and of the cap what the allocator holds back. Of these 80 MiB, 57 are pages of
+// libraries (RssFile of a conversion of NetCDF tiles); the rest has room for what HDF5 keeps of its files.
+constexpr uint64_t kProgramBytes = 80 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
 constexpr uint64_t kSeamShare = 8, kSlabShare = 8, kMeshShare = 2;  // of the rest
 // The fewest splats of a bucket: some bricks for each thread to work on.

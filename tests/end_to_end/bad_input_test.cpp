@@ -227,7 +227,7 @@ TEST_F(BadInput, InvalidOptionValues) {
   refused({"convert", file("scene.xyz"), "-o"}, "--output needs a value");
   expectOneLine(runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"),
                             "--memory", "1K"}),
-                1, {"--memory 1 KiB: conversion of 1 scalar takes at least 144 MiB"});
+                1, {"--memory 1 KiB: conversion of 1 scalar takes at least 160 MiB"});
   expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--memory", "1K"}), 2,
                 {"--memory 1 KiB: too little"});
 }

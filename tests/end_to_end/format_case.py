@@ -94,7 +94,7 @@ class FormatCase(unittest.TestCase):
         return refused / len(tried)
 
     def peak_memory(self, path, scalar, budget, *others):
-        """Peak memory in bytes of a conversion within `budget` ("144M"). `others`: further files of the grid."""
+        """Peak memory in bytes of a conversion within `budget` ("160M"). `others`: further files of the grid."""
         statistics = self.folder / "stats.json"
         result = self.run_program("convert", path, *others, "-o", self.folder / "m.splats", "--overwrite", "--scalar", scalar,
                                   "--memory", budget, "--stats", statistics)

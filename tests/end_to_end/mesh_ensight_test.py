@@ -237,6 +237,35 @@ class EnsightCases(MeshFormats):
                         expected = self.cache([self.folder / "expected.vts"], name)
                         self.assertEqual(found, expected, name)
 
+    def test_several_parts(self):
+        """Two parts of the cube are the cube: nodes that they share coincide."""
+        mesh = self.rounded(Mesh(kinds=(8,)))
+        half = len(mesh.cells) // 2
+        parts = [(4, mesh.cells[:half], mesh.c[:half]), (9, mesh.cells[half:], mesh.c[half:])]
+        for order in (None, "<"):
+            geometry, values = self.head(order, "off"), EnsightFile(order)
+            values.text("values")
+            for number, cells, c in parts:
+                geometry.text("part")
+                geometry.ints([number])
+                geometry.text(f"part {number}", "coordinates")
+                geometry.ints([len(mesh.points)])
+                geometry.floats(mesh.points.T)
+                geometry.text("hexa8")
+                geometry.ints([len(cells)])
+                geometry.ints(np.array(cells) + 1)
+                values.text("part")
+                values.ints([number])
+                values.text("hexa8")
+                values.floats(c)
+            (self.folder / "mesh.geo").write_bytes(geometry.data)
+            (self.folder / "c").write_bytes(values.data)
+            self.path.write_text("FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: mesh.geo\nVARIABLE\nscalar per element: c c\n")
+            info = self.info(self.path)
+            self.assertEqual(info["cells"]["count"], len(mesh.cells))
+            np.testing.assert_allclose([info["scalars"][0][end] for end in ("min", "max")], [mesh.c.min(), mesh.c.max()], rtol=1e-7)
+            self.assertAlmostEqual(self.volume([self.path], "c"), 1, delta=2e-3)
+
     def test_damage(self):
         mesh = self.rounded(Mesh(2))
         for order in (None, "<"):

@@ -58,6 +58,18 @@ class MeshFiles(MeshCase):
         for scalar in ("p", "c", "v:x"):
             self.assertAlmostEqual(self.volume(path, scalar), 1, delta=1e-3)
 
+    def test_polyhedra_of_vtk_9_4_are_refused(self):
+        """VTK 9.4 writes the arrays face_connectivity, face_offsets, polyhedron_to_faces and polyhedron_offsets."""
+        path = self.folder / "mesh.vtu"
+        write_xml(cube(8), path, mode="Ascii")
+        text = path.read_text().replace('Name="faces"', 'Name="polyhedron_to_faces"').replace('Name="faceoffsets"', 'Name="polyhedron_offsets"')
+        self.assertIn("polyhedron_to_faces", text)
+        path.write_text(text)
+        result = self.run_program("info", path)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("polyhedra as VTK 9.4 writes them, which are not read; write them with an earlier version", result.stderr)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+
     def test_prisms_over_polygons(self):
         for sides, kind in ((5, vtk.VTK_PENTAGONAL_PRISM), (6, vtk.VTK_HEXAGONAL_PRISM)):
             angle = 2 * np.pi * np.arange(sides) / sides

@@ -372,6 +372,118 @@ class ModelFiles(ModelFileTest):
             f.add("t", "lev lat lon", np.ones((3, 8, 12)))
         self.assertIn("lev has no unit; expected a length or a pressure: set it (ncatted -a units,lev,o,c,m FILE)", self.info(fails=True))
 
+    def test_integers_without_a_sign(self):
+        """The classic format has none: `_Unsigned` says so. netCDF4 reads the same numbers."""
+        stored = RANDOM.integers(0, 251, (6, 8, 12)).astype("u1")
+        stored[0, 0, :3], stored[0, 1, 0], stored[0, 1, 1] = 255, 250, 0
+        for kind, signed, unsigned in (("i1", "i1", "u1"), ("i2", "i2", "u2"), ("u1", "i1", "false")):
+            form = "NETCDF4" if kind == "u1" else "NETCDF3_CLASSIC"
+            raw = stored.astype("u2") * 257 if kind == "i2" else stored
+            top = 255 * 257 if kind == "i2" else 255
+            with File(self.folder / "file.nc", {"lev": 6, "lat": 8, "lon": 12}, format=form) as f:
+                lon, lat = self.air(f)
+                depth = np.arange(6.0)
+                f.add("lev", "lev", depth, units="km", positive="up")
+                whole = {"_Unsigned": "false"} if unsigned == "false" else {
+                    "_Unsigned": "true", "valid_range": np.array([1, top - 1], unsigned).view(signed)}
+                fill = np.array(top, "u2" if kind == "i2" else "u1").view(kind)
+                f.add("q", "lev lat lon", raw.view(kind), kind, fill, scale_factor=0.5, add_offset=1.0, **whole)
+            with netCDF4.Dataset(self.folder / "file.nc") as f:
+                read = np.ma.filled(f["q"][:].astype("f8"), np.nan)
+            if unsigned == "false":
+                values = np.where(stored == 255, np.nan, 0.5 * stored.view("i1") + 1)
+            else:
+                values = np.where((raw == top) | (raw == 0), np.nan, 0.5 * raw + 1)
+                np.testing.assert_array_equal(read, values)
+            self.expect(self.info(), sphere(lon, lat, depth[:, None, None]), values)
+
+    def test_a_field_called_z(self):
+        """Data, where the levels have a unit of their own; heights, where they have none."""
+        for units in ("km", None):
+            with self.file(lev=3, lat=8, lon=12) as f:
+                lon, lat = self.air(f)
+                if units:
+                    f.add("lev", "lev", [1.0, 2, 4], units=units, positive="up")
+                t = RANDOM.random((3, 8, 12)).astype("f4")
+                f.add("t", "lev lat lon", t, "f4")
+                z = 1000 * np.array([1.0, 3, 4])[:, None, None] * np.ones((3, 8, 12))
+                f.add("z", "lev lat lon", z)
+            info = self.info()
+            height = np.array([1.0, 2 if units else 3, 4])[:, None, None]
+            self.assertIn("vertical lev" if units else "vertical z", info["format"])
+            self.expect(info, sphere(lon, lat, height), t.astype("f8"), scalar=[s["name"] for s in info["scalars"]].index("t"))
+
+    def test_lead_times_of_a_forecast(self):
+        """As cfgrib and xarray write them: steps in hours since a start, which is a time of its own."""
+        t = RANDOM.random((1, 3, 4, 8, 12)).astype("f4")
+        for dimensions, name in (("time step lev lat lon", "step"), ("step lev lat lon", "step"), ("time fc lev lat lon", "fc")):
+            with self.file(time=1, **{name: 3}, lev=4, lat=8, lon=12) as f:
+                lon, lat = self.air(f)
+                f.add("lev", "lev", np.arange(4.0), units="km", positive="up")
+                f.add("time", "time", [6.0], units="hours since 2020-01-01", standard_name="time")
+                f.add(name, name, [0.0, 6, 12], units="hours", **({} if name == "step" else {"standard_name": "forecast_period"}))
+                f.add("t", dimensions, t if dimensions.startswith("time") else t[0], "f4")
+            for step in range(3):
+                info = self.info("file.nc", "--time-step", str(step))
+                self.assertEqual(info["times"], [0, 6, 12])
+                self.expect(info, sphere(lon, lat, np.arange(4.0)[:, None, None]), t[0, step].astype("f8"))
+
+    def test_storages(self):
+        """Every format of netCDF4, types that only some have, and HDF5's checksums and byte orders."""
+        whole = RANDOM.integers(-10**12, 10**12, (3, 8, 12))
+        small = RANDOM.integers(0, 60000, (3, 8, 12))
+        for form, kind, values, options in (
+                ("NETCDF3_CLASSIC", "i4", small, {}), ("NETCDF3_64BIT_OFFSET", "f8", small / 7, {}), ("NETCDF3_64BIT_DATA", "i8", whole, {}),
+                ("NETCDF3_64BIT_DATA", "u2", small, {}), ("NETCDF4_CLASSIC", "f4", small, {}), ("NETCDF4", "i8", whole, {"endian": "big"}),
+                ("NETCDF4", "f4", small, {"endian": "big", "fletcher32": True, "shuffle": True, "zlib": True, "chunksizes": (2, 5, 7)})):
+            with File(self.folder / "file.nc", {"lev": 3, "lat": 8, "lon": 12}, format=form) as f:
+                lon, lat = self.air(f)
+                f.add("lev", "lev", [1.0, 2, 4], units="km", positive="up")
+                f.createVariable("q", kind, ("lev", "lat", "lon"), **options)[:] = values
+            with self.subTest(form=form, kind=kind):
+                self.expect(self.info(), sphere(lon, lat, np.array([1.0, 2, 4])[:, None, None]), values.astype("f8"))
+
+    def test_variables_of_other_types(self):
+        """Enumerations, lists, records and strings do not stop the others."""
+        with self.file(lev=3, lat=8, lon=12) as f:
+            lon, lat = self.air(f)
+            f.add("lev", "lev", [1.0, 2, 4], units="km", positive="up")
+            on = ("lev", "lat", "lon")
+            f.createVariable("a", f.createEnumType("u1", "kind", {"sea": 0, "ice": 1}), on)[:] = np.zeros((3, 8, 12), "u1")
+            f.createVariable("b", f.createVLType("f4", "ragged"), on)
+            f.createVariable("c", f.createCompoundType(np.dtype([("r", "f4"), ("i", "f4")]), "complex"), on)
+            f.createVariable("d", str, on)
+            f.createVariable("e", "S1", on)
+            t = RANDOM.random((3, 8, 12)).astype("f4")
+            f.add("t", "lev lat lon", t, "f4")
+        info = self.info()
+        self.assertEqual([s["name"] for s in info["scalars"]], ["t"])
+        self.expect(info, sphere(lon, lat, np.array([1.0, 2, 4])[:, None, None]), t.astype("f8"))
+
+    def test_a_file_without_a_record(self):
+        with self.file(time=None, lev=3, lat=8, lon=12) as f:
+            self.air(f)
+            f.add("lev", "lev", [1.0, 2, 4], units="km", positive="up")
+            f.createVariable("time", "f8", ("time",)).units = "days since 2000-01-01"
+            f.createVariable("t", "f4", ("time", "lev", "lat", "lon"))
+        self.assertIn("has no time step: dimension time has length 0", self.info(fails=True))
+
+    def test_filters_that_are_not_installed(self):
+        try:
+            import h5py
+        except ModuleNotFoundError:
+            self.skipTest("no h5py")
+        with self.file(lev=3, lat=8, lon=12) as f:
+            self.air(f)
+            f.add("lev", "lev", [1.0, 2, 4], units="km", positive="up")
+        with h5py.File(self.folder / "file.nc", "a") as f:
+            t = f.create_dataset("t", data=np.ones((3, 8, 12)), chunks=(3, 8, 12), compression="lzf")
+            for n, name in enumerate(("lev", "lat", "lon")):
+                t.dims[n].attach_scale(f[name])
+        line = self.info(fails=True)
+        self.assertIn("t is compressed by a filter that HDF5 lacks here", line)
+        self.assertEqual(line.count("\n"), 1, line)
+
     def test_a_grid_without_a_node(self):
         with self.file(lev=3, lat=8, lon=12) as f:
             self.air(f)

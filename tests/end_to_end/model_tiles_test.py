@@ -11,7 +11,7 @@ import subprocess
 import unittest
 
 from model_faces_test import CUBE, SHELL, degrees, on_face
-from model_files import PROGRAM, RANDOM, ModelFileTest, np
+from model_files import PROGRAM, RANDOM, File, ModelFileTest, np
 
 N = 12
 LEVELS = np.array([0.0, 200, 500])  # kilometres: those of model_faces_test.py's shell
@@ -158,21 +158,62 @@ class ModelTiles(ModelFileTest):
         self.assertEqual([(b["ni"], b["nj"], b["nk"]) for b in info["blocks"]], 6 * [(N + 1, N + 1, 3)])
         self.assertAlmostEqual(sum(abs(b["volume"]) for b in info["blocks"]) / SHELL, 1, delta=0.01)
 
+    def write_names(self, file, **variables):
+        """Text as FRE's tools write it (characters), or as xarray does (strings)."""
+        for form in ("NETCDF3_CLASSIC", "NETCDF4"):
+            with File(self.folder / file, {"string": 255}, format=form) as f:
+                for variable, names in variables.items():
+                    dimensions = ()
+                    if isinstance(names, list):
+                        dimensions = ("ntiles",)
+                        f.createDimension("ntiles", len(names))
+                    if form == "NETCDF4":
+                        f.createVariable(variable, str, dimensions)[...] = np.array(names, object)
+                        continue
+                    padded = np.zeros((np.size(names), 255), "S1")
+                    for n, name in enumerate(np.atleast_1d(names)):
+                        padded[n, : len(name)] = list(name)
+                    f.createVariable(variable, "S1", (*dimensions, "string"))[:] = padded if dimensions else padded[0]
+            yield form
+
     def test_a_mosaic_names_its_grid_files(self):
         names, grids = self.write(kinds=()), self.write_supergrids()
-        with self.file("C12_mosaic.nc", ntiles=6, string=255) as f:
-            words = np.zeros((6, 255), "S1")
-            for n, grid in enumerate(grids):
-                words[n, : len(grid)] = list(grid)
-            f.createVariable("gridfiles", "S1", ("ntiles", "string"))[:] = words
-        self.expect_closed(self.info(*names, "C12_mosaic.nc"))
-        self.expect_closed(self.info(*names, "C12_mosaic.nc", *grids[:2]))
+        for _ in self.write_names("C12_mosaic.nc", gridfiles=grids):
+            self.expect_closed(self.info(*names, "C12_mosaic.nc"))
+            self.expect_closed(self.info(*names, "C12_mosaic.nc", *grids[:2]))
+            one = self.info(names[2], "C12_mosaic.nc")
+            self.assertEqual([(b["ni"], b["nj"], b["nk"]) for b in one["blocks"]], [(N, N, 3)])
+            self.assertTrue(one["files"][2].endswith(grids[2]), one["files"])
         (self.folder / grids[4]).unlink()
         line = self.info(*names, "C12_mosaic.nc", fails=True)
         self.assertIn("C12_mosaic.nc: names the grid file C12_grid.tile5.nc, which is not beside it", line)
         self.assertEqual(line.count("\n"), 1, line)
 
-    def test_a_supergrid_of_a_single_tile(self):
+    def test_a_coupled_model_names_its_mosaics(self):
+        """Of the atmosphere's six tiles and the ocean's single one, the data's own are read."""
+        names, grids = self.write(kinds=()), self.write_supergrids()
+        ocean, hgrid, _, _ = self.write_ocean()
+        list(self.write_names("C12_mosaic.nc", gridfiles=grids))
+        list(self.write_names("ocean_mosaic.nc", gridfiles=[hgrid]))
+        components = {"atm_mosaic_file": "C12_mosaic.nc", "lnd_mosaic_file": "C12_mosaic.nc", "ocn_mosaic_file": "ocean_mosaic.nc"}
+        expected, expected_ocean = self.convert([*names, *grids])[0], self.info(ocean, hgrid)
+        for form in self.write_names("grid_spec.nc", **components):
+            self.expect_closed(self.info(*names, "grid_spec.nc"))
+            self.assertEqual(self.info(ocean, "grid_spec.nc")["bounds"], expected_ocean["bounds"], form)
+        self.assertEqual(self.convert([*names, "grid_spec.nc"])[0], expected)
+        (self.folder / "ocean_mosaic.nc").unlink()
+        self.expect_closed(self.info(*names, "grid_spec.nc"))
+        line = self.info(ocean, "grid_spec.nc", fails=True)
+        self.assertIn("grid_spec.nc: names the mosaics C12_mosaic.nc, ocean_mosaic.nc; none of them with a grid of one tile is beside it", line)
+        self.assertEqual(line.count("\n"), 1, line)
+        list(self.write_names("ocean_mosaic.nc", gridfiles=[hgrid]))
+        list(self.write_names("land_mosaic.nc", gridfiles=["land_hgrid.nc"]))
+        list(self.write_names("grid_spec.nc", **{**components, "lnd_mosaic_file": "land_mosaic.nc"}))
+        line = self.info(ocean, "grid_spec.nc", fails=True)
+        self.assertIn("grid_spec.nc: names several grids (ocean_hgrid.nc, land_hgrid.nc)", line)
+        self.assertEqual(line.count("\n"), 1, line)
+
+    def write_ocean(self):
         """MOM6: nominal longitudes and latitudes of one dimension in the file, the true ones in ocean_hgrid.nc."""
         ni, nj = 10, 8
         x, y = np.meshgrid(np.arange(2 * ni + 1) / 2, np.arange(2 * nj + 1) / 2 + 20)
@@ -185,7 +226,11 @@ class ModelTiles(ModelFileTest):
         with self.file("ocean_hgrid.nc", nyp=2 * nj + 1, nxp=2 * ni + 1) as f:
             f.add("x", "nyp nxp", x, units="degrees")
             f.add("y", "nyp nxp", y, units="degrees")
-        nominal, true = self.info("ocean.nc"), self.info("ocean.nc", "ocean_hgrid.nc")
+        return "ocean.nc", "ocean_hgrid.nc", x, y
+
+    def test_a_supergrid_of_a_single_tile(self):
+        ocean, hgrid, x, y = self.write_ocean()
+        nominal, true = self.info(ocean), self.info(ocean, hgrid)
         self.assertIn("xh, yh", nominal["format"])
         east, north = np.radians(x[1::2, 1::2]), np.radians(y[1::2, 1::2])
         places = np.stack([np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], -1)
@@ -247,17 +292,45 @@ class ModelTiles(ModelFileTest):
         # Five tiles leave the place of the sixth open.
         self.assertIn("5 faces joined at 8 edges and 4 corners", self.info(*names[:5])["format"])
 
-    def test_damage(self):
-        names = self.write()
-        path = self.folder / names[2]
+    def expect_no_crash(self, name, files):
+        """Truncations and wrong bytes of the file, by `info` of all files: a line or numbers. Returns how many were refused."""
+        path = self.folder / name
         data = path.read_bytes()
-        for n in range(12):
-            damaged = bytearray(data[: len(data) * (n + 1) // 12] if n < 6 else data)
-            for at in RANDOM.integers(0, len(damaged), 3 if n >= 6 else 0):
+        refused = 0
+        for n in range(20):
+            damaged = bytearray(data[: len(data) * (n + 1) // 11] if n < 10 else data)
+            for at in RANDOM.integers(0, min(len(damaged), 8192), 3 if n >= 10 else 0):
                 damaged[at] ^= int(RANDOM.integers(1, 256))
             path.write_bytes(bytes(damaged))
-            done = subprocess.run([PROGRAM, "info", *(str(self.folder / name) for name in names)], capture_output=True, text=True, errors="replace")
+            done = subprocess.run([PROGRAM, "info", *(str(self.folder / name) for name in files)], capture_output=True, text=True, errors="replace")
             self.assertIn(done.returncode, (0, 1), done.stderr)
+            if done.returncode:
+                self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+                refused += 1
+        path.write_bytes(data)
+        return refused
+
+    def test_damage(self):
+        names = self.write()
+        self.expect_no_crash(names[2], names)
+
+    def test_damaged_supergrids_and_mosaics(self):
+        """Truncated files are refused. Their names lead to no file elsewhere."""
+        ocean, hgrid, x, y = self.write_ocean()
+        for form in self.write_names("ocean_mosaic.nc", gridfiles=[hgrid]):
+            self.assertGreaterEqual(self.expect_no_crash("ocean_mosaic.nc", [ocean, "ocean_mosaic.nc"]), 8, form)
+            with File(self.folder / hgrid, {"nyp": x.shape[0], "nxp": x.shape[1]}, format=form) as f:
+                f.add("x", "nyp nxp", x, units="degrees")
+                f.add("y", "nyp nxp", y, units="degrees")
+            self.assertGreaterEqual(self.expect_no_crash(hgrid, [ocean, hgrid]), 8, form)
+        for form in self.write_names("grid_spec.nc", ocn_mosaic_file="ocean_mosaic.nc"):
+            self.assertGreaterEqual(self.expect_no_crash("grid_spec.nc", [ocean, "grid_spec.nc"]), 8, form)
+        for wrong in ("../ocean_hgrid.nc", "/etc/passwd", ".", "", "ocean.nc/", "x" * 200, "a\x01b"):
+            list(self.write_names("ocean_mosaic.nc", gridfiles=[wrong]))
+            done = subprocess.run([PROGRAM, "info", str(self.folder / ocean), str(self.folder / "ocean_mosaic.nc")],
+                                  capture_output=True, text=True, errors="replace")
+            self.assertIn(done.returncode, (0, 1), wrong)
+            self.assertNotIn("root", done.stdout + done.stderr)
             if done.returncode:
                 self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
 

@@ -13,8 +13,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
+from cgns_layout import CgnsLayout
 from sweep import some_of
 
 try:
@@ -120,13 +122,42 @@ class SeveralFiles(unittest.TestCase):
         self.assertEqual(info["bounds"]["upper"][0], np.float32(2 * (NI - 1) + 0.1 * (NJ - 1)))
         self.assertIn("left out: r", " ".join(info["warnings"]))
 
+    def write_cgns(self, name, shift, **solutions):
+        """Coordinates as write_vts has them, by h5py. `solutions`: of nodes."""
+        k, j, i = np.meshgrid(np.arange(NK), np.arange(NJ), np.arange(NI), indexing="ij")
+        block = types.SimpleNamespace(shape=(NK, NJ, NI), places=np.stack([i + shift + 0.1 * j, j, k]).astype("f4"))
+        file = CgnsLayout(self.folder / name)
+        base = file.node(file.file, "Base", "CGNSBase_t", np.array([3, 3], "i4"))
+        zone = file.block(base, name.split(".")[0], block)
+        for field, values in solutions.items():
+            solution = file.node(zone, f"of {field}", "FlowSolution_t")
+            file.node(solution, "GridLocation", "GridLocation_t", "Vertex")
+            file.node(solution, field, "DataArray_t", values)
+        file.file.close()
+
+    def test_fields_and_blocks_of_cgns(self):
+        p, q = self.fields(2)
+        self.write_cgns("left.cgns", 0, p=p)
+        self.write_cgns("fields.cgns", 0, q=q)
+        info = self.info("left.cgns", "fields.cgns")
+        self.assertEqual((len(info["blocks"]), len(info["files"])), (1, 2))
+        for name, values in (("p", p), ("q", q)):
+            np.testing.assert_allclose(self.range_of(info, name), [values.min(), values.max()], rtol=1e-6)
+        self.write_cgns("right.cgns", NI - 1, p=q)
+        info = self.info("left.cgns", "right.cgns")
+        self.assertEqual([(b["ni"], b["nj"], b["nk"]) for b in info["blocks"]], 2 * [(NI, NJ, NK)])
+        both = np.stack([p, q])
+        np.testing.assert_allclose(self.range_of(info, "p"), [both.min(), both.max()], rtol=1e-6)
+        self.assertEqual(info["bounds"]["upper"][0], np.float32(2 * (NI - 1) + 0.1 * (NJ - 1)))
+
     def files(self):
         write_netcdf(self.folder / "three.nc", "NETCDF3_CLASSIC")
         write_netcdf(self.folder / "four.nc", "NETCDF4")
         write_vts(self.folder / "grid.vts", 0, p=self.fields(1)[0])
         x = np.stack(np.meshgrid(np.arange(5.0), np.arange(4.0), np.arange(3.0))).astype("f4")
         (self.folder / "grid.xyz").write_bytes(np.array(x.shape[:0:-1], "i4").tobytes() + x.tobytes())
-        return ["three.nc", "four.nc", "grid.vts", "grid.xyz"]
+        self.write_cgns("grid.cgns", 0, p=self.fields(1)[0])
+        return ["three.nc", "four.nc", "grid.vts", "grid.xyz", "grid.cgns"]
 
     def test_compressed_files_are_those_files(self):
         for name in self.files():

@@ -61,6 +61,19 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("a.xml", "an XML file");
   write("a.grib", "GRIB\0\0\0\2"s);
   expectNamed("a.grib", "a GRIB file");
+  write("a.mat", "MATLAB 5.0 MAT-file Platform: posix" + std::string(128, '\0'));
+  expectNamed("a.mat", "a MATLAB file, which is not read");
+  write("b.mat", "MATLAB 7.3 MAT-file, Platform: GLNXA64" + std::string(512, '\0'));
+  expectNamed("b.mat", "a MATLAB file (HDF5), whose arrays an XDMF file has to describe");
+  write("a.npy", "\x93NUMPY\1\0v\0{'descr': '<f4', 'fortran_order': False, 'shape': (6, 5, 7), }"s +
+                     std::string(900, '\0'));
+  expectNamed("a.npy", "a NumPy array without a grid");
+  write("a.msh", "$MeshFormat\n4.1 1 8\n\1\0\0\0\n$EndMeshFormat\n"s);
+  expectNamed("a.msh", "a Gmsh mesh");
+  write("a.inp", "*HEADING\nAbaqus\n*NODE\n1, 0, 0, 0\n");
+  expectNamed("a.inp", "an Abaqus mesh");
+  write("a.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n8\n");
+  expectNamed("a.mesh", "a Medit mesh");
 }
 
 TEST_F(ForeignFormats, TextsOfNumbersAreStillTriedAsPlot3d) {
@@ -121,6 +134,9 @@ TEST_F(ForeignFormats, PlainHdf5IsNamed) {
   }
   expectNamed("plain.h5",
               "an HDF5 file, but neither NetCDF-4 nor CGNS; describe its arrays in an XDMF file (.xmf)");
+  Hdf5Editor(file).group("/VTKHDF");
+  Hdf5Editor(file).group("/VTKHDF/PointData");
+  expectNamed("plain.h5", "a VTKHDF file (save it as .vts, .vti or .vtu)");
 }
 
 }  // namespace

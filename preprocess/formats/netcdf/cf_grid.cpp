@@ -31,6 +31,17 @@ bool isTime(const NetcdfFiles& file, size_t dim, size_t rank) {
   return dimension.unlimited && rank > 3;
 }
 
+/// Lead times of a forecast: hours since its start.
+bool isLeadTime(const NetcdfFiles& file, size_t dim) {
+  static const std::set<std::string> names{"step",         "lead", "lead_time", "leadtime", "forecast_period",
+                                           "forecast_hour"};
+  static const std::set<std::string> units{"hours", "hour", "h", "days", "day", "minutes", "seconds", "s"};
+  const NetcdfVariable* const coordinate = file.find(file.dimensions()[dim].name);
+  return coordinate && coordinate->numeric && units.contains(lowerCase(coordinate->text("units"))) &&
+         (coordinate->text("standard_name") == "forecast_period" ||
+          names.contains(lowerCase(coordinate->name)));
+}
+
 /// Whether a dimension numbers the faces of a grid: by its name, if longitude (or x) differs between them.
 bool numbersFaces(const NetcdfFiles& file, size_t dim) {
   static const std::set<std::string> names{"nf",   "face",  "faces", "nface", "nfaces",
@@ -57,6 +68,15 @@ std::optional<CfDimensions> dimensionsOf(const NetcdfFiles& file, const NetcdfVa
     else
       space.push_back(dim);
   }
+  // The start of a single forecast is no series of times.
+  if (!dims.time || file.dimensions()[*dims.time].length == 1)
+    if (const auto lead =
+            std::find_if(space.begin(), space.end(), [&](size_t dim) { return isLeadTime(file, dim); });
+        lead != space.end()) {
+      const std::optional<size_t> start = std::exchange(dims.time, *lead);
+      space.erase(lead);
+      if (start) space.insert(space.begin(), *start);
+    }
   // If there are more than three, dimensions of length 1 are dropped.
   for (size_t n = 0; space.size() > 3 && n < space.size();) {
     if (file.dimensions()[space[n]].length == 1)

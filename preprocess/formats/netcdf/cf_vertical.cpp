@@ -66,7 +66,13 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
   for (std::string name; names >> name;)
     if (const NetcdfVariable* const named = file.find(name)) candidates.push_back(named);
   if (along) candidates.push_back(along);
-  for (const NetcdfVariable& other : file.variables()) candidates.push_back(&other);
+  // Where the levels have a unit, a field without one is data, even if its name is z.
+  const bool levels_known = along && (kilometresOf(along->text("units")) || pascalsOf(along->text("units")));
+  for (const NetcdfVariable& other : file.variables())
+    if (!levels_known || other.dims.size() < 3 || !other.text("units").empty() ||
+        !other.text("standard_name").empty() || !other.text("positive").empty() ||
+        !other.text("axis").empty())
+      candidates.push_back(&other);
 
   // Lengths before pressures, whose heights are the standard atmosphere's.
   for (const bool pressure : {false, true}) {

@@ -41,6 +41,9 @@ std::optional<std::string> foreignNetcdf(const NetcdfFiles& file) {
     return mentions(file, {"source", "title"}, "ICON") ? "an unstructured grid (ICON)"
                                                        : "an unstructured grid";
   if (hasDimensions(file, {"nCells", "nVertices"})) return "an unstructured mesh (MPAS)";
+  const std::vector<std::string>& groups = file.groups();
+  if (file.plainHdf5() && std::find(groups.begin(), groups.end(), "VTKHDF") != groups.end())
+    return "a VTKHDF file (save it as .vts, .vti or .vtu)";
   if (file.plainHdf5()) return "an HDF5 file, but neither NetCDF-4 nor CGNS";
   return std::nullopt;
 }

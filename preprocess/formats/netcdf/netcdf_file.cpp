@@ -30,6 +30,7 @@ constexpr float kChunkCachePreemption = 0.75f;
 // Limit for attributes: they hold descriptions, not data.
 constexpr size_t kMaxAttributeValues = size_t{1} << 20;
 constexpr double kMaxTextBytes = 1 << 24;
+constexpr double kMaxStrings = 1 << 16;
 // Deflate shrinks zeros to about a thousandth.
 constexpr double kMaxCompression = 1100;
 constexpr const char* kNetcdf4 = "NetCDF-4";
@@ -179,6 +180,12 @@ int NetcdfFile::opened() const {
 }
 
 void NetcdfFile::fail(const std::string& place, int status) const {
+  if (status == NC_ENOFILTER)
+    throw Error(
+        "{}: {} is compressed by a filter that HDF5 lacks here (LZF of h5py, Blosc, ...); write it with "
+        "deflate, "
+        "where the filter is installed (h5repack -f GZIP=1)",
+        path_.string(), place);
   throw Error("{}: {} cannot be read as NetCDF: {}; if the file is damaged, copy or write it again",
               path_.string(), place, nc_strerror(status));
 }
@@ -248,7 +255,8 @@ void NetcdfFile::readVariable(int id) {
   readAttributes(id, attributes, variable);
   packings_.push_back(packingOf(variable));
   if (numbersOf(variable, "_FillValue").empty())
-    if (const auto fill = defaultFill(type)) packings_.back().missing.push_back(*fill);
+    if (const auto fill = defaultFill(type))
+      packings_.back().missing.push_back(wrapped(packings_.back(), *fill));
   variables_.push_back(std::move(variable));
 }
 
@@ -302,10 +310,29 @@ NetcdfFile::Packing NetcdfFile::packingOf(const NetcdfVariable& variable) const 
   };
   packing.scale = first("scale_factor", 1);
   packing.offset = first("add_offset", 0);
+  setWrap(variable, packing);
   for (const char* attribute : {"_FillValue", "missing_value"})
-    for (const double value : numbersOf(variable, attribute)) packing.missing.push_back(value);
+    for (const double value : numbersOf(variable, attribute))
+      packing.missing.push_back(wrapped(packing, value));
   addRange(variable, packing);
   return packing;
+}
+
+/// Source: NetCDF User's Guide, appendix A, _Unsigned.
+void NetcdfFile::setWrap(const NetcdfVariable& variable, Packing& packing) {
+  if (bytesOf(variable.type) == 0 || isReal(variable.type)) return;
+  const std::string word = variable.text("_Unsigned");
+  const bool has_sign = variable.type == NC_BYTE || variable.type == NC_SHORT || variable.type == NC_INT ||
+                        variable.type == NC_INT64;
+  if (!(has_sign ? word == "true" || word == "True" : word == "false" || word == "False")) return;
+  const double all = std::ldexp(1.0, static_cast<int>(8 * bytesOf(variable.type)));
+  packing.wraps_at = has_sign ? 0 : all / 2;
+  packing.wraps_by = has_sign ? all : -all;
+}
+
+double NetcdfFile::wrapped(const Packing& packing, double value) {
+  if (packing.wraps_by == 0) return value;
+  return (value < packing.wraps_at) == (packing.wraps_by > 0) ? value + packing.wraps_by : value;
 }
 
 /// By NetCDF's conventions a valid range is in stored units, unless it has the type of scale_factor and
@@ -332,7 +359,7 @@ void NetcdfFile::addRange(const NetcdfVariable& variable, Packing& packing) {
     if (convert && !(std::isfinite(packing.scale) && packing.scale != 0 && std::isfinite(packing.offset)))
       return;
     const bool stored_upper = upper != (convert && packing.scale < 0);
-    const double stored = convert ? (value - packing.offset) / packing.scale : value;
+    const double stored = convert ? (value - packing.offset) / packing.scale : wrapped(packing, value);
     if (stored_upper)
       packing.most = stored + (convert ? half_step : 0);
     else
@@ -363,6 +390,8 @@ std::string NetcdfFile::missingValues(const NetcdfVariable& variable) const {
 template <typename Value>
 void NetcdfFile::unpack(const Packing& packing, std::span<Value> values) {
   constexpr Value kNone = std::numeric_limits<Value>::quiet_NaN();
+  if (packing.wraps_by != 0)
+    for (Value& value : values) value = static_cast<Value>(wrapped(packing, static_cast<double>(value)));
   for (const double missing : packing.missing) {
     const auto wanted = static_cast<Value>(missing);
     for (Value& value : values)
@@ -455,6 +484,36 @@ std::string NetcdfFile::readText(const NetcdfVariable& variable) const {
   const int status = nc_get_vara_text(opened(), variable.id, start.data(), count.data(), text.data());
   if (status != NC_NOERR) fail(variable.name, status);
   return text;
+}
+
+std::vector<std::string> NetcdfFile::readStrings(const NetcdfVariable& variable) const {
+  const std::vector<size_t>& dims = variables_.at(variable.position).dims;
+  NetcdfBox all{std::vector<size_t>(dims.size(), 0), {}};
+  double strings = 1;
+  for (size_t n = 0; n < dims.size(); ++n) {
+    all.count.push_back(dimensions_.at(dims[n]).length);
+    if (variable.type == NC_STRING || n + 1 < dims.size()) strings *= static_cast<double>(all.count[n]);
+  }
+  std::vector<std::string> found;
+  if (strings > kMaxStrings) return found;
+  if (variable.type == NC_STRING) {
+    std::vector<char*> stored(static_cast<size_t>(strings), nullptr);
+    const QuietHdf5 quiet;
+    const int status =
+        nc_get_vara_string(opened(), variable.id, all.start.data(), all.count.data(), stored.data());
+    if (status != NC_NOERR) fail(variable.name, status);
+    for (const char* string : stored) found.emplace_back(string ? string : "");
+    nc_free_string(stored.size(), stored.data());
+    return found;
+  }
+  const std::string text = readText(variable);
+  const size_t length = all.count.empty() ? text.size() : all.count.back();
+  for (size_t at = 0; length > 0 && at + length <= text.size(); at += length) {
+    std::string& string = found.emplace_back(text.substr(at, length));
+    string.resize(std::min(string.size(), string.find('\0')));
+    string.erase(string.find_last_not_of(' ') + 1);
+  }
+  return found;
 }
 
 void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const {

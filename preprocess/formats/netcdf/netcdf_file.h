@@ -93,13 +93,18 @@ class NetcdfFile {
 
   /// The characters of a variable of text (NC_CHAR); empty if it is not one or has more than 16 MiB.
   std::string readText(const NetcdfVariable& variable) const;
+  /// The strings of a variable: NC_STRING, or NC_CHAR, whose last dimension counts characters (zeros and spaces at the end are left
+  /// out). Empty if it is neither, or has more than 65,536 strings.
+  std::vector<std::string> readStrings(const NetcdfVariable& variable) const;
 
  private:
   /// How stored numbers are converted to values.
   struct Packing {
     double scale = 1, offset = 0;
-    std::vector<double> missing;
-    std::optional<double> least, most;  // as stored
+    /// Integers from this one on stand for others (`_Unsigned`): the classic format has none without a sign.
+    double wraps_at = 0, wraps_by = 0;
+    std::vector<double> missing;        // as stored, wrapped
+    std::optional<double> least, most;  // as stored, wrapped
     std::string range;                  // the same in words
   };
 
@@ -111,6 +116,8 @@ class NetcdfFile {
   void readVariable(int id);
   void readAttributes(int id, int count, NetcdfVariable& variable) const;
   static void addRange(const NetcdfVariable& variable, Packing& packing);
+  static void setWrap(const NetcdfVariable& variable, Packing& packing);
+  static double wrapped(const Packing& packing, double value);
   void checkSizes(uint64_t file_bytes) const;
   Packing packingOf(const NetcdfVariable& variable) const;
   template <typename Value>

@@ -1,14 +1,20 @@
 #include "preprocess/formats/netcdf/supergrid.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <set>
 #include <string>
 #include <string_view>
 
+#include "preprocess/formats/netcdf/tile_number.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {
+
+using std::filesystem::path;
 
 /// By its units, else by its name: MOM6's are "degrees".
 bool hasRole(const NetcdfFiles& file, const NetcdfVariable& variable, CfRole role) {
@@ -20,26 +26,72 @@ bool hasRole(const NetcdfFiles& file, const NetcdfVariable& variable, CfRole rol
          lowerCase(variable.name) == (role == CfRole::kLongitude ? "x" : "y");
 }
 
-/// The names in a mosaic's `gridfiles`: one for each of its first dimension.
-std::vector<std::string> gridsOf(const std::filesystem::path& path) {
-  const NetcdfFile file(path);
-  const NetcdfVariable* const names = file.find("gridfiles");
-  if (!names || names->dims.size() != 2) return {};
-  const std::string text = file.readText(*names);
-  const uint64_t length = file.dimension(*names, 1).length;
-  std::vector<std::string> grids;
-  for (uint64_t at = 0; length > 0 && at + length <= text.size(); at += length) {
-    std::string name = text.substr(at, length);
-    name.resize(std::min(name.size(), name.find('\0')));
-    name.erase(name.find_last_not_of(' ') + 1);
-    if (!name.empty()) grids.push_back(std::move(name));
-  }
-  return grids;
+/// The strings of a variable that are not empty; none if there is no such variable.
+std::vector<std::string> namesIn(const NetcdfFile& file, std::string_view variable) {
+  std::vector<std::string> names;
+  if (const NetcdfVariable* const found = file.find(variable)) names = file.readStrings(*found);
+  std::erase(names, "");
+  return names;
 }
 
-bool isMosaic(const std::filesystem::path& path) {
-  return lowerCase(path.filename().string()).find("mosaic") != std::string::npos &&
-         NetcdfFile::recognises(InputFile(path));
+std::vector<std::string> gridsOf(const NetcdfFile& mosaic) {
+  return namesIn(mosaic, "gridfiles");
+}
+
+/// Only files beside `file`: one that names others must not reach elsewhere.
+path beside(const path& file, const std::string& name) {
+  return file.parent_path() / path(name).filename();
+}
+
+bool isFile(const path& file) {
+  std::error_code unreadable;
+  return std::filesystem::is_regular_file(file, unreadable);
+}
+
+/// Whether its name is one that mosaics and the grids of coupled models have: other files are not opened to look.
+bool mayBeMosaic(const path& file) {
+  const std::string name = lowerCase(file.filename().string());
+  return (name.find("mosaic") != std::string::npos || name.find("grid_spec") != std::string::npos) &&
+         !tileNumber(file) && NetcdfFile::recognises(InputFile(file));
+}
+
+bool numbered(const std::vector<std::string>& names) {
+  return std::any_of(names.begin(), names.end(),
+                     [](const std::string& name) { return tileNumber(name).has_value(); });
+}
+
+/// The grid files of the component of a coupled model that the data are of: those with tiles if the data are in tiles.
+std::vector<std::string> gridsOfComponent(const path& coupled, const std::vector<std::string>& mosaics,
+                                          bool tiles) {
+  std::vector<std::vector<std::string>> fitting;
+  for (const std::string& name : mosaics) {
+    const path mosaic = beside(coupled, name);
+    if (!isFile(mosaic) || !NetcdfFile::recognises(InputFile(mosaic))) continue;
+    std::vector<std::string> grids = gridsOf(NetcdfFile(mosaic));
+    if (!grids.empty() && numbered(grids) == tiles &&
+        std::find(fitting.begin(), fitting.end(), grids) == fitting.end())
+      fitting.push_back(std::move(grids));
+  }
+  if (fitting.empty())
+    throw Error(
+        "{}: names the mosaics {}; none of them with {} is beside it; put it there, or give the grid files "
+        "of the data",
+        coupled.string(), fmt::join(mosaics, ", "), tiles ? "tiles" : "a grid of one tile");
+  if (fitting.size() > 1)
+    throw Error("{}: names several grids ({}, {}); give the one of the data in its place", coupled.string(),
+                fitting[0][0], fitting[1][0]);
+  return fitting[0];
+}
+
+/// The names of the grid files that `file` names, itself or by the mosaics that it names.
+std::vector<std::string> gridsNamedBy(const path& file, bool tiles) {
+  const NetcdfFile opened(file);
+  if (std::vector<std::string> grids = gridsOf(opened); !grids.empty()) return grids;
+  std::vector<std::string> mosaics;
+  for (const char* component : {"atm_mosaic_file", "ocn_mosaic_file", "lnd_mosaic_file"})
+    for (const std::string& name : namesIn(opened, component))
+      if (std::find(mosaics.begin(), mosaics.end(), name) == mosaics.end()) mosaics.push_back(name);
+  return mosaics.empty() ? mosaics : gridsOfComponent(file, mosaics, tiles);
 }
 
 }  // namespace
@@ -53,19 +105,22 @@ std::optional<CfTerm> supergridOf(const NetcdfFiles& file, const NetcdfVariable&
   return std::nullopt;
 }
 
-std::vector<std::filesystem::path> withGridsOfMosaics(const std::vector<std::filesystem::path>& files) {
-  std::vector<std::filesystem::path> all = files;
-  for (const std::filesystem::path& mosaic : files) {
-    if (!isMosaic(mosaic)) continue;
-    for (const std::string& name : gridsOf(mosaic)) {
-      // Only files beside the mosaic: a file that names others must not reach elsewhere.
-      const std::filesystem::path grid = mosaic.parent_path() / std::filesystem::path(name).filename();
-      std::error_code unreadable;
-      if (!std::filesystem::is_regular_file(grid, unreadable))
+std::vector<path> withGridsOfMosaics(const std::vector<path>& files) {
+  std::vector<path> all = files;
+  std::set<uint32_t> tiles;
+  for (const path& file : files)
+    if (const auto number = tileNumber(file)) tiles.insert(*number);
+  for (const path& mosaic : files) {
+    if (!mayBeMosaic(mosaic)) continue;
+    for (const std::string& name : gridsNamedBy(mosaic, !tiles.empty())) {
+      const path grid = beside(mosaic, name);
+      if (const auto number = tileNumber(grid); number && !tiles.empty() && !tiles.contains(*number))
+        continue;
+      if (!isFile(grid))
         throw Error(
             "{}: names the grid file {}, which is not beside it; put it there, or leave the mosaic out",
             mosaic.string(), grid.filename().string());
-      const bool given = std::any_of(all.begin(), all.end(), [&](const std::filesystem::path& one) {
+      const bool given = std::any_of(all.begin(), all.end(), [&](const path& one) {
         std::error_code error;
         return std::filesystem::equivalent(one, grid, error);
       });

@@ -1,8 +1,8 @@
 // Grid files of FV3, MOM6 and FMS (C96_grid.tile1.nc, ocean_hgrid.nc). Their x and y are the longitudes and latitudes of a
 // supergrid of twice the resolution, here of 2x1 cells with corners o, centres + and the middles of edges .:
 //
-//   o . o . o    C96_mosaic.nc names the grid files of all tiles.
-//   . + . + .
+//   o . o . o    C96_mosaic.nc names the grid files of all tiles; grid_spec.nc of a coupled model the mosaics of
+//   . + . + .    its components.
 //   o . o . o
 #pragma once
 
@@ -21,8 +21,9 @@ namespace curvisplat {
 std::optional<CfTerm> supergridOf(const NetcdfFiles& file, const NetcdfVariable& variable,
                                   const CfDimensions& dims, CfRole role);
 
-/// The files with the grid files that any mosaic among them names, which are expected beside it. Throws Error if one of
-/// these is not there.
+/// The files with the grid files that any mosaic among them names, itself or by the mosaics of a coupled model's components, which
+/// are expected beside it. Of components, the one with tiles if files are tiles, else the one without. Throws Error if one of the
+/// files is not there, or if several components fit.
 std::vector<std::filesystem::path> withGridsOfMosaics(const std::vector<std::filesystem::path>& files);
 
 }  // namespace curvisplat

@@ -29,6 +29,11 @@ constexpr Magic kMagics[] = {
     {"\0\0\0\x50"
      "Fortran Binary"sv,
      "an EnSight geometry file in Fortran Binary, which is not read"},
+    {"MATLAB 5.0 MAT-file"sv,
+     "a MATLAB file, which is not read (save it with -v7.3 and describe its arrays in an XDMF file)"},
+    {"MATLAB 7.3 MAT-file"sv, "a MATLAB file (HDF5), whose arrays an XDMF file has to describe"},
+    {"\x93NUMPY"sv, "a NumPy array without a grid, which is not read (an XDMF file describes arrays)"},
+    {"$MeshFormat"sv, "a Gmsh mesh, which is not read (meshio convert FILE mesh.vtu)"},
     {"GRIB"sv, "a GRIB file, which is not read"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
     {"{"sv, "a JSON file (give a .p3d file alone, instead of the grid)"},
@@ -53,6 +58,10 @@ std::optional<std::string> foreignText(std::string begin) {
   std::transform(begin.begin(), begin.end(), begin.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
   if (begin.starts_with("<?xml")) return "an XML file";
+  if (begin.starts_with("*heading"))
+    return "an Abaqus mesh, which is not read (meshio convert FILE mesh.vtu)";
+  if (begin.starts_with("meshversionformatted"))
+    return "a Medit mesh, which is not read (meshio convert FILE mesh.vtu)";
   return std::nullopt;
 }
 
