@@ -6,10 +6,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstring>
 #include <functional>
-#include <limits>
 #include <mutex>
 #include <numeric>
 
@@ -39,62 +36,6 @@ bool isClassic(std::string_view mark) {
   return mark.starts_with("CDF\x01") || mark.starts_with("CDF\x02") || mark.starts_with("CDF\x05");
 }
 
-size_t bytesOf(nc_type type) {
-  switch (type) {
-    case NC_BYTE:
-    case NC_UBYTE:
-      return 1;
-    case NC_SHORT:
-    case NC_USHORT:
-      return 2;
-    case NC_INT:
-    case NC_UINT:
-    case NC_FLOAT:
-      return 4;
-    case NC_INT64:
-    case NC_UINT64:
-    case NC_DOUBLE:
-      return 8;
-    default:
-      return 0;
-  }
-}
-
-/// NetCDF's fill value for samples that were never written, unless the variable has its own. By convention
-/// bytes have none, since all of their values are in use.
-std::optional<double> defaultFill(nc_type type) {
-  switch (type) {
-    case NC_SHORT:
-      return NC_FILL_SHORT;
-    case NC_USHORT:
-      return NC_FILL_USHORT;
-    case NC_INT:
-      return NC_FILL_INT;
-    case NC_UINT:
-      return NC_FILL_UINT;
-    case NC_FLOAT:
-      return NC_FILL_FLOAT;
-    case NC_DOUBLE:
-      return NC_FILL_DOUBLE;
-    case NC_INT64:
-      return static_cast<double>(NC_FILL_INT64);
-    case NC_UINT64:
-      return static_cast<double>(NC_FILL_UINT64);
-    default:
-      return std::nullopt;
-  }
-}
-
-bool isReal(nc_type type) {
-  return type == NC_FLOAT || type == NC_DOUBLE;
-}
-
-const std::vector<double>& numbersOf(const NetcdfVariable& variable, const char* attribute) {
-  static const std::vector<double> none;
-  const auto found = variable.attributes.find(attribute);
-  return found == variable.attributes.end() ? none : found->second.numbers;
-}
-
 /// Size, and time of the last change.
 std::pair<uint64_t, int64_t> stateOf(const std::filesystem::path& path) {
   struct stat state {};
@@ -104,11 +45,6 @@ std::pair<uint64_t, int64_t> stateOf(const std::filesystem::path& path) {
 }
 
 }  // namespace
-
-std::string NetcdfVariable::text(const char* attribute) const {
-  const auto found = attributes.find(attribute);
-  return found == attributes.end() ? "" : found->second.text;
-}
 
 size_t NetcdfBox::values() const {
   return std::accumulate(count.begin(), count.end(), size_t{1}, std::multiplies<>());
@@ -244,7 +180,7 @@ void NetcdfFile::readVariable(int id) {
   variable.id = id;
   variable.position = variables_.size();
   variable.type = type;
-  variable.value_bytes = bytesOf(type);
+  variable.value_bytes = netcdfBytes(type);
   variable.numeric = variable.value_bytes > 0;
   for (const int dimension : ids) {
     if (dimension < 0 || static_cast<size_t>(dimension) >= dimensions_.size())
@@ -253,10 +189,7 @@ void NetcdfFile::readVariable(int id) {
     variable.dims.push_back(static_cast<size_t>(dimension));
   }
   readAttributes(id, attributes, variable);
-  packings_.push_back(packingOf(variable));
-  if (numbersOf(variable, "_FillValue").empty())
-    if (const auto fill = defaultFill(type))
-      packings_.back().missing.push_back(wrapped(packings_.back(), *fill));
+  packings_.emplace_back(variable);
   variables_.push_back(std::move(variable));
 }
 
@@ -280,7 +213,7 @@ void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) con
       status = nc_get_att_string(file_, id, name, &text);
       if (status == NC_NOERR && text) attribute.text = text;
       if (status == NC_NOERR) nc_free_string(1, &text);
-    } else if (bytesOf(type) > 0) {
+    } else if (netcdfBytes(type) > 0) {
       attribute.numbers.resize(length);
       status = nc_get_att_double(file_, id, name, attribute.numbers.data());
     }
@@ -300,112 +233,6 @@ void NetcdfFile::checkSizes(uint64_t file_bytes) const {
           "or write it again",
           path_.string(), variable.name, bytes, file_bytes);
   }
-}
-
-NetcdfFile::Packing NetcdfFile::packingOf(const NetcdfVariable& variable) const {
-  Packing packing;
-  const auto first = [&](const char* attribute, double otherwise) {
-    const std::vector<double>& numbers = numbersOf(variable, attribute);
-    return numbers.empty() ? otherwise : numbers[0];
-  };
-  packing.scale = first("scale_factor", 1);
-  packing.offset = first("add_offset", 0);
-  setWrap(variable, packing);
-  for (const char* attribute : {"_FillValue", "missing_value"})
-    for (const double value : numbersOf(variable, attribute))
-      packing.missing.push_back(wrapped(packing, value));
-  addRange(variable, packing);
-  return packing;
-}
-
-/// Source: NetCDF User's Guide, appendix A, _Unsigned.
-void NetcdfFile::setWrap(const NetcdfVariable& variable, Packing& packing) {
-  if (bytesOf(variable.type) == 0 || isReal(variable.type)) return;
-  const std::string word = variable.text("_Unsigned");
-  const bool has_sign = variable.type == NC_BYTE || variable.type == NC_SHORT || variable.type == NC_INT ||
-                        variable.type == NC_INT64;
-  if (!(has_sign ? word == "true" || word == "True" : word == "false" || word == "False")) return;
-  const double all = std::ldexp(1.0, static_cast<int>(8 * bytesOf(variable.type)));
-  packing.wraps_at = has_sign ? 0 : all / 2;
-  packing.wraps_by = has_sign ? all : -all;
-}
-
-double NetcdfFile::wrapped(const Packing& packing, double value) {
-  if (packing.wraps_by == 0) return value;
-  return (value < packing.wraps_at) == (packing.wraps_by > 0) ? value + packing.wraps_by : value;
-}
-
-/// By NetCDF's conventions a valid range is in stored units, unless it has the type of scale_factor and
-/// add_offset (the wider of the two) and that is wider than the variable's: then it is in unpacked units. Such
-/// a range is converted to stored units here.
-/// Source: NetCDF User's Guide, appendix A, valid_range.
-void NetcdfFile::addRange(const NetcdfVariable& variable, Packing& packing) {
-  nc_type unpacked = NC_NAT;
-  for (const char* attribute : {"scale_factor", "add_offset"}) {
-    const auto found = variable.attributes.find(attribute);
-    if (found == variable.attributes.end() || found->second.numbers.empty()) continue;
-    if (bytesOf(found->second.type) > bytesOf(unpacked)) unpacked = found->second.type;
-  }
-  const bool widens =
-      isReal(unpacked) && (!isReal(variable.type) || bytesOf(unpacked) > bytesOf(variable.type));
-  // A stored integer stands for values half a step to either side, which absorbs the rounding of the factor.
-  const double half_step = isReal(variable.type) ? 0 : 0.5;
-
-  const auto bound = [&](const char* attribute, size_t size, size_t n, bool upper) {
-    const auto found = variable.attributes.find(attribute);
-    if (found == variable.attributes.end() || found->second.numbers.size() != size) return;
-    const double value = found->second.numbers[n];
-    const bool convert = widens && found->second.type == unpacked;
-    if (convert && !(std::isfinite(packing.scale) && packing.scale != 0 && std::isfinite(packing.offset)))
-      return;
-    const bool stored_upper = upper != (convert && packing.scale < 0);
-    const double stored = convert ? (value - packing.offset) / packing.scale : wrapped(packing, value);
-    if (stored_upper)
-      packing.most = stored + (convert ? half_step : 0);
-    else
-      packing.least = stored - (convert ? half_step : 0);
-    packing.range +=
-        fmt::format("{}{} {} {:g}{}", packing.range.empty() ? "" : " or ", upper ? "above" : "below",
-                    attribute, value, convert ? " after unpacking" : "");
-  };
-  bound("valid_range", 2, 0, false);
-  bound("valid_range", 2, 1, true);
-  bound("valid_min", 1, 0, false);
-  bound("valid_max", 1, 0, true);
-}
-
-std::string NetcdfFile::missingValues(const NetcdfVariable& variable) const {
-  const Packing& packing = packings_.at(variable.position);
-  std::string words = packing.range;
-  std::vector<std::string> values;  // as _FillValue and missing_value are often the same
-  for (const double missing : packing.missing)
-    if (std::string value = fmt::format("{:g}", missing);
-        std::find(values.begin(), values.end(), value) == values.end())
-      values.push_back(std::move(value));
-  if (!values.empty())
-    words += fmt::format("{}equal to {}", words.empty() ? "" : " or ", fmt::join(values, " or "));
-  return words;
-}
-
-template <typename Value>
-void NetcdfFile::unpack(const Packing& packing, std::span<Value> values) {
-  constexpr Value kNone = std::numeric_limits<Value>::quiet_NaN();
-  if (packing.wraps_by != 0)
-    for (Value& value : values) value = static_cast<Value>(wrapped(packing, static_cast<double>(value)));
-  for (const double missing : packing.missing) {
-    const auto wanted = static_cast<Value>(missing);
-    for (Value& value : values)
-      if (value == wanted) value = kNone;
-  }
-  if (packing.least)
-    for (Value& value : values)
-      if (value < static_cast<Value>(*packing.least)) value = kNone;
-  if (packing.most)
-    for (Value& value : values)
-      if (value > static_cast<Value>(*packing.most)) value = kNone;
-  if (packing.scale == 1 && packing.offset == 0) return;
-  for (Value& value : values)
-    value = static_cast<Value>(static_cast<double>(value) * packing.scale + packing.offset);
 }
 
 const NetcdfVariable* NetcdfFile::find(std::string_view name) const {
@@ -446,7 +273,7 @@ std::optional<double> NetcdfFile::number(const char* attribute) const {
   size_t length = 0;
   double value = 0;
   if (nc_inq_att(opened(), NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length != 1 ||
-      bytesOf(type) == 0 || nc_get_att_double(file_, NC_GLOBAL, attribute, &value) != NC_NOERR)
+      netcdfBytes(type) == 0 || nc_get_att_double(file_, NC_GLOBAL, attribute, &value) != NC_NOERR)
     return std::nullopt;
   return value;
 }
@@ -466,7 +293,7 @@ void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const 
     // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
     if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
   }
-  unpack(packings_.at(variable.position), to.first(box.values()));
+  packings_.at(variable.position).unpack(to.first(box.values()));
 }
 
 std::string NetcdfFile::readText(const NetcdfVariable& variable) const {

@@ -8,7 +8,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,37 +15,11 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/netcdf/netcdf_packing.h"
+#include "preprocess/formats/netcdf/netcdf_variable.h"
 #include "stream/base/file.h"
 
 namespace curvisplat {
-
-struct NetcdfDimension {
-  std::string name;
-  uint64_t length = 0;
-  bool unlimited = false;
-};
-
-/// An attribute is text or a list of numbers.
-struct NetcdfAttribute {
-  std::string text;
-  std::vector<double> numbers;
-  int type = 0;  // as stored, an nc_type
-};
-
-struct NetcdfVariable {
-  std::string name;
-  int id = 0;
-  size_t file = 0;           // index into the files of a NetcdfFiles
-  size_t position = 0;       // index into its NetcdfFile::variables()
-  int type = 0;              // as stored, an nc_type
-  size_t value_bytes = 0;    // size of a stored value
-  bool numeric = false;      // neither text nor a user-defined type
-  std::vector<size_t> dims;  // indices into NetcdfFile::dimensions(), slowest first
-  std::map<std::string, NetcdfAttribute> attributes;
-
-  /// The text of an attribute; empty if there is none.
-  std::string text(const char* attribute) const;
-};
 
 /// A box of a variable: start and count along each dimension, slowest first.
 struct NetcdfBox {
@@ -80,12 +53,12 @@ class NetcdfFile {
   /// A numeric attribute of the file with one value.
   std::optional<double> number(const char* attribute) const;
   /// Which stored values of a variable read() replaces by NaN, in words; empty if none.
-  std::string missingValues(const NetcdfVariable& variable) const;
+  std::string missingValues(const NetcdfVariable& variable) const {
+    return packings_.at(variable.position).missingValues();
+  }
   const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
 
-  /// Reads box.values() values to the beginning of `to`, multiplied by scale_factor, plus add_offset. NaN
-  /// where the stored value is _FillValue (or NetCDF's default fill value), missing_value, or outside the
-  /// valid range.
+  /// Reads box.values() values to the beginning of `to`, as NetcdfPacking unpacks them.
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
   /// Closes the file until the next call that needs it, which opens it again: an open NetCDF-4 file keeps some MiB.
@@ -98,16 +71,6 @@ class NetcdfFile {
   std::vector<std::string> readStrings(const NetcdfVariable& variable) const;
 
  private:
-  /// How stored numbers are converted to values.
-  struct Packing {
-    double scale = 1, offset = 0;
-    /// Integers from this one on stand for others (`_Unsigned`): the classic format has none without a sign.
-    double wraps_at = 0, wraps_by = 0;
-    std::vector<double> missing;        // as stored, wrapped
-    std::optional<double> least, most;  // as stored, wrapped
-    std::string range;                  // the same in words
-  };
-
   [[noreturn]] void fail(const std::string& place, int status) const;
   /// Opens the file again if it was released; dataLibraryMutex() must be held. Throws Error if it is another by now.
   int opened() const;
@@ -115,13 +78,7 @@ class NetcdfFile {
   void readGroups();
   void readVariable(int id);
   void readAttributes(int id, int count, NetcdfVariable& variable) const;
-  static void addRange(const NetcdfVariable& variable, Packing& packing);
-  static void setWrap(const NetcdfVariable& variable, Packing& packing);
-  static double wrapped(const Packing& packing, double value);
   void checkSizes(uint64_t file_bytes) const;
-  Packing packingOf(const NetcdfVariable& variable) const;
-  template <typename Value>
-  static void unpack(const Packing& packing, std::span<Value> values);
   template <typename Value, typename Get>
   void readWith(const Get& get, const NetcdfVariable& variable, const NetcdfBox& box,
                 std::span<Value> to) const;
@@ -134,7 +91,7 @@ class NetcdfFile {
   std::vector<NetcdfDimension> dimensions_;
   std::vector<NetcdfVariable> variables_;
   std::vector<std::string> groups_;
-  std::vector<Packing> packings_;  // [variable]
+  std::vector<NetcdfPacking> packings_;  // [variable]
 };
 
 }  // namespace curvisplat
