@@ -1,6 +1,8 @@
 // The panels of what cuts the data: clip box, clip planes, slices.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "stream/cache/cache_reader.h"
@@ -20,7 +22,7 @@ class CutPanel {
   void drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state, PanelActions& actions);
 
   const CacheReader& cache_;
-  size_t planes_seen_ = 0, slices_seen_ = 0;  // in the frame before
+  std::optional<size_t> planes_seen_, slices_seen_;  // in the frame before
 };
 
 /// A plane in the middle of the data that faces the viewer.

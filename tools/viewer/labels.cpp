@@ -39,16 +39,17 @@ bool section(const char* text, bool open_at_first) {
   return open;
 }
 
-bool sectionOf(const char* text, size_t& seen, size_t number) {
+bool sectionOf(const char* text, std::optional<size_t>& seen, size_t number) {
   constexpr float kSeenLines = 8;  // of the list below its header
-  const bool has_more = number > seen;
+  const bool at_first = !seen, has_more = number > seen.value_or(0);
   seen = number;
   const bool was_open = ImGui::GetStateStorage()->GetInt(ImGui::GetID(text)) != 0;
   if (has_more) ImGui::SetNextItemOpen(true);
   const bool open = section(text, false);
-  // Only a list that was folded: one that is in use must not move under the mouse.
+  // Only a list that was folded: one that is in use must not move under the mouse. Nor do the panels begin at a list.
   const float end = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
-  if (has_more && !was_open && ImGui::GetItemRectMax().y + kSeenLines * ImGui::GetFrameHeight() > end)
+  if (has_more && !at_first && !was_open &&
+      ImGui::GetItemRectMax().y + kSeenLines * ImGui::GetFrameHeight() > end)
     ImGui::SetScrollHereY(0);
   return open;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "tools/viewer/panel_actions.h"
@@ -19,8 +20,8 @@ bool option(const char* text, bool& value);
 /// A heading that folds what is below. Named by its text. Returns whether it is unfolded.
 bool section(const char* text, bool open_at_first);
 /// The same of a list, which is folded at first: unfolded if it has more than before, by the menu or by a saved view, and then
-/// scrolled to if it would lie below the window's end. `seen`: how many there were.
-bool sectionOf(const char* text, size_t& seen, size_t number);
+/// scrolled to if it would lie below the window's end. `seen`: how many there were in the frame before; none before the first.
+bool sectionOf(const char* text, std::optional<size_t>& seen, size_t number);
 /// A line under the widget that the mouse is over, after a moment.
 void hint(const char* text);
 

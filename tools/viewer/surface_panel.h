@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,7 @@ class SurfacePanel {
   void drawIsosurfaces(ViewState& state, PanelActions& actions);
 
   const CacheReader& cache_;
-  size_t surfaces_seen_ = 0, isovalues_seen_ = 0;  // in the frame before
+  std::optional<size_t> surfaces_seen_, isovalues_seen_;  // in the frame before
 };
 
 }  // namespace curvisplat
