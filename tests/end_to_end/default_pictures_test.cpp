@@ -68,6 +68,7 @@ TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
 
 /// Of grids from thin to long, in pictures from wide to high: nothing is cut off at the sides, with an outline nor without.
 TEST_P(DefaultPictures, HoldTheWholeData) {
+  constexpr int kTouchedZoomed = 6;  // of 640 pixels along the edges
   convert(GetParam(), "48x32x24");
   const auto touched = [](const Image& image) {
     int number = 0;
@@ -92,7 +93,9 @@ TEST_P(DefaultPictures, HoldTheWholeData) {
         if (outline) words.push_back("--outline");
         words.insert(words.begin(), {"render", file("a.splats"), "-o", file("a.png")});
         const ProgramResult result = run(words);
-        EXPECT_EQ(touched(readImage(file("a.png"))), 0)
+        // What is zoomed to leaves a hundredth of the extinction out on each side.
+        const int may_touch = result.out.find("--focal-point") == std::string::npos ? 0 : kTouchedZoomed;
+        EXPECT_LE(touched(readImage(file("a.png"))), may_touch)
             << stretched << " " << size << (outline ? " outline: " : ": ") << result.out;
       }
 }
