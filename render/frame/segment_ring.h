@@ -31,7 +31,7 @@ class SegmentRing {
   /// counted from 0. Returns nullopt once the ring is closed. Any thread. Every sequence number must be
   /// acquired, and only once.
   std::optional<std::span<ScreenSplat>> acquire(uint64_t sequence, size_t count);
-  /// Whether the next segment, of so many splats, would get its space at once. Any thread.
+  /// Whether the next segment, of `count` splats, would get its space at once. Any thread.
   bool hasSpaceFor(size_t count) const;
   /// Marks the segment as filled. Any thread.
   void commit(uint64_t sequence);

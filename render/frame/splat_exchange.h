@@ -112,8 +112,8 @@ class SplatExchange {
     uint32_t rank = 0;
     uint32_t first = 0, count = 0;  // entries, or all
     bool offered = false, done = false;
-    bool kept =
-        false;  // this rank, which takes all of the part's splats from where they are until the next step
+    // It is this rank, which takes all of the part's splats from where they are, until the next step.
+    bool kept = false;
     uint64_t bytes() const { return kHeaderBytes + count * kElementBytes; }
   };
   struct Prepared {
