@@ -48,10 +48,12 @@ function(curvisplat_together_in folder types)
   endforeach()
 endfunction()
 
-foreach(folder stream preprocess render tools bench)
-  if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder})
-    curvisplat_together_in(${PROJECT_SOURCE_DIR}/${folder} "EXECUTABLE;STATIC_LIBRARY;OBJECT_LIBRARY")
+get_property(folders DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTY SUBDIRECTORIES)
+foreach(folder ${folders})
+  # Not the tests' libraries: a program takes those files from them that it uses, and links what these need.
+  if(folder STREQUAL "${PROJECT_SOURCE_DIR}/tests")
+    curvisplat_together_in(${folder} EXECUTABLE)
+  else()
+    curvisplat_together_in(${folder} "EXECUTABLE;STATIC_LIBRARY;OBJECT_LIBRARY")
   endif()
 endforeach()
-# Not the tests' libraries: a program takes those files from them that it uses, and links what these need.
-curvisplat_together_in(${PROJECT_SOURCE_DIR}/tests EXECUTABLE)
