@@ -185,8 +185,7 @@ void addView(CLI::App& app) {
   command->add_option("--memory", arguments->memory,
                       "Memory limit for drawing, such as 512M or 2G (default: as last time, initially 512M)");
   command->add_option("--frame-time", arguments->frame_time,
-                      "Time budget of a picture while the camera moves, in ms (default 33 with a graphics "
-                      "card, 100 without)");
+                      "Time budget of a picture while the camera moves, in ms (default 33)");
   addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
   addStepOptions(*command, arguments->steps, "Time steps");
   command->callback([arguments] { view(*arguments); });

@@ -162,6 +162,7 @@ void CacheView::takeFrame() {
   }
   if (!frame) return;
   picture_.set(frame->bytes, frame->image.size);
+  window_.redraw();
   shown_ = std::move(frame);
   annotate();
   reportDamage();
@@ -214,6 +215,7 @@ void CacheView::annotate() {
   const ShownFunctions functions(state_, manifest());
   const AnnotatedScene scene = sceneOf(state_, functions, *shown_, picture_size_);
   overlay_.set(annotationLayer(state_.annotations, scene), picture_size_);
+  window_.redraw();
   shown_strip_ = 1 - static_cast<double>(data_size_.width) / picture_size_.width;
 }
 
@@ -280,7 +282,7 @@ void CacheView::ask(bool moving) {
   request.faces = state_.faceNames();
   request.faces_at = faces_at_;
   if (frames_failed_) restartFrames();
-  request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
+  request.target_s = target_s_;
   request_ = frames_->request(std::move(request));
   values_.reset();
   values_failed_ = false;

@@ -142,7 +142,7 @@ class CacheView {
   const Manifest& manifest() const { return cache_.manifest(); }
 
   const CacheReader cache_;
-  const std::optional<double> target_s_;
+  const double target_s_;
   const FacesAtStep faces_at_;
   const std::vector<std::string> face_names_;  // that the list of surfaces offers
   const std::optional<Preview> preview_;

@@ -152,11 +152,6 @@ std::string FrameLoop::backendName() const {
   return backend_name_;
 }
 
-bool FrameLoop::drawsInSoftware() const {
-  const MutexLock lock(mutex_);
-  return software_;
-}
-
 bool FrameLoop::superseded(uint64_t number) const {
   const MutexLock lock(mutex_);
   return state_ == State::kStopping || number != newest_;
@@ -233,7 +228,6 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
   {
     const MutexLock lock(mutex_);
     backend_name_ = renderer.backendName();
-    software_ = renderer.drawsInSoftware();
   }
 
   Effort& effort = drawing.effort;

@@ -65,7 +65,7 @@ struct FrameRequest {
   Camera camera;
   FrameOptions options;
   bool moving = false;
-  double target_s = 0.1;                  // time budget of a picture while moving
+  double target_s = 0.033;                // time budget of a picture while moving
   uint64_t step = 0;                      // time step
   double part = 0;                        // of the way to the next one: its values, with the faces of `step`
   bool wants_bytes = true;                // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
@@ -143,8 +143,6 @@ class FrameLoop {
   bool busy() const;
   /// Name of the drawing back end; empty until the first picture.
   std::string backendName() const;
-  /// Whether the processor draws; true until the first picture.
-  bool drawsInSoftware() const;
 
  private:
   enum class State { kIdle, kMoving, kRefining, kValues, kFailed, kStopping };  // the diagram above
@@ -179,7 +177,6 @@ class FrameLoop {
   std::optional<ShownValues> values_ GUARDED_BY(mutex_);
   std::exception_ptr failure_ GUARDED_BY(mutex_);  // of the loop in kFailed, else of the last request
   std::string backend_name_ GUARDED_BY(mutex_);
-  bool software_ GUARDED_BY(mutex_) = true;
   std::thread thread_;
 };
 

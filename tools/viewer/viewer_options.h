@@ -41,7 +41,7 @@ struct ViewerOptions {
   ConversionServices conversion;
   OpenMovieOutput open_movie;
   std::vector<std::filesystem::path> files;  // to open first, in place of a cache
-  std::optional<double> target_s;  // per picture while moving; default 0.033 with a graphics card, else 0.1
+  double target_s = 0.033;                   // per picture while moving
 
   /// Of the cache that is shown: the grid's files that were opened, if it is a kept cache of them; what it is a preview
   /// of; and the view that it continues, of the same grid.

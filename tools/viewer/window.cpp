@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "stream/base/error.h"
+#include "tools/viewer/drawn_frame.h"
 #include "tools/viewer/fonts.h"
 
 namespace curvisplat {
@@ -109,6 +110,7 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   glfwSetScrollCallback(window_, onWheel);
   glfwSetWindowSizeCallback(window_, onSize);
   glfwSetFramebufferSizeCallback(window_, onPixels);
+  glfwSetWindowRefreshCallback(window_, onRefresh);
   glfwSetCharCallback(window_, onLetter);
   glfwSetDropCallback(window_, onDrop);
   int height = 0;
@@ -143,6 +145,7 @@ void Window::applyLook() {
   loadFont(static_cast<float>(text_height_ * pixelScale()), static_cast<float>(pixelScale()));
   ImGui_ImplOpenGL3_DestroyFontsTexture();
   ImGui_ImplOpenGL3_CreateFontsTexture();
+  redraw();
 }
 
 void Window::setTitle(const std::string& title) {
@@ -258,6 +261,9 @@ void Window::closeWidgets() {
 
 void Window::endFrame(const glm::vec3& background) {
   ImGui::Render();
+  // By OpenGL in software, drawing takes as long as a picture of moving data does.
+  const uint64_t appearance = appearanceOf(*ImGui::GetDrawData());
+  if (std::exchange(shown_, appearance) == appearance) return;
   const ImageSize size = pixels();
   gl_->Viewport(0, 0, size.width, size.height);
   gl_->ClearColor(background.x, background.y, background.z, 1);
@@ -275,7 +281,15 @@ void Window::onSize(GLFWwindow* window, int width, int) {
 }
 
 void Window::onPixels(GLFWwindow* window, int width, int height) {
-  static_cast<Window*>(glfwGetWindowUserPointer(window))->pixels_ = {width, height};
+  auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  self->pixels_ = {width, height};
+  self->redraw();
+}
+
+void Window::onRefresh(GLFWwindow* window) {
+  auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  self->input_ = true;
+  self->redraw();
 }
 
 void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {

@@ -3,6 +3,7 @@
 // All members except wake() are for the main thread.
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <glm/vec2.hpp>
 #include <memory>
@@ -52,11 +53,13 @@ class Window {
   /// Ends a wait(). Any thread, during the window's lifetime.
   static void wake();
 
-  /// Begins and ends a Dear ImGui frame; endFrame() shows it.
+  /// Begins and ends a Dear ImGui frame; endFrame() shows it if it looks otherwise than the one that is shown.
   void beginFrame();
   /// Closes what an exception has left open of this frame's windows, menus and lists.
   void closeWidgets();
   void endFrame(const glm::vec3& background);
+  /// The contents of a texture have changed: shows the next frame in any case.
+  void redraw() { shown_.reset(); }
 
   /// Size of the contents in pixels; {0, 0} while the window is minimised.
   ImageSize pixels() const { return pixels_; }
@@ -124,6 +127,7 @@ class Window {
   static void onWheel(GLFWwindow* window, double x, double y);
   static void onSize(GLFWwindow* window, int width, int height);
   static void onPixels(GLFWwindow* window, int width, int height);
+  static void onRefresh(GLFWwindow* window);
   static void onLetter(GLFWwindow* window, unsigned letter);
   static void onDrop(GLFWwindow* window, int count, const char** paths);
   bool overPicture() const;
@@ -153,6 +157,7 @@ class Window {
   std::deque<glm::dvec2> mouse_events_;  // positions of button events that it has yet to see
   bool shows_click_ = false;
   bool input_ = true;
+  std::optional<uint64_t> shown_;  // the frame that is shown (drawn_frame.h); none: it must be drawn again
 
   Rectangle picture_;
   std::vector<Rectangle> covers_, last_covers_;  // of this frame, and of the one that is shown
