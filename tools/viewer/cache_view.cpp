@@ -230,7 +230,7 @@ void CacheView::react(const WindowLayout& layout) {
 
 void CacheView::drawPanels(const WindowLayout& layout) {
   PanelFacts facts;
-  facts.shown = {shown_ ? &shown_->statistics : nullptr, isFinal(), frames_->busy(), frames_->backendName()};
+  facts.shown = {shown_ ? &shown_->statistics : nullptr, isFinal(), isRefining(), frames_->backendName()};
   facts.flies = navigation_.flies();
   facts.playback = &playback_;
   facts.views = views_;

@@ -60,6 +60,8 @@ class CacheView {
   void releasePictures();
   /// Draws one frame with the effects of all input so far.
   void draw(const WindowLayout& layout);
+  /// Whether a picture of a moving camera or of playback is being drawn, which takes no longer than options.target_s.
+  bool expectsMovingPicture() const { return was_moving_ && !frames_failed_ && !isShown(); }
   /// Applies a command that is not the window's own.
   void run(Command command);
   void choose(const MenuChoice& choice);
@@ -135,6 +137,8 @@ class CacheView {
   bool isUntouchedPreview() const { return preview_ && toJson(state_) == first_state_; }
   std::optional<glm::dvec2> placeOf(const glm::dvec3& point, const WindowLayout& layout) const;
   bool isShown() const { return shown_ && shown_->request == request_; }
+  /// Of a moving camera there is one picture, and the loop may have yet to notice that it has drawn it.
+  bool isRefining() const { return frames_->busy() && !(was_moving_ && isShown()); }
   bool isFinal() const { return isShown() && shown_->is_final && !chooser_.busy(); }
   void say(const std::string& text) { reports_.say(text); }
   /// What the picture that is shown lacks, for a sentence: ", without 3 damaged bricks"; empty if nothing.

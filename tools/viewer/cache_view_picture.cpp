@@ -187,7 +187,7 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   const std::string state =
       (preview_ ? fmt::format("preview of {}, ", preview_->what) : "") +
       (chooser_.busy() ? "choosing colours, " : "") +
-      stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_->busy(), ""}) + lacks();
+      stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), isRefining(), ""}) + lacks();
   ImGui::SameLine(static_cast<float>(place.width) - ImGui::CalcTextSize(state.c_str()).x -
                   2 * ImGui::GetStyle().FramePadding.x);
   ImGui::TextDisabled("%s", state.c_str());

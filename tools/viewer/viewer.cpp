@@ -139,7 +139,7 @@ class Viewer {
     std::optional<FileDialog::Chosen> chosen;
     attempt([&] { chosen = dialog_.draw(window_); });
     if (window_.showsClick()) pressKeys();
-    window_.endFrame(glm::vec3(0.12f));
+    window_.endFrame(glm::vec3(0.12f), opened_.view() && opened_.view()->expectsMovingPicture());
     writeWidgetPlaces();
     // What replaces the view or the font waits until the frame is over.
     applyLook();

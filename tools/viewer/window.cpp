@@ -21,7 +21,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kClickReach = 4;  // a button that moves further than this drags
+constexpr double kLongestWaitSeconds = 0.1;  // for a picture that is near
+constexpr double kClickReach = 4;            // a button that moves further than this drags
 
 std::string last_glfw_error;  // main thread only
 
@@ -259,11 +260,17 @@ void Window::closeWidgets() {
   ImGui::ErrorCheckEndFrameRecover(nullptr);
 }
 
-void Window::endFrame(const glm::vec3& background) {
+void Window::endFrame(const glm::vec3& background, bool next_is_near) {
   ImGui::Render();
   // By OpenGL in software, drawing takes as long as a picture of moving data does.
   const uint64_t appearance = appearanceOf(*ImGui::GetDrawData());
-  if (std::exchange(shown_, appearance) == appearance) return;
+  if (shown_ == appearance) return;
+  if (shown_ && next_is_near) {
+    if (!left_out_since_s_) left_out_since_s_ = glfwGetTime();
+    if (glfwGetTime() - *left_out_since_s_ < kLongestWaitSeconds) return;
+  }
+  left_out_since_s_.reset();
+  shown_ = appearance;
   const ImageSize size = pixels();
   gl_->Viewport(0, 0, size.width, size.height);
   gl_->ClearColor(background.x, background.y, background.z, 1);

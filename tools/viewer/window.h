@@ -57,7 +57,9 @@ class Window {
   void beginFrame();
   /// Closes what an exception has left open of this frame's windows, menus and lists.
   void closeWidgets();
-  void endFrame(const glm::vec3& background);
+  /// `next_is_near`: another one follows in a moment, with a new picture. Then this one is left out, for 0.1 s at
+  /// most.
+  void endFrame(const glm::vec3& background, bool next_is_near);
   /// The contents of a texture have changed: shows the next frame in any case.
   void redraw() { shown_.reset(); }
 
@@ -157,6 +159,7 @@ class Window {
   std::deque<glm::dvec2> mouse_events_;  // positions of button events that it has yet to see
   bool shows_click_ = false;
   bool input_ = true;
+  std::optional<double> left_out_since_s_;  // by GLFW's clock
   std::optional<uint64_t> shown_;  // the frame that is shown (drawn_frame.h); none: it must be drawn again
 
   Rectangle picture_;
