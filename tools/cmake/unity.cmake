@@ -1,8 +1,8 @@
-# Compiles sources together, up to ten at a time: most of a source's time is its headers'. unity_groups.py says which can be.
+# Compiles sources together, ten at a time, of tests 24: most of a source's time is its headers'. unity_groups.py says which can be.
 # Those with options of their own stay alone, and those that are compiled once for each instruction set.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
-function(curvisplat_together target)
+function(curvisplat_together target count)
   get_target_property(all ${target} SOURCES)
   get_target_property(folder ${target} SOURCE_DIR)
   set(sources)
@@ -24,7 +24,7 @@ function(curvisplat_together target)
     return()
   endif()
   execute_process(
-    COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tools/cmake/unity_groups.py 10 ${sources}
+    COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tools/cmake/unity_groups.py ${count} ${sources}
     OUTPUT_VARIABLE groups OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
   string(REPLACE "\n" ";" groups "${groups}")
   foreach(source group IN ZIP_LISTS sources groups)
@@ -33,18 +33,18 @@ function(curvisplat_together target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 endfunction()
 
-# Those targets in a folder that are of these types.
-function(curvisplat_together_in folder types)
+# Those targets in a folder that are of these types, `count` sources at a time.
+function(curvisplat_together_in folder types count)
   get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
   foreach(target ${targets})
     get_target_property(type ${target} TYPE)
     if(type IN_LIST types)
-      curvisplat_together(${target})
+      curvisplat_together(${target} ${count})
     endif()
   endforeach()
   get_property(folders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
   foreach(inner ${folders})
-    curvisplat_together_in(${inner} "${types}")
+    curvisplat_together_in(${inner} "${types}" ${count})
   endforeach()
 endfunction()
 
@@ -52,8 +52,8 @@ get_property(folders DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTY SUBDIRECTORIES)
 foreach(folder ${folders})
   # Not the tests' libraries: a program takes those files from them that it uses, and links what these need.
   if(folder STREQUAL "${PROJECT_SOURCE_DIR}/tests")
-    curvisplat_together_in(${folder} EXECUTABLE)
+    curvisplat_together_in(${folder} EXECUTABLE 24)
   else()
-    curvisplat_together_in(${folder} "EXECUTABLE;STATIC_LIBRARY;OBJECT_LIBRARY")
+    curvisplat_together_in(${folder} "EXECUTABLE;STATIC_LIBRARY;OBJECT_LIBRARY;MODULE_LIBRARY" 10)
   endif()
 endforeach()
