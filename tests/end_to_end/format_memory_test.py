@@ -61,18 +61,20 @@ class FormatMemory(StructuredFormats):
     def test_plot3d(self):
         self.expect_within("PLOT3D, grid and functions", *self.write_plot3d(), scalar="1")
 
+    def write_vts(self, path, mode):
+        writer = vtk.vtkXMLStructuredGridWriter()
+        writer.SetFileName(str(path))
+        writer.SetInputData(self.block.vtk())
+        getattr(writer, f"SetDataModeTo{mode}")()
+        if mode == "Appended":
+            writer.SetCompressorTypeToNone()
+            writer.EncodeAppendedDataOff()
+        writer.Write()
+        return path
+
     def test_vtk(self):
         for name, mode in (("appended, raw", "Appended"), ("zlib, base64", "Binary"), ("ASCII", "Ascii")):
-            path = self.folder / "a.vts"
-            writer = vtk.vtkXMLStructuredGridWriter()
-            writer.SetFileName(str(path))
-            writer.SetInputData(self.block.vtk())
-            getattr(writer, f"SetDataModeTo{mode}")()
-            if mode == "Appended":
-                writer.SetCompressorTypeToNone()
-                writer.EncodeAppendedDataOff()
-            writer.Write()
-            self.expect_within(f"VTK .vts, {name}", path)
+            self.expect_within(f"VTK .vts, {name}", self.write_vts(self.folder / "a.vts", mode))
 
     def test_cgns(self):
         path = self.folder / "a.cgns"
@@ -106,19 +108,36 @@ class FormatMemory(StructuredFormats):
         values = self.write_netcdf(self.folder / "d.nc", "NETCDF3_CLASSIC", places=False)
         self.expect_within("NetCDF, coordinates in a second file", values, places)
 
-    def test_compressed_files(self):
-        path = self.write_netcdf(self.folder / "a.nc", "NETCDF3_CLASSIC")
-        data = path.read_bytes()
-        path.with_name("a.nc.gz").write_bytes(gzip.compress(data, 1))
-        path.with_name("a.nc.xz").write_bytes(lzma.compress(data, preset=0))
-        kinds = ["gz", "xz"]
+    @staticmethod
+    def packed(path):
+        """The file compressed as a whole, in every way that there is here."""
+        data, kinds = path.read_bytes(), {}
+        for kind, pack in (("gz", lambda d: gzip.compress(d, 1)), ("xz", lambda d: lzma.compress(d, preset=0))):
+            kinds[kind] = path.with_name(f"{path.name}.{kind}")
+            kinds[kind].write_bytes(pack(data))
         if shutil.which("zstd"):
             subprocess.run(["zstd", "-q", "-1", path], check=True)
-            kinds.append("zst")
-        for kind in kinds:
-            self.expect_within(f"NetCDF, compressed as a whole (.{kind})", path.with_name(f"a.nc.{kind}"))
+            kinds["zst"] = path.with_name(f"{path.name}.zst")
+        path.unlink()
+        return kinds
 
-    def test_tiles(self):
+    def test_compressed_files(self):
+        path = self.write_netcdf(self.folder / "a.nc", "NETCDF3_CLASSIC")
+        for kind, packed in self.packed(path).items():
+            self.expect_within(f"NetCDF, compressed as a whole (.{kind})", packed)
+        for kind, packed in self.packed(self.write_vts(self.folder / "a.vts", "Appended")).items():
+            self.expect_within(f"VTK .vts, compressed as a whole (.{kind})", packed)
+        grid, function = (self.packed(path) for path in self.write_plot3d())
+        for kind in grid:
+            self.expect_within(f"PLOT3D, compressed as a whole (.{kind})", grid[kind], function[kind], scalar="1")
+
+    def test_compressed_tiles(self):
+        """Names of unpacked files are removed while they are open: all of them stay open."""
+        values, grids = ([self.packed(path) for path in paths] for paths in self.write_tiles())
+        for kind in values[0]:
+            self.expect_within(f"NetCDF, six tiles with supergrids (.{kind})", *(p[kind] for p in values), *(p[kind] for p in grids))
+
+    def write_tiles(self):
         """The tiles lie side by side; x and y of the grid files are those of a supergrid."""
         values, grids = [], []
         nk, nj, ni = TILE
@@ -138,6 +157,10 @@ class FormatMemory(StructuredFormats):
                 for name, array, units in (("x", 0.7 * fine[0] + 59 * n, "degree_east"), ("y", 0.7 * fine[1] - 26, "degree_north")):
                     f.createVariable(name, "f8", ("nyp", "nxp"))[:] = array
                     f[name].units = units
+        return values, grids
+
+    def test_tiles(self):
+        values, grids = self.write_tiles()
         self.expect_within("NetCDF, six tiles with supergrids", *values, *grids)
 
     def test_several_blocks(self):

@@ -125,6 +125,9 @@ class Columns(MeshFormats):
         info = self.info(self.path)
         self.assertEqual(info["cells"]["count"], self.LAYERS * len(self.faces))
         self.assertEqual(len(info["times"]), 2)
+        for step in range(2):
+            scalar = self.info(self.path, "--time-step", step)["scalars"][0]
+            self.assertAlmostEqual(scalar["max"], float(self.t.max()) + step, places=6)
 
     def test_ugrid_at_nodes(self):
         self.write_ugrid(at_nodes=True)

@@ -183,6 +183,34 @@ __attribute__((destructor)) static void report(void) {
 }
 """
 
+# A file system whose inodes differ in their upper 32 bits alone, as large ones (XFS with inode64) and unions of them have them.
+INODES = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#define NEXT(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
+static int far(int result, ino_t* inode) {
+  if (result == 0) *inode = (*inode << 32) | 7;
+  return result;
+}
+int stat(const char* path, struct stat* to) { return far(NEXT(stat)(path, to), &to->st_ino); }
+int lstat(const char* path, struct stat* to) { return far(NEXT(lstat)(path, to), &to->st_ino); }
+int fstat(int fd, struct stat* to) { return far(NEXT(fstat)(fd, to), &to->st_ino); }
+int fstatat(int fd, const char* path, struct stat* to, int flags) { return far(NEXT(fstatat)(fd, path, to, flags), &to->st_ino); }
+int stat64(const char* path, struct stat64* to) { return far(NEXT(stat64)(path, to), &to->st_ino); }
+int lstat64(const char* path, struct stat64* to) { return far(NEXT(lstat64)(path, to), &to->st_ino); }
+int fstat64(int fd, struct stat64* to) { return far(NEXT(fstat64)(fd, to), &to->st_ino); }
+int fstatat64(int fd, const char* path, struct stat64* to, int flags) { return far(NEXT(fstatat64)(fd, path, to, flags), &to->st_ino); }
+int statx(int fd, const char* path, int flags, unsigned mask, struct statx* to) {
+  int result = NEXT(statx)(fd, path, flags, mask, to);
+  if (result == 0) to->stx_ino = (to->stx_ino << 32) | 7;
+  return result;
+}
+"""
+
+
 def opens(folder, flags):
     try:
         os.close(os.open(folder, flags, 0o600))
@@ -304,6 +332,37 @@ class OddHosts(unittest.TestCase):
         folder = self.folder / "clock"
         folder.mkdir()
         self.expect_same(folder, {"LD_PRELOAD": str(library)})
+
+    def test_inodes_beyond_32_bits(self):
+        compiler = shutil.which("cc") or shutil.which("gcc")
+        if not compiler:
+            self.skipTest("no C compiler")
+        source, library = self.folder / "inodes.c", self.folder / "inodes.so"
+        source.write_text(INODES)
+        subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True)
+        environment = {"LD_PRELOAD": str(library)}
+        seen = subprocess.run(["stat", "-c", "%i", source, library], capture_output=True, text=True, env={**os.environ, **environment}, check=True)
+        numbers = [int(number) for number in seen.stdout.split()]
+        self.assertEqual([number & 0xffffffff for number in numbers], [7, 7], "the library is not in use")
+        self.assertNotEqual(*numbers)
+        folder = self.folder / "inodes"
+        folder.mkdir()
+        self.expect_same(folder, environment)
+        # A file in the place of another, of the same size and time: what is kept for the first is not taken for it.
+        run = lambda *words: subprocess.run([PROGRAM, *words], cwd=folder, capture_output=True, text=True, check=True,
+                                            env={**os.environ, **environment, "XDG_CACHE_HOME": str(folder / "kept")})
+        draw = lambda to: (run("render", "same.vtk", "-o", to, "--size", "48x32", "--range", "0,30"), (folder / to).read_bytes())[1]
+        pictures = []
+        for name, value in (("a", "1"), ("b", "9")):
+            values = " ".join(str((n % 10) * int(value) % 30) for n in range(1000))
+            (folder / name).write_text("# vtk DataFile Version 3.0\na\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 10 10 10\nORIGIN 0 0 0\n"
+                                       f"SPACING 1 1 1\nPOINT_DATA 1000\nSCALARS p float 1\nLOOKUP_TABLE default\n{values:<4000}\n")
+            os.utime(folder / name, (1e9, 1e9))
+        self.assertEqual((folder / "a").stat().st_size, (folder / "b").stat().st_size)
+        for name in ("a", "b"):
+            (folder / name).rename(folder / "same.vtk")
+            pictures.append(draw(f"{name}.png"))
+        self.assertNotEqual(*pictures)
 
     def network(self):
         compiler = shutil.which("cc") or shutil.which("gcc")

@@ -285,6 +285,14 @@ class Xdmf(StructuredFormats):
         self.expect_same([path], [a, b])
         self.assertIn("1 of 2 grids have no attribute p", self.run_program("info", path).stdout)
 
+    def test_values_that_are_not_finite(self):
+        block = Block()
+        block.p[2, 1, 3], block.p[0, 0, 0], block.p[1, 4, 6] = np.nan, np.inf, -np.inf
+        for kind in ("HDF", "Binary"):
+            path = self.write(grid(self.new(kind), block))
+            self.expect_same([path], [block])
+            self.assertEqual(self.info(path)["blanked"]["not_finite"], 3)
+
     def test_what_is_refused(self):
         block = Block()
         writer = self.new()

@@ -74,6 +74,25 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("a.inp", "an Abaqus mesh");
   write("a.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n8\n");
   expectNamed("a.mesh", "a Medit mesh");
+  for (const char* text :
+       {"$ a comment\nSOL 101\nCEND\nBEGIN BULK\nGRID,1,,0.,0.,0.\n", "CEND\nBEGIN BULK\n",
+        "begin bulk\nGRID*                  1\n", "$ meshio\nGRID, 1,, 0.0, 0.0, 0.0\nCTETRA,1,,1,2,3,4\n"}) {
+    write("a.bdf", text);
+    expectNamed("a.bdf", "a Nastran mesh");
+  }
+  write("b.inp", "# by AVS\n4 1 0 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n1 0 tet 1 2 3 4\n");
+  expectNamed("b.inp", "an AVS UCD mesh");
+}
+
+TEST_F(ForeignFormats, FoldersOfZarrAreNamed) {
+  for (const char* mark : {".zgroup", ".zarray", ".zmetadata", "zarr.json"}) {
+    const std::filesystem::path store = folder_ / (std::string(mark) + ".zarr");
+    std::filesystem::create_directory(store);
+    std::ofstream(store / mark) << "{}";
+    expectNamed(store.filename().c_str(), "a Zarr store, which is not read (");
+  }
+  std::filesystem::create_directory(folder_ / "folder");
+  expectNamed("folder", "a directory; expected");
 }
 
 TEST_F(ForeignFormats, TextsOfNumbersAreStillTriedAsPlot3d) {

@@ -1,11 +1,14 @@
 // Writing a cache and reading it again; what an unfinished, overwritten or damaged one does.
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <filesystem>
 
 #include "stream/base/error.h"
 #include "stream/cache/cache_format.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+#include "stream/cache/partial_folder.h"
 #include "tests/stream/test_bricks.h"
 #include "tests/support/faulty_system_calls.h"
 
@@ -225,6 +228,38 @@ TEST(Cache, AForeignFolderBesideAMarkedCacheIsRefused) {
   overwriteFile(partial / "precious", "mine");
   EXPECT_PRED2(says, errorOf([&] { SmallCache().write(target, true); }), "was not made by curvisplat");
   EXPECT_EQ(bytesOfFile(partial / "precious"), "mine");
+}
+
+/// Removing a file called lock fails.
+class KeptLocks : public SystemCalls {
+ public:
+  int kept = 0;
+  int remove(const char* path) override {
+    if (fs::path(path).filename() != "lock") return SystemCalls::remove(path);
+    ++kept;
+    errno = EACCES;
+    return -1;
+  }
+};
+
+TEST(Cache, ALockThatCannotBeRemovedHarmsNothingAndGoesWithTheNext) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  {
+    KeptLocks calls;
+    const ScopedSystemCalls scope(calls);
+    SmallCache().write(path);
+    EXPECT_EQ(calls.kept, 1);
+  }
+  EXPECT_TRUE(fs::exists(path / "lock"));
+  EXPECT_FALSE(hasUnfinished(path));
+  EXPECT_EQ(CacheReader(path).bricks().size(), 10u);
+  EXPECT_TRUE(verifyCache(CacheReader(path)).findings.empty());
+  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(path); }), "exists already");
+  SmallCache().write(path, true);
+  EXPECT_EQ(CacheReader(path).bricks().size(), 10u);
+  EXPECT_FALSE(fs::exists(path / "lock"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST(Cache, AConversionKilledBeforeItIsMarkedDoesNotBlockTheNext) {

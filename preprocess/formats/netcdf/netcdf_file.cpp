@@ -96,10 +96,20 @@ NetcdfFile::~NetcdfFile() {
 }
 
 void NetcdfFile::release() const {
-  if (path_.parent_path().extension() == ".unpacked") return;  // its name goes (unpacked_file.h)
   const QuietHdf5 quiet;
+  // Its name goes (unpacked_file.h): it stays open, without what its variables' caches hold.
+  if (path_.parent_path().extension() == ".unpacked") return emptyCaches();
   if (file_ >= 0) nc_close(file_);
   file_ = -1;
+}
+
+void NetcdfFile::emptyCaches() const {
+  if (file_ < 0 || kind_ != kNetcdf4) return;
+  int count = 0;
+  if (nc_inq_nvars(file_, &count) != NC_NOERR) return;
+  // Sets what is set: the library closes the data set, which frees its chunks, and opens it again.
+  for (int id = 0; id < count; ++id)
+    nc_set_var_chunk_cache(file_, id, kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
 }
 
 int NetcdfFile::opened() const {

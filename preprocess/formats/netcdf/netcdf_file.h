@@ -62,6 +62,7 @@ class NetcdfFile {
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
   /// Closes the file until the next call that needs it, which opens it again: an open NetCDF-4 file keeps some MiB.
+  /// A file that was unpacked, whose name has gone, stays open and frees what its variables' caches hold.
   void release() const;
 
   /// The characters of a variable of text (NC_CHAR); empty if it is not one or has more than 16 MiB.
@@ -74,6 +75,7 @@ class NetcdfFile {
   [[noreturn]] void fail(const std::string& place, int status) const;
   /// Opens the file again if it was released; dataLibraryMutex() must be held. Throws Error if it is another by now.
   int opened() const;
+  void emptyCaches() const;
   void readHeader();
   void readGroups();
   void readVariable(int id);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <vector>
 
 namespace curvisplat {
 namespace {
@@ -52,6 +53,57 @@ constexpr Magic kMagics[] = {
     {"PK\x03\x04"sv, "a zip archive (extract it first)"},
 };
 
+/// The next line of `text` that is not empty and does not begin with `comment`, without its blanks at both ends.
+std::string_view nextLine(std::string_view& text, char comment) {
+  while (!text.empty()) {
+    const size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
+    line = line.substr(0, line.find_last_not_of(" \t\r") + 1);
+    if (!line.empty() && line.front() != comment) return line;
+  }
+  return {};
+}
+
+/// Executive control, case control or the bulk data alone, in lower case.
+bool isNastran(std::string_view begin) {
+  const std::string_view line = nextLine(begin, '$');
+  if (line == "cend" || line == "begin bulk") return true;
+  const auto is_card = [&](std::string_view name) {
+    return line.starts_with(name) && line.size() > name.size() &&
+           std::string_view(" ,*\t").find(line[name.size()]) != std::string_view::npos;
+  };
+  return (line.starts_with("sol ") && begin.find("cend") != std::string_view::npos) || is_card("grid") ||
+         is_card("ctetra") || is_card("chexa") || is_card("cpenta");
+}
+
+/// Five counts, of which the fourth and the fifth may be 0, then the first node: its number and x, y, z.
+bool isAvsUcd(std::string_view begin) {
+  const auto words = [](std::string_view line) {
+    std::vector<std::string_view> found;
+    while (!line.empty()) {
+      const size_t end = std::min(line.find_first_of(" \t"), line.size());
+      found.push_back(line.substr(0, end));
+      line.remove_prefix(std::min(line.find_first_not_of(" \t", end), line.size()));
+    }
+    return found;
+  };
+  const std::vector<std::string_view> counts = words(nextLine(begin, '#'));
+  const bool are_counts = counts.size() == 5 && std::ranges::all_of(counts, [](std::string_view count) {
+                            return count.find_first_not_of("0123456789") == std::string_view::npos;
+                          });
+  if (!are_counts || counts.front() == "1") return false;  // "1 ..." may be a PLOT3D file of one block
+  if (words(nextLine(begin, '#')).size() != 4) return false;
+  for (std::string_view rest = begin; !rest.empty();) {
+    const std::vector<std::string_view> line = words(nextLine(rest, '#'));
+    if (line.size() > 2)
+      for (const std::string_view kind : {"tet", "hex", "prism", "pyr", "tri", "quad", "line", "pt"})
+        if (line[2] == kind) return true;
+  }
+  return false;
+}
+
 /// The formats that are text, by the words that they begin with. `begin`: the first bytes of the file.
 std::optional<std::string> foreignText(std::string begin) {
   if (std::any_of(begin.begin(), begin.end(), [](char c) { return c == '\0'; })) return std::nullopt;
@@ -62,6 +114,8 @@ std::optional<std::string> foreignText(std::string begin) {
     return "an Abaqus mesh, which is not read (meshio convert FILE mesh.vtu)";
   if (begin.starts_with("meshversionformatted"))
     return "a Medit mesh, which is not read (meshio convert FILE mesh.vtu)";
+  if (isNastran(begin)) return "a Nastran mesh, which is not read (meshio convert FILE mesh.vtu)";
+  if (isAvsUcd(begin)) return "an AVS UCD mesh, which is not read (meshio convert FILE mesh.vtu)";
   return std::nullopt;
 }
 
@@ -75,6 +129,14 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
   // The first four bytes of an ADF file differ between versions.
   if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
   return foreignText(std::move(begin));
+}
+
+std::optional<std::string> foreignFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (const char* mark : {".zgroup", ".zarray", ".zmetadata", "zarr.json"})
+    if (std::filesystem::is_regular_file(folder / mark, error))
+      return "a Zarr store, which is not read (save it as NetCDF, with xarray's to_netcdf)";
+  return std::nullopt;
 }
 
 }  // namespace curvisplat

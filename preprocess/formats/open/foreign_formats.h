@@ -2,6 +2,7 @@
 // that are NetCDF or HDF5 inside are recognised in formats/netcdf/foreign_netcdf.h.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -11,5 +12,8 @@ namespace curvisplat {
 
 /// "compressed with gzip (decompress it first)", "an XDMF file"; nullopt for a file that may be PLOT3D.
 std::optional<std::string> foreignFormat(const InputFile& file);
+
+/// The same of a folder: "a Zarr store, ..."; nullopt for others, and for what is not a folder.
+std::optional<std::string> foreignFolder(const std::filesystem::path& folder);
 
 }  // namespace curvisplat

@@ -75,6 +75,8 @@ constexpr GridFormat kFormats[] = {
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
+  if (const auto format = foreignFolder(path))
+    throw Error("{}: is {}; expected {}", path.string(), *format, expected);
   std::error_code none_there;
   if (std::filesystem::is_directory(path, none_there))
     throw Error("{}: is a directory; expected {}", path.string(), expected);
@@ -174,7 +176,7 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
 }
 
 bool isGridFolder(const std::filesystem::path& path) {
-  return isFoamCase(path);
+  return isFoamCase(path) || foreignFolder(path);
 }
 
 std::unique_ptr<GridSource> requireGrid(std::unique_ptr<DataSource> source, const char* cannot) {

@@ -14,7 +14,7 @@ namespace curvisplat {
 /// A GridSource or a MeshSource. Throws Error with the file, and with what was expected and found.
 std::unique_ptr<DataSource> openData(const OpenGridOptions& options);
 
-/// Whether openData() opens this folder: an OpenFOAM case.
+/// Whether openData() opens this folder, an OpenFOAM case, or refuses it by its format's name (foreign_formats.h).
 bool isGridFolder(const std::filesystem::path& path);
 
 /// As openData(), for a structured grid: throws Error for an unstructured one.

@@ -1,0 +1,92 @@
+#!/usr/bin/python3
+"""early_signals_test.py CURVISPLAT
+
+Signals before there is anything to show: in the first tenth of a second of each command, and while `info` reads a sparse grid of
+192 GB, which shows how far it has come.
+"""
+import os
+import pathlib
+import pty
+import select
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
+MOST_SECONDS = 240  # until the machine counts as stuck
+
+
+class EarlySignals(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory(prefix="curvisplat_signals_")
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        (self.folder / "temporary").mkdir()
+        self.environment = {**os.environ, "TMPDIR": str(self.folder / "temporary"), "XDG_CACHE_HOME": str(self.folder / "kept")}
+
+    def run_program(self, *words):
+        return subprocess.run([PROGRAM, *words], cwd=self.folder, env=self.environment, capture_output=True, text=True, check=True)
+
+    def files(self):
+        """All files but those that are kept for the next run."""
+        return sorted(str(path.relative_to(self.folder)) for path in self.folder.rglob("*") if "kept" not in path.parts)
+
+    def test_info_of_a_sparse_grid_shows_its_progress_and_can_be_stopped(self):
+        side = 2000
+        with (self.folder / "sparse.xyz").open("wb") as file:
+            file.write(struct.pack("<3i", side, side, side))
+            try:
+                file.truncate(12 + 24 * side**3)
+            except OSError as error:
+                self.skipTest(f"no sparse file of 192 GB here: {error}")
+        before = self.files()
+        ours, theirs = pty.openpty()
+        self.addCleanup(os.close, ours)
+        program = subprocess.Popen([PROGRAM, "info", "sparse.xyz"], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
+                                   stderr=theirs, text=True)
+        os.close(theirs)
+        self.addCleanup(program.stdout.close)
+        self.addCleanup(program.kill)
+        shown = b""
+        while not (b"reading" in shown and b"s left" in shown):
+            self.assertTrue(select.select([ours], [], [], MOST_SECONDS)[0], f"shows nothing: {shown}")
+            shown += os.read(ours, 4096)
+        program.send_signal(signal.SIGINT)
+        self.assertIn(program.wait(MOST_SECONDS), (-signal.SIGINT, 128 + signal.SIGINT))
+        self.assertEqual(self.files(), before)
+
+    def test_a_signal_as_early_as_it_may_come_leaves_nothing(self):
+        """Until the work has begun the system ends the program; from then on the program ends in order. A shell sees one status."""
+        self.run_program("generate", "o-grid", "--size", "40x30x20", "-o", "o")
+        self.run_program("convert", "o.xyz", "o.fun", "-o", "whole.splats")
+        before = self.files()
+        commands = (["convert", "o.xyz", "o.fun", "-o", "new.splats"], ["render", "whole.splats", "-o", "new.png", "--size", "64x48"],
+                    ["info", "o.xyz", "o.fun"])
+        ended_early = 0
+        for command in commands:
+            for milliseconds in (0, 1, 2, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100):
+                for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+                    with self.subTest(" ".join(command), milliseconds=milliseconds, signal=number.name):
+                        program = subprocess.Popen([PROGRAM, *command], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
+                                                   stderr=subprocess.PIPE, text=True)
+                        time.sleep(milliseconds / 1000)
+                        program.send_signal(number)
+                        message = program.communicate(timeout=MOST_SECONDS)[1]
+                        if program.returncode == 0:
+                            continue  # it was done by then
+                        self.assertIn(program.returncode, (-number, 128 + number), message)
+                        self.assertLessEqual(message.count("curvisplat: "), 1 if program.returncode > 0 else 0, message)
+                        ended_early += 1
+                        self.assertEqual(self.files(), before)
+            for path in ("new.splats", "new.png"):
+                subprocess.run(["rm", "-rf", self.folder / path], check=True)
+        print(f"{ended_early} runs ended by a signal", flush=True)
+        self.assertGreater(ended_early, 10)
+
+
+if __name__ == "__main__":
+    unittest.main()
