@@ -309,6 +309,7 @@ void CacheView::run(Command command) {
       copies_movie_ = command == Command::kCopyMovieCommand;
       return;
     case Command::kUndo:
+      history_.record(state_);  // a movement that has not come to rest is undone as a whole
       return restore(history_.undo());
     case Command::kRedo:
       return restore(history_.redo());
@@ -363,7 +364,7 @@ void CacheView::run(Command command) {
 bool CacheView::isEnabled(Command command) const {
   switch (command) {
     case Command::kUndo:
-      return history_.canUndo();
+      return history_.canUndo() || !rests_;
     case Command::kRedo:
       return history_.canRedo();
     case Command::kPlay:
