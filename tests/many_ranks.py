@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Converts and draws by 2, 3, 4, 7 and 16 ranks on this machine, and compares every byte with what one process makes.
+"""Converts, adds a scalar and draws by 2, 3, 4, 7 and 16 ranks on this machine, and compares every byte with what one process makes.
 
     many_ranks.py PROGRAM [--ranks 2 3 4 7 16] [--size 160x120x60] [--folder /tmp]
 
@@ -81,6 +81,29 @@ class Jobs:
         for path in paths:
             shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
 
+    def compare_addition(self, what, count, words, cache):
+        """Adds to copies of `cache`; `words` without --to."""
+        wanted, found = self.folder / "added_one.splats", self.folder / "added_ranks.splats"
+        if what not in self.expected:
+            shutil.copytree(cache, wanted)
+            result = self.run(*words, "--to", wanted)
+            if result.returncode:
+                sys.exit(f"{what}: one process fails: {result.stderr}")
+            self.expected[what] = digests(wanted)
+        shutil.copytree(cache, found)
+        result, peaks = self.run_ranks(count, *words, "--to", found)
+        fault = ""
+        if result.returncode:
+            fault = f"FAILS: {result.stderr.strip()}"
+        elif digests(found) != self.expected[what]:
+            fault = "DIFFERENT"
+        elif list(self.folder.glob("added_ranks.splats?*")):
+            fault = "SOMETHING IS LEFT"
+        elif len(peaks) != count or max(peaks) > MEMORY_MIB:
+            fault = f"MEMORY: {peaks} MiB, {MEMORY_MIB} allowed"
+        self.tell(what, count, fault, max(peaks, default=0))
+        shutil.rmtree(found)
+
     def compare_parts(self, what, count, words):
         output = self.folder / "joined.splats"
         faults = ""
@@ -125,6 +148,8 @@ def main():
         for count in arguments.ranks:
             for grid in ("one", "tiny"):
                 jobs.compare(f"convert {grid}", count, ["convert", folder / f"{grid}.xyz", folder / f"{grid}.fun", *limits], ".splats")
+            jobs.compare_addition("add a scalar", count, ["convert", folder / "one.xyz", folder / "one.fun", "--add-scalar", "volume", *limits],
+                                  folder / "drawn.splats")
             for grid, files in series.items():
                 words = ["convert", *files, *limits]
                 jobs.compare(f"series {grid}", count, words, ".splats")

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "preprocess/addition/addition_checks.h"
+#include "preprocess/addition/addition_workspace.h"
 #include "preprocess/addition/cache_grid.h"
 #include "preprocess/addition/drawn_mesh.h"
 #include "preprocess/addition/further_faces.h"
@@ -18,11 +19,10 @@
 #include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
-#include "preprocess/convert/scratch_folder.h"
+#include "preprocess/convert/shared_passes.h"
 #include "stream/base/error.h"
 #include "stream/base/freed_memory.h"
 #include "stream/base/paths.h"
-#include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/variable_writer.h"
@@ -57,10 +57,10 @@ class Addition {
       : options_(options),
         plan_(plan),
         progress_(progress),
-        lock_(options.cache),
+        ranks_(options.ranks),
+        workspace_(options.cache, temporaryFolder(options), ranks_),
         cache_(options.cache),
-        description_(source.description()),
-        scratch_(newScratch(options.cache, temporaryFolder(options)), ScratchFolder::Folder::kMake) {
+        description_(source.description()) {
     for (const uint32_t scalar : options.scalars)
       report_.scalars.push_back(source.description().scalars[scalar].name);
     report_.nodes = manifest().nodes;
@@ -76,11 +76,12 @@ class Addition {
     } else {
       grid_ = std::make_unique<CacheGrid>(dynamic_cast<const GridSource&>(source));
       reader_ = std::make_unique<NodeReader>(*grid_, options.scalars, options.blank_value);
+      if (ranks_) plan_.slab_bytes = slabBytesOfRanks(*reader_, plan_.slab_bytes, *ranks_);
     }
     checkCentring();
     checkBlocks(mesh_ ? origin_->blocks() : description_.blocks, cache_);
     checkNames(report_.scalars, cache_);
-    if (options.check_disk_space)
+    if (options.check_disk_space && isFirst())
       checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
                                        minValueRecordBytes(options.scalars.size())),
                      options.cache, temporaryFolder(options));
@@ -88,7 +89,7 @@ class Addition {
 
   AddScalarReport run() {
     scan();
-    pass("scatter", manifest().nodes, "nodes", &Addition::scatter);
+    pass("scatter", nodesOfRank(), "nodes", &Addition::scatter);
     pass("seams", 0, "nodes", &Addition::mergeSeams);
     pass("build", manifest().splats, "splats", &Addition::build);
     pass("faces", manifest().nodes, "nodes", &Addition::writeFaces);
@@ -106,7 +107,7 @@ class Addition {
   }
 
   void scan() {
-    pass("scan", manifest().nodes, "nodes", &Addition::survey);
+    pass("scan", nodesOfRank(), "nodes", &Addition::survey);
     if (survey_.blanked.by_grid < manifest().blanked_nodes) {
       if (manifest().overlap == kOverlapOwner)
         throw Error(
@@ -117,26 +118,37 @@ class Addition {
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
       if (grid_ && manifest().splats < manifest().nodes - manifest().blanked_nodes)
         pass("merged nodes", manifest().nodes, "nodes", &Addition::findMergedNodes);
-      pass("scan again", manifest().nodes, "nodes", &Addition::survey);
+      pass("scan again", nodesOfRank(), "nodes", &Addition::survey);
     }
-    checkSurvey();
+    if (isFirst()) checkSurvey();
   }
 
+  bool isFirst() const { return !ranks_ || ranks_->isFirst(); }
+  /// Of a pass that ranks share.
+  uint64_t nodesOfRank() const { return manifest().nodes / (ranks_ ? ranks_->count() : 1); }
+
   void survey() {
-    survey_ = mesh_ ? origin_->survey(progress_) : surveyGrid(*reader_, plan_.slab_bytes, nullptr, progress_);
+    if (grid_) {
+      survey_ = surveyGrid(*reader_, plan_.slab_bytes, nullptr, progress_, ranks_);
+      return;
+    }
+    if (isFirst()) survey_ = origin_->survey(progress_);
+    if (ranks_) survey_ = broadcastSurvey(survey_, *ranks_);
   }
   void newOrigin() {
     origin_ =
-        std::make_unique<MeshOrigin>(*mesh_, options_.scalars, options_.blank_value, plan_, scratch_.path());
+        std::make_unique<MeshOrigin>(*mesh_, options_.scalars, options_.blank_value, plan_, workspace_.own());
   }
 
-  void findMergedNodes() {
-    grid_->addMergedFaces(plan_, unlikeHalvesOf(manifest()), scratch_.path(), progress_);
-  }
+  // Each rank finds these nodes for itself: it asks for them where it reads its share.
   void findDrawnNodes() {
-    if (grid_) return grid_->restrictTo(cache_, plan_, scratch_.path(), progress_);
-    mesh_->restrictTo(cache_, plan_, scratch_.path(), progress_);
+    if (grid_) return grid_->restrictTo(cache_, plan_, workspace_.own(), progress_);
+    if (!isFirst()) return;  // it makes all splats
+    mesh_->restrictTo(cache_, plan_, workspace_.own(), progress_);
     newOrigin();
+  }
+  void findMergedNodes() {
+    grid_->addMergedFaces(plan_, unlikeHalvesOf(manifest()), workspace_.own(), progress_);
   }
 
   void checkSurvey() const {
@@ -181,11 +193,13 @@ class Addition {
   }
 
   void scatter() {
-    writer_ = std::make_unique<VariableWriter>(lock_, manifest(), this->variables());
+    if (isFirst())
+      writer_ = std::make_unique<VariableWriter>(workspace_.lock(), manifest(), this->variables());
     passes_ =
-        std::make_unique<ValuePasses>(cache_, options_.scalars.size(), plan_, scratch_.path(), progress_);
+        std::make_unique<ValuePasses>(cache_, options_.scalars.size(), plan_, workspace_.own(), progress_);
+    if (ranks_) passes_->shareWith(*ranks_, workspace_.shared());
     if (mesh_) return passes_->scatter(*origin_);
-    passes_->setOverlaps(overlapsFor(manifest(), *grid_, plan_.slab_bytes, progress_));
+    passes_->setOverlaps(overlapsFor(manifest(), *grid_, plan_.slab_bytes, progress_, ranks_));
     passes_->scatter(*reader_);
   }
 
@@ -195,20 +209,23 @@ class Addition {
   }
 
   void build() {
-    passes_->build(*writer_);
+    if (isFirst()) passes_->build(*writer_);
     passes_.reset();
   }
 
   void writeFaces() {
-    if (mesh_) return;
+    if (mesh_ || !isFirst()) return;
     const std::vector<uint32_t> numbers = writer_->numbers();
-    const FurtherFaces job{cache_, *reader_, scratch_.path(), facesFileOfVariable(numbers.front()), numbers};
+    const FurtherFaces job{cache_, *reader_, workspace_.own(), facesFileOfVariable(numbers.front()), numbers};
     if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer_->addFile(*file);
   }
 
   void finish() {
-    for (const FileInfo& file : writer_->finish(description_.files))
-      report_.files.push_back({file.name, file.size});
+    if (ranks_) ranks_->barrier();  // where another has failed, the cache stays as it is
+    if (isFirst())
+      for (const FileInfo& file : writer_->finish(description_.files))
+        report_.files.push_back({file.name, file.size});
+    if (ranks_) ranks_->barrier();
   }
 
   std::vector<VariableInfo> variables() const {
@@ -223,12 +240,12 @@ class Addition {
   const Manifest& manifest() const { return cache_.manifest(); }
 
   const AddScalarOptions& options_;
-  const MemoryPlan plan_;
+  MemoryPlan plan_;
   Progress& progress_;
-  const CacheLock lock_;  // before the cache is read
+  Ranks* const ranks_;                 // null: this process alone
+  const AdditionWorkspace workspace_;  // before the cache is read, and before what has files in its folder
   const CacheReader cache_;
   const GridDescription& description_;
-  const ScratchFolder scratch_;  // before what has files in it
   // Of a structured grid, or of an unstructured one.
   std::unique_ptr<CacheGrid> grid_;
   std::unique_ptr<NodeReader> reader_;
@@ -242,16 +259,23 @@ class Addition {
 
 }  // namespace
 
-AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& options, Progress& progress) {
+AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& given_options,
+                           Progress& progress) {
+  AddScalarOptions options = given_options;
+  if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (const auto* const grid = dynamic_cast<const GridSource*>(&source))
     GridOrigin::requireMemory(*grid, options.scalars, plan);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
   if (options.most_buckets) plan.most_buckets = *options.most_buckets;
 
-  checkWritable(options.cache, "; name a splat cache that you may change");
-  checkWritable(temporaryFolder(options), "; name another folder with --tmp");
-  ConversionWorkspace::clearKilled(options.cache);
+  if (options.ranks) plan = commonPlan(plan, *options.ranks);
+
+  if (!options.ranks || options.ranks->isFirst()) {
+    checkWritable(options.cache, "; name a splat cache that you may change");
+    checkWritable(temporaryFolder(options), "; name another folder with --tmp");
+    ConversionWorkspace::clearKilled(options.cache);
+  }
 
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
   AddScalarReport report = Addition(source, options, plan, progress).run();

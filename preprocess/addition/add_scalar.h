@@ -12,6 +12,7 @@
 #include "preprocess/convert/convert.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/progress.h"
+#include "stream/base/ranks.h"
 
 namespace curvisplat {
 
@@ -23,6 +24,10 @@ struct AddScalarOptions {
   unsigned threads = 0;                    // 0: as many as the machine has
   bool check_disk_space = true;            // before the work
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
+
+  /// Processes that add together: each has the same source and options, and calls addScalars(). Rank 0 alone changes the
+  /// cache, and its report counts. Null: this process alone.
+  Ranks* ranks = nullptr;
 
   /// Smaller buckets than memory would allow, and fewer of them in a file: for tests.
   std::optional<uint64_t> bucket_splats;

@@ -79,9 +79,12 @@ void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache) {
 }
 
 std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid, uint64_t slab_bytes,
-                                      const Progress& progress) {
+                                      const Progress& progress, Ranks* ranks) {
   if (cache.overlap != kOverlapOwner) return {};
-  return findOverlaps(grid, slab_bytes, progress);
+  if (!ranks) return findOverlaps(grid, slab_bytes, progress);
+  std::vector<BlockOverlap> overlaps;
+  if (ranks->isFirst()) overlaps = findOverlaps(grid, slab_bytes, progress);
+  return fromBytes<BlockOverlap>(ranks->broadcast(toBytes(overlaps)));
 }
 
 std::filesystem::path newScratch(const std::filesystem::path& cache, const std::filesystem::path& folder) {

@@ -8,6 +8,7 @@
 #include "preprocess/addition/build_values.h"
 #include "preprocess/addition/cache_grid.h"
 #include "preprocess/convert/scatter.h"
+#include "preprocess/convert/shared_passes.h"
 #include "stream/cache/cell_octants.h"
 
 namespace curvisplat {
@@ -19,17 +20,38 @@ ValuePasses::ValuePasses(const CacheReader& cache, size_t variables, const Memor
       plan_(plan),
       scratch_(std::move(scratch)),
       progress_(&progress),
+      shared_(scratch_),
       order_(cache),
       buckets_(cache.bricks(), order_, variables, plan.bucket_bytes),
       grouped_(ValueLoader::grouping(buckets_.size(), plan)) {}
 
+void ValuePasses::shareWith(Ranks& ranks, std::filesystem::path shared) {
+  ranks_ = &ranks;
+  shared_ = std::move(shared);
+}
+
+std::filesystem::path ValuePasses::fileOf(unsigned rank) const {
+  return shared_ / fmt::format("values.{}.bin", rank);
+}
+
 void ValuePasses::openFile() {
   const uint32_t numbers = (buckets_.size() + grouped_ - 1) / grouped_;
-  file_ = std::make_unique<BucketFile>(scratch_ / "values.bin", numbers, plan_.chunkBytes(numbers));
+  file_ =
+      std::make_unique<BucketFile>(fileOf(ranks_ ? ranks_->rank() : 0), numbers, plan_.chunkBytes(numbers));
+}
+
+/// At rank 0 the file has all ranks' records then.
+void ValuePasses::joinFiles() {
+  const std::vector<BucketChains> others = gatherChains(file_->chains(), *ranks_);
+  for (size_t n = 0; n < others.size(); ++n) file_->join(fileOf(static_cast<unsigned>(n + 1)), others[n]);
+  if (isFirst()) return;
+  file_->leave();  // for rank 0
+  file_.reset();
 }
 
 void ValuePasses::scatter(SplatOrigin& origin) {
   openFile();
+  if (!isFirst()) return;
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
   origin.scatter([&]() -> SplatSink& { return sinks.local(); }, *progress_);
   ValueSink last = newSink();
@@ -49,6 +71,7 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
   if (!overlaps_.empty()) owners.emplace(ownersReader(reader, true), overlaps_, plan_.owner_bytes);
   SlabPass pass(*progress_, std::move(see));
   pass.owners = owners ? &*owners : nullptr;
+  pass.ranks = ranks_;
   pass.octants = cache_->manifest().hasFeature(kCellOctants);
   streamSplats(
       reader, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, pass);
@@ -56,17 +79,19 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
 }
 
 void ValuePasses::mergeSeams() {
-  if (seams_) {
+  if (seams_ && ranks_) seams_->sendToFirst(*ranks_);
+  if (seams_ && isFirst()) {
     ValueSink sink = newSink();
     seams_->finish(coordinate_bytes_, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
       sink.add(splat, values);
       progress_->advance(1);
     });
     sink.flush();
-    seams_.reset();
   }
-  file_->close();
-  temporary_bytes_ = file_->size();
+  seams_.reset();
+  file_->close(ranks_ != nullptr);
+  if (ranks_) joinFiles();
+  if (file_) temporary_bytes_ = file_->size();
 }
 
 void ValuePasses::build(ValuesWriter& writer, const StepReferences* references) {

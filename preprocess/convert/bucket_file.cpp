@@ -215,7 +215,7 @@ struct BucketFile::State {
   /// What is in the file at `offset` must be as it was written.
   void require(bool condition, uint64_t offset) const {
     if (!condition)
-      throw LostBuckets("{}: is damaged at byte {}; convert the grid again", path.string(), offset);
+      throw LostBuckets("{}: is damaged at byte {}; run the same command again", path.string(), offset);
   }
 };
 
@@ -225,7 +225,7 @@ BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size
 BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
     : state_(std::make_unique<State>(path, chains)) {
   if (!std::filesystem::exists(path))
-    throw LostBuckets("{}: was removed during the conversion; convert the grid again", path.string());
+    throw LostBuckets("{}: was removed meanwhile; run the same command again", path.string());
   state_->input.emplace(path, Caching::kDirect);
   state_->require(state_->input->size() >= chains.size, state_->input->size());
 }

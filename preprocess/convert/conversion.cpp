@@ -19,6 +19,7 @@
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/scattered_splats.h"
 #include "preprocess/convert/shared_build.h"
+#include "preprocess/convert/shared_folder.h"
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/convert/splat_record.h"
@@ -152,19 +153,9 @@ class Conversion {
     }
     own_scratch_ = scratch_;
     if (!ranks_) return;
-    const std::string names = scratch_.string() + '\n' + partial_.string();
-    const auto sent =
-        fromBytes<char>(ranks_->broadcast(toBytes(std::vector<char>(names.begin(), names.end()))));
-    const auto end = std::find(sent.begin(), sent.end(), '\n');
-    scratch_ = std::string(sent.begin(), end);
-    partial_ = std::string(end + 1, sent.end());
-    for (const std::filesystem::path& folder : {scratch_, partial_})
-      if (!std::filesystem::is_directory(folder))
-        throw Error("{}: does not exist here; several ranks need a file system that they share",
-                    folder.string());
-    own_scratch_ = scratch_ / fmt::format("rank{}", rank());
-    removeAll(own_scratch_);
-    makeFolder(own_scratch_);
+    scratch_ = sharedFolder(scratch_, *ranks_);
+    partial_ = sharedFolder(partial_, *ranks_);
+    own_scratch_ = makeFolderOfRank(scratch_, rank());
   }
 
   /// Whether an interrupted conversion has left splats that are all there.

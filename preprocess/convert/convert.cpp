@@ -9,6 +9,7 @@
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/preflight.h"
+#include "preprocess/convert/shared_passes.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
@@ -66,6 +67,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given_opti
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.owner_bytes) plan.owner_bytes = *options.owner_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
+  if (options.ranks) plan = commonPlan(plan, *options.ranks);
 
   if (!grid) {
     if (!options.planes.empty())

@@ -46,16 +46,9 @@ uint64_t GridOrigin::smallSlabBytes() const {
   return std::min(plan_.slab_bytes, std::max(kBytes, leastSlabBytes(blocks(), reader_.scalars(), kNoHalo)));
 }
 
-/// Makes the slabs small enough for every rank to get about eight.
 bool GridOrigin::shareWith(Ranks& ranks) {
-  constexpr uint64_t kSlabsOfRank = 8;
   ranks_ = &ranks;
-  uint64_t nodes = 0;
-  for (const GridBlock& block : blocks()) nodes += block.nodes();
-  const uint64_t share = nodes * slabBytesPerNode(reader_.scalars()) / (kSlabsOfRank * ranks.count());
-  const Halo halo = centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo;
-  plan_.slab_bytes =
-      std::min(plan_.slab_bytes, std::max(share, leastSlabBytes(blocks(), reader_.scalars(), halo)));
+  plan_.slab_bytes = slabBytesOfRanks(reader_, plan_.slab_bytes, ranks);
   return true;
 }
 

@@ -1,7 +1,11 @@
 #include "preprocess/convert/shared_passes.h"
 
+#include <algorithm>
 #include <bit>
 #include <utility>
+
+#include "preprocess/splats/cell_splats.h"
+#include "preprocess/splats/node_splats.h"
 
 namespace curvisplat {
 namespace {
@@ -38,6 +42,31 @@ GridSurvey unpackSurvey(const Ranks::Bytes& bytes) {
 }
 
 }  // namespace
+
+uint64_t slabBytesOfRanks(const NodeReader& reader, uint64_t slab_bytes, const Ranks& ranks) {
+  constexpr uint64_t kSlabsOfRank = 8;
+  const std::vector<GridBlock>& blocks = reader.source().description().blocks;
+  uint64_t nodes = 0;
+  for (const GridBlock& block : blocks) nodes += block.nodes();
+  const uint64_t share = nodes * slabBytesPerNode(reader.scalars()) / (kSlabsOfRank * ranks.count());
+  const Halo halo = reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo;
+  return std::min(slab_bytes, std::max(share, leastSlabBytes(blocks, reader.scalars(), halo)));
+}
+
+MemoryPlan commonPlan(MemoryPlan plan, Ranks& ranks) {
+  const std::vector<MemoryPlan> own{plan};
+  Ranks::Bytes plans;
+  for (const Ranks::Bytes& one : ranks.gather(toBytes(own)))
+    plans.insert(plans.end(), one.begin(), one.end());
+  for (const MemoryPlan& other : fromBytes<MemoryPlan>(ranks.broadcast(std::move(plans)))) {
+    for (auto bytes : {&MemoryPlan::slab_bytes, &MemoryPlan::counting_bytes, &MemoryPlan::seam_bytes,
+                       &MemoryPlan::owner_bytes, &MemoryPlan::mesh_bytes, &MemoryPlan::chunk_buffer_bytes,
+                       &MemoryPlan::bucket_splats, &MemoryPlan::bucket_bytes})
+      plan.*bytes = std::min(plan.*bytes, other.*bytes);
+    plan.most_buckets = std::min(plan.most_buckets, other.most_buckets);
+  }
+  return plan;
+}
 
 GridSurvey combinedSurvey(const GridSurvey& share, Ranks& ranks) {
   GridSurvey whole = share;

@@ -6,6 +6,8 @@
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_tree.h"
 #include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/ranks.h"
@@ -17,7 +19,14 @@ inline SlabShare shareOf(const Ranks* ranks) {
   return ranks ? SlabShare{ranks->rank(), ranks->count()} : SlabShare{};
 }
 
+/// The size of slabs of which each rank gets about eight; at most `slab_bytes`, and as much as a row and its halo need.
+uint64_t slabBytesOfRanks(const NodeReader& reader, uint64_t slab_bytes, const Ranks& ranks);
+
 // All ranks have to call these.
+
+/// The plan of all: the smallest that any of them has of each thing, since they have to cut the grid and the buckets
+/// alike. Limit and threads stay each rank's own.
+MemoryPlan commonPlan(MemoryPlan plan, Ranks& ranks);
 
 /// The survey of the whole, of each rank's survey of its share.
 GridSurvey combinedSurvey(const GridSurvey& share, Ranks& ranks);

@@ -179,12 +179,56 @@ TEST_F(RanksCommand, ConvertASeriesTogether) {
   EXPECT_FALSE(fs::exists(file("w.splats.parts")));
 }
 
-TEST_F(RanksCommand, RefuseToAddScalars) {
-  const ProgramResult result =
-      runAsRanks(2, {"convert", file("g.xyz"), file("g.fun"), "--add-scalar", "f", "--to", file("g.splats")});
-  EXPECT_EQ(result.status, 2);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("one process"), std::string::npos) << result.err;
+TEST_F(RanksCommand, AddScalarsTogether) {
+  const auto adding = [](const std::string& cache, std::vector<std::string> more = {}) {
+    std::vector<std::string> words{
+        "convert",   file("g.xyz"), file("g.fun"), "--add-scalar", "volume,jacobian", "--to", file(cache),
+        "--threads", "1",           "--memory",    "256M"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  fs::copy(file("g.splats"), file("one.splats"));
+  ASSERT_EQ(runProgram(adding("one.splats")).status, 0);
+  const Files expected = filesOf(file("one.splats"));
+  for (const unsigned count : {2u, 3u}) {
+    fs::remove_all(file("added.splats"));
+    fs::copy(file("g.splats"), file("added.splats"));
+    const ProgramResult shared = runAsRanks(count, adding("added.splats", {"--stats", file("a.json")}));
+    EXPECT_EQ(shared.status, 0) << shared.err;
+    EXPECT_EQ(lineCount(shared.out), 2) << shared.out;  // of rank 0 alone
+    EXPECT_TRUE(filesOf(file("added.splats")) == expected);
+    EXPECT_EQ(nlohmann::json::parse(readTextFile(file("a.json")))["ranks"], count);
+  }
+  const ProgramResult again = runAsRanks(2, adding("added.splats"));
+  EXPECT_EQ(again.status, 2);
+  EXPECT_EQ(lineCount(again.err), 1) << again.err;
+  EXPECT_NE(again.err.find("already has a scalar"), std::string::npos) << again.err;
+  EXPECT_TRUE(filesOf(file("added.splats")) == expected);
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("added.splats."), std::string::npos) << entry.path();
+}
+
+TEST_F(RanksCommand, LeaveTheCacheWhereOneFailsInAnAddition) {
+  fs::copy(file("g.splats"), file("kept.splats"));
+  const Files before = filesOf(file("kept.splats"));
+  // Rank 1 has no grid, or a full disk.
+  for (const char* const fault : {"grid=missing.xyz", "ulimit -f 100"}) {
+    const std::string script = file("one_fails.sh");
+    writeFileAtomically(
+        script, fmt::format("#!/bin/bash\n"
+                            "grid=\"{}\"\n"
+                            "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && {}\n"
+                            "exec \"{}\" convert \"$grid\" \"{}\" --add-scalar volume --to \"{}\"\n",
+                            file("g.xyz"), fault, CURVISPLAT_PROGRAM, file("g.fun"), file("kept.splats")));
+    fs::permissions(script, fs::perms::owner_all);
+    const ProgramResult result = runAsRanks(3, {}, script);
+    EXPECT_EQ(result.status, 1) << fault;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find("rank 1 of 3"), std::string::npos) << result.err;
+    EXPECT_TRUE(filesOf(file("kept.splats")) == before) << fault;
+    for (const auto& entry : fs::directory_iterator(folder_->path()))
+      EXPECT_EQ(entry.path().filename().string().find("kept.splats."), std::string::npos) << entry.path();
+  }
 }
 
 TEST_F(RanksCommand, LeaveNothingWhereOneFailsInAConversion) {

@@ -14,7 +14,9 @@
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/array_mesh.h"
+#include "tests/support/folder_files.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/thread_ranks.h"
 
 namespace curvisplat {
 namespace {
@@ -93,6 +95,18 @@ class MeshAddition : public testing::Test {
     ASSERT_EQ(with_added.manifest().variables.size(), 2u);
     expectSameValues(with_added, 0, with_both, 0);
     expectSameValues(with_added, 1, with_both, 1);
+
+    options.cache = convertAt(source, fmt::format("ranks{}", number_), {first});
+    runRanks(3, [&](Ranks& ranks) {
+      AddScalarOptions of_rank = options;
+      of_rank.ranks = &ranks;
+      Progress of_pass;
+      addScalars(source, of_rank, of_pass);
+    });
+    Files one = filesOf(added), shared = filesOf(options.cache);
+    one.erase("manifest.json");  // their titles differ
+    shared.erase("manifest.json");
+    EXPECT_TRUE(one == shared);
   }
 
   SeriesReport convertSteps(const std::vector<const DataSource*>& steps, uint32_t scalar) {

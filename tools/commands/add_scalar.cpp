@@ -11,6 +11,7 @@
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
+#include "tools/output/launched_ranks.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
@@ -53,18 +54,23 @@ nlohmann::json statistics(const AddScalarReport& report, const Progress& progres
 
 void runAddScalar(ConvertArguments arguments) {
   checkArguments(arguments);
+  Ranks& ranks = launchedRanks();
   if (!arguments.to.has_filename()) arguments.to = arguments.to.parent_path();  // "NAME.splats/"
   AddScalarOptions options;
   options.cache = arguments.to;
+  options.ranks = &ranks;
   applyCommonOptions(arguments, options);
 
   const std::unique_ptr<DataSource> source = openSource(arguments, arguments.to);
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
   requireThreads(arguments.threads);
-  Progress progress{progressBar()};
+  Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
+  const StopRanksWith stopping_ranks(ranks, progress);
   const AddScalarReport report = addScalars(*source, options, progress);
-  const nlohmann::json numbers = statistics(report, progress);
+  if (!ranks.isFirst()) return;
+  nlohmann::json numbers = statistics(report, progress);
+  numbers["ranks"] = ranks.count();
   for (const std::string& warning : source->description().warnings) printMessage("warning: {}", warning);
   if (const auto note = timeStepNote(source->description(), arguments.grid.time_step))
     printMessage("note: {}", *note);
