@@ -95,6 +95,14 @@ class WindowTest : public testing::Test {
     })) << menu;
     click("item " + item);
   }
+  /// Types a name into the file dialog, which is waited for, and accepts it.
+  void answer(const std::string& name) {
+    placeOf("file name");
+    press("ctrl+a");
+    act({"type", name});
+    press("Return");
+    EXPECT_TRUE(eventually([] { return !hasWidget("file name"); })) << name;
+  }
   void addPoint() { click(placeOf("curve", 0.28, 0.2)); }
   void chooseScalar(const std::string& name) {
     click("scalar");

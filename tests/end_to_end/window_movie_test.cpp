@@ -22,10 +22,7 @@ class WindowMovie : public WindowTest {
   /// Chooses it from the menu and types the name; waits until it is saved, or does not.
   void saveMovie(const std::string& item, const std::string& name) {
     choose("File", item);
-    placeOf("file name");
-    press("ctrl+a");
-    act({"type", name});
-    press("Return");
+    answer(name);
   }
   static bool isSaved() {
     return eventually([] { return hasWidget("message saved ") && !hasWidget("movie"); }, 300);

@@ -205,9 +205,7 @@ TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {
 TEST_F(WindowOpening, WithoutAFileItAsksForOneAndRemembersIt) {
   openWith({});
   click("open");
-  placeOf("file name");
-  act({"type", "a.xyz a.fun"});
-  press("Return");
+  answer("a.xyz a.fun");
   placeOf("curve");
   close();
   openWith({});
@@ -223,9 +221,7 @@ TEST_F(WindowOpening, OpeningWhatIsShownKeepsTheView) {
   const Image turned = save();
   ASSERT_LT(difference(first, turned), 30);
   press("ctrl+o");
-  placeOf("file name");
-  act({"type", "a.splats"});
-  press("Return");
+  answer("a.splats");
   // The view before is remembered once the other takes its place.
   EXPECT_TRUE(eventually([] { return fs::exists("config/curvisplat/views"); }));
   EXPECT_GT(difference(save(), turned), 50);

@@ -72,5 +72,41 @@ TEST_F(WindowPictures, HaveTheNameThatWasTypedDuringOneFrame) {
   close();
 }
 
+/// What is typed before the dialog has been drawn: the keys that open it and the name come during one frame.
+TEST_F(WindowPictures, HaveTheNameThatWasTypedBeforeTheDialogOpened) {
+  open();
+  save();
+  window_->signal(SIGSTOP);
+  press("ctrl+shift+s");
+  press("ctrl+a");
+  act({"type", "early.png"});
+  press("Return");
+  window_->signal(SIGCONT);
+  EXPECT_TRUE(eventually([] { return std::filesystem::exists("early.png"); }, kLong));
+  EXPECT_TRUE(eventually([] { return !isOpen(); }, kLong));
+  close();
+}
+
+/// A narrower picture has all that the window shows: the outline's box was whole in it, so nothing reaches the border.
+TEST_F(WindowPictures, ThatAreNarrowerHoldWhatIsShown) {
+  open();
+  save();
+  const ImageSize shown = pictureSize();
+  openDialog("whole.png");
+  click("picture width");
+  press("ctrl+a");
+  act({"type", "200"});
+  press("Tab");
+  EXPECT_TRUE(eventually([] { return hasWidget("picture of 200 x"); }, kLong));
+  const Image narrow = accept("whole.png");
+  EXPECT_EQ(narrow.size.width, 200);
+  EXPECT_EQ(narrow.size.height, shown.height);
+  for (int y = 0; y < narrow.size.height; ++y) {
+    EXPECT_EQ(narrow.pixel(0, y)[0], 1) << y;
+    EXPECT_EQ(narrow.pixel(199, y)[0], 1) << y;
+  }
+  close();
+}
+
 }  // namespace
 }  // namespace curvisplat

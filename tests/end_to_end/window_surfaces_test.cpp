@@ -28,17 +28,6 @@ class WindowSurfaces : public WindowTest {
     click("add surface");
     click("add surface " + name);
   }
-  /// Types into the file dialog and accepts. The first keys may come before the dialog listens.
-  void answer(const std::string& name) {
-    placeOf("file name");
-    EXPECT_TRUE(eventually([&] {
-      if (!hasWidget("file name")) return true;
-      press("ctrl+a");
-      act({"type", name});
-      press("Return");
-      return eventually([] { return !hasWidget("file name"); }, 5);
-    }));
-  }
 };
 
 TEST_F(WindowSurfaces, FacesOfTheGridAreAddedColouredUndoneAndRemoved) {

@@ -72,6 +72,18 @@ TEST_P(CameraControls, ZoomScalesTheFocalPlane) {
   EXPECT_NEAR(unitsPerPixel(zoomed(camera_, 2), kSize), unitsPerPixel(camera_, kSize) / 2, 1e-15);
 }
 
+TEST_P(CameraControls, ZoomKeepsWhatIsUnderTheMouse) {
+  const Camera aside = panned(camera_, {31, -17}, kSize);
+  const glm::dvec3 point = aside.focal_point;  // in the focal plane, not in the middle
+  const glm::dvec2 mouse = pixelOf(camera_, point);
+  ASSERT_GT(glm::length(mouse - glm::dvec2(150, 100)), 30);
+  for (const double factor : {0.5, 1.1, 3.0}) {
+    const Camera after = zoomedAt(camera_, factor, mouse, kSize);
+    EXPECT_LE(glm::length(pixelOf(after, point) - mouse), 1e-6) << factor;
+    EXPECT_NEAR(unitsPerPixel(after, kSize), unitsPerPixel(camera_, kSize) / factor, 1e-15);
+  }
+}
+
 TEST_P(CameraControls, TheOtherProjectionKeepsTheFocalPlane) {
   const Camera other = withOtherProjection(camera_);
   EXPECT_NE(other.projection, camera_.projection);

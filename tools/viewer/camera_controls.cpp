@@ -71,6 +71,11 @@ Camera zoomed(const Camera& camera, double factor) {
   return result;
 }
 
+Camera zoomedAt(const Camera& camera, double factor, const glm::dvec2& pixel, ImageSize size) {
+  const glm::dvec2 from_middle = pixel - 0.5 * glm::dvec2(size.width, size.height);
+  return panned(zoomed(camera, factor), (1 - factor) * from_middle, size);
+}
+
 Camera looking(const Camera& camera, const glm::dvec2& movement, ImageSize size) {
   const ViewAxes axes = axesOf(camera);
   const double degrees_per_pixel = camera.view_angle_deg / size.height;

@@ -18,6 +18,8 @@ Camera panned(const Camera& camera, const glm::dvec2& movement, ImageSize size);
 /// Magnifies objects at the focal point's depth by `factor` > 0; a perspective camera moves towards the
 /// point.
 Camera zoomed(const Camera& camera, double factor);
+/// The same; what is seen at `pixel` at the focal point's depth stays there.
+Camera zoomedAt(const Camera& camera, double factor, const glm::dvec2& pixel, ImageSize size);
 /// Turns the camera in place; moving across the window's height turns by the view angle.
 Camera looking(const Camera& camera, const glm::dvec2& movement, ImageSize size);
 /// Moves camera and focal point by `step` in world units: x to the right, y up, z forward.

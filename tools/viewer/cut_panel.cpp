@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -12,6 +13,36 @@
 #include "tools/viewer/widget_places.h"
 
 namespace curvisplat {
+namespace {
+
+/// The direction in which a plane's place is counted, of unit length, and its name.
+struct PlaneScale {
+  glm::dvec3 along;
+  const char* name;
+};
+
+/// A plane across an axis is at a coordinate, whichever of its sides is kept.
+PlaneScale planeScaleOf(const glm::dvec3& normal) {
+  const glm::dvec3 along = glm::normalize(normal);
+  constexpr std::array<const char*, 3> kNames{"x of plane", "y of plane", "z of plane"};
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dvec3 unit(0.0);
+    unit[axis] = 1;
+    if (std::abs(along[axis]) > 1 - 1e-12) return {unit, kNames[static_cast<size_t>(axis)]};
+  }
+  return {along, "place of plane"};
+}
+
+/// How a coordinate of data between two ends is written: to a few thousandths of their distance, and 0 for a rounding error.
+std::string coordinateFormat(double coordinate, double lowest, double highest) {
+  const double extent = highest - lowest;
+  if (std::abs(coordinate) < 1e-6 * extent) return "0";
+  const double largest = std::max(std::abs(lowest), std::abs(highest));
+  const double further = extent > 0 ? std::ceil(std::log10(largest / extent)) : 0;
+  return fmt::format("%.{}g", 4 + std::clamp(static_cast<int>(further), 0, 4));
+}
+
+}  // namespace
 
 void CutPanel::draw(ViewState& state, PanelActions& actions) {
   if (section("Clip box", false)) drawClipBox(state, actions);
@@ -46,15 +77,20 @@ void CutPanel::drawClipBox(ViewState& state, PanelActions& actions) {
     const WorldBox& box = state.clip_box ? *state.clip_box : whole;
     float lower = static_cast<float>(box.lower[axis]), upper = static_cast<float>(box.upper[axis]);
     const char* const name = kNames[static_cast<size_t>(axis)];
+    const auto format = [&](float end) {
+      return coordinateFormat(static_cast<double>(end), manifest.lower[axis], manifest.upper[axis]);
+    };
     label(name);
     if (ImGui::DragFloatRange2(fmt::format("##{}", name).c_str(), &lower, &upper, (highest - lowest) / 500,
-                               lowest, highest, "%.4g", "%.4g", ImGuiSliderFlags_AlwaysClamp)) {
+                               lowest, highest, format(lower).c_str(), format(upper).c_str(),
+                               ImGuiSliderFlags_AlwaysClamp)) {
       state.clip_box->lower[axis] = static_cast<double>(lower);
       state.clip_box->upper[axis] = static_cast<double>(std::max(lower, upper));
       actions.changed = true;
     }
     actions.dragging |= ImGui::IsItemActive();
     nameWidget(fmt::format("clip {}", name));
+    hint("drag to change; Ctrl + click to type a number");
   }
   ImGui::EndDisabled();
 }
@@ -75,8 +111,11 @@ void CutPanel::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const Vie
     ClipPlane& plane = planes[n];
     ImGui::PushID(static_cast<int>(n));
     ImGui::Separator();
+    const std::string name = fmt::format("{} {}", clips ? "clip plane" : "slice", n + 1);
     const auto turn = [&](const char* label, const glm::dvec3& normal) {
-      if (!ImGui::Button(label)) return;
+      const bool turns = ImGui::Button(label);
+      nameWidget(fmt::format("{} {}", label, name));
+      if (!turns) return;
       plane.normal = normal;
       actions.changed = true;
     };
@@ -87,23 +126,30 @@ void CutPanel::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const Vie
     turn("z", {0, 0, 1});
     ImGui::SameLine();
     turn("view", planeBeforeViewer(manifest, state).normal);
+    hint("facing you");
     ImGui::SameLine();
-    turn("flip", -plane.normal);
-    ImGui::SameLine();
+    if (clips) {
+      turn("flip", -plane.normal);
+      hint("keep the other side");
+      ImGui::SameLine();
+    }
     if (ImGui::Button("remove")) removed = n;
-    nameWidget(fmt::format("remove {} {}", clips ? "clip plane" : "slice", n + 1));
-    // From the data's one end along the normal to the other.
-    const double reach = glm::dot(half, glm::abs(plane.normal));
-    const double length2 = glm::dot(plane.normal, plane.normal);
-    double place = glm::dot(plane.normal, plane.point - middle);
-    float share = reach > 0 ? static_cast<float>(0.5 + 0.5 * place / reach) : 0.5f;
-    label(fmt::format("place {}", n + 1).c_str());
-    if (ImGui::SliderFloat("##place", &share, 0, 1, "%.3f")) {
-      place = reach * (2 * static_cast<double>(share) - 1);
-      plane.point = middle + (place / length2) * plane.normal;
+    nameWidget("remove " + name);
+    // From the data's one end along the normal to the other; a plane across an axis has its coordinate there.
+    const PlaneScale scale = planeScaleOf(plane.normal);
+    const double centre = glm::dot(scale.along, middle), reach = glm::dot(half, glm::abs(scale.along));
+    const double lowest = centre - reach, highest = centre + reach;
+    double place = glm::dot(scale.along, plane.point);
+    label(fmt::format("{} {}", scale.name, n + 1).c_str());
+    if (ImGui::SliderScalar("##place", ImGuiDataType_Double, &place, &lowest, &highest,
+                            coordinateFormat(place, lowest, highest).c_str())) {
+      plane.point = middle + (place - centre) * scale.along;
       actions.changed = true;
     }
     actions.dragging |= ImGui::IsItemActive();
+    nameWidget(name);
+    nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
+    hint("Ctrl + click to type a number");
     ImGui::PopID();
   }
   ImGui::PopID();

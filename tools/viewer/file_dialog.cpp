@@ -18,7 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxSide = 16384;  // of a picture, in pixels
+constexpr int kMaxSide = 16384;     // of a picture, in pixels
+constexpr int kFramesToFocus = 10;  // Dear ImGui takes two
 
 struct Look {
   const char *title, *button;
@@ -81,6 +82,7 @@ std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std
 void FileDialog::open(Purpose purpose, const std::string& name) {
   purpose_ = purpose;
   opens_ = true;
+  frames_to_focus_ = kFramesToFocus;
   std::error_code ignored;
   enter(folder_.empty() ? fs::current_path(ignored) : folder_);
   take({});
@@ -131,6 +133,9 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   accepts |= ImGui::InputTextWithHint("##name", look.saves ? "name" : "name, or a path", &name_,
                                       ImGuiInputTextFlags_EnterReturnsTrue);
   nameWidget("file name");
+  // Dear ImGui gives a field no letters in the frame in which it gets the focus.
+  frames_to_focus_ = ImGui::IsItemActive() ? 0 : std::max(0, frames_to_focus_ - 1);
+  if (frames_to_focus_ > 0) window.holdInput();
   if (*purpose_ == Purpose::kSavePicture) drawSize();
   accepts |= ImGui::Button(look.button);
   nameWidget("file accept");
@@ -242,7 +247,10 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
   const auto whole = [&](const std::string& name) {
     return fs::path(name).is_absolute() ? fs::path(name) : folder_ / name;
   };
-  if (name_.empty()) return std::nullopt;
+  if (name_.empty()) {
+    error_ = look.saves ? "type a name first" : "choose a file first, or type its name";
+    return std::nullopt;
+  }
   if (const fs::path path = whole(name_); fs::is_directory(path, ignored) && !isCache(path)) {
     enter(path);
     name_.clear();

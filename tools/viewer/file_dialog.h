@@ -52,6 +52,7 @@ class FileDialog {
 
   std::optional<Purpose> purpose_;
   bool opens_ = false;
+  int frames_to_focus_ = 0;  // at most: what is typed waits until the name has the focus
   std::filesystem::path folder_;
   std::vector<FolderEntry> entries_;
   std::vector<std::string> taken_;  // names that were clicked

@@ -175,9 +175,10 @@ void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& 
 
 void drawKeys(bool& open, Window& window) {
   if (!open) return;
-  constexpr std::array<std::pair<const char*, const char*>, 7> kMouse{{
+  constexpr std::array<std::pair<const char*, const char*>, 8> kMouse{{
       {"left drag", "rotate; while flying, look around"},
-      {"right drag, wheel", "zoom"},
+      {"wheel", "zoom to what is under the mouse"},
+      {"right drag", "zoom"},
       {"middle drag, Shift + left drag", "move the picture"},
       {"click", "keep the value there as a marker"},
       {"drag a round handle", "move a clip plane or a slice"},

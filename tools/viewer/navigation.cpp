@@ -37,7 +37,7 @@ bool Navigation::drag(Window& window, Camera& camera, ImageSize size) {
     if (flies_)
       camera = flown(camera, {0, 0, notches * kWheelFlight * glm::length(upper_ - lower_)});
     else
-      camera = zoomed(camera, std::pow(kWheelFactor, notches));
+      camera = zoomedAt(camera, std::pow(kWheelFactor, notches), window.mouseInPicture(), size);
     moved = true;
   }
   for (const Window::Drag& drag : window.takeDrags()) {

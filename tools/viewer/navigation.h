@@ -2,7 +2,8 @@
 //
 //   left drag                   rotate
 //   middle or shift+left drag   pan
-//   wheel or right drag         zoom
+//   wheel                       zoom; what is under the mouse stays there
+//   right drag                  zoom
 //   flying: w s forwards and backwards, a d left and right, q e down and up, left drag looks around
 #pragma once
 

@@ -73,7 +73,7 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   if (option("loop", loops)) playback.setLoop(loops);
   bool interpolates = playback.interpolates();
   if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
-  commandButton(Command::kSaveStepsMovie, actions, "save movie...");
+  commandButton(Command::kSaveStepsMovie, actions, "save movie of all steps...");
 }
 
 namespace {
@@ -233,7 +233,7 @@ void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   ImGui::EndDisabled();
   commandButton(Command::kSavePicture, actions, "save picture");
   ImGui::SameLine(column);
-  commandButton(Command::kSaveTurnMovie, actions, "save movie...");
+  commandButton(Command::kSaveTurnMovie, actions, "movie once around...");
   commandButton(Command::kCopyCommand, actions, "copy command");
 }
 

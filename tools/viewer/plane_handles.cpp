@@ -14,6 +14,8 @@
 namespace curvisplat {
 namespace {
 
+constexpr ImU32 kColour = IM_COL32(235, 140, 30, 255);
+
 ImVec2 toImGui(const glm::dvec2& point) {
   return {static_cast<float>(point.x), static_cast<float>(point.y)};
 }
@@ -45,9 +47,29 @@ double shiftAlong(const glm::dvec2& from, const glm::dvec2& to, const glm::dvec2
   return length2 < 1 ? 0 : glm::dot(movement, along) / length2;
 }
 
+namespace {
+
+/// The edges of the clip box: what is clipped may be clear, so that the picture alone does not show where it ends.
+void drawBox(const WorldBox& box, const PlaceInWindow& place) {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const auto corner = [&](unsigned n) {
+    return place({n & 1 ? box.upper.x : box.lower.x, n & 2 ? box.upper.y : box.lower.y,
+                  n & 4 ? box.upper.z : box.lower.z});
+  };
+  for (unsigned from = 0; from < 8; ++from)
+    for (const unsigned axis : {1u, 2u, 4u}) {
+      if (from & axis) continue;
+      const auto begin = corner(from), end = corner(from | axis);
+      if (begin && end) list->AddLine(toImGui(*begin), toImGui(*end), kColour, 0.11f * ImGui::GetFontSize());
+    }
+}
+
+}  // namespace
+
 bool PlaneHandles::draw(ViewState& state, const Manifest& manifest, const PlaceInWindow& place,
                         Window& window) {
   if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragged_.reset();
+  if (state.clip_box) drawBox(*state.clip_box, place);
   bool moved = false;
   size_t number = 0;
   for (auto* planes : {&state.clip_planes, &state.slices})
@@ -69,7 +91,7 @@ bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Manifest& mani
   if (!handle || !end) return false;
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   const bool dragged = dragged_ == number;
-  const ImU32 colour = dragged ? IM_COL32(255, 200, 60, 255) : IM_COL32(235, 140, 30, 255);
+  const ImU32 colour = dragged ? IM_COL32(255, 200, 60, 255) : kColour;
   std::array<ImVec2, 4> corners;
   bool seen = true;
   for (size_t n = 0; n < 4; ++n) {

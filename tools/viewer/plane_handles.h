@@ -1,5 +1,5 @@
 // Clip planes and slices in the picture: a frame in the data with a handle in its middle, which is dragged along the
-// plane's normal.
+// plane's normal. The clip box has its edges there.
 #pragma once
 
 #include <functional>

@@ -127,7 +127,7 @@ class Viewer {
   /// Draws one frame of the window with the effects of all input so far.
   void update() {
     window_.beginFrame();
-    if (!window_.showsClick()) pressKeys();  // first: this frame shows what they do to the layout, too
+    pressKeys();  // first: this frame shows what they do to the layout, too
     const WindowLayout place = layout();
     window_.setPicture(place.picture);
     attempt([&] { drawMenuBar(); });
@@ -138,7 +138,6 @@ class Viewer {
     drawToasts(toasts_, place.picture, glfwGetTime(), window_);
     std::optional<FileDialog::Chosen> chosen;
     attempt([&] { chosen = dialog_.draw(window_); });
-    if (window_.showsClick()) pressKeys();
     window_.endFrame(glm::vec3(0.12f), opened_.view() && opened_.view()->expectsMovingPicture());
     writeWidgetPlaces();
     // What replaces the view or the font waits until the frame is over.

@@ -189,53 +189,55 @@ void Window::wake() {
   glfwPostEmptyEvent();
 }
 
-/// Dear ImGui samples keys and mouse once per frame. Reports a key that was pressed and released between two
-/// frames as down for one frame, and a button event at the position where it happened.
+/// Dear ImGui samples keys and mouse once per frame: gives it what happened between two frames in its order, a button event
+/// in a frame of its own and at the position where it happened.
 void Window::showInput() {
   ImGuiIO& io = ImGui::GetIO();
   for (const int key : shown_keys_) io.KeysDown[key] = glfwGetKey(window_, key) == GLFW_PRESS;
   shown_keys_.clear();
-  shows_click_ = !mouse_events_.empty();
-  showTyped();
+  io.InputQueueCharacters.clear();  // they are in events_
+  for (const Event& event : events_)
+    if (event.key >= 0) io.KeysDown[event.key] = false;
+  const bool clicks = !events_.empty() && events_.front().button >= 0;
+  if (!std::exchange(holds_input_, false)) clicks ? showButton() : showTyped();
   io.KeyCtrl = io.KeysDown[GLFW_KEY_LEFT_CONTROL] || io.KeysDown[GLFW_KEY_RIGHT_CONTROL];
   io.KeyShift = io.KeysDown[GLFW_KEY_LEFT_SHIFT] || io.KeysDown[GLFW_KEY_RIGHT_SHIFT];
-  if (!shows_click_) return;
-  io.MousePos = {static_cast<float>(mouse_events_.front().x), static_cast<float>(mouse_events_.front().y)};
-  mouse_events_.pop_front();
+  std::copy(shown_buttons_.begin(), shown_buttons_.end(), io.MouseDown);
 }
 
-constexpr int kButton = -2;  // among keys: a button event that came between them
+void Window::showButton() {
+  const Event event = events_.front();
+  events_.pop_front();
+  shown_buttons_[static_cast<size_t>(event.button)] = event.presses;
+  ImGui::GetIO().MousePos = {static_cast<float>(event.at.x), static_cast<float>(event.at.y)};
+}
 
-/// Keys and letters in their order, however slow the frames are: Dear ImGui takes all keys of a frame before its letters, and
-/// no letters with Control. So what follows a click, letters after Control and other keys after letters wait for the next frame.
+/// Dear ImGui takes all keys of a frame before its letters, and no letters with Control. So letters after Control, other keys
+/// after letters, a click after either, and all after a key with Control wait for the next frame.
 void Window::showTyped() {
   ImGuiIO& io = ImGui::GetIO();
-  io.InputQueueCharacters.clear();  // they are in typed_
   const auto isControl = [](int key) {
     return key == GLFW_KEY_LEFT_CONTROL || key == GLFW_KEY_RIGHT_CONTROL;
   };
   bool letters = false, control = false;
-  while (!typed_.empty()) {
-    const Typed next = typed_.front();
-    if (next.key == kButton) {
-      typed_.pop_front();
-      if (shows_click_) break;
-      continue;
-    }
-    const bool writes = typed_.size() > 1 && typed_[1].letter != 0;  // the key of a letter
+  while (!events_.empty() && events_.front().button < 0) {
+    const Event next = events_.front();
+    const bool writes = events_.size() > 1 && events_[1].letter != 0;  // the key of a letter
     if (next.letter != 0 || writes ? control : letters) break;
-    typed_.pop_front();
+    events_.pop_front();
     if (next.letter != 0) {
       io.AddInputCharacter(next.letter);
+      if (next.letter == '?') keys_.push_back({kQuestionMark});
       letters = true;
       continue;
     }
     io.KeysDown[next.key] = true;
     shown_keys_.push_back(next.key);
     control |= isControl(next.key);
+    if (!next.command) continue;
+    keys_.push_back(*next.command);
+    if (next.command->control && !isControl(next.key)) break;  // it may open a dialog, for which the rest is
   }
-  for (const Typed& later : typed_)
-    if (later.letter == 0 && later.key >= 0) io.KeysDown[later.key] = false;
 }
 
 void Window::beginFrame() {
@@ -305,15 +307,15 @@ void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {
   if (action == GLFW_RELEASE) self->with_control_.erase(key);
   if (action != GLFW_PRESS) return;
   if (mods & GLFW_MOD_CONTROL) self->with_control_.insert(key);
+  if (key < 0) return;  // some keys have no GLFW code
   // Control and Shift as they were when the key was pressed: a slow frame may come after their release.
-  if (mods & GLFW_MOD_CONTROL) self->typed_.push_back({GLFW_KEY_LEFT_CONTROL});
-  if (mods & GLFW_MOD_SHIFT) self->typed_.push_back({GLFW_KEY_LEFT_SHIFT});
-  if (key >= 0) self->typed_.push_back({key});  // some keys have no GLFW code
-  self->keys_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
+  const bool shift = (mods & GLFW_MOD_SHIFT) != 0, control = (mods & GLFW_MOD_CONTROL) != 0;
+  if (control) self->events_.push_back(Event::ofKey(GLFW_KEY_LEFT_CONTROL));
+  if (shift) self->events_.push_back(Event::ofKey(GLFW_KEY_LEFT_SHIFT));
+  self->events_.push_back(Event::ofKey(key, Key{key, shift, control}));
 }
 
 std::vector<Window::Key> Window::takeKeys() {
-  if (!mouse_events_.empty()) return {};
   std::vector<Key> keys = std::exchange(keys_, {});
   const auto edits = [](const Key& key) {
     if (key.code == GLFW_KEY_F1) return false;
@@ -327,8 +329,7 @@ std::vector<Window::Key> Window::takeKeys() {
 void Window::onLetter(GLFWwindow* window, unsigned letter) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
-  if (letter != 0) self->typed_.push_back({-1, letter});
-  if (letter == '?') self->keys_.push_back({kQuestionMark});
+  if (letter != 0) self->events_.push_back(Event::ofLetter(letter));
 }
 
 void Window::onDrop(GLFWwindow* window, int count, const char** paths) {
@@ -338,7 +339,7 @@ void Window::onDrop(GLFWwindow* window, int count, const char** paths) {
 }
 
 bool Window::takeInput() {
-  return std::exchange(input_, false) || !typed_.empty();
+  return std::exchange(input_, false) || !events_.empty();
 }
 
 bool Window::overPicture() const {
@@ -350,8 +351,8 @@ bool Window::overPicture() const {
 void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
-  self->mouse_events_.push_back(self->mouse_);
-  self->typed_.push_back({kButton});
+  if (button < static_cast<int>(self->shown_buttons_.size()))
+    self->events_.push_back(Event::ofButton(button, action == GLFW_PRESS, self->mouse_));
   if (action == GLFW_PRESS && !self->isDragging()) {
     // mouse_ is still the position of this event.
     if (!self->overPicture()) return;

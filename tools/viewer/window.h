@@ -3,6 +3,7 @@
 // All members except wake() are for the main thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <glm/vec2.hpp>
@@ -73,11 +74,12 @@ class Window {
     bool shift = false, control = false;
   };
   static constexpr int kQuestionMark = -'?';  // which is on another key in each country
-  /// Keys pressed since the last call. While text is typed, only F1 and those with Control that do not edit. Empty
-  /// while Dear ImGui has yet to see earlier clicks.
+  /// Keys that Dear ImGui has been shown since the last call, so that all earlier clicks and letters have had their effect.
+  /// While text is typed, only F1 and those with Control that do not edit.
   std::vector<Key> takeKeys();
-  /// Whether this Dear ImGui frame contains a click that may precede the keys.
-  bool showsClick() const { return shows_click_; }
+  /// Keeps what is typed and clicked from Dear ImGui's next frame, for the frames after it: for a text field that gets the
+  /// focus only then.
+  void holdInput() { holds_input_ = true; }
   /// Whether a key, a button or the wheel was used since the last call.
   bool takeInput();
   /// Whether a key is held that was pressed without Control.
@@ -93,6 +95,8 @@ class Window {
   std::vector<Drag> takeDrags();
   /// Wheel notches over the picture since the last call; positive away from the user.
   double takeWheel();
+  /// The mouse in pixels from the picture's upper left corner.
+  glm::dvec2 mouseInPicture() const { return pixelScale() * (mouse_ - glm::dvec2(picture_.x, picture_.y)); }
   /// Whether a drag is in progress.
   bool isDragging() const { return dragged_button_ >= 0; }
   /// Where the picture is, in Dear ImGui units.
@@ -134,6 +138,7 @@ class Window {
   static void onDrop(GLFWwindow* window, int count, const char** paths);
   bool overPicture() const;
   void showInput();
+  void showButton();
   void showTyped();
   void applyLook();
 
@@ -149,15 +154,25 @@ class Window {
 
   std::vector<Key> keys_;
   std::set<int> with_control_;  // that are down, and were pressed so
-  /// A key that was pressed, or a letter that it wrote.
-  struct Typed {
+  /// A key that was pressed, a letter that it wrote, or a button of the mouse.
+  struct Event {
     int key = -1;
     unsigned letter = 0;
+    int button = -1;
+    bool presses = false;        // the button; else it was released
+    glm::dvec2 at{0.0};          // the mouse then
+    std::optional<Key> command;  // that the key may be
+
+    static Event ofKey(int key, std::optional<Key> command = {}) { return {key, 0, -1, false, {}, command}; }
+    static Event ofLetter(unsigned letter) { return {-1, letter, -1, false, {}, {}}; }
+    static Event ofButton(int button, bool presses, const glm::dvec2& at) {
+      return {-1, 0, button, presses, at, {}};
+    }
   };
-  std::deque<Typed> typed_;              // what Dear ImGui has yet to see, in order
+  std::deque<Event> events_;             // what Dear ImGui has yet to see, in order
   std::vector<int> shown_keys_;          // reported as down in its last frame
-  std::deque<glm::dvec2> mouse_events_;  // positions of button events that it has yet to see
-  bool shows_click_ = false;
+  std::array<bool, 5> shown_buttons_{};  // as Dear ImGui knows them
+  bool holds_input_ = false;
   bool input_ = true;
   std::optional<double> left_out_since_s_;  // by GLFW's clock
   std::optional<uint64_t> shown_;  // the frame that is shown (drawn_frame.h); none: it must be drawn again
