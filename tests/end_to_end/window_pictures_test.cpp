@@ -72,6 +72,25 @@ TEST_F(WindowPictures, HaveTheNameThatWasTypedDuringOneFrame) {
   close();
 }
 
+/// Letters, a click into another field, letters there and Return, all during one frame that is slow.
+TEST_F(WindowPictures, HaveTheSizeThatWasTypedDuringOneFrame) {
+  open();
+  save();
+  openDialog("slow");
+  const Place width = placeOf("picture width");
+  window_->signal(SIGSTOP);
+  press("ctrl+a");
+  act({"type", "narrow.png"});
+  click(width);
+  press("ctrl+a");
+  act({"type", "200"});
+  press("Tab");
+  window_->signal(SIGCONT);
+  EXPECT_TRUE(eventually([] { return hasWidget("picture of 200 x"); }, kLong));
+  EXPECT_EQ(accept("narrow.png").size.width, 200);
+  close();
+}
+
 /// What is typed before the dialog has been drawn: the keys that open it and the name come during one frame.
 TEST_F(WindowPictures, HaveTheNameThatWasTypedBeforeTheDialogOpened) {
   open();

@@ -122,6 +122,36 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndLeaveWithTheirScalar) {
   expectDraws(commands[1], higher);
 }
 
+/// It can be typed, and stays where it is when the other side is kept.
+TEST_F(WindowSurfaces, AClipPlaneIsAtACoordinate) {
+  openWithRoom();
+  const Image whole = save();
+  choose("Picture", "Add a clip plane");
+  click("x clip plane 1");
+  EXPECT_TRUE(eventually([] { return hasWidget("clip plane 1: x of plane at "); }));
+  act({"keydown", "ctrl"});
+  click("clip plane 1");
+  act({"keyup", "ctrl"});
+  save();
+  press("ctrl+a");
+  act({"type", "-0.25"});
+  press("Return");
+  const std::string there = "clip plane 1: x of plane at -0.25";
+  EXPECT_TRUE(eventually([&] { return hasWidget(there); }));
+  const Image cut = saveAndCopy();
+  EXPECT_LT(difference(whole, cut), 45);
+  click("flip clip plane 1");
+  const Image other = saveAndCopy();
+  EXPECT_LT(difference(cut, other), 45);
+  EXPECT_TRUE(hasWidget(there));
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_TRUE(valueOf(commands[0], "--clip-plane").starts_with("-0.25,")) << testing::PrintToString(commands);
+  EXPECT_TRUE(valueOf(commands[1], "--clip-plane").starts_with("-0.25,")) << testing::PrintToString(commands);
+  expectDraws(commands[0], cut);
+  expectDraws(commands[1], other);
+}
+
 /// In a window that ends above the list.
 TEST_F(WindowSurfaces, WhatTheMenuAddsIsScrolledTo) {
   open();

@@ -183,6 +183,24 @@ TEST_F(WindowsCamera, FliesThroughTheData) {
   EXPECT_GT(glm::dot(seen[8].position - seen[7].position, seen[7].forward()), 0.001);
 }
 
+/// Numbers hold when their field is left by a click, and both ends of a range when both have been left.
+TEST_F(WindowTest, TypedNumbersHoldWithoutReturn) {
+  open();
+  const Image whole = save();
+  click(placeOf("range", 0.15));
+  press("ctrl+a");
+  act({"type", "2"});  // above the upper end
+  press("Tab");
+  press("ctrl+a");
+  act({"type", "3"});
+  click("state");
+  const Image above = saveAndCopy();
+  EXPECT_LT(difference(whole, above), 45);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--range"), "2,3");
+}
+
 TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
   open();
   save();
@@ -245,6 +263,22 @@ TEST_F(WindowTest, SavesAndLoadsAFunction) {
   EXPECT_EQ(valueOf(command, "--tf"), "a_colours.json");
   expectDraws(command, edited);
   fs::remove("function.json");
+}
+
+/// Longer than Control: its repetitions are no letters of the name.
+TEST_F(WindowTest, AHeldKeyOfACommandWritesNothing) {
+  open();
+  save();
+  for (const char* const key : {"ctrl", "shift", "s"}) act({"keydown", key});
+  for (const char* const key : {"shift", "ctrl"}) act({"keyup", key});
+  placeOf("file name");
+  act({"sleep", "1.5"});  // the display repeats a key after 0.66 s
+  act({"keyup", "s"});
+  act({"type", "held.png"});
+  press("Return");
+  EXPECT_TRUE(eventually([] { return !hasWidget("file name"); }));
+  EXPECT_TRUE(eventually([] { return fs::exists("held.png"); }));
+  close();
 }
 
 TEST_F(WindowTest, ComesBackAsItWasLeft) {

@@ -180,8 +180,8 @@ std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
                           100 * contrast.seen)
             : "of one colour";
   if (!function_options.empty())
-    return fmt::format("the picture is {}; leave out {} to have colours and opacities chosen from the data",
-                       what, function_options);
+    return fmt::format("the picture is {}; leave out {} to have colours and opacities chosen from the data{}",
+                       what, function_options, blank ? ", or look from elsewhere (--view iso)" : "");
   if (blank)
     return fmt::format("the picture is {}; try --opacity auto --opacity-unit {:.2g} or --view iso", what,
                        scene.transfer_function.opacityUnit() / 10);

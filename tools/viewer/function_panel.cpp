@@ -4,6 +4,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -18,8 +19,6 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBins = 128;
-constexpr ImGuiInputTextFlags kNumber =
-    ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsScientific;
 constexpr float kGrabRadius = 0.6f;  // around a point, in lines of text
 constexpr float kPointRadius = 0.38f;
 constexpr float kCurveLines = 9;  // height in lines of text
@@ -279,19 +278,19 @@ bool FunctionPanel::drawPoints(EditedFunction& function) {
     const OpacityPoint point = function.points()[n];
     const bool end = n == 0 || n + 1 == function.points().size();
     ImGui::PushID(static_cast<int>(n));
-    double scalar = function.scalarAt(point.x), opacity = point.opacity;
+    const double scalar = function.scalarAt(point.x), opacity = point.opacity;
     ImGui::SetNextItemWidth(half);
     ImGui::BeginDisabled(end);
-    bool moved = ImGui::InputScalar("##x", ImGuiDataType_Double, &scalar, nullptr, nullptr, "%.5g", kNumber);
+    const auto typed_scalar = typed_.draw("##x", {&scalar, 1}, "%.5g");
     nameWidget(fmt::format("point {} scalar", n + 1));
     ImGui::EndDisabled();
     ImGui::SameLine();
     ImGui::SetNextItemWidth(half);
-    moved |=
-        ImGui::InputScalar("##opacity", ImGuiDataType_Double, &opacity, nullptr, nullptr, "%.4g", kNumber);
+    const auto typed_opacity = typed_.draw("##opacity", {&opacity, 1}, "%.4g");
     nameWidget(fmt::format("point {} opacity", n + 1));
-    if (moved) {
-      function.movePoint(n, end ? point.x : function.coordinateOf(scalar), opacity);
+    if (typed_scalar || typed_opacity) {
+      function.movePoint(n, typed_scalar && !end ? function.coordinateOf(typed_scalar->front()) : point.x,
+                         typed_opacity ? typed_opacity->front() : opacity);
       changed = true;
     }
     ImGui::SameLine();
@@ -372,11 +371,11 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
     }
     nameWidget(fmt::format("colour {}", n + 1));
     ImGui::SameLine();
-    double scalar = function.scalarAt(point.x);
+    const double scalar = function.scalarAt(point.x);
     ImGui::SetNextItemWidth(0.4f * ImGui::GetContentRegionAvail().x);
     ImGui::BeginDisabled(end);
-    if (ImGui::InputScalar("##x", ImGuiDataType_Double, &scalar, nullptr, nullptr, "%.5g", kNumber)) {
-      function.moveColour(n, function.coordinateOf(scalar));
+    if (const auto typed = typed_.draw("##colour's x", {&scalar, 1}, "%.5g")) {
+      function.moveColour(n, function.coordinateOf(typed->front()));
       changed = true;
     }
     ImGui::SameLine();
@@ -401,11 +400,12 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
 
 bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& variable) {
   bool changed = false;
-  double ends[2] = {function.range().first, function.range().second};
+  const std::array ends{function.range().first, function.range().second};
   label("range");
-  if (ImGui::InputScalarN("##range", ImGuiDataType_Double, ends, 2, nullptr, nullptr, "%.6g", kNumber)) {
-    if (!function.setRange(ends[0], ends[1]))
-      throw UsageError("range {:.6g} to {:.6g}: expected a lower end below the upper one{}", ends[0], ends[1],
+  if (const auto typed = typed_.draw("##range", ends, "%.6g")) {
+    const auto [low, high] = *typed;
+    if (!function.setRange(low, high))
+      throw UsageError("range {:.6g} to {:.6g}: expected a lower end below the upper one{}", low, high,
                        function.logScale() ? ", and above zero on a logarithmic scale" : "");
     changed = true;
   }
@@ -432,14 +432,13 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
 }
 
 bool FunctionPanel::drawUnit(EditedFunction& function) {
-  double unit = function.opacityUnit();
+  const double unit = function.opacityUnit();
   label("opacity unit");
-  const bool changed =
-      ImGui::InputScalar("##opacity unit", ImGuiDataType_Double, &unit, nullptr, nullptr, "%.4g", kNumber);
-  if (changed) function.setOpacityUnit(unit);
+  const auto typed = typed_.draw("##opacity unit", {&unit, 1}, "%.4g");
+  if (typed) function.setOpacityUnit(typed->front());
   nameWidget("opacity unit");
   hint("the length over which the opacity accumulates: smaller is more opaque");
-  return changed;
+  return typed.has_value();
 }
 
 }  // namespace curvisplat

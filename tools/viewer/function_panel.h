@@ -10,6 +10,7 @@
 
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/edited_function.h"
+#include "tools/viewer/typed_numbers.h"
 
 namespace curvisplat {
 
@@ -43,6 +44,7 @@ class FunctionPanel {
 
   const CacheReader& cache_;
   std::optional<size_t> dragged_;
+  TypedNumbers typed_;
   std::vector<double> histogram_;
   struct HistogramOf {
     size_t variable;

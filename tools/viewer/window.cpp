@@ -305,6 +305,7 @@ void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
   if (action == GLFW_RELEASE) self->with_control_.erase(key);
+  self->repeats_command_ = action == GLFW_REPEAT && self->with_control_.contains(key);
   if (action != GLFW_PRESS) return;
   if (mods & GLFW_MOD_CONTROL) self->with_control_.insert(key);
   if (key < 0) return;  // some keys have no GLFW code
@@ -329,7 +330,8 @@ std::vector<Window::Key> Window::takeKeys() {
 void Window::onLetter(GLFWwindow* window, unsigned letter) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
-  if (letter != 0) self->events_.push_back(Event::ofLetter(letter));
+  // A key that is held longer than Control would write into the dialog that it has opened.
+  if (letter != 0 && !self->repeats_command_) self->events_.push_back(Event::ofLetter(letter));
 }
 
 void Window::onDrop(GLFWwindow* window, int count, const char** paths) {

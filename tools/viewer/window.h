@@ -154,6 +154,7 @@ class Window {
 
   std::vector<Key> keys_;
   std::set<int> with_control_;  // that are down, and were pressed so
+  bool repeats_command_ = false;  // the key whose letter comes next
   /// A key that was pressed, a letter that it wrote, or a button of the mouse.
   struct Event {
     int key = -1;
