@@ -153,7 +153,7 @@ class Window {
   int width_ = 0;  // in units of the mouse
 
   std::vector<Key> keys_;
-  std::set<int> with_control_;  // that are down, and were pressed so
+  std::set<int> with_control_;    // that are down, and were pressed so
   bool repeats_command_ = false;  // the key whose letter comes next
   /// A key that was pressed, a letter that it wrote, or a button of the mouse.
   struct Event {
