@@ -7,6 +7,8 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools/cmake"))
 import unity_groups  # noqa: E402
 
+HEADER = '#include "tests/faults/small_conversion.h"\n'
+
 SOURCE = """\
 #include "stream/base/error.h"
 #define LIMIT 3
@@ -64,6 +66,14 @@ class UnityGroups(unittest.TestCase):
         self.assertEqual(taken, {"Brick"})
         self.assertEqual(unity_groups.groups(["int a() {", "struct Brick {", "int b() {"], 10, taken), [0, 1, 0])
         self.assertIn("CacheReader", unity_groups.types_of_headers())
+
+    def test_names_of_an_included_header_of_tests(self):
+        self.assertIn("twoBlocks", unity_groups.included(HEADER))
+        # Sources that include it may be together; one that declares the same name may not be with them, before or after.
+        for texts in ([HEADER, HEADER, "int twoBlocks() {"], ["int twoBlocks() {", HEADER, HEADER]):
+            numbers = unity_groups.groups(texts, 10)
+            self.assertEqual(len(set(numbers)), 2)
+            self.assertEqual(numbers[1], numbers[0] if texts[0] == HEADER else numbers[2])
 
     def test_neighbours_are_together_in_groups_of_the_same_size(self):
         texts = [f"int f{n}() {{" for n in range(12)]

@@ -3,9 +3,10 @@
 
     unity_groups.py SIZE FILE ...    prints the number of each file's group, one a line
 
-A group has at most SIZE files. None of them declares a name for itself that another one declares, too: a static function, or one in a
-namespace without name, say. One that has a type of the name of a header's is alone. What is declared is read from the layout: our
+A group has at most SIZE files. None of them declares a name for itself that another one declares, too, or that a header of the
+tests declares which another one includes: a static function, or one in a namespace without name, say. One that has a type of the name of a header's is alone. What is declared is read from the layout: our
 formatter puts declarations of a namespace at the beginning of a line, and nothing else."""
+import functools
 import pathlib
 import re
 import sys
@@ -18,6 +19,7 @@ ALIAS = re.compile(r"(?:using(?= \w+ =)|#define) (\w+)")
 TEST = re.compile(r"\w*TEST\w*\((\w+), (\w+)[,)]")
 FUNCTION = re.compile(r"[^(=]*?(?<![:\w])(\w+)\(")
 VARIABLE = re.compile(r"[^(={]*?(?<![:\w])(\w+)(?:\[[^\]]*\])*(?: =|\{|;)")
+HEADER = re.compile(r'#include "(tests/[^"]*\.h)"')
 NEXT = re.compile(r", (\w+)(?: =|\{)")  # of several variables on a line
 
 
@@ -36,6 +38,18 @@ def names(text):
     return found
 
 
+@functools.lru_cache(maxsize=None)
+def names_of_header(path):
+    """What a header of the tests declares, and those that it includes."""
+    text = (ROOT / path).read_text(encoding="utf-8")
+    return frozenset(names(text) | included(text))
+
+
+def included(text):
+    """What the tests' headers declare that a source includes."""
+    return set().union(*(names_of_header(path) for path in HEADER.findall(text)))
+
+
 def types(text):
     """The types that a header declares in its namespaces."""
     return {match[1] for line in text.splitlines() if not OTHER.match(line) and (match := TYPE.match(line))}
@@ -51,13 +65,15 @@ def groups(texts, size, taken=frozenset()):
     that declares one of the names `taken` is alone."""
     size = -(-len(texts) // -(-len(texts) // size)) if texts else size  # as many groups, of the same size
     known, numbers = [], []
-    for own in map(names, texts):
-        at = next((n for n, (count, declared) in enumerate(known) if count < size and not own & declared), len(known))
+    for text in texts:
+        own, foreign = names(text), included(text)
+        at = next((n for n, (count, declared, others) in enumerate(known)
+                   if count < size and not own & declared and not own & others and not foreign & declared), len(known))
         if own & taken:
             at = len(known)
         if at == len(known):
-            known.append([0, set()])
-        known[at] = [size if own & taken else known[at][0] + 1, known[at][1] | own]
+            known.append([0, set(), set()])
+        known[at] = [size if own & taken else known[at][0] + 1, known[at][1] | own, known[at][2] | foreign]
         numbers.append(at)
     return numbers
 
