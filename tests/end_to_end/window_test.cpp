@@ -183,6 +183,26 @@ TEST_F(WindowsCamera, FliesThroughTheData) {
   EXPECT_GT(glm::dot(seen[8].position - seen[7].position, seen[7].forward()), 0.001);
 }
 
+TEST_F(WindowTest, RangesThatCannotBeAreSaidAndTheOldOneStays) {
+  open();
+  const Image before = save();
+  const auto type = [&](const char* number) {
+    click(placeOf("range", 0.15));
+    press("ctrl+a");
+    act({"type", number});
+    press("Return");
+  };
+  type("5");  // above the upper end
+  EXPECT_TRUE(eventually([] { return hasWidget("message range 5 to "); }));
+  type("-1");
+  save();
+  click("log scale");
+  EXPECT_TRUE(eventually([] { return hasWidget("message log scale: the range begins at -1"); }));
+  press("ctrl+z");
+  EXPECT_GE(difference(save(), before), 50);
+  close();
+}
+
 /// Numbers hold when their field is left by a click, and both ends of a range when both have been left.
 TEST_F(WindowTest, TypedNumbersHoldWithoutReturn) {
   open();

@@ -302,7 +302,7 @@ void CacheView::run(Command command) {
     case Command::kSaveTurnMovie:
     case Command::kSaveStepsMovie:
       movie_kind_ = command == Command::kSaveTurnMovie ? MovieKind::kOneTurn : MovieKind::kAllSteps;
-      return dialog_.open(FileDialog::Purpose::kSaveMovie, cache_.cachePath().stem().string() + ".mp4");
+      return dialog_.openToSaveMovie(cache_.cachePath().stem().string() + ".mp4", textOf(newMovie({})));
     case Command::kCopyCommand:
     case Command::kCopyMovieCommand:
       copy_requested_ = true;

@@ -108,6 +108,7 @@ class CacheView {
   void colourFaces(const std::string& scalar);
   void leaveIsosurfaces(const std::string& before);
   void saveMovieTo(const std::filesystem::path& file);
+  MovieRequest newMovie(const std::filesystem::path& file) const;
   void giveUpSaving();
   void giveUpRequest();
   void restartFrames();

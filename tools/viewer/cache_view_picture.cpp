@@ -236,13 +236,17 @@ void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
 
 /// What is shown now, whatever is changed while it is drawn.
 void CacheView::saveMovieTo(const fs::path& file) {
+  wanted_movie_ = newMovie(file);
+}
+
+MovieRequest CacheView::newMovie(const fs::path& file) const {
   MovieRequest movie{movie_kind_, file, cache_.at(playback_.position()), state_, picture_size_};
   if (movie_kind_ == MovieKind::kAllSteps) movie.frames_per_s = playback_.stepsPerSecond();
   movie.backend = backend_;
   movie.faces_at = faces_at_;
   movie.keep_going = !damaged_.empty();
   if (preview_) movie.keeps = preview_->folder;
-  wanted_movie_ = std::move(movie);
+  return movie;
 }
 
 void CacheView::copyCommand(bool turns) {

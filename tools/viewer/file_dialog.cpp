@@ -94,6 +94,11 @@ void FileDialog::openToSavePicture(const std::string& name, ImageSize size) {
   size_ = offered_size_ = size;
 }
 
+void FileDialog::openToSaveMovie(const std::string& name, const std::string& about) {
+  open(Purpose::kSaveMovie, name);
+  about_ = about;
+}
+
 void FileDialog::enter(const fs::path& folder) {
   error_.clear();
   overwrites_.clear();
@@ -137,6 +142,10 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   frames_to_focus_ = ImGui::IsItemActive() ? 0 : std::max(0, frames_to_focus_ - 1);
   if (frames_to_focus_ > 0) window.holdInput();
   if (*purpose_ == Purpose::kSavePicture) drawSize();
+  if (*purpose_ == Purpose::kSaveMovie) {
+    ImGui::TextUnformatted(about_.c_str());
+    nameWidget("movie of " + about_);
+  }
   accepts |= ImGui::Button(look.button);
   nameWidget("file accept");
   ImGui::SameLine();

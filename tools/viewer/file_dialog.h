@@ -38,6 +38,8 @@ class FileDialog {
   void open(Purpose purpose, const std::string& name = "");
   /// The same, to save a picture; `size` is offered, and can be changed.
   void openToSavePicture(const std::string& name, ImageSize size);
+  /// The same, to save a movie; `about`: its pictures and how long it plays.
+  void openToSaveMovie(const std::string& name, const std::string& about);
   bool isOpen() const { return purpose_.has_value(); }
   /// Draws it, if it is open. Returns what was chosen, once.
   std::optional<Chosen> draw(Window& window);
@@ -57,7 +59,7 @@ class FileDialog {
   std::vector<FolderEntry> entries_;
   std::vector<std::string> taken_;  // names that were clicked
   std::string taken_text_;          // them, as they were put into `name_`
-  std::string name_, error_, overwrites_;
+  std::string name_, error_, overwrites_, about_;
   ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture
 };
 

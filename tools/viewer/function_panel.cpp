@@ -200,7 +200,7 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
   paintNumbers(function);
   if (left > 0) ImGui::Unindent(left);
   if (shows != Shows::kOpacities) result.changed |= drawMaps(function, result);
-  result.changed |= drawRange(function, info);
+  drawRange(function, info, result);
   if (shows != Shows::kColours) result.changed |= drawUnit(function);
   if (shows != Shows::kColours && ImGui::TreeNode("opacity points")) {
     nameWidget("opacity points");
@@ -398,26 +398,27 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
   return changed;
 }
 
-bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& variable) {
-  bool changed = false;
+void FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& variable, Result& result) {
   const std::array ends{function.range().first, function.range().second};
+  const auto set = [&](double low, double high) {
+    if (function.setRange(low, high))
+      result.changed = true;
+    else
+      result.error = fmt::format("range {:.6g} to {:.6g}: expected a lower end below the upper one{}", low,
+                                 high, function.logScale() ? ", and above zero on a logarithmic scale" : "");
+  };
   label("range");
-  if (const auto typed = typed_.draw("##range", ends, "%.6g")) {
-    const auto [low, high] = *typed;
-    if (!function.setRange(low, high))
-      throw UsageError("range {:.6g} to {:.6g}: expected a lower end below the upper one{}", low, high,
-                       function.logScale() ? ", and above zero on a logarithmic scale" : "");
-    changed = true;
-  }
+  if (const auto typed = typed_.draw("##range", ends, "%.6g")) set((*typed)[0], (*typed)[1]);
   nameWidget("range");
   bool log_scale = function.logScale();
   if (option("log scale", log_scale)) {
-    if (!function.setLogScale(log_scale))
-      throw UsageError("log scale: the range begins at {:.6g}; expected above zero", ends[0]);
-    changed = true;
+    if (function.setLogScale(log_scale))
+      result.changed = true;
+    else
+      result.error = fmt::format("log scale: the range begins at {:.6g}; expected above zero", ends[0]);
   }
   ImGui::SameLine();
-  if (ImGui::Button("full range")) changed |= function.setRange(variable.min, variable.max);
+  if (ImGui::Button("full range")) set(variable.min, variable.max);
   nameWidget("full range");
   ImGui::SameLine();
   const bool resets = ImGui::Button("reset points");
@@ -426,9 +427,8 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
   if (resets) {
     const std::string name = function.map().empty() ? "viridis" : function.map();
     function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
-    changed = true;
+    result.changed = true;
   }
-  return changed;
 }
 
 bool FunctionPanel::drawUnit(EditedFunction& function) {

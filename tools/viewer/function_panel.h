@@ -25,10 +25,9 @@ class FunctionPanel {
     bool automatic = false;           // the user asked for a function that is chosen from the data
     bool dragging = false;            // a point is being dragged
     bool load = false, save = false;  // the user asked to load a function, or to save this one
-    std::string error;                // of reading the histogram
+    std::string error;                // of reading the histogram, or why what the user asked for cannot be
   };
-  /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables. Throws UsageError for
-  /// what the user asked for and cannot be.
+  /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables.
   Result draw(EditedFunction& function, size_t variable, Shows shows);
 
  private:
@@ -36,7 +35,7 @@ class FunctionPanel {
   bool drawPoints(EditedFunction& function);
   bool drawMaps(EditedFunction& function, Result& result);
   bool drawColours(EditedFunction& function);
-  bool drawRange(EditedFunction& function, const VariableInfo& variable);
+  void drawRange(EditedFunction& function, const VariableInfo& variable, Result& result);
   bool drawUnit(EditedFunction& function);
   /// Takes the finished histogram, and starts computing another one if the function's range has changed.
   /// Returns why it cannot be read, once; the one before is kept then.

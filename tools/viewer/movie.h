@@ -47,6 +47,8 @@ struct MovieRequest {
 
 /// Frames of a movie: 90 once around, as `render --orbit 360` draws; one a time step; or one.
 uint64_t framesOf(const MovieRequest& movie);
+/// "90 pictures of 1280 x 800, 3.6 s".
+std::string textOf(const MovieRequest& movie);
 
 /// Where a movie named so is written: as it is, or with the frame's number if it is of pictures: "a.png" -> "a_%04d.png".
 std::filesystem::path movieNameOf(const std::filesystem::path& file);

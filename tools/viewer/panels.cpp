@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stream/base/error.h"
 #include "tools/viewer/labels.h"
 #include "tools/viewer/marker_panel.h"
 #include "tools/viewer/widget_places.h"
@@ -24,14 +23,10 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
                                       ImGuiWindowFlags_NoBringToFrontOnFocus |
                                       ImGuiWindowFlags_AlwaysVerticalScrollbar;
   ImGui::Begin("panels", nullptr, kFixed);
-  try {
-    if (facts.playback && facts.playback->steps() > 1 && section("Time", true))
-      drawTime(actions, *facts.playback);
-    if (section("Scalar", true)) drawScalars(state, facts.further, actions);
-    if (section("Colours and opacities", true)) drawFunctions(state, actions);
-  } catch (const UsageError& error) {
-    actions.error = error.what();
-  }
+  if (facts.playback && facts.playback->steps() > 1 && section("Time", true))
+    drawTime(actions, *facts.playback);
+  if (section("Scalar", true)) drawScalars(state, facts.further, actions);
+  if (section("Colours and opacities", true)) drawFunctions(state, actions);
   actions.changed |= actions.function_changed;
   if (section("Picture", true)) drawPicture(state, actions);
   if (section("View", true)) drawView(state, actions, facts);

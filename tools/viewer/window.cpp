@@ -373,6 +373,7 @@ void Window::onMove(GLFWwindow* window, double x, double y) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   const glm::dvec2 movement = self->pixelScale() * (glm::dvec2(x, y) - self->mouse_);
   self->mouse_ = {x, y};
+  self->input_ = true;  // menus follow the mouse in the frames after its last movement
   if (self->isDragging())
     self->drags_.push_back({self->dragged_button_, self->dragged_with_shift_, movement});
 }

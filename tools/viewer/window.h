@@ -80,7 +80,7 @@ class Window {
   /// Keeps what is typed and clicked from Dear ImGui's next frame, for the frames after it: for a text field that gets the
   /// focus only then.
   void holdInput() { holds_input_ = true; }
-  /// Whether a key, a button or the wheel was used since the last call.
+  /// Whether a key, a button, the mouse or the wheel was used since the last call.
   bool takeInput();
   /// Whether a key is held that was pressed without Control.
   bool isDown(int key) const;
