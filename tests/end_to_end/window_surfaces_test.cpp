@@ -134,7 +134,7 @@ TEST_F(WindowSurfaces, AClipPlaneIsAtACoordinate) {
   act({"keyup", "ctrl"});
   save();
   press("ctrl+a");
-  act({"type", "-0.25"});
+  act({"type", "--", "-0.25"});
   press("Return");
   const std::string there = "clip plane 1: x of plane at -0.25";
   EXPECT_TRUE(eventually([&] { return hasWidget(there); }));
