@@ -13,7 +13,7 @@ namespace curvisplat {
 /// "compressed with gzip (decompress it first)", "an XDMF file"; nullopt for a file that may be PLOT3D.
 std::optional<std::string> foreignFormat(const InputFile& file);
 
-/// The same of a folder: "a Zarr store, ..."; nullopt for others, and for what is not a folder.
+/// What a folder is that is not read: "a Zarr store, ..."; nullopt for other folders and for files.
 std::optional<std::string> foreignFolder(const std::filesystem::path& folder);
 
 }  // namespace curvisplat
