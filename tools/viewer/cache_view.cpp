@@ -282,7 +282,8 @@ void CacheView::ask(bool moving) {
   request.faces = state_.faceNames();
   request.faces_at = faces_at_;
   if (frames_failed_) restartFrames();
-  request.target_s = target_s_;
+  // With a conversion beside the window, a picture can take more than twice as long as the one before it.
+  request.target_s = (preview_ || adds_scalar_ ? 0.5 : 1.0) * target_s_;
   request_ = frames_->request(std::move(request));
   values_.reset();
   values_failed_ = false;
