@@ -1,51 +1,29 @@
 #include "stream/base/durable_file.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <string_view>
 #include <utility>
 
-#include "stream/base/checksum.h"
 #include "stream/base/file.h"
 #include "stream/base/new_file.h"
 #include "stream/base/open_retrying.h"
 #include "stream/base/paths.h"
+#include "stream/base/temporary_names.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kBegin = ".curvisplat.", kEnd = ".part";
-constexpr size_t kHostDigits = 8, kRandomDigits = 8;
+constexpr TemporaryNames kNames{".curvisplat.", ".part"};
 
 std::string reason() {
   return std::strerror(errno);
-}
-
-/// Locks of other machines cannot be relied upon on every file system: names tell their files from ours.
-std::string hostDigits() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  const std::string_view host(name.data());
-  return fmt::format("{:016x}", checksumOf(std::as_bytes(std::span(host)))).substr(0, kHostDigits);
-}
-
-bool isTemporaryOfThisHost(const std::string& name) {
-  return name.size() == kBegin.size() + kHostDigits + kRandomDigits + kEnd.size() &&
-         name.starts_with(std::string(kBegin) + hostDigits()) && name.ends_with(kEnd);
-}
-
-/// Whether the descriptor's file still has a name.
-bool hasName(int fd) {
-  struct stat status {};
-  return ::fstat(fd, &status) == 0 && status.st_nlink > 0;
 }
 
 }  // namespace
@@ -71,18 +49,13 @@ void renameDurably(const fs::path& from, const fs::path& to) {
 }
 
 TemporaryFile::TemporaryFile(fs::path target) : target_(std::move(target)) {
-  const auto name = [&](uint32_t random) {
-    return folderOf(target_) / fmt::format("{}{}{:08x}{}", kBegin, hostDigits(), random, kEnd);
-  };
+  const auto name = [&](uint32_t random) { return folderOf(target_) / kNames.of(random); };
   while (true) {
     NewFile file = createNewFile(name, 0666);
     path_ = std::move(file.path);
     fd_ = file.fd;
     if (fd_ < 0) throw Error("{}: no file can be made beside it: {}", target_.string(), reason());
-    // Where files cannot be locked, removeAbandonedFiles() cannot lock them either, and removes nothing.
-    const bool busy = ::flock(fd_, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK;
-    if (!busy && hasName(fd_)) return;
-    // Another process took it for abandoned before it was locked.
+    if (lockNew(fd_)) return;
     SystemCalls::current().close(fd_);
   }
 }
@@ -132,20 +105,8 @@ void writeFileDurably(const fs::path& path, const std::string& text) {
 }
 
 void removeAbandonedFiles(const fs::path& folder) noexcept {
-  try {
-    std::error_code error;
-    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-      if (!isTemporaryOfThisHost(entry->path().filename().string())) continue;
-      const int fd = openRetrying(entry->path(), O_RDWR | O_NOFOLLOW | O_NONBLOCK, 0);
-      if (fd < 0) continue;
-      struct stat status {};
-      if (::fstat(fd, &status) == 0 && S_ISREG(status.st_mode) && ::flock(fd, LOCK_EX | LOCK_NB) == 0)
-        SystemCalls::current().remove(entry->path().c_str());
-      SystemCalls::current().close(fd);
-    }
-  } catch (...) {
-    // They are in nobody's way.
-  }
+  removeAbandoned(folder, kNames, O_RDWR | O_NOFOLLOW | O_NONBLOCK,
+                  [](const struct stat& status) { return S_ISREG(status.st_mode); });
 }
 
 }  // namespace curvisplat

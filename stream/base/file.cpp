@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/open_retrying.h"
 
 namespace curvisplat {
@@ -191,8 +192,12 @@ void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
         SystemCalls::current().pwrite(fd_, from.data() + done, count, static_cast<int64_t>(offset + done));
     if (put < 0) {
       if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
-      throw Error("{}: cannot write {} bytes at offset {}: {}", path_.string(), count, offset + done,
-                  reason());
+      const bool full = errno == ENOSPC || errno == EDQUOT;
+      const std::string why = reason();
+      const std::string text = fmt::format("{}: cannot write {} bytes at offset {}: {}", path_.string(),
+                                           count, offset + done, why);
+      if (full) throw DiskFull(path_, why, text);
+      throw Error(text);
     }
     done += static_cast<size_t>(put);
   }

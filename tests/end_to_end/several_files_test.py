@@ -8,11 +8,13 @@ files themselves. Exit status 77 (skipped) without python3-vtk9, python3-netcdf4
 import gzip
 import json
 import lzma
+import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import types
 import unittest
 
@@ -196,6 +198,23 @@ class SeveralFiles(unittest.TestCase):
                 self.assertEqual(done.returncode, 1, f"{suffix} wrong at {place}")
                 self.assertRegex(done.stderr, r"^curvisplat: wrong: .*\n$")
         self.assertEqual(list(pathlib.Path(tempfile.gettempdir()).glob("curvisplat.*.unpacked")), before)
+
+    def test_what_a_killed_program_has_unpacked_is_removed_by_the_next(self):
+        grid = self.files()[0]
+        (self.folder / "large.gz").write_bytes(gzip.compress(bytes(1 << 28), 1))  # a second of unpacking
+        (self.folder / f"{grid}.gz").write_bytes(gzip.compress((self.folder / grid).read_bytes()))
+        with tempfile.TemporaryDirectory() as temporary:
+            environment = dict(os.environ, TMPDIR=temporary)
+            unpacked = lambda: list(pathlib.Path(temporary).glob("curvisplat.*.unpacked"))
+            words = dict(cwd=self.folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            killed = subprocess.Popen([PROGRAM, "info", "large.gz"], **words)
+            while not unpacked() and killed.poll() is None:
+                time.sleep(0.001)
+            killed.kill()
+            killed.wait()
+            self.assertEqual(len(unpacked()), 1)
+            subprocess.run([PROGRAM, "info", f"{grid}.gz"], **words)
+            self.assertEqual(unpacked(), [])
 
     def peak_mebibytes(self, name):
         script = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL, " \

@@ -2,16 +2,15 @@
 
 #include <fmt/format.h>
 #include <lzma.h>
-#include <unistd.h>
 #include <zlib.h>
 #include <zstd.h>
 
 #include <array>
-#include <atomic>
-#include <cerrno>
 #include <functional>
 #include <string_view>
 #include <vector>
+
+#include "stream/base/disk_full.h"
 
 namespace curvisplat {
 namespace {
@@ -152,34 +151,21 @@ bool UnpackedFile::recognises(const InputFile& file) {
   return begin.starts_with(kGzip) || begin.starts_with(kXz) || begin.starts_with(kZstd);
 }
 
-UnpackedFile::UnpackedFile(const fs::path& path, const fs::path& folder) : original_(path) {
-  static std::atomic<unsigned> files = 0;
-  const fs::path own = folder / fmt::format("curvisplat.{}.{}.unpacked", ::getpid(), files++);
-  if (SystemCalls::current().mkdir(own.c_str(), 0700) != 0)
-    throw Error("{}: cannot be created as a temporary folder: {}", own.string(),
-                std::generic_category().message(errno));
-  path_ = own / path.stem();
+UnpackedFile::UnpackedFile(const fs::path& path, const fs::path& folder)
+    : original_(path), folder_(folder, ".unpacked"), path_(folder_.path() / path.stem()) {
+  const InputFile file(path);
+  Input input(file);
+  OutputFile out(path_);
+  const Sink sink = [&](std::span<const std::byte> bytes) { out.append(bytes); };
+  const std::string begin = beginning(file);
   try {
-    const InputFile file(path);
-    Input input(file);
-    OutputFile out(path_);
-    const Sink sink = [&](std::span<const std::byte> bytes) { out.append(bytes); };
-    const std::string begin = beginning(file);
     begin.starts_with(kGzip) ? unpackGzip(input, sink)
     : begin.starts_with(kXz) ? unpackXz(input, sink)
                              : unpackZstd(input, sink);
-  } catch (...) {
-    removeAll(own);
-    throw;
+  } catch (const DiskFull& full) {
+    throw Error("{}: is decompressed into {}, where there is no room: {}; make room there", path.string(),
+                folder.string(), full.reason());
   }
-}
-
-UnpackedFile::~UnpackedFile() {
-  removeName();
-}
-
-void UnpackedFile::removeName() {
-  removeAll(path_.parent_path());
 }
 
 }  // namespace curvisplat

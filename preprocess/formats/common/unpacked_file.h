@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "stream/base/file.h"
+#include "stream/base/temporary_subfolder.h"
 
 namespace curvisplat {
 
@@ -18,11 +19,8 @@ class UnpackedFile {
   static bool recognises(const InputFile& file);
 
   /// Decompresses `path` into `folder`. Throws Error with `path` if it is damaged, truncated or needs more
-  /// memory, and with the temporary file if that cannot be written.
+  /// memory, and with `folder` if there is no room. What killed processes have left in `folder` is removed.
   UnpackedFile(const std::filesystem::path& path, const std::filesystem::path& folder);
-  ~UnpackedFile();
-  UnpackedFile(const UnpackedFile&) = delete;
-  UnpackedFile& operator=(const UnpackedFile&) = delete;
 
   /// The compressed file.
   const std::filesystem::path& original() const { return original_; }
@@ -30,10 +28,12 @@ class UnpackedFile {
   /// ending.
   const std::filesystem::path& path() const { return path_; }
   /// To be called once a reader has opened the file: it then vanishes with the process, however that ends.
-  void removeName();
+  void removeName() { folder_.remove(); }
 
  private:
-  std::filesystem::path original_, path_;
+  std::filesystem::path original_;
+  TemporarySubfolder folder_;
+  std::filesystem::path path_;
 };
 
 }  // namespace curvisplat
