@@ -268,6 +268,7 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& giv
     GridOrigin::requireMemory(*grid, options.scalars, plan);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
   if (options.most_buckets) plan.most_buckets = *options.most_buckets;
+  if (options.slab_bytes) plan.slab_bytes = *options.slab_bytes;
 
   if (options.ranks) plan = commonPlan(plan, *options.ranks);
 

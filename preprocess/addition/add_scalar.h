@@ -32,6 +32,8 @@ struct AddScalarOptions {
   /// Smaller buckets than memory would allow, and fewer of them in a file: for tests.
   std::optional<uint64_t> bucket_splats;
   std::optional<uint32_t> most_buckets;
+  /// Smaller slabs, in which even the rows of a small grid are cut: for tests.
+  std::optional<uint64_t> slab_bytes;
 };
 
 struct AddScalarReport {

@@ -67,11 +67,11 @@ std::unique_ptr<GridSource> inOrderOf(const Manifest& series, const DataSource& 
 
 /// What the scatter pass learns about a grid of node-centred scalars on its way.
 struct SlabSurvey {
-  uint64_t grid_checksum = 0;
+  GridChecksum grid_checksum;
   std::vector<ScalarRange> ranges;
 
   void add(const LoadedSlab& loaded, const GridBlock& block) {
-    grid_checksum += checksumOfGrid(loaded, block);
+    grid_checksum.add(loaded, block);
     // The halo's nodes are nodes of the grid as well: counting them twice changes no range.
     const NodeArrays& nodes = loaded.nodes;
     for (size_t scalar = 0; scalar < ranges.size(); ++scalar) {
@@ -108,6 +108,7 @@ class StepAddition {
         grid_(dynamic_cast<const GridSource*>(&source_)) {
     if (grid_) GridOrigin::requireMemory(*grid_, scalars_, plan_);
     if (options.bucket_splats) plan_.limitBuckets(*options.bucket_splats, scalars_.size());
+    if (options.slab_bytes) plan_.slab_bytes = *options.slab_bytes;
     report_.step = cache_.series().steps.size();
     report_.nodes = cache_.manifest().nodes;
     if (grid_) {
@@ -175,7 +176,7 @@ class StepAddition {
     } catch (const Error&) {
       return false;  // its splats lie elsewhere; or it cannot be read, which the scan reports
     }
-    if (survey.grid_checksum != expected) return false;
+    if (survey.grid_checksum.value() != expected) return false;
     ranges_ = survey.ranges;
     finishValues(passes, cache_);
     return true;

@@ -25,8 +25,8 @@ struct AddStepOptions {
   bool to_part = false;                    // the cache is a part of a series (series_part.h)
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
 
-  /// Smaller buckets than memory would allow: for tests.
-  std::optional<uint64_t> bucket_splats;
+  /// Smaller buckets than memory would allow, and smaller slabs, in which even the rows of a small grid are cut: for tests.
+  std::optional<uint64_t> bucket_splats, slab_bytes;
 };
 
 struct AddStepReport {

@@ -1,5 +1,6 @@
 #include "preprocess/addition/cache_grid.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -64,6 +65,18 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
 void CacheGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                      NodeArrays& out) const {
   source_->read(block, box, scalars, out);
+  blankOthers(block, box, scalars, out);
+}
+
+void CacheGrid::readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                               NodeArrays& out) const {
+  source_->readPartOfRows(block, box, scalars, out);
+  blankOthers(block, box, scalars, out);
+}
+
+/// Blanks what has no splat in the cache.
+void CacheGrid::blankOthers(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                            NodeArrays& out) const {
   for (size_t n = 0; n < out.x.size(); ++n)
     out.blank[n] |= !(std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]));
   if (!drawn_) return;
@@ -81,16 +94,18 @@ void CacheGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_
 
 void CacheGrid::restrict(uint32_t block_number, const NodeBox& box, std::vector<uint8_t>& blank) const {
   const GridBlock& block = description().blocks[block_number];
+  const uint64_t end = box.endOfRow(block.ni), row_nodes = end - box.i0;
+  const uint64_t inner_begin = std::max<uint64_t>(1, box.i0), inner_end = std::min(end, block.ni - 1);
   size_t at = 0;
   for (uint64_t k = box.k0; k < box.k1; ++k) {
-    for (uint64_t j = box.j0; j < box.j1; ++j, at += block.ni) {
-      const std::span<uint8_t> row(&blank[at], block.ni);
+    for (uint64_t j = box.j0; j < box.j1; ++j, at += row_nodes) {
+      const std::span<uint8_t> row(&blank[at], row_nodes);
       const uint64_t first = first_nodes_[block_number] + (k * block.nj + j) * block.ni;
       const bool on_face = j == 0 || j + 1 == block.nj || k == 0 || k + 1 == block.nk;
       if (!all_faces_)
-        drawn_->blankOthers(first, row);
-      else if (!on_face && block.ni > 2)
-        drawn_->blankOthers(first + 1, row.subspan(1, block.ni - 2));
+        drawn_->blankOthers(first + box.i0, row);
+      else if (!on_face && inner_begin < inner_end)
+        drawn_->blankOthers(first + inner_begin, row.subspan(inner_begin - box.i0, inner_end - inner_begin));
     }
   }
 }

@@ -37,8 +37,15 @@ class CacheGrid : public GridSource {
   const GridDescription& description() const override { return source_->description(); }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override;
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
+    return source_->rowsInMemory(scalars);
+  }
 
  private:
+  void blankOthers(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                   NodeArrays& out) const;
   void restrict(uint32_t block, const NodeBox& box, std::vector<uint8_t>& blank) const;
 
   const GridSource* source_;

@@ -23,6 +23,7 @@
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/convert/splat_record.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/freed_memory.h"
@@ -119,6 +120,13 @@ class Conversion {
   bool leaveForResuming() {
     if (file_) file_->leave();
     return workspace_ && workspace_->leaveForResuming();
+  }
+
+  /// The folder that has the cache or the temporary files, whichever `file` belongs to.
+  std::filesystem::path folderOf(const std::filesystem::path& file) const {
+    if (partial_.empty()) return file.parent_path();
+    const auto [differs, ignored] = std::mismatch(scratch_.begin(), scratch_.end(), file.begin(), file.end());
+    return differs == scratch_.end() ? scratch_.parent_path() : partial_.parent_path();
   }
 
  private:
@@ -374,6 +382,8 @@ class Conversion {
   ConvertReport report_;
 };
 
+constexpr const char* kKept = "; finished work is kept: continue with --resume";
+
 }  // namespace
 
 ConvertReport runConversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
@@ -387,9 +397,14 @@ ConvertReport runConversion(const DataSource& source, const ConvertOptions& opti
             ? "interrupted; continue with the same command and --resume"
             : "interrupted before there was anything to resume; its temporary files were removed";
     throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
+  } catch (const DiskFull& full) {
+    const std::string text = fmt::format(
+        "{}: no room for the cache and its temporary files: {}; make room, or name a folder on another disk "
+        "with --tmp",
+        conversion.folderOf(full.file()).string(), full.reason());
+    throw Error("{}{}", text, options.resume && conversion.leaveForResuming() ? kKept : "");
   } catch (const Error& error) {
-    if (options.resume && conversion.leaveForResuming())
-      throw Error("{}; finished work is kept: continue with --resume", error.what());
+    if (options.resume && conversion.leaveForResuming()) throw Error("{}{}", error.what(), kKept);
     throw;
   }
 }

@@ -66,6 +66,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given_opti
   if (options.ranks) plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.owner_bytes) plan.owner_bytes = *options.owner_bytes;
+  if (options.slab_bytes) plan.slab_bytes = *options.slab_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
   if (options.ranks) plan = commonPlan(plan, *options.ranks);
 

@@ -42,6 +42,8 @@ struct ConvertOptions {
   std::optional<uint64_t> mesh_bytes;
   /// For tests: a memory limit for the cells of overlapping blocks, so that small ones are read in several parts.
   std::optional<uint64_t> owner_bytes;
+  /// For tests: slabs smaller than memory would allow, so that even the rows of a small grid are cut.
+  std::optional<uint64_t> slab_bytes;
 };
 
 /// A file of the cache, and its size.

@@ -22,10 +22,16 @@ GridOrigin::GridOrigin(const GridSource& source, std::vector<uint32_t> scalars,
       scratch_(std::move(scratch)) {}
 
 void GridOrigin::requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars,
-                               MemoryPlan& plan) {
+                               const MemoryPlan& plan) {
+  const std::vector<GridBlock>& blocks = source.description().blocks;
   const bool cells = NodeReader(source, scalars, std::nullopt).centring() == Centring::kCell;
-  plan.requireSlabs(
-      leastSlabBytes(source.description().blocks, scalars.size(), cells ? kCellSplatHalo : kNodeSplatHalo));
+  const uint64_t rows = source.rowsInMemory(scalars);
+  if (rows == 0 ||
+      leastSlabBytes(blocks, scalars.size(), cells ? kCellSplatHalo : kNodeSplatHalo) <= plan.slab_bytes)
+    return;
+  const auto longest = std::max_element(blocks.begin(), blocks.end(),
+                                        [](const GridBlock& a, const GridBlock& b) { return a.ni < b.ni; });
+  plan.requireRow(longest->name, longest->ni, rows * longest->ni * slabBytesPerNode(scalars.size()));
 }
 
 uint64_t GridOrigin::temporaryBytes() const {

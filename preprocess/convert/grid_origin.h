@@ -23,8 +23,9 @@ class GridOrigin final : public SplatOrigin {
   GridOrigin(const GridSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
              Overlap overlap, const MemoryPlan& plan, std::filesystem::path scratch);
 
-  /// Makes the plan's slabs large enough for the grid's rows. Throws Error that names a sufficient cap.
-  static void requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars, MemoryPlan& plan);
+  /// Throws Error that names a sufficient cap, where the source reads rows as a whole and they are too long.
+  static void requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars,
+                            const MemoryPlan& plan);
 
   const GridDescription& description() const override { return reader_.source().description(); }
   Centring centring() const override { return reader_.centring(); }

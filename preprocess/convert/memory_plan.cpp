@@ -107,12 +107,12 @@ uint64_t MemoryPlan::capForMesh(uint64_t mesh_bytes) {
   return capFor(mesh_bytes * kMeshShare);
 }
 
-void MemoryPlan::requireSlabs(uint64_t bytes) {
-  const uint64_t of_two = (bytes + kSlabsOfLongRows - 1) / kSlabsOfLongRows;
-  if (capFor(of_two * kSlabShare) > cap_bytes)
-    throw Error("--memory {}: the grid's rows along i are long and need at least {} MiB", byteText(cap_bytes),
-                (capFor(of_two * kSlabShare) >> 20) + 1);
-  slab_bytes = std::max(slab_bytes, of_two);
+void MemoryPlan::requireRow(const std::string& block, uint64_t nodes, uint64_t bytes) const {
+  if (const uint64_t cap = capFor(bytes * kSlabShare); cap > cap_bytes)
+    throw Error(
+        "--memory {}: {}: a row of {} nodes along i does not fit, and this format is read by whole rows; "
+        "give at least {} MiB",
+        byteText(cap_bytes), block, nodes, (cap >> 20) + 1);
 }
 
 uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {

@@ -3,7 +3,8 @@
 //
 //    scan          2 slabs | seams: faces of cells
 //    count         2 slabs | counting grid
-//    scatter       2 slabs | chunk buffers | seams | cells of overlapping blocks | a task's splats a thread
+//    scatter       2 slabs | a row that is read as a whole | chunk buffers | seams | cells of overlapping blocks
+//                  a task's splats a thread
 //                  of a mesh: points and sums | chunk buffers | chunks of cells
 //    seams         chunk buffers | seams
 //    build         2 buckets (one is read while the other is built) | a brick's scratch a thread
@@ -11,12 +12,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 namespace curvisplat {
 
 struct MemoryPlan {
   uint64_t cap_bytes = 0;       // limit of the process
-  uint64_t slab_bytes = 0;      // each of two; one of long rows may have kSlabsOfLongRows times as much
+  uint64_t slab_bytes = 0;      // each of two; and a row of a source that reads rows as a whole
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
   uint64_t owner_bytes = 0;         // the cells of overlapping blocks, while splats are made
@@ -38,8 +40,9 @@ struct MemoryPlan {
   /// The limit at which a mesh gets this much.
   static uint64_t capForMesh(uint64_t mesh_bytes);
 
-  /// Makes room for slabs of `bytes`, which long rows need. Throws Error that names a sufficient limit if there is too little.
-  void requireSlabs(uint64_t bytes);
+  /// Throws Error that names a sufficient limit if a row of `bytes` does not fit beside the slabs. `block`: the name of
+  /// its block; `nodes`: its nodes along i.
+  void requireRow(const std::string& block, uint64_t nodes, uint64_t bytes) const;
 
   /// Makes slabs and buckets no larger than serves a grid of `samples`: then one is read while another is worked on, and
   /// memory is used again instead of being asked for, which costs a page fault every 4 KiB.

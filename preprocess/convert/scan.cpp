@@ -119,7 +119,10 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
   GridSurvey none;
   none.ranges.resize(reader.scalars());
   GridSurvey survey = none;
-  SlabStream slabs(reader, slab_bytes, kNoHalo, shareOf(ranks));
+  SlabShare share = shareOf(ranks);
+  share.whole_rows = true;  // for the checksum
+  SlabStream slabs(reader, slab_bytes, kNoHalo, share);
+  GridChecksum checksum;
   while (const LoadedSlab* loaded = slabs.next()) {
     const size_t count = loaded->nodes.x.size();
     // The smallest and the largest do not depend on how the work is divided.
@@ -133,10 +136,11 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
         unitedSurvey);
     of_slab.nodes = count;
     of_slab.blanked = loaded->blanked;
-    of_slab.grid_checksum = checksumOfGrid(*loaded, reader.source().description().blocks[loaded->slab.block]);
+    checksum.add(*loaded, reader.source().description().blocks[loaded->slab.block]);
     survey = unitedSurvey(std::move(survey), of_slab);
     progress.advance(count);
   }
+  survey.grid_checksum = checksum.value();
   if (ranks) survey = combinedSurvey(survey, *ranks);
   checkExtent(survey, reader.source().description(), reader.centring());
   return survey;

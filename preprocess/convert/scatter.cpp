@@ -45,14 +45,16 @@ class SplatStream {
   void add(const LoadedSlab& loaded, std::span<const uint64_t> covered) {
     const Slab& slab = loaded.slab;
     const GridBlock& block = (*blocks_)[slab.block];
-    const std::vector<NodeBox> boxes = cutForTasks(block, slab.box, kNodesPerTask);
-    const uint64_t parts = (block.ni + kNodesOfRowPerTask - 1) / kNodesOfRowPerTask;
+    const uint64_t row_nodes = slab.box.rowNodes(block.ni);
+    const std::vector<NodeBox> boxes = cutForTasks(row_nodes, slab.box, kNodesPerTask);
+    const uint64_t parts = (row_nodes + kNodesOfRowPerTask - 1) / kNodesOfRowPerTask;
     tbb::parallel_for(size_t{0}, boxes.size() * parts, [&](size_t task) {
       progress_->throwIfStopped();
       const TraceScope trace("make splats");
-      const uint64_t i0 = task % parts * kNodesOfRowPerTask;
+      const uint64_t i0 = slab.box.i0 + task % parts * kNodesOfRowPerTask;
+      const uint64_t i1 = std::min(i0 + kNodesOfRowPerTask, slab.box.i1);
       const NodeBox& box = boxes[task / parts];
-      BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes, i0, i0 + kNodesOfRowPerTask};
+      BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes, i0, i1};
       if (!covered.empty()) window.covered = covered.data();
       Worker& worker = workers_.local();
       if (centring_ == Centring::kCell)
@@ -174,8 +176,10 @@ void RecordRouter::flush() {
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const SinkOfThread& sink_of_thread, SeamMerger& seams, const SlabPass& pass) {
   SplatStream splats(reader, faces, sink_of_thread, seams, pass);
+  SlabShare share = shareOf(pass.ranks);
+  share.whole_rows = pass.see != nullptr;  // a checksum of the grid needs them
   SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo,
-                   shareOf(pass.ranks));
+                   share);
   std::vector<uint64_t> covered;
   while (const LoadedSlab* loaded = slabs.next()) {
     if (pass.see) {
@@ -185,7 +189,7 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
     if (pass.owners) pass.owners->cover(*loaded, covered);
     splats.add(*loaded, covered);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
-    pass.progress.advance(rowsOf(loaded->slab.box) * block.ni);
+    pass.progress.advance(rowsOf(loaded->slab.box) * loaded->slab.box.rowNodes(block.ni));
   }
   return splats.counts(pass.ranks);
 }

@@ -16,6 +16,8 @@ namespace {
 
 // Edges whose lengths differ by less are skipped together.
 constexpr double kAlike = 1.5;
+// Patches that are in memory at once: of one scalar, 17 MiB.
+constexpr uint64_t kPatchesAtOnce = 256;
 
 using Pair = std::array<uint64_t, 2>;
 
@@ -76,14 +78,16 @@ class PatchBuilder {
   PatchBuilder(const FaceSpool& spool, uint32_t face, const QuadMask& drawn)
       : spool_(spool), face_(spool.faces()[face]), number_(face), drawn_(drawn) {}
 
-  /// One row of the patches of a level. Decimates rows of nodes as it reads them.
-  std::vector<Built> row(const std::array<uint32_t, 2>& stride, uint64_t patch_v) const {
-    std::vector<Built> built(patchesAlong(face_, stride, 0));
-    for (size_t n = 0; n < built.size(); ++n) begin(built[n], stride, {n, patch_v});
-    const FacePatch& first = built.front().patch;
-    for (uint64_t r = 0; r < first.nodes[1]; ++r) {
-      const LatticeRow nodes = spool_.row(number_, latticeIndex(face_, first, 1, r));
-      for (Built& b : built) append(b, nodes);
+  /// The patches of a row of a level from place `first` on, kPatchesAtOnce at the most. Decimates rows of nodes as it
+  /// reads them.
+  std::vector<Built> part(const std::array<uint32_t, 2>& stride, const Pair& first) const {
+    std::vector<Built> built(std::min(kPatchesAtOnce, patchesAlong(face_, stride, 0) - first[0]));
+    for (size_t n = 0; n < built.size(); ++n) begin(built[n], stride, {first[0] + n, first[1]});
+    const FacePatch &left = built.front().patch, &right = built.back().patch;
+    const RowRange range{left.first[0], latticeIndex(face_, right, 0, right.nodes[0] - 1u) + 1};
+    for (uint64_t r = 0; r < left.nodes[1]; ++r) {
+      const LatticeRow nodes = spool_.row(number_, latticeIndex(face_, left, 1, r), range);
+      for (Built& b : built) append(b, nodes, range.begin);
     }
     tbb::parallel_for(size_t{0}, built.size(), [&](size_t n) { complete(built[n]); });
     return built;
@@ -105,11 +109,12 @@ class PatchBuilder {
     b.lattice.scalars.resize(spool_.scalars());
   }
 
-  void append(Built& b, const LatticeRow& row) const {
+  /// `row` begins at node `first`.
+  void append(Built& b, const LatticeRow& row, uint64_t first) const {
     for (uint64_t n = 0; n < b.patch.nodes[0]; ++n) {
-      const uint64_t u = latticeIndex(face_, b.patch, 0, n);
-      for (size_t axis = 0; axis < 3; ++axis) b.lattice.codes[axis].push_back(row.codes[u][axis]);
-      for (size_t s = 0; s < row.scalars.size(); ++s) b.lattice.scalars[s].push_back(row.scalars[s][u]);
+      const uint64_t at = latticeIndex(face_, b.patch, 0, n) - first;
+      for (size_t axis = 0; axis < 3; ++axis) b.lattice.codes[axis].push_back(row.codes[at][axis]);
+      for (size_t s = 0; s < row.scalars.size(); ++s) b.lattice.scalars[s].push_back(row.scalars[s][at]);
     }
   }
 
@@ -245,19 +250,22 @@ std::vector<FacePatch> writePatches(const FaceSpool& spool, uint32_t face, const
       const std::vector<Pair> below = childPlaces(built.place, stride, strides[levels.size() - 1]);
       return std::any_of(below.begin(), below.end(), [&](const Pair& p) { return levels.back().has(p); });
     };
-    for (uint64_t v = 0; v < patchesAlong(spool.faces()[face], stride, 1); ++v) {
+    const auto write_part = [&](const Pair& first) {
       progress.throwIfStopped();
-      std::vector<Built> row = builder.row(stride, v);
-      std::vector<std::vector<std::byte>> streams(row.size());
-      tbb::parallel_for(size_t{0}, row.size(), [&](size_t n) {
-        if (is_needed(row[n])) streams[n] = encodePatch(row[n].lattice);
+      std::vector<Built> part = builder.part(stride, first);
+      std::vector<std::vector<std::byte>> streams(part.size());
+      tbb::parallel_for(size_t{0}, part.size(), [&](size_t n) {
+        if (is_needed(part[n])) streams[n] = encodePatch(part[n].lattice);
       });
-      for (size_t n = 0; n < row.size(); ++n) {
+      for (size_t n = 0; n < part.size(); ++n) {
         if (streams[n].empty()) continue;
-        row[n].patch.extent = writer.append(streams[n]);
-        level.add(row[n].place, row[n].patch);
+        part[n].patch.extent = writer.append(streams[n]);
+        level.add(part[n].place, part[n].patch);
       }
-    }
+    };
+    for (uint64_t v = 0; v < patchesAlong(spool.faces()[face], stride, 1); ++v)
+      for (uint64_t u = 0; u < patchesAlong(spool.faces()[face], stride, 0); u += kPatchesAtOnce)
+        write_part({u, v});
     if (level.empty()) return {};
     levels.push_back(std::move(level));
   }

@@ -31,7 +31,7 @@ class QuadMask {
 };
 
 /// Appends the streams of the face's patches and returns them, the coarsest first; numbers of children count from
-/// `first_number`. None if no quad is drawn. Holds the rows of one row of patches.
+/// `first_number`. None if no quad is drawn. Holds 256 patches at a time.
 std::vector<FacePatch> writePatches(const FaceSpool& spool, uint32_t face, const QuadMask& drawn,
                                     uint32_t first_number, FacesWriter& writer, const Progress& progress);
 

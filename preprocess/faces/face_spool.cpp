@@ -21,8 +21,7 @@ Node sizeOf(const GridBlock& block) {
 
 /// Where a node is in a slab's arrays.
 size_t placeIn(const LoadedSlab& loaded, uint64_t ni, const Node& node) {
-  const NodeBox& window = loaded.slab.window;
-  return ((node[2] - window.k0) * (window.j1 - window.j0) + (node[1] - window.j0)) * ni + node[0];
+  return WindowStrides(loaded.slab.window, ni).at(node[0], node[1], node[2]);
 }
 
 /// The part of a face's lattice whose nodes (or, of the layer of cells behind it, lowest nodes) are in the box.
@@ -31,7 +30,7 @@ struct LatticeBox {
   bool empty = false;
 
   LatticeBox(const GridFace& face, const Node& size, const NodeBox& box, uint64_t layer) {
-    const Node from{0, box.j0, box.k0}, to{size[0], box.j1, box.k1};
+    const Node from{box.i0, box.j0, box.k0}, to{box.endOfRow(size[0]), box.j1, box.k1};
     const auto axis = static_cast<size_t>(face.axis);
     empty = layer < from[axis] || layer >= to[axis];
     for (size_t n = 0; n < 2; ++n) {
@@ -92,7 +91,8 @@ void FaceSpool::fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& pro
     }
     for (size_t face = first_face; face < end_face; ++face) take(*loaded, face);
     addEnds(*loaded, abutting);
-    progress.advance(rowsOf(loaded->slab.box) * reader_.source().description().blocks[block].ni);
+    progress.advance(rowsOf(loaded->slab.box) *
+                     loaded->slab.box.rowNodes(reader_.source().description().blocks[block].ni));
   }
 }
 
@@ -131,7 +131,7 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
   if (scalars() == 0) return;
   const uint64_t layer = of_cells ? layerOfCells(face, size) : face.index;
   const LatticeBox of_values(face, size, loaded.slab.box, layer);
-  const size_t plane_stride = size[0] * (loaded.slab.window.j1 - loaded.slab.window.j0);
+  const WindowStrides strides(loaded.slab.window, size[0]);
   for (uint64_t v = of_values.first[1]; !of_values.empty && v < of_values.end[1]; ++v) {
     if (values.empty()) first = v * face.nodes[0] + of_values.first[0];
     for (uint64_t u = of_values.first[0]; u < of_values.end[0]; ++u) {
@@ -139,7 +139,7 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
       const size_t at = placeIn(loaded, size[0], node);
       const bool has_cell =
           of_cells && node[0] + 1 < size[0] && node[1] + 1 < size[1] && node[2] + 1 < size[2];
-      const bool none = of_cells && !(has_cell && cellIsThere(nodes, at, size[0], plane_stride));
+      const bool none = of_cells && !(has_cell && cellIsThere(nodes, at, strides.row, strides.plane));
       for (const std::vector<float>& scalar : nodes.scalars) values.push_back(none ? NAN : scalar[at]);
     }
     if (!is_last(of_values, v)) continue;
@@ -154,71 +154,80 @@ void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const
   const Slab& slab = loaded.slab;
   const NodeArrays& nodes = loaded.nodes;
   const Node size = sizeOf(reader_.source().description().blocks[slab.block]);
-  const size_t plane_stride = size[0] * (slab.window.j1 - slab.window.j0);
+  const WindowStrides strides(slab.window, size[0]);
   std::vector<AbuttingFaces::Centre> centres;
   const auto add = [&](const CellFace& face, size_t at) {
     if (ofCells()) {
-      if (!cellIsThere(nodes, at, size[0], plane_stride)) return;
+      if (!cellIsThere(nodes, at, strides.row, strides.plane)) return;
     } else {
       const size_t bit = size_t{1} << face.axis;
       for (size_t corner = 0; corner < 8; ++corner)
         if (((corner & bit) != 0) == face.upper &&
-            nodes.blank[at + (corner & 1) + (corner >> 1 & 1) * size[0] + (corner >> 2) * plane_stride])
+            nodes.blank[at + (corner & 1) + (corner >> 1 & 1) * strides.row + (corner >> 2) * strides.plane])
           return;
     }
     centres.push_back(abutting.centreOf(
-        face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, size[0], plane_stride)));
+        face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, strides.row, strides.plane)));
   };
   for (uint64_t k = slab.box.k0; k < std::min(slab.box.k1, size[2] - 1); ++k)
     for (uint64_t j = slab.box.j0; j < std::min(slab.box.j1, size[1] - 1); ++j) {
       const bool row_at_end = j == 0 || j + 2 == size[1] || k == 0 || k + 2 == size[2];
-      const size_t row = placeIn(loaded, size[0], {0, j, k});
-      for (uint64_t i = 0; i + 1 < size[0]; i = row_at_end || i + 2 >= size[0] ? i + 1 : size[0] - 2)
+      // In other rows only the first and the last cell are at an end.
+      const auto next = [&](uint64_t i) {
+        return row_at_end || i + 2 >= size[0] ? i + 1 : std::max(i + 1, size[0] - 2);
+      };
+      const uint64_t first =
+          row_at_end || slab.box.i0 == 0 ? slab.box.i0 : std::max(slab.box.i0, size[0] - 2);
+      for (uint64_t i = first; i < slab.box.i1 && i + 1 < size[0]; i = next(i))
         for (int axis = 0; axis < 3; ++axis)
           for (const bool upper : {false, true})
             if (const CellFace face{slab.block, {i, j, k}, axis, upper}; abutting.isAtEnd(face))
-              add(face, row + i);
+              add(face, strides.at(i, j, k));
     }
   abutting.add(centres);
 }
 
-std::vector<float> FaceSpool::storedScalars(size_t face, uint64_t v) const {
-  std::vector<float> values(faces_[face].nodes[0] * scalars());
-  file_.in().readAt(places_[face].scalars + v * values.size() * sizeof(float), std::span(values));
+std::vector<float> FaceSpool::storedScalars(size_t face, uint64_t v, const RowRange& range) const {
+  std::vector<float> values((range.end - range.begin) * scalars());
+  const uint64_t first = v * faces_[face].nodes[0] + range.begin;
+  file_.in().readAt(places_[face].scalars + first * scalars() * sizeof(float), std::span(values));
   return values;
 }
 
 std::vector<uint8_t> FaceSpool::cellsOfRow(size_t face, uint64_t v) const {
-  const std::vector<float> values = storedScalars(face, v);
+  const std::vector<float> values = storedScalars(face, v, {0, faces_[face].nodes[0]});
   std::vector<uint8_t> there(faces_[face].nodes[0] - 1);
   for (size_t u = 0; u < there.size(); ++u) there[u] = !std::isnan(values[u * scalars()]);
   return there;
 }
 
-LatticeRow FaceSpool::row(size_t face_number, uint64_t v) const {
+LatticeRow FaceSpool::row(size_t face_number, uint64_t v, const RowRange& range) const {
   const GridFace& face = faces_[face_number];
+  const uint64_t begin = range.begin, end = std::min(range.end, face.nodes[0]);
   LatticeRow row;
-  row.codes.resize(face.nodes[0]);
-  file_.in().readAt(places_[face_number].positions + v * face.nodes[0] * kPositionBytes,
+  row.codes.resize(end - begin);
+  file_.in().readAt(places_[face_number].positions + (v * face.nodes[0] + begin) * kPositionBytes,
                     std::span(row.codes));
-  row.scalars.assign(scalars(), std::vector<float>(face.nodes[0]));
+  row.scalars.assign(scalars(), std::vector<float>(end - begin));
   if (scalars() == 0) return row;
-  const std::vector<float> here = storedScalars(face_number, v);
+  // A node's value is made from the cells on both sides of it.
+  const uint64_t first = ofCells() && begin > 0 ? begin - 1 : begin;
+  const std::vector<float> here = storedScalars(face_number, v, {first, end});
   if (!ofCells()) {
     for (size_t s = 0; s < scalars(); ++s)
-      for (size_t u = 0; u < face.nodes[0]; ++u) row.scalars[s][u] = here[u * scalars() + s];
+      for (size_t n = 0; n < end - begin; ++n) row.scalars[s][n] = here[n * scalars() + s];
     return row;
   }
-  const std::vector<float> before = v > 0 ? storedScalars(face_number, v - 1) : here;
+  const std::vector<float> before = v > 0 ? storedScalars(face_number, v - 1, {first, end}) : here;
   for (size_t s = 0; s < scalars(); ++s)
-    for (size_t u = 0; u < face.nodes[0]; ++u) {
+    for (uint64_t u = begin; u < end; ++u) {
       double sum = 0;
       int count = 0;
       for (const std::vector<float>* of : {&before, &here})
-        for (size_t at = u > 0 ? u - 1 : 0; at <= u; ++at)
-          if (const float value = (*of)[at * scalars() + s]; !std::isnan(value))
+        for (uint64_t cell = u > 0 ? u - 1 : 0; cell <= u; ++cell)
+          if (const float value = (*of)[(cell - first) * scalars() + s]; !std::isnan(value))
             sum += double{value}, ++count;
-      row.scalars[s][u] = count > 0 ? static_cast<float>(sum / count) : 0;
+      row.scalars[s][u - begin] = count > 0 ? static_cast<float>(sum / count) : 0;
     }
   return row;
 }

@@ -21,7 +21,12 @@
 
 namespace curvisplat {
 
-/// A row of nodes of a face.
+/// A range of the nodes of a row.
+struct RowRange {
+  uint64_t begin = 0, end = UINT64_MAX;  // end above the row's: to its end
+};
+
+/// A row of nodes of a face, or a range of it.
 struct LatticeRow {
   static constexpr uint32_t kNone = 0xffffffff;  // as the first code: there is no such node
 
@@ -44,7 +49,7 @@ class FaceSpool {
   const FaceBox& box() const { return box_; }
   size_t scalars() const { return reader_.scalars(); }
   /// After fill(). Rows of nodes along u. Any thread.
-  LatticeRow row(size_t face, uint64_t v) const;
+  LatticeRow row(size_t face, uint64_t v, const RowRange& range = {}) const;
   /// Whether the cells behind the quads of a row are there; nodes decide otherwise. Of cells only.
   std::vector<uint8_t> cellsOfRow(size_t face, uint64_t v) const;
   bool ofCells() const { return reader_.centring() == Centring::kCell; }
@@ -55,7 +60,7 @@ class FaceSpool {
   };
   void take(const LoadedSlab& loaded, size_t face);
   void addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const;
-  std::vector<float> storedScalars(size_t face, uint64_t v) const;
+  std::vector<float> storedScalars(size_t face, uint64_t v, const RowRange& range) const;
 
   const NodeReader& reader_;
   const std::vector<GridFace> faces_;

@@ -15,9 +15,16 @@
 
 namespace curvisplat {
 
-/// Half-open ranges of node indices of one block, the unit of reading: all i, j0 <= j < j1, k0 <= k < k1.
+/// Half-open ranges of node indices of one block, the unit of reading: j0 <= j < j1, k0 <= k < k1, and all i, or
+/// i0 <= i < i1 of each row.
 struct NodeBox {
   uint64_t j0 = 0, j1 = 0, k0 = 0, k1 = 0;
+  uint64_t i0 = 0, i1 = UINT64_MAX;  // i1 above the block's ni: to the end of the row
+
+  bool hasWholeRows(uint64_t ni) const { return i0 == 0 && i1 >= ni; }
+  uint64_t endOfRow(uint64_t ni) const { return i1 < ni ? i1 : ni; }
+  /// Nodes of a row, in a block of `ni` along i.
+  uint64_t rowNodes(uint64_t ni) const { return endOfRow(ni) - i0; }
 };
 
 struct GridBlock {
@@ -105,16 +112,33 @@ class DataSource {
 
 class GridSource : public DataSource {
  public:
-  /// Reads the nodes of `box` in block number `block`: coordinates, the block's own blanking, and the scalars
-  /// with the given indices in description().scalars. Any number of threads may read concurrently. Throws
-  /// Error with the file and the offset.
+  /// Reads the nodes of `box`, which has whole rows, in block number `block`: coordinates, the block's own blanking,
+  /// and the scalars with the given indices in description().scalars. Any number of threads may read concurrently.
+  /// Throws Error with the file and the offset.
   virtual void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                     NodeArrays& out) const = 0;
-  /// Which nodes of the box are fringe: interpolated from another block (a negative iblank). Fills `out` with 1 or 0
-  /// for each and returns true; returns false if the grid does not tell. As read().
+  /// The same for parts of rows: `out` gets box.rowNodes() nodes of each. The default reads whole rows, one after the
+  /// other.
+  virtual void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                              NodeArrays& out) const;
+  /// The number of whole rows that readPartOfRows() holds in memory beside `out`: 0 if it reads the parts alone.
+  virtual uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const { return 1; }
+  /// Which nodes of the box, which has whole rows, are fringe: interpolated from another block (a negative iblank).
+  /// Fills `out` with 1 or 0 for each and returns true; returns false if the grid does not tell. As read().
   virtual bool readFringe(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<uint8_t>& /*out*/) const {
     return false;
   }
+  /// The same for parts of rows; reads whole rows, one after the other.
+  bool readFringePart(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const;
 };
+
+/// Reads a box of whole rows or of parts of them.
+inline void readBox(const GridSource& source, uint32_t block, const NodeBox& box,
+                    std::span<const uint32_t> scalars, NodeArrays& out) {
+  if (box.hasWholeRows(source.description().blocks.at(block).ni))
+    source.read(block, box, scalars, out);
+  else
+    source.readPartOfRows(block, box, scalars, out);
+}
 
 }  // namespace curvisplat

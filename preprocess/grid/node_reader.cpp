@@ -95,7 +95,7 @@ NodeReader::NodeReader(const GridSource& source, std::vector<uint32_t> scalars,
       centring_(centringOf(source.description(), scalars_)) {}
 
 BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out) const {
-  source_->read(block, box, scalars_, out);
+  readBox(*source_, block, box, scalars_, out);
   BlankCounts counts;
   if (centring_ == Centring::kCell) {
     markCells(blank_value_, out);

@@ -1,6 +1,6 @@
 // Reads the next value in a thread of its own while the caller processes the current one. Conversion's disk
 // reads need no more concurrency, and blocking reads stay off the TBB workers. There are two values, which
-// are reused and keep their capacity; or one, where two are too large, and then nothing is read ahead.
+// are reused and keep their capacity.
 #pragma once
 
 #include <array>
@@ -20,9 +20,7 @@ template <typename T>
 class ReadAhead {
  public:
   /// `fill` runs in the reading thread: it overwrites a value and returns true, or returns false at the end.
-  /// `values`: 1 or 2.
-  explicit ReadAhead(std::function<bool(T&)> fill, size_t values = 2)
-      : fill_(std::move(fill)), count_(values), thread_([this] { fillAll(); }) {}
+  explicit ReadAhead(std::function<bool(T&)> fill) : fill_(std::move(fill)), thread_([this] { fillAll(); }) {}
 
   ~ReadAhead() {
     {
@@ -46,7 +44,7 @@ class ReadAhead {
       const TraceScope trace("wait for reading", TraceKind::kWait);
       while (filled_ <= taken_ && !ended_) changed_.wait(lock);
     }
-    if (filled_ > taken_) return &values_[taken_++ % count_];
+    if (filled_ > taken_) return &values_[taken_++ % values_.size()];
     if (error_) std::rethrow_exception(error_);
     return nullptr;
   }
@@ -57,14 +55,14 @@ class ReadAhead {
     for (uint64_t filled = 0;; ++filled) {
       {
         MutexLock lock(mutex_);
-        while (!stopped_ && filled >= given_back_ + count_) changed_.wait(lock);
+        while (!stopped_ && filled >= given_back_ + values_.size()) changed_.wait(lock);
         if (stopped_) return;
       }
       bool more = false;
       std::exception_ptr error;
       try {
         const TraceScope trace("read ahead");
-        more = fill_(values_[filled % count_]);
+        more = fill_(values_[filled % values_.size()]);
       } catch (...) {
         error = std::current_exception();
       }
@@ -79,7 +77,6 @@ class ReadAhead {
 
   std::function<bool(T&)> fill_;
   std::array<T, 2> values_;
-  const size_t count_;  // of values that are used
   Mutex mutex_;
   ConditionVariable changed_;
   uint64_t filled_ GUARDED_BY(mutex_) = 0, taken_ GUARDED_BY(mutex_) = 0, given_back_ GUARDED_BY(mutex_) = 0;

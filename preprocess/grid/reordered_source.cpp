@@ -28,6 +28,13 @@ class ReorderedSource final : public GridSource {
             NodeArrays& out) const override {
     source_.read(order_.at(block), box, scalars, out);
   }
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    source_.readPartOfRows(order_.at(block), box, scalars, out);
+  }
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
+    return source_.rowsInMemory(scalars);
+  }
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
     return source_.readFringe(order_.at(block), box, out);
   }

@@ -95,9 +95,17 @@ class SampleSource final : public GridSource {
 
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
-    source_->read(boxes_[block].block, inGrid(block, box), scalars, out);
+    readBox(*source_, boxes_[block].block, inGrid(block, box), scalars, out);
     for (size_t n = 0; n < scalars.size(); ++n)
       if (description_.scalars[scalars[n]].centring == Centring::kCell) cutCells(block, box, out.scalars[n]);
+  }
+
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    read(block, box, scalars, out);
+  }
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
+    return source_->rowsInMemory(scalars);
   }
 
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
@@ -107,17 +115,18 @@ class SampleSource final : public GridSource {
  private:
   NodeBox inGrid(uint32_t block, const NodeBox& box) const {
     const NodeBox& rows = boxes_[block].rows;
-    return {rows.j0 + box.j0, rows.j0 + box.j1, rows.k0 + box.k0, rows.k0 + box.k1};
+    return {rows.j0 + box.j0, rows.j0 + box.j1, rows.k0 + box.k0, rows.k0 + box.k1, box.i0, box.i1};
   }
 
   /// No cell begins at the last row or plane of a block.
   void cutCells(uint32_t block, const NodeBox& box, std::vector<float>& values) const {
     const GridBlock& of = description_.blocks[block];
+    const auto row_nodes = static_cast<std::ptrdiff_t>(box.rowNodes(of.ni));
     auto row = values.begin();
     for (uint64_t k = box.k0; k < box.k1; ++k)
-      for (uint64_t j = box.j0; j < box.j1; ++j, row += static_cast<std::ptrdiff_t>(of.ni))
+      for (uint64_t j = box.j0; j < box.j1; ++j, row += row_nodes)
         if (j + 1 == of.nj || k + 1 == of.nk)
-          std::fill_n(row, of.ni, std::numeric_limits<float>::quiet_NaN());
+          std::fill_n(row, row_nodes, std::numeric_limits<float>::quiet_NaN());
   }
 
   const std::unique_ptr<GridSource> source_;

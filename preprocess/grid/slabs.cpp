@@ -11,20 +11,37 @@ namespace {
 /// With fewer planes than this besides the halo's two, strips re-read fewer rows than slabs of whole planes.
 constexpr uint64_t kMinPlanes = 4;
 
-/// The number of rows along j and planes along k of a box whose window has at most `window_rows` rows.
+/// The nodes along i, j and k of the box of a slab.
 struct Extent {
-  uint64_t j, k;
+  uint64_t i, j, k;
 };
 
-/// `margin`: rows of the halo, the sum of both sides.
-Extent extentWithin(const GridBlock& block, uint64_t window_rows, uint64_t margin) {
+/// Of slabs of whole rows whose windows have at most `window_rows` rows. `margin`: rows of the halo, the sum of both
+/// sides.
+Extent extentOfRows(const GridBlock& block, uint64_t window_rows, uint64_t margin) {
   const uint64_t planes = window_rows / block.nj;
-  if (planes >= block.nk) return {block.nj, block.nk};
-  if (planes >= kMinPlanes + margin) return {block.nj, planes - margin};
+  if (planes >= block.nk) return {block.ni, block.nj, block.nk};
+  if (planes >= kMinPlanes + margin) return {block.ni, block.nj, planes - margin};
   const auto side = static_cast<uint64_t>(std::sqrt(static_cast<double>(window_rows)));
   const uint64_t k = std::min(side, block.nk);
   const uint64_t j = std::min(window_rows / k, block.nj);
-  return {j - std::min(j - 1, margin), k - std::min(k - 1, margin)};
+  return {block.ni, j - std::min(j - 1, margin), k - std::min(k - 1, margin)};
+}
+
+/// Of slabs of parts of rows.
+Extent extentOfParts(const GridBlock& block, uint64_t window_nodes, uint64_t margin) {
+  if (margin == 0) return {std::max<uint64_t>(1, window_nodes), 1, 1};
+  const auto nodes = static_cast<double>(window_nodes);
+  const uint64_t k = std::min(static_cast<uint64_t>(std::cbrt(nodes)), block.nk);
+  const auto side = static_cast<uint64_t>(std::sqrt(nodes / static_cast<double>(std::max<uint64_t>(1, k))));
+  const uint64_t j = std::min(side, block.nj);
+  const uint64_t i = std::min(window_nodes / std::max<uint64_t>(1, j * k), block.ni);
+  const auto within = [&](uint64_t count, uint64_t all) {
+    if (count < std::min(margin + 1, all))
+      throw Error("{}: not even a node and its neighbours fit in memory; increase --memory", block.name);
+    return count == all ? all : count - margin;
+  };
+  return {within(i, block.ni), within(j, block.nj), within(k, block.nk)};
 }
 
 /// The rows of the smallest window that is not cut any further.
@@ -48,53 +65,51 @@ std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t wi
   for (uint32_t number = 0; number < blocks.size(); ++number) {
     const GridBlock& block = blocks[number];
     const uint64_t rows = window_nodes / std::max<uint64_t>(block.ni, 1);
-    if (rows < leastRows(block, halo))
-      throw Error("{}: {} rows of {} nodes along i do not fit in memory; increase --memory", block.name,
-                  leastRows(block, halo), block.ni);
-    const Extent extent = extentWithin(block, rows, margin);
-    for (uint64_t k = 0; k < block.nk; k += extent.k) {
-      for (uint64_t j = 0; j < block.nj; j += extent.j) {
-        const NodeBox box{j, std::min(j + extent.j, block.nj), k, std::min(k + extent.k, block.nk)};
-        const NodeBox window{box.j0 - std::min(box.j0, halo.before), std::min(box.j1 + halo.after, block.nj),
-                             box.k0 - std::min(box.k0, halo.before), std::min(box.k1 + halo.after, block.nk)};
-        slabs.push_back({number, first_node, box, window});
-      }
-    }
+    const Extent extent = rows < leastRows(block, halo) ? extentOfParts(block, window_nodes, margin)
+                                                        : extentOfRows(block, rows, margin);
+    const auto before = [&](uint64_t index) { return index - std::min(index, halo.before); };
+    for (uint64_t k = 0; k < block.nk; k += extent.k)
+      for (uint64_t j = 0; j < block.nj; j += extent.j)
+        for (uint64_t i = 0; i < block.ni; i += extent.i) {
+          const NodeBox box{j, std::min(j + extent.j, block.nj), k, std::min(k + extent.k, block.nk),
+                            i, std::min(i + extent.i, block.ni)};
+          const NodeBox window{before(j), std::min(box.j1 + halo.after, block.nj),
+                               before(k), std::min(box.k1 + halo.after, block.nk),
+                               before(i), std::min(box.i1 + halo.after, block.ni)};
+          slabs.push_back({number, first_node, box, window});
+        }
     first_node += block.nodes();
   }
   return slabs;
 }
 
-std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uint64_t nodes) {
-  const uint64_t rows = std::max<uint64_t>(1, nodes / std::max<uint64_t>(1, block.ni));
+std::vector<NodeBox> cutForTasks(uint64_t row_nodes, const NodeBox& box, uint64_t nodes) {
+  const uint64_t rows = std::max<uint64_t>(1, nodes / std::max<uint64_t>(1, row_nodes));
   const uint64_t planes = std::max<uint64_t>(1, rows / (box.j1 - box.j0));
   const uint64_t strip = std::min(rows, box.j1 - box.j0);
   std::vector<NodeBox> tasks;
   for (uint64_t k = box.k0; k < box.k1; k += planes)
     for (uint64_t j = box.j0; j < box.j1; j += strip)
-      tasks.push_back({j, std::min(j + strip, box.j1), k, std::min(k + planes, box.k1)});
+      tasks.push_back({j, std::min(j + strip, box.j1), k, std::min(k + planes, box.k1), box.i0, box.i1});
   return tasks;
 }
 
 SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share)
-    : SlabStream(reader, slab_bytes,
-                 leastSlabBytes(reader.source().description().blocks, reader.scalars(), halo), halo, share) {}
+    : slabs_(cutIntoSlabs(reader.source().description().blocks,
+                          slab_bytes / slabBytesPerNode(reader.scalars()), halo)),
+      position_(beginOf(share.index, share)),
+      end_(beginOf(share.index + 1, share)),
+      ahead_([this, &reader](LoadedSlab& loaded) {
+        if (position_ == end_) return false;
+        loaded.slab = slabs_[position_++];
+        loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
+        return true;
+      }) {}
 
-SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, uint64_t least_bytes, Halo halo,
-                       const SlabShare& share)
-    : slabs_(cutIntoSlabs(
-          reader.source().description().blocks,
-          (least_bytes > slab_bytes ? kSlabsOfLongRows : 1) * slab_bytes / slabBytesPerNode(reader.scalars()),
-          halo)),
-      position_(slabs_.size() * share.index / share.count),
-      end_(slabs_.size() * (share.index + 1) / share.count),
-      ahead_(
-          [this, &reader](LoadedSlab& loaded) {
-            if (position_ == end_) return false;
-            loaded.slab = slabs_[position_++];
-            loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
-            return true;
-          },
-          least_bytes > slab_bytes ? 1 : 2) {}
+size_t SlabStream::beginOf(unsigned index, const SlabShare& share) const {
+  size_t begin = slabs_.size() * index / share.count;
+  while (share.whole_rows && begin < slabs_.size() && slabs_[begin].box.i0 > 0) ++begin;
+  return begin;
+}
 
 }  // namespace curvisplat

@@ -33,6 +33,20 @@ inline uint64_t rowsOf(const NodeBox& box) {
   return (box.j1 - box.j0) * (box.k1 - box.k0);
 }
 
+/// Where the nodes of a window of a block lie in NodeArrays: node i, j, k of the block is element at(i, j, k).
+struct WindowStrides {
+  uint64_t i0, j0, k0;
+  size_t row, plane;  // from one row to the next, and from one plane to the next
+
+  WindowStrides(const NodeBox& window, uint64_t ni)
+      : i0(window.i0),
+        j0(window.j0),
+        k0(window.k0),
+        row(window.rowNodes(ni)),
+        plane(row * (window.j1 - window.j0)) {}
+  size_t at(uint64_t i, uint64_t j, uint64_t k) const { return (k - k0) * plane + (j - j0) * row + (i - i0); }
+};
+
 /// Size of a node in NodeArrays.
 inline uint64_t slabBytesPerNode(size_t scalars) {
   return 3 * sizeof(double) + sizeof(uint8_t) + scalars * sizeof(float);
@@ -40,17 +54,16 @@ inline uint64_t slabBytesPerNode(size_t scalars) {
 
 /// Cuts all blocks, in order, into boxes that cover each node once and whose windows have at most
 /// `window_nodes` nodes: whole planes if several fit, else strips of about equal length along j and k, so
-/// that few nodes are read twice. Throws Error if a row and its neighbours do not fit.
+/// that few nodes are read twice. Where a row and its neighbours do not fit, rows are cut as well: with a halo into boxes
+/// about as long along i, j and k, or longer along i where the block is thin; without one into parts of a single row.
+/// The parts of a row follow one another. Throws Error if not even a node and its neighbours fit.
 std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, Halo halo);
 
-/// Size of the largest window that cutIntoSlabs() cannot divide: a row and its neighbours.
+/// Size of the smallest window of whole rows: a row and its neighbours.
 uint64_t leastSlabBytes(const std::vector<GridBlock>& blocks, size_t scalars, Halo halo);
 
-/// The largest slab of long rows, as a multiple of `slab_bytes`: it is alone in memory.
-inline constexpr uint64_t kSlabsOfLongRows = 3;
-
-/// Cuts `box` into boxes of about `nodes` nodes, one for each task.
-std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uint64_t nodes);
+/// Cuts `box` into boxes of about `nodes` nodes, one for each task. `row_nodes`: of a row of the box.
+std::vector<NodeBox> cutForTasks(uint64_t row_nodes, const NodeBox& box, uint64_t nodes);
 
 /// A slab and the nodes of its window.
 struct LoadedSlab {
@@ -62,10 +75,11 @@ struct LoadedSlab {
 /// One of `count` parts of the slabs of a grid, about as many in each, next to one another.
 struct SlabShare {
   unsigned index = 0, count = 1;
+  bool whole_rows = false;  // all parts of a row are in one share
 };
 
 /// Reads all slabs of a grid, or a share of them, in order, one ahead. `reader` must outlive it. Two slabs of
-/// `slab_bytes` are in memory at any time; where rows are too long for that, one of kSlabsOfLongRows as much.
+/// `slab_bytes` are in memory at any time.
 class SlabStream {
  public:
   SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share = {});
@@ -74,8 +88,8 @@ class SlabStream {
   const LoadedSlab* next() { return ahead_.next(); }
 
  private:
-  SlabStream(const NodeReader& reader, uint64_t slab_bytes, uint64_t least_bytes, Halo halo,
-             const SlabShare& share);
+  /// Number of the first slab of share `index`.
+  size_t beginOf(unsigned index, const SlabShare& share) const;
 
   std::vector<Slab> slabs_;
   size_t position_, end_;

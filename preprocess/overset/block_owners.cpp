@@ -12,8 +12,9 @@ namespace curvisplat {
 namespace {
 
 constexpr Halo kCorners{0, 1};
-constexpr uint64_t kTreeBytesPerNode = 24;  // of a CellTree, beside the nodes
-constexpr uint64_t kTilesInMemory = 4;      // at least
+constexpr uint64_t kTreeBytesPerNode = 24;               // of a CellTree, beside the nodes
+constexpr uint64_t kTilesInMemory = 4;                   // at least
+constexpr uint64_t kMaxLeastBytes = uint64_t{64} << 10;  // of a tile; longer rows are cut
 
 /// The order in which blocks come: the least owns the point.
 struct Rank {
@@ -62,7 +63,7 @@ NodeReader ownersReader(const NodeReader& reader, bool everywhere) {
 
 uint64_t BlockOwners::leastBytes(const GridDescription& grid, size_t scalars) {
   const uint64_t bytes = leastSlabBytes(grid.blocks, scalars, kCorners);
-  return bytes + bytes / slabBytesPerNode(scalars) * kTreeBytesPerNode;
+  return std::min(bytes + bytes / slabBytesPerNode(scalars) * kTreeBytesPerNode, kMaxLeastBytes);
 }
 
 LoadedSlab BlockOwners::read(const Slab& slab) const {
@@ -74,7 +75,11 @@ LoadedSlab BlockOwners::read(const Slab& slab) const {
 
 std::vector<uint8_t> BlockOwners::fringeOf(const Slab& slab) const {
   std::vector<uint8_t> fringe;
-  if (!reader_.source().readFringe(slab.block, slab.window, fringe)) fringe.clear();
+  const GridSource& source = reader_.source();
+  const bool has_fringe = slab.window.hasWholeRows(source.description().blocks[slab.block].ni)
+                              ? source.readFringe(slab.block, slab.window, fringe)
+                              : source.readFringePart(slab.block, slab.window, fringe);
+  if (!has_fringe) fringe.clear();
   return fringe;
 }
 
@@ -115,7 +120,7 @@ class BlockOwners::SlabCover {
     boxes_.resize(rowsOf(around_));
     forRows(around_, [&](uint64_t j, uint64_t k) {
       BoundingBox& box = boxes_[rowAt(j, k)];
-      forSamples(j, k, [&](size_t sample) { samples_.addTo(box, sample); });
+      forSamples(around_, j, k, [&](size_t sample) { samples_.addTo(box, sample); });
     });
   }
 
@@ -128,7 +133,7 @@ class BlockOwners::SlabCover {
       forRows(box_, [&](uint64_t j, uint64_t k) {
         if (!tree->box().touches(boxAround(j, k))) return;
         CellTree::Hint hint;
-        forSamples(j, k, [&](size_t sample) { coverSample(*tree, partner, sample, j, k, hint); });
+        forSamples(box_, j, k, [&](size_t sample) { coverSample(*tree, partner, sample, j, k, hint); });
       });
     }
   }
@@ -137,7 +142,8 @@ class BlockOwners::SlabCover {
   static NodeBox withNeighbours(const Slab& slab) {
     const NodeBox &box = slab.box, &window = slab.window;
     return {std::max(window.j0 + 1, box.j0) - 1, std::min(box.j1 + 1, window.j1),
-            std::max(window.k0 + 1, box.k0) - 1, std::min(box.k1 + 1, window.k1)};
+            std::max(window.k0 + 1, box.k0) - 1, std::min(box.k1 + 1, window.k1),
+            std::max(window.i0 + 1, box.i0) - 1, std::min(box.i1 + 1, window.i1)};
   }
   static BoundingBox twiceAsLarge(const BoundingBox& box) {
     const glm::dvec3 margin = 0.5 * (box.upper - box.lower);
@@ -152,10 +158,11 @@ class BlockOwners::SlabCover {
     tbb::parallel_for(uint64_t{0}, rowsOf(box),
                       [&](uint64_t n) { each(box.j0 + n % width, box.k0 + n / width); });
   }
+  /// Of a row of `box`.
   template <typename Each>
-  void forSamples(uint64_t j, uint64_t k, const Each& each) const {
-    const size_t first = samples_.elementOf(0, j, k);
-    for (size_t sample = first; sample < first + block_.ni; ++sample)
+  void forSamples(const NodeBox& box, uint64_t j, uint64_t k, const Each& each) const {
+    const size_t first = samples_.elementOf(box.i0, j, k);
+    for (size_t sample = first; sample < first + box.rowNodes(block_.ni); ++sample)
       if (samples_.isThere(sample)) each(sample);
   }
 
@@ -186,7 +193,7 @@ class BlockOwners::SlabCover {
     forRows(around_, [&](uint64_t j, uint64_t k) {
       if (!boxes_[rowAt(j, k)].touches(tree.box())) return;
       CellTree::Hint hint;
-      forSamples(j, k, [&](size_t sample) {
+      forSamples(around_, j, k, [&](size_t sample) {
         const auto [smallest, largest] = samples_.sizes(sample);
         const bool fringe = samples_.isFringe(sample);
         const Rank first{fringe, smallest, number_}, last{fringe, largest, number_};
@@ -201,12 +208,13 @@ class BlockOwners::SlabCover {
 
   /// What the neighbours of a sample and it have in common, and what any of them has.
   std::pair<uint8_t, uint8_t> statesAround(size_t sample, uint64_t j, uint64_t k) const {
-    const uint64_t i = sample - samples_.elementOf(0, j, k);
+    const uint64_t i = around_.i0 + (sample - samples_.elementOf(around_.i0, j, k));
     uint8_t all = 0xff, any = 0;
     bool outside = false;
     for (uint64_t kk = std::max(k, around_.k0 + 1) - 1; kk < std::min(k + 2, around_.k1); ++kk)
       for (uint64_t jj = std::max(j, around_.j0 + 1) - 1; jj < std::min(j + 2, around_.j1); ++jj)
-        for (uint64_t ii = std::max<uint64_t>(i, 1) - 1; ii < std::min(i + 2, block_.ni); ++ii) {
+        for (uint64_t ii = std::max(i, around_.i0 + 1) - 1; ii < std::min(i + 2, around_.endOfRow(block_.ni));
+             ++ii) {
           const size_t other = samples_.elementOf(ii, jj, kk);
           if (!samples_.isThere(other)) continue;
           all &= states_[other];

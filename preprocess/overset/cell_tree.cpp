@@ -22,14 +22,15 @@ std::array<CellTree::Range, 2> CellTree::Range::halves() const {
 CellTree::CellTree(const GridBlock& block, LoadedSlab loaded, std::vector<uint8_t> fringe, Centring centring)
     : loaded_(std::move(loaded)),
       fringe_(std::move(fringe)),
-      row_stride_(block.ni),
-      plane_stride_(block.ni * (loaded_.slab.window.j1 - loaded_.slab.window.j0)) {
+      row_stride_(loaded_.slab.window.rowNodes(block.ni)),
+      plane_stride_(row_stride_ * (loaded_.slab.window.j1 - loaded_.slab.window.j0)) {
   const NodeBox &box = loaded_.slab.box, &window = loaded_.slab.window;
   const auto along = [](uint64_t from, uint64_t to, uint64_t nodes) {
     return std::pair{static_cast<uint32_t>(from),
                      static_cast<uint32_t>(std::max(from, std::min(to, nodes - 1)))};
   };
-  std::tie(all_.begin[0], all_.end[0]) = along(0, block.ni, block.ni);
+  std::tie(all_.begin[0], all_.end[0]) =
+      along(box.i0 - window.i0, box.endOfRow(block.ni) - window.i0, row_stride_);
   std::tie(all_.begin[1], all_.end[1]) = along(box.j0 - window.j0, box.j1 - window.j0, window.j1 - window.j0);
   std::tie(all_.begin[2], all_.end[2]) = along(box.k0 - window.k0, box.k1 - window.k0, window.k1 - window.k0);
 

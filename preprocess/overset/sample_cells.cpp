@@ -14,18 +14,19 @@ SampleCells::SampleCells(const GridBlock& block, const LoadedSlab& loaded, std::
                          Centring centring)
     : loaded_(&loaded), centring_(centring), fringe_(std::move(fringe)) {
   const NodeBox& window = loaded.slab.window;
-  const uint64_t rows = window.j1 - window.j0, planes = window.k1 - window.k0;
-  strides_ = {1, block.ni, block.ni * rows};
-  counts_ = {block.ni, rows, planes};
+  const uint64_t row = window.rowNodes(block.ni), rows = window.j1 - window.j0,
+                 planes = window.k1 - window.k0;
+  strides_ = {1, row, row * rows};
+  counts_ = {row, rows, planes};
   const NodeArrays& nodes = loaded.nodes;
   const bool cells = centring == Centring::kCell;
   sizes_.assign(nodes.x.size(), kNoCell);
   there_.assign(nodes.x.size(), 0);
   tbb::parallel_for(uint64_t{0}, planes, [&](uint64_t k) {
     for (uint64_t j = 0; j < rows; ++j)
-      for (uint64_t i = 0; i < block.ni; ++i) {
+      for (uint64_t i = 0; i < row; ++i) {
         const size_t at = k * strides_[2] + j * strides_[1] + i;
-        const bool has_cell = i + 1 < block.ni && j + 1 < rows && k + 1 < planes;
+        const bool has_cell = i + 1 < row && j + 1 < rows && k + 1 < planes;
         if (has_cell)
           sizes_[at] = cellSize(
               cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, strides_[1], strides_[2]));

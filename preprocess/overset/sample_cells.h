@@ -49,7 +49,7 @@ class SampleCells {
 
   size_t elementOf(uint64_t i, uint64_t j, uint64_t k) const {
     const NodeBox& window = loaded_->slab.window;
-    return (k - window.k0) * strides_[2] + (j - window.j0) * strides_[1] + i;
+    return (k - window.k0) * strides_[2] + (j - window.j0) * strides_[1] + (i - window.i0);
   }
   const std::array<size_t, 3>& strides() const { return strides_; }
   /// Samples of the window along i, j and k.

@@ -15,8 +15,8 @@ namespace curvisplat {
 /// What is read around the nodes of a box.
 inline constexpr Halo kNodeSplatHalo{kStretchReach, kStretchReach};
 
-/// A window of one block: `nodes` holds `window`, which is `box` and its halo (kNodeSplatHalo) in j and k
-/// inside the block.
+/// A window of one block: `nodes` holds `window`, which is `box` and its halo (kNodeSplatHalo) inside the block. Where
+/// the window has parts of rows, that includes the halo of the nodes i0 to i1.
 struct BlockWindow {
   GridBlock block;
   uint64_t first_node = 0;  // of the block in the whole grid

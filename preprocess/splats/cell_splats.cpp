@@ -29,8 +29,9 @@ class Cells {
       : in_(in),
         box_(box),
         ends_(ends),
-        row_stride_(in.block.ni),
-        plane_stride_(in.block.ni * (in.window.j1 - in.window.j0)),
+        strides_(in.window, in.block.ni),
+        row_stride_(strides_.row),
+        plane_stride_(strides_.plane),
         known_{box.j0 - std::min<uint64_t>(box.j0, kReach), std::min(box.j1 + kReach, in.block.nj - 1),
                box.k0 - std::min<uint64_t>(box.k0, kReach), std::min(box.k1 + kReach, in.block.nk - 1)},
         cells_i_(in.block.ni - 1),
@@ -55,9 +56,7 @@ class Cells {
   size_t count() const { return count_; }
 
  private:
-  size_t nodeAt(uint64_t i, uint64_t j, uint64_t k) const {
-    return (k - in_.window.k0) * plane_stride_ + (j - in_.window.j0) * row_stride_ + i;
-  }
+  size_t nodeAt(uint64_t i, uint64_t j, uint64_t k) const { return strides_.at(i, j, k); }
   size_t cellAt(uint64_t i, uint64_t j, uint64_t k) const {
     return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * (known_i1_ - known_i0_) +
            (i - known_i0_);
@@ -82,6 +81,7 @@ class Cells {
   const BlockWindow& in_;
   const NodeBox box_;
   const BlockEnds& ends_;
+  const WindowStrides strides_;
   const size_t row_stride_, plane_stride_;
   const NodeBox known_;                 // cells that are in the scratch: the box and its neighbours
   const uint64_t cells_i_;              // of a row
@@ -303,6 +303,8 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnd
                    window.k0 <= box.k0 - std::min(box.k0, kCellSplatHalo.before));
   CURVISPLAT_CHECK(std::min(box.j1 + kCellSplatHalo.after, block.nj) <= window.j1 &&
                    std::min(box.k1 + kCellSplatHalo.after, block.nk) <= window.k1);
+  CURVISPLAT_CHECK(window.i0 <= in.i0 - std::min(in.i0, kCellSplatHalo.before) &&
+                   std::min(in.endOfPart(block.ni) + kCellSplatHalo.after, block.ni) <= window.i1);
   out.splats.clear();
   out.values.clear();
   out.probes.clear();

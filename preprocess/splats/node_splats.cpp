@@ -33,8 +33,8 @@ class Window {
         ni_(in.block.ni),
         i0_(in.i0),
         i1_(in.endOfPart(in.block.ni)),
-        row_stride_(static_cast<ptrdiff_t>(ni_)),
-        plane_stride_(static_cast<ptrdiff_t>(ni_ * (in.window.j1 - in.window.j0))),
+        row_stride_(static_cast<ptrdiff_t>(in.window.rowNodes(ni_))),
+        plane_stride_(row_stride_ * static_cast<ptrdiff_t>(in.window.j1 - in.window.j0)),
         scratch_(scratch),
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
@@ -83,8 +83,7 @@ class Window {
 
 void Window::addRow(uint64_t j, uint64_t k) {
   const GridBlock& block = in_.block;
-  const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
-                        static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
+  const ptrdiff_t row = lines_.elementOfRow(j, k);
   first_node_of_row_ = in_.first_node + (k * block.nj + j) * ni_;
   row_j_ = j;
   row_k_ = k;
@@ -404,6 +403,8 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& s
                    window.k0 <= box.k0 - std::min(box.k0, halo.before));
   CURVISPLAT_CHECK(std::min(box.j1 + halo.after, in.block.nj) <= window.j1 &&
                    std::min(box.k1 + halo.after, in.block.nk) <= window.k1);
+  CURVISPLAT_CHECK(window.i0 <= in.i0 - std::min(in.i0, halo.before) &&
+                   std::min(in.endOfPart(in.block.ni) + halo.after, in.block.ni) <= window.i1);
 
   // Sized for the most there can be and cut afterwards: in a run over equal boxes nothing is initialised
   // twice.

@@ -24,8 +24,8 @@ WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch&
       ni_(in.block.ni),
       i0_(in.i0),
       i1_(in.endOfPart(in.block.ni)),
-      row_stride_(static_cast<ptrdiff_t>(ni_)),
-      plane_stride_(static_cast<ptrdiff_t>(ni_ * (in.window.j1 - in.window.j0))),
+      row_stride_(static_cast<ptrdiff_t>(in.window.rowNodes(ni_))),
+      plane_stride_(row_stride_ * static_cast<ptrdiff_t>(in.window.j1 - in.window.j0)),
       scratch_(scratch) {
   for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
   for (auto* rows : {&scratch.growth, &scratch.drift})
@@ -34,14 +34,14 @@ WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch&
 }
 
 void WindowLines::findBlanks() {
-  const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
-  const uint64_t count = std::min(i1_ + kStretchReach, ni_) - first;
-  const uint64_t rows_a_plane = in_.window.j1 - in_.window.j0;
+  const NodeBox& window = in_.window;
+  const uint64_t first = std::max(window.i0, i0_ - std::min<uint64_t>(i0_, kStretchReach));
+  const uint64_t count = std::min(i1_ + kStretchReach, window.endOfRow(ni_)) - first;
   scratch_.has_blank.clear();
   for (uint64_t k = near_.k0; k < near_.k1; ++k) {
     for (uint64_t j = near_.j0; j < near_.j1; ++j) {
-      const uint64_t row = (k - in_.window.k0) * rows_a_plane + (j - in_.window.j0);
-      scratch_.has_blank.push_back(std::memchr(lattice_.blank + row * ni_ + first, 1, count) != nullptr);
+      const uint8_t* const blank = lattice_.blank + (elementOfRow(j, k) + static_cast<ptrdiff_t>(first));
+      scratch_.has_blank.push_back(std::memchr(blank, 1, count) != nullptr);
     }
   }
 }
@@ -57,8 +57,7 @@ bool WindowLines::anyBlankAround(uint64_t j, uint64_t k) const {
 void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
   constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
   const GridBlock& block = in_.block;
-  const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
-                        static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
+  const ptrdiff_t row = elementOfRow(j, k);
   const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
   const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
   for (size_t axis = 0; axis < 3; ++axis) {

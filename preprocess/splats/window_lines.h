@@ -25,6 +25,11 @@ class WindowLines {
   WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch);
 
   const NodeLattice& lattice() const { return lattice_; }
+  /// The element of node 0 of a row: negative where the window begins beyond it.
+  ptrdiff_t elementOfRow(uint64_t j, uint64_t k) const {
+    return static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
+           static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_ - static_cast<ptrdiff_t>(in_.window.i0);
+  }
   /// Whether a node of the row's part, or one next to it, is blank; of the rows around it as well.
   bool anyBlankAround(uint64_t j, uint64_t k) const;
   /// Fills the scratch with the stretch of the nodes of a row's part.

@@ -155,15 +155,15 @@ class Bins {
 template <typename Keep, typename Each>
 void forEachCell(const GridBlock& block, const LoadedSlab& loaded, const Keep& keep, const Each& each) {
   const Slab& slab = loaded.slab;
-  const size_t row = block.ni, plane = row * (slab.window.j1 - slab.window.j0);
+  const WindowStrides strides(slab.window, block.ni);
   const uint64_t width = slab.box.j1 - slab.box.j0;
   tbb::parallel_for(uint64_t{0}, rowsOf(slab.box), [&](uint64_t n) {
     const uint64_t j = slab.box.j0 + n % width, k = slab.box.k0 + n / width;
     if (j + 1 >= block.nj || k + 1 >= block.nk || !keep(j, k)) return;
-    const size_t first = (k - slab.window.k0) * plane + (j - slab.window.j0) * row;
-    for (uint64_t i = 0; i + 1 < block.ni; ++i)
-      if (!cornerMarks(loaded.nodes.blank.data(), first + i, row, plane))
-        each(first + i, row, plane, i, j, k);
+    size_t at = strides.at(slab.box.i0, j, k);
+    for (uint64_t i = slab.box.i0; i < slab.box.i1 && i + 1 < block.ni; ++i, ++at)
+      if (!cornerMarks(loaded.nodes.blank.data(), at, strides.row, strides.plane))
+        each(at, strides.row, strides.plane, i, j, k);
   });
 }
 

@@ -56,37 +56,38 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
   GridSurvey nothing;
   nothing.ranges.resize(reader.scalars());
   GridSurvey survey = nothing;
+  GridChecksum checksum;
   SlabStream slabs(reader, slab_bytes, kCorners);
   while (const LoadedSlab* loaded = slabs.next()) {
     const Slab& slab = loaded->slab;
     const NodeArrays& nodes = loaded->nodes;
     const GridBlock& block = reader.source().description().blocks[slab.block];
-    const size_t plane_stride = block.ni * (slab.window.j1 - slab.window.j0);
-    const uint64_t rows = slab.box.j1 - slab.box.j0;
+    const WindowStrides strides(slab.window, block.ni);
+    const uint64_t rows = slab.box.j1 - slab.box.j0, row_nodes = slab.box.rowNodes(block.ni);
     const auto add_ends = [&](const std::array<uint64_t, 3>& cell, size_t at,
                               std::vector<AbuttingFaces::Centre>& ends) {
       for (int axis = 0; axis < 3; ++axis)
         for (const bool upper : {false, true})
           if (const CellFace face{slab.block, cell, axis, upper}; faces->isAtEnd(face))
-            ends.push_back(faces->centreOf(
-                face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, block.ni, plane_stride)));
+            ends.push_back(faces->centreOf(face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at,
+                                                           strides.row, strides.plane)));
     };
     const auto add_row = [&](size_t row, GridSurvey& to, std::vector<AbuttingFaces::Centre>& ends) {
       const uint64_t j = slab.box.j0 + row % rows, k = slab.box.k0 + row / rows;
       if (j + 1 == block.nj || k + 1 == block.nk) return;
-      const size_t first = (k - slab.window.k0) * plane_stride + (j - slab.window.j0) * block.ni;
       const bool row_at_end = j == 0 || j + 2 == block.nj || k == 0 || k + 2 == block.nk;
-      for (uint64_t i = 0; i + 1 < block.ni; ++i) {
-        const bool is_there = addCell(nodes, first + i, block.ni, plane_stride, to);
+      size_t at = strides.at(slab.box.i0, j, k);
+      for (uint64_t i = slab.box.i0; i < slab.box.i1 && i + 1 < block.ni; ++i, ++at) {
+        const bool is_there = addCell(nodes, at, strides.row, strides.plane, to);
         const bool at_end = row_at_end || i == 0 || i + 2 == block.ni;
-        if (faces && is_there && at_end) add_ends({i, j, k}, first + i, ends);
+        if (faces && is_there && at_end) add_ends({i, j, k}, at, ends);
       }
     };
     // Counts, minima and maxima do not depend on how the work is divided.
     survey = unitedSurvey(
         std::move(survey),
         tbb::parallel_reduce(
-            tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), nothing,
+            tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / row_nodes + 1), nothing,
             [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
               const TraceScope trace("scan cells");
               std::vector<AbuttingFaces::Centre> ends;
@@ -98,9 +99,10 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
               return of_range;
             },
             unitedSurvey));
-    survey.grid_checksum += checksumOfGrid(*loaded, block);
-    progress.advance(rowsOf(slab.box) * block.ni);
+    checksum.add(*loaded, block);
+    progress.advance(rowsOf(slab.box) * row_nodes);
   }
+  survey.grid_checksum = checksum.value();
   return survey;
 }
 

@@ -62,7 +62,8 @@ struct Corners {
 CellCounts countCells(const GridBlock& block, const LoadedSlab& loaded) {
   const Slab& slab = loaded.slab;
   const NodeArrays& nodes = loaded.nodes;
-  const size_t row = block.ni, plane = row * (slab.window.j1 - slab.window.j0);
+  const WindowStrides strides(slab.window, block.ni);
+  const uint64_t end = std::min(slab.box.i1, block.ni - 1);  // of the lowest nodes of cells
   const uint64_t width = slab.box.j1 - slab.box.j0;
   // Deterministic, since floating-point addition of the volume is not associative.
   return tbb::parallel_deterministic_reduce(
@@ -71,10 +72,11 @@ CellCounts countCells(const GridBlock& block, const LoadedSlab& loaded) {
         for (uint64_t n = rows.begin(); n < rows.end(); ++n) {
           const uint64_t j = slab.box.j0 + n % width, k = slab.box.k0 + n / width;
           if (j + 1 >= block.nj || k + 1 >= block.nk) continue;
-          const size_t first = (k - slab.window.k0) * plane + (j - slab.window.j0) * row;
-          for (size_t at = first; at + 1 < first + block.ni; ++at) {
-            if (cornerMarks(nodes.blank.data(), at, row, plane)) continue;
-            const auto corner = cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, row, plane);
+          size_t at = strides.at(slab.box.i0, j, k);
+          for (uint64_t i = slab.box.i0; i < end; ++i, ++at) {
+            if (cornerMarks(nodes.blank.data(), at, strides.row, strides.plane)) continue;
+            const auto corner =
+                cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, strides.row, strides.plane);
             const Corners corners(corner);
             ++counts.cells;
             counts.degenerate += corners.flat;

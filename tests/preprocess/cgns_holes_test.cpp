@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/preprocess/cgns_fixture.h"
+#include "tests/support/parts_of_rows.h"
 
 namespace curvisplat {
 namespace {
@@ -32,6 +33,7 @@ class CgnsHolesOfZones : public Cgns {
     const auto source = open();
     EXPECT_TRUE(source->description().warnings.empty());
     EXPECT_TRUE(source->description().blocks[0].has_blanking);
+    expectPartsOfRows(*source);
     const std::vector<uint32_t> scalars{0, 1};
     for (uint64_t j0 = 0; j0 < 5; ++j0)
       for (uint64_t k0 = 0; k0 < 4; ++k0) {

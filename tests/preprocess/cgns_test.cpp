@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "tests/preprocess/cgns_fixture.h"
+#include "tests/support/parts_of_rows.h"
 
 namespace curvisplat {
 namespace {
@@ -43,6 +44,7 @@ TEST_P(Cgns, VertexAndCellSolutionsAreReadByAnyBox) {
   EXPECT_EQ(description.scalars[2].centring, Centring::kCell);
   expectAllBoxes(*source, 1, linear(0.5, 9));
   expectAllBoxes(*source, 2, linear(7));
+  expectPartsOfRows(*source);
 }
 
 TEST_P(Cgns, RindPlanesAreDropped) {

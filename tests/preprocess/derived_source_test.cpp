@@ -17,6 +17,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/cell_grid.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/parts_of_rows.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -203,6 +204,7 @@ TEST(DerivedSource, IsTheSameHoweverItIsRead) {
             for (size_t s = 0; s < scalars.size(); ++s) ASSERT_EQ(part.scalars[s][n], whole.scalars[s][at]);
           }
     }
+  expectPartsOfRows(source);
 }
 
 TEST(DerivedSource, LeavesOutWhatIsBlankOrHasNoFlow) {
@@ -364,6 +366,7 @@ TEST(DerivedSource, OfCellsStandInCells) {
     EXPECT_NEAR(out.scalars[1][n], 3, 1e-4);
   }
   EXPECT_EQ(cells_there, 7 * 7 * 7 - 8);
+  expectPartsOfRows(source);
   // Coordinates are still those of the nodes.
   EXPECT_EQ(out.x[3], bent({0, 3, 0, 0}, 8, 8, 8).x);
 }

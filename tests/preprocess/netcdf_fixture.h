@@ -13,6 +13,7 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "tests/support/netcdf_writer.h"
+#include "tests/support/parts_of_rows.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -93,6 +94,7 @@ class NetcdfFixture : public testing::TestWithParam<NetcdfFileType> {
     expectBox(source, position, {1, 2, 0, block.nk}, expected);
     expectBox(source, position, {0, block.nj, 1, 2}, expected);
     expectBox(source, position, {block.nj - 1, block.nj, block.nk - 1, block.nk}, expected);
+    expectPartsOfRows(source, std::span(&position, 1));
   }
 
   TemporaryFolder folder_;

@@ -4,6 +4,7 @@
 
 #include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
+#include "tests/support/parts_of_rows.h"
 
 namespace curvisplat {
 namespace {
@@ -59,6 +60,29 @@ TEST_F(OpenGrid, FindsScalarsByNameAliasAndNumber) {
   EXPECT_EQ(scalarsNamed(description, {"pressure", "Density", "StagnationEnergy", "momentum-y"}),
             (Positions{7, 0, 4, 2}));
   EXPECT_EQ(scalarsNamed(description, {"2", "velocity-U"}), (Positions{6, 5}));
+}
+
+TEST_F(OpenGrid, ReadsPartsOfRows) {
+  Plot3dLayout grid, q;
+  grid.kind = Plot3dKind::kGrid;
+  q.kind = Plot3dKind::kQ;
+  for (Plot3dLayout* layout : {&grid, &q}) {
+    layout->multi_block = true;
+    layout->precision_bytes = 8;
+    layout->byte_order = ByteOrder::kBig;
+    layout->records = RecordMarkers::kBytes4;
+  }
+  grid.blanking = true;
+  const std::vector<TestBlock> blocks{testBlock(9, 4, 3, 5), testBlock(7, 5, 6, 5, 40)};
+  for (const uint64_t subrecord_bytes : {0u, 200u}) {
+    folder_.write("grid.xyz", plot3dBytes(grid, blocks, subrecord_bytes));
+    folder_.write("a.q", plot3dBytes(q, blocks, subrecord_bytes));
+    const auto source = open({"a.q"});
+    EXPECT_EQ(source->description().blocks.size(), 2u);
+    EXPECT_TRUE(source->description().blocks[0].has_blanking);
+    EXPECT_EQ(source->rowsInMemory({}), 0u);
+    expectPartsOfRows(*source);
+  }
 }
 
 TEST_F(OpenGrid, RefusesUnknownScalarsWithTheListOfThem) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <set>
 
+#include "tests/support/parts_of_rows.h"
+
 namespace curvisplat {
 namespace {
 
@@ -77,6 +79,7 @@ TEST(SampleSource, HasBoxesThatDoNotOverlap) {
     EXPECT_GT(found.nodes, 10'000u);
     EXPECT_LT(found.nodes, 40'000u);
     EXPECT_EQ(found.cells, found.expected_cells);  // none begins at a box's last row or plane
+    expectPartsOfRows(*sample);
   }
 }
 

@@ -13,6 +13,7 @@
 #include "stream/base/file.h"
 #include "tests/support/all_nodes.h"
 #include "tests/support/crc32.h"
+#include "tests/support/parts_of_rows.h"
 
 namespace curvisplat {
 namespace {
@@ -89,6 +90,7 @@ void expectFile(const std::filesystem::path& path, const json& blocks) {
   const auto source = open(path);
   ASSERT_EQ(source->description().blocks.size(), blocks.size());
   for (uint32_t b = 0; b < blocks.size(); ++b) expectBlock(*source, b, blocks[b]);
+  if (path.string().starts_with(kMade.string())) expectPartsOfRows(*source);
 }
 
 TEST(VtkFiles, WrittenByVtkReadAsVtkReadsThem) {

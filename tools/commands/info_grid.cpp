@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "preprocess/grid/calendar.h"
-#include "preprocess/grid/slabs.h"
+#include "preprocess/grid/grid_source.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
 #include "stream/base/count_text.h"
@@ -46,10 +46,8 @@ GridInfo inspect(const GridSource& source) {
   for (const GridBlock& block : description.blocks) info.nodes += block.nodes();
   Progress progress{progressBar()};
   progress.begin("reading", 2 * info.nodes, "nodes");
-  const uint64_t slab_bytes =
-      std::max(kSlabBytes, leastSlabBytes(description.blocks, info.stored.size(), kCellHalo));
-  info.statistics = measureGrid(source, info.stored, slab_bytes, progress);
-  info.overlaps = findOverlaps(source, slab_bytes, progress);
+  info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
+  info.overlaps = findOverlaps(source, kSlabBytes, progress);
   const bool by_cell = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
   info.estimate =
       InfoEstimate(by_cell ? info.statistics.cells() : info.nodes - info.statistics.blank().total());

@@ -22,9 +22,10 @@ CgnsBox boxOf(const CgnsZone& zone, const NodeBox& box, const CgnsArray& array, 
   const uint64_t last = centring == Centring::kCell ? 1 : 0;
   const uint64_t j1 = std::min(box.j1, zone.nodes[1] - last), k1 = std::min(box.k1, zone.nodes[2] - last);
   CgnsBox part;
-  part.first = {array.rind[0], array.rind[1] + box.j0, array.rind[2] + box.k0};
-  part.count = {zone.nodes[0] - last, j1 - std::min(box.j0, j1), k1 - std::min(box.k0, k1)};
-  part.memory = {zone.nodes[0], box.j1 - box.j0};
+  const uint64_t i1 = std::min(box.i1, zone.nodes[0] - last);
+  part.first = {array.rind[0] + box.i0, array.rind[1] + box.j0, array.rind[2] + box.k0};
+  part.count = {i1 - std::min(box.i0, i1), j1 - std::min(box.j0, j1), k1 - std::min(box.k0, k1)};
+  part.memory = {box.rowNodes(zone.nodes[0]), box.j1 - box.j0};
   return part;
 }
 
@@ -53,7 +54,7 @@ void CgnsSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
                       NodeArrays& out) const {
   CURVISPLAT_CHECK_OP(block, <, tree_.zones.size());
   const CgnsZone& zone = tree_.zones[block];
-  const size_t nodes = zone.nodes[0] * (box.j1 - box.j0) * (box.k1 - box.k0);
+  const size_t nodes = box.rowNodes(zone.nodes[0]) * (box.j1 - box.j0) * (box.k1 - box.k0);
   std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
   for (size_t axis = 0; axis < 3; ++axis) {
     axes[axis]->resize(nodes);
@@ -72,6 +73,19 @@ void CgnsSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
     if (description_.scalars[scalars[n]].centring == Centring::kCell)
       zone.holes.blankCells(zone.nodes, box, out.scalars[n]);
   }
+}
+
+void CgnsSource::readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                                NodeArrays& out) const {
+  if (tree_.zones.at(block).holes.empty())
+    read(block, box, scalars, out);
+  else
+    GridSource::readPartOfRows(block, box, scalars, out);
+}
+
+uint64_t CgnsSource::rowsInMemory(std::span<const uint32_t>) const {
+  const auto has_holes = [](const CgnsZone& zone) { return !zone.holes.empty(); };
+  return std::any_of(tree_.zones.begin(), tree_.zones.end(), has_holes) ? 1 : 0;
 }
 
 void CgnsSource::readScalar(const CgnsZone& zone, const NodeBox& box, const CgnsArrays& arrays,

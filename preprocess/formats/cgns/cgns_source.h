@@ -28,6 +28,9 @@ class CgnsSource final : public GridSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override;
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override;
 
  private:
   void readScalar(const CgnsZone& zone, const NodeBox& box, const CgnsArrays& arrays, Centring centring,

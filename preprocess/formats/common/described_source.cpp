@@ -28,6 +28,13 @@ class DescribedGrid final : public GridSource {
             NodeArrays& out) const override {
     withText(text_, [&] { source_->read(block, box, scalars, out); });
   }
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    withText(text_, [&] { source_->readPartOfRows(block, box, scalars, out); });
+  }
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
+    return source_->rowsInMemory(scalars);
+  }
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
     return withText(text_, [&] { return source_->readFringe(block, box, out); });
   }

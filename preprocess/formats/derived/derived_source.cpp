@@ -12,9 +12,12 @@ namespace {
 
 constexpr uint64_t kPieceNodes = 48 << 10;
 
-/// Cuts `box` into pieces: whole planes if several fit, else strips of equal length along j and k.
-std::vector<NodeBox> piecesOf(const GridBlock& block, const NodeBox& box) {
-  const uint64_t rows = std::max<uint64_t>(1, kPieceNodes / block.ni);
+/// Cuts `box` into pieces: whole planes if several fit, else strips of equal length along j and k. `cuts_rows`: long
+/// rows are cut, too.
+std::vector<NodeBox> piecesOf(const GridBlock& block, const NodeBox& box, bool cuts_rows) {
+  const uint64_t row_nodes = box.rowNodes(block.ni), end = box.endOfRow(block.ni);
+  const uint64_t part = cuts_rows ? std::min(row_nodes, kPieceNodes) : row_nodes;
+  const uint64_t rows = std::max<uint64_t>(1, kPieceNodes / part);
   const uint64_t width = box.j1 - box.j0;
   const auto side = static_cast<uint64_t>(std::sqrt(static_cast<double>(rows)));
   const uint64_t planes = std::max<uint64_t>(1, rows / width >= 4 ? rows / width : side);
@@ -22,7 +25,9 @@ std::vector<NodeBox> piecesOf(const GridBlock& block, const NodeBox& box) {
   std::vector<NodeBox> pieces;
   for (uint64_t k = box.k0; k < box.k1; k += planes)
     for (uint64_t j = box.j0; j < box.j1; j += strip)
-      pieces.push_back({j, std::min(j + strip, box.j1), k, std::min(k + planes, box.k1)});
+      for (uint64_t i = box.i0; i < end; i += part)
+        pieces.push_back(
+            {j, std::min(j + strip, box.j1), k, std::min(k + planes, box.k1), i, std::min(i + part, end)});
   return pieces;
 }
 
@@ -66,6 +71,25 @@ bool DerivedSource::readFringe(uint32_t block, const NodeBox& box, std::vector<u
   return source_->readFringe(block, box, out);
 }
 
+std::vector<uint32_t> DerivedSource::inputsOf(std::span<const uint32_t> scalars) const {
+  const size_t of_source = source_->description().scalars.size();
+  std::vector<uint32_t> inputs;
+  unsigned needs = 0;
+  for (const uint32_t scalar : scalars) {
+    if (scalar < of_source)
+      inputs.push_back(scalar);
+    else
+      needs |= quantities_.at(scalar - of_source).needs;
+  }
+  const std::vector<uint32_t> needed = inputs_.neededFor(needs);
+  inputs.insert(inputs.end(), needed.begin(), needed.end());
+  return inputs;
+}
+
+uint64_t DerivedSource::rowsInMemory(std::span<const uint32_t> scalars) const {
+  return source_->rowsInMemory(inputsOf(scalars));
+}
+
 void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                          NodeArrays& out) const {
   const size_t of_source = source_->description().scalars.size();
@@ -82,17 +106,20 @@ void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uin
     }
   }
   if (stored.size() == scalars.size()) {
-    source_->read(block, box, scalars, out);
+    readBox(*source_, block, box, scalars, out);
     return;
   }
 
-  const auto nodes = static_cast<size_t>(description_.blocks[block].ni * rowsOf(box));
+  const uint64_t ni = description_.blocks[block].ni;
+  const auto nodes = static_cast<size_t>(box.rowNodes(ni) * rowsOf(box));
   for (auto* axis : {&out.x, &out.y, &out.z}) axis->resize(nodes);
   out.blank.resize(nodes);
   out.scalars.resize(scalars.size());
   for (auto& values : out.scalars) values.resize(nodes);
   FlowWindow window(*source_, inputs_, gas_, blank_value_, needs);
-  for (const NodeBox& piece : piecesOf(description_.blocks[block], box)) {
+  // Each part of a row takes some whole ones of a source that reads nothing else.
+  const bool cuts_rows = !box.hasWholeRows(ni) || rowsInMemory(scalars) == 0;
+  for (const NodeBox& piece : piecesOf(description_.blocks[block], box, cuts_rows)) {
     window.read(block, piece, stored);
     window.copyStored(box, stored_to, out);
     window.computeFlow();

@@ -69,28 +69,30 @@ FlowWindow::FlowWindow(const GridSource& source, const FlowInputs& inputs, const
 void FlowWindow::read(uint32_t block, const NodeBox& box, const std::vector<uint32_t>& stored) {
   block_ = &source_.description().blocks[block];
   box_ = box;
-  window_ = {box.j0 - std::min(box.j0, halo_.before), std::min(box.j1 + halo_.after, block_->nj),
-             box.k0 - std::min(box.k0, halo_.before), std::min(box.k1 + halo_.after, block_->nk)};
-  row_ = block_->ni;
+  window_ = {
+      box.j0 - std::min(box.j0, halo_.before), std::min(box.j1 + halo_.after, block_->nj),
+      box.k0 - std::min(box.k0, halo_.before), std::min(box.k1 + halo_.after, block_->nk),
+      box.i0 - std::min(box.i0, halo_.before), std::min(box.endOfRow(block_->ni) + halo_.after, block_->ni)};
+  row_ = window_.rowNodes(block_->ni);
   plane_ = row_ * (window_.j1 - window_.j0);
   std::vector<uint32_t> all = stored;
   all.insert(all.end(), needed_.begin(), needed_.end());
-  source_.read(block, window_, all, nodes_);
+  readBox(source_, block, window_, all, nodes_);
   stored_ = stored.size();
 }
 
 /// Calls each(element in the window, element in `whole`, j, k).
 template <typename Each>
 void FlowWindow::forEachRow(const NodeBox& whole, const Each& each) const {
+  const WindowStrides to(whole, block_->ni);
   for (uint64_t k = box_.k0; k < box_.k1; ++k)
-    for (uint64_t j = box_.j0; j < box_.j1; ++j)
-      each(nodeAt(j, k), ((k - whole.k0) * (whole.j1 - whole.j0) + (j - whole.j0)) * row_, j, k);
+    for (uint64_t j = box_.j0; j < box_.j1; ++j) each(nodeAt(j, k), to.at(box_.i0, j, k), j, k);
 }
 
 void FlowWindow::copyStored(const NodeBox& whole, std::span<const size_t> to, NodeArrays& out) const {
   forEachRow(whole, [&](size_t from, size_t at, uint64_t, uint64_t) {
     const auto copy = [&](const auto& source, auto& target) {
-      std::copy_n(source.begin() + static_cast<ptrdiff_t>(from), row_,
+      std::copy_n(source.begin() + static_cast<ptrdiff_t>(from), box_.rowNodes(block_->ni),
                   target.begin() + static_cast<ptrdiff_t>(at));
     };
     copy(nodes_.x, out.x);
@@ -250,7 +252,8 @@ void FlowWindow::compute(Quantity quantity, double freestream_mach, const NodeBo
     return flowQuantity(quantity, flow, gradients, gas_, freestream_mach);
   };
   forEachRow(whole, [&](size_t from, size_t at, uint64_t j, uint64_t k) {
-    for (uint64_t i = 0; i < row_; ++i) out[at + i] = static_cast<float>(value(from + i, {i, j, k}));
+    for (uint64_t i = 0; i < box_.rowNodes(block_->ni); ++i)
+      out[at + i] = static_cast<float>(value(from + i, {box_.i0 + i, j, k}));
   });
 }
 

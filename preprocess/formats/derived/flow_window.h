@@ -65,7 +65,10 @@ class FlowWindow {
  private:
   template <typename Each>
   void forEachRow(const NodeBox& whole, const Each& each) const;
-  size_t nodeAt(uint64_t j, uint64_t k) const { return (k - window_.k0) * plane_ + (j - window_.j0) * row_; }
+  /// Of the box's first node in a row.
+  size_t nodeAt(uint64_t j, uint64_t k) const {
+    return (k - window_.k0) * plane_ + (j - window_.j0) * row_ + (box_.i0 - window_.i0);
+  }
   glm::dvec3 position(size_t n) const { return {nodes_.x[n], nodes_.y[n], nodes_.z[n]}; }
   double input(const std::optional<uint32_t>& scalar, size_t n) const;
   FlowState flowAt(size_t n) const;

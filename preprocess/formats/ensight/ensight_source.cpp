@@ -213,38 +213,43 @@ void EnsightGridSource::read(uint32_t block, const NodeBox& box, std::span<const
                              NodeArrays& out) const {
   const EnsightPart& part = data_.parts().at(block);
   const uint64_t ni = part.nodes[0], nj = part.nodes[1], rows = box.j1 - box.j0;
-  const size_t nodes = ni * rows * (box.k1 - box.k0);
+  const uint64_t row = box.rowNodes(ni), cells_end = std::min(box.endOfRow(ni), ni - 1);
+  const size_t nodes = row * rows * (box.k1 - box.k0);
   std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
   for (std::vector<double>* const axis : axes) axis->resize(nodes);
   out.blank.assign(nodes, 0);
   out.scalars.resize(scalars.size());
   for (std::vector<float>& values : out.scalars) values.assign(nodes, kNaN);
-  std::vector<double> iblank(ni * rows);
-  for (uint64_t k = box.k0; k < box.k1; ++k) {
-    const uint64_t stored = ni * (box.j0 + nj * k), at = ni * rows * (k - box.k0), plane = ni * rows;
+  // Whole rows of a plane follow one another.
+  const uint64_t rows_at_once = box.hasWholeRows(ni) ? rows : 1, count = row * rows_at_once;
+  std::vector<double> iblank(count);
+  for (uint64_t n_row = 0; n_row < rows * (box.k1 - box.k0); n_row += rows_at_once) {
+    const uint64_t j0 = box.j0 + n_row % rows, k = box.k0 + n_row / rows;
+    const uint64_t stored = ni * (j0 + nj * k) + box.i0, at = row * n_row;
     for (size_t axis = 0; axis < 3; ++axis) {
       if (part.kind == EnsightPart::Kind::kCurvilinear) {
-        part.coordinates.read(axis * part.points + stored, std::span(*axes[axis]).subspan(at, plane));
+        part.coordinates.read(axis * part.points + stored, std::span(*axes[axis]).subspan(at, count));
         continue;
       }
-      for (uint64_t n = 0; n < plane; ++n) {
-        const uint64_t index[] = {n % ni, box.j0 + n / ni, k};
+      for (uint64_t n = 0; n < count; ++n) {
+        const uint64_t index[] = {box.i0 + n % row, j0 + n / row, k};
         (*axes[axis])[at + n] = part.axes[axis][index[axis]];
       }
     }
     if (part.iblank.count > 0) {
       part.iblank.read(stored, std::span(iblank));
-      for (uint64_t n = 0; n < plane; ++n) out.blank[at + n] = iblank[n] == 0;
+      for (uint64_t n = 0; n < count; ++n) out.blank[at + n] = iblank[n] == 0;
     }
     for (size_t n = 0; n < scalars.size(); ++n) {
       std::vector<float>& values = out.scalars[n];
       if (data_.description().scalars[scalars[n]].centring == Centring::kNode) {
-        data_.readValues(scalars[n], block, 0, stored, part.points, std::span(values).subspan(at, plane));
+        data_.readValues(scalars[n], block, 0, stored, part.points, std::span(values).subspan(at, count));
         continue;
       }
-      for (uint64_t j = box.j0; j < std::min(box.j1, nj - 1) && k + 1 < part.nodes[2]; ++j)
-        data_.readValues(scalars[n], block, 0, (ni - 1) * (j + (nj - 1) * k), part.cells,
-                         std::span(values).subspan(at + ni * (j - box.j0), ni - 1));
+      if (box.i0 >= cells_end || k + 1 >= part.nodes[2]) continue;
+      for (uint64_t j = j0; j < std::min(j0 + rows_at_once, nj - 1); ++j)
+        data_.readValues(scalars[n], block, 0, (ni - 1) * (j + (nj - 1) * k) + box.i0, part.cells,
+                         std::span(values).subspan(at + row * (j - j0), cells_end - box.i0));
     }
   }
 }

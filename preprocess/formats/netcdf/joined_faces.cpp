@@ -57,6 +57,15 @@ class JoinedFaces final : public GridSource {
       readHole(holes_[added - joints_.size()], box, scalars, out);
   }
 
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    if (block < shape_.faces) return source_->readPartOfRows(block, box, scalars, out);
+    GridSource::readPartOfRows(block, box, scalars, out);  // two nodes a row
+  }
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
+    return source_->rowsInMemory(scalars);
+  }
+
  private:
   /// Where nodes read from the source go: node (row, level) to `first + 2 * (row + rows * level)`.
   struct Target {

@@ -129,6 +129,17 @@ bool CombinedSource::readFringe(uint32_t block, const NodeBox& box, std::vector<
   return sources_[groups_[group].sources.front()]->readFringe(number, box, out);
 }
 
+uint64_t CombinedSource::rowsInMemory(std::span<const uint32_t> scalars) const {
+  uint64_t rows = 0;
+  for (const Group& group : groups_) rows = std::max(rows, sources_[group.sources.front()]->rowsInMemory({}));
+  for (const std::vector<Place>& places : places_)
+    for (const uint32_t scalar : scalars) {
+      const Place& place = places.at(scalar);
+      rows = std::max(rows, sources_[place.source]->rowsInMemory({&place.scalar, 1}));
+    }
+  return rows;
+}
+
 void CombinedSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                           NodeArrays& out) const {
   const size_t group = blocks_.at(block).first;
@@ -145,7 +156,7 @@ void CombinedSource::read(uint32_t block, const NodeBox& box, std::span<const ui
   };
   const std::vector<size_t>& own = of_source[first];
   std::vector<std::vector<float>> kept;
-  sources_[first]->read(number, box, wantedOf(own), out);
+  readBox(*sources_[first], number, box, wantedOf(own), out);
   kept.swap(out.scalars);
   out.scalars.resize(scalars.size());
   for (size_t n = 0; n < own.size(); ++n) out.scalars[own[n]].swap(kept[n]);
@@ -160,15 +171,15 @@ void CombinedSource::read(uint32_t block, const NodeBox& box, std::span<const ui
 void CombinedSource::readFrom(size_t source, uint32_t block, const NodeBox& box,
                               std::span<const uint32_t> scalars,
                               std::span<std::vector<float>* const> to) const {
-  const uint64_t ni = sources_[source]->description().blocks[block].ni, nj = box.j1 - box.j0;
+  const uint64_t ni = box.rowNodes(sources_[source]->description().blocks[block].ni), nj = box.j1 - box.j0;
   const uint64_t rows = std::clamp<uint64_t>(kNodesAtATime / ni, 1, nj);
   const uint64_t planes = rows < nj ? 1 : std::clamp<uint64_t>(kNodesAtATime / (ni * nj), 1, box.k1 - box.k0);
   for (std::vector<float>* values : to) values->clear();
   NodeArrays piece;
   for (uint64_t k = box.k0; k < box.k1; k += planes)
     for (uint64_t j = box.j0; j < box.j1; j += rows) {
-      sources_[source]->read(block, {j, std::min(j + rows, box.j1), k, std::min(k + planes, box.k1)}, scalars,
-                             piece);
+      const NodeBox part{j, std::min(j + rows, box.j1), k, std::min(k + planes, box.k1), box.i0, box.i1};
+      readBox(*sources_[source], block, part, scalars, piece);
       for (size_t n = 0; n < to.size(); ++n)
         to[n]->insert(to[n]->end(), piece.scalars[n].begin(), piece.scalars[n].end());
     }

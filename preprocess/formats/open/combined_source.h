@@ -23,6 +23,11 @@ class CombinedSource final : public GridSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    read(block, box, scalars, out);
+  }
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override;
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override;
 
  private:

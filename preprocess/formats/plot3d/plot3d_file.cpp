@@ -39,13 +39,18 @@ void Plot3dFile::readRanges(uint32_t block, const NodeBox& box, uint64_t array_o
   CURVISPLAT_CHECK_OP(box.k0, <=, box.k1);
   CURVISPLAT_CHECK_OP(box.j1, <=, dims.nj);
   CURVISPLAT_CHECK_OP(box.k1, <=, dims.nk);
-  const bool whole_planes = box.j0 == 0 && box.j1 == dims.nj;
-  const uint64_t ranges = whole_planes ? std::min<uint64_t>(1, box.k1 - box.k0) : box.k1 - box.k0;
-  const uint64_t range_nodes = dims.ni * (box.j1 - box.j0) * (whole_planes ? box.k1 - box.k0 : 1);
+  CURVISPLAT_CHECK_OP(box.i0, <=, box.endOfRow(dims.ni));
+  const uint64_t row_nodes = box.rowNodes(dims.ni), rows = box.j1 - box.j0, planes = box.k1 - box.k0;
+  const bool whole_rows = row_nodes == dims.ni;
+  const bool whole_planes = whole_rows && box.j0 == 0 && box.j1 == dims.nj;
+  const uint64_t ranges_of_plane = whole_rows ? 1 : rows;
+  const uint64_t ranges = whole_planes ? std::min<uint64_t>(1, planes) : planes * ranges_of_plane;
+  const uint64_t range_nodes = row_nodes * (whole_rows ? rows : 1) * (whole_planes ? planes : 1);
   const std::span<std::byte> buffer = threadBuffer();
   uint64_t first = 0;
   for (uint64_t range = 0; range < ranges; ++range) {
-    const uint64_t node = ((box.k0 + range) * dims.nj + box.j0) * dims.ni;
+    const uint64_t k = box.k0 + range / ranges_of_plane, j = box.j0 + range % ranges_of_plane;
+    const uint64_t node = (k * dims.nj + j) * dims.ni + box.i0;
     uint64_t offset = dims.values_offset + array_offset + node * width;
     for (uint64_t left = range_nodes; left > 0;) {
       const uint64_t count = std::min<uint64_t>(left, buffer.size() / width);

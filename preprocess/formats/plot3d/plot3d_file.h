@@ -11,7 +11,8 @@
 namespace curvisplat {
 
 /// Any number of threads may read concurrently. Reads exactly the requested bytes: one range per component if
-/// the box has all j of the block, else one range for each k. Needs a buffer of 256 KiB per thread.
+/// the box has all j of the block, else one range for each k, or for each row where the box has parts of rows. Needs a
+/// buffer of 256 KiB per thread.
 class Plot3dFile {
  public:
   explicit Plot3dFile(Plot3dFit fit) : fit_(std::move(fit)) {}
@@ -50,7 +51,7 @@ class Plot3dFile {
 };
 
 inline uint64_t nodesOf(const GridBlock& block, const NodeBox& box) {
-  return block.ni * (box.j1 - box.j0) * (box.k1 - box.k0);
+  return box.rowNodes(block.ni) * (box.j1 - box.j0) * (box.k1 - box.k0);
 }
 
 }  // namespace curvisplat

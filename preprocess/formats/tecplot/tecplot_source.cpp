@@ -150,24 +150,27 @@ void TecplotSource::readBox(const TecplotZone& zone, size_t variable, const Node
                             std::vector<Value>& to) const {
   const TecplotValues& values = zone.values[variable];
   const uint64_t less = values.centring == Centring::kCell ? 1 : 0;
-  const uint64_t along = zone.nodes[0] - less, ni = zone.nodes[0], rows = box.j1 - box.j0;
+  const uint64_t ni = zone.nodes[0], row = box.rowNodes(ni), rows = box.j1 - box.j0;
+  const uint64_t end = std::min(box.endOfRow(ni), ni - less);
   const uint64_t j1 = std::min(box.j1, zone.nodes[1] - less), k1 = std::min(box.k1, zone.nodes[2] - less);
-  if (box.j0 >= j1) return;
+  if (box.j0 >= j1 || box.i0 >= end) return;
+  const uint64_t along = end - box.i0;
   for (uint64_t k = box.k0; k < k1; ++k) {
-    const uint64_t first = values.row_pitch * (box.j0 + values.columns * k), at = ni * rows * (k - box.k0);
+    const uint64_t first = values.row_pitch * (box.j0 + values.columns * k) + box.i0,
+                   at = row * rows * (k - box.k0);
     if (along == ni && values.row_pitch == ni) {
       readTecplotValues(values, first, std::span(to).subspan(at, ni * (j1 - box.j0)));
       continue;
     }
     for (uint64_t j = 0; j < j1 - box.j0; ++j)
-      readTecplotValues(values, first + values.row_pitch * j, std::span(to).subspan(at + ni * j, along));
+      readTecplotValues(values, first + values.row_pitch * j, std::span(to).subspan(at + row * j, along));
   }
 }
 
 void TecplotSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                          NodeArrays& out) const {
   const TecplotZone& zone = data_.zones.at(block);
-  const size_t nodes = zone.nodes[0] * (box.j1 - box.j0) * (box.k1 - box.k0);
+  const size_t nodes = box.rowNodes(zone.nodes[0]) * (box.j1 - box.j0) * (box.k1 - box.k0);
   std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
   for (size_t axis = 0; axis < 3; ++axis) {
     axes[axis]->resize(nodes);

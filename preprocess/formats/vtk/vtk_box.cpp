@@ -21,6 +21,8 @@ VtkBox inPiece(const VtkPiece& piece, const VtkBlock& block) {
 }
 
 VtkBox within(VtkBox box, const NodeBox& rows) {
+  box.upper[0] = box.lower[0] + rows.endOfRow(box.along(0));
+  box.lower[0] += rows.i0;
   box.upper[1] = box.lower[1] + rows.j1;
   box.lower[1] += rows.j0;
   box.upper[2] = box.lower[2] + rows.k1;

@@ -108,29 +108,32 @@ void XdmfSource::addScalars() {
 
 void XdmfSource::readPlaces(const XdmfGrid& grid, const NodeBox& box, NodeArrays& out) const {
   std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
-  const uint64_t ni = grid.nodes[0], rows = box.j1 - box.j0, plane = ni * rows;
+  const uint64_t ni = grid.nodes[0], row = box.rowNodes(ni), rows = box.j1 - box.j0;
+  // Whole rows of a plane follow one another.
+  const uint64_t rows_at_once = box.hasWholeRows(ni) ? rows : 1, count = row * rows_at_once;
   std::array<std::vector<double>, 3> along;
   if (grid.kind == XdmfGrid::Kind::kAxes)
     for (size_t axis = 0; axis < 3; ++axis) {
       along[axis].resize(grid.nodes[axis]);
       grid.places[axis]->read(0, along[axis]);
     }
-  for (uint64_t k = box.k0; k < box.k1; ++k) {
-    const uint64_t stored = ni * (box.j0 + grid.nodes[1] * k), at = plane * (k - box.k0);
+  for (uint64_t n_row = 0; n_row < rows * (box.k1 - box.k0); n_row += rows_at_once) {
+    const uint64_t j0 = box.j0 + n_row % rows, k = box.k0 + n_row / rows;
+    const uint64_t stored = ni * (j0 + grid.nodes[1] * k) + box.i0, at = row * n_row;
     if (grid.kind == XdmfGrid::Kind::kPoints) {
-      forEachTuple(*grid.places[0], 3, stored, plane, [&](uint64_t n, std::span<const double> place) {
+      forEachTuple(*grid.places[0], 3, stored, count, [&](uint64_t n, std::span<const double> place) {
         for (size_t axis = 0; axis < 3; ++axis) (*axes[axis])[at + n] = place[axis];
       });
       continue;
     }
     for (size_t axis = 0; axis < 3; ++axis) {
-      const std::span<double> to = std::span(*axes[axis]).subspan(at, plane);
+      const std::span<double> to = std::span(*axes[axis]).subspan(at, count);
       if (grid.kind == XdmfGrid::Kind::kSeparate) {
         grid.places[axis]->read(stored, to);
         continue;
       }
-      for (uint64_t n = 0; n < plane; ++n) {
-        const uint64_t index[] = {n % ni, box.j0 + n / ni, k};
+      for (uint64_t n = 0; n < count; ++n) {
+        const uint64_t index[] = {box.i0 + n % row, j0 + n / row, k};
         to[n] = grid.kind == XdmfGrid::Kind::kAxes
                     ? along[axis][index[axis]]
                     : grid.origin[axis] + grid.spacing[axis] * static_cast<double>(index[axis]);
@@ -142,8 +145,8 @@ void XdmfSource::readPlaces(const XdmfGrid& grid, const NodeBox& box, NodeArrays
 void XdmfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                       NodeArrays& out) const {
   const XdmfGrid& grid = file_.grids.at(block);
-  const uint64_t ni = grid.nodes[0], rows = box.j1 - box.j0;
-  const size_t nodes = ni * rows * (box.k1 - box.k0);
+  const uint64_t ni = grid.nodes[0], row = box.rowNodes(ni), rows = box.j1 - box.j0;
+  const size_t nodes = row * rows * (box.k1 - box.k0);
   for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->resize(nodes);
   readPlaces(grid, box, out);
   out.blank.assign(nodes, 0);
@@ -159,14 +162,19 @@ void XdmfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
     const uint64_t along = ni - less, nj = grid.nodes[1] - less;
     const uint64_t j1 = std::min(box.j1, nj), k1 = std::min(box.k1, grid.nodes[2] - less);
     if (box.j0 >= j1) continue;
-    // The rows of a plane follow one another.
+    const uint64_t end = std::min(box.endOfRow(ni), along);
+    if (box.i0 >= end) continue;
+    const uint64_t part = end - box.i0;
+    // Whole rows of a plane follow one another.
+    const uint64_t rows_at_once = part == along ? j1 - box.j0 : 1;
     for (uint64_t k = box.k0; k < k1; ++k)
-      forEachTuple(*attribute->values, scalar.components, along * (box.j0 + nj * k), along * (j1 - box.j0),
-                   [&](uint64_t tuple, std::span<const double> values) {
-                     const uint64_t row = tuple / along;
-                     to[ni * (row + rows * (k - box.k0)) + tuple % along] =
-                         pick<float>(values, scalar.component);
-                   });
+      for (uint64_t j = box.j0; j < j1; j += rows_at_once)
+        forEachTuple(*attribute->values, scalar.components, along * (j + nj * k) + box.i0,
+                     part * rows_at_once, [&](uint64_t tuple, std::span<const double> values) {
+                       const uint64_t of_row = j - box.j0 + tuple / part;
+                       to[row * (of_row + rows * (k - box.k0)) + tuple % part] =
+                           pick<float>(values, scalar.component);
+                     });
   }
 }
 

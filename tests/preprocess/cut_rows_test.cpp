@@ -1,0 +1,273 @@
+// Grids whose rows do not fit in a slab: caches have the bytes that slabs of whole rows give.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "preprocess/addition/add_scalar.h"
+#include "preprocess/addition/add_step.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/grid_origin.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/scenes/scenes.h"
+#include "preprocess/splats/cell_splats.h"
+#include "preprocess/survey/grid_checksum.h"
+#include "stream/base/error.h"
+#include "tests/reference/function_grid.h"
+#include "tests/reference/overset_grid.h"
+#include "tests/support/folder_files.h"
+#include "tests/support/parts_of_rows.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/thread_ranks.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr float kMissing = 9999;
+
+class CutRows : public testing::Test {
+ protected:
+  ConvertOptions optionsFor(const std::string& name, const GridSource& source) const {
+    ConvertOptions options;
+    options.output = folder_ / name;
+    options.overwrite = true;
+    options.title = "rows";
+    options.planes = {{std::nullopt, 0, 2}, {std::nullopt, 2, 1}};
+    for (uint32_t n = 0; n < source.description().scalars.size(); ++n) options.scalars.push_back(n);
+    return options;
+  }
+
+  Files convertTo(const GridSource& source, const ConvertOptions& options) const {
+    Progress progress;
+    convert(source, options, progress);
+    return filesOf(options.output);
+  }
+
+  static uint64_t bytesFor(uint64_t window_nodes, size_t scalars) {
+    return window_nodes * slabBytesPerNode(scalars);
+  }
+
+  /// Into how many parts rows are cut at the most.
+  static size_t partsOfRows(const GridSource& source, uint64_t window_nodes) {
+    const bool cells = source.description().scalars.front().centring == Centring::kCell;
+    size_t most = 0, parts = 0;
+    for (const Slab& slab :
+         cutIntoSlabs(source.description().blocks, window_nodes, cells ? kCellSplatHalo : kNodeSplatHalo)) {
+      parts = slab.box.i0 == 0 ? 1 : parts + 1;
+      most = std::max(most, parts);
+    }
+    return most;
+  }
+
+  void expectSameBytes(const GridSource& source, std::initializer_list<uint64_t> windows,
+                       std::optional<uint64_t> owner_bytes = {}) const {
+    ConvertOptions options = optionsFor("whole.splats", source);
+    const Files expected = convertTo(source, options);
+    options.output = folder_ / "cut.splats";
+    options.owner_bytes = owner_bytes;
+    for (const uint64_t window : windows) {
+      SCOPED_TRACE(window);
+      ASSERT_GT(partsOfRows(source, window), 2u);
+      options.slab_bytes = bytesFor(window, options.scalars.size());
+      options.threads = 1 + window % 2;
+      const Files found = convertTo(source, options);
+      ASSERT_EQ(found.size(), expected.size());
+      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
+    }
+  }
+
+  const TemporaryFolder folder_;
+};
+
+/// A thin tube that closes on itself across, of uneven cells along it: `ni` nodes long.
+FunctionGridSource tube(uint64_t ni, uint64_t nj, uint64_t nk) {
+  return {{gridBlock(ni, nj, nk)}, 2, [=](const GridNode& node) {
+            const auto i = static_cast<double>(node.i);
+            const double angle =
+                2 * std::numbers::pi * static_cast<double>(node.j % (nj - 1)) / static_cast<double>(nj - 1);
+            const double radius = 1 + 0.3 * static_cast<double>(node.k) + 0.1 * std::sin(0.05 * i);
+            NodeValues values;
+            values.position = {0.2 * (i + 0.3 * std::sin(1.7 * i)), radius * std::cos(angle),
+                               radius * std::sin(angle)};
+            values.scalars = {static_cast<float>(std::sin(0.1 * i) + radius), static_cast<float>(angle)};
+            values.blank = node.i % 97 == 50 && node.j < 3;
+            return values;
+          }};
+}
+
+/// Abutting blocks of unlike cells, that end at one another along i and along j, one apart; blanked nodes near the cuts.
+FunctionGridSource blocksWithSeams(Centring centring) {
+  return FunctionGridSource(
+      {gridBlock(90, 12, 11), gridBlock(60, 12, 11), gridBlock(90, 6, 11), gridBlock(9, 8, 7)}, 2,
+      [](const GridNode& node) {
+        const auto i = static_cast<double>(node.i), j = static_cast<double>(node.j);
+        NodeValues values;
+        double x = i, y = j;
+        if (node.block == 1) x = 89 + 1.4 * i;
+        if (node.block == 2) y = 11 + 1.3 * j;
+        if (node.block == 3) x = 400 + i;
+        const auto z = static_cast<double>(node.k);
+        values.position = {x + 0.2 * std::sin(y), y, z + 0.002 * x * y};
+        values.scalars = {static_cast<float>(std::sin(0.1 * x) + y), static_cast<float>(x * z)};
+        if (node.i % 17 == 3 && node.k > 6) values.scalars[0] = kMissing;
+        values.blank = node.block == 1 && node.i % 13 == 5 && node.j > 2 && node.j < 6 && node.k < 9;
+        return values;
+      },
+      centring);
+}
+
+TEST_F(CutRows, OfAThinGridGiveTheBytesOfWholeRows) {
+  expectSameBytes(tube(3000, 2 + 4, 2), {900, 2000, 10001});
+}
+
+TEST_F(CutRows, OfAPeriodicGridGiveTheBytesOfWholeRows) {
+  expectSameBytes(SceneGridSource(makeScene("wake"), {150, 30, 20}), {4001});
+}
+
+TEST_F(CutRows, OfBlocksWithSeamsAndBlanksGiveTheBytesOfWholeRows) {
+  expectSameBytes(blocksWithSeams(Centring::kNode), {1200, 2001, 4000});
+}
+
+TEST_F(CutRows, OfCellsGiveTheBytesOfWholeRows) {
+  expectSameBytes(blocksWithSeams(Centring::kCell), {1200, 2001});
+}
+
+TEST_F(CutRows, OfOverlappingBlocksGiveTheBytesOfWholeRows) {
+  for (const Centring centring : {Centring::kNode, Centring::kCell})
+    expectSameBytes(
+        oversetGrid(makeScene("half-annulus"), gridBlock(400, 8, 8), boxesInHalfAnnulus(3, 18), centring),
+        {3000}, 1);
+}
+
+TEST_F(CutRows, AreSharedByRanks) {
+  for (const Centring centring : {Centring::kNode, Centring::kCell}) {
+    const FunctionGridSource source = blocksWithSeams(centring);
+    ConvertOptions options = optionsFor("one.splats", source);
+    const Files expected = convertTo(source, options);
+    options.output = folder_ / "ranks.splats";
+    options.slab_bytes = bytesFor(1500, 2);
+    for (const unsigned count : {2u, 5u}) {
+      runRanks(count, [&](Ranks& ranks) {
+        ConvertOptions of_rank = options;
+        of_rank.ranks = &ranks;
+        of_rank.threads = 1;
+        Progress progress;
+        convert(source, of_rank, progress);
+      });
+      const Files found = filesOf(options.output);
+      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << count << name;
+    }
+  }
+}
+
+TEST_F(CutRows, TakeAFurtherScalarAsWholeOnesDo) {
+  for (const Centring centring : {Centring::kNode, Centring::kCell})
+    for (const bool blanks : {false, true}) {  // of the older scalar, which the cache alone knows
+      const FunctionGridSource source = blocksWithSeams(centring);
+      ConvertOptions options = optionsFor("first.splats", source);
+      options.scalars = {0};
+      if (blanks) options.blank_value = kMissing;
+      const auto added = [&](const char* name, std::optional<uint64_t> slab_bytes) {
+        options.output = folder_ / name;
+        convertTo(source, options);
+        AddScalarOptions adding;
+        adding.cache = options.output;
+        adding.scalars = {1};
+        adding.slab_bytes = slab_bytes;
+        Progress progress;
+        addScalars(source, adding, progress);
+        return filesOf(options.output);
+      };
+      const Files expected = added("whole.splats", std::nullopt),
+                  found = added("cut.splats", bytesFor(1500, 1));
+      ASSERT_TRUE(expected.contains("var.1.bin"));
+      for (const auto& [name, bytes] : expected) {
+        if (name != "manifest.json") {
+          EXPECT_TRUE(found.at(name) == bytes) << name << ' ' << blanks;
+        }
+      }
+    }
+}
+
+TEST_F(CutRows, OfAStepAreRecognisedAsTheSameGeometry) {
+  const FunctionGridSource source = blocksWithSeams(Centring::kNode);
+  ConvertOptions options = optionsFor("steps.splats", source);
+  options.surfaces = false;
+  options.planes = {};
+  convertTo(source, options);
+  AddStepOptions adding;
+  adding.cache = options.output;
+  adding.slab_bytes = bytesFor(1500, 2);
+  Progress progress;
+  EXPECT_FALSE(addStep(source, adding, progress).new_geometry);
+  const FunctionGridSource moved(source.description().blocks, 2, [&](const GridNode& node) {
+    const auto i = static_cast<double>(node.i), j = static_cast<double>(node.j);
+    return NodeValues{{i + 500.0 * node.block, j + 1e-3 * i, static_cast<double>(node.k)}, {1, 2}, false};
+  });
+  EXPECT_TRUE(addStep(moved, adding, progress).new_geometry);
+}
+
+TEST_F(CutRows, HaveTheChecksumOfWholeRows) {
+  const FunctionGridSource source = blocksWithSeams(Centring::kNode);
+  const NodeReader reader(source, {0}, std::nullopt);
+  const auto checksum = [&](uint64_t window, Halo halo) {
+    GridChecksum sum;
+    SlabStream slabs(reader, bytesFor(window, 1), halo);
+    while (const LoadedSlab* loaded = slabs.next())
+      sum.add(*loaded, source.description().blocks[loaded->slab.block]);
+    return sum.value();
+  };
+  const uint64_t whole = checksum(1 << 20, kNoHalo);
+  for (const uint64_t window : {1u, 7u, 50u, 89u}) EXPECT_EQ(checksum(window, kNoHalo), whole) << window;
+  for (const uint64_t window : {1200u, 1500u, 6000u})
+    EXPECT_EQ(checksum(window, kNodeSplatHalo), whole) << window;
+  // A share of slabs has whole rows.
+  for (const unsigned count : {2u, 3u, 7u}) {
+    uint64_t sum = 0;
+    for (unsigned index = 0; index < count; ++index) {
+      GridChecksum of_share;
+      SlabStream slabs(reader, bytesFor(40, 1), kNoHalo, {index, count, true});
+      while (const LoadedSlab* loaded = slabs.next())
+        of_share.add(*loaded, source.description().blocks[loaded->slab.block]);
+      sum += of_share.value();
+    }
+    EXPECT_EQ(sum, whole) << count;
+  }
+}
+
+TEST_F(CutRows, AreTakenFromWholeOnesByDefault) {
+  expectPartsOfRows(blocksWithSeams(Centring::kNode));
+  expectPartsOfRows(blocksWithSeams(Centring::kCell));
+}
+
+TEST_F(CutRows, OfASourceThatReadsWholeOnesAreRefusedWithASufficientSize) {
+  class Parts : public FunctionGridSource {
+   public:
+    using FunctionGridSource::FunctionGridSource;
+    uint64_t rowsInMemory(std::span<const uint32_t>) const override { return 0; }
+  };
+  const auto none = [](const GridNode&) { return NodeValues{}; };
+  const std::vector<GridBlock> blocks{gridBlock(10, 10, 10), gridBlock(3'000'000, 3, 3)};
+  constexpr uint64_t kMiB = 1 << 20;
+  EXPECT_NO_THROW(GridOrigin::requireMemory(Parts(blocks, 1, none), {0}, MemoryPlan::of(160 * kMiB, 1, 2)));
+
+  const FunctionGridSource rows(blocks, 1, none);
+  ConvertOptions options = optionsFor("refused.splats", rows);
+  options.memory_bytes = 256 * kMiB;
+  std::string error;
+  try {
+    convertTo(rows, options);
+  } catch (const Error& thrown) {
+    error = thrown.what();
+  }
+  const std::string before =
+      "a row of 3000000 nodes along i does not fit, and this format is read by whole rows; give at least ";
+  ASSERT_NE(error.find(before), std::string::npos) << error;
+  const uint64_t least = std::stoull(error.substr(error.find(before) + before.size()));
+  EXPECT_NO_THROW(GridOrigin::requireMemory(rows, {0}, MemoryPlan::of(least * kMiB, 1, 2)));
+  EXPECT_THROW(GridOrigin::requireMemory(rows, {0}, MemoryPlan::of((least - 2) * kMiB, 1, 2)), Error);
+}
+
+}  // namespace
+}  // namespace curvisplat
