@@ -31,7 +31,7 @@ constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
 constexpr size_t kLargeBlock = size_t{1} << 20;
 
 PaintResources resourcesOf(const FrameOptions& options) {
-  return {.threads = options.threads};
+  return {.threads = options.threads, .stop = options.stop};
 }
 
 unsigned threadsOf(const FrameOptions& options) {

@@ -4,8 +4,10 @@
 //
 // A rank prepares as much as makes its preparing and painting together those of the others: who paints much prepares
 // little. Parts are dealt out in rounds of neighbours in the sweep's order, since what all wait for comes in that order. In a
-// round each rank gets its share, the largest parts first, and each part goes to the rank that paints most of its splats, if that
-// rank's share of the round is not full.
+// round each rank gets its share, and each part goes to the rank that paints most of its splats, if that rank's share of the
+// round is not full; first the parts of which one rank paints many splats. Then it is known what each rank's tiles take it, with
+// the splats of its neighbours that reach into them; tiles and parts are dealt out again by that, some times, and the shares that
+// take least time count.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +26,9 @@ struct PictureShares {
 
 /// `parts` are in the sweep's order. The same for the same costs on any processor of one instruction set.
 PictureShares sharePicture(std::span<const PartCost> parts, ImageSize size, uint32_t ranks);
-/// How many parts, one after the other, are a round.
-size_t partsARound(uint32_t ranks);
+/// The ends of the rounds in which `parts` are prepared, each the number of parts before it. Rounds become smaller, since
+/// nothing is left to prepare while the last one is painted. Each rank prepares some parts in every round.
+std::vector<size_t> roundEnds(size_t parts, uint32_t ranks);
 
 /// What one rank has to do.
 struct RankWork {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "render/frame/picture_shares.h"
 #include "render/project/footprint_box.h"
 #include "stream/base/check.h"
 
@@ -53,6 +54,11 @@ std::vector<uint8_t> bitsOf(const std::vector<uint32_t>& numbers, size_t count) 
   return bits;
 }
 
+/// Whether a rank has said in its request that it needs the part.
+bool needs(const Ranks::Bytes& request, uint32_t part) {
+  return (std::to_integer<unsigned>(request[sizeof(RequestHeader) + part / 8]) >> part % 8 & 1) != 0;
+}
+
 }  // namespace
 
 SplatExchange::SplatExchange(Ranks& ranks, const SharedParts& shared, uint64_t buffer_bytes)
@@ -87,15 +93,16 @@ bool SplatExchange::beginSlab(std::optional<Request> request) {
     for (int y = box.y0; y < box.y1; ++y)
       for (int x = box.x0; x < box.x1; ++x) painters_[static_cast<size_t>(y * columns_ + x)] = rank;
   }
+  all_painted_ = std::find(painters_.begin(), painters_.end(), kNobody) == painters_.end();
   own_.clear();
   index_of_brick_.clear();
   prepared_.clear();
+  beginRounds(all);
   for (uint32_t part = 0; part < shared_.parts.size(); ++part) {
     if (shared_.preparers[part] != ranks_.rank()) continue;
     Prepared prepared;
     for (uint32_t rank = 0; rank < ranks_.count(); ++rank)
-      if (std::to_integer<unsigned>(all[rank][sizeof(RequestHeader) + part / 8]) >> part % 8 & 1)
-        prepared.receivers.push_back({rank, 0, 0, false, false});
+      if (needs(all[rank], part)) prepared.receivers.push_back({rank, 0, 0, false, false});
     if (prepared.receivers.empty()) continue;
     index_of_brick_[shared_.parts[part].part.brick] = static_cast<uint32_t>(own_.size());
     own_.push_back(part);
@@ -113,11 +120,25 @@ bool SplatExchange::beginSlab(std::optional<Request> request) {
   return any;
 }
 
+/// Of the parts that any rank needs. `requests`: of all ranks.
+void SplatExchange::beginRounds(const std::vector<Ranks::Bytes>& requests) {
+  std::vector<uint32_t> needed;
+  for (uint32_t part = 0; part < shared_.parts.size(); ++part)
+    if (std::any_of(requests.begin(), requests.end(),
+                    [&](const Ranks::Bytes& request) { return needs(request, part); }))
+      needed.push_back(part);
+  round_ends_.clear();
+  for (const size_t end : roundEnds(needed.size(), ranks_.count()))
+    round_ends_.push_back(needed[end - 1] + 1);
+  round_ = 0;
+  steps_ = 0;
+}
+
 // ---------------------------------------------------------------------------------------------- preparing
 
 std::optional<size_t> SplatExchange::nextToPrepare() {
   const MutexLock lock(mutex_);
-  if (next_own_ == own_.size()) return {};
+  if (next_own_ == own_.size() || own_[next_own_] >= round_ends_[round_]) return {};
   const uint64_t most = shared_.elements * kPreparedBytes;
   if (prepared_bytes_ > 0 && prepared_bytes_ + most > buffer_bytes_) return {};
   prepared_bytes_ += most;
@@ -168,6 +189,8 @@ void SplatExchange::findReceivers(Prepared& part, std::span<const ScreenSplat> s
   std::vector<uint32_t> place(ranks_.count(), kNone);  // [rank] in the receivers
   for (uint32_t n = 0; n < part.receivers.size(); ++n)
     if (!part.receivers[n].done) place[part.receivers[n].rank] = n;
+  // A part that lies in one rank's tiles. What lies outside of the picture has been left out already.
+  if (all_painted_ && part.receivers.size() == 1) part.all = true;
   std::vector<std::vector<uint32_t>> lists(part.receivers.size());
   const uint64_t most = kEntriesAnElement * splats.size();
   uint64_t entries = 0;
@@ -234,6 +257,8 @@ bool SplatExchange::step(const std::function<bool(uint64_t sequence)>& unneeded)
     granted.push_back(fromBytes<uint32_t>(bytes).at(0));
   send(granted);
   next_received_ = begin;
+  // Nothing is prepared before the first step.
+  if (steps_++ > 0 && round_ + 1 < round_ends_.size()) ++round_;
   return true;
 }
 

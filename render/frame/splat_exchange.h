@@ -9,9 +9,9 @@
 //
 // A preparer's own splats are not sent: it takes them from where they are, or, where it needs only some, from a copy.
 //
-// Work and steps alternate. In a step, a preparer offers what it has prepared; an owner grants, in its sweep's order,
-// what it has space for; then splats are sent. An owner may cancel parts that it does not need any more, as long as
-// they have not been sent.
+// Work and steps alternate. Parts are prepared in rounds (picture_shares.h), the next one after each step. In a step, a
+// preparer offers what it has prepared; an owner grants, in its sweep's order, what it has space for; then splats are sent. An
+// owner may cancel parts that it does not need any more, as long as they have not been sent.
 //
 // A rank paints its tiles region by region, each in slabs of depth, where its memory is short (frame_regions.h). All ranks
 // begin their next slab together, whichever regions these belong to, and say which tiles and parts they need for it; parts that
@@ -131,6 +131,7 @@ class SplatExchange {
     const ScreenSplat* splats = nullptr;
   };
 
+  void beginRounds(const std::vector<Ranks::Bytes>& requests);
   void findReceivers(Prepared& part, std::span<const ScreenSplat> splats) const;
   TileBox tilesOf(const ScreenBox& box) const;
   std::vector<Ranks::Bytes> offers(const std::vector<uint32_t>& cancelled);
@@ -157,7 +158,10 @@ class SplatExchange {
   std::vector<Prepared> prepared_;                         // [own]; each is one worker's until it is ready
   std::unique_ptr<std::atomic<uint32_t>[]> wanted_by_;     // [own] ranks
   std::vector<size_t> kept_;                               // own parts with a receiver that is kept
-  size_t first_open_ = 0;                                  // own parts before it have been sent to all
+  std::vector<uint32_t> round_ends_;                       // [round] the first part that comes later
+  size_t steps_ = 0, round_ = 0;
+  bool all_painted_ = false;  // every tile of the picture is some rank's
+  size_t first_open_ = 0;     // own parts before it have been sent to all
   uint64_t offered_bytes_ = 0, sent_bytes_ = 0;
   std::vector<Arrived> arrived_;        // [needed]
   std::vector<Ranks::Bytes> received_;  // [rank]

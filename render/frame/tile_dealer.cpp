@@ -27,6 +27,22 @@ class Dealer {
       if (const TilePart part = TilePart::of(cost, size); part.isSeen()) parts_.push_back(part);
   }
 
+  /// By the costs of tiles instead of parts.
+  Dealer(std::span<const double> tile_costs, ImageSize size)
+      : how_{{0, 0, TileSet::tilesAlong(size.width, kSharedTileSide),
+              TileSet::tilesAlong(size.height, kSharedTileSide)}},
+        columns_(how_.box.x1),
+        owners_(tile_costs.size(), kNobody),
+        sums_((static_cast<size_t>(columns_) + 1) * (static_cast<size_t>(how_.box.y1) + 1)) {
+    for (int y = 0; y < how_.box.y1; ++y) {
+      double row = 0;
+      for (int x = 0; x < columns_; ++x) {
+        row += tile_costs[static_cast<size_t>(y * columns_ + x)];
+        sums_[placeOf(x + 1, y + 1)] = sums_[placeOf(x + 1, y)] + row;
+      }
+    }
+  }
+
   std::vector<uint32_t> deal(uint32_t ranks) {
     std::vector<uint32_t> parts(parts_.size());
     for (uint32_t n = 0; n < parts.size(); ++n) parts[n] = n;
@@ -84,7 +100,27 @@ class Dealer {
     return found;
   }
 
+  size_t placeOf(int x, int y) const { return static_cast<size_t>(y * (columns_ + 1) + x); }
+
+  double costOf(const TileBox& box) const {
+    return sums_[placeOf(box.x1, box.y1)] - sums_[placeOf(box.x0, box.y1)] - sums_[placeOf(box.x1, box.y0)] +
+           sums_[placeOf(box.x0, box.y0)];
+  }
+
+  CutCosts cutCosts(const TileBox& box, bool vertical) const {
+    CutCosts costs;
+    TileBox low = box, high = box;
+    int& place = vertical ? low.y1 : low.x1;
+    for (place = vertical ? box.y0 : box.x0; place <= (vertical ? box.y1 : box.x1); ++place) {
+      (vertical ? high.y0 : high.x0) = place;
+      costs.before.push_back(costOf(low));
+      costs.behind.push_back(costOf(high));
+    }
+    return costs;
+  }
+
   CutCosts cutCosts(const TileBox& box, bool vertical, const std::vector<uint32_t>& parts) const {
+    if (!sums_.empty()) return cutCosts(box, vertical);
     const int begin = vertical ? box.y0 : box.x0, end = vertical ? box.y1 : box.x1;
     const auto tiles = static_cast<size_t>(end - begin);
     std::vector<double> paint(tiles, kTileCost * (vertical ? box.columns() : box.rows()));
@@ -102,7 +138,7 @@ class Dealer {
       }
       for (size_t n = first; n <= last; ++n) {
         const double tile = static_cast<double>(begin) + static_cast<double>(n);
-        paint[n] += part.paint * across * part.along(vertical, tile, tile + 1);
+        paint[n] += (part.paint + part.sort) * across * part.along(vertical, tile, tile + 1);
       }
     }
     CutCosts costs{std::vector<double>(tiles + 1), std::vector<double>(tiles + 1)};
@@ -115,6 +151,7 @@ class Dealer {
   const int columns_;
   std::vector<TilePart> parts_;
   std::vector<uint32_t> owners_;
+  std::vector<double> sums_;  // of the costs of tiles above and to the left, where those are known
 };
 
 /// About half the width of a footprint, if its splats fill the box evenly.
@@ -135,9 +172,10 @@ std::vector<PartCost> partCosts(std::span<const SweptPart> parts, std::span<cons
     const Brick& brick = bricks[part.part.brick];
     const auto drawn = static_cast<double>(SplatRanges(brick, part.part.octants).splats());
     const ScreenBox box = screenBoxOf(brick, view);
-    costs.push_back({box, drawn, kPaintPerPrepare * drawn,
-                     uint64_t{brick.geometry.length} + variables[part.part.brick].values.length, drawn,
-                     reachOf(box, brick.splats, view)});
+    const double reach = reachOf(box, brick.splats, view);
+    costs.push_back({box, drawn, kPaintPerPixel * reach * reach * drawn,
+                     uint64_t{brick.geometry.length} + variables[part.part.brick].values.length, drawn, reach,
+                     kSortPerPrepare * drawn});
   }
   return costs;
 }
@@ -147,10 +185,22 @@ std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size,
   return Dealer(parts, size, how).deal(ranks);
 }
 
-std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size, uint32_t ranks) {
-  const TileBox all{0, 0, TileSet::tilesAlong(size.width, kSharedTileSide),
-                    TileSet::tilesAlong(size.height, kSharedTileSide)};
-  return dealTiles(parts, size, {all}, ranks);
+std::vector<uint32_t> dealTiles(std::span<const double> tile_costs, ImageSize size, uint32_t ranks) {
+  return Dealer(tile_costs, size).deal(ranks);
+}
+
+std::vector<double> tileCosts(std::span<const PartCost> parts, ImageSize size) {
+  const int columns = TileSet::tilesAlong(size.width, kSharedTileSide);
+  std::vector<double> costs(TileSet::tilesOf(size, kSharedTileSide), kTileCost);
+  for (const PartCost& cost : parts) {
+    const TilePart part = TilePart::of(cost, size);
+    if (!part.isSeen()) continue;
+    for (int y = static_cast<int>(part.y0); y < part.y1; ++y)
+      for (int x = static_cast<int>(part.x0); x < part.x1; ++x)
+        costs[static_cast<size_t>(y * columns + x)] +=
+            (part.paint + part.sort) * part.along(false, x, x + 1) * part.along(true, y, y + 1);
+  }
+  return costs;
 }
 
 }  // namespace curvisplat

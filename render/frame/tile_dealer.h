@@ -3,7 +3,8 @@
 // (render/project/tile_set.h), so that few splats are painted by several. Costs are estimated from the index alone:
 //
 //   preparing   a part costs its preparer as much as it has splats
-//   painting    a splat costs its share of the tiles; a brick's splats are spread evenly over its box
+//   painting    a splat is sorted by each rank that paints some of it, and each of its pixels painted by one; a brick's splats
+//               are spread evenly over its box, and the larger they are, the more a splat costs
 //
 // The picture is halved again and again (a k-d tree), each time where the costs of both sides, by the ranks that they
 // get, are most alike. What splats hide of each other is not known beforehand.
@@ -36,7 +37,9 @@ struct TileDealing {
 /// tiles get kNobody.
 std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size, const TileDealing& how,
                                 uint32_t ranks);
-/// All tiles.
-std::vector<uint32_t> dealTiles(std::span<const PartCost> parts, ImageSize size, uint32_t ranks);
+/// All tiles, by what each costs, wherever its neighbours are painted.   tile_costs [shared tile]
+std::vector<uint32_t> dealTiles(std::span<const double> tile_costs, ImageSize size, uint32_t ranks);
+/// [shared tile] sorting and painting the splats in it, and the tile itself.
+std::vector<double> tileCosts(std::span<const PartCost> parts, ImageSize size);
 
 }  // namespace curvisplat

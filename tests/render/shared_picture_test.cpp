@@ -314,6 +314,53 @@ TEST(TileDealer, SplatsNearABorderArePaintedTwice) {
   EXPECT_NEAR(splats, 1000 * (1 + 8.0 / 640), 1e-6);
 }
 
+// Both sides sort the splats near a border; each pixel is painted by one rank.
+TEST(TileDealer, SplatsNearABorderAreSortedTwiceButTheirPixelsPaintedOnce) {
+  const ImageSize size{640, 480};
+  const std::vector<PartCost> sorted{{{0, 0, 640, 480}, 0, 0, 1, 1000, 3, 1500}},
+      painted{{{0, 0, 640, 480}, 0, 1500, 1, 1000, 3, 0}}, nothing{{{0, 0, 640, 480}, 0, 0, 1, 1000, 3, 0}};
+  const auto paintOf = [&](const std::vector<PartCost>& parts) {
+    double paint = 0;
+    for (const RankWork& one : workOfRanks(parts, size, 2).ranks) paint += one.paint;
+    return paint;
+  };
+  EXPECT_NEAR(paintOf(sorted) - paintOf(nothing), 1500 * (1 + 8.0 / 640), 1e-6);
+  EXPECT_NEAR(paintOf(painted) - paintOf(nothing), 1500, 1e-6);
+}
+
+// The denser the picture, the smaller a rank's tiles are, and the more splats of its neighbours reach into them.
+TEST(PictureShares, WorkIsEvenWhereNeighboursSplatsAreMuchOfIt) {
+  const ImageSize size{640, 480};
+  std::vector<PartCost> parts;
+  for (int n = 0; n < 4000; ++n) {
+    const double angle = 2.4 * n, away = 0.05 * n;
+    const auto x = static_cast<float>(300 + away * std::cos(angle)),
+               y = static_cast<float>(220 + away * std::sin(angle));
+    parts.push_back({{x, y, x + 40, y + 40}, 1000, 500, 100, 1000, 3, 1400});
+  }
+  const uint32_t ranks = 64;
+  const SharedWork work = workOfRanks(parts, size, ranks);
+  double all = 0;
+  for (const RankWork& one : work.ranks) all += one.prepare + one.paint;
+  EXPECT_GT(all / ranks / work.longest, 0.91);
+}
+
+TEST(PictureShares, RoundsEndWithTheLastPartAndBecomeSmaller) {
+  for (const uint32_t ranks : {1u, 2u, 7u, 512u})
+    for (const size_t parts : {0u, 1u, 100u, 5000u, 20000u}) {
+      const std::vector<size_t> ends = roundEnds(parts, ranks);
+      ASSERT_EQ(ends.empty(), parts == 0);
+      size_t before = 0, largest = parts;
+      for (const size_t end : ends) {
+        ASSERT_GT(end, before);
+        EXPECT_LE(end - before, largest);
+        largest = end - before;
+        before = end;
+      }
+      EXPECT_EQ(before, parts);
+    }
+}
+
 TEST(TileSet, TouchesWhatALookAtEveryTileFinds) {
   const ImageSize size{300, 200};
   std::vector<uint32_t> owners(TileSet::tilesOf(size, kSharedTileSide));

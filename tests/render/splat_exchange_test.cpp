@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "render/frame/picture_shares.h"
 #include "stream/base/freed_memory.h"
 #include "tests/support/thread_ranks.h"
 
@@ -73,6 +74,41 @@ TEST(SplatExchange, HoldsNoMoreThanItsBuffers) {
   for (uint32_t rank = 0; rank < kRanks; ++rank) {
     EXPECT_GT(received[rank], kParts * kSplats / 2);
     EXPECT_LT(most[rank] - before, kRanks * 3 * buffer);
+  }
+}
+
+// No rank is ahead of the others by more than a round: what they all wait for comes first.
+TEST(SplatExchange, PreparesInRounds) {
+  SharedParts shared = twoHalves();
+  shared.elements = 4;
+  const std::vector<size_t> ends = roundEnds(kParts, kRanks);
+  ASSERT_GT(ends.size(), 2u);
+  const std::vector<ScreenSplat> splats = {splatsOfAPart()[0]};
+  const std::vector<uint32_t> keys = {0};
+  std::array<std::vector<std::vector<size_t>>, kRanks> prepared;
+  runRanks(kRanks, [&](Ranks& ranks) {
+    SplatExchange exchange(ranks, shared, 1 << 20);
+    const int half = TileSet::tilesAlong(64, kSharedTileSide) / 2, first = ranks.rank() == 0 ? 0 : half;
+    SplatExchange::Request request{{first, 0, first + half, 2 * half}, {}};
+    for (uint32_t n = 0; n < kParts; ++n) request.parts.push_back(n);
+    ASSERT_TRUE(exchange.beginSlab(request));
+    while (exchange.step([](uint64_t) { return false; })) {
+      while (const auto sequence = exchange.nextReceived()) exchange.received(*sequence);
+      std::vector<size_t>& round = prepared[ranks.rank()].emplace_back();
+      while (const auto index = exchange.nextToPrepare()) {
+        round.push_back(exchange.toPrepare()[*index]);
+        exchange.give(*index, splats, keys);
+      }
+    }
+  });
+  for (const auto& rounds : prepared) {
+    ASSERT_GE(rounds.size(), ends.size());
+    for (size_t n = 0; n < rounds.size(); ++n)
+      for (const size_t part : rounds[n]) {
+        ASSERT_LT(n, ends.size());
+        EXPECT_GE(part, n == 0 ? 0 : ends[n - 1]);
+        EXPECT_LT(part, ends[n]);
+      }
   }
 }
 
