@@ -125,14 +125,14 @@ class Marcher {
     first_ = begin + kSkin * (end - begin);
     last_ = end - kSkin * (end - begin);
     held_ = {};
-    double t = begin, extinction = properties(t).extinction, step = stepFromHere(steps_.step);
+    double t = begin, at_begin = extinction(t), step = stepFromHere(steps_.step);
     while (t < end) {
       const double next = end - t < 1.001 * step ? end : t + step;
-      const double next_extinction = properties(next).extinction;
+      const double at_end = extinction(next);
       step = stepFromHere(steps_.step);
-      addHalving(t, next, extinction, next_extinction, 0);
+      addHalving(t, next, at_begin, at_end, 0);
       t = next;
-      extinction = next_extinction;
+      at_begin = at_end;
     }
     first_.reset();
   }
@@ -168,17 +168,29 @@ class Marcher {
 
   bool inside(double t) { return probe_->at(ray_.at(t)).has_value(); }
 
-  OpticalProperties properties(double t) {
+  /// What the field is at a place on the ray, without light and without the colours of another scalar.
+  struct Sample {
+    double t = 0, scalar = 0;
+    OpticalProperties optical;
+  };
+
+  Sample sample(double t) {
     if (first_) t = std::clamp(t, *first_, last_);
     const std::optional<double> scalar = probe_->at(ray_.at(t));
     // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty,
     // unless the field said that it is there.
     if (!scalar && !first_) return {};
-    if (!scalar) return held_;
-    held_ = function_(*scalar);
-    if (colour_at_ && held_.extinction > 0) held_.colour = (*colour_at_)(ray_.at(t));
-    if (light_ && held_.extinction > 0) held_.colour = lit(held_.colour, gradient(ray_.at(t), *scalar));
+    if (scalar) held_ = {t, *scalar, function_(*scalar)};
     return held_;
+  }
+  double extinction(double t) { return sample(t).optical.extinction; }
+
+  /// Six more samples of the field where there is light: only for those whose colour counts.
+  glm::dvec3 colourOf(const Sample& sample) {
+    if (!(sample.optical.extinction > 0)) return sample.optical.colour;
+    const glm::dvec3 at = ray_.at(sample.t);
+    const glm::dvec3 colour = colour_at_ ? (*colour_at_)(at) : sample.optical.colour;
+    return light_ ? lit(colour, gradient(at, sample.scalar)) : colour;
   }
 
   glm::dvec3 gradient(const glm::dvec3& at, double scalar) {
@@ -215,21 +227,20 @@ class Marcher {
     return in;
   }
 
-  void add(double begin, double end) {
-    addHalving(begin, end, properties(begin).extinction, properties(end).extinction, 0);
-  }
+  void add(double begin, double end) { addHalving(begin, end, extinction(begin), extinction(end), 0); }
 
   void addHalving(double begin, double end, double at_begin, double at_end, int halvings) {
     const double middle = 0.5 * (begin + end), length = end - begin;
-    const OpticalProperties here = properties(middle);
-    const auto [least, most] = std::minmax({at_begin, here.extinction, at_end});
+    const Sample here = sample(middle);
+    const double at_middle = here.optical.extinction;
+    const auto [least, most] = std::minmax({at_begin, at_middle, at_end});
     if ((most - least) * length > steps_.depth_tolerance && halvings < kMaxHalvings) {
-      addHalving(begin, middle, at_begin, here.extinction, halvings + 1);
-      addHalving(middle, end, here.extinction, at_end, halvings + 1);
+      addHalving(begin, middle, at_begin, at_middle, halvings + 1);
+      addHalving(middle, end, at_middle, at_end, halvings + 1);
       return;
     }
-    const double passed = std::exp(-here.extinction * length);
-    colour_ += transmittance_ * (1 - passed) * here.colour;
+    const double passed = std::exp(-at_middle * length);
+    colour_ += transmittance_ * (1 - passed) * colourOf(here);
     transmittance_ *= passed;
   }
 
@@ -242,7 +253,7 @@ class Marcher {
   const PointColour* colour_at_;
   std::optional<double> first_;  // between first_ and last_ the field is there
   double last_ = 0;
-  OpticalProperties held_;  // of the last point found since first_ was set
+  Sample held_;  // the last point found since first_ was set
   glm::dvec3 colour_{0.0};
   double transmittance_ = 1;
 };
