@@ -74,6 +74,7 @@ struct CpuPainter::State {
   std::optional<ShadingTable> table, colours;
   std::optional<tbb::task_arena> arena;
   PixelShading shading;
+  std::stop_token stop;
   double upload_s = 0, draw_s = 0;
 
   float* tile(size_t number) { return tiles.get() + number * kTileFloats; }
@@ -105,6 +106,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   const unsigned threads = threadsOf(resources);
   state.upload_s = state.draw_s = 0;
   state.shading = shading;
+  state.stop = resources.stop;
   state.table.emplace(table);
   state.colours.reset();
   if (shading.colours) state.colours.emplace(*shading.colours);
@@ -187,7 +189,7 @@ void CpuPainter::State::paintBatch() {
   arena->execute([this] { bins->sort(); });
   forTiles([this](size_t number) {
     const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
-    if (order.empty()) return;
+    if (order.empty() || stop.stop_requested()) return;
     const TraceScope trace("paint tile");
     const auto columns = static_cast<size_t>(bins->columns());
     const BlockMask left = paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
@@ -202,7 +204,7 @@ void CpuPainter::State::paintBatch() {
 
 void CpuPainter::draw(std::span<const ScreenSplat> splats) {
   State& state = *state_;
-  while (!splats.empty()) {
+  while (!splats.empty() && !state.stop.stop_requested()) {
     size_t added;
     {
       const StageTimer timer(state.upload_s, "bin splats");

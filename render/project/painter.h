@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <glm/vec4.hpp>
 #include <span>
+#include <stop_token>
 
 #include "render/colour/classification.h"
 #include "render/image/image.h"
@@ -23,6 +24,8 @@ namespace curvisplat {
 struct PaintResources {
   unsigned threads = 0;         // 0: one per core
   size_t batch_splats = 65536;  // the most splats that may be collected and drawn together
+  std::stop_token stop =
+      {};  // once it is requested, the rest may be left out: nobody wants the picture any more
 };
 
 /// How the pixels of a splat get their colours.

@@ -329,6 +329,29 @@ TEST_F(WindowOpening, ThePreviewHandsItsViewOn) {
   EXPECT_EQ(position.substr(position.find(',')), focus.substr(focus.find(',')));
 }
 
+/// The first movements that the whole's view gets come before it has drawn anything.
+TEST_F(WindowOpening, ADragGoesOnWhenTheWholeComes) {
+  run({"generate", "half-annulus", "--size", "128x96x96", "-o", "middle"});
+  openWith({"middle.xyz", "middle.fun"});
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview"); }));
+  const Place middle = placeOf("picture");
+  moveTo(middle);
+  act({"mousedown", "1"});
+  int moves = 0;
+  EXPECT_TRUE(eventually(
+      [&] {
+        moveTo({middle.first + 20 + ++moves % 9, middle.second + 10});
+        return !hasWidget("opening");
+      },
+      300));
+  act({"mouseup", "1"});
+  cache_ = "middle";
+  saveAndCopy();
+  const std::string position = valueOf(close().at(0), "--position");
+  cache_ = "a";
+  EXPECT_EQ(position.find("nan"), std::string::npos) << position;
+}
+
 TEST_F(WindowOpening, AFileDroppedIsOpened) {
   openWith({});
   placeOf("open");

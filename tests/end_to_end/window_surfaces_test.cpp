@@ -138,6 +138,7 @@ TEST_F(WindowSurfaces, AClipPlaneIsAtACoordinate) {
   press("Return");
   const std::string there = "clip plane 1: x of plane at -0.25";
   EXPECT_TRUE(eventually([&] { return hasWidget(there); }));
+  save();  // in the frame after Return, Ctrl+C is still the text's
   const Image cut = saveAndCopy();
   EXPECT_LT(difference(whole, cut), 45);
   click("flip clip plane 1");

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <stop_token>
 #include <vector>
 
 #include "render/cpu/tile.h"
@@ -281,6 +282,23 @@ TEST(CpuPainter, FootprintIsClose) {
     double sum = 0;
     for (int term = kFootprintTerms - 1; term >= 0; --term) sum = sum * x + terms[term];
     EXPECT_NEAR(x * x * sum, footprint(kKernelSupport * std::sqrt(1 - x)), 2e-4) << x;
+  }
+}
+
+// Else a window would wait for the rest of a large batch whenever its camera begins to move.
+TEST(CpuPainter, PaintsNothingMoreOnceStopped) {
+  const ImageSize size{70, 50};
+  const auto table = lively();
+  const std::vector<ScreenSplat> splats = randomSplats(200, 7, size);
+  for (const bool before_drawing : {true, false}) {
+    std::stop_source stopping;
+    CpuPainter painter;
+    painter.begin(size, kWhite, table, {}, {.stop = stopping.get_token()});
+    if (before_drawing) stopping.request_stop();
+    painter.draw(splats);
+    stopping.request_stop();  // before end(), which paints what fills no batch
+    const Image picture = painter.end();
+    EXPECT_EQ(picture.rgba, std::vector<float>(picture.rgba.size(), 1.0f)) << before_drawing;
   }
 }
 

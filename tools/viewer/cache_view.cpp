@@ -125,14 +125,15 @@ void CacheView::draw(const WindowLayout& layout) {
   reports_.attempt([&] { takeFrame(); });
   reports_.attempt([&] { takeFunction(); });
   reports_.attempt([&] { takeSurface(); });
-  react(layout);
   const ImageSize size = pixelsOf(layout.picture, window_);
+  const bool resized = size.width > 0 && !same(size, picture_size_);
+  if (resized) fitTo(size);  // before the mouse's movements, which are in its pixels
+  react(layout);
   if (size.width > 0) {
     const bool moving = navigation_.isMoving() || dragging_ || playback_.isPlaying();
     // A button that is pressed and has not moved anything asks for nothing: a click for a value is answered at once.
-    if (changed_ || (was_moving_ && !moving) || !same(size, picture_size_)) {
-      picture_size_ = size;
-      data_size_ = dataSizeOf(state_, manifest(), size);
+    if (changed_ || (was_moving_ && !moving) || resized) {
+      fitTo(size);  // bars may have come or gone
       reports_.attempt([&] { ask(moving); });
     }
     showPicture(layout);
@@ -144,6 +145,11 @@ void CacheView::draw(const WindowLayout& layout) {
     keepHistory();
   }
   drawStatus(layout);
+}
+
+void CacheView::fitTo(ImageSize size) {
+  picture_size_ = size;
+  data_size_ = dataSizeOf(state_, manifest(), size);
 }
 
 void CacheView::takeFrame() {

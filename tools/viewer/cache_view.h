@@ -112,6 +112,8 @@ class CacheView {
   void giveUpSaving();
   void giveUpRequest();
   void restartFrames();
+  /// The window's picture has this size, in pixels.
+  void fitTo(ImageSize size);
   void react(const WindowLayout& layout);
   void drawPanels(const WindowLayout& layout);
   void apply(const PanelActions& actions);

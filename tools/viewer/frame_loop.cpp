@@ -33,6 +33,7 @@ std::vector<uint8_t> bytesOf(const Image& image) {
 
 // Too slow: reduce splats as long as that helps, then the resolution. Too fast: raise them in reverse order.
 void Effort::learn(double seconds, double target, bool complete) {
+  has_learned_ = true;
   const double factor = std::clamp(target / std::max(seconds, 1e-6), 0.25, 2.0);
   const bool splats_help = !complete && splats_ > min_;
   if (factor < 1 && !splats_help)
@@ -251,7 +252,8 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
       continue;       // finer bricks may be intact
     }
     if (request.wants_bytes) frame.bytes = bytesOf(frame.image);
-    if (request.moving) {
+    // A view's first picture, at rest, teaches too: else the first movement of the mouse would wait for one that takes too long.
+    if (request.moving || !effort.hasLearned()) {
       // Drawing fewer splats than the limit does not mean that the view is complete: the next level may
       // exceed it.
       const bool complete = frame.is_final || frame.statistics.largest_error_px <= request.options.lod_pixels;

@@ -104,6 +104,7 @@ class Effort {
   explicit Effort(uint64_t min_splats) : min_(min_splats), splats_(std::max(min_splats, kFirst)) {}
 
   uint64_t splats() const { return splats_; }
+  bool hasLearned() const { return has_learned_; }
   /// Size in pixels of the finest detail to draw; 0: full resolution.
   double detailPixels() const { return reduction_ > 1 ? 2 * reduction_ : 0; }
   /// Adapts to a picture that took `seconds` instead of `target`. `complete`: a higher splat limit would not
@@ -115,6 +116,7 @@ class Effort {
   static constexpr uint64_t kMax = 1'000'000'000;
   static constexpr double kMaxReduction = 8;
   uint64_t min_, splats_;
+  bool has_learned_ = false;
   double reduction_ = 1;  // of the resolution in each direction
 };
 
