@@ -56,13 +56,21 @@ def upgrade(origin):
 
 
 class Viewer:
-    """A page without a browser."""
+    """A page without a browser. Waits for a place: viewers that have gone keep theirs until their pictures have been stopped."""
 
     def __init__(self, server, size=(64, 48)):
-        self.socket = server.socket()
-        self.hello = self.text("hello")
         self.size = list(size)
         self.number = 0
+        wait_for(lambda: self.gets_in(server), "a place among the viewers")
+
+    def gets_in(self, server):
+        self.socket = server.socket()
+        try:
+            self.hello = self.text("hello")
+            return True
+        except (ValueError, websocket.WebSocketException):  # it was told to try again later
+            self.socket.close()
+            return False
 
     def send(self, **message):
         self.socket.send(json.dumps(message))
@@ -200,7 +208,7 @@ def broken_frames(server):
              b"".join(frame(1 if n == 0 else 0, b"x" * 1000, final=False) for n in range(100))]
     cases += [bytes(random.randrange(256) for _ in range(random.randint(1, 300))) for _ in range(100)]
     for case in cases:
-        viewer = server.socket()
+        viewer = Viewer(server).socket
         try:
             viewer.sock.sendall(case)
             viewer.sock.sendall(frame(8, b"\x03\xe8"))
@@ -297,7 +305,7 @@ def floods(server):
     """Too many messages close the connection, whichever they are."""
     for what, payload in (("messages", frame(1, b'{"type":"shown","picture":1}')), ("pings", frame(9, b"x")),
                           ("requests", frame(1, b'{"type":"histogram","cache":0,"scalar":"value","low":0,"high":1,"log":false}'))):
-        viewer = server.socket()
+        viewer = Viewer(server).socket
         viewer.sock.settimeout(30)
         try:
             for _ in range(300):
@@ -368,15 +376,7 @@ def too_many_viewers(server, most):
     told = extra.sock.recv(1000)
     expect(told[0] == 0x88 and struct.unpack(">H", told[2:4])[0] == 1013, "one viewer too many is told to try again later")
     viewers.pop().socket.close()
-
-    def gets_in():
-        try:
-            Viewer(server).socket.close()
-            return True
-        except (AssertionError, ValueError, TypeError, OSError, websocket.WebSocketException):
-            return False
-
-    wait_for(gets_in, "a place to be free again")
+    Viewer(server).socket.close()  # the place is free again
     for viewer in viewers:
         viewer.socket.close()
 
