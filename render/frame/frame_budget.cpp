@@ -51,18 +51,19 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t taken = rounded + pools + wanted * worker_bytes <= memory_bytes ? rounded : exact;
   budget.workers =
       static_cast<unsigned>(std::min<uint64_t>(wanted, (memory_bytes - taken - pools) / worker_bytes));
-  uint64_t rest = memory_bytes - taken - pools - budget.workers * worker_bytes;
-  const uint64_t share = rest / 4;
+  const uint64_t free = memory_bytes - taken - pools - budget.workers * worker_bytes;
+  const uint64_t share = free / 4;
   const uint64_t ring_bytes = std::min(kMinRingBytes + share, kMaxRingBytes);
   budget.ring_splats = ring_bytes / sizeof(ScreenSplat);
   budget.pager_bytes =
       std::max(fixed.least_pager_bytes, std::min(fixed.least_pager_bytes + share, kMaxPagerBytes));
   const uint64_t most_sweep_bytes = std::max(kMinSweepBytes, SweepBuffer::bytes(fixed.splats));
-  const uint64_t sweep_bytes = std::min(kMinSweepBytes + rest * 3 / 8, most_sweep_bytes);
+  uint64_t rest = free - (ring_bytes - kMinRingBytes) - (budget.pager_bytes - fixed.least_pager_bytes);
+  // Ranks wait for each other at the end of each slab; one process gains more from bricks that stay decoded.
+  const uint64_t sweep_share = fixed.several_ranks ? rest * 7 / 8 : free * 3 / 8;
+  const uint64_t sweep_bytes = std::min(kMinSweepBytes + sweep_share, most_sweep_bytes);
   budget.sweep_splats = sweep_bytes / SweepBuffer::bytes(SweepBuffer::kPageSplats) * SweepBuffer::kPageSplats;
   rest -= sweep_bytes - kMinSweepBytes;
-  rest -= ring_bytes - kMinRingBytes;
-  rest -= budget.pager_bytes - fixed.least_pager_bytes;
   // Of a series, the values of three steps are kept for each brick: the step, and the two that it is predicted from.
   budget.kept_bytes = fixed.is_series ? rest * kKeptArrays / (kArraysOfSplats + kKeptArrays) : 0;
   budget.cache_bytes = rest - budget.kept_bytes;

@@ -24,8 +24,9 @@ struct FrameBudget {
     uint64_t output_bytes = 0;       // reserved for the use of the finished picture
     uint64_t splats = 0;             // the most that any picture can have
     ImageSize size;
-    bool is_series = false;    // of several time steps
-    bool two_scalars = false;  // splats have ScreenColours
+    bool is_series = false;      // of several time steps
+    bool two_scalars = false;    // splats have ScreenColours
+    bool several_ranks = false;  // draw the picture together
   };
   /// Divides `memory_bytes` for at most `threads` workers (0: one per core). Workers come first, then the
   /// ring, the pager and the sweep, each up to the size from which more does not help; the cache gets the

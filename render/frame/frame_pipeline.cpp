@@ -152,7 +152,8 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
                                  planner_.mostSplats(),
                                  options.size,
                                  cache_.series().steps.size() > 1,
-                                 coloured_by_.has_value()};
+                                 coloured_by_.has_value(),
+                                 options.ranks != nullptr};
   return FrameBudget::of(options.memory_bytes, fixed, options.threads);
 }
 

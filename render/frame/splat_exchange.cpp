@@ -42,7 +42,7 @@ void put(Ranks::Bytes& to, const T* values, size_t count) {
 }
 
 template <typename T>
-void get(const Ranks::Bytes& from, size_t& at, T* values, size_t count) {
+void get(std::span<const std::byte> from, size_t& at, T* values, size_t count) {
   CURVISPLAT_CHECK_OP(at + count * sizeof(T), <=, from.size());
   if (count > 0) std::memcpy(values, from.data() + at, count * sizeof(T));
   at += count * sizeof(T);
@@ -67,13 +67,14 @@ SplatExchange::SplatExchange(Ranks& ranks, const SharedParts& shared, uint64_t b
       buffer_bytes_(buffer_bytes),
       columns_(TileSet::tilesAlong(shared.size.width, kSharedTileSide)),
       rows_(TileSet::tilesAlong(shared.size.height, kSharedTileSide)),
-      boxes_(ranks.count()) {}
+      boxes_(ranks.count()),
+      sending_(buffer_bytes),
+      received_(buffer_bytes) {}
 
 bool SplatExchange::beginSlab(std::optional<Request> request) {
   const RequestHeader header{request ? request->tiles : TileBox{0, 0, 0, 0}, request.has_value()};
   needed_ = request ? std::move(request->parts) : std::vector<uint32_t>();
   arrived_.assign(needed_.size(), {});
-  received_.clear();
   available_ = next_received_ = 0;
   Ranks::Bytes message;
   put(message, &header, 1);
@@ -241,7 +242,6 @@ void SplatExchange::findReceivers(Prepared& part, std::span<const ScreenSplat> s
 bool SplatExchange::step(const std::function<bool(uint64_t sequence)>& unneeded) {
   // What was received has been entered.
   const uint64_t begin = available_;
-  received_.clear();
   endKept();
   std::vector<uint32_t> cancelled;
   for (uint64_t n = begin; n < std::min<uint64_t>(needed_.size(), begin + kCancelAhead); ++n) {
@@ -380,64 +380,62 @@ void SplatExchange::send(const std::vector<uint32_t>& granted) {
   const auto isSentNow = [&](size_t n, const Receiver& receiver) {
     return !receiver.done && !receiver.kept && receiver.offered && own_[n] < granted[receiver.rank];
   };
-  std::vector<uint64_t> bytes_to(ranks_.count());
-  for (size_t n = first_open_; n < own_.size() && prepared_[n].ready; ++n)
-    for (const Receiver& receiver : prepared_[n].receivers)
-      if (isSentNow(n, receiver)) bytes_to[receiver.rank] += receiver.bytes();
-  std::vector<Ranks::Bytes> to(ranks_.count());
-  for (uint32_t rank = 0; rank < ranks_.count(); ++rank) to[rank].reserve(bytes_to[rank]);
+  std::vector<uint64_t> bytes_to(ranks_.count()), written(ranks_.count());
   for (size_t n = first_open_; n < own_.size() && prepared_[n].ready; ++n)
     for (Receiver& receiver : prepared_[n].receivers) {
       if (!isSentNow(n, receiver)) continue;
       offered_bytes_ -= receiver.bytes();
-      if (keep(prepared_[n], receiver, own_[n])) {
+      if (keep(prepared_[n], receiver, own_[n]))
         kept_.push_back(n);
-        continue;
-      }
-      append(prepared_[n], receiver, own_[n], to[receiver.rank]);
+      else
+        bytes_to[receiver.rank] += receiver.bytes();
+    }
+  sending_.begin(bytes_to);
+  for (size_t n = first_open_; n < own_.size() && prepared_[n].ready; ++n)
+    for (Receiver& receiver : prepared_[n].receivers) {
+      if (!isSentNow(n, receiver)) continue;
+      uint64_t& at = written[receiver.rank];
+      write(prepared_[n], receiver, own_[n], sending_.of(receiver.rank).data() + at);
+      at += receiver.bytes();
       if (receiver.rank != ranks_.rank()) sent_bytes_ += receiver.bytes();
       finish(prepared_[n], receiver);
     }
-  Ranks::Bytes own = std::exchange(to[ranks_.rank()], {});
-  received_ = ranks_.exchange(to);
-  received_[ranks_.rank()] = std::move(own);
-  for (const Ranks::Bytes& bytes : received_)
-    for (size_t at = 0; at < bytes.size();) {
-      MessageHeader header;
-      get(bytes, at, &header, 1);
-      Arrived& part = arrived(header.part);
-      CURVISPLAT_CHECK_OP(part.count, ==, header.count);
-      // Messages are made of 4-byte numbers: keys, then splats.
-      part.keys = reinterpret_cast<const uint32_t*>(bytes.data() + at);
-      part.splats = reinterpret_cast<const ScreenSplat*>(bytes.data() + at + header.count * sizeof(uint32_t));
-      at += header.count * kElementBytes;
-      CURVISPLAT_CHECK_OP(at, <=, bytes.size());
-    }
+  ranks_.exchange(sending_, received_);
+  for (uint32_t rank = 0; rank < ranks_.count(); ++rank)
+    takeSplats(rank == ranks_.rank() ? sending_.of(rank) : received_.of(rank));
 }
 
-void SplatExchange::append(const Prepared& part, const Receiver& receiver, uint32_t number,
-                           Ranks::Bytes& to) const {
+/// Of one rank: they stay where they are until the next step.
+void SplatExchange::takeSplats(std::span<const std::byte> bytes) {
+  for (size_t at = 0; at < bytes.size();) {
+    MessageHeader header;
+    get(bytes, at, &header, 1);
+    Arrived& part = arrived(header.part);
+    CURVISPLAT_CHECK_OP(part.count, ==, header.count);
+    // Messages are made of 4-byte numbers: keys, then splats.
+    part.keys = reinterpret_cast<const uint32_t*>(bytes.data() + at);
+    part.splats = reinterpret_cast<const ScreenSplat*>(bytes.data() + at + header.count * sizeof(uint32_t));
+    at += header.count * kElementBytes;
+    CURVISPLAT_CHECK_OP(at, <=, bytes.size());
+  }
+}
+
+void SplatExchange::write(const Prepared& part, const Receiver& receiver, uint32_t number, std::byte* to) {
   const MessageHeader header{number, receiver.count};
-  size_t at = to.size();
-  to.resize(at + receiver.bytes());
-  std::memcpy(&to[at], &header, sizeof header);
-  at += sizeof header;
+  const auto append = [&to](const void* from, size_t bytes) {
+    if (bytes > 0) std::memcpy(to, from, bytes);
+    to += bytes;
+  };
+  append(&header, sizeof header);
   if (receiver.count == 0) return;
   if (part.all) {
-    std::memcpy(&to[at], part.keys.data(), part.keys.size() * sizeof(uint32_t));
-    std::memcpy(&to[at + part.keys.size() * sizeof(uint32_t)], part.splats.data(),
-                part.splats.size() * sizeof(ScreenSplat));
+    append(part.keys.data(), part.keys.size() * sizeof(uint32_t));
+    append(part.splats.data(), part.splats.size() * sizeof(ScreenSplat));
     return;
   }
   const auto entries = std::span(part.entries).subspan(receiver.first, receiver.count);
-  for (const uint32_t entry : entries) {
-    std::memcpy(&to[at], &part.keys[entry], sizeof(uint32_t));
-    at += sizeof(uint32_t);
-  }
-  for (const uint32_t entry : entries) {
-    std::memcpy(&to[at], &part.splats[entry], sizeof(ScreenSplat));
-    at += sizeof(ScreenSplat);
-  }
+  for (const uint32_t entry : entries) append(&part.keys[entry], sizeof(uint32_t));
+  for (const uint32_t entry : entries) append(&part.splats[entry], sizeof(ScreenSplat));
 }
 
 // ---------------------------------------------------------------------------------------------- receiving

@@ -139,7 +139,8 @@ class SplatExchange {
   void cancel(uint32_t part, uint32_t rank);
   std::vector<Ranks::Bytes> grants();
   void send(const std::vector<uint32_t>& granted);
-  void append(const Prepared& part, const Receiver& receiver, uint32_t number, Ranks::Bytes& to) const;
+  void takeSplats(std::span<const std::byte> bytes);
+  static void write(const Prepared& part, const Receiver& receiver, uint32_t number, std::byte* to);
   void finish(Prepared& part, Receiver& receiver);
   bool keep(Prepared& part, Receiver& receiver, uint32_t number);
   void endKept();
@@ -163,9 +164,9 @@ class SplatExchange {
   bool all_painted_ = false;  // every tile of the picture is some rank's
   size_t first_open_ = 0;     // own parts before it have been sent to all
   uint64_t offered_bytes_ = 0, sent_bytes_ = 0;
-  std::vector<Arrived> arrived_;        // [needed]
-  std::vector<Ranks::Bytes> received_;  // [rank]
-  uint64_t available_ = 0;              // needed parts before it have arrived or were cancelled
+  std::vector<Arrived> arrived_;  // [needed]
+  Messages sending_, received_;   // of the last step; splats for this rank itself stay in the first
+  uint64_t available_ = 0;        // needed parts before it have arrived or were cancelled
   std::atomic<uint64_t> next_received_ = 0;
 
   mutable Mutex mutex_;

@@ -10,6 +10,15 @@
 
 namespace curvisplat {
 
+void Messages::begin(std::span<const uint64_t> bytes) {
+  begins_.assign(1, 0);
+  for (const uint64_t of_rank : bytes) begins_.push_back(begins_.back() + of_rank);
+  if (begins_.back() <= capacity_) return;
+  block_.reset();  // before the next one is allocated
+  capacity_ = std::max(begins_.back(), expected_);
+  block_ = std::make_unique_for_overwrite<std::byte[]>(capacity_);
+}
+
 /// MPI's own waits keep a core busy, which others may need for their work.
 void Ranks::wait() {
   constexpr int kEagerTries = 1000;
@@ -44,15 +53,20 @@ bool Ranks::waitForFailures(std::chrono::milliseconds longest) {
   return true;
 }
 
+std::vector<uint64_t> Ranks::sizesFor(const std::vector<std::span<const std::byte>>& out) {
+  std::vector<uint64_t> out_bytes, in_bytes(count());
+  for (const auto& bytes : out) out_bytes.push_back(bytes.size());
+  transport_->beginSizes(out_bytes.data(), in_bytes.data());
+  wait();
+  return in_bytes;
+}
+
 std::vector<Ranks::Bytes> Ranks::exchange(const std::vector<Bytes>& to) {
   CURVISPLAT_CHECK_OP(to.size(), ==, count());
   if (alone()) return to;
-  std::vector<uint64_t> out_bytes, in_bytes(count());
-  for (const Bytes& bytes : to) out_bytes.push_back(bytes.size());
-  transport_->beginSizes(out_bytes.data(), in_bytes.data());
-  wait();
+  const std::vector<std::span<const std::byte>> out(to.begin(), to.end());
+  const std::vector<uint64_t> in_bytes = sizesFor(out);
   std::vector<Bytes> from(count());
-  std::vector<std::span<const std::byte>> out(to.begin(), to.end());
   std::vector<std::span<std::byte>> in;
   for (unsigned n = 0; n < count(); ++n) {
     from[n].resize(in_bytes[n]);
@@ -61,6 +75,17 @@ std::vector<Ranks::Bytes> Ranks::exchange(const std::vector<Bytes>& to) {
   transport_->beginExchange(out.data(), in.data());
   wait();
   return from;
+}
+
+void Ranks::exchange(const Messages& to, Messages& from) {
+  std::vector<std::span<const std::byte>> out;
+  for (unsigned n = 0; n < count(); ++n) out.push_back(n == rank() ? std::span<const std::byte>() : to.of(n));
+  from.begin(alone() ? std::vector<uint64_t>(1) : sizesFor(out));
+  if (alone()) return;
+  std::vector<std::span<std::byte>> in;
+  for (unsigned n = 0; n < count(); ++n) in.push_back(from.of(n));
+  transport_->beginExchange(out.data(), in.data());
+  wait();
 }
 
 std::vector<Ranks::Bytes> Ranks::gather(Bytes bytes) {

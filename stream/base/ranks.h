@@ -48,6 +48,25 @@ class RankTransport {
   [[noreturn]] virtual void abort(int status) = 0;
 };
 
+/// Messages for each rank, or from each, in one block of memory that stays for the next ones: of large blocks that are
+/// allocated anew, the system first has to clear every page. One thread at a time.
+class Messages {
+ public:
+  /// `expected`: bytes of all messages together, as far as known; more are allocated where needed.
+  explicit Messages(uint64_t expected = 0) : expected_(expected) {}
+
+  /// Makes room for bytes[n] to or from each rank n. What was there is lost; the new bytes have any values.
+  void begin(std::span<const uint64_t> bytes);
+  std::span<std::byte> of(unsigned rank) const {
+    return {block_.get() + begins_[rank], begins_[rank + 1] - begins_[rank]};
+  }
+
+ private:
+  uint64_t expected_, capacity_ = 0;
+  std::unique_ptr<std::byte[]> block_;
+  std::vector<uint64_t> begins_;  // [rank], then the end
+};
+
 /// The ranks of a job, as one of them sees them.
 class Ranks {
  public:
@@ -69,6 +88,8 @@ class Ranks {
 
   /// Sends to[n] to each rank n. Returns what came from each.
   std::vector<Bytes> exchange(const std::vector<Bytes>& to);
+  /// The same, for messages that are large and many. What a rank has for itself stays where it is, in `to`.
+  void exchange(const Messages& to, Messages& from);
   /// At rank 0: what each rank has given; elsewhere nothing.
   std::vector<Bytes> gather(Bytes bytes);
   /// What rank 0 has given.
@@ -85,6 +106,8 @@ class Ranks {
   RankTransport* transport() { return transport_.get(); }
 
  private:
+  /// How many bytes come from each rank, if out[n] go to each rank n.
+  std::vector<uint64_t> sizesFor(const std::vector<std::span<const std::byte>>& out);
   void wait();
   void throwIfOneFailed();
 
