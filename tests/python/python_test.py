@@ -95,8 +95,9 @@ class Pictures(PythonTest):
         # Of grids, of several frames (orbit() has their cameras), of files.
         others = {"help", "help-all", "value-precision", "output", "steps", "orbit", "path", "frames", "frame-rate", "part", "first-image",
                   "stats", "trace"}
-        options = set(re.findall(r"--([a-z-]+)", command("render", "--help").stdout.split("\n", 1)[1]))
-        listed = {name for name in options - others if f"  --{name} " in command("render", "--help").stdout}
+        told = command("render", "--help").stdout
+        options = set(re.findall(r"--([a-z-]+)", told.split("\n", 1)[1]))
+        listed = {name for name in options - others if f"  --{name} " in told}
         parameters = set(inspect.signature(curvisplat.Cache.render).parameters)
         missing = {name for name in listed if own_names.get(name, name.replace("-", "_")) not in parameters}
         self.assertEqual(missing, set())
