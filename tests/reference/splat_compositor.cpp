@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 #include <optional>
 #include <vector>
 
@@ -67,14 +69,29 @@ Remainder remainderOf(const Cuts& cuts, double u0, double u1) {
   return left;
 }
 
-/// What one splat adds at an offset from its centre, premultiplied.
-glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, double dx, double dy,
+/// F(rho) (render/project/kernel.h) of the square of rho, to 4e-8: each quadrature takes a microsecond.
+double footprintOfSquare(double rho2) {
+  constexpr int kSteps = 1 << 14;
+  static const std::vector<double> table = footprintTable(kSteps);
+  const double at = rho2 * (kSteps / (kKernelSupport * kKernelSupport));
+  if (!(at < kSteps)) return 0;
+  const auto step = static_cast<size_t>(at);
+  return std::lerp(table[step], table[step + 1], at - static_cast<double>(step));
+}
+
+/// A pixel in the coordinates of a splat's footprint.
+glm::dvec2 inFootprint(const ScreenSplat& splat, int x, int y) {
+  const double u0 = (x + 0.5 - splat.x) / splat.l11;
+  return {u0, (y + 0.5 - splat.y - splat.l21 * u0) / splat.l22};
+}
+
+/// What one splat adds at a place of its footprint, premultiplied.
+glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, const glm::dvec2& at,
                         const ClassificationTable& table, PixelShading shading) {
-  const double u0 = dx / splat.l11;
-  const double u1 = (dy - splat.l21 * u0) / splat.l22;
+  const double u0 = at.x, u1 = at.y;
   const Remainder left = cuts.cut || cuts.depth ? remainderOf(cuts, u0, u1) : Remainder{};
   const double skew = FootprintSkew::unpack(splat.skew).at(u0, u1);
-  const double depth = std::abs(splat.amplitude) * footprint(std::hypot(u0, u1)) * skew * left.share;
+  const double depth = std::abs(splat.amplitude) * footprintOfSquare(u0 * u0 + u1 * u1) * skew * left.share;
   if (depth == 0) return glm::dvec4(0.0);
   const float widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
   const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};
@@ -113,6 +130,8 @@ Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationT
         for (size_t n = 0; n < splats.size(); ++n) {
           const ScreenSplat& splat = splats[n];
           if (isRecord(splat)) continue;
+          const glm::dvec2 at = inFootprint(splat, x, y);
+          if (glm::dot(at, at) >= kKernelSupport * kKernelSupport) continue;  // most splats
           Cuts cuts{{}, {}, depths};
           if (hasCut(splat) || shading.colours) {
             const SplatRecords records = SplatRecords::beside(&splat, 1, shading.colours != nullptr);
@@ -121,8 +140,7 @@ Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationT
             cuts.colour = records.colour;
           }
           if (!cuts.depth && window > 0) continue;
-          const glm::dvec4 above =
-              contribution(splat, cuts, x + 0.5 - splat.x, y + 0.5 - splat.y, table, shading);
+          const glm::dvec4 above = contribution(splat, cuts, at, table, shading);
           pixel = above + (1 - above.w) * pixel;
         }
       }
