@@ -55,7 +55,7 @@ TEST_F(WindowTest, ShowsEachChange) {
   EXPECT_EQ(first.size.width, pictureSize().width);
   EXPECT_EQ(first.size.height, pictureSize().height);
   // What is on the screen is what was saved: 8 bits, with the scalar bar and the axes.
-  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), first) > 45; }, 5))
+  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), first) > 45; }))
       << difference(shown(first.size), first);
 
   dragPicture(1, 0.2, 0.1);
@@ -66,7 +66,7 @@ TEST_F(WindowTest, ShowsEachChange) {
   EXPECT_LT(difference(rotated, perspective), 45);
   addPoint();
   // The edit is on the screen, without anything else that would make it draw.
-  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), perspective) < 35; }, 5));
+  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), perspective) < 35; }));
   const Image edited = saveAndCopy();
   EXPECT_LT(difference(perspective, edited), 35);
 
