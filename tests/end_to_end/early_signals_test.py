@@ -8,6 +8,7 @@ import os
 import pathlib
 import pty
 import select
+import shutil
 import signal
 import struct
 import subprocess
@@ -35,6 +36,11 @@ class EarlySignals(unittest.TestCase):
         """All files but those that are kept for the next run."""
         return sorted(str(path.relative_to(self.folder)) for path in self.folder.rglob("*") if "kept" not in path.parts)
 
+    def assert_same_caches(self, one, other):
+        contents = [{path.name: path.read_bytes() for path in (self.folder / cache).iterdir()} for cache in (one, other)]
+        self.assertEqual(contents[0].keys(), contents[1].keys())
+        self.assertEqual([name for name in contents[0] if contents[0][name] != contents[1][name]], [])
+
     def test_info_of_a_sparse_grid_shows_its_progress_and_can_be_stopped(self):
         side = 2000
         with (self.folder / "sparse.xyz").open("wb") as file:
@@ -60,7 +66,8 @@ class EarlySignals(unittest.TestCase):
         self.assertEqual(self.files(), before)
 
     def test_a_signal_as_early_as_it_may_come_leaves_nothing(self):
-        """Until the work has begun the system ends the program; from then on the program ends in order. A shell sees one status."""
+        """Until the work has begun the system ends the program; from then on the program ends in order. A shell sees one status.
+        A conversion that is done with its first pass by then keeps it, says so, and can be resumed."""
         self.run_program("generate", "o-grid", "--size", "40x30x20", "-o", "o")
         self.run_program("convert", "o.xyz", "o.fun", "-o", "whole.splats")
         before = self.files()
@@ -76,14 +83,20 @@ class EarlySignals(unittest.TestCase):
                         time.sleep(milliseconds / 1000)
                         program.send_signal(number)
                         message = program.communicate(timeout=MOST_SECONDS)[1]
-                        if program.returncode == 0:
-                            continue  # it was done by then
-                        self.assertIn(program.returncode, (-number, 128 + number), message)
-                        self.assertLessEqual(message.count("curvisplat: "), 1 if program.returncode > 0 else 0, message)
-                        ended_early += 1
+                        done = program.returncode == 0
+                        if not done:
+                            self.assertIn(program.returncode, (-number, 128 + number), message)
+                            self.assertLessEqual(message.count("curvisplat: "), 1 if program.returncode > 0 else 0, message)
+                            ended_early += 1
+                        resumes = not done and "--resume" in message
+                        if resumes:
+                            self.run_program(*command, "--resume")
+                        if resumes or done and command[0] == "convert":
+                            self.assert_same_caches("whole.splats", "new.splats")
+                            shutil.rmtree(self.folder / "new.splats")
+                        elif done:
+                            (self.folder / "new.png").unlink(missing_ok=True)
                         self.assertEqual(self.files(), before)
-            for path in ("new.splats", "new.png"):
-                subprocess.run(["rm", "-rf", self.folder / path], check=True)
         print(f"{ended_early} runs ended by a signal", flush=True)
         self.assertGreater(ended_early, 10)
 
