@@ -249,7 +249,7 @@ class Measurement {
         constexpr double kAgreementDb = 60;
         steps.step = 0.016 * grid.length;
         steps.cells = 1;
-        steps.depth_tolerance = 5e-4;
+        steps.tolerance = 2e-4;
         writeImage(
             toImage(convergedMarch(grid.field, function, view.camera, size_, steps, kAgreementDb).image),
             path);

@@ -71,6 +71,7 @@ class Marcher {
           const MarchSteps& steps, const Surroundings& around)
       : field_(field),
         probe_(field.probe()),
+        gradient_probe_(around.light ? field.probe() : nullptr),
         function_(function),
         ray_(ray),
         steps_(steps),
@@ -125,14 +126,16 @@ class Marcher {
     first_ = begin + kSkin * (end - begin);
     last_ = end - kSkin * (end - begin);
     held_ = {};
-    double t = begin, at_begin = extinction(t), step = stepFromHere(steps_.step);
+    double t = begin;
+    Sample here = sample(t);
+    double step = stepFromHere(steps_.step);
     while (t < end) {
       const double next = end - t < 1.001 * step ? end : t + step;
-      const double at_end = extinction(next);
+      const Sample there = sample(next);
       step = stepFromHere(steps_.step);
-      addHalving(t, next, at_begin, at_end, 0);
+      add(t, next, here, there);
       t = next;
-      at_begin = at_end;
+      here = there;
     }
     first_.reset();
   }
@@ -140,24 +143,23 @@ class Marcher {
   /// Without knowing where the field begins and ends.
   void marchSearching(double begin, double end, double largest_step) {
     double t = begin;
-    bool is_inside = inside(t);
+    Sample here = sample(t);
     while (t < end) {
-      const double step = is_inside ? stepFromHere(largest_step) : largest_step;
+      const double step = here.is_inside ? stepFromHere(largest_step) : largest_step;
       const double next = std::min(end, t + step);
-      const bool next_inside = inside(next);
-      if (is_inside && next_inside) {
-        add(t, next);
-        t = next;
-      } else if (is_inside) {
-        add(t, face(t, next));
-        t = next;
-      } else if (next_inside) {
+      const Sample there = sample(next);
+      if (!here.is_inside && there.is_inside) {
         t = face(next, t);  // and then in steps of the cells that are there
-        inside(t);
-      } else {
-        t = next;
+        here = sample(t);
+        here.is_inside = true;
+        continue;
       }
-      is_inside = next_inside;
+      if (here.is_inside) {
+        const double last = there.is_inside ? next : face(t, next);
+        add(t, last, here, there.is_inside ? there : sample(last));
+      }
+      t = next;
+      here = there;
     }
   }
 
@@ -168,29 +170,27 @@ class Marcher {
 
   bool inside(double t) { return probe_->at(ray_.at(t)).has_value(); }
 
-  /// What the field is at a place on the ray, without light and without the colours of another scalar.
+  /// What the field is at a place on the ray. A colour without extinction counts nothing, and is not lit.
   struct Sample {
-    double t = 0, scalar = 0;
+    bool is_inside = false;
     OpticalProperties optical;
   };
 
   Sample sample(double t) {
     if (first_) t = std::clamp(t, *first_, last_);
-    const std::optional<double> scalar = probe_->at(ray_.at(t));
+    const glm::dvec3 at = ray_.at(t);
+    const std::optional<double> scalar = probe_->at(at);
     // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty,
     // unless the field said that it is there.
-    if (!scalar && !first_) return {};
-    if (scalar) held_ = {t, *scalar, function_(*scalar)};
-    return held_;
-  }
-  double extinction(double t) { return sample(t).optical.extinction; }
-
-  /// Six more samples of the field where there is light: only for those whose colour counts.
-  glm::dvec3 colourOf(const Sample& sample) {
-    if (!(sample.optical.extinction > 0)) return sample.optical.colour;
-    const glm::dvec3 at = ray_.at(sample.t);
-    const glm::dvec3 colour = colour_at_ ? (*colour_at_)(at) : sample.optical.colour;
-    return light_ ? lit(colour, gradient(at, sample.scalar)) : colour;
+    if (!scalar) return first_ ? held_ : Sample{};
+    Sample found{true, function_(*scalar)};
+    if (found.optical.extinction > 0) {
+      glm::dvec3& colour = found.optical.colour;
+      if (colour_at_) colour = (*colour_at_)(at);
+      if (light_) colour = lit(colour, gradient(at, *scalar));
+    }
+    if (first_) held_ = found;
+    return found;
   }
 
   glm::dvec3 gradient(const glm::dvec3& at, double scalar) {
@@ -199,7 +199,8 @@ class Marcher {
     for (int axis = 0; axis < 3; ++axis) {
       glm::dvec3 step(0.0);
       step[axis] = kStep;
-      const std::optional<double> before = probe_->at(at - step), after = probe_->at(at + step);
+      const std::optional<double> before = gradient_probe_->at(at - step),
+                                  after = gradient_probe_->at(at + step);
       const double length = (before ? kStep : 0) + (after ? kStep : 0);
       result[axis] = length > 0 ? (after.value_or(scalar) - before.value_or(scalar)) / length : 0;
     }
@@ -227,25 +228,42 @@ class Marcher {
     return in;
   }
 
-  void add(double begin, double end) { addHalving(begin, end, extinction(begin), extinction(end), 0); }
+  /// What a step adds, by Simpson's rule: exact where colour and extinction are constant.
+  struct Gain {
+    double depth = 0;        // optical
+    double error = 0;        // of the depth and of each channel by the midpoint rule; far above Simpson's
+    glm::dvec3 colour{0.0};  // the mean of what comes out
+  };
+  static Gain gainOf(double length, const OpticalProperties& begin, const OpticalProperties& middle,
+                     const OpticalProperties& end) {
+    const double a = begin.extinction, b = middle.extinction, c = end.extinction;
+    Gain gain{length / 6 * (a + 4 * b + c), length / 6 * std::abs(a - 2 * b + c), middle.colour};
+    // How much of the light that each point emits leaves the step.
+    const double of_middle = 4 * b * std::exp(-std::max(0.0, length / 24 * (5 * a + 8 * b - c))),
+                 of_end = c * std::exp(-gain.depth), sum = a + of_middle + of_end;
+    if (!(sum > 0)) return gain;
+    gain.colour = (a * begin.colour + of_middle * middle.colour + of_end * end.colour) / sum;
+    const glm::dvec3 change = glm::abs(gain.colour - middle.colour);
+    gain.error = std::max(gain.error, gain.depth * std::max({change.r, change.g, change.b}));
+    return gain;
+  }
 
-  void addHalving(double begin, double end, double at_begin, double at_end, int halvings) {
-    const double middle = 0.5 * (begin + end), length = end - begin;
-    const Sample here = sample(middle);
-    const double at_middle = here.optical.extinction;
-    const auto [least, most] = std::minmax({at_begin, at_middle, at_end});
-    if ((most - least) * length > steps_.depth_tolerance && halvings < kMaxHalvings) {
-      addHalving(begin, middle, at_begin, at_middle, halvings + 1);
-      addHalving(middle, end, at_middle, at_end, halvings + 1);
+  void add(double begin, double end, const Sample& at_begin, const Sample& at_end, int halvings = 0) {
+    const double middle = 0.5 * (begin + end);
+    const Sample at_middle = sample(middle);
+    const Gain gain = gainOf(end - begin, at_begin.optical, at_middle.optical, at_end.optical);
+    if (gain.error > steps_.tolerance && halvings < kMaxHalvings) {
+      add(begin, middle, at_begin, at_middle, halvings + 1);
+      add(middle, end, at_middle, at_end, halvings + 1);
       return;
     }
-    const double passed = std::exp(-at_middle * length);
-    colour_ += transmittance_ * (1 - passed) * colourOf(here);
+    const double passed = std::exp(-gain.depth);
+    colour_ += transmittance_ * (1 - passed) * gain.colour;
     transmittance_ *= passed;
   }
 
   const ReferenceField& field_;
-  std::unique_ptr<FieldProbe> probe_;
+  std::unique_ptr<FieldProbe> probe_, gradient_probe_;  // which remember where they were asked
   const OpticalFunction& function_;
   Ray ray_;
   const MarchSteps& steps_;
@@ -253,7 +271,7 @@ class Marcher {
   const PointColour* colour_at_;
   std::optional<double> first_;  // between first_ and last_ the field is there
   double last_ = 0;
-  Sample held_;  // the last point found since first_ was set
+  Sample held_;  // the last one found since first_ was set
   glm::dvec3 colour_{0.0};
   double transmittance_ = 1;
 };

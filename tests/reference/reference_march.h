@@ -2,10 +2,10 @@
 // grid, along the rays through the pixels' centres. It shares no code with render/ but the words for a
 // camera. Slow, and right.
 //
-// Front to back, emission and absorption: where colour c and extinction kappa are constant over a length d,
-// the picture gains T (1 - exp(-kappa d)) c and the transmittance T shrinks by exp(-kappa d). A step is
-// halved until kappa hardly changes over it, so that jumps of the transfer function are found too. The
-// field's ends are where it says that they are (ReferenceField::crossings), else found by bisection.
+// Front to back, emission and absorption: over a step of the optical depth d, the picture gains
+// T (1 - exp(-d)) c and the transmittance T shrinks by exp(-d). d and the mean colour c are those of Simpson's
+// rule. A step is halved until the midpoint rule agrees, so that jumps of the transfer function are found too.
+// The field's ends are where it says that they are (ReferenceField::crossings), else found by bisection.
 #pragma once
 
 #include <functional>
@@ -50,8 +50,9 @@ struct MarchSteps {
   double step = 0.004;  // world units
   double cells = 0.5;   // of a grid's cell, at the point where a step begins
   double near = 0;      // perspective: as ScreenView::near
-  // A step is halved until the optical depth that extinction's change over it could be worth is below this.
-  double depth_tolerance = 2e-5;
+  // A step is halved until its optical depth, and the light from it, are within this of the midpoint rule's.
+  // But at jumps, Simpson's rule is far nearer to the truth.
+  double tolerance = 1e-5;
 };
 
 /// Light on the field's level surfaces, by the formulas of render/project/light.h, with the field's own
