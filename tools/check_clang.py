@@ -5,6 +5,7 @@ by clang-tidy (.clang-tidy) as well. Takes the commands of build/release, which 
 
     tools/check_clang.py [--tidy] [FILE ...]    these; without any, all sources
     tools/check_clang.py [--tidy] --since REV   those that have changed since this commit
+    tools/check_clang.py --tidy-since REV       all sources; of those that have changed since this commit, by clang-tidy
 
 Headers take most of the time. So sources with the same macros are checked several at a time, as one that includes them, and
 what most include (tools/cmake/common_headers.h, and GoogleTest) is parsed once. Names that two of them have for themselves
@@ -92,8 +93,7 @@ class Group:
         self.precompiled = ["-include-pch", output]
 
     def batches(self):
-        numbers = unity_groups.groups([file.read_text(encoding="utf-8") for file in self.files], AT_A_TIME,
-                                      unity_groups.types_of_headers())
+        numbers = unity_groups.groups([file.read_text(encoding="utf-8") for file in self.files], AT_A_TIME)
         return [(self, [file for file, of in zip(self.files, numbers) if of == n]) for n in range(max(numbers) + 1)]
 
     def findings(self, files):
@@ -116,12 +116,13 @@ class Group:
         return self.findings(files[:half]) + self.findings(files[half:])
 
 
-def groups(folder, sources, tidy):
+def groups(folder, sources, tidied):
     found = {}
     for file, arguments in sources:
         are_tests = file.is_relative_to(ROOT / "tests")
+        tidy = file in tidied and not are_tests
         macros = sorted(argument for argument in arguments if argument.startswith("-D"))
-        found.setdefault((are_tests, *macros), Group(folder, are_tests, tidy and not are_tests)).add(file, arguments)
+        found.setdefault((are_tests, tidy, *macros), Group(folder, are_tests, tidy)).add(file, arguments)
     return list(found.values())
 
 
@@ -129,6 +130,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tidy", action="store_true", help="run clang-tidy, too")
     parser.add_argument("--since", metavar="REV", help="check the sources that have changed since this commit")
+    parser.add_argument("--tidy-since", metavar="REV", help="run clang-tidy on the sources that have changed since this commit")
     parser.add_argument("files", nargs="*", type=pathlib.Path)
     options = parser.parse_args()
     named = {file.resolve() for file in options.files}
@@ -138,12 +140,13 @@ def main():
         if not chosen:
             print(f"check_clang: no source has changed since {options.since}")
             return 0
-    packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy else [])
+    packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy or options.tidy_since else [])
     subprocess.run([ROOT / "tools/setup.sh", *packages], check=True)
 
     sources = commands(chosen, named)
+    tidied = {file for file, _ in sources} if options.tidy else changed_since(options.tidy_since) if options.tidy_since else set()
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        alike = groups(pathlib.Path(folder), sources, options.tidy)
+        alike = groups(pathlib.Path(folder), sources, tidied)
         list(pool.map(Group.precompile, [group for group in alike if len(group.files) > AT_A_TIME]))
         batches = [batch for group in alike for batch in group.batches()]
         found = [findings for findings in pool.map(lambda batch: batch[0].findings(batch[1]), batches) if findings]

@@ -45,7 +45,7 @@ std::vector<std::byte> logOf(std::span<const std::byte> bytes, size_t variables,
   return log;
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzBrickLog(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   const size_t variables = input.take<uint8_t>() % 3;
   const auto entries = input.takeBytes(input.take<uint16_t>());
@@ -66,7 +66,7 @@ void run(std::span<const std::byte> bytes) {
   for (uint64_t id = 0; id < writer.bricks().size(); ++id) writer.readBack(id);
 }
 
-const RegisteredFuzzTarget registered("brick_log", run);
+const RegisteredFuzzTarget brick_log_target("brick_log", fuzzBrickLog);
 
 }  // namespace
 }  // namespace curvisplat

@@ -100,7 +100,7 @@ void checkCut(const CutTree& tree, const CutView& view, CutOptions options) {
   }
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzBrickTable(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   const auto flags = input.take<uint8_t>();
   RootCube root;
@@ -140,7 +140,7 @@ void run(std::span<const std::byte> bytes) {
   if (flags & kLimits) checkCut(tree, view, {.lod_pixels = 0, .max_splats = 200, .max_bytes = 3000});
 }
 
-const RegisteredFuzzTarget registered("brick_table", run);
+const RegisteredFuzzTarget brick_table_target("brick_table", fuzzBrickTable);
 
 }  // namespace
 }  // namespace curvisplat

@@ -9,7 +9,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzCameraPath(std::span<const std::byte> bytes) {
   const CameraPath path = CameraPath::fromFile(fuzzFile("path.json", bytes));
   for (int n = -1; n <= 9; ++n) {
     const Camera camera = path.at(path.begin() + n / 8.0 * (path.end() - path.begin()));
@@ -22,7 +22,7 @@ void run(std::span<const std::byte> bytes) {
   }
 }
 
-const RegisteredFuzzTarget registered("camera_path", run);
+const RegisteredFuzzTarget camera_path_target("camera_path", fuzzCameraPath);
 
 }  // namespace
 }  // namespace curvisplat

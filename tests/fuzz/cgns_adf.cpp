@@ -7,7 +7,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzCgnsAdf(std::span<const std::byte> bytes) {
   if (bytes.size() < 32 || !textOf(bytes).substr(4).starts_with("ADF Database Version")) return;
   OpenGridOptions options;
   options.grid = fuzzFile("a.cgns", bytes);
@@ -15,7 +15,7 @@ void run(std::span<const std::byte> bytes) {
   readData(*openCgns(options));
 }
 
-const RegisteredFuzzTarget registered("cgns_adf", run);
+const RegisteredFuzzTarget cgns_adf_target("cgns_adf", fuzzCgnsAdf);
 
 }  // namespace
 }  // namespace curvisplat

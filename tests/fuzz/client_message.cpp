@@ -21,7 +21,7 @@ Manifest manifest() {
   return manifest;
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzClientMessage(std::span<const std::byte> bytes) {
   const std::string_view text = textOf(bytes);
   // The same bytes as the headers of a request: these refuse, and never throw.
   targetOf(text);
@@ -47,7 +47,7 @@ void run(std::span<const std::byte> bytes) {
   state.frameOptions(view->size);
 }
 
-const RegisteredFuzzTarget registered("client_message", run);
+const RegisteredFuzzTarget client_message_target("client_message", fuzzClientMessage);
 
 }  // namespace
 }  // namespace curvisplat

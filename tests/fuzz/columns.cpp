@@ -7,7 +7,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzColumns(std::span<const std::byte> bytes) {
   if (!textOf(bytes).starts_with("CDF")) return;
   OpenGridOptions options;
   options.grid = fuzzFile("a.nc", bytes);
@@ -15,7 +15,7 @@ void run(std::span<const std::byte> bytes) {
   if (isColumnsGrid(options)) readMesh(ColumnsSource(options));
 }
 
-const RegisteredFuzzTarget registered("columns", run);
+const RegisteredFuzzTarget columns_target("columns", fuzzColumns);
 
 }  // namespace
 }  // namespace curvisplat

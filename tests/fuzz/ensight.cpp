@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzEnsight(std::span<const std::byte> bytes) {
   constexpr std::string_view kKinds[] = {"scalar per node", "scalar per element", "vector per node"};
   FuzzInput input(bytes);
   const std::string_view kind = kKinds[input.take<uint8_t>() % 3];
@@ -35,7 +35,7 @@ void run(std::span<const std::byte> bytes) {
     mesh->readCells(0, 0, std::min<uint64_t>(piece.cells, 4096), std::span(&scalar, 1), cells);
 }
 
-const RegisteredFuzzTarget registered("ensight", run);
+const RegisteredFuzzTarget ensight_target("ensight", fuzzEnsight);
 
 }  // namespace
 }  // namespace curvisplat

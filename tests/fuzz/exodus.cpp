@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzExodus(std::span<const std::byte> bytes) {
   if (!textOf(bytes).starts_with("CDF")) return;
   OpenGridOptions options;
   options.grid = fuzzFile("a.exo", bytes);
@@ -16,7 +16,7 @@ void run(std::span<const std::byte> bytes) {
   if (isExodus(InputFile(options.grid))) readMesh(ExodusSource(options));
 }
 
-const RegisteredFuzzTarget registered("exodus", run);
+const RegisteredFuzzTarget exodus_target("exodus", fuzzExodus);
 
 }  // namespace
 }  // namespace curvisplat

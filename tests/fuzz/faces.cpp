@@ -37,7 +37,7 @@ uint64_t makeRight(std::vector<std::byte>& file) {
   return checksum.value();
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzFaces(std::span<const std::byte> bytes) {
   std::vector<std::byte> file(bytes.begin(), bytes.end());
   const uint64_t checksum = makeRight(file);
   Manifest manifest;
@@ -56,7 +56,7 @@ void run(std::span<const std::byte> bytes) {
   }
 }
 
-const RegisteredFuzzTarget registered("faces", run);
+const RegisteredFuzzTarget faces_target("faces", fuzzFaces);
 
 }  // namespace
 }  // namespace curvisplat

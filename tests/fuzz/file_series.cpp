@@ -15,7 +15,7 @@ bool copySteps() {
   return true;
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzFileSeries(std::span<const std::byte> bytes) {
   [[maybe_unused]] static const bool copied = copySteps();
   OpenGridOptions options;
   options.grid = fuzzFile("a.vts.series", bytes);
@@ -28,7 +28,7 @@ void run(std::span<const std::byte> bytes) {
   }
 }
 
-const RegisteredFuzzTarget registered("file_series", run);
+const RegisteredFuzzTarget file_series_target("file_series", fuzzFileSeries);
 
 }  // namespace
 }  // namespace curvisplat

@@ -25,7 +25,7 @@ void checkFinite(const SplatGeometry& splats, float size) {
   for (const uint32_t code : splats.growth_code) CURVISPLAT_CHECK(isPossibleGrowthCode(code));
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzGeometryStream(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   Brick brick;
   brick.splats = input.take<uint16_t>() + 1u;
@@ -52,7 +52,7 @@ void run(std::span<const std::byte> bytes) {
   checkFinite(splats, static_cast<float>(root.cellSize(brick.cell.level)));
 }
 
-const RegisteredFuzzTarget registered("geometry_stream", run);
+const RegisteredFuzzTarget geometry_stream_target("geometry_stream", fuzzGeometryStream);
 
 }  // namespace
 }  // namespace curvisplat

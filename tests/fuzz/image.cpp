@@ -8,12 +8,12 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzImage(std::span<const std::byte> bytes) {
   const Image image = readImage(fuzzFile("picture", bytes));
   CURVISPLAT_CHECK_OP(image.rgba.size(), ==, 4 * image.size.pixels());
 }
 
-const RegisteredFuzzTarget registered("image", run);
+const RegisteredFuzzTarget image_target("image", fuzzImage);
 
 }  // namespace
 }  // namespace curvisplat

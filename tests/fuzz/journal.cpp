@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzJournal(std::span<const std::byte> bytes) {
   std::string text(textOf(bytes));
   std::erase(text, '\n');
   text += "\n";
@@ -22,7 +22,7 @@ void run(std::span<const std::byte> bytes) {
     CURVISPLAT_CHECK_OP(tree.leafOf({{at, at / 2, at / 3}}), <, tree.size());
 }
 
-const RegisteredFuzzTarget registered("journal", run);
+const RegisteredFuzzTarget journal_target("journal", fuzzJournal);
 
 }  // namespace
 }  // namespace curvisplat

@@ -7,14 +7,14 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzManifest(std::span<const std::byte> bytes) {
   const Manifest manifest = Manifest::fromJson(std::string(textOf(bytes)), "manifest.json");
   const std::string text = manifest.toJson();
   const std::string again = Manifest::fromJson(text, "again.json").toJson();
   CURVISPLAT_CHECK(text == again);
 }
 
-const RegisteredFuzzTarget registered("manifest", run);
+const RegisteredFuzzTarget manifest_target("manifest", fuzzManifest);
 
 }  // namespace
 }  // namespace curvisplat

@@ -9,7 +9,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzMesh(std::span<const std::byte> bytes) {
   constexpr const char* kNames[] = {"a.stl", "a.ply", "a.obj", "a"};
   FuzzInput input(bytes);
   const char* const name = kNames[input.take<uint8_t>() % 4];
@@ -21,7 +21,7 @@ void run(std::span<const std::byte> bytes) {
     for (int axis = 0; axis < 3; ++axis) CURVISPLAT_CHECK(std::abs(normal[axis]) <= 1.0001f);
 }
 
-const RegisteredFuzzTarget registered("mesh", run);
+const RegisteredFuzzTarget mesh_target("mesh", fuzzMesh);
 
 }  // namespace
 }  // namespace curvisplat

@@ -7,13 +7,13 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzNetcdfClassic(std::span<const std::byte> bytes) {
   if (!textOf(bytes).starts_with("CDF")) return;
   const InputFile file(fuzzFile("a.nc", bytes));
   if (NetcdfFile::recognises(file)) checkClassicNetcdf(file);
 }
 
-const RegisteredFuzzTarget registered("netcdf_classic", run);
+const RegisteredFuzzTarget netcdf_classic_target("netcdf_classic", fuzzNetcdfClassic);
 
 }  // namespace
 }  // namespace curvisplat

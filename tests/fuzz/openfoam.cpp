@@ -11,7 +11,7 @@ namespace {
 constexpr const char* kMeshFiles[] = {"constant/polyMesh/points", "constant/polyMesh/faces",
                                       "constant/polyMesh/owner", "constant/polyMesh/neighbour", "0/p"};
 
-void run(std::span<const std::byte> bytes) {
+void fuzzOpenfoam(std::span<const std::byte> bytes) {
   for (const char* folder : {"constant/polyMesh", "0"})
     std::filesystem::create_directories(fuzzFolder() / folder);
   FuzzInput input(bytes);
@@ -22,7 +22,7 @@ void run(std::span<const std::byte> bytes) {
   readMesh(FoamSource(options));
 }
 
-const RegisteredFuzzTarget registered("openfoam", run);
+const RegisteredFuzzTarget openfoam_target("openfoam", fuzzOpenfoam);
 
 }  // namespace
 }  // namespace curvisplat

@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzPackedStream(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   Brick brick;
   brick.splats = input.take<uint16_t>() + 1u;
@@ -25,7 +25,7 @@ void run(std::span<const std::byte> bytes) {
   }
 }
 
-const RegisteredFuzzTarget registered("packed_stream", run);
+const RegisteredFuzzTarget packed_stream_target("packed_stream", fuzzPackedStream);
 
 }  // namespace
 }  // namespace curvisplat

@@ -57,7 +57,7 @@ const ClassificationTable& table() {
   return table;
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzPicture(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   const auto flags = input.take<uint8_t>();
   glm::dvec3 corner, scale;
@@ -93,7 +93,7 @@ void run(std::span<const std::byte> bytes) {
   for (const float channel : image.rgba) CURVISPLAT_CHECK(std::isfinite(channel));
 }
 
-const RegisteredFuzzTarget registered("picture", run);
+const RegisteredFuzzTarget picture_target("picture", fuzzPicture);
 
 }  // namespace
 }  // namespace curvisplat

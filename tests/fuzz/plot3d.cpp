@@ -4,8 +4,8 @@
 namespace curvisplat {
 namespace {
 
-const RegisteredFuzzTarget registered("plot3d",
-                                      [](std::span<const std::byte> bytes) { readPlot3d(bytes, false); });
+const RegisteredFuzzTarget plot3d_target("plot3d",
+                                         [](std::span<const std::byte> bytes) { readPlot3d(bytes, false); });
 
 }  // namespace
 }  // namespace curvisplat

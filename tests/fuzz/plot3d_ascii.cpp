@@ -4,8 +4,9 @@
 namespace curvisplat {
 namespace {
 
-const RegisteredFuzzTarget registered("plot3d_ascii",
-                                      [](std::span<const std::byte> bytes) { readPlot3d(bytes, true); });
+const RegisteredFuzzTarget plot3d_ascii_target("plot3d_ascii", [](std::span<const std::byte> bytes) {
+  readPlot3d(bytes, true);
+});
 
 }  // namespace
 }  // namespace curvisplat

@@ -27,7 +27,7 @@ bool writeFiles() {
   return true;
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzPlot3dMeta(std::span<const std::byte> bytes) {
   [[maybe_unused]] static const bool written = writeFiles();
   OpenGridOptions options;
   options.grid = fuzzFile("a.p3d", bytes);
@@ -36,7 +36,7 @@ void run(std::span<const std::byte> bytes) {
   readGrid(*openPlot3dMeta(options));
 }
 
-const RegisteredFuzzTarget registered("plot3d_meta", run);
+const RegisteredFuzzTarget plot3d_meta_target("plot3d_meta", fuzzPlot3dMeta);
 
 }  // namespace
 }  // namespace curvisplat

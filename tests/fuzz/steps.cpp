@@ -11,7 +11,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzSteps(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   Manifest manifest;
   manifest.variables.resize(1 + input.take<uint8_t>() % 4);
@@ -29,7 +29,7 @@ void run(std::span<const std::byte> bytes) {
   }
 }
 
-const RegisteredFuzzTarget registered("steps", run);
+const RegisteredFuzzTarget steps_target("steps", fuzzSteps);
 
 }  // namespace
 }  // namespace curvisplat

@@ -7,7 +7,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzSu2(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   OpenGridOptions options;
   options.grid = fuzzFile("a.su2", input.takeBytes(input.take<uint16_t>()));
@@ -22,7 +22,7 @@ void run(std::span<const std::byte> bytes) {
     source.readPoints(0, 0, source.description().pieces[0].points, std::span(&n, 1), points);
 }
 
-const RegisteredFuzzTarget registered("su2", run);
+const RegisteredFuzzTarget su2_target("su2", fuzzSu2);
 
 }  // namespace
 }  // namespace curvisplat

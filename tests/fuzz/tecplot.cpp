@@ -7,14 +7,14 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzTecplot(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.plt", bytes);
   options.temporary_folder = fuzzFolder();
   if (isTecplot(InputFile(options.grid))) readGrid(TecplotSource(options));
 }
 
-const RegisteredFuzzTarget registered("tecplot", run);
+const RegisteredFuzzTarget tecplot_target("tecplot", fuzzTecplot);
 
 }  // namespace
 }  // namespace curvisplat

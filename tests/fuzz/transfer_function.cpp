@@ -21,7 +21,7 @@ void checkValues(const TransferFunction& function) {
   }
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzTransferFunction(std::span<const std::byte> bytes) {
   const TransferFunctionDefinition definition = parseParaViewPreset(std::string(textOf(bytes)), "a.json");
   const std::string text = toParaViewPreset(definition);
   CURVISPLAT_CHECK(toParaViewPreset(parseParaViewPreset(text, "again.json")) == text);
@@ -36,7 +36,7 @@ void run(std::span<const std::byte> bytes) {
   }
 }
 
-const RegisteredFuzzTarget registered("transfer_function", run);
+const RegisteredFuzzTarget transfer_function_target("transfer_function", fuzzTransferFunction);
 
 }  // namespace
 }  // namespace curvisplat

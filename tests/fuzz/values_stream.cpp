@@ -13,7 +13,7 @@
 namespace curvisplat {
 namespace {
 
-void run(std::span<const std::byte> bytes) {
+void fuzzValuesStream(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   Brick brick;
   brick.splats = input.take<uint16_t>() + 1u;
@@ -37,7 +37,7 @@ void run(std::span<const std::byte> bytes) {
   decodeVariable(brick, again.variable, again.bytes, values);
 }
 
-const RegisteredFuzzTarget registered("values_stream", run);
+const RegisteredFuzzTarget values_stream_target("values_stream", fuzzValuesStream);
 
 }  // namespace
 }  // namespace curvisplat

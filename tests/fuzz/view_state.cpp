@@ -24,7 +24,7 @@ bool isSame(const nlohmann::json& a, const nlohmann::json& b) {
   return std::abs(x - y) <= 1e-9 * std::max({1.0, std::abs(x), std::abs(y)});
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzViewState(std::span<const std::byte> bytes) {
   Manifest manifest;
   manifest.lower = {-1, 2, 3};
   manifest.upper = {3, 6, 7};
@@ -38,7 +38,7 @@ void run(std::span<const std::byte> bytes) {
   state.function.function();
 }
 
-const RegisteredFuzzTarget registered("view_state", run);
+const RegisteredFuzzTarget view_state_target("view_state", fuzzViewState);
 
 }  // namespace
 }  // namespace curvisplat

@@ -4,8 +4,9 @@
 namespace curvisplat {
 namespace {
 
-const RegisteredFuzzTarget registered("vtk_legacy",
-                                      [](std::span<const std::byte> bytes) { readVtk("a.vtk", bytes); });
+const RegisteredFuzzTarget vtk_legacy_target("vtk_legacy", [](std::span<const std::byte> bytes) {
+  readVtk("a.vtk", bytes);
+});
 
 }  // namespace
 }  // namespace curvisplat

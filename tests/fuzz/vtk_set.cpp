@@ -13,12 +13,12 @@ bool copyPieces() {
   return true;
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzVtkSet(std::span<const std::byte> bytes) {
   [[maybe_unused]] static const bool copied = copyPieces();
   readVtk("a.pvts", bytes);
 }
 
-const RegisteredFuzzTarget registered("vtk_set", run);
+const RegisteredFuzzTarget vtk_set_target("vtk_set", fuzzVtkSet);
 
 }  // namespace
 }  // namespace curvisplat

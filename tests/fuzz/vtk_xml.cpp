@@ -4,8 +4,8 @@
 namespace curvisplat {
 namespace {
 
-const RegisteredFuzzTarget registered("vtk_xml",
-                                      [](std::span<const std::byte> bytes) { readVtk("a.vts", bytes); });
+const RegisteredFuzzTarget vtk_xml_target("vtk_xml",
+                                          [](std::span<const std::byte> bytes) { readVtk("a.vts", bytes); });
 
 }  // namespace
 }  // namespace curvisplat

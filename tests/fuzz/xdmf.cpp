@@ -17,7 +17,7 @@ bool writeNumbers() {
   return true;
 }
 
-void run(std::span<const std::byte> bytes) {
+void fuzzXdmf(std::span<const std::byte> bytes) {
   [[maybe_unused]] static const bool written = writeNumbers();
   // HDF5's own damage is tried in a process of its own, which takes milliseconds.
   if (textOf(bytes).find(".h5") != std::string_view::npos) return;
@@ -27,7 +27,7 @@ void run(std::span<const std::byte> bytes) {
   if (isXdmf(InputFile(options.grid))) readGrid(XdmfSource(options));
 }
 
-const RegisteredFuzzTarget registered("xdmf", run);
+const RegisteredFuzzTarget xdmf_target("xdmf", fuzzXdmf);
 
 }  // namespace
 }  // namespace curvisplat

@@ -31,7 +31,7 @@ std::vector<T> sorted(std::vector<T> values) {
   return values;
 }
 
-class Reader final : public Source {
+class Lines final : public Source {
   int member_ = 0;
 };
 
@@ -44,6 +44,7 @@ INSTANTIATE_TEST_SUITE_P(All, Other, testing::Values(1));
 
 Reader::Reader(int at) : at_(at) {
 }
+Reader::~Reader() = default;
 void Reader::open() {
 }
 
@@ -54,18 +55,23 @@ void Reader::open() {
 class UnityGroups(unittest.TestCase):
     def test_names_are_those_that_a_source_declares_in_its_namespaces(self):
         self.assertEqual(unity_groups.names(SOURCE), {
-            "LIMIT", "Words", "kRatio", "kLeft", "kRight", "kSides", "table", "counter", "Kind", "sorted", "Reader", "Suite_Holds", "Other_Holds",
+            "LIMIT", "Words", "kRatio", "kLeft", "kRight", "kSides", "table", "counter", "Kind", "sorted", "Lines", "Suite_Holds", "Other_Holds",
             "All_Other"})
 
     def test_sources_with_a_name_in_common_are_apart(self):
         a, b, c = "int first() {", "int second() {", "bool first(double x) {"
         self.assertEqual(unity_groups.groups([a, b, c, b], 10), [0, 0, 1, 1])
 
-    def test_a_source_with_a_type_of_a_name_that_a_header_has_is_alone(self):
-        taken = unity_groups.types("struct Brick {\nclass Forward;\ninline int size() {\n")
-        self.assertEqual(taken, {"Brick"})
-        self.assertEqual(unity_groups.groups(["int a() {", "struct Brick {", "int b() {"], 10, taken), [0, 1, 0])
-        self.assertIn("CacheReader", unity_groups.types_of_headers())
+    def test_a_source_with_a_type_of_a_name_that_an_included_header_has_is_apart(self):
+        self.assertEqual(unity_groups.types("struct Brick {\nclass Forward;\ninline int size() {\n"), {"Brick"})
+        includes = '#include "stream/cache/cache_reader.h"\n'  # which includes stream/model/brick.h
+        self.assertTrue({"CacheReader", "Brick"} <= unity_groups.included(includes))
+        self.assertNotIn("readTextFile", unity_groups.included('#include "stream/base/file.h"\n'))  # a function
+        for name in ("CacheReader", "Brick"):
+            for texts in (["int a() {", f"struct {name} {{", includes], [includes, f"struct {name} {{", "int b() {"]):
+                numbers = unity_groups.groups(texts, 10)
+                self.assertNotEqual(numbers[texts.index(includes)], numbers[1])
+        self.assertEqual(unity_groups.groups(["int a() {", "struct Brick {", "int b() {"], 10), [0, 0, 0])
 
     def test_names_of_an_included_header_of_tests(self):
         self.assertIn("twoBlocks", unity_groups.included(HEADER))
