@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <optional>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
@@ -35,18 +36,23 @@ const TransferFunction& hues() {
 
 class TwoScalarsTest : public testing::Test {
  protected:
-  TwoScalarsTest() { convertTo("a.splats", 0); }
+  static void SetUpTestSuite() {
+    kept_.emplace();
+    convertTo("a.splats", 0);
+  }
+  static void TearDownTestSuite() { kept_.reset(); }
 
-  void convertTo(const char* name, double added_to_hues) const {
+  static void convertTo(const char* name, double added_to_hues) {
+    const auto annulus = makeScene("half-annulus");
     const FunctionGridSource source(
         {gridBlock(kNodes[0], kNodes[1], kNodes[2])}, 2, [&](const GridNode& node) {
           const glm::dvec3 uvw(double(node.i) / (kNodes[0] - 1), double(node.j) / (kNodes[1] - 1),
                                double(node.k) / (kNodes[2] - 1));
-          const glm::dvec3 at = annulus_->position(uvw);
-          return NodeValues{at, {float(annulus_->scalar(at)), float(hueAt(at) + added_to_hues)}};
+          const glm::dvec3 at = annulus->position(uvw);
+          return NodeValues{at, {float(annulus->scalar(at)), float(hueAt(at) + added_to_hues)}};
         });
     ConvertOptions options;
-    options.output = folder_ / name;
+    options.output = *kept_ / name;
     options.scalars = {0, 1};
     Progress progress;
     convert(source, options, progress);
@@ -70,7 +76,8 @@ class TwoScalarsTest : public testing::Test {
     return compareImages(image, reference).psnr_db;
   }
 
-  const TemporaryFolder folder_;
+  static inline std::optional<TemporaryFolder> kept_;
+  const TemporaryFolder& folder_ = *kept_;
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
   const SceneField field_{*annulus_};
 };

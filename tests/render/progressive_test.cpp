@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -40,8 +41,8 @@ class ProgressiveTest : public testing::Test {
     return camera;
   }
   static TransferFunction function() {
-    return TransferFunction::fromFile(std::string(CURVISPLAT_TEST_DATA) + "/half_annulus_smooth.json",
-                                      nullptr, 0, 1);
+    return TransferFunction::fromFile(
+        std::filesystem::path(CURVISPLAT_TEST_DATA) / "half_annulus_smooth.json", nullptr, 0, 1);
   }
   static FrameOptions options(double lod_pixels) {
     FrameOptions made;
