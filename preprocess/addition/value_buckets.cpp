@@ -136,8 +136,8 @@ void ValueLoader::load(const BucketFile& file, uint32_t number, uint32_t bucket,
       splats += cache_->bricks()[(*order_)[out.first + n]].splats;
   if (file.bytes(number) > splats * maxValueRecordBytes(variables_))
     throw Error(
-        "{}: {} of its bricks hold {} splats, but the grid has more there; this grid is not the one the "
-        "cache was made from",
+        "{}: {} of its bricks hold {} splats, but the grid has more samples there; this grid is not the one "
+        "the cache was made from",
         cache_->path().string(), bricks, splats);
   file.read(number, out.bytes);
   std::vector<size_t> next(bricks + 1);

@@ -225,7 +225,7 @@ BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size
 BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
     : state_(std::make_unique<State>(path, chains)) {
   if (!std::filesystem::exists(path))
-    throw LostBuckets("{}: was removed meanwhile; run the same command again", path.string());
+    throw LostBuckets("{}: was removed while it was needed; run the same command again", path.string());
   state_->input.emplace(path, Caching::kDirect);
   state_->require(state_->input->size() >= chains.size, state_->input->size());
 }

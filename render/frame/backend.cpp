@@ -60,7 +60,7 @@ class CpuBackend final : public PaintingBackend {
 std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
   try {
     if (!eglMayHaveCard()) {
-      why_not = "EGL knows of no graphics card";
+      why_not = "EGL finds no graphics card";
       return nullptr;
     }
     auto card = std::make_unique<GlBackend>(GlLibrary::kEgl);

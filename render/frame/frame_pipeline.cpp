@@ -368,9 +368,8 @@ std::optional<IsoLayers> FramePipeline::isosurfaces(const FramePlan& plan, const
     if (splats.overflowed()) {
       if (tiles.count() == 1)
         throw UsageError(
-            "isosurfaces: the splats in {0}x{0} pixels are too many (they take more than their {1} KiB of "
-            "the memory); "
-            "give more --memory, or a larger --lod-pixels",
+            "isosurfaces: too many splats in {0}x{0} pixels (they need more than their {1} KiB of --memory); "
+            "increase --memory or --lod-pixels",
             kTileSide, isoSplatBytes(options) >> 10);
       const size_t middle = (tiles.begin + tiles.end) / 2;
       left.push_back({middle, tiles.end});

@@ -181,7 +181,8 @@ void readVertices(const Element& element, Values& values, const std::filesystem:
     for (size_t n = 0; n < element.properties.size(); ++n) {
       const Property& property = element.properties[n];
       if (property.counted_by)
-        throw Error("{}: its vertices have a list, '{}'", path.string(), property.name);
+        throw Error("{}: its vertices have the list property '{}', which is not supported", path.string(),
+                    property.name);
       const double value = values.next(property.type);
       for (int axis = 0; axis < 3; ++axis)
         if (places[axis] == static_cast<int>(n)) position[axis] = value;

@@ -191,9 +191,8 @@ class CacheReader::State::ValuesDecoder {
       references.steps_back = stepsBackOf(stream);
       if (hasFineMeans(stream) && !state_.of_series->hasFeature(kFineValues))
         throw Error(
-            "its values are stored as the feature '{}' has them, which the manifest does not name; the cache "
-            "is "
-            "damaged: convert again",
+            "its values use the feature '{}', which the manifest does not list; the cache is damaged: "
+            "convert again",
             kFineValues);
     });
     // The one further back first: the other may be predicted from it as well.

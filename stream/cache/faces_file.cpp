@@ -88,7 +88,7 @@ class TableBytes {
   std::span<const std::byte> rest_;
 };
 
-/// Refuses tables that no writer makes. What uses them relies on these checks.
+/// Refuses invalid tables. What uses the tables relies on these checks.
 class FacesChecker {
  public:
   FacesChecker(const std::filesystem::path& path, std::span<const GridFace> faces,

@@ -105,7 +105,7 @@ PatchNodes decodePatch(const FacePatch& patch, size_t variables, const FaceBox& 
                std::isfinite(scalar.upper) && scalar.lower <= scalar.upper;
     planes_in_all += scalar.array.planes;
   }
-  if (!possible) throw Error("a patch's stream has an array code or a range that no writer makes");
+  if (!possible) throw Error("a patch's stream has an invalid array code or range");
 
   PlaneReader planes(bytes.subspan(before), quadBytes(quads) + planes_in_all * nodes);
   PatchNodes out;

@@ -344,7 +344,7 @@ TEST_F(RenderOptions, WrongOptionsAreUsageErrors) {
     expectUsageError(c.options, c.word);
   }
   expectRefused({"render", cache(), "-o", file("a.jpg")}, 2, ".png");
-  expectRefused({"render", cache(), "-o", file("a.avi"), "--orbit", "90"}, 2, "'.avi' is the ending of no");
+  expectRefused({"render", cache(), "-o", file("a.avi"), "--orbit", "90"}, 2, "'.avi' is not the ending of");
   expectRefused({"render", cache(), "-o", file("a.pfm"), "--background", "transparent"}, 2, "transparent");
 }
 

@@ -248,7 +248,7 @@ class TecplotBinary(StructuredFormats):
         path = self.write(file)
         data = path.read_bytes()
         for damaged, told in ((data.replace(b"#!TDV112", b"#!TDV75 "), "version 75"), (data[:-1], "truncated"), (data[:100], "truncated"),
-                              (b"#!SZPLT1" + data[8:], "subzone"), (data.replace(b"\x07\0\0\0", b"\xff\xff\xff\x7f"), "no room"),
+                              (b"#!SZPLT1" + data[8:], "subzone"), (data.replace(b"\x07\0\0\0", b"\xff\xff\xff\x7f"), "can hold"),
                               (data.replace(b"\x07\0\0\0", b"\xff\xff\xff\xff"), "a count")):
             path.write_bytes(damaged)
             self.expect_line(path, words=told)

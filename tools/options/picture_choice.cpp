@@ -45,7 +45,7 @@ void checkFunctionArguments(const ScalarArguments& arguments) {
   if (arguments.opacity_unit) parsePositive("--opacity-unit", *arguments.opacity_unit);
   const bool is_auto = arguments.opacity && *arguments.opacity == "auto";
   if (is_auto && isFile(arguments))
-    throw UsageError("--opacity auto cannot be combined with a file: --tf {} has opacities of its own",
+    throw UsageError("--opacity auto cannot be combined with a file: --tf {} has its own opacities",
                      *arguments.transfer_function);
   if (is_auto && (arguments.range || arguments.asinh))
     throw UsageError("--opacity auto chooses the range as well; remove {}",

@@ -94,8 +94,7 @@ FrameNames::FrameNames(const std::filesystem::path& pattern_path) : folder_(patt
   if (numbers > 0) return;
   const std::string ending = pattern_path.extension().string();
   if (!ending.empty() && !isImageName(pattern_path))
-    refusePattern(pattern,
-                  fmt::format("'{}' is the ending of no picture and no movie that is written", ending));
+    refusePattern(pattern, fmt::format("'{}' is not the ending of a supported picture or movie", ending));
   refusePattern(pattern, "all frames would have the same name");
 }
 

@@ -93,10 +93,8 @@ void CgnsCells::countCells(const CgnsSection& section) {
       const int64_t type = length > 0 ? numbers[static_cast<size_t>(begins[n] - begins.front())] : 0;
       const CgnsElementKind element = cgnsElementKind(type);
       if (element.nodes == 0 || length != element.nodes + 1)
-        throw Error(
-            "{}: {} has an element {} of type {} with {} numbers; expected its type and nodes; the file is "
-            "damaged",
-            file_, section.path, section.first + first + n, type, length);
+        throw Error("{}: {}: element {} has type {} and {} entries, which do not match; the file is damaged",
+                    file_, section.path, section.first + first + n, type, length);
       const bool solid = element.cell != CellKind::kNone;
       ++(solid ? counts_.solid : counts_.others);
       if (solid && element.nodes > cornersOf(element.cell)) ++counts_.curved;

@@ -94,7 +94,8 @@ class SectionReader {
 
 void SectionReader::readRange(const std::vector<double>& range, CgnsSection& section) const {
   if (range.size() != 2 || !(range[0] >= 1 && range[1] >= range[0] && range[1] <= kLargestInteger))
-    damaged("has an ElementRange of {} numbers that is not a range", range.size());
+    damaged("has an invalid ElementRange of {} numbers; expected two, the first at most the second",
+            range.size());
   section.first = static_cast<uint64_t>(range[0]);
   section.elements = static_cast<uint64_t>(range[1]) - section.first + 1;
 }

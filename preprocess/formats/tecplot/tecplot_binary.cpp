@@ -65,14 +65,14 @@ class Words {
     for (int32_t c = integer(); c != 0; c = integer()) {
       text += static_cast<char>(c & 0xff);
       if (text.size() > kMost)
-        throw Error("{}: byte {}: has a text without end; the file is damaged", name(), offset_);
+        throw Error("{}: byte {}: a text does not end; the file is damaged", name(), offset_);
     }
     return text;
   }
 
   template <typename Value>
   [[noreturn]] void damaged(const char* what, Value found, const char* expected) const {
-    throw Error("{}: byte {}: {} is {} (expected {}); the file is damaged, or of a version that is not read",
+    throw Error("{}: byte {}: {} is {} (expected {}); the file is damaged or of an unsupported version",
                 name(), offset_, what, found, expected);
   }
 

@@ -99,8 +99,9 @@ void shareTecplotValues(const std::string& file, TecplotData& data, size_t from,
 void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most) {
   const auto [ni, nj, nk] = zone.nodes;
   if (ni > 0 && nj > 0 && nk > 0 && ni <= most && nj <= most / ni && nk <= most / ni / nj) return;
-  throw Error("{}: {} has {}x{}x{} nodes, which the file has no room for; it is truncated or damaged", file,
-              zone.describe(number), ni, nj, nk);
+  throw Error(
+      "{}: {} declares {}x{}x{} nodes, more than a file of this size can hold; it is truncated or damaged",
+      file, zone.describe(number), ni, nj, nk);
 }
 
 void refuseTecplotZone(const std::string& file, const TecplotZone& zone, size_t number,

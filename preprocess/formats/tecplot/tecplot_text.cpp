@@ -71,7 +71,7 @@ Numbers countNumbers(TextReader& text) {
       return true;
     });
     if (count < before || count > kMaxDimension)
-      throw Error("{}: byte {}: has more numbers than any grid; the file is damaged", text.file().name(),
+      throw Error("{}: byte {}: more numbers than a grid can have; the file is damaged", text.file().name(),
                   text.offset());
     text.word();
   }
@@ -146,9 +146,8 @@ class Reader {
   [[noreturn]] void badValue(const std::string& key, const std::vector<TecplotToken>& value) const {
     std::string shown;
     for (const TecplotToken& token : value) shown += token.raw;
-    fail(fmt::format("{} has {} = {}, which is not understood",
-                     data_.zones.back().describe(data_.zones.size() - 1), key,
-                     printable(shown.substr(0, 40))));
+    fail(fmt::format("{} has the unknown value {} = {}", data_.zones.back().describe(data_.zones.size() - 1),
+                     key, printable(shown.substr(0, 40))));
   }
 
   /// The tokens up to the next numbers.
@@ -357,8 +356,7 @@ class Reader {
     if (count != expected)
       throw Error(
           "{}: {} has {} numbers; expected {}, for {} variables of {}x{}x{} nodes; the file is truncated, or "
-          "its "
-          "packing another",
+          "DATAPACKING is wrong",
           file_->name(), zone.describe(index), count, expected, stored.size(), zone.nodes[0], zone.nodes[1],
           zone.nodes[2]);
     checkSpace(zone, index, count);

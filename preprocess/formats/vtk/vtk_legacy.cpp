@@ -203,7 +203,9 @@ class LegacyReader : VtkLegacyFile {
     cells_.ends.type = VtkType::kUint64;
     cells_.ends.tuples = cells;
     cells_.ends.order = kMachineByteOrder;
-    if (cells > numbers) fail("has {} cells in {} numbers; expected at least one each", cells, numbers);
+    if (cells > numbers)
+      fail("declares {} cells but only {} numbers for them; expected at least one for each cell", cells,
+           numbers);
     const auto spooled = std::make_shared<SpooledBytes>(
         files_.spool, cells * sizeof(uint64_t), [&](const SpoolFile::Sink& sink) { writeEnds(cells, sink); });
     spooled->fill();

@@ -69,7 +69,7 @@ std::vector<std::string> VtkLegacyFile::restOfLine() {
 
 std::string VtkLegacyFile::lineOfType() {
   const std::vector<std::string> words = restOfLine();
-  if (words.size() != 1) fail("found {} words; expected a type", words.size());
+  if (words.size() != 1) fail("found a line of {} words; expected one word, a type", words.size());
   return words[0];
 }
 

@@ -88,7 +88,7 @@ class Reader {
       values->read(0, times.numbers);
     }
     if (!std::all_of(times.numbers.begin(), times.numbers.end(), [](double t) { return std::isfinite(t); }))
-      throw Error("{} has a time that is no number", document_.describe(item));
+      throw Error("{} has a time that is not a finite number", document_.describe(item));
     times.spread = type == "hyperslab";
     if (times.spread && times.numbers.size() != 3)
       throw Error("{} has {} numbers; expected the first time, the step and the count",
