@@ -173,14 +173,13 @@ void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
                 "Add the time steps of these files to the cache --to, after its last")
       ->group(kGroup);
   command
-      .add_option(
-          "--part", arguments.part,
-          "Convert the i-th of n parts of the time steps (i/n, i from 1) into OUT.splats.parts, for job "
-          "arrays; --join joins the parts")
+      .add_option("--part", arguments.part,
+                  "Convert part i of n of the time steps, given as i/n, into the folder OUT.splats.parts, "
+                  "for job arrays; --join joins the parts")
       ->group(kGroup);
   command
       .add_flag("--join", arguments.joins,
-                "GRID is the folder OUT.splats.parts: join its parts to the cache -o")
+                "Join the parts in the folder OUT.splats.parts, given as GRID, to the cache -o")
       ->group(kGroup);
   CLI::Option* const follow =
       command
@@ -202,7 +201,8 @@ void addConvert(CLI::App& app) {
   CLI::App* command = app.add_subcommand("convert", "Convert a grid to a splat cache, in bounded memory");
   command
       ->add_option("GRID", arguments->grid.grid,
-                   "Grid file: PLOT3D, VTK, CGNS, NetCDF or Exodus; or an OpenFOAM case")
+                   "Grid file (PLOT3D, VTK, CGNS, NetCDF, EnSight, Tecplot, XDMF, Exodus or SU2), or the "
+                   "folder of an OpenFOAM case")
       ->required();
   command->add_option("SOLUTION", arguments->grid.solutions,
                       "Further files of the grid: PLOT3D solution (Q) and function files; NetCDF, VTK or "
@@ -227,8 +227,8 @@ void addConvert(CLI::App& app) {
   command->add_option("--blank", arguments->blank_value, "Treat samples with this value as blanked");
   command->add_option(
       "--value-precision", arguments->precision,
-      "Stored values: normal (16 bits for the range of a brick), or fine (24 bits, as floats have; `info` "
-      "of a cache prints the bound)");
+      "Precision of stored values: normal (16 bits over the local range of values) or fine (24 bits, as in a "
+      "float). info CACHE prints the largest rounding error (default: normal)");
   command->add_option(
       "--memory", arguments->memory,
       "Memory limit of this process, such as 512M (default: 2G, at most 1/4 of the machine's)");

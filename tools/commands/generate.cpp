@@ -88,7 +88,8 @@ void addGenerate(CLI::App& app) {
   CLI::App* command = app.add_subcommand("generate", "Write an analytic scene as PLOT3D files of any size");
   command->add_option("SCENE", options->scene, fmt::format("Scene: one of {}", fmt::join(sceneNames(), ", ")))
       ->required();
-  command->add_option("--size", options->size, "Number of nodes along i, j and k: NIxNJxNK");
+  command->add_option("--size", options->size,
+                      "Number of nodes along i, j and k: NIxNJxNK, such as 128x64x64; required");
   command
       ->add_option("-o,--output", options->prefix,
                    "Prefix of the files to write: PREFIX.xyz, PREFIX.fun and PREFIX.nam")

@@ -307,7 +307,8 @@ void addRender(CLI::App& app) {
       ->required();
   command->add_option("SOLUTION", arguments->solutions, "Further files of the grid");
   command->add_option("--value-precision", arguments->value_precision,
-                      "Of a grid: how finely values are stored, normal or fine, as for convert");
+                      "Precision of the values stored when CACHE is a grid: normal or fine, as for convert "
+                      "(default: normal)");
   command
       ->add_option("-o,--output", arguments->output,
                    "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "
@@ -374,9 +375,9 @@ void addRender(CLI::App& app) {
 
   command
       ->add_option("--channels", arguments->channels,
-                   "Further channels of an .exr picture: depth,normal,scalar or some of them, each taken "
-                   "where half of the pixel's opacity lies in front; or none (default: depth). Drawing takes "
-                   "about three times as long")
+                   "Further channels of an .exr picture: depth, normal and scalar, separated by commas, or "
+                   "none (default: depth). Each is taken at the point of the ray that half of the pixel's "
+                   "opacity lies in front of. Drawing takes about three times as long")
       ->group(what);
   addSurfaceOptions(*command, arguments->surfaces, surfaces);
   const std::string when = "Time steps";

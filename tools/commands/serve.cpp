@@ -101,7 +101,7 @@ void addServe(CLI::App& app) {
   command
       ->add_option(
           "--memory", arguments->memory,
-          "Memory limit of all viewers together; divided by --viewer-memory, the largest number of viewers")
+          "Memory limit of all viewers together. At most --memory / --viewer-memory viewers can connect")
       ->capture_default_str();
   command
       ->add_option("--backend", arguments->backend,

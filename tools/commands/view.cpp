@@ -170,8 +170,9 @@ void addView(CLI::App& app) {
   command->add_option("FILE", arguments->files,
                       "Splat cache, a directory NAME.splats; or a grid and its solutions, which are "
                       "converted into the user's cache folder. If none is given, the window asks for one");
-  command->add_option("--value-precision", arguments->value_precision,
-                      "Of grids: how finely values are stored, normal or fine, as for convert");
+  command->add_option(
+      "--value-precision", arguments->value_precision,
+      "Precision of the values stored when FILE is a grid: normal or fine, as for convert (default: normal)");
   command->add_option("--size", arguments->size, "Size of the window, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
   command->add_option("--scalar", arguments->scalar, "Name of the scalar to show (default: as last time)");

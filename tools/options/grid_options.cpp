@@ -55,7 +55,8 @@ void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
 }  // namespace
 
 void addGridOptions(CLI::App& app, OpenGridOptions& options) {
-  app.add_option("--time-step", options.time_step, "Time step to read, counted from 0 (default 0)");
+  app.add_option("--time-step", options.time_step,
+                 "Time step to read from the grid's files, counted from 0 (default 0)");
   addGlobeOptions(app, options.globe);
   Plot3dForce& force = options.force;
   addChoice<ByteOrder>(app, "--byte-order", "Byte order of binary files",

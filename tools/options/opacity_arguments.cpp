@@ -53,8 +53,8 @@ void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std
       ->group(group);
   command
       .add_option("--iso-by", arguments.iso_scalar,
-                  "Name of the scalar whose isosurfaces --iso draws, in the colours of --scalar; with "
-                  "--opacity-by, one of the two (default: that of --opacity-by, or the --scalar)")
+                  "Scalar whose isosurfaces --iso draws, coloured by --scalar. With --opacity-by it must be "
+                  "one of these two (default: the --opacity-by scalar if given, otherwise --scalar)")
       ->group(surfaces_group);
 }
 

@@ -23,20 +23,20 @@ void addFunctionOptions(CLI::App& command, ScalarArguments& arguments, const std
   command
       .add_option("--range", arguments.range,
                   "Scalar range of the transfer function: LO,HI; percentiles of the volume, such as 1%,99%; "
-                  "data: all values, of the series with --steps; step: those of the first step drawn; "
-                  "series: those of all time steps "
-                  "(default: chosen from the data; with a file, the file's)")
+                  "or all values of step (the first time step drawn), series (all time steps) or data "
+                  "(series with --steps, otherwise step) "
+                  "(default: chosen from the data, or the range in the --tf file)")
       ->group(group);
   command
       .add_option("--opacity", arguments.opacity,
                   "Opacities along the range, POSITION:OPACITY,... from 0 to 1, such as "
                   "0.2:0,0.5:0.8,1:0.1; ramp, which rises from 0 to 0.4; or auto, chosen from the data "
-                  "(default: auto, with --range or --opacity-unit ramp)")
+                  "(default: auto; ramp if --range or --opacity-unit is given)")
       ->group(group);
   command
       .add_option("--asinh", arguments.asinh,
                   "Spread values near CENTRE: colours and opacities follow asinh((value - CENTRE)/WIDTH) "
-                  "along the range. CENTRE,WIDTH (default: chosen from the data; with --range linear)")
+                  "along the range. CENTRE,WIDTH (default: chosen from the data; none if --range is given)")
       ->group(group);
   command
       .add_option("--opacity-unit", arguments.opacity_unit,

@@ -8,8 +8,9 @@ namespace curvisplat {
 
 void addStepOptions(CLI::App& command, StepArguments& arguments, const std::string& group) {
   CLI::Option* const step =
-      command.add_option("--step", arguments.step, "Time step, counted from 0 (default 0)")->group(group);
-  command.add_option("--time", arguments.time, "Time of the step; the nearest step is taken")
+      command.add_option("--step", arguments.step, "Time step of the cache, counted from 0 (default 0)")
+          ->group(group);
+  command.add_option("--time", arguments.time, "Choose the time step nearest to this time")
       ->group(group)
       ->excludes(step);
 }

@@ -130,10 +130,9 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->allow_extra_args(false)
       ->group(group);
   command
-      .add_option(
-          "--surface-by", arguments.surface_by,
-          "Colour the grid's faces by this scalar: the transfer function's colours if it is the one that "
-          "is drawn, else colours chosen from its data")
+      .add_option("--surface-by", arguments.surface_by,
+                  "Colour the grid's faces by this scalar, by the transfer function if it is the scalar "
+                  "drawn, otherwise by colours chosen from its data")
       ->group(group);
   command
       .add_option(
@@ -172,7 +171,8 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--volume", arguments.volume, "on, or off to draw surfaces, slices and isosurfaces alone")
+      .add_option("--volume", arguments.volume,
+                  "Draw the volume: on, or off for surfaces, slices and isosurfaces alone")
       ->capture_default_str()
       ->group(group);
 }
