@@ -82,6 +82,13 @@ def write_vts(folder):
             f"{points}</DataArray></Points></Piece></StructuredGrid></VTKFile>\n")
 
 
+def write_tecplot(folder):
+    """A text file of one ordered zone, with a scalar p."""
+    with open(os.path.join(folder, "jet.dat"), "w") as file:
+        file.write(f'VARIABLES = "x" "y" "z" "p"\nZONE I={NI} J={NJ} K={NK} DATAPACKING=POINT\n')
+        file.writelines(f"{x:.6g} {y:.6g} {z:.6g} {math.sin(x) + z:.6g}\n" for x, y, z in lattice())
+
+
 def write_netcdf(path, dimensions, variables):
     """A file in NetCDF's classic format. `variables`: (name, numbers of its dimensions, attributes, values)."""
     def text(name):
@@ -160,6 +167,7 @@ def make_inputs(folder):
     write_plot3d(folder)
     write_stl(folder)
     write_vts(folder)
+    write_tecplot(folder)
     write_ocean(folder)
     os.symlink(os.path.join(ROOT, "tests/data/cgns/flow.cgns"), os.path.join(folder, "delta_vertex.cgns"))
     os.symlink(os.path.join(ROOT, "tools"), os.path.join(folder, "tools"))
