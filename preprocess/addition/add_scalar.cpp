@@ -111,9 +111,10 @@ class Addition {
     if (survey_.blanked.by_grid < manifest().blanked_nodes) {
       if (manifest().overlap == kOverlapOwner)
         throw Error(
-            "{}: its blocks overlap, and older scalars have no values at some of its {}; convert again with "
+            "{}: its blocks overlap, and older scalars have no values at some of its samples; convert again "
+            "with "
             "all scalars",
-            cache_.path().string(), manifest().cells ? "cells" : "nodes");
+            cache_.path().string());
       // Older scalars have blanked nodes that the grid does not: only the cache knows them.
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
       if (grid_ && manifest().splats < manifest().nodes - manifest().blanked_nodes)
@@ -158,16 +159,16 @@ class Addition {
     if (restricted ? survey_.blanked.by_grid < manifest().blanked_nodes
                    : survey_.blanked.by_grid != manifest().blanked_nodes)
       throw Error(
-          "{}: {} {} were blanked when it was made, and this grid blanks {}; it is not the one the cache was "
+          "{}: {} samples were blanked when it was made, and this grid blanks {}; it is not the one the "
+          "cache was "
           "made from, or scalars were missing at nodes where blocks meet: convert again with all scalars",
-          cache_.path().string(), manifest().blanked_nodes, manifest().cells ? "cells" : "nodes",
-          survey_.blanked.by_grid);
+          cache_.path().string(), manifest().blanked_nodes, survey_.blanked.by_grid);
     if (missing > 0)
       throw Error(
-          "{}: {} of its {} have no value of {} ({} not finite in single precision, {} with the blank "
+          "{}: {} of its samples have no value of {} ({} not finite in single precision, {} with the blank "
           "value), and every splat needs one; convert again with all scalars",
-          cache_.path().string(), missing, manifest().cells ? "cells" : "nodes", joined(report_.scalars),
-          survey_.blanked.not_finite, survey_.blanked.by_value);
+          cache_.path().string(), missing, joined(report_.scalars), survey_.blanked.not_finite,
+          survey_.blanked.by_value);
     checkRanges(survey_, description_, options_.scalars);
     const auto inside = [](const glm::dvec3& a, const glm::dvec3& b) {
       return glm::all(glm::lessThanEqual(a, b));

@@ -80,7 +80,7 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
   // Nothing is drawn where there is no cell, or where every point of them is blanked.
   if (survey.drawn_cells == 0 || !(grid.lower.x <= grid.upper.x))
     grid.blanked.by_grid = grid.nodes - grid.blanked.by_value - grid.blanked.not_finite;
-  checkExtent(grid, reader.source().description(), reader.centring());
+  checkExtent(grid, reader.source().description());
   return survey;
 }
 

@@ -93,14 +93,13 @@ class PartCounter {
 
 }  // namespace
 
-void checkExtent(const GridSurvey& survey, const GridDescription& description, Centring centring) {
+void checkExtent(const GridSurvey& survey, const GridDescription& description) {
   const std::string file = description.files.empty() ? description.format : description.files.front();
   if (survey.nodes == survey.blanked.total())
     throw Error(
-        "{}: all {} {} are blanked ({} by the grid, {} by value, {} not finite in single "
+        "{}: all {} samples are blanked ({} by the grid, {} by value, {} not finite in single "
         "precision): there is nothing to draw{}",
-        file, survey.nodes, centring == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
-        survey.blanked.by_value, survey.blanked.not_finite,
+        file, survey.nodes, survey.blanked.by_grid, survey.blanked.by_value, survey.blanked.not_finite,
         survey.blanked.by_grid > 0 && !description.blanking.empty() ? "; " + description.blanking : "");
   const glm::dvec3 extent = survey.upper - survey.lower;
   const double largest = std::max({extent.x, extent.y, extent.z});
@@ -113,7 +112,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
                       Ranks* ranks) {
   if (reader.centring() == Centring::kCell) {
     const GridSurvey survey = surveyCells(reader, slab_bytes, faces, progress);
-    checkExtent(survey, reader.source().description(), reader.centring());
+    checkExtent(survey, reader.source().description());
     return survey;
   }
   GridSurvey none;
@@ -142,7 +141,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
   }
   survey.grid_checksum = checksum.value();
   if (ranks) survey = combinedSurvey(survey, *ranks);
-  checkExtent(survey, reader.source().description(), reader.centring());
+  checkExtent(survey, reader.source().description());
   return survey;
 }
 

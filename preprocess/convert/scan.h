@@ -28,7 +28,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
                       Ranks* ranks = nullptr);
 
 /// Throws Error if no sample is left, or if the grid is larger or smaller than single precision can say.
-void checkExtent(const GridSurvey& survey, const GridDescription& description, Centring centring);
+void checkExtent(const GridSurvey& survey, const GridDescription& description);
 
 /// Throws Error if the values of one of the survey's scalars lie further apart than single precision can say
 /// the square of.

@@ -374,8 +374,8 @@ TEST_F(ToAnExistingCache, RefusesMissingValues) {
     if (node.i == 3 && node.j == 4) values.scalars[1] = kNotANumber;
     if (node.i == 5 && node.j == 4) values.scalars[2] = kBlank;
   });
-  expectRefused(lacking, adding(cache, {1}), "44 of its nodes have no value of s1 (44 not finite");
-  expectRefused(lacking, adding(cache, {1, 2}), "88 of its nodes have no value of s1, s2");
+  expectRefused(lacking, adding(cache, {1}), "44 of its samples have no value of s1 (44 not finite");
+  expectRefused(lacking, adding(cache, {1, 2}), "88 of its samples have no value of s1, s2");
 }
 
 TEST_F(ToAnExistingCache, RefusesAFolderThatIsNotACache) {

@@ -156,7 +156,7 @@ TEST_P(Netcdf, AGridWithoutAnyValueIsExplained) {
     FAIL();
   } catch (const Error& error) {
     const std::string words = error.what();
-    EXPECT_NE(words.find("all 24 nodes are blanked"), std::string::npos) << words;
+    EXPECT_NE(words.find("all 24 samples are blanked"), std::string::npos) << words;
     EXPECT_NE(words.find("t is missing where it is below valid_min 200"), std::string::npos) << words;
   }
 }
