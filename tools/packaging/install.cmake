@@ -42,9 +42,9 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 
-set(CPACK_DEBIAN_PROGRAM_DESCRIPTION "Converts structured, curvilinear simulation grids (PLOT3D, VTK, CGNS, NetCDF)
-once to a cache of splats, and draws pictures and a window from it within a
-fixed amount of memory, whatever the size of the grid.")
+set(CPACK_DEBIAN_PROGRAM_DESCRIPTION "Converts curvilinear and unstructured simulation grids (PLOT3D, VTK, CGNS,
+NetCDF, OpenFOAM and others) once to a cache of splats, and draws pictures and
+a window from it within a fixed amount of memory, whatever the size of the grid.")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME curvisplat)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
