@@ -7,6 +7,7 @@
 #include "preprocess/addition/value_record.h"
 #include "preprocess/convert/merge_levels.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 
 namespace curvisplat {
 namespace {
@@ -145,7 +146,7 @@ void ValueLoader::load(const BucketFile& file, uint32_t number, uint32_t bucket,
     ++next[valueRecordBrick(&out.bytes[at]) - out.first + 1];
   for (uint32_t n = 0; n < bricks; ++n) next[n + 1] += next[n];
   out.begins = next;
-  if (out.places.capacity() < next.back()) out.places = {};
+  if (out.places.capacity() < next.back()) freeMemory(out.places);
   out.places.resize(next.back());
   for (size_t at = 0; at < out.bytes.size(); at += valueRecordBytes(&out.bytes[at], variables_))
     out.places[next[valueRecordBrick(&out.bytes[at]) - out.first]++] = static_cast<uint32_t>(at);
@@ -154,7 +155,7 @@ void ValueLoader::load(const BucketFile& file, uint32_t number, uint32_t bucket,
   for (uint32_t n = 0; n < bricks; ++n)
     out.geometries.push_back(out.geometries.back() +
                              cache_->bricks()[(*order_)[out.first + n]].geometry.length);
-  if (out.geometry.capacity() < out.geometries.back()) out.geometry = {};
+  if (out.geometry.capacity() < out.geometries.back()) freeMemory(out.geometry);
   out.geometry.resize(out.geometries.back());
   for (uint32_t n = 0; n < bricks; ++n)
     geometry_.readAt(

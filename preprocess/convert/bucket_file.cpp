@@ -12,6 +12,7 @@
 #include "stream/base/check.h"
 #include "stream/base/checksum.h"
 #include "stream/base/file.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/mutex.h"
 #include "stream/base/thread_name.h"
 #include "stream/base/trace.h"
@@ -299,7 +300,7 @@ uint64_t BucketFile::size() const {
 }
 
 void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
-  if (out.capacity() < bytes(bucket)) out = {};  // or old and new would be in memory together
+  if (out.capacity() < bytes(bucket)) freeMemory(out);  // or old and new would be in memory together
   out.resize(bytes(bucket));
   size_t done = 0;
   forEachChunk(bucket, [&](std::span<const std::byte> records) {

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "preprocess/convert/splat_record.h"
+#include "stream/base/freed_memory.h"
 #include "stream/model/brick.h"
 
 namespace curvisplat {
@@ -72,6 +73,11 @@ void BucketLoader::group(LoadedBucket& loaded) {
   std::vector<LoadedBucket::Part>& parts = loaded.parts;
   std::vector<uint32_t> part_of(tree_->size(), BucketTree::kNone);
   tags_.clear();
+  const size_t most = loaded.bytes.size() / regularRecordBytes(variables_);
+  if (tags_.capacity() < most) {
+    freeMemory(tags_);
+    tags_.reserve(most);  // growing would hold the old and the new
+  }
   for (size_t at = 0; at < loaded.bytes.size();) {
     const std::byte* record = &loaded.bytes[at];
     uint32_t& part = part_of[finder.unitOf(recordPosition(record))];
@@ -96,7 +102,7 @@ void BucketLoader::group(LoadedBucket& loaded) {
     parts[part].begin = next[part] = begin;
     begin += parts[part].count;
   }
-  if (loaded.places.capacity() < tags_.size()) loaded.places = {};
+  if (loaded.places.capacity() < tags_.size()) freeMemory(loaded.places);
   loaded.places.resize(tags_.size());
   size_t at = 0;
   for (const uint32_t tag : tags_) {

@@ -11,6 +11,7 @@
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/point_sums.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -82,7 +83,7 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
 }
 
 ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
-  used_ = {};
+  freeMemory(used_);
   const uint64_t half = halfBesideChunks(plan_.mesh_bytes, chunk_bytes_);
   CornerGather gather(reader_, *numbers_, half, scratch_, progress);
   const TakeSplat take = [&](const NodeSplat& splat, std::span<const SplatScalar> values) {

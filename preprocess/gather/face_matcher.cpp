@@ -7,6 +7,8 @@
 #include <cstring>
 #include <utility>
 
+#include "stream/base/freed_memory.h"
+
 namespace curvisplat {
 namespace {
 
@@ -166,9 +168,10 @@ void FaceMatcher::matchStream(size_t stream, const TakePair& pair, const TakeSin
 void FaceMatcher::finish(const TakePair& pair, const TakeSingle& single, const Progress& progress) {
   for (uint32_t entry = 0; entry < waiting_.size(); ++entry)
     if (waiting_[entry].single) spill(entry);
-  free_ = buckets_ = {};
-  waiting_ = {};
-  records_ = {};
+  freeMemory(free_);
+  freeMemory(buckets_);
+  freeMemory(waiting_);
+  freeMemory(records_);
   spilled_->close();
   for (size_t stream = 0; stream < spilled_->streams(); ++stream) {
     progress.throwIfStopped();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stream/base/freed_memory.h"
+
 namespace curvisplat {
 StreamsFile::StreamsFile(std::filesystem::path folder, size_t streams, uint64_t memory_bytes)
     : folder_(std::move(folder)),
@@ -38,7 +40,7 @@ void StreamsFile::flush(Stream& stream) {
 void StreamsFile::close() {
   for (Stream& stream : streams_) {
     if (!stream.buffer.empty()) flush(stream);
-    stream.buffer = {};
+    freeMemory(stream.buffer);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "preprocess/grid/node_reader.h"
+#include "stream/base/freed_memory.h"
 
 namespace curvisplat {
 
@@ -46,8 +47,8 @@ CellTree::CellTree(const GridBlock& block, LoadedSlab loaded, std::vector<uint8_
         sizes_[cell] = cellSize(cornersOf(cell));
       }
   });
-  loaded_.nodes.blank = {};
-  loaded_.nodes.scalars = {};
+  freeMemory(loaded_.nodes.blank);
+  freeMemory(loaded_.nodes.scalars);
 
   if (all_.cells() == 0) return;
   for (uint32_t k = all_.begin[2]; k < all_.end[2]; ++k)

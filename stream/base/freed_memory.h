@@ -12,4 +12,10 @@ namespace curvisplat {
 /// For the whole process. `large`: bytes of a large block; the last call's holds. Any thread.
 void returnFreedMemory(size_t large = size_t{4} << 20);
 
+/// Empties a vector and frees its memory. `values = {}` does not: that assigns no elements, and the capacity stays.
+template <typename Vector>
+void freeMemory(Vector& values) {
+  Vector().swap(values);
+}
+
 }  // namespace curvisplat
