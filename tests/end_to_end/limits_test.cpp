@@ -4,10 +4,12 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -58,6 +60,13 @@ class LimitsTest : public testing::Test {
     return at == std::string::npos ? 0 : std::stoull(result.err.substr(at + before.size()));
   }
 
+  /// The most memory in MiB that any program has taken that this process has run.
+  static uint64_t largestProgram() {
+    rusage usage{};
+    EXPECT_EQ(getrusage(RUSAGE_CHILDREN, &usage), 0);
+    return static_cast<uint64_t>(usage.ru_maxrss) >> 10;
+  }
+
   static std::unique_ptr<TemporaryFolder> folder_;
 };
 std::unique_ptr<TemporaryFolder> LimitsTest::folder_;
@@ -98,6 +107,20 @@ TEST_F(LimitsTest, LongRowsAreConvertedWithinTheMemory) {
   EXPECT_EQ(added.status, 0) << added.err;
 }
 
+TEST_F(LimitsTest, TheLayoutOfAFileWithLongRowsIsFoundWithinTheMemory) {
+  constexpr uint64_t kMebibytes = 160;
+  const std::array<int32_t, 3> size{500000, 8, 8};
+  const std::string grid = file("zeros.xyz");
+  writeFileAtomically(grid, std::as_bytes(std::span(size)));
+  constexpr uint64_t kNodes = 500000 * 8 * 8;
+  std::filesystem::resize_file(grid, sizeof size + 3 * sizeof(float) * kNodes);
+  const uint64_t before = largestProgram();
+  const ProgramResult result = runProgram(
+      {"convert", grid, "--scalar", "none", "-o", file("none.splats"), "--memory", mebibytes(kMebibytes)});
+  EXPECT_NE(result.err.find("no scalar 'none'"), std::string::npos) << result.err;
+  EXPECT_LE(largestProgram(), std::max(before, kMebibytes));
+}
+
 TEST_F(LimitsTest, AddingAScalarNamesTheLeastMemoryThatItTakes) {
   const auto add = [&](uint64_t least) {
     return runProgram({"convert", file("cube.xyz"), file("cube.fun"), "--add-scalar", "j", "--to",
@@ -131,10 +154,7 @@ TEST_F(LimitsTest, AHugePictureNamesItsMemoryBeforeItTakesAny) {
     EXPECT_EQ(refused.status, 2);
     EXPECT_GT(leastMebibytes(refused), kPictureMebibytes);
   }
-  // Of all programs that this process has run, the largest.
-  rusage usage{};
-  ASSERT_EQ(getrusage(RUSAGE_CHILDREN, &usage), 0);
-  EXPECT_LT(static_cast<uint64_t>(usage.ru_maxrss) >> 10, kPictureMebibytes / 4);
+  EXPECT_LT(largestProgram(), kPictureMebibytes / 4);
   EXPECT_EQ(render("huge.png", {"--size", "16385x1"}).status, 2);
 }
 

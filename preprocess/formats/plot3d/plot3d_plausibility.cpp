@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "preprocess/formats/plot3d/plot3d_file.h"
@@ -42,59 +44,87 @@ bool isExtreme(double value) {
   return size != 0 && (size < kNoiseBelow || size > kNoiseAbove);
 }
 
-/// Whether `values` (rows of `ni`) look like noise instead of a field; if so, `example` is one of them.
-bool isNoise(const std::vector<double>& values, uint64_t ni, double& example) {
-  uint64_t finite = 0, extreme = 0, jumps = 0;
-  double largest = 0, before = 0, extreme_value = 0;
-  for (size_t n = 0; n < values.size(); ++n) {
-    if (n % ni == 0) before = 0;
-    if (!std::isfinite(values[n])) continue;
-    const double size = std::abs(values[n]);
-    ++finite;
-    if (isExtreme(values[n])) {
-      ++extreme;
-      extreme_value = values[n];
+/// Whether numbers look like noise instead of a field.
+class NoiseTest {
+ public:
+  /// The next number begins a row.
+  void beginRow() { before_ = 0; }
+  void add(std::span<const double> values) {
+    for (const double value : values) {
+      if (!std::isfinite(value)) continue;
+      const double size = std::abs(value);
+      ++finite_;
+      if (isExtreme(value)) {
+        ++extreme_;
+        extreme_value_ = value;
+      }
+      if (size != 0 && before_ != 0) jumps_ += size > kNoiseJump * before_ || before_ > kNoiseJump * size;
+      largest_ = std::max(largest_, size);
+      before_ = size;
     }
-    if (size != 0 && before != 0) jumps += size > kNoiseJump * before || before > kNoiseJump * size;
-    largest = std::max(largest, size);
-    before = size;
   }
-  const double limit = kNoiseShare * static_cast<double>(finite);
-  // Among numbers of usual magnitude, tiny ones are rounding errors of zero.
-  const bool jumpy = largest > kUsualSize && static_cast<double>(jumps) > limit;
-  example = jumpy ? largest : extreme_value;
-  return jumpy || static_cast<double>(extreme) > limit;
+  /// If they do, one of them.
+  std::optional<double> example() const {
+    const double limit = kNoiseShare * static_cast<double>(finite_);
+    // Among numbers of usual magnitude, tiny ones are rounding errors of zero.
+    if (largest_ > kUsualSize && static_cast<double>(jumps_) > limit) return largest_;
+    if (static_cast<double>(extreme_) > limit) return extreme_value_;
+    return std::nullopt;
+  }
+
+ private:
+  uint64_t finite_ = 0, extreme_ = 0, jumps_ = 0;
+  double largest_ = 0, before_ = 0, extreme_value_ = 0;
+};
+
+/// Pieces of a row to be read one at a time: rows may be long, and memory is planned only once the format is known.
+std::vector<NodeBox> piecesOf(const NodeBox& row, uint64_t ni) {
+  constexpr uint64_t kPieceNodes = 1 << 16;
+  std::vector<NodeBox> pieces;
+  for (uint64_t i = 0; i < ni; i += kPieceNodes) {
+    NodeBox& piece = pieces.emplace_back(row);
+    piece.i0 = i;
+    piece.i1 = std::min(i + kPieceNodes, ni);
+  }
+  return pieces;
 }
 
 }  // namespace
 
 std::optional<std::string> implausibility(const Plot3dFit& fit) {
   const Plot3dFile file(fit);
-  std::vector<double> values(fit.blocks.front().ni);
-  file.read(0, 0, {0, 1, 0, 1}, values);
+  std::vector<double> values(1);
+  file.read(0, 0, {0, 1, 0, 1, 0, 1}, values);
   if (isExtreme(values.front()))
     return fmt::format("its values begin with {}, as if its header were longer", values.front());
-  double example = 0;
+  std::vector<int32_t> iblank;
   const std::vector<uint32_t> blocks = sampleBlocks(fit.blocks.size());
   for (const uint32_t b : blocks) {
     const uint64_t ni = fit.blocks[b].ni;
     const std::vector<NodeBox> rows = sampleRows(fit.blocks[b], 64 / blocks.size());
     for (uint32_t component = 0; component < fit.components; ++component) {
-      values.resize(rows.size() * ni);
-      for (size_t r = 0; r < rows.size(); ++r)
-        file.read(b, component, rows[r], std::span(values).subspan(r * ni, ni));
-      if (isNoise(values, ni, example))
+      NoiseTest noise;
+      for (const NodeBox& row : rows) {
+        noise.beginRow();
+        for (const NodeBox& piece : piecesOf(row, ni)) {
+          values.resize(piece.rowNodes(ni));
+          file.read(b, component, piece, values);
+          noise.add(values);
+        }
+      }
+      if (const std::optional<double> example = noise.example())
         return fmt::format("many values of component {} of block {} are like {}", component + 1, b + 1,
-                           example);
+                           *example);
     }
     if (!fit.layout.blanking) continue;
-    std::vector<int32_t> iblank(ni);
-    for (const NodeBox& row : rows) {
-      file.readIblank(b, row, iblank);
-      for (const int32_t value : iblank)
-        if (value > kLargestIblank || value < -kLargestIblank)
-          return fmt::format("block {} has an iblank of {}", b + 1, value);
-    }
+    for (const NodeBox& row : rows)
+      for (const NodeBox& piece : piecesOf(row, ni)) {
+        iblank.resize(piece.rowNodes(ni));
+        file.readIblank(b, piece, iblank);
+        for (const int32_t value : iblank)
+          if (value > kLargestIblank || value < -kLargestIblank)
+            return fmt::format("block {} has an iblank of {}", b + 1, value);
+      }
   }
   return std::nullopt;
 }
