@@ -86,7 +86,7 @@ class PatchBuilder {
     const FacePatch &left = built.front().patch, &right = built.back().patch;
     const RowRange range{left.first[0], latticeIndex(face_, right, 0, right.nodes[0] - 1u) + 1};
     for (uint64_t r = 0; r < left.nodes[1]; ++r) {
-      const LatticeRow nodes = spool_.row(number_, latticeIndex(face_, left, 1, r), range);
+      const LatticeRow nodes = rowOf(latticeIndex(face_, left, 1, r), range, stride[0]);
       for (Built& b : built) append(b, nodes, range.begin);
     }
     tbb::parallel_for(size_t{0}, built.size(), [&](size_t n) { complete(built[n]); });
@@ -94,6 +94,10 @@ class PatchBuilder {
   }
 
  private:
+  LatticeRow rowOf(uint64_t v, const RowRange& range, uint32_t stride) const {
+    return stride > 1 ? spool_.thinnedRow(number_, v, range, stride) : spool_.row(number_, v, range);
+  }
+
   void begin(Built& b, const std::array<uint32_t, 2>& stride, const Pair& place) const {
     b.place = place;
     FacePatch& patch = b.patch;
@@ -109,10 +113,11 @@ class PatchBuilder {
     b.lattice.scalars.resize(spool_.scalars());
   }
 
-  /// `row` begins at node `first`.
+  /// `row` begins at node `first`, and has the nodes of the patch's level alone.
   void append(Built& b, const LatticeRow& row, uint64_t first) const {
+    const uint32_t stride = b.patch.stride[0];
     for (uint64_t n = 0; n < b.patch.nodes[0]; ++n) {
-      const uint64_t at = latticeIndex(face_, b.patch, 0, n) - first;
+      const uint64_t at = (latticeIndex(face_, b.patch, 0, n) - first + stride - 1) / stride;
       for (size_t axis = 0; axis < 3; ++axis) b.lattice.codes[axis].push_back(row.codes[at][axis]);
       for (size_t s = 0; s < row.scalars.size(); ++s) b.lattice.scalars[s].push_back(row.scalars[s][at]);
     }

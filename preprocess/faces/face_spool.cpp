@@ -19,11 +19,6 @@ Node sizeOf(const GridBlock& block) {
   return {block.ni, block.nj, block.nk};
 }
 
-/// Where a node is in a slab's arrays.
-size_t placeIn(const LoadedSlab& loaded, uint64_t ni, const Node& node) {
-  return WindowStrides(loaded.slab.window, ni).at(node[0], node[1], node[2]);
-}
-
 /// The part of a face's lattice whose nodes (or, of the layer of cells behind it, lowest nodes) are in the box.
 struct LatticeBox {
   std::array<uint64_t, 2> first{}, end{};
@@ -113,11 +108,13 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
     return v + 1 == box.end[1] || box.first[0] > 0 || box.end[0] < face.nodes[0];
   };
   const LatticeBox part(face, size, loaded.slab.box, face.index);
+  const WindowStrides strides(loaded.slab.window, size[0]);
+  const auto placeOf = [&](const Node& node) { return strides.at(node[0], node[1], node[2]); };
   uint64_t first = 0;
   for (uint64_t v = part.first[1]; !part.empty && v < part.end[1]; ++v) {
     if (codes.empty()) first = v * face.nodes[0] + part.first[0];
     for (uint64_t u = part.first[0]; u < part.end[0]; ++u) {
-      const size_t at = placeIn(loaded, size[0], nodeAt(face, face.index, u, v));
+      const size_t at = placeOf(nodeAt(face, face.index, u, v));
       if (isThere(nodes, at, of_cells))
         codes.push_back({code_of(nodes.x[at], 0), code_of(nodes.y[at], 1), code_of(nodes.z[at], 2)});
       else
@@ -131,12 +128,11 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
   if (scalars() == 0) return;
   const uint64_t layer = of_cells ? layerOfCells(face, size) : face.index;
   const LatticeBox of_values(face, size, loaded.slab.box, layer);
-  const WindowStrides strides(loaded.slab.window, size[0]);
   for (uint64_t v = of_values.first[1]; !of_values.empty && v < of_values.end[1]; ++v) {
     if (values.empty()) first = v * face.nodes[0] + of_values.first[0];
     for (uint64_t u = of_values.first[0]; u < of_values.end[0]; ++u) {
       const Node node = nodeAt(face, layer, u, v);
-      const size_t at = placeIn(loaded, size[0], node);
+      const size_t at = placeOf(node);
       const bool has_cell =
           of_cells && node[0] + 1 < size[0] && node[1] + 1 < size[1] && node[2] + 1 < size[2];
       const bool none = of_cells && !(has_cell && cellIsThere(nodes, at, strides.row, strides.plane));
@@ -155,19 +151,30 @@ void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const
   const NodeArrays& nodes = loaded.nodes;
   const Node size = sizeOf(reader_.source().description().blocks[slab.block]);
   const WindowStrides strides(slab.window, size[0]);
+  constexpr size_t kCentresAtOnce = 4096;
   std::vector<AbuttingFaces::Centre> centres;
-  const auto add = [&](const CellFace& face, size_t at) {
-    if (ofCells()) {
-      if (!cellIsThere(nodes, at, strides.row, strides.plane)) return;
-    } else {
-      const size_t bit = size_t{1} << face.axis;
-      for (size_t corner = 0; corner < 8; ++corner)
-        if (((corner & bit) != 0) == face.upper &&
-            nodes.blank[at + (corner & 1) + (corner >> 1 & 1) * strides.row + (corner >> 2) * strides.plane])
-          return;
-    }
-    centres.push_back(abutting.centreOf(
-        face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, strides.row, strides.plane)));
+  const auto isThereAt = [&](const CellFace& face, size_t at) {
+    if (ofCells()) return cellIsThere(nodes, at, strides.row, strides.plane);
+    const size_t bit = size_t{1} << face.axis;
+    for (size_t corner = 0; corner < 8; ++corner)
+      if (((corner & bit) != 0) == face.upper &&
+          nodes.blank[at + (corner & 1) + (corner >> 1 & 1) * strides.row + (corner >> 2) * strides.plane])
+        return false;
+    return true;
+  };
+  const auto addCell = [&](CellFace face) {
+    const size_t at = strides.at(face.cell[0], face.cell[1], face.cell[2]);
+    const std::array<glm::dvec3, 8> corners =
+        cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, strides.row, strides.plane);
+    for (face.axis = 0; face.axis < 3; ++face.axis)
+      for (const bool upper : {false, true}) {
+        face.upper = upper;
+        if (abutting.isAtEnd(face) && isThereAt(face, at))
+          centres.push_back(abutting.centreOf(face, corners));
+      }
+    if (centres.size() < kCentresAtOnce) return;
+    abutting.add(centres);
+    centres.clear();
   };
   for (uint64_t k = slab.box.k0; k < std::min(slab.box.k1, size[2] - 1); ++k)
     for (uint64_t j = slab.box.j0; j < std::min(slab.box.j1, size[1] - 1); ++j) {
@@ -179,10 +186,7 @@ void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const
       const uint64_t first =
           row_at_end || slab.box.i0 == 0 ? slab.box.i0 : std::max(slab.box.i0, size[0] - 2);
       for (uint64_t i = first; i < slab.box.i1 && i + 1 < size[0]; i = next(i))
-        for (int axis = 0; axis < 3; ++axis)
-          for (const bool upper : {false, true})
-            if (const CellFace face{slab.block, {i, j, k}, axis, upper}; abutting.isAtEnd(face))
-              add(face, strides.at(i, j, k));
+        addCell({slab.block, {i, j, k}, 0, false});
     }
   abutting.add(centres);
 }
@@ -230,6 +234,26 @@ LatticeRow FaceSpool::row(size_t face_number, uint64_t v, const RowRange& range)
       row.scalars[s][u - begin] = count > 0 ? static_cast<float>(sum / count) : 0;
     }
   return row;
+}
+
+LatticeRow FaceSpool::thinnedRow(size_t face, uint64_t v, const RowRange& range, uint32_t stride) const {
+  // Reads pieces that a processor's cache holds; single nodes where the stride skips whole pages.
+  constexpr uint64_t kPieceNodes = 4096, kMaxStride = 512;
+  const uint64_t step = stride > kMaxStride ? stride : kPieceNodes / stride * stride;
+  const uint64_t piece = stride > kMaxStride ? 1 : step;
+  const uint64_t last = std::min(range.end, faces_[face].nodes[0]) - 1;
+  LatticeRow thinned;
+  thinned.scalars.resize(scalars());
+  const auto add = [&](uint64_t begin, uint64_t end) {
+    const LatticeRow of_piece = row(face, v, {begin, end});
+    for (uint64_t n = 0; n < end - begin; n += stride) {
+      thinned.codes.push_back(of_piece.codes[n]);
+      for (size_t s = 0; s < scalars(); ++s) thinned.scalars[s].push_back(of_piece.scalars[s][n]);
+    }
+  };
+  for (uint64_t begin = range.begin; begin < last; begin += step) add(begin, std::min(begin + piece, last));
+  add(last, last + 1);
+  return thinned;
 }
 
 }  // namespace curvisplat

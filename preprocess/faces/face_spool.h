@@ -50,6 +50,8 @@ class FaceSpool {
   size_t scalars() const { return reader_.scalars(); }
   /// After fill(). Rows of nodes along u. Any thread.
   LatticeRow row(size_t face, uint64_t v, const RowRange& range = {}) const;
+  /// Every `stride`-th node of the range, from its first on, and its last.
+  LatticeRow thinnedRow(size_t face, uint64_t v, const RowRange& range, uint32_t stride) const;
   /// Whether the cells behind the quads of a row are there; nodes decide otherwise. Of cells only.
   std::vector<uint8_t> cellsOfRow(size_t face, uint64_t v) const;
   bool ofCells() const { return reader_.centring() == Centring::kCell; }

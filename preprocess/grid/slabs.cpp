@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "stream/base/error.h"
+#include "stream/base/huge_pages.h"
 
 namespace curvisplat {
 namespace {
@@ -48,6 +49,20 @@ Extent extentOfParts(const GridBlock& block, uint64_t window_nodes, uint64_t mar
 uint64_t leastRows(const GridBlock& block, Halo halo) {
   const uint64_t side = halo.before + 1 + halo.after;
   return std::min(side * side, block.nj * block.nk);
+}
+
+/// Reserves memory for as many nodes, in large pages. Elements may be lost.
+void makeRoom(size_t count, size_t scalars, NodeArrays& nodes) {
+  const auto make = [&](auto& values) {
+    if (values.capacity() >= count) return;
+    values.clear();
+    values.reserve(count);
+    preferHugePages(values.data(), count * sizeof(values[0]));
+  };
+  for (auto* axis : {&nodes.x, &nodes.y, &nodes.z}) make(*axis);
+  make(nodes.blank);
+  nodes.scalars.resize(scalars);
+  for (auto& values : nodes.scalars) make(values);
 }
 
 }  // namespace
@@ -102,6 +117,9 @@ SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo,
       ahead_([this, &reader](LoadedSlab& loaded) {
         if (position_ == end_) return false;
         loaded.slab = slabs_[position_++];
+        const NodeBox& window = loaded.slab.window;
+        const uint64_t ni = reader.source().description().blocks[loaded.slab.block].ni;
+        makeRoom(rowsOf(window) * window.rowNodes(ni), reader.scalars(), loaded.nodes);
         loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
         return true;
       }) {}
