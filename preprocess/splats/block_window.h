@@ -8,6 +8,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/splats/joint_line.h"
 #include "preprocess/splats/stretch.h"
 
 namespace curvisplat {
@@ -31,6 +32,7 @@ struct BlockWindow {
 /// What computeNodeSplats() (node_splats.h) needs for a while; keeps its capacity.
 struct NodeScratch {
   std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
+  std::array<std::vector<JointLine>, 3> lines;               // the same, of nodes at faces and one away
   std::vector<uint8_t> has_blank;                            // [row around the box]
 };
 

@@ -52,6 +52,8 @@ class JointLine {
   JointLine() = default;
   /// `unit`: > 0, the length of the node's half cell, or of its whole cell one away from the face.
   JointLine(const CellRow& row, double unit);
+  /// The same from twice the lengths, squared.
+  static JointLine ofExtents(const SquaredExtents& extents, double unit);
 
   bool isThere() const { return unit_ > 0; }
   double unit() const { return unit_; }

@@ -244,9 +244,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   node.behind_face = false;
   node.layers = 0;
   node.lines = {};
-  if ((on_face || layers != Layers{}) && corrections_.lines)
-    node.lines = lines_.atJoints({i, row_j_, row_k_}, at, neighbours, layers);
-  node.spacing = on_face ? lattice_.spacing(at, neighbours) : 0.0;
+  if ((on_face || layers != Layers{}) && corrections_.lines && corrections_.stretch)
+    node.lines = lines_.atJoints({i, row_j_, row_k_});
 
   glm::dmat3 jacobian;  // columns along i, j, k
   for (int axis = 0; axis < 3; ++axis)
@@ -261,11 +260,14 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   glm::dvec3 aside(0.0);            // from the node to the cell's middle, across the columns
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
   std::array<float, 3> growth{};
+  double nearest = std::numeric_limits<double>::infinity();  // neighbour that is not at the node's own place
   double weight_factor = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const glm::dvec3 to_before = node.node_position - lattice_.position(at + neighbours.before[axis]);
     const glm::dvec3 to_after = lattice_.position(at + neighbours.after[axis]) - node.node_position;
     const double a = glm::length(to_before), b = glm::length(to_after);
+    if (a > 0) nearest = std::min(nearest, a);
+    if (b > 0) nearest = std::min(nearest, b);
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
     if (whole) {
       bend += stretch[axis] * stretch[axis] * (to_after - to_before);
@@ -289,6 +291,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       weight_factor *= 0.5;
     }
   }
+  node.spacing = on_face && std::isfinite(nearest) ? nearest : 0.0;
   node.splat.position = node.node_position + jacobian * middle + aside;
   for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
   const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's

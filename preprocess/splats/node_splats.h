@@ -140,7 +140,7 @@ struct NodeSplatCorrections {
   bool bends = true;    // of the scalar
   bool stretch = true;  // else splats are as long as their cells
   bool growth = true;   // else kernels are symmetric; takes stretch
-  bool lines = true;    // else cells at joints know their own block alone; takes growth
+  bool lines = true;    // else cells at joints know their own block alone; takes growth and stretch
   bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
 
   bool all() const {

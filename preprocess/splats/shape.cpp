@@ -110,9 +110,11 @@ CellShape shapeFromJacobian(const glm::dmat3& jacobian, double smallest) {
   // Scaled, no square leaves the range of double.
   glm::dmat3 unit = jacobian;
   for (int column = 0; column < 3; ++column) unit[column] /= scale;
+  const LqFactors lq = factorsOf(unit);
+  if (surelyAboveFloor(lq.lower)) return shapeOf(lq, scale);
   const Svd svd = decompose(unit);
   const double floor = kAxisFloor * svd.sigma[0];
-  if (svd.sigma[2] >= floor) return shapeOf(factorsOf(unit), scale);
+  if (svd.sigma[2] >= floor) return shapeOf(lq, scale);
 
   glm::dmat3 raised(0.0);
   for (int n = 0; n < 3; ++n) raised += glm::outerProduct(std::max(svd.sigma[n], floor) * svd.u[n], svd.v[n]);

@@ -64,6 +64,10 @@ SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t
   before = std::min(before, kStretchReach);
   after = std::min(after, kStretchReach);
   if (before + after == 0) return {};
+  if (before + after == 1) {
+    const double own = 4 * nodes.squaredDistance(at, at + (after - before) * stride);
+    return {own, own, own, own, own};
+  }
   const int samples = before + 1 + after;
   const LineEnd first(nodes, at - before * stride, stride, samples);
   const LineEnd last(nodes, at + after * stride, -stride, samples);

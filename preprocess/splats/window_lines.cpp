@@ -30,6 +30,7 @@ WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch&
   for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
   for (auto* rows : {&scratch.growth, &scratch.drift})
     for (auto& row : *rows) row.assign(i1_ - i0_, 0.0f);
+  for (auto& row : scratch.lines) row.resize(i1_ - i0_);
   findBlanks();
 }
 
@@ -67,8 +68,12 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
       for (uint64_t i = begin; i < end; ++i) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
         if (lattice_.blank[at]) continue;
-        const Stretch stretch =
-            stretchOf(extentsOf(at, strides[axis], axis == 0 ? i : index[axis], count[axis]));
+        const NodeOnLine node = onLine(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
+        const SquaredExtents extents =
+            extentsOnLine({lattice_.x, lattice_.y, lattice_.z}, at, node.stride, node.before, node.after);
+        const bool has_two = node.before + node.after == 1;
+        const Stretch stretch = has_two ? Stretch() : stretchOf(extents);
+        if (isAtJoint(node.index, node.count)) scratch_.lines[axis][i - i0_] = lineOf(node, extents);
         out[i - i0_] = stretch.factor;
         growth[i - i0_] = stretch.growth;
         drift[i - i0_] = stretch.drift;
@@ -99,8 +104,8 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
   }
 }
 
-/// Of a node that is there, number `index` of `count` along the axis of `stride`.
-SquaredExtents WindowLines::extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
+WindowLines::NodeOnLine WindowLines::onLine(ptrdiff_t at, ptrdiff_t stride, uint64_t index,
+                                            uint64_t count) const {
   const auto neighbours = [&](uint64_t most, ptrdiff_t step) {
     int found = 0;
     while (found < kStretchReach && static_cast<uint64_t>(found) < most &&
@@ -108,29 +113,27 @@ SquaredExtents WindowLines::extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t i
       ++found;
     return found;
   };
-  return extentsOnLine({lattice_.x, lattice_.y, lattice_.z}, at, stride, neighbours(index, -stride),
-                       neighbours(count - 1 - index, stride));
+  return {at, stride, index, count, neighbours(index, -stride), neighbours(count - 1 - index, stride)};
 }
 
-std::array<JointLine, 3> WindowLines::atJoints(const std::array<uint64_t, 3>& ijk, ptrdiff_t at,
-                                               const Neighbours& neighbours, const Layers& layers) const {
-  const GridBlock& block = in_.block;
-  const std::array<uint64_t, 3> count{ni_, block.nj, block.nk};
-  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
+/// None where the node has a neighbour on neither side, or on both sides of a face.
+JointLine WindowLines::lineOf(const NodeOnLine& node, const SquaredExtents& extents) const {
+  const bool has_before = node.before > 0, has_after = node.after > 0;
+  const bool is_half = isFace(node.index, node.count) && has_before != has_after;
+  const int layer = layerOf(node.index, node.count);
+  if (!is_half && !(layer != 0 && has_before && has_after)) return {};
+  SquaredExtents row = extents;
+  if (is_half ? has_before : layer < 0) std::reverse(row.begin(), row.end());
+  const double extent = glm::length(lattice_.position(node.at + (has_after ? node.stride : 0)) -
+                                    lattice_.position(node.at - (has_before ? node.stride : 0)));
+  return JointLine::ofExtents(row, 0.5 * extent);
+}
+
+std::array<JointLine, 3> WindowLines::atJoints(const std::array<uint64_t, 3>& ijk) const {
+  const std::array<uint64_t, 3> count{ni_, in_.block.nj, in_.block.nk};
   std::array<JointLine, 3> lines{};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const bool has_before = neighbours.before[axis] != 0, has_after = neighbours.after[axis] != 0;
-    const bool is_half = isFace(ijk[axis], count[axis]) && has_before != has_after;
-    const bool is_layer = layers[axis] != 0 && has_before && has_after;
-    if (!is_half && !is_layer) continue;
-    const SquaredExtents extents = extentsOf(at, strides[axis], ijk[axis], count[axis]);
-    CellRow row;
-    for (size_t n = 0; n < row.size(); ++n) row[n] = 0.5 * std::sqrt(extents[n]);
-    if (is_half ? has_before : layers[axis] < 0) std::reverse(row.begin(), row.end());
-    const double extent = glm::length(lattice_.position(at + neighbours.after[axis]) -
-                                      lattice_.position(at + neighbours.before[axis]));
-    lines[axis] = JointLine(row, 0.5 * extent);
-  }
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (isAtJoint(ijk[axis], count[axis])) lines[axis] = scratch_.lines[axis][ijk[0] - i0_];
   return lines;
 }
 

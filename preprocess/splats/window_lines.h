@@ -32,18 +32,27 @@ class WindowLines {
   }
   /// Whether a node of the row's part, or one next to it, is blank; of the rows around it as well.
   bool anyBlankAround(uint64_t j, uint64_t k) const;
-  /// Fills the scratch with the stretch of the nodes of a row's part.
+  /// Fills the scratch with the stretch of the nodes of a row's part, and with their lines.
   void stretchRow(uint64_t j, uint64_t k) const;
-  /// Of a node: the lines across the faces of the block that it is on, or one away from. `at`: its element.
-  std::array<JointLine, 3> atJoints(const std::array<uint64_t, 3>& ijk, ptrdiff_t at,
-                                    const Neighbours& neighbours, const Layers& layers) const;
+  /// After stretchRow(), of a node of the row: the lines across the faces of the block that it is on, or one away from.
+  std::array<JointLine, 3> atJoints(const std::array<uint64_t, 3>& ijk) const;
 
  private:
+  /// A node that is there, number `index` of `count` along an axis.
+  struct NodeOnLine {
+    ptrdiff_t at, stride;
+    uint64_t index, count;
+    int before, after;  // neighbours in a row, kStretchReach at the most
+  };
   bool hasBlank(uint64_t j, uint64_t k) const {
     return scratch_.has_blank[(k - near_.k0) * (near_.j1 - near_.j0) + (j - near_.j0)] != 0;
   }
   void findBlanks();
-  SquaredExtents extentsOf(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
+  bool isAtJoint(uint64_t index, uint64_t count) const {
+    return isFace(index, count) || layerOf(index, count) != 0;
+  }
+  JointLine lineOf(const NodeOnLine& node, const SquaredExtents& extents) const;
+  NodeOnLine onLine(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
 
   const BlockWindow& in_;
   const NodeBox near_;  // the rows that the splats of the box may depend on
