@@ -1,12 +1,12 @@
 #include "preprocess/splats/abutting_faces.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 
 #include "preprocess/splats/coincidence_sweep.h"
-#include "preprocess/splats/seam_sorter.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
@@ -24,13 +24,29 @@ uint64_t facesOfSide(const std::array<uint64_t, 3>& cells, size_t axis) {
   return cells[kAlong[axis][0]] * cells[kAlong[axis][1]];
 }
 
+// A centre's record in the sorter: along, across, the face's number, three coordinates, spacing.
+constexpr size_t kCentreSize = 7;
+
 /// The mean of the corners whose bits under `mask` are those of `bits`.
-glm::dvec3 middle(const std::array<glm::dvec3, 8>& corners, size_t mask, size_t bits) {
+template <size_t mask, size_t bits>
+glm::dvec3 middle(const std::array<glm::dvec3, 8>& corners) {
+  constexpr double kCount = 8 >> std::popcount(mask);
   glm::dvec3 sum(0.0);
-  int count = 0;
   for (size_t n = 0; n < 8; ++n)
-    if (((n ^ bits) & mask) == 0) sum += corners[n], ++count;
-  return sum / static_cast<double>(count);
+    if (((n ^ bits) & mask) == 0) sum += corners[n];
+  return sum / kCount;
+}
+
+/// The centre of the face whose corners' bits under `bit` are `side`, and along each axis how far apart the middles of the face's
+/// opposite edges are, or, across the face, the centres of the cell's two ends. Templates, so that the sums are unrolled.
+template <size_t bit, size_t side>
+void measureFace(const std::array<glm::dvec3, 8>& corners, glm::dvec3& centre,
+                 std::array<double, 3>& widths) {
+  centre = middle<bit, side>(corners);
+  const auto width = [&]<size_t other>() {
+    return glm::distance(middle<bit | other, side>(corners), middle<bit | other, side ^ other>(corners));
+  };
+  widths = {width.template operator()<1>(), width.template operator()<2>(), width.template operator()<4>()};
 }
 
 }  // namespace
@@ -39,12 +55,12 @@ AbuttingFaces::Needs AbuttingFaces::needsOf(std::span<const GridBlock> blocks) {
   uint64_t faces = 0;
   for (const GridBlock& block : blocks)
     for (const size_t axis : {0u, 1u, 2u}) faces += 2 * facesOfSide(cellsOf(block), axis);
-  return {faces / 8, faces * SeamSorter::recordBytes(0)};
+  return {faces / 8, faces * kCentreSize * sizeof(double)};
 }
 
 AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_bytes, uint64_t memory_bytes,
                              std::filesystem::path temporary_folder)
-    : coordinate_bytes_(coordinate_bytes), centres_(0, memory_bytes, std::move(temporary_folder)) {
+    : coordinate_bytes_(coordinate_bytes), centres_(kCentreSize, memory_bytes, std::move(temporary_folder)) {
   uint64_t faces = 0;
   for (const GridBlock& block : blocks) {
     Block& added = blocks_.emplace_back(Block{cellsOf(block), {}});
@@ -74,17 +90,35 @@ uint64_t AbuttingFaces::numberOf(const CellFace& face) const {
 AbuttingFaces::Centre AbuttingFaces::centreOf(const CellFace& face,
                                               const std::array<glm::dvec3, 8>& corners) const {
   CURVISPLAT_CHECK(isAtEnd(face));
-  const size_t bit = size_t{1} << face.axis, side = face.upper ? bit : 0;
   Centre centre;
   centre.face = numberOf(face);
-  centre.at = middle(corners, bit, side);
+  std::array<double, 3> widths{};
+  switch (2 * face.axis + face.upper) {
+    case 0:
+      measureFace<1, 0>(corners, centre.at, widths);
+      break;
+    case 1:
+      measureFace<1, 1>(corners, centre.at, widths);
+      break;
+    case 2:
+      measureFace<2, 0>(corners, centre.at, widths);
+      break;
+    case 3:
+      measureFace<2, 2>(corners, centre.at, widths);
+      break;
+    case 4:
+      measureFace<4, 0>(corners, centre.at, widths);
+      break;
+    default:
+      measureFace<4, 4>(corners, centre.at, widths);
+      break;
+  }
   const double rounding = coordinateRounding(centre.at, coordinate_bytes_);
   // It is as far to the centre of another face as across this one, or through the cell.
   centre.spacing = std::numeric_limits<double>::infinity();
-  for (const size_t other : {1u, 2u, 4u}) {
-    const double width =
-        glm::distance(middle(corners, bit | other, side), middle(corners, bit | other, side ^ other));
-    if (other != bit && !(width > rounding)) centre.collapsed = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double width = widths[static_cast<size_t>(axis)];
+    if (axis != face.axis && !(width > rounding)) centre.collapsed = true;
     if (width > 0) centre.spacing = std::min(centre.spacing, width);
   }
   if (!std::isfinite(centre.spacing)) centre.spacing = 0;
@@ -97,25 +131,37 @@ void AbuttingFaces::add(std::span<const Centre> centres) {
       abutting_[centre.face] = true;
       continue;
     }
-    NodeSplat splat;
-    splat.node = centre.face;
-    splat.on_block_face = true;
-    splat.node_position = splat.splat.position = centre.at;
-    splat.splat.weight = 1;
-    splat.spacing = centre.spacing;
-    centres_.add(splat, {});
+    const auto [along, across] = seamPosition(centre.at);
+    double* const rest = centres_.add(along, across, centre.face) + 3;
+    rest[0] = centre.at.x;
+    rest[1] = centre.at.y;
+    rest[2] = centre.at.z;
+    rest[3] = centre.spacing;
   }
 }
 
 void AbuttingFaces::match(const Progress& progress) {
-  centres_.forEachSet(coordinate_bytes_, [&](std::span<const uint64_t> faces) {
-    progress.throwIfStopped();
-    for (const uint64_t face : faces) abutting_[face] = true;
-    if (!folded_.empty()) noteFolds(faces);
+  std::vector<std::vector<uint64_t>> sets;
+  CoincidenceSweep sweep(coordinate_bytes_, [&](size_t set) {
+    if (sets[set].size() > 1) {
+      progress.throwIfStopped();
+      noteSet(sets[set]);
+    }
+    sets[set].clear();
   });
+  centres_.drain([&](const double* record) {
+    const size_t set = sweep.add({{RecordSorter::alongOf(record), RecordSorter::acrossOf(record)},
+                                  {record[3], record[4], record[5]},
+                                  record[6]});
+    if (set == sets.size()) sets.emplace_back();
+    sets[set].push_back(RecordSorter::numberOf(record));
+  });
+  sweep.finish();
 }
 
-void AbuttingFaces::noteFolds(std::span<const uint64_t> faces) {
+void AbuttingFaces::noteSet(std::span<const uint64_t> faces) {
+  for (const uint64_t face : faces) abutting_[face] = true;
+  if (folded_.empty()) return;
   const auto side_of = [&](uint64_t face) {
     return std::upper_bound(sides_.begin(), sides_.end(), face) - sides_.begin();
   };

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
-#include "preprocess/splats/seams.h"
+#include "preprocess/splats/record_sorter.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
@@ -23,7 +23,7 @@ struct CellFace {
   bool upper = false;
 };
 
-/// Two faces at blocks' ends abut if their centres coincide, by SeamMerger's tolerance; on which side of them
+/// Two faces at blocks' ends abut if their centres coincide, by CoincidenceSweep's tolerance; on which side of them
 /// the cells lie does not matter. A face that has collapsed to an edge (at an axis) or to a point is no border
 /// either. Not found are abutting faces of different sizes, and faces beside a blanked cell in whose place
 /// another block has a cell.
@@ -36,7 +36,7 @@ class AbuttingFaces {
   };
   static Needs needsOf(std::span<const GridBlock> blocks);
 
-  /// Sorts in `memory_bytes`, as SeamMerger does, beside its Needs. `coordinate_bytes`: of the grid's, as
+  /// Sorts in `memory_bytes`, beside its Needs. `coordinate_bytes`: of the grid's, as
   /// stored.
   AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_bytes, uint64_t memory_bytes,
                 std::filesystem::path temporary_folder);
@@ -69,7 +69,7 @@ class AbuttingFaces {
 
  private:
   uint64_t numberOf(const CellFace& face) const;
-  void noteFolds(std::span<const uint64_t> faces);
+  void noteSet(std::span<const uint64_t> faces);
 
   struct Block {
     std::array<uint64_t, 3> cells;
@@ -77,7 +77,7 @@ class AbuttingFaces {
   };
   std::vector<Block> blocks_;
   int coordinate_bytes_;
-  SeamMerger centres_;
+  RecordSorter centres_;
   std::vector<bool> abutting_, folded_;  // [face at a block's end]
   std::vector<uint64_t> sides_;          // the first face of every side
 };

@@ -1,6 +1,7 @@
 // The means of a cell that is merged of its parts, corrected for how the scalars bend between them.
 #pragma once
 
+#include <algorithm>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -17,6 +18,11 @@ class BendOfParts {
  public:
   explicit BendOfParts(size_t variables) : sums_(variables) {}
 
+  void clear() {
+    weight_ = 0;
+    middle_ = glm::dvec3(0.0);
+    std::fill(sums_.begin(), sums_.end(), Sums());
+  }
   /// `offset`: of the part's middle, from any point that is common to all.
   void add(const Splat& splat, const glm::dvec3& offset, std::span<const SplatScalar> values);
   void correct(std::span<SplatScalar> merged) const;

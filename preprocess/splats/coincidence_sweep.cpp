@@ -1,6 +1,7 @@
 #include "preprocess/splats/coincidence_sweep.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -18,21 +19,21 @@ const glm::dvec3 kAcross =
 
 /// How far from a node another may lie that is the same point. Half the spacing would let two neighbours meet
 /// at a third node between them.
-double toleranceOf(const NodeSplat& node, int coordinate_bytes) {
-  const double rounding = coordinateRounding(node.node_position, coordinate_bytes);
+double toleranceOf(const SweptNode& node, int coordinate_bytes) {
+  const double rounding = coordinateRounding(node.position, coordinate_bytes);
   return std::max(1e-3 * node.spacing, std::min(rounding, 0.4 * node.spacing));
 }
 
 /// What rounding may do to `along` and `across`.
-double slackOf(const NodeSplat& node) {
-  const glm::dvec3 size = glm::abs(node.node_position);
+double slackOf(const SweptNode& node) {
+  const glm::dvec3 size = glm::abs(node.position);
   return 4 * std::numeric_limits<double>::epsilon() * (size.x + size.y + size.z);
 }
 
 }  // namespace
 
-SeamNode seamNodeOf(const NodeSplat& splat) {
-  return {glm::dot(kAlong, splat.node_position), glm::dot(kAcross, splat.node_position), splat};
+SeamPosition seamPosition(const glm::dvec3& position) {
+  return {glm::dot(kAlong, position), glm::dot(kAcross, position)};
 }
 
 double coordinateRounding(const glm::dvec3& position, int coordinate_bytes) {
@@ -40,32 +41,46 @@ double coordinateRounding(const glm::dvec3& position, int coordinate_bytes) {
   const double largest = std::max({size.x, size.y, size.z});
   const int digits =
       coordinate_bytes == 4 ? std::numeric_limits<float>::digits : std::numeric_limits<double>::digits;
+  // Computes the exponent's bits: std::ilogb() and std::ldexp() are slow.
+  constexpr int kMantissaBits = 52;
+  const uint64_t power = std::bit_cast<uint64_t>(largest) >> kMantissaBits;
+  if (power > static_cast<uint64_t>(digits) && std::isfinite(largest))
+    return 4 * std::bit_cast<double>((power - static_cast<uint64_t>(digits - 1)) << kMantissaBits);
   return largest > 0 ? std::ldexp(4.0, std::ilogb(largest) - (digits - 1)) : 0.0;
 }
 
-CoincidenceSweep::CoincidenceSweep(int coordinate_bytes, UnlikeHalves unlike, Sink sink)
-    : coordinate_bytes_(coordinate_bytes), unlike_(unlike), sink_(std::move(sink)) {}
+CoincidenceSweep::CoincidenceSweep(int coordinate_bytes, Sink sink)
+    : coordinate_bytes_(coordinate_bytes), sink_(std::move(sink)) {}
 
-void CoincidenceSweep::add(const SeamNode& node, std::span<const SplatScalar> values) {
-  release(node.along);
-  const double tolerance = toleranceOf(node.splat, coordinate_bytes_);
+size_t CoincidenceSweep::add(const SweptNode& node) {
+  release(node.sweep.along);
+  const double tolerance = toleranceOf(node, coordinate_bytes_);
   auto cluster = find(node, tolerance);
   if (cluster == clusters_.end()) {
-    cluster =
-        clusters_.emplace(node.across, Cluster{node.splat.node_position, tolerance, JointNodes(unlike_)});
-    leaving_.push({node.along + tolerance + slackOf(node.splat), sequence_++, cluster});
+    cluster = newCluster(node, tolerance);
+    leaving_.push({node.sweep.along + tolerance + slackOf(node), sequence_++, cluster});
   }
-  cluster->second.nodes.add(node.splat, values);
+  return cluster->second.set;
+}
+
+CoincidenceSweep::Clusters::iterator CoincidenceSweep::newCluster(const SweptNode& node, double tolerance) {
+  if (unused_.empty())
+    return clusters_.emplace(node.sweep.across, Cluster{node.position, tolerance, sets_++});
+  Clusters::node_type cluster = std::move(unused_.back());
+  unused_.pop_back();
+  cluster.key() = node.sweep.across;
+  cluster.mapped() = {node.position, tolerance, cluster.mapped().set};
+  return clusters_.insert(std::move(cluster));
 }
 
 /// The cluster of the nearest leader that is within the tolerance of both.
-CoincidenceSweep::Clusters::iterator CoincidenceSweep::find(const SeamNode& node, double tolerance) {
-  const double reach = tolerance + slackOf(node.splat);
+CoincidenceSweep::Clusters::iterator CoincidenceSweep::find(const SweptNode& node, double tolerance) {
+  const double reach = tolerance + slackOf(node);
   auto nearest = clusters_.end();
   double nearest_distance = tolerance;
-  for (auto at = clusters_.lower_bound(node.across - reach);
-       at != clusters_.end() && at->first <= node.across + reach; ++at) {
-    const double distance = glm::distance(at->second.leader, node.splat.node_position);
+  for (auto at = clusters_.lower_bound(node.sweep.across - reach);
+       at != clusters_.end() && at->first <= node.sweep.across + reach; ++at) {
+    const double distance = glm::distance(at->second.leader, node.position);
     if (distance > at->second.tolerance || distance > nearest_distance) continue;
     if (distance == nearest_distance && nearest != clusters_.end()) continue;
     nearest = at;
@@ -79,8 +94,8 @@ void CoincidenceSweep::release(double before) {
   while (!leaving_.empty() && leaving_.top().after < before) {
     const auto at = leaving_.top().cluster;
     leaving_.pop();
-    sink_(at->second.nodes);
-    clusters_.erase(at);
+    sink_(at->second.set);
+    unused_.push_back(clusters_.extract(at));
   }
 }
 

@@ -2,46 +2,57 @@
 // their positions along it, so those that can still coincide with others are a narrow window.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <glm/vec3.hpp>
 #include <map>
 #include <queue>
-#include <span>
-
-#include "preprocess/splats/joint_nodes.h"
-#include "preprocess/splats/seam_sorter.h"
+#include <vector>
 
 namespace curvisplat {
 
-/// A node with its position along the sweep's directions.
-SeamNode seamNodeOf(const NodeSplat& splat);
+/// A node's position along the sweep's directions.
+struct SeamPosition {
+  double along = 0, across = 0;
+};
+SeamPosition seamPosition(const glm::dvec3& position);
 
 /// What rounding may have done to a coordinate, in world units: 4 units in the last place of the largest, as
 /// stored in `coordinate_bytes`.
 double coordinateRounding(const glm::dvec3& position, int coordinate_bytes);
 
+/// What decides whether a node coincides with others.
+struct SweptNode {
+  SeamPosition sweep;
+  glm::dvec3 position{0.0};
+  double spacing = 0;  // NodeSplat's
+};
+
 /// Not for several threads at once.
 class CoincidenceSweep {
  public:
-  using Sink = std::function<void(JointNodes&)>;
+  /// Gets the number of a set.
+  using Sink = std::function<void(size_t)>;
 
   /// `sink` gets each set of nodes that coincide once no other node can join it. Two nodes coincide if
   /// they lie within the tolerance of both: 1e-3 of the node's spacing, or the rounding of its coordinates (4
   /// units in the last place, for coordinates of `coordinate_bytes` bytes) but then at most 0.4 of its spacing,
   /// so that neighbours along a grid line never coincide, however thin the boundary layer, unless they are one
   /// point.
-  CoincidenceSweep(int coordinate_bytes, UnlikeHalves unlike, Sink sink);
+  CoincidenceSweep(int coordinate_bytes, Sink sink);
 
-  /// In rising order of `along`.
-  void add(const SeamNode& node, std::span<const SplatScalar> values);
+  /// In rising order of `along`. Returns the number of the node's set, counted from 0. Numbers of sets that the sink has had
+  /// are used again.
+  size_t add(const SweptNode& node);
   /// Gives out all sets that are left.
   void finish();
 
  private:
   struct Cluster {
-    glm::dvec3 leader;  // position of the first node, which the others coincide with
-    double tolerance;
-    JointNodes nodes;
+    glm::dvec3 leader{0.0};  // position of the first node, which the others coincide with
+    double tolerance = 0;
+    size_t set = 0;
   };
   using Clusters = std::multimap<double, Cluster>;  // by `across` of the leader
 
@@ -54,13 +65,15 @@ class CoincidenceSweep {
     }
   };
 
-  Clusters::iterator find(const SeamNode& node, double tolerance);
+  Clusters::iterator find(const SweptNode& node, double tolerance);
+  Clusters::iterator newCluster(const SweptNode& node, double tolerance);
   void release(double before);
 
   const int coordinate_bytes_;
-  const UnlikeHalves unlike_;
   const Sink sink_;
   Clusters clusters_;
+  std::vector<Clusters::node_type> unused_;  // of clusters that have left, with their sets' numbers
+  size_t sets_ = 0;
   std::priority_queue<Leaving> leaving_;
   uint64_t sequence_ = 0;
 };

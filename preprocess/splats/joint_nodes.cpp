@@ -56,13 +56,13 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
 
 /// The group of each part, numbered by its first part: parts on two sides of an unlike joint are in two. All zero if no
 /// joint is unlike.
-std::vector<size_t> groupsAtJoints(std::span<const SplatWithValues> parts) {
+std::vector<size_t> groupsAtJoints(std::span<const NodeSplat> parts) {
   std::vector<size_t> group(parts.size());
   std::iota(group.begin(), group.end(), size_t{0});
   bool any_unlike = false;
   for (size_t a = 0; a < parts.size(); ++a)
     for (size_t b = a + 1; b < parts.size(); ++b) {
-      const Neighbourhood lie = neighbourhood(parts[a].splat, parts[b].splat);
+      const Neighbourhood lie = neighbourhood(parts[a], parts[b]);
       any_unlike |= lie == Neighbourhood::kUnlike;
       if (lie == Neighbourhood::kUnlike || lie == Neighbourhood::kDiagonal) continue;
       const size_t to = std::min(group[a], group[b]), from = std::max(group[a], group[b]);
@@ -88,12 +88,16 @@ void goOnBehind(std::span<const NodeSplat* const> parts, std::span<const JointSi
 
 }  // namespace
 
-MergedParts::MergedParts(const NodeSplat& first, std::span<const SplatScalar> values,
-                         std::span<const JointSide> sides)
-    : origin_(first.node_position),
-      lowest_{first, {values.begin(), values.end()}},
-      merger_(values.size()),
-      bend_(values.size()) {
+void MergedParts::begin(const NodeSplat& first, std::span<const SplatScalar> values,
+                        std::span<const JointSide> sides) {
+  origin_ = first.node_position;
+  lowest_.splat = first;
+  lowest_.values.assign(values.begin(), values.end());
+  merger_.clear();
+  bend_.clear();
+  borders_.clear();
+  sides_.clear();
+  nodes_.clear();
   add(first, values, sides);
 }
 
@@ -101,10 +105,10 @@ void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values
                       std::span<const JointSide> sides) {
   nodes_.push_back(part.node);
   Splat half = part.splat;
-  std::vector<SplatScalar> of_half(values.begin(), values.end());
-  if (!sides.empty()) unstretchHalves(part, sides, half, of_half);
-  merger_.add(half.position, half, of_half);
-  bend_.add(half, half.position - origin_, of_half);
+  values_of_half_.assign(values.begin(), values.end());
+  if (!sides.empty()) unstretchHalves(part, sides, half, values_of_half_);
+  merger_.add(half.position, half, values_of_half_);
+  bend_.add(half, half.position - origin_, values_of_half_);
   borders_.add(part.splat, part.border_code);
   if (part.node > lowest_.splat.node) return;
   lowest_.splat = part;
@@ -141,67 +145,92 @@ SplatWithValues MergedParts::finish() const {
 
 void JointNodes::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
   if (splat.behind_face) {
-    behind_.push_back({splat, {values.begin(), values.end()}});
-  } else if (merged_) {
-    merged_->add(splat, values, {});
+    behind_.add(splat, values);
+  } else if (all_merged_) {
+    groups_.front().add(splat, values, {});
   } else {
-    parts_.push_back({splat, {values.begin(), values.end()}});
+    parts_.add(splat, values);
     if (parts_.size() > kMaxParts) mergeAll();
   }
 }
 
+MergedParts& JointNodes::nextGroup() {
+  if (group_count_ == groups_.size()) groups_.emplace_back(variables_);
+  return groups_[group_count_++];
+}
+
 void JointNodes::mergeAll() {
-  merged_.emplace(parts_[0].splat, parts_[0].values, std::span<const JointSide>());
-  for (size_t n = 1; n < parts_.size(); ++n) merged_->add(parts_[n].splat, parts_[n].values, {});
+  MergedParts& merged = nextGroup();
+  merged.begin(parts_.splat(0), parts_.values(0), {});
+  for (size_t n = 1; n < parts_.size(); ++n) merged.add(parts_.splat(n), parts_.values(n), {});
   parts_.clear();
+  all_merged_ = true;
 }
 
 /// `sides`: by part.
-std::vector<MergedParts> JointNodes::groups(std::span<const size_t> group,
-                                            std::span<const JointSide> sides) const {
-  std::vector<MergedParts> groups;
-  std::vector<size_t> place(parts_.size());  // in `groups`, of the group that begins with a part
+void JointNodes::mergeGroups(std::span<const size_t> group, std::span<const JointSide> sides) {
+  std::vector<size_t> place(parts_.size());  // in `groups_`, of the group that begins with a part
   for (size_t n = 0; n < parts_.size(); ++n) {
-    const SplatWithValues& part = parts_[n];
     const auto of_part =
         std::equal_range(sides.begin(), sides.end(), JointSide{n},
                          [](const JointSide& a, const JointSide& b) { return a.part < b.part; });
     const std::span<const JointSide> own(of_part.first, of_part.second);
     if (group[n] == n) {
-      place[n] = groups.size();
-      groups.emplace_back(part.splat, part.values, own);
+      place[n] = group_count_;
+      nextGroup().begin(parts_.splat(n), parts_.values(n), own);
     } else {
-      groups[place[group[n]]].add(part.splat, part.values, own);
+      groups_[place[group[n]]].add(parts_.splat(n), parts_.values(n), own);
     }
   }
-  return groups;
 }
 
 void JointNodes::finish(const Sink& sink) {
-  std::vector<const NodeSplat*> parts;
-  for (const SplatWithValues& part : parts_) parts.push_back(&part.splat);
-  std::vector<size_t> group(parts_.size(), 0);
-  if (unlike_ == UnlikeHalves::kApart) group = groupsAtJoints(parts_);
-  const std::vector<JointSide> sides = sidesOf(parts, group);
-  std::vector<SplatWithValues> merged;
-  const auto give = [&](const MergedParts& of) {
-    merged.push_back(of.finish());
-    sink(merged.back().splat, merged.back().values, of.nodes());
-  };
-  if (merged_)
-    give(*merged_);
-  else
-    for (const MergedParts& of : groups(group, sides)) give(of);
+  if (!all_merged_ && parts_.size() == 1) {
+    // Most points have one part, which stays as it is.
+    const uint64_t node = parts_.splat(0).node;
+    sink(parts_.splat(0), parts_.values(0), {&node, 1});
+    if (behind_.size() > 0) {
+      faces_.push_back(parts_.splat(0));
+      const NodeSplat* const part = &faces_.front();
+      finishBehind({&part, 1}, {}, sink);
+    }
+  } else {
+    finishSeveral(sink);
+  }
+  parts_.clear();
+  behind_.clear();
+  faces_.clear();
+  all_merged_ = false;
+  group_count_ = 0;
+}
 
-  for (SplatWithValues& behind : behind_) {
-    const bool open = std::any_of(merged.begin(), merged.end(), [&](const SplatWithValues& face) {
-      return isOpen(face.splat.splat, face.splat.border_code, behind.splat.splat);
+void JointNodes::finishSeveral(const Sink& sink) {
+  std::vector<const NodeSplat*> parts;
+  for (const NodeSplat& part : parts_.splats()) parts.push_back(&part);
+  std::vector<size_t> group(parts_.size(), 0);
+  if (unlike_ == UnlikeHalves::kApart) group = groupsAtJoints(parts_.splats());
+  const std::vector<JointSide> sides = sidesOf(parts, group);
+  if (!all_merged_) mergeGroups(group, sides);
+  for (size_t n = 0; n < group_count_; ++n) {
+    const SplatWithValues merged = groups_[n].finish();
+    faces_.push_back(merged.splat);
+    sink(merged.splat, merged.values, groups_[n].nodes());
+  }
+  finishBehind(parts, sides, sink);
+}
+
+void JointNodes::finishBehind(std::span<const NodeSplat* const> parts, std::span<const JointSide> sides,
+                              const Sink& sink) {
+  for (size_t n = 0; n < behind_.size(); ++n) {
+    NodeSplat& behind = behind_.splat(n);
+    const bool open = std::any_of(faces_.begin(), faces_.end(), [&](const NodeSplat& face) {
+      return isOpen(face.splat, face.border_code, behind.splat);
     });
     if (!open) {
-      behind.splat.border_code = kNoBorder;
-      goOnBehind(parts, sides, behind.splat, behind.values);
+      behind.border_code = kNoBorder;
+      goOnBehind(parts, sides, behind, behind_.values(n));
     }
-    sink(behind.splat, behind.values, {});
+    sink(behind, behind_.values(n), {});
   }
 }
 

@@ -10,7 +10,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -39,11 +38,38 @@ struct SplatWithValues {
   std::vector<SplatScalar> values;
 };
 
-/// Some of the nodes at one point as one splat.
+/// Splats and their values, in two arrays.
+class SplatList {
+ public:
+  explicit SplatList(size_t variables) : variables_(variables) {}
+
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values) {
+    splats_.push_back(splat);
+    values_.insert(values_.end(), values.begin(), values.end());
+  }
+  /// Keeps its memory.
+  void clear() {
+    splats_.clear();
+    values_.clear();
+  }
+  size_t size() const { return splats_.size(); }
+  NodeSplat& splat(size_t n) { return splats_[n]; }
+  std::span<const NodeSplat> splats() const { return splats_; }
+  std::span<SplatScalar> values(size_t n) { return std::span(values_).subspan(n * variables_, variables_); }
+
+ private:
+  size_t variables_;
+  std::vector<NodeSplat> splats_;
+  std::vector<SplatScalar> values_;  // [splat][variable]
+};
+
+/// Some of the nodes at one point as one splat. Made once and used for many points, since its sums allocate.
 class MergedParts {
  public:
-  /// `sides`: those of a part.
-  MergedParts(const NodeSplat& first, std::span<const SplatScalar> values, std::span<const JointSide> sides);
+  explicit MergedParts(size_t variables) : merger_(variables), bend_(variables) {}
+
+  /// Forgets what it had. `sides`: those of the part.
+  void begin(const NodeSplat& first, std::span<const SplatScalar> values, std::span<const JointSide> sides);
   void add(const NodeSplat& part, std::span<const SplatScalar> values, std::span<const JointSide> sides);
   /// Its node (and node_position) is the lowest of the parts; regular is false unless there is only one, which
   /// comes out as it went in.
@@ -54,19 +80,21 @@ class MergedParts {
  private:
   std::vector<OpenBorders::Layer> layersOfLowest() const;
 
-  glm::dvec3 origin_;
+  glm::dvec3 origin_{0.0};
   SplatWithValues lowest_;
   SplatMerger merger_;
   BendOfParts bend_;
   OpenBorders borders_;
   std::vector<JointSide> sides_;  // of the lowest
   std::vector<uint64_t> nodes_;
+  std::vector<SplatScalar> values_of_half_;
 };
 
 /// Not for several threads at once. The sums depend on the order of adding.
 class JointNodes {
  public:
-  explicit JointNodes(UnlikeHalves unlike) : unlike_(unlike) {}
+  JointNodes(UnlikeHalves unlike, size_t variables)
+      : variables_(variables), unlike_(unlike), parts_(variables), behind_(variables) {}
 
   /// A node at the point, or one of the layer behind a face there, which loses its border code if that face is closed.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
@@ -74,16 +102,25 @@ class JointNodes {
   /// Gets a splat and the nodes that it is merged of; none of the layer behind.
   using Sink =
       std::function<void(const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes)>;
+  /// Then forgets the nodes.
   void finish(const Sink& sink);
 
  private:
   void mergeAll();
-  std::vector<MergedParts> groups(std::span<const size_t> group, std::span<const JointSide> sides) const;
+  MergedParts& nextGroup();
+  void mergeGroups(std::span<const size_t> group, std::span<const JointSide> sides);
+  void finishSeveral(const Sink& sink);
+  void finishBehind(std::span<const NodeSplat* const> parts, std::span<const JointSide> sides,
+                    const Sink& sink);
 
+  size_t variables_;
   UnlikeHalves unlike_;
-  std::vector<SplatWithValues> parts_;
-  std::optional<MergedParts> merged_;  // in place of parts_, if there are many
-  std::vector<SplatWithValues> behind_;
+  SplatList parts_;
+  bool all_merged_ = false;          // in the first group, in place of parts_, if there are many
+  std::vector<MergedParts> groups_;  // the first group_count_ of them are in use
+  size_t group_count_ = 0;
+  SplatList behind_;
+  std::vector<NodeSplat> faces_;  // what the parts have become
 };
 
 }  // namespace curvisplat

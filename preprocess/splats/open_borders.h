@@ -19,6 +19,10 @@ bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind);
 
 class OpenBorders {
  public:
+  void clear() {
+    inward_.clear();
+    parts_ = 0;
+  }
   void add(const Splat& part, uint32_t border_code);
   /// The half cell of `merged`, the parts' splat. A direction inwards is closed by another part's opposite
   /// one, and several parts' similar ones are one, with a face to be cut at if all have; angles are measured

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -20,45 +19,51 @@ constexpr uint64_t kWaitingShare = 8;  // of the memory: of the splats that wait
 class WaitingSplats {
  public:
   WaitingSplats(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder)
-      : sorter_(variables, memory_bytes, std::move(temporary_folder)) {}
+      : variables_(variables), sorter_(variables, memory_bytes, std::move(temporary_folder)) {}
 
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) {
-    sorter_.add({static_cast<double>(splat.node), 0, splat}, values);
+    sorter_.add({static_cast<double>(splat.node), 0}, splat, values);
   }
 
   /// Gives out all splats, without the layers behind seams.
   void finish(const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
-    std::optional<SplatWithValues> waiting;
+    SplatWithValues waiting;
+    NodeSplat probe;
+    waiting.values.resize(variables_);
+    bool any = false;
     uint64_t node = 0;
     uint32_t seams = 0;  // bit n: across axis n of the lattice
     std::array<JointLine, 3> joined{};
     const auto release = [&] {
-      if (waiting) {
-        NodeSplat& splat = waiting->splat;
+      if (any) {
+        NodeSplat& splat = waiting.splat;
         const LayeredBorder left = withoutSeams({splat.border_code, splat.layers}, seams);
         splat.border_code = left.code;
         splat.layers = left.layers;
         for (size_t axis = 0; axis < joined.size(); ++axis)
-          if ((seams >> axis & 1) != 0) goOnAcross(axis, joined[axis], splat, waiting->values);
-        sink(splat, waiting->values);
+          if ((seams >> axis & 1) != 0) goOnAcross(axis, joined[axis], splat, waiting.values);
+        sink(splat, waiting.values);
       }
-      waiting.reset();
+      any = false;
       seams = 0;
     };
-    sorter_.drain([&](const SeamNode& next, std::span<const SplatScalar> values) {
-      if (next.splat.node != node) release();
-      node = next.splat.node;
-      if (next.splat.is_probe) {
-        seams |= 1u << next.splat.layers;
-        joined[next.splat.layers] = next.splat.lines[next.splat.layers];
+    sorter_.drain([&](const SeamRecord& next) {
+      if (next.node() != node) release();
+      node = next.node();
+      next.unpack(probe, {});
+      if (probe.is_probe) {
+        seams |= 1u << probe.layers;
+        joined[probe.layers] = probe.lines[probe.layers];
       } else {
-        waiting = SplatWithValues{next.splat, {values.begin(), values.end()}};
+        next.unpack(waiting.splat, waiting.values);
+        any = true;
       }
     });
     release();
   }
 
  private:
+  const size_t variables_;
   SeamSorter sorter_;
 };
 
@@ -66,11 +71,13 @@ class WaitingSplats {
 
 struct SeamMerger::State {
   UnlikeHalves unlike;
+  size_t variables;
   SeamSorter sorter;
   WaitingSplats waiting;
 
-  State(size_t variables, uint64_t memory_bytes, const std::filesystem::path& folder, UnlikeHalves how)
+  State(size_t variable_count, uint64_t memory_bytes, const std::filesystem::path& folder, UnlikeHalves how)
       : unlike(how),
+        variables(variable_count),
         sorter(variables, memory_bytes - memory_bytes / kWaitingShare, folder),
         waiting(variables, memory_bytes / kWaitingShare, folder) {}
 
@@ -84,12 +91,16 @@ struct SeamMerger::State {
         sink(splat, values, nodes);
       }
     };
-    CoincidenceSweep sweep(coordinate_bytes, unlike, [&](JointNodes& joint) { joint.finish(sink_or_wait); });
-    sorter.drain([&](const SeamNode& node, std::span<const SplatScalar> values) {
-      if (node.splat.on_block_face || node.splat.behind_face)
-        sweep.add(node, values);
-      else
-        waiting.add(node.splat, values);
+    std::vector<JointNodes> sets;
+    CoincidenceSweep sweep(coordinate_bytes, [&](size_t set) { sets[set].finish(sink_or_wait); });
+    NodeSplat splat;
+    std::vector<SplatScalar> values(variables);
+    sorter.drain([&](const SeamRecord& node) {
+      node.unpack(splat, values);
+      if (!splat.on_block_face && !splat.behind_face) return waiting.add(splat, values);
+      const size_t set = sweep.add(node.swept());
+      if (set == sets.size()) sets.emplace_back(unlike, variables);
+      sets[set].add(splat, values);
     });
     sweep.finish();
   }
@@ -103,7 +114,7 @@ SeamMerger::SeamMerger(SeamMerger&&) noexcept = default;
 SeamMerger& SeamMerger::operator=(SeamMerger&&) noexcept = default;
 
 void SeamMerger::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
-  state_->sorter.add(seamNodeOf(splat), values);
+  state_->sorter.add(seamPosition(splat.node_position), splat, values);
 }
 
 void SeamMerger::add(const NodeSplats& splats, size_t variables) {

@@ -98,7 +98,7 @@ TEST(AbuttingFaces, TakeABitAndADiskRecordEach) {
   const std::vector<GridBlock> blocks{gridBlock(21, 31, 11), gridBlock(6, 31, 11), gridBlock(5, 1, 9)};
   const uint64_t faces = 2 * (20 * 30 + 20 * 10 + 30 * 10) + 2 * (5 * 30 + 5 * 10 + 30 * 10) + 2 * (4 * 8);
   EXPECT_EQ(AbuttingFaces::needsOf(blocks).memory_bytes, faces / 8);
-  EXPECT_EQ(AbuttingFaces::needsOf(blocks).disk_bytes, faces * 192);
+  EXPECT_EQ(AbuttingFaces::needsOf(blocks).disk_bytes, faces * 56);
 }
 
 TEST(AbuttingFaces, AreThoseOfCellsThatAreThere) {

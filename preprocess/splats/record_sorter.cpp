@@ -1,0 +1,186 @@
+#include "preprocess/splats/record_sorter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+#include <span>
+#include <utility>
+
+#include "stream/base/huge_pages.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMaxReadBytes = 1 << 20;  // of a run at a time
+constexpr size_t kWriteSize = 32 << 10;      // doubles
+constexpr size_t kRecordsAhead = 12;         // to prefetch
+constexpr size_t kEntriesOfBucket = 8;  // on average; a bucket takes a size_t, so an entry takes another byte
+constexpr size_t kFewEntries = 1024;    // sorted without buckets
+constexpr size_t kCacheLineDoubles = 8;
+
+void prefetch(const double* record, size_t size) {
+  for (size_t n = 0; n < size; n += kCacheLineDoubles) __builtin_prefetch(record + n);
+  __builtin_prefetch(record + size - 1);
+}
+
+/// Reads a run from the file, a buffer of whole records at a time.
+class RunReader {
+ public:
+  RunReader(const InputFile& file, uint64_t begin, uint64_t end, size_t record_size, size_t buffer_records)
+      : file_(&file),
+        next_(begin),
+        end_(end),
+        record_size_(record_size),
+        size_(std::min<uint64_t>(buffer_records * record_size, (end - begin) / sizeof(double))),
+        buffer_(std::make_unique_for_overwrite<double[]>(size_)) {
+    fill();
+  }
+
+  bool done() const { return filled_ == 0; }
+  const double* record() const { return buffer_.get() + at_; }
+  void advance() {
+    at_ += record_size_;
+    if (at_ == filled_) fill();
+  }
+
+ private:
+  void fill() {
+    at_ = 0;
+    filled_ = static_cast<size_t>(std::min<uint64_t>(size_, (end_ - next_) / sizeof(double)));
+    file_->readAt(next_, std::span(buffer_.get(), filled_));
+    next_ += filled_ * sizeof(double);
+  }
+
+  const InputFile* file_;
+  uint64_t next_, end_;        // bytes of the file
+  size_t record_size_, size_;  // in doubles
+  std::unique_ptr<double[]> buffer_;
+  size_t at_ = 0, filled_ = 0;
+};
+
+}  // namespace
+
+RecordSorter::RecordSorter(size_t record_size, uint64_t memory_bytes, std::filesystem::path temporary_folder)
+    : record_size_(record_size),
+      memory_bytes_(memory_bytes),
+      capacity_(std::max<uint64_t>(1, memory_bytes / (record_size * sizeof(double) + 2 * sizeof(Entry) + 1))),
+      folder_(std::move(temporary_folder)) {}
+
+double* RecordSorter::add(double along, double across, uint64_t number) {
+  if (entries_.size() == capacity_) spill();
+  if (!records_) {
+    // All at once: growing would hold the old and the new. Pages that are never touched cost nothing.
+    entries_.reserve(capacity_);
+    records_ = std::make_unique_for_overwrite<double[]>(capacity_ * record_size_);
+    preferHugePages(records_.get(), capacity_ * record_size_ * sizeof(double));
+  }
+  double* const record = records_.get() + entries_.size() * record_size_;
+  entries_.push_back({along, entries_.size()});
+  record[0] = along;
+  record[1] = across;
+  record[2] = std::bit_cast<double>(number);
+  return record;
+}
+
+/// Distributes entries over buckets of equal width, then sorts each bucket: quick where positions are spread more or less evenly.
+void RecordSorter::sortEntries() {
+  const auto is_before = [this](const Entry& a, const Entry& b) { return isBefore(a, b); };
+  if (entries_.size() < kFewEntries) return std::sort(entries_.begin(), entries_.end(), is_before);
+  const auto [least, most] = std::minmax_element(
+      entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.along < b.along; });
+  const double lower = least->along, width = most->along - lower;
+  const auto buckets = static_cast<uint32_t>(std::min<size_t>(entries_.size() / kEntriesOfBucket, 1u << 24));
+  const double scale = buckets / width;
+  if (!(std::isfinite(width) && scale < 1e300)) return std::sort(entries_.begin(), entries_.end(), is_before);
+  const auto bucketOf = [&](const Entry& entry) {
+    return std::min(static_cast<uint32_t>((entry.along - lower) * scale), buckets - 1);
+  };
+  std::vector<size_t> begins(buckets + size_t{1});
+  for (const Entry& entry : entries_) ++begins[bucketOf(entry) + size_t{1}];
+  for (size_t n = 1; n < begins.size(); ++n) begins[n] += begins[n - 1];
+  sorted_.reserve(entries_.capacity());
+  sorted_.resize(entries_.size());
+  for (const Entry& entry : entries_) sorted_[begins[bucketOf(entry)]++] = entry;
+  size_t begin = 0;
+  for (uint32_t bucket = 0; bucket < buckets; ++bucket) {
+    const size_t end = begins[bucket];
+    std::sort(sorted_.begin() + static_cast<ptrdiff_t>(begin), sorted_.begin() + static_cast<ptrdiff_t>(end),
+              is_before);
+    begin = end;
+  }
+  entries_.swap(sorted_);
+}
+
+void RecordSorter::forEachInMemory(const Visit& visit) {
+  sortEntries();
+  for (size_t n = 0; n < entries_.size(); ++n) {
+    if (n + kRecordsAhead < entries_.size()) prefetch(record(entries_[n + kRecordsAhead]), record_size_);
+    visit(record(entries_[n]));
+  }
+  entries_.clear();
+}
+
+void RecordSorter::spill() {
+  if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
+  OutputFile& out = file_->out();
+  const uint64_t begin = out.size();
+  std::vector<double> block;
+  forEachInMemory([&](const double* record) {
+    block.insert(block.end(), record, record + record_size_);
+    if (block.size() < kWriteSize) return;
+    out.append(std::span<const double>(block));
+    block.clear();
+  });
+  out.append(std::span<const double>(block));
+  runs_.push_back({begin, out.size()});
+}
+
+void RecordSorter::drain(const Visit& visit) {
+  if (!runs_.empty()) return drainRuns(visit);
+  forEachInMemory(visit);
+  forget();
+}
+
+void RecordSorter::forget() {
+  entries_ = std::vector<Entry>();
+  sorted_ = std::vector<Entry>();
+  records_.reset();
+}
+
+void RecordSorter::drainRuns(const Visit& visit) {
+  if (!entries_.empty()) spill();
+  forget();
+
+  const size_t buffer_bytes = std::min(kMaxReadBytes, memory_bytes_ / runs_.size());
+  const size_t buffer_records = std::max<uint64_t>(1, buffer_bytes / (record_size_ * sizeof(double)));
+  std::vector<RunReader> readers;
+  for (const Run& run : runs_)
+    readers.emplace_back(file_->in(), run.begin, run.end, record_size_, buffer_records);
+
+  struct Head {
+    double along;
+    uint64_t number;
+    size_t run;
+  };
+  const auto later = [](const Head& a, const Head& b) {
+    return a.along != b.along ? a.along > b.along : a.number > b.number;
+  };
+  std::priority_queue<Head, std::vector<Head>, decltype(later)> heads(later);
+  const auto push_head = [&](size_t run) {
+    if (readers[run].done()) return;
+    const double* record = readers[run].record();
+    heads.push({alongOf(record), numberOf(record), run});
+  };
+  for (size_t run = 0; run < readers.size(); ++run) push_head(run);
+  while (!heads.empty()) {
+    const size_t run = heads.top().run;
+    heads.pop();
+    visit(readers[run].record());
+    readers[run].advance();
+    push_head(run);
+  }
+  runs_.clear();
+  file_.reset();
+}
+
+}  // namespace curvisplat

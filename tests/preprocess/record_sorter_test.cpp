@@ -1,0 +1,97 @@
+#include "preprocess/splats/record_sorter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <numeric>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kSize = 5;  // of a record: the last two are made of its number
+constexpr size_t kCount = 5000;
+
+class RecordSorterTest : public testing::Test {
+ protected:
+  /// Adds records at these positions, in an order without order, and expects them in the right one.
+  void expectSorted(const std::vector<double>& along, uint64_t memory_bytes) const {
+    std::vector<std::pair<double, uint64_t>> expected;
+    for (size_t n = 0; n < along.size(); ++n) expected.emplace_back(along[n], n);
+    std::vector<std::pair<double, uint64_t>> added = expected;
+    std::shuffle(added.begin(), added.end(), std::mt19937(1));
+    std::sort(expected.begin(), expected.end());
+
+    RecordSorter sorter(kSize, memory_bytes, folder_.path());
+    for (const auto& [position, number] : added) {
+      double* const record = sorter.add(position, -position, number);
+      record[3] = static_cast<double>(number) + 0.5;
+      record[4] = static_cast<double>(number) * 3;
+    }
+    size_t next = 0;
+    sorter.drain([&](const double* record) {
+      ASSERT_LT(next, expected.size());
+      const auto& [position, number] = expected[next++];
+      ASSERT_EQ(RecordSorter::alongOf(record), position);
+      ASSERT_EQ(RecordSorter::acrossOf(record), -position);
+      ASSERT_EQ(RecordSorter::numberOf(record), number);
+      ASSERT_EQ(record[3], static_cast<double>(number) + 0.5);
+      ASSERT_EQ(record[4], static_cast<double>(number) * 3);
+    });
+    EXPECT_EQ(next, expected.size());
+    sorter.drain([](const double*) { FAIL() << "a record that was forgotten"; });
+  }
+
+  const TemporaryFolder folder_;
+};
+
+/// Positions by what is unusual about them.
+std::map<std::string, std::vector<double>> positions() {
+  std::map<std::string, std::vector<double>> all;
+  const auto add = [&](const char* name, const std::function<double(double)>& at) {
+    std::vector<double>& made = all[name];
+    for (size_t n = 0; n < kCount; ++n) made.push_back(at(static_cast<double>(n)));
+  };
+  add("evenly spread", [](double n) { return 0.37 * std::fmod(n * 377, kCount) - 100; });
+  add("equal", [](double) { return 2.5; });
+  add("few different", [](double n) { return std::fmod(n, 3); });
+  add("at one end", [](double n) { return n == 0 ? -1e9 : 1e-3 * n; });
+  add("growing", [](double n) { return std::exp(0.2 * n - 500); });
+  add("nearly equal", [](double n) { return 1 + n * 0x1p-52; });
+  add("subnormal", [](double n) { return n * 0x1p-1070; });
+  add("as far apart as can be", [](double n) { return std::fmod(n, 2) == 0 ? -1.7e308 : 1.7e308; });
+  return all;
+}
+
+TEST_F(RecordSorterTest, SortsInMemory) {
+  for (const auto& [name, along] : positions()) {
+    SCOPED_TRACE(name);
+    expectSorted(along, 1 << 20);
+  }
+}
+
+TEST_F(RecordSorterTest, SortsInRunsOnDisk) {
+  for (const auto& [name, along] : positions()) {
+    SCOPED_TRACE(name);
+    expectSorted(along, 100'000);
+    expectSorted(along, 3000);
+  }
+}
+
+TEST_F(RecordSorterTest, SortsFewAndNone) {
+  expectSorted({}, 1 << 20);
+  expectSorted({1}, 1 << 20);
+  expectSorted({3, 1, 2, 1, 3}, 1);
+}
+
+}  // namespace
+}  // namespace curvisplat
