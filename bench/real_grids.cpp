@@ -95,9 +95,9 @@ struct Ripple {
 };
 
 double decibels(double square_sum, size_t pixels) {
-  constexpr double kMost = 99;
-  if (square_sum == 0 || pixels == 0) return kMost;
-  return std::min(kMost, -10 * std::log10(square_sum / static_cast<double>(pixels)));
+  constexpr double kMax = 99;
+  if (square_sum == 0 || pixels == 0) return kMax;
+  return std::min(kMax, -10 * std::log10(square_sum / static_cast<double>(pixels)));
 }
 
 /// Of two pictures of a uniform medium, black over white.

@@ -44,13 +44,13 @@ VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
     plane.point /= plane.area;
   }
   std::array<VoxelPlanes::Plane, kMaxDirections> kept;
-  auto end = count > VoxelPlanes::kMost
+  auto end = count > VoxelPlanes::kMax
                  ? std::copy_if(all.begin(), all.end(), kept.begin(),
                                 [&](const VoxelPlanes::Plane& plane) { return !isClosed(plane, all); })
                  : std::copy(all.begin(), all.end(), kept.begin());
-  if (end - kept.begin() > static_cast<ptrdiff_t>(VoxelPlanes::kMost)) {
+  if (end - kept.begin() > static_cast<ptrdiff_t>(VoxelPlanes::kMax)) {
     std::stable_sort(kept.begin(), end, [](const auto& a, const auto& b) { return a.area > b.area; });
-    end = kept.begin() + VoxelPlanes::kMost;
+    end = kept.begin() + VoxelPlanes::kMax;
   }
   VoxelPlanes found;
   found.count =

@@ -106,8 +106,8 @@ std::optional<CellTree::Holder> CellTree::in(size_t cell, const glm::dvec3& poin
   for (const glm::dvec3& corner : corners) box.add(corner);
   if (!box.holds(point)) return std::nullopt;
   const std::optional<glm::dvec3> u = locateInHexahedron(corners, point);
-  constexpr double kMost = 1 + kOnFace;
-  if (!u || std::abs(u->x) > kMost || std::abs(u->y) > kMost || std::abs(u->z) > kMost) return std::nullopt;
+  constexpr double kMax = 1 + kOnFace;
+  if (!u || std::abs(u->x) > kMax || std::abs(u->y) > kMax || std::abs(u->z) > kMax) return std::nullopt;
   return Holder{cell, *u};
 }
 

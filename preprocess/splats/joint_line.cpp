@@ -7,10 +7,10 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMost = 127;
+constexpr double kMax = 127;
 
 int8_t rounded(double x) {
-  return static_cast<int8_t>(std::clamp(std::round(x), -kMost, kMost));
+  return static_cast<int8_t>(std::clamp(std::round(x), -kMax, kMax));
 }
 
 bool isUsable(double x) {
@@ -29,7 +29,7 @@ int8_t roundedLogarithm(double squared_ratio, double step, const Ratio& ratio) {
     const double shifted = steps + (kMaxSteps + 0.5);
     const int nearest = static_cast<int>(shifted);
     if (const double part = shifted - nearest; part > kClose && part < 1 - kClose) {
-      constexpr int kMaxRounded = static_cast<int>(kMost);
+      constexpr int kMaxRounded = static_cast<int>(kMax);
       return static_cast<int8_t>(std::clamp(nearest - kMaxSteps, -kMaxRounded, kMaxRounded));
     }
   }
@@ -77,7 +77,7 @@ glm::dvec3 JointLine::inward() const {
 }
 
 void JointLine::setInward(const glm::dvec3& unit_vector) {
-  for (int n = 0; n < 3; ++n) inward_[static_cast<size_t>(n)] = rounded(kMost * unit_vector[n]);
+  for (int n = 0; n < 3; ++n) inward_[static_cast<size_t>(n)] = rounded(kMax * unit_vector[n]);
 }
 
 }  // namespace curvisplat

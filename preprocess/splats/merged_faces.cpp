@@ -50,7 +50,7 @@ void MergedFaces::add(size_t voxel, const glm::dvec3& position, const Splat& spl
     for (uint32_t n = first_[voxel]; n != kNone && !sums; n = sums_[n].next, ++count)
       if (glm::dot(sums_[n].inward, normal) > kSimilar * glm::length(sums_[n].inward)) sums = &sums_[n];
     if (!sums) {
-      if (count == VoxelPlanes::kMost) continue;
+      if (count == VoxelPlanes::kMax) continue;
       sums = &sums_.emplace_back();
       sums->next = first_[voxel];
       first_[voxel] = static_cast<uint32_t>(sums_.size() - 1);
@@ -85,7 +85,7 @@ uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position,
     double distance, area, ratio;
     bool touched;
   };
-  std::array<Face, VoxelPlanes::kMost> faces;
+  std::array<Face, VoxelPlanes::kMax> faces;
   size_t count = 0;
   for (size_t n = 0; n < planes.count; ++n) {
     const auto& plane = planes.planes[n];

@@ -17,14 +17,14 @@ namespace curvisplat {
 
 /// Planes of one voxel; normals are unit vectors from the border inwards.
 struct VoxelPlanes {
-  static constexpr size_t kMost = 4;
+  static constexpr size_t kMax = 4;
   struct Plane {
     glm::dvec3 inward, point;
     double area;      // of the cross-sections of the splats that touch it
     double thickest;  // of these splats, across the plane
     bool face;        // to be cut at
   };
-  std::array<Plane, kMost> planes;
+  std::array<Plane, kMax> planes;
   size_t count = 0;
 };
 
@@ -39,7 +39,7 @@ class MergedFaces {
 
   /// As VoxelMerger::add(). Sums depend on the order of the calls.
   void add(size_t voxel, const glm::dvec3& position, const Splat& splat, uint32_t border_code);
-  /// Similar ones of its splats as one; beyond the first VoxelPlanes::kMost they are left out.
+  /// Similar ones of its splats as one; beyond the first VoxelPlanes::kMax they are left out.
   VoxelPlanes of(size_t voxel) const;
 
  private:

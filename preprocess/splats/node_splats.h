@@ -72,12 +72,12 @@ uint32_t borderCode(const std::array<double, 3>& inwards, bool faces, const Rota
 /// The growth code of a cell that grows by `growth` along i, j and k. `rotate` gives Q's image of a vector.
 template <typename Rotate>
 uint32_t growthCode(const std::array<float, 3>& growth, const Rotate& rotate) {
-  constexpr float kLeast = 1.0f / 64;  // less becomes none
-  if (std::max({std::abs(growth[0]), std::abs(growth[1]), std::abs(growth[2])}) < kLeast) return kNoGrowth;
+  constexpr float kMin = 1.0f / 64;  // less becomes none
+  if (std::max({std::abs(growth[0]), std::abs(growth[1]), std::abs(growth[2])}) < kMin) return kNoGrowth;
   const glm::dmat3 axes(1.0);
   std::array<glm::dvec3, 3> rotated{};
   for (int axis = 0; axis < 3; ++axis)
-    if (!(std::abs(growth[axis]) < kLeast)) rotated[axis] = rotate(axes[axis]);
+    if (!(std::abs(growth[axis]) < kMin)) rotated[axis] = rotate(axes[axis]);
   return packGrowthCode(rotated, {growth[0], growth[1], growth[2]});
 }
 

@@ -10,8 +10,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kAlong = 0.7;       // cosine of directions that are about the same
-constexpr double kLeast = 1.0 / 64;  // less growth becomes none
+constexpr double kAlong = 0.7;     // cosine of directions that are about the same
+constexpr double kMin = 1.0 / 64;  // less growth becomes none
 
 /// Changes A to A M, and shifts the splat, both in its frame. Returns the rotation from the old frame's directions to the new one's.
 glm::dmat3 change(const glm::dmat3& m, const glm::dvec3& shift, Splat& splat, std::span<SplatScalar> values) {
@@ -50,7 +50,7 @@ void GrownAxes::add(const glm::dvec3& axis, double growth) {
   glm::dvec3 left = axis;
   for (size_t n = 0; n < count_; ++n) left -= glm::dot(left, axes_[n]) * axes_[n];
   const double length = glm::length(left);
-  if (count_ == axes_.size() || std::abs(growth) < kLeast || !(length > kAlong)) return;
+  if (count_ == axes_.size() || std::abs(growth) < kMin || !(length > kAlong)) return;
   axes_[count_] = left / length;
   growth_[count_++] = growth;
 }

@@ -192,8 +192,8 @@ MeanExtinction::MeanExtinction(const ClassificationTable& table)
 }
 
 double MeanExtinction::inCells(double scalar) const {
-  constexpr double kLeast = ClassificationTable::kMinLogarithmic;
-  return scale_ * (log_scale_ ? std::log(std::max(scalar, kLeast)) : scalar) + bias_;
+  constexpr double kMin = ClassificationTable::kMinLogarithmic;
+  return scale_ * (log_scale_ ? std::log(std::max(scalar, kMin)) : scalar) + bias_;
 }
 
 }  // namespace curvisplat

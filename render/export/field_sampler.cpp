@@ -117,7 +117,7 @@ class Sums {
     double ratio;
     glm::dvec3 slope{0.0};
     double mean = 0;
-    std::array<Face, CutFaces::kMost> faces = {};
+    std::array<Face, CutFaces::kMax> faces = {};
     int face_count = 0;
   };
   struct Sum {

@@ -112,8 +112,8 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
   size_t taken = 0, given = 0;
   // zlib counts in 32 bits.
   while (true) {
-    constexpr size_t kMost = size_t{1} << 30;
-    const size_t in = std::min(bytes.size() - taken, kMost), room = std::min(out.size() - given, kMost);
+    constexpr size_t kMax = size_t{1} << 30;
+    const size_t in = std::min(bytes.size() - taken, kMax), room = std::min(out.size() - given, kMax);
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data() + taken));
     stream.avail_in = static_cast<uInt>(in);
     stream.avail_out = static_cast<uInt>(room);

@@ -27,16 +27,16 @@ struct CutFace {
 };
 /// The borders of a cell, and clip planes.
 struct CutFaces {
-  static constexpr int kMost = 6;
+  static constexpr int kMax = 6;
 
-  std::array<CutFace, kMost> face;
+  std::array<CutFace, kMax> face;
   int count = 0;
 
   const CutFace* begin() const { return face.data(); }
   const CutFace* end() const { return face.data() + count; }
-  /// In the place of the face that takes the least, where there are kMost.
+  /// In the place of the face that takes the least, where there are kMax.
   void add(const CutFace& added) {
-    if (count < kMost) {
+    if (count < kMax) {
       face[static_cast<size_t>(count++)] = added;
       return;
     }

@@ -20,8 +20,8 @@ ColourTable::ColourTable(const TransferFunction& function) : log_scale_(function
 }
 
 glm::vec4 ColourTable::valueAt(double scalar) const {
-  constexpr double kLeast = 1e-300;
-  const double v = log_scale_ ? std::log(std::max(scalar, kLeast)) : scalar;
+  constexpr double kMin = 1e-300;
+  const double v = log_scale_ ? std::log(std::max(scalar, kMin)) : scalar;
   const double x = std::clamp((v - low_) * scale_, 0.0, double{kCells});
   const int cell = std::min(static_cast<int>(x), kCells - 1);
   return glm::mix(values_[static_cast<size_t>(cell)], values_[static_cast<size_t>(cell) + 1],

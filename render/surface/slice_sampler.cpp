@@ -14,7 +14,7 @@ constexpr double kFixed = 4294967296.0;  // of the sums
 // How much of a splat's own gradient counts. Of 1, 0.9 and 0.5 this is best on merged levels, whose means are
 // over their cells.
 constexpr double kOwn = 0.9;
-constexpr double kMost = 1e5;          // pixels, or ranges of the scalar a pixel
+constexpr double kMax = 1e5;           // pixels, or ranges of the scalar a pixel
 constexpr double kMaxRatio = 1000;     // of V to √det S: beyond it a splat is degenerate
 constexpr double kSeenAtLeast = 1e-6;  // of the plane's normal along a ray
 // Inside the data the weights add up to 1, to within a tenth; at an end without a face to half of that.
@@ -213,8 +213,8 @@ void SliceSampler::addPiece(const glm::dvec3& cell_min, const SplatPiece& piece)
             weight * std::clamp((double{piece.mean} + own_ * change - low_) * per_range_, -1.0, 2.0));
       for (int axis = 0; axis < 3; ++axis) {
         const auto n = static_cast<size_t>(axis);
-        addTo(sums->moved[n], weight * std::clamp(moved[axis], -kMost, kMost));
-        addTo(sums->gradient[n], weight * std::clamp(gradient[axis], -kMost, kMost));
+        addTo(sums->moved[n], weight * std::clamp(moved[axis], -kMax, kMax));
+        addTo(sums->gradient[n], weight * std::clamp(gradient[axis], -kMax, kMax));
       }
       if (inside < 1) addTo(sums->outside, weight * (1 - inside));
       touched = true;

@@ -13,8 +13,8 @@ float blended(float earlier, float later, double part) {
 
 /// For lengths of vectors whose components are rounded each.
 float roundedUp(float value) {
-  constexpr float kMost = std::numeric_limits<float>::infinity();
-  return value > 0 ? std::nextafter(std::nextafter(value, kMost), kMost) : value;
+  constexpr float kMax = std::numeric_limits<float>::infinity();
+  return value > 0 ? std::nextafter(std::nextafter(value, kMax), kMax) : value;
 }
 
 }  // namespace

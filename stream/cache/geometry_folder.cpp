@@ -19,12 +19,12 @@ namespace fs = std::filesystem;
 
 /// The paths of the caches in the folder of one that is missing, as that is written.
 std::vector<std::string> cachesBeside(const fs::path& cache) {
-  constexpr size_t kMost = 1000;
+  constexpr size_t kMax = 1000;
   std::vector<std::string> caches;
   std::error_code error;
   const fs::path folder = cache.parent_path();
   for (fs::directory_iterator at(folder.empty() ? "." : folder, error), end;
-       !error && at != end && caches.size() < kMost; at.increment(error))
+       !error && at != end && caches.size() < kMax; at.increment(error))
     if (at->path().extension() == ".splats") caches.push_back((folder / at->path().filename()).string());
   return caches;
 }

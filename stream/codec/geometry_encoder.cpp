@@ -158,7 +158,7 @@ class GeometryEncoder {
   /// The logarithm of what the decoded volumes lack for the weights to have the right sum. Cells that are all alike, or all a little
   /// longer than their weight, are rounded in one direction; the rounding of a brick would not average out.
   double missingVolume() const {
-    constexpr double kMost = 0.25 * kVolumeStep;  // of shapes, which have a bound to keep
+    constexpr double kMax = 0.25 * kVolumeStep;  // of shapes, which have a bound to keep
     double exact = 0, decoded = 0;
     for (size_t n = 0; n < count_; ++n) {
       const double weight = brick_.splats[n].weight, volume = decoded_.axis[2][n];
@@ -167,7 +167,7 @@ class GeometryEncoder {
       decoded += std::abs(weight - volume) < 0.5 * kWeightStep * volume ? volume : weight;
     }
     const double ratio = exact / decoded;
-    return ratio > 0 && std::isfinite(ratio) ? std::clamp(std::log(ratio), -kMost, kMost) : 0.0;
+    return ratio > 0 && std::isfinite(ratio) ? std::clamp(std::log(ratio), -kMax, kMax) : 0.0;
   }
 
   template <typename StepOf, typename Target>

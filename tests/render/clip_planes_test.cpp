@@ -112,7 +112,7 @@ TEST(ClipPlanes, KeepTheFacesThatTakeMost) {
   CutFaces faces;
   for (const float distance : {0.5f, -0.25f, 1.0f, 0.75f, 0.0f, 0.3f, -0.5f, 1.25f})
     faces.add({{1, 0, 0}, distance});
-  ASSERT_EQ(faces.count, CutFaces::kMost);
+  ASSERT_EQ(faces.count, CutFaces::kMax);
   std::vector<float> kept;
   for (const CutFace& face : faces) kept.push_back(face.distance);
   std::sort(kept.begin(), kept.end());

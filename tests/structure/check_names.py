@@ -26,7 +26,7 @@ CONSTEXPR = re.compile(r"^[ \t]*(?:(?:static|inline|thread_local|HWY_MAYBE_UNUSE
 CONST = re.compile(r"^(?:(?:static|inline)\s+)*const\s+" + DECLARED, re.M)
 
 UPPER_CAMEL = re.compile(r"[A-Z][A-Za-z0-9]*")
-CONSTANT = re.compile(r"k(?!(?:Most|Least)[A-Z])[A-Z0-9][A-Za-z0-9]*")
+CONSTANT = re.compile(r"k(?!(?:Most|Least)(?![a-z]))[A-Z0-9][A-Za-z0-9]*")
 
 
 NAMESPACE = re.compile(r"^namespace ([\w:]+) \{")

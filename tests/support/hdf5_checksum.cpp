@@ -40,8 +40,8 @@ uint32_t hdf5Checksum(std::string_view bytes) {
 }
 
 bool renewChecksum(std::string_view whole, size_t begin, std::string& changed) {
-  constexpr size_t kLeast = 8, kMost = 4096;
-  for (size_t bytes = kLeast; bytes < kMost && begin + bytes + sizeof(uint32_t) <= whole.size(); ++bytes) {
+  constexpr size_t kMin = 8, kMax = 4096;
+  for (size_t bytes = kMin; bytes < kMax && begin + bytes + sizeof(uint32_t) <= whole.size(); ++bytes) {
     uint32_t stored = 0;
     std::memcpy(&stored, whole.data() + begin + bytes, sizeof stored);
     if (stored != hdf5Checksum(whole.substr(begin, bytes))) continue;

@@ -177,8 +177,8 @@ void EditedFunction::setColours(const std::string& preset) {
 }
 
 void EditedFunction::thinColours() {
-  constexpr size_t kMost = 12, kThinned = 9;
-  if (definition_.colours.size() <= kMost) return;
+  constexpr size_t kMax = 12, kThinned = 9;
+  if (definition_.colours.size() <= kMax) return;
   std::vector<ColourPoint> thinned;
   for (size_t n = 0; n < kThinned; ++n) {
     const double x = static_cast<double>(n) / (kThinned - 1);

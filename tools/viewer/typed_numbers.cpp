@@ -9,12 +9,12 @@
 
 namespace curvisplat {
 
-std::optional<std::array<double, TypedNumbers::kMost>> TypedNumbers::draw(const char* label,
-                                                                          std::span<const double> values,
-                                                                          const char* format) {
-  CURVISPLAT_CHECK_OP(values.size(), <=, kMost);
+std::optional<std::array<double, TypedNumbers::kMax>> TypedNumbers::draw(const char* label,
+                                                                         std::span<const double> values,
+                                                                         const char* format) {
+  CURVISPLAT_CHECK_OP(values.size(), <=, kMax);
   const ImGuiID id = ImGui::GetID(label);
-  std::array<double, kMost> numbers = typed_;
+  std::array<double, kMax> numbers = typed_;
   if (field_ != id) std::ranges::copy(values, numbers.begin());
   if (ImGui::InputScalarN(label, ImGuiDataType_Double, numbers.data(), static_cast<int>(values.size()),
                           nullptr, nullptr, format, ImGuiInputTextFlags_CharsScientific)) {

@@ -60,11 +60,11 @@ class Words {
     return static_cast<uint64_t>(value);
   }
   std::string text() {
-    constexpr size_t kMost = 1 << 20;
+    constexpr size_t kMax = 1 << 20;
     std::string text;
     for (int32_t c = integer(); c != 0; c = integer()) {
       text += static_cast<char>(c & 0xff);
-      if (text.size() > kMost)
+      if (text.size() > kMax)
         throw Error("{}: byte {}: a text does not end; the file is damaged", name(), offset_);
     }
     return text;

@@ -90,9 +90,9 @@ void addArrays(const VtkXmlFile& file, const Node& data, const Owner& owner, Vtk
 
 /// An attribute that counts points or cells.
 uint64_t countIn(const VtkXmlFile& file, const Node& piece, const char* attribute) {
-  constexpr double kMost = 1e14;
+  constexpr double kMax = 1e14;
   const double count = file.numbers(piece, attribute, 1)[0];
-  if (!(count >= 0) || count > kMost || count != std::trunc(count))
+  if (!(count >= 0) || count > kMax || count != std::trunc(count))
     file.fail(fmt::format("has {} {}; expected a count", attribute, count));
   return static_cast<uint64_t>(count);
 }

@@ -28,11 +28,11 @@ class BinaryValues final : public XdmfValues {
   int valueBytes() const override { return binary_.kind == 'f' && binary_.bytes == 4 ? 4 : 8; }
 
   void read(uint64_t first, std::span<double> to) const override {
-    constexpr size_t kMost = 32 << 10;
+    constexpr size_t kMax = 32 << 10;
     const auto width = static_cast<size_t>(binary_.bytes);
-    std::vector<std::byte> bytes(std::min(to.size(), kMost) * width);
-    for (size_t done = 0; done < to.size(); done += kMost) {
-      const std::span<double> part = to.subspan(done, std::min(kMost, to.size() - done));
+    std::vector<std::byte> bytes(std::min(to.size(), kMax) * width);
+    for (size_t done = 0; done < to.size(); done += kMax) {
+      const std::span<double> part = to.subspan(done, std::min(kMax, to.size() - done));
       binary_.file->readAt(binary_.seek + (first + done) * width,
                            std::span(bytes).first(part.size() * width));
       convert(bytes.data(), part);
