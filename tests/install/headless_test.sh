@@ -16,10 +16,10 @@ case "$*" in *imgui* | *cairo*) exit 1 ;; esac
 exec pkg-config "$@"
 END
 chmod +x "$folder/pkg-config"
-without=(-DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON -DPKG_CONFIG_EXECUTABLE="$folder/pkg-config" -DCURVISPLAT_TESTS=OFF)
-parts=(-DCURVISPLAT_WINDOW=OFF -DCURVISPLAT_ANNOTATIONS=OFF -DCURVISPLAT_SERVER=OFF)
+without=(-DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON -DPKG_CONFIG_EXECUTABLE="$folder/pkg-config")
 
-quietly cmake -G Ninja -S "$root" -B "$folder/build" "${without[@]}" "${parts[@]}" -DCURVISPLAT_THROUGHPUT=OFF
+unset CURVISPLAT_UNITY CURVISPLAT_PRECOMPILE  # targets of single sources are built below
+quietly cmake --preset headless -S "$root" -B "$folder/build" "${without[@]}"
 tools=tools/CMakeFiles/curvisplat.dir
 quietly cmake --build "$folder/build" --target \
   $tools/viewer/window_left_out.cpp.o $tools/commands/{view,serve,bench}_left_out.cpp.o \
