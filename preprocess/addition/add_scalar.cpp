@@ -222,6 +222,7 @@ class Addition {
   }
 
   void finish() {
+    progress_.throwIfStopped();     // the last moment: a rank without work of its own does not look before
     if (ranks_) ranks_->barrier();  // where another has failed, the cache stays as it is
     if (isFirst())
       for (const FileInfo& file : writer_->finish(description_.files))
