@@ -1,12 +1,15 @@
 #include "render/automatic/first_choice.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
 #include <numeric>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "render/automatic/opacity_rule.h"
@@ -27,13 +30,44 @@ constexpr int kRangeDigits = 3, kUnitDigits = 3, kPlaceDigits = 4;
 constexpr const char* kSequential = "viridis";
 constexpr const char* kDiverging = "cool-warm-extended";
 
-/// The coordinate below which `part` of the weights lie.
-double weightedPercentile(std::vector<std::pair<double, double>>& weighted, double total, double part) {
-  double sum = 0;
-  for (const auto& [coordinate, weight] : weighted)
-    if ((sum += weight) >= part * total) return coordinate;
-  return weighted.back().first;
-}
+/// Numbers with weights, in bins by their size: a percentile sorts those of one bin alone.
+class WeightedBins {
+ public:
+  WeightedBins(std::vector<double> numbers, std::span<const double> weights)
+      : numbers_(std::move(numbers)), weights_(weights) {
+    const auto [least, most] = std::minmax_element(numbers_.begin(), numbers_.end());
+    low_ = *least;
+    high_ = *most;
+    for (size_t n = 0; n < numbers_.size(); ++n) sums_[binOf(numbers_[n])] += weights_[n];
+  }
+
+  double low() const { return low_; }
+  double high() const { return high_; }
+  /// The number below which `part` of the weights lie.
+  double percentile(double part) const {
+    double left = part * std::accumulate(sums_.begin(), sums_.end(), 0.0);
+    size_t bin = 0;
+    while (bin + 1 < sums_.size() && sums_[bin] < left) left -= sums_[bin++];
+    std::vector<std::pair<double, double>> weighted;
+    for (size_t n = 0; n < numbers_.size(); ++n)
+      if (binOf(numbers_[n]) == bin) weighted.emplace_back(numbers_[n], weights_[n]);
+    std::sort(weighted.begin(), weighted.end());
+    for (const auto& [number, weight] : weighted)
+      if ((left -= weight) <= 0) return number;
+    return weighted.empty() ? high_ : weighted.back().first;
+  }
+
+ private:
+  size_t binOf(double number) const {
+    const double place = (number - low_) / (high_ - low_) * static_cast<double>(sums_.size());
+    return place < static_cast<double>(sums_.size()) ? static_cast<size_t>(place) : sums_.size() - 1;
+  }
+
+  std::vector<double> numbers_;
+  std::span<const double> weights_;
+  double low_ = 0, high_ = 0;
+  std::array<double, 1024> sums_{};
+};
 
 }  // namespace
 
@@ -134,20 +168,17 @@ ViewChoice FirstChoice::view(const TransferFunction& function, ImageSize size) c
     total += weights[n];
   }
   if (!(total > 0)) return choice;
-  glm::dvec2 from, to;
-  std::vector<std::pair<double, double>> weighted(samples_.size());
+  glm::dvec2 from, to, lowest, highest;
   for (int axis = 0; axis < 2; ++axis) {
-    for (size_t n = 0; n < samples_.size(); ++n) weighted[n] = {places[n][axis], weights[n]};
-    std::sort(weighted.begin(), weighted.end());
-    from[axis] = weightedPercentile(weighted, total, kUnseenPart);
-    to[axis] = weightedPercentile(weighted, total, 1 - kUnseenPart);
+    std::vector<double> along(samples_.size());
+    for (size_t n = 0; n < samples_.size(); ++n) along[n] = places[n][axis];
+    const WeightedBins bins(std::move(along), weights);
+    from[axis] = bins.percentile(kUnseenPart);
+    to[axis] = bins.percentile(1 - kUnseenPart);
+    lowest[axis] = bins.low();
+    highest[axis] = bins.high();
   }
   const double aspect = static_cast<double>(size.width) / size.height;
-  glm::dvec2 lowest = places.front(), highest = places.front();
-  for (const glm::dvec2& place : places) {
-    lowest = glm::min(lowest, place);
-    highest = glm::max(highest, place);
-  }
   const auto halfHeight = [&](const glm::dvec2& a, const glm::dvec2& b, double margin) {
     return 0.5 * margin * std::max(b.y - a.y, (b.x - a.x) / aspect);
   };

@@ -1,8 +1,9 @@
 #include "render/automatic/value_distribution.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <numeric>
+#include <cstdint>
 
 #include "render/automatic/rounded.h"
 #include "stream/base/check.h"
@@ -30,19 +31,24 @@ std::array<double, VolumeHistogram::kBins> smooth(const std::array<double, Volum
   return result;
 }
 
+/// A number that is larger for a larger value.
+uint32_t sortable(float value) {
+  const auto bits = std::bit_cast<uint32_t>(value + 0.0f);  // -0 is 0
+  return bits >> 31 ? ~bits : bits | 0x80000000u;
+}
+
 }  // namespace
 
 ValueDistribution::ValueDistribution(const CoarseSamples& samples) {
   CURVISPLAT_CHECK(samples.size() > 0);
-  std::vector<uint32_t> order(samples.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return samples.values[a] != samples.values[b] ? samples.values[a] < samples.values[b] : a < b;
-  });
+  std::vector<uint64_t> order(samples.size());
+  for (size_t n = 0; n < order.size(); ++n) order[n] = uint64_t{sortable(samples.values[n])} << 32 | n;
+  std::sort(order.begin(), order.end());
   values_.reserve(order.size());
   cumulative_.reserve(order.size());
   double sum = 0;
-  for (const uint32_t n : order) {
+  for (const uint64_t key : order) {
+    const auto n = static_cast<uint32_t>(key);
     values_.push_back(samples.values[n]);
     cumulative_.push_back(sum += samples.volumes[n]);
   }
