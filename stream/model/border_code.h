@@ -4,7 +4,7 @@
 //
 // The directions are unit vectors in the frame of the splat's A (A q is from the border inwards, as long as
 // the cell is in that direction) and at right angles to one another, since J = A Q with Q orthogonal. They
-// are kept as a rotation, good to 0.01 in the cell's own measure whatever its aspect ratio, and each has a
+// are kept as a rotation, good to 0.006 (0.02 at the most) in the cell's own measure whatever its aspect ratio, and each has a
 // bit that says how the renderer is to draw it: in parts, or cut at the border's face.
 //
 //   bits 0-1   number of directions
