@@ -93,26 +93,10 @@ AbuttingFaces::Centre AbuttingFaces::centreOf(const CellFace& face,
   Centre centre;
   centre.face = numberOf(face);
   std::array<double, 3> widths{};
-  switch (2 * face.axis + face.upper) {
-    case 0:
-      measureFace<1, 0>(corners, centre.at, widths);
-      break;
-    case 1:
-      measureFace<1, 1>(corners, centre.at, widths);
-      break;
-    case 2:
-      measureFace<2, 0>(corners, centre.at, widths);
-      break;
-    case 3:
-      measureFace<2, 2>(corners, centre.at, widths);
-      break;
-    case 4:
-      measureFace<4, 0>(corners, centre.at, widths);
-      break;
-    default:
-      measureFace<4, 4>(corners, centre.at, widths);
-      break;
-  }
+  constexpr decltype(&measureFace<1, 0>) kMeasureSide[] = {measureFace<1, 0>, measureFace<1, 1>,
+                                                           measureFace<2, 0>, measureFace<2, 2>,
+                                                           measureFace<4, 0>, measureFace<4, 4>};
+  kMeasureSide[2 * face.axis + face.upper](corners, centre.at, widths);
   const double rounding = coordinateRounding(centre.at, coordinate_bytes_);
   // It is as far to the centre of another face as across this one, or through the cell.
   centre.spacing = std::numeric_limits<double>::infinity();
