@@ -5,7 +5,8 @@
 
 A page without a browser turns the camera by a degree a request, as a dragged mouse does, and reports each picture as soon as it
 is there (or `--delay-ms` later: a slow line), as often as a screen of 240 Hz shows. Prints pictures a second, the server's
-processor time for each, and their bytes, after a second of adaptation. Processor time tells versions apart on a machine with other work; pictures a second do not.
+processor time for each, and their bytes, after a second of adaptation. Processor time tells versions apart on a machine with
+other work; pictures a second do not.
 """
 import argparse
 import json

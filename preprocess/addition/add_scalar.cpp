@@ -112,8 +112,7 @@ class Addition {
       if (manifest().overlap == kOverlapOwner)
         throw Error(
             "{}: its blocks overlap, and older scalars have no values at some of its samples; convert again "
-            "with "
-            "all scalars",
+            "with all scalars",
             cache_.path().string());
       // Older scalars have blanked nodes that the grid does not: only the cache knows them.
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
@@ -160,8 +159,8 @@ class Addition {
                    : survey_.blanked.by_grid != manifest().blanked_nodes)
       throw Error(
           "{}: {} samples were blanked when it was made, and this grid blanks {}; it is not the one the "
-          "cache was "
-          "made from, or scalars were missing at nodes where blocks meet: convert again with all scalars",
+          "cache was made from, or scalars were missing at nodes where blocks meet: convert again with all "
+          "scalars",
           cache_.path().string(), manifest().blanked_nodes, survey_.blanked.by_grid);
     if (missing > 0)
       throw Error(

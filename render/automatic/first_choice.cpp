@@ -33,8 +33,9 @@ constexpr const char* kDiverging = "cool-warm-extended";
 /// Numbers with weights, in bins by their size: a percentile sorts those of one bin alone.
 class WeightedBins {
  public:
-  WeightedBins(std::vector<double> numbers, std::span<const double> weights)
-      : numbers_(std::move(numbers)), weights_(weights) {
+  /// Both must outlive it.
+  WeightedBins(std::span<const double> numbers, std::span<const double> weights)
+      : numbers_(numbers), weights_(weights) {
     const auto [least, most] = std::minmax_element(numbers_.begin(), numbers_.end());
     low_ = *least;
     high_ = *most;
@@ -63,8 +64,7 @@ class WeightedBins {
     return place < static_cast<double>(sums_.size()) ? static_cast<size_t>(place) : sums_.size() - 1;
   }
 
-  std::vector<double> numbers_;
-  std::span<const double> weights_;
+  std::span<const double> numbers_, weights_;
   double low_ = 0, high_ = 0;
   std::array<double, 1024> sums_{};
 };
@@ -159,20 +159,21 @@ ViewChoice FirstChoice::view(const TransferFunction& function, ImageSize size) c
   if (samples_.size() == 0) return choice;
   const Camera whole = Camera::named(choice.view, lower_, upper_, size, Projection::kOrthographic);
   const glm::dmat4 view_from_world = whole.viewFromWorld();
-  std::vector<glm::dvec2> places(samples_.size());
+  std::array<std::vector<double>, 2> places;  // along the picture's axes
+  for (std::vector<double>& along : places) along.resize(samples_.size());
   std::vector<double> weights(samples_.size());
   double total = 0;
   for (size_t n = 0; n < samples_.size(); ++n) {
-    places[n] = glm::dvec2(view_from_world * glm::dvec4(samples_.positions[n], 1));
+    const glm::dvec4 place = view_from_world * glm::dvec4(samples_.positions[n], 1);
+    places[0][n] = place.x;
+    places[1][n] = place.y;
     weights[n] = samples_.volumes[n] * function.at(samples_.values[n]).extinction;
     total += weights[n];
   }
   if (!(total > 0)) return choice;
   glm::dvec2 from, to, lowest, highest;
   for (int axis = 0; axis < 2; ++axis) {
-    std::vector<double> along(samples_.size());
-    for (size_t n = 0; n < samples_.size(); ++n) along[n] = places[n][axis];
-    const WeightedBins bins(std::move(along), weights);
+    const WeightedBins bins(places[static_cast<size_t>(axis)], weights);
     from[axis] = bins.percentile(kUnseenPart);
     to[axis] = bins.percentile(1 - kUnseenPart);
     lowest[axis] = bins.low();
