@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """early_signals_test.py CURVISPLAT
 
-Signals before there is anything to show: in the first tenth of a second of each command, and while `info` reads a sparse grid of
-192 GB, which shows how far it has come.
+Signals before there is anything to show: in the first 0.12 s of each command (some are done by then), and while `info` reads a
+sparse grid of 192 GB, which shows how far it has come.
 """
 import os
 import pathlib
@@ -75,7 +75,7 @@ class EarlySignals(unittest.TestCase):
                     ["info", "o.xyz", "o.fun"])
         ended_early = 0
         for command in commands:
-            for milliseconds in (0, 1, 2, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100):
+            for milliseconds in (0, 1, 2, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100, 110, 120):
                 for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
                     with self.subTest(" ".join(command), milliseconds=milliseconds, signal=number.name):
                         program = subprocess.Popen([PROGRAM, *command], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,

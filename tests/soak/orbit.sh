@@ -29,7 +29,7 @@ view=(--parallel-scale 0.3 --lod-pixels 2 --max-splats "$splats" --size "$pictur
 "$program" render "$cache" -o "$folder/frame_%04d.png" --position 4,4,3 --orbit 720 --frames "$frames" \
   "${view[@]}" --stats "$folder/stats.json" > "$folder/render.log" 2>&1 &
 pid=$!
-watch "$pid" "$folder/orbit.txt" "$interval_s"
+watch "$pid" "$folder/orbit.txt" "$interval_s" "$folder/frame_0000.png"
 if wait "$pid"; then cat "$folder/render.log"; else fail "render: $(cat "$folder/render.log")"; fi
 judge "$folder/orbit.txt" 4
 differing=0

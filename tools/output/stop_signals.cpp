@@ -1,15 +1,18 @@
 #include "tools/output/stop_signals.h"
 
+#include <signal.h>
+
 #include <atomic>
-#include <cstddef>
 
 namespace curvisplat {
 namespace {
 
 std::atomic<Progress*> job = nullptr;
-static_assert(std::atomic<Progress*>::is_always_lock_free);
+std::atomic<int> received = 0;  // the last signal; 0: none
+static_assert(std::atomic<Progress*>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
 
 void stopJob(int signal) {
+  received = signal;
   if (Progress* progress = job) progress->stop(signal);
 }
 
@@ -20,16 +23,15 @@ StopOnSignals::StopOnSignals(Progress& progress) {
   struct sigaction action {};
   action.sa_handler = stopJob;
   action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);
-  for (size_t n = 0; n < kSignals.size(); ++n) {
-    ::sigaction(kSignals[n], nullptr, &before_[n]);
-    if (before_[n].sa_handler != SIG_IGN) ::sigaction(kSignals[n], &action, nullptr);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    ::sigaction(signal, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) ::sigaction(signal, &action, nullptr);
   }
+  if (const int signal = received) progress.stop(signal);
 }
 
-StopOnSignals::~StopOnSignals() {
-  for (size_t n = 0; n < kSignals.size(); ++n) ::sigaction(kSignals[n], &before_[n], nullptr);
-  job = nullptr;
-}
+StopOnSignals::~StopOnSignals() { job = nullptr; }
 
 void ignoreFileSizeSignal() {
   struct sigaction action {};
