@@ -2,7 +2,10 @@
 // what the file has no room for.
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/support/damaged_files.h"
 #include "tests/support/earth_files.h"
 #include "tests/support/temporary_folder.h"
@@ -34,6 +37,26 @@ TEST_P(NetcdfDamage, FilesWithAWrongByteAreRefusedOrRead) {
   const DamageReport report = openCorrupted(path_, 1000, 23, open);
   EXPECT_EQ(harm("a wrong byte", report), "");
   EXPECT_GT(report.refused, 50);
+}
+
+TEST(ClassicNetcdfDamage, NamesThatAreTooLongAreRefused) {
+  // Of NetCDF's first version: no records, and one dimension with a name of 300 bytes and a length of 4.
+  std::string header("CDF\1\0\0\0\0\0\0\0\x0a\0\0\0\1\0\0\x01\x2c", 20);
+  header += std::string(300, 'n') + std::string("\0\0\0\4", 4) + std::string(16, '\0');
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "file.nc";
+  std::ofstream(path, std::ios::binary) << header;
+  try {
+    OpenGridOptions options;
+    options.grid = path;
+    openGrid(options);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              path.string() +
+                  ": its NetCDF header has a name longer than 256 characters before byte 20; "
+                  "the file is damaged: copy or write it again");
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, NetcdfDamage,

@@ -49,6 +49,13 @@ class NetcdfHostileAttributes : public ::testing::Test {
   std::filesystem::path path_ = folder_ / "grid.nc";
 };
 
+TEST_F(NetcdfHostileAttributes, NamesThatAreTooLongAreRefused) {
+  const std::filesystem::path file = copy();
+  Hdf5Editor(file).group("/" + std::string(300, 'n'));
+  EXPECT_EQ(errorOf(file),
+            file.string() + ": / has an object with a name of 300 bytes; NetCDF allows 256: rename it");
+}
+
 TEST_F(NetcdfHostileAttributes, AttributesThatLibrariesTrustAreChecked) {
   struct Case {
     const char *object, *attribute;

@@ -1,6 +1,7 @@
 #include "preprocess/formats/netcdf/netcdf4_structure.h"
 
 #include <fmt/format.h>
+#include <netcdf.h>
 
 #include <array>
 #include <exception>
@@ -89,6 +90,9 @@ class Walk {
       throw Error("{}: has more than {} objects, more than the file can hold; its links form a cycle",
                   path_.string(), most_);
     for (const std::string& name : names) {
+      if (name.size() > NC_MAX_NAME)
+        throw Error("{}: {} has an object with a name of {} bytes; NetCDF allows {}: rename it",
+                    path_.string(), place.empty() ? "/" : place, name.size(), NC_MAX_NAME);
       const Hdf5Object object(H5Oopen(group.id(), name.c_str(), H5P_DEFAULT));
       if (!object) continue;
       checkAttributes(object, place + "/" + name);

@@ -8,8 +8,9 @@
 //   scales      NAME                  one terminated string of fixed length
 //   root        _NCProperties         one string
 //
-// The lists of links and attributes are checked as hdf5_lists.h says. libnetcdf also follows links without recognising cycles. The walk therefore visits objects as it does and
-// limits their number to what the file can hold.
+// The lists of links and attributes are checked as hdf5_lists.h says. libnetcdf also copies longer names than it has
+// room for, without their end, and follows links without recognising cycles. The walk therefore visits objects as it
+// does and limits their number to what the file can hold.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,7 @@
 #include "preprocess/formats/netcdf/netcdf_classic.h"
 
+#include <netcdf.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -103,7 +105,12 @@ class Header {
   }
 
   uint64_t count() { return cursor_.number(count_bytes_); }
-  void skipName() { cursor_.skip(count()); }
+  void skipName() {
+    const uint64_t characters = count();
+    // The library copies longer ones beyond its callers' buffers.
+    if (characters > NC_MAX_NAME) cursor_.damaged("a name longer than 256 characters");
+    cursor_.skip(characters);
+  }
 
   /// The number of entries of a list; the list may be absent.
   uint64_t listed(uint64_t tag) {
