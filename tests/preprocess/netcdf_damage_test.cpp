@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "tests/support/damaged_files.h"
@@ -57,6 +58,23 @@ TEST(ClassicNetcdfDamage, NamesThatAreTooLongAreRefused) {
                   ": its NetCDF header has a name longer than 256 characters before byte 20; "
                   "the file is damaged: copy or write it again");
   }
+}
+
+TEST(ClassicNetcdfDamage, RecordsThatTheHeaderDoesNotCountAreCountedByTheFilesSize) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "file.nc";
+  roms::write(path, NetcdfFileType::kClassic, "ocean_s_coordinate_g2");
+  const auto records = [&] {
+    const NetcdfFile file(path);
+    for (const NetcdfDimension& dimension : file.dimensions())
+      if (dimension.unlimited) return dimension.length;
+    return uint64_t{0};
+  };
+  const uint64_t counted = records();
+  std::fstream(path, std::ios::binary | std::ios::in | std::ios::out).seekp(4) << "\xff\xff\xff\xff";
+  EXPECT_EQ(records(), counted);
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) - 8);
+  EXPECT_EQ(records(), counted - 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, NetcdfDamage,

@@ -74,23 +74,22 @@ class Header {
     count_bytes_ = version_ == 5 ? 8 : 4;
     offset_bytes_ = version_ == 1 ? 4 : 8;
     records_ = count();
-    // A file that is still being written has no record count yet.
-    if (records_ == (count_bytes_ == 4 ? 0xffffffffu : ~uint64_t{0})) records_ = 0;
+    const bool unknown = records_ == (count_bytes_ == 4 ? 0xffffffffu : ~uint64_t{0});
     for (uint64_t n = listed(0x0a); n > 0; --n) {
       skipName();
       dimensions_.push_back(count());
     }
     skipAttributes();
     for (uint64_t n = listed(0x0b); n > 0; --n) readVariable();
+    if (unknown) records_ = recordsIn(static_cast<double>(file.size()));
   }
+
+  uint64_t records() const { return records_; }
 
   /// The end of the last value.
   double bytes() const {
-    const auto in_records = [](const Variable& variable) { return variable.in_records; };
-    const bool one = std::count_if(variables_.begin(), variables_.end(), in_records) == 1;
-    double record = 0, end = 0;
-    for (const Variable& variable : variables_)
-      if (variable.in_records) record += one ? variable.record_bytes : padded(variable.record_bytes);
+    const double record = recordBytes();
+    double end = 0;
     for (const Variable& variable : variables_) {
       if (variable.in_records && records_ == 0) continue;
       const double before = variable.in_records ? static_cast<double>(records_ - 1) * record : 0;
@@ -102,6 +101,25 @@ class Header {
  private:
   static double padded(double bytes) {
     return static_cast<double>((static_cast<uint64_t>(std::min(bytes, 1e18)) + 3) / 4 * 4);
+  }
+
+  /// Of all variables together.
+  double recordBytes() const {
+    const auto in_records = [](const Variable& variable) { return variable.in_records; };
+    const bool one = std::count_if(variables_.begin(), variables_.end(), in_records) == 1;
+    double bytes = 0;
+    for (const Variable& variable : variables_)
+      if (variable.in_records) bytes += one ? variable.record_bytes : padded(variable.record_bytes);
+    return bytes;
+  }
+
+  /// Of a file that is still being written, whose header does not count them: those that are complete.
+  uint64_t recordsIn(double file_bytes) const {
+    double begin = file_bytes;  // of the first record
+    for (const Variable& variable : variables_)
+      if (variable.in_records) begin = std::min(begin, variable.begin);
+    const double record = recordBytes();
+    return record > 0 ? static_cast<uint64_t>(std::max(0.0, file_bytes - begin) / record) : 0;
   }
 
   uint64_t count() { return cursor_.number(count_bytes_); }
@@ -163,11 +181,13 @@ class Header {
 
 }  // namespace
 
-void checkClassicNetcdf(const InputFile& file) {
-  const double bytes = Header(file).bytes();
+uint64_t checkClassicNetcdf(const InputFile& file) {
+  const Header header(file);
+  const double bytes = header.bytes();
   if (bytes > static_cast<double>(file.size()))
     throw Error("{}: is truncated or damaged (found {} bytes, expected {:.0f}); copy or write it again",
                 file.path().string(), file.size(), bytes);
+  return header.records();
 }
 
 }  // namespace curvisplat

@@ -64,7 +64,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   std::array<char, 4> begin{};
   if (bytes >= begin.size()) file.readAt(0, std::span<char>(begin));
   if (isClassic({begin.data(), begin.size()}))
-    checkClassicNetcdf(file);
+    records_ = checkClassicNetcdf(file);
   else {
     tryHdf5(path, [&] { const NetcdfFile again(path); });
     plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
@@ -157,6 +157,7 @@ void NetcdfFile::readHeader() {
     char name[NC_MAX_NAME + 1] = {};
     size_t length = 0;
     if ((status = nc_inq_dim(file_, id, name, &length)) != NC_NOERR) fail("a dimension", status);
+    if (id == unlimited) length = records_.value_or(length);
     dimensions_[static_cast<size_t>(id)] = {name, length, id == unlimited};
   }
   for (int id = 0; id < variables; ++id) readVariable(id);

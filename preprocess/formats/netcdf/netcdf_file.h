@@ -90,6 +90,7 @@ class NetcdfFile {
   std::pair<uint64_t, int64_t> opened_as_;  // size, and time of the last change in nanoseconds
   std::string kind_;
   bool plain_hdf5_ = false;
+  std::optional<uint64_t> records_;  // of a classic file
   std::vector<NetcdfDimension> dimensions_;
   std::vector<NetcdfVariable> variables_;
   std::vector<std::string> groups_;
