@@ -2,6 +2,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 
 #include "preprocess/gather/streams_file.h"
 #include "stream/base/check.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -32,6 +34,40 @@ uint64_t cornersDrawn(const MeshCells& cells) {
 /// Where a corner wants its point.
 struct Reference {
   uint64_t point, slot;
+};
+
+/// Uses some cells in a task, while the caller gathers the next ones.
+class UsedBeside {
+ public:
+  explicit UsedBeside(const std::function<void(const GatheredCells&)>& use) : use_(&use) {}
+  ~UsedBeside() {
+    try {
+      task_.wait();
+    } catch (...) {  // another error is on its way
+    }
+  }
+  UsedBeside(const UsedBeside&) = delete;
+  UsedBeside& operator=(const UsedBeside&) = delete;
+
+  /// To be filled.
+  GatheredCells& next() { return cells_[next_]; }
+  /// next() is full. Waits until those before it have been used.
+  void use() {
+    task_.wait();
+    task_.run([this, full = next_] {
+      const TraceScope trace("use cells");
+      (*use_)(cells_[full]);
+    });
+    next_ = 1 - next_;
+  }
+  /// Waits for the last ones. Throws what `use` threw.
+  void finish() { task_.wait(); }
+
+ private:
+  const std::function<void(const GatheredCells&)>* use_;
+  std::array<GatheredCells, 2> cells_;
+  size_t next_ = 0;
+  tbb::task_group task_;
 };
 
 }  // namespace
@@ -141,9 +177,11 @@ void CornerGather::gatherInMemory(const std::function<void(const GatheredCells&)
       }
     });
   });
-  GatheredCells cells;
+  UsedBeside used(use);
   reader_->forEachCells([&](const LoadedCells& loaded) {
     for (size_t next = 0; next < loaded.cells.size();) {
+      const TraceScope trace("gather corners");
+      GatheredCells& cells = used.next();
       next = take(loaded, next, cells);
       inParts(cells.corners.size(), [&](size_t begin, size_t end) {
         for (size_t n = begin; n < end; ++n) {
@@ -153,10 +191,11 @@ void CornerGather::gatherInMemory(const std::function<void(const GatheredCells&)
         }
       });
       dropBlanked(cells);
-      use(cells);
+      used.use();
     }
     progress_->advance(loaded.range.count);
   });
+  used.finish();
 }
 
 void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&)>& use) {
@@ -222,6 +261,7 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
   }
   corners.close();
 
+  UsedBeside used(use);
   std::vector<std::byte> slots;
   for (size_t number = 0; number < groups.size(); ++number) {
     const Group& group = groups[number];
@@ -238,6 +278,8 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
     size_t slot = 0;
     reader_->forEachCells(group.ranges, [&](const LoadedCells& loaded) {
       for (size_t next = 0; next < loaded.cells.size();) {
+        const TraceScope trace("gather corners");
+        GatheredCells& cells = used.next();
         next = take(loaded, next, cells);
         for (size_t n = 0; n < cells.corners.size(); ++n, ++slot) {
           const std::byte* from = slots.data() + slot * point_bytes;
@@ -247,12 +289,13 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
                         corner_fields_ * sizeof(float));
         }
         dropBlanked(cells);
-        use(cells);
+        used.use();
       }
       progress_->advance(loaded.range.count);
     });
     CURVISPLAT_CHECK_OP(slot, ==, group.slots);
   }
+  used.finish();
 }
 
 }  // namespace curvisplat

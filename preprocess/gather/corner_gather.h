@@ -62,7 +62,8 @@ class CornerGather {
   CornerGather(const MeshReader& reader, const PointNumbers& numbers, uint64_t memory_bytes,
                std::filesystem::path folder, Progress& progress);
 
-  /// Calls `use` for all cells, in order, some at a time. A cell with a blanked corner is left out. Once.
+  /// Calls `use` for all cells, in order, some at a time; in any thread, while the next ones are gathered. A cell with a
+  /// blanked corner is left out. Once.
   void forEach(const std::function<void(const GatheredCells&)>& use);
 
  private:

@@ -3,6 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -107,8 +108,8 @@ PointSums::PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t me
 PointSums::~PointSums() = default;
 
 void PointSums::add(const GatheredCells& cells) {
-  borders_->add(cells);
-  sums_ ? accumulate(cells, *sums_) : write(cells);
+  tbb::parallel_invoke([&] { borders_->add(cells); },
+                       [&] { sums_ ? accumulate(cells, *sums_) : write(cells); });
 }
 
 void PointSums::write(const GatheredCells& cells) {
