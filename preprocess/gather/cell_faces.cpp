@@ -4,7 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <atomic>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -65,9 +66,12 @@ void measure(std::span<const glm::dvec3> at, const glm::dvec3& middle, HalfFace&
   face.inward = (glm::dot(area, middle - face.centre) < 0 ? -0.5 : 0.5) * area;
 }
 
-size_t countOf(std::span<const uint32_t> faces) {
+/// The number of faces of a cell; `own`: those of a polyhedron.
+size_t countOf(CellKind shape, std::span<const uint32_t> own) {
+  static constexpr std::array<size_t, 5> kFaces{0, 4, 5, 5, 6};  // [CellKind]
+  if (shape != CellKind::kPolyhedron) return kFaces[static_cast<size_t>(shape)];
   size_t count = 0;
-  for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}) ++count;
+  for (size_t at = 0; at < own.size(); at += own[at] + size_t{1}) ++count;
   return count;
 }
 
@@ -78,87 +82,56 @@ glm::dvec3 middleOf(std::span<const glm::dvec3> corners) {
 }
 
 std::span<const uint32_t> facesOfCell(const GatheredCells& cells, size_t n) {
-  return facesOf(cells.shapes[n], cells.view(n, 0).faces);
-}
-
-/// Calls use(cell, whether it is plain, number of its first face), in parallel, after resize(number of faces).
-template <typename Resize, typename Use>
-void forEachCell(const GatheredCells& cells, const Resize& resize, const Use& use) {
-  std::vector<size_t> begin(cells.size() + 1, 0);
-  for (size_t n = 0; n < cells.size(); ++n)
-    begin[n + 1] = begin[n] + (cells.shapes[n] == CellKind::kNone ? 0 : countOf(facesOfCell(cells, n)));
-  resize(begin.back());
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
-                    [&](const tbb::blocked_range<size_t>& part) {
-                      for (size_t n = part.begin(); n < part.end(); ++n) {
-                        if (cells.shapes[n] == CellKind::kNone) continue;
-                        const bool is_plain =
-                            cells.shapes[n] != CellKind::kPolyhedron && areDifferent(cells.cornersOfCell(n));
-                        use(n, is_plain, begin[n]);
-                      }
-                    });
+  return facesOf(cells.shapes[n], cells.facesOfPolyhedron(n));
 }
 
 FaceCorners lowestOf(std::span<const uint64_t> corners, std::span<const uint32_t> face, bool is_plain) {
   return is_plain ? lowestOfPlain(corners, face) : lowestOf(corners, face);
 }
 
-/// Leaves out collapsed faces. `move`: from, to.
-template <typename Move>
-size_t leaveOutCollapsed(std::vector<FaceCorners>& corners, const Move& move) {
+}  // namespace
+
+void FaceList::assign(const GatheredCells& cells) {
+  begins_.resize(cells.size() + 1);
+  for (size_t n = 0; n < cells.size(); ++n)
+    begins_[n + 1] = begins_[n] + countOf(cells.shapes[n], cells.facesOfPolyhedron(n));
+  corners.resize(begins_.back());
+  places.resize(begins_.back());
+  std::atomic<bool> any_collapsed = false;
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+                    [&](const tbb::blocked_range<size_t>& part) {
+                      bool collapsed = false;
+                      for (size_t n = part.begin(); n < part.end(); ++n) collapsed |= assignCell(cells, n);
+                      if (collapsed) any_collapsed = true;
+                    });
+  if (any_collapsed) leaveOutCollapsed();
+}
+
+/// Returns whether a face is collapsed.
+bool FaceList::assignCell(const GatheredCells& cells, size_t n) {
+  if (cells.shapes[n] == CellKind::kNone) return false;
+  const std::span<const uint64_t> of_cell = cells.cornersOfCell(n);
+  const bool is_plain = cells.shapes[n] != CellKind::kPolyhedron && areDifferent(of_cell);
+  const std::span<const uint32_t> faces = facesOfCell(cells, n);
+  bool collapsed = false;
+  size_t to = begins_[n];
+  for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}, ++to) {
+    corners[to] = lowestOf(of_cell, faces.subspan(at + 1, faces[at]), is_plain);
+    places[to] = {static_cast<uint32_t>(n), static_cast<uint32_t>(at), is_plain};
+    collapsed |= corners[to][2] == UINT64_MAX;
+  }
+  return collapsed;
+}
+
+void FaceList::leaveOutCollapsed() {
   size_t kept = 0;
   for (size_t n = 0; n < corners.size(); ++n) {
     if (corners[n][2] == UINT64_MAX) continue;
-    if (kept != n) {
-      corners[kept] = corners[n];
-      move(n, kept);
-    }
-    ++kept;
+    corners[kept] = corners[n];
+    places[kept++] = places[n];
   }
   corners.resize(kept);
-  return kept;
-}
-
-}  // namespace
-
-void facesOfCells(const GatheredCells& cells, size_t record_bytes,
-                  const std::function<void(const HalfFace&, std::span<std::byte>)>& put, FaceRecords& out) {
-  const auto resize = [&](size_t faces) {
-    out.corners.resize(faces);
-    out.records.resize(faces * record_bytes);
-  };
-  forEachCell(cells, resize, [&](size_t n, bool is_plain, size_t to) {
-    const CellView view = cells.view(n, 0);
-    const glm::dvec3 middle = middleOf(view.corners);
-    const std::span<const uint32_t> faces = facesOfCell(cells, n);
-    for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}, ++to) {
-      HalfFace face{n, faces.subspan(at + 1, faces[at]), is_plain, {}, {}};
-      out.corners[to] = lowestOf(cells.cornersOfCell(n), face.corners, is_plain);
-      if (out.corners[to][2] == UINT64_MAX) continue;
-      measure(view.corners, middle, face);
-      put(face, std::span(out.records).subspan(to * record_bytes, record_bytes));
-    }
-  });
-  const size_t kept = leaveOutCollapsed(out.corners, [&](size_t from, size_t to) {
-    std::memmove(out.records.data() + to * record_bytes, out.records.data() + from * record_bytes,
-                 record_bytes);
-  });
-  out.records.resize(kept * record_bytes);
-}
-
-void FaceList::assign(const GatheredCells& cells) {
-  const auto resize = [&](size_t faces) {
-    corners.resize(faces);
-    places.resize(faces);
-  };
-  forEachCell(cells, resize, [&](size_t n, bool is_plain, size_t to) {
-    const std::span<const uint32_t> faces = facesOfCell(cells, n);
-    for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}, ++to) {
-      corners[to] = lowestOf(cells.cornersOfCell(n), faces.subspan(at + 1, faces[at]), is_plain);
-      places[to] = {static_cast<uint32_t>(n), static_cast<uint32_t>(at), is_plain};
-    }
-  });
-  places.resize(leaveOutCollapsed(corners, [&](size_t from, size_t to) { places[to] = places[from]; }));
+  places.resize(kept);
 }
 
 HalfFace FaceList::face(const GatheredCells& cells, size_t n) const {

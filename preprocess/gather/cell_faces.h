@@ -17,13 +17,9 @@ struct HalfFace {
   glm::dvec3 centre{0.0};             // the mean of its corners
 };
 
-/// Overwrites `out` with the faces of all cells in their order, in parallel; `put` writes a face's record, of
-/// `record_bytes`. Collapsed faces, with fewer than three corners, are left out.
-void facesOfCells(const GatheredCells& cells, size_t record_bytes,
-                  const std::function<void(const HalfFace&, std::span<std::byte>)>& put, FaceRecords& out);
-
-/// The same faces in the same order, without records.
-struct FaceList {
+/// The faces of all cells in their order. Collapsed ones, with fewer than three corners, are left out.
+class FaceList {
+ public:
   /// Which face.
   struct Place {
     uint32_t cell, at;  // among the gathered ones; where it begins in facesOf() the cell
@@ -35,6 +31,12 @@ struct FaceList {
   void assign(const GatheredCells& cells);  // in parallel; keeps the capacity
   /// Face n, measured. Any thread.
   HalfFace face(const GatheredCells& cells, size_t n) const;
+
+ private:
+  bool assignCell(const GatheredCells& cells, size_t n);
+  void leaveOutCollapsed();
+
+  std::vector<size_t> begins_{0};  // [cell + 1], in corners, with collapsed ones
 };
 
 }  // namespace curvisplat

@@ -2,7 +2,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "preprocess/gather/streams_file.h"
+#include "stream/base/freed_memory.h"
 
 namespace curvisplat {
 namespace {
@@ -113,42 +114,63 @@ CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes,
 CellSlopes::~CellSlopes() = default;
 
 void CellSlopes::add(const GatheredCells& cells) {
-  std::vector<CellBody> bodies(cells.size());
-  tbb::parallel_for(
-      tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
-      [&](const tbb::blocked_range<size_t>& part) { setBodies(cells, part.begin(), part.end(), bodies); });
-  std::vector<std::byte> body_record(sizeof(BodyRecord) + fields_ * sizeof(float));
+  of_cells_.resize(cells.size());
+  tbb::parallel_invoke([&] { list_.assign(cells); },
+                       [&] {
+                         tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+                                           [&](const tbb::blocked_range<size_t>& part) {
+                                             setBodies(cells, part.begin(), part.end(), of_cells_);
+                                           });
+                       });
+  tbb::parallel_invoke([&] { addFaces(cells); }, [&] { addBodies(cells); });
+}
+
+void CellSlopes::addBodies(const GatheredCells& cells) {
+  std::vector<std::byte> record(sizeof(BodyRecord) + fields_ * sizeof(float));
   for (size_t n = 0; n < cells.size(); ++n) {
     if (cells.shapes[n] == CellKind::kNone) continue;
-    put(body_record.data(), BodyRecord{cells.numbers[n], bodies[n]}, valuesOf(cells, n));
-    bodies_->append(cells.numbers[n] / range_cells_, body_record);
+    put(record.data(), BodyRecord{cells.numbers[n], of_cells_[n]}, valuesOf(cells, n));
+    bodies_->append(cells.numbers[n] / range_cells_, record);
   }
-  facesOfCells(
-      cells, sizeof(FaceRecord) + fields_ * sizeof(float),
-      [&](const HalfFace& face, std::span<std::byte> to) {
-        put(to.data(),
-            FaceRecord{cells.numbers[face.cell], bodies[face.cell].centre, face.inward, face.centre},
-            valuesOf(cells, face.cell));
-      },
-      records_);
-  faces_->add(records_, [&](auto first, auto second) { join(first, second); });
+}
+
+void CellSlopes::addFaces(const GatheredCells& cells) {
+  const auto cellOf = [&](size_t face) { return size_t{list_.places[face].cell}; };
+  const auto tellOf = [&](uint64_t cell, size_t neighbour) {
+    tell(cell, cells.numbers[neighbour], of_cells_[neighbour].centre,
+         std::as_bytes(valuesOf(cells, neighbour)));
+  };
+  faces_->add(
+      list_.corners,
+      {[&](size_t n, std::span<std::byte> to) {
+         const HalfFace face = list_.face(cells, n);
+         put(to.data(),
+             FaceRecord{cells.numbers[face.cell], of_cells_[face.cell].centre, face.inward, face.centre},
+             valuesOf(cells, face.cell));
+       },
+       [&](size_t first, size_t second) {
+         if (cellOf(first) == cellOf(second)) return;
+         tellOf(cells.numbers[cellOf(first)], cellOf(second));
+         tellOf(cells.numbers[cellOf(second)], cellOf(first));
+       },
+       [&](std::span<const std::byte> first, size_t second) {
+         const FaceRecord earlier = recordIn<FaceRecord>(first);
+         const uint64_t cell = cells.numbers[cellOf(second)];
+         tellOf(earlier.cell, cellOf(second));
+         tell(cell, earlier.cell, earlier.centre_of_cell, first.subspan(sizeof(FaceRecord)));
+       }});
 }
 
 std::span<const float> CellSlopes::valuesOf(const GatheredCells& cells, size_t n) const {
   return std::span(cells.cell_values).subspan(n * fields_, fields_);
 }
 
-void CellSlopes::join(std::span<const std::byte> first, std::span<const std::byte> second) {
-  const FaceRecord a = recordIn<FaceRecord>(first), b = recordIn<FaceRecord>(second);
-  if (a.cell == b.cell) return;
-  const auto tell = [&](const FaceRecord& to, const FaceRecord& of, std::span<const std::byte> values) {
-    const NeighbourRecord record{to.cell, of.cell, of.centre_of_cell};
-    std::memcpy(neighbour_.data(), &record, sizeof record);
-    std::memcpy(neighbour_.data() + sizeof record, values.data(), values.size());
-    neighbours_->append(to.cell / range_cells_, neighbour_);
-  };
-  tell(a, b, second.subspan(sizeof(FaceRecord)));
-  tell(b, a, first.subspan(sizeof(FaceRecord)));
+void CellSlopes::tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre,
+                      std::span<const std::byte> values) {
+  const NeighbourRecord record{cell, neighbour, centre};
+  std::memcpy(neighbour_.data(), &record, sizeof record);
+  std::memcpy(neighbour_.data() + sizeof record, values.data(), values.size());
+  neighbours_->append(cell / range_cells_, neighbour_);
 }
 
 void CellSlopes::makeSplats(size_t range, const TakeSplat& take, PointSums::Counts& counts) {
@@ -208,14 +230,22 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, PointSums::Coun
 }
 
 PointSums::Counts CellSlopes::finish(const TakeSplat& take, const Progress& progress) {
-  records_ = {};
+  list_ = {};
+  freeMemory(of_cells_);
   bodies_->close();
-  faces_->finish([&](auto first, auto second) { join(first, second); },
-                 [&](std::span<const std::byte> bytes) {
-                   const auto face = recordIn<FaceRecord>(bytes);
-                   planes_->add(face.cell, {face.inward, face.centre, true});
-                 },
-                 progress);
+  const auto join = [&](std::span<const std::byte> first, std::span<const std::byte> second) {
+    const FaceRecord a = recordIn<FaceRecord>(first), b = recordIn<FaceRecord>(second);
+    if (a.cell == b.cell) return;
+    tell(a.cell, b.cell, b.centre_of_cell, second.subspan(sizeof(FaceRecord)));
+    tell(b.cell, a.cell, a.centre_of_cell, first.subspan(sizeof(FaceRecord)));
+  };
+  faces_->finish(
+      join,
+      [&](std::span<const std::byte> bytes) {
+        const auto face = recordIn<FaceRecord>(bytes);
+        planes_->add(face.cell, {face.inward, face.centre, true});
+      },
+      progress);
   faces_.reset();
   neighbours_->close();
   planes_->close();

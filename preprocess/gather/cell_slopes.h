@@ -32,7 +32,9 @@ class CellSlopes {
 
  private:
   std::span<const float> valuesOf(const GatheredCells& cells, size_t n) const;
-  void join(std::span<const std::byte> first, std::span<const std::byte> second);
+  void addBodies(const GatheredCells& cells);
+  void addFaces(const GatheredCells& cells);
+  void tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre, std::span<const std::byte> values);
   void makeSplats(size_t range, const TakeSplat& take, PointSums::Counts& counts);
 
   const uint64_t cells_;
@@ -41,7 +43,8 @@ class CellSlopes {
   std::unique_ptr<class StreamsFile> bodies_, neighbours_;
   std::unique_ptr<FaceMatcher> faces_;
   std::unique_ptr<OuterPlanes> planes_;
-  FaceRecords records_;
+  FaceList list_;
+  std::vector<CellBody> of_cells_;  // that are added
   std::vector<std::byte> neighbour_;
 };
 

@@ -44,6 +44,9 @@ struct GatheredCells {
   std::span<const uint64_t> cornersOfCell(size_t n) const {
     return std::span(corners).subspan(corner_begin[n], corner_begin[n + 1] - corner_begin[n]);
   }
+  std::span<const uint32_t> facesOfPolyhedron(size_t n) const {
+    return std::span(faces).subspan(face_begin[n], face_begin[n + 1] - face_begin[n]);
+  }
   void clear();
 };
 

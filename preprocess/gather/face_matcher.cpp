@@ -1,5 +1,7 @@
 #include "preprocess/gather/face_matcher.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -11,6 +13,8 @@
 
 namespace curvisplat {
 namespace {
+
+constexpr size_t kRecordsPerTask = 512;
 
 uint64_t hashOf(const FaceCorners& corners) {
   uint64_t hash = 0;
@@ -45,7 +49,7 @@ FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_by
 FaceMatcher::~FaceMatcher() = default;
 
 uint64_t FaceMatcher::waitingBytes(size_t record_bytes, uint64_t faces) {
-  return std::min<uint64_t>(faces, kMaxWaiting) * (sizeof(Waiting) + record_bytes + 4 * sizeof(uint32_t));
+  return std::min<uint64_t>(faces, kMaxWaiting) * (sizeof(Waiting) + record_bytes + 6 * sizeof(uint32_t));
 }
 
 uint64_t FaceMatcher::bucketOf(const FaceCorners& corners) const {
@@ -56,7 +60,7 @@ void FaceMatcher::unlink(uint32_t entry) {
   uint32_t* link = &buckets_[bucketOf(waiting_[entry].corners)];
   while (*link != entry) link = &waiting_[*link].next;
   *link = waiting_[entry].next;
-  waiting_[entry].single = false;
+  waiting_[entry].face = kNone;
 }
 
 void FaceMatcher::spill(uint32_t entry) {
@@ -66,7 +70,7 @@ void FaceMatcher::spill(uint32_t entry) {
   spilled_->append(spilled_->streams() > 1 ? (hashOf(corners) >> 32) % spilled_->streams() : 0, scratch_);
 }
 
-uint32_t FaceMatcher::newEntry() {
+uint32_t FaceMatcher::newEntry(const FaceCalls& calls) {
   if (!free_.empty()) {
     const uint32_t entry = free_.back();
     free_.pop_back();
@@ -79,15 +83,15 @@ uint32_t FaceMatcher::newEntry() {
   }
   const uint32_t entry = next_to_spill_;
   next_to_spill_ = (next_to_spill_ + 1) % kMaxWaiting;
+  if (waiting_[entry].face != kHasRecord) calls.put(waiting_[entry].face, recordOf(entry));
   spill(entry);
   unlink(entry);
   return entry;
 }
 
-/// Calls pair(waiting entry, n) for a face that has a like one, put(n, to) for one that is to wait.
-template <typename Pair, typename Put>
-void FaceMatcher::addEach(std::span<const FaceCorners> faces, const Pair& pair, const Put& put) {
+void FaceMatcher::add(std::span<const FaceCorners> faces, const FaceCalls& calls) {
   constexpr size_t kAhead = 8;  // faces whose places in the table are fetched before they are looked up
+  taken_.clear();
   for (size_t n = 0; n < faces.size(); ++n) {
     if (n + 2 * kAhead < faces.size()) __builtin_prefetch(&buckets_[bucketOf(faces[n + 2 * kAhead])]);
     if (n + kAhead < faces.size()) {
@@ -99,31 +103,35 @@ void FaceMatcher::addEach(std::span<const FaceCorners> faces, const Pair& pair, 
     uint32_t same = buckets_[bucket];
     while (same != kNone && !areSame(waiting_[same].corners, corners)) same = waiting_[same].next;
     if (same != kNone) {
-      pair(same, n);
+      const uint32_t face = waiting_[same].face;
+      if (face == kHasRecord) {
+        if (calls.pair_with_earlier) calls.pair_with_earlier(recordOf(same), n);
+      } else if (calls.pair) {
+        calls.pair(face, n);
+      }
       unlink(same);
       free_.push_back(same);
       continue;
     }
-    const uint32_t entry = newEntry();
-    waiting_[entry] = {corners, buckets_[bucket], true};
+    const uint32_t entry = newEntry(calls);
+    waiting_[entry] = {corners, buckets_[bucket], static_cast<uint32_t>(n)};
     buckets_[bucket] = entry;
-    put(n, recordOf(entry));
+    taken_.emplace_back(entry, static_cast<uint32_t>(n));
   }
+  makeRecords(calls);
 }
 
-void FaceMatcher::add(const FaceRecords& faces, const TakePair& pair) {
-  const auto recordOfFace = [&](size_t n) {
-    return std::span(faces.records).subspan(n * record_bytes_, record_bytes_);
-  };
-  addEach(
-      faces.corners, [&](uint32_t same, size_t n) { pair(recordOf(same), recordOfFace(n)); },
-      [&](size_t n, std::span<std::byte> to) { std::ranges::copy(recordOfFace(n), to.begin()); });
-}
-
-void FaceMatcher::add(std::span<const FaceCorners> faces,
-                      const std::function<void(size_t, std::span<std::byte>)>& put) {
-  addEach(
-      faces, [](uint32_t, size_t) {}, put);
+/// Of the faces that were added and still wait.
+void FaceMatcher::makeRecords(const FaceCalls& calls) {
+  std::erase_if(taken_, [&](const auto& taken) { return waiting_[taken.first].face != taken.second; });
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, taken_.size(), kRecordsPerTask),
+                    [&](const tbb::blocked_range<size_t>& part) {
+                      for (size_t n = part.begin(); n < part.end(); ++n) {
+                        const auto [entry, face] = taken_[n];
+                        calls.put(face, recordOf(entry));
+                        waiting_[entry].face = kHasRecord;
+                      }
+                    });
 }
 
 void FaceMatcher::matchStream(size_t stream, const TakePair& pair, const TakeSingle& single) const {
@@ -167,8 +175,9 @@ void FaceMatcher::matchStream(size_t stream, const TakePair& pair, const TakeSin
 
 void FaceMatcher::finish(const TakePair& pair, const TakeSingle& single, const Progress& progress) {
   for (uint32_t entry = 0; entry < waiting_.size(); ++entry)
-    if (waiting_[entry].single) spill(entry);
+    if (waiting_[entry].face != kNone) spill(entry);
   freeMemory(free_);
+  freeMemory(taken_);
   freeMemory(buckets_);
   freeMemory(waiting_);
   freeMemory(records_);

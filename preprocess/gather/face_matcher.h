@@ -17,6 +17,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "preprocess/gather/streams_file.h"
@@ -27,15 +28,13 @@ namespace curvisplat {
 /// The lowest three corners of a face, rising.
 using FaceCorners = std::array<uint64_t, 3>;
 
-/// Faces and what belongs to each: a record of FaceMatcher's size.
-struct FaceRecords {
-  std::vector<FaceCorners> corners;
-  std::vector<std::byte> records;
-
-  void clear() {
-    corners.clear();
-    records.clear();
-  }
+/// What is done with the faces that come together.
+struct FaceCalls {
+  /// Makes the record of face n, of FaceMatcher's size. Any thread.
+  std::function<void(size_t n, std::span<std::byte> to)> put;
+  /// A pair of two of them, or of one of them and the record of one that came earlier. May be empty.
+  std::function<void(size_t first, size_t second)> pair = {};
+  std::function<void(std::span<const std::byte> first, size_t second)> pair_with_earlier = {};
 };
 
 class FaceMatcher {
@@ -47,11 +46,8 @@ class FaceMatcher {
   FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes, std::filesystem::path folder);
   ~FaceMatcher();
 
-  /// Calls pair(earlier, later) for some of the pairs, in this thread.
-  void add(const FaceRecords& faces, const TakePair& pair);
-  /// Leaves the pairs out. put(n, to) makes the record of face n, in this thread; of most faces that have one before
-  /// them it is not called.
-  void add(std::span<const FaceCorners> faces, const std::function<void(size_t, std::span<std::byte>)>& put);
+  /// Calls for some of the pairs, in this thread. Records are made of the faces that have no second one among these.
+  void add(std::span<const FaceCorners> faces, const FaceCalls& calls);
   /// The others, and those without another. Once, after all faces.
   void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
 
@@ -60,15 +56,14 @@ class FaceMatcher {
   static uint64_t waitingBytes(size_t record_bytes, uint64_t faces);
 
  private:
-  static constexpr uint32_t kNone = UINT32_MAX;
+  static constexpr uint32_t kNone = UINT32_MAX, kHasRecord = UINT32_MAX - 1;
   struct Waiting {
     FaceCorners corners;
     uint32_t next;  // of the same bucket
-    bool single;
+    uint32_t face;  // among those that are added; kHasRecord: an earlier one; kNone: nothing waits here
   };
-  template <typename Pair, typename Put>
-  void addEach(std::span<const FaceCorners> faces, const Pair& pair, const Put& put);
-  uint32_t newEntry();
+  void makeRecords(const FaceCalls& calls);
+  uint32_t newEntry(const FaceCalls& calls);
   void spill(uint32_t entry);
   void unlink(uint32_t entry);
   std::span<std::byte> recordOf(uint32_t entry) {
@@ -81,7 +76,8 @@ class FaceMatcher {
   std::vector<uint32_t> buckets_;  // the first entry of each
   std::vector<Waiting> waiting_;
   std::vector<std::byte> records_;
-  std::vector<uint32_t> free_;  // of waiting_
+  std::vector<uint32_t> free_;                        // of waiting_
+  std::vector<std::pair<uint32_t, uint32_t>> taken_;  // by the faces that are added: entry, face
   uint32_t next_to_spill_ = 0;
   std::unique_ptr<StreamsFile> spilled_;
   std::vector<std::byte> scratch_;

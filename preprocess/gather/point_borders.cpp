@@ -58,10 +58,10 @@ uint64_t PointBorders::waitingBytes(uint64_t cells) {
 
 void PointBorders::add(const GatheredCells& cells) {
   list_.assign(cells);
-  faces_.add(list_.corners, [&](size_t n, std::span<std::byte> to) {
-    const FaceRecord record = recordOf(cells, list_.face(cells, n));
-    std::memcpy(to.data(), &record, sizeof record);
-  });
+  faces_.add(list_.corners, {[&](size_t n, std::span<std::byte> to) {
+               const FaceRecord record = recordOf(cells, list_.face(cells, n));
+               std::memcpy(to.data(), &record, sizeof record);
+             }});
 }
 
 void PointBorders::finish(const Progress& progress) {
