@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "preprocess/gather/point_pages.h"
 #include "preprocess/gather/streams_file.h"
 #include "stream/base/check.h"
 #include "stream/base/trace.h"
@@ -15,14 +16,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kCornersPerTask = 4096;
-
-/// Calls use(begin, end) for parts of [0, count), in parallel.
-template <typename Use>
-void inParts(size_t count, const Use& use) {
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kCornersPerTask),
-                    [&](const tbb::blocked_range<size_t>& part) { use(part.begin(), part.end()); });
-}
+constexpr size_t kCellsPerTask = 512;
 
 uint64_t cornersDrawn(const MeshCells& cells) {
   uint64_t corners = 0;
@@ -36,8 +30,10 @@ struct Reference {
   uint64_t point, slot;
 };
 
+}  // namespace
+
 /// Uses some cells in a task, while the caller gathers the next ones.
-class UsedBeside {
+class CornerGather::UsedBeside {
  public:
   explicit UsedBeside(const std::function<void(const GatheredCells&)>& use) : use_(&use) {}
   ~UsedBeside() {
@@ -69,8 +65,6 @@ class UsedBeside {
   size_t next_ = 0;
   tbb::task_group task_;
 };
-
-}  // namespace
 
 CellView GatheredCells::view(size_t n, size_t corner_fields) const {
   const size_t begin = corner_begin[n], count = corner_begin[n + 1] - begin;
@@ -130,75 +124,82 @@ size_t CornerGather::take(const LoadedCells& loaded, size_t begin, GatheredCells
   uint64_t first_point = 0;
   for (uint32_t piece = 0; piece < loaded.range.piece; ++piece)
     first_point += reader_->pieces()[piece].points;
-  size_t n = begin;
+  const bool one_piece = numbers_->merged() == 0;
+  size_t n = begin, corners = 0;
   for (; n < cells.size(); ++n) {
     if (cells.shapes[n] == CellKind::kNone) continue;
-    if (out.size() > 0 && (out.corners.size() + cells.cornersOfCell(n).size() > GatheredCells::kMaxCorners ||
-                           out.faces.size() + cells.facesOfCell(n).size() > GatheredCells::kMaxCorners))
+    const std::span<const uint64_t> points = cells.cornersOfCell(n);
+    const std::span<const uint32_t> faces = cells.facesOfCell(n);
+    if (out.size() > 0 && (corners + points.size() > GatheredCells::kMaxCorners ||
+                           out.faces.size() + faces.size() > GatheredCells::kMaxCorners))
       break;
     out.numbers.push_back(loaded.range.number + n);
     out.shapes.push_back(cells.shapes[n]);
-    for (const uint64_t point : cells.cornersOfCell(n))
-      out.corners.push_back((*numbers_)(first_point + point));
-    out.corner_begin.push_back(out.corners.size());
-    const std::span<const uint32_t> faces = cells.facesOfCell(n);
+    if (out.corners.size() < corners + points.size())
+      out.corners.resize(std::max(corners + points.size(), GatheredCells::kMaxCorners));
+    for (const uint64_t point : points)
+      out.corners[corners++] = one_piece ? first_point + point : (*numbers_)(first_point + point);
+    out.corner_begin.push_back(corners);
     out.faces.insert(out.faces.end(), faces.begin(), faces.end());
     out.face_begin.push_back(out.faces.size());
     for (const std::vector<float>& values : cells.scalars) out.cell_values.push_back(values[n]);
   }
-  out.at.resize(out.corners.size());
-  out.corner_values.resize(out.corners.size() * corner_fields_);
+  out.corners.resize(corners);
+  out.at.resize(corners);
+  out.corner_values.resize(corners * corner_fields_);
   return n;
 }
 
-/// Makes the cells with a blanked corner degenerate, without corners: they take part in nothing.
-void CornerGather::dropBlanked(GatheredCells& cells) const {
-  for (size_t n = 0; n < cells.size(); ++n)
-    for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner)
-      if (std::isnan(cells.at[corner].x)) cells.shapes[n] = CellKind::kNone;
-}
-
 void CornerGather::forEach(const std::function<void(const GatheredCells&)>& use) {
-  const uint64_t bytes = reader_->points() * (sizeof(glm::dvec3) + corner_fields_ * sizeof(float));
-  bytes <= memory_bytes_ ? gatherInMemory(use) : gatherByStreams(use);
-}
-
-void CornerGather::gatherInMemory(const std::function<void(const GatheredCells&)>& use) {
-  std::vector<glm::dvec3> at(reader_->points());
-  std::vector<float> values(reader_->points() * corner_fields_);
-  reader_->forEachPoints([&](const LoadedPoints& loaded) {
-    progress_->throwIfStopped();
-    const MeshPoints& points = loaded.points;
-    inParts(points.x.size(), [&](size_t begin, size_t end) {
-      for (size_t n = begin; n < end; ++n) {
-        at[loaded.range.number + n] = {points.x[n], points.y[n], points.z[n]};
-        for (size_t field = 0; field < corner_fields_; ++field)
-          values[(loaded.range.number + n) * corner_fields_ + field] = points.scalars[field][n];
-      }
-    });
-  });
   UsedBeside used(use);
-  reader_->forEachCells([&](const LoadedCells& loaded) {
-    for (size_t next = 0; next < loaded.cells.size();) {
-      const TraceScope trace("gather corners");
-      GatheredCells& cells = used.next();
-      next = take(loaded, next, cells);
-      inParts(cells.corners.size(), [&](size_t begin, size_t end) {
-        for (size_t n = begin; n < end; ++n) {
-          cells.at[n] = at[cells.corners[n]];
-          std::copy_n(&values[cells.corners[n] * corner_fields_], corner_fields_,
-                      &cells.corner_values[n * corner_fields_]);
-        }
-      });
-      dropBlanked(cells);
-      used.use();
-    }
-    progress_->advance(loaded.range.count);
-  });
+  std::vector<MeshRange> left = reader_->cellRanges();
+  gatherByPages(left, used);
+  if (!left.empty()) gatherByStreams(left, used);
   used.finish();
 }
 
-void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&)>& use) {
+/// Makes a cell with a blanked corner degenerate: it takes part in nothing.
+void CornerGather::dropIfBlanked(GatheredCells& cells, size_t n) {
+  for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner)
+    if (std::isnan(cells.at[corner].x)) cells.shapes[n] = CellKind::kNone;
+}
+
+void CornerGather::gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& used) {
+  PointPages pages(*reader_, corner_fields_, memory_bytes_);
+  size_t done = 0;  // ranges
+  reader_->forEachCellsWhile(ranges, [&](const LoadedCells& loaded) {
+    progress_->throwIfStopped();
+    for (size_t begin = 0, end = 0; begin < loaded.cells.size(); begin = end) {
+      const TraceScope trace("gather corners");
+      GatheredCells& cells = used.next();
+      end = take(loaded, begin, cells);
+      if (!pages.hold(cells.corners)) {
+        ranges[done].first += begin;
+        ranges[done].number += begin;
+        ranges[done].count -= begin;
+        return false;
+      }
+      tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+                        [&](const tbb::blocked_range<size_t>& part) {
+                          for (size_t n = part.begin(); n < part.end(); ++n) {
+                            for (size_t at = cells.corner_begin[n]; at < cells.corner_begin[n + 1]; ++at) {
+                              cells.at[at] = pages.at(cells.corners[at]);
+                              std::copy_n(pages.values(cells.corners[at]), corner_fields_,
+                                          cells.corner_values.data() + at * corner_fields_);
+                            }
+                            dropIfBlanked(cells, n);
+                          }
+                        });
+      used.use();
+    }
+    progress_->advance(loaded.range.count);
+    ++done;
+    return true;
+  });
+  ranges.erase(ranges.begin(), ranges.begin() + static_cast<ptrdiff_t>(done));
+}
+
+void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedBeside& used) {
   const size_t point_bytes = sizeof(glm::dvec3) + corner_fields_ * sizeof(float);
   const size_t record_bytes = sizeof(uint64_t) + point_bytes;
   const uint64_t range_points = std::max<uint64_t>(1, memory_bytes_ / 4 / point_bytes);
@@ -208,7 +209,7 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
   StreamsFile references(folder_, ranges, memory_bytes_ / 4);
   std::vector<Group> groups(1);
   GatheredCells cells;
-  reader_->forEachCells([&](const LoadedCells& loaded) {
+  reader_->forEachCells(of_cells, [&](const LoadedCells& loaded) {
     progress_->throwIfStopped();
     const uint64_t corners = cornersDrawn(loaded.cells);
     if (groups.back().slots > 0 && groups.back().slots + corners > group_slots)
@@ -261,7 +262,6 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
   }
   corners.close();
 
-  UsedBeside used(use);
   std::vector<std::byte> slots;
   for (size_t number = 0; number < groups.size(); ++number) {
     const Group& group = groups[number];
@@ -288,14 +288,13 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
             std::memcpy(&cells.corner_values[n * corner_fields_], from + sizeof(glm::dvec3),
                         corner_fields_ * sizeof(float));
         }
-        dropBlanked(cells);
+        for (size_t n = 0; n < cells.size(); ++n) dropIfBlanked(cells, n);
         used.use();
       }
       progress_->advance(loaded.range.count);
     });
     CURVISPLAT_CHECK_OP(slot, ==, group.slots);
   }
-  used.finish();
 }
 
 }  // namespace curvisplat

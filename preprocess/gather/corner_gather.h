@@ -1,11 +1,13 @@
 // Gives each cell the positions and values of its corners. Cells refer to points by number, and the points of a
 // mesh need not fit in memory:
 //
+// Cells mostly refer to points near those of the cell before: then the pages of points that were used last are in memory,
+// and others are read when a cell has them (point_pages.h). Where cells refer to points all over the mesh:
+//
 //    cells --(point, slot)--> streams by ranges of points --+ points of a range --(slot, position, values)-->
 //                                                                     streams by groups of cells --> cells
 //
-// A slot is the place of a corner among those of all cells, in order. Where the points fit they are read into
-// memory instead, and nothing is written. What comes out is the same.
+// A slot is the place of a corner among those of all cells, in order. What comes out is the same.
 #pragma once
 
 #include <array>
@@ -76,12 +78,14 @@ class CornerGather {
     uint64_t first_slot = 0, slots = 0;
   };
 
-  void gatherInMemory(const std::function<void(const GatheredCells&)>& use);
-  void gatherByStreams(const std::function<void(const GatheredCells&)>& use);
+  class UsedBeside;
+  /// Leaves in `ranges` those of the cells that are left for streams.
+  void gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& used);
+  void gatherByStreams(const std::vector<MeshRange>& of_cells, UsedBeside& used);
   /// Overwrites `out` with what is drawn of the cells from `begin` on, as many as go together, without positions and
   /// values. Returns the first of the others.
   size_t take(const LoadedCells& loaded, size_t begin, GatheredCells& out) const;
-  void dropBlanked(GatheredCells& cells) const;
+  static void dropIfBlanked(GatheredCells& cells, size_t n);
 
   const MeshReader* reader_;
   const PointNumbers* numbers_;

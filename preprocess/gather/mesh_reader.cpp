@@ -96,15 +96,15 @@ void MeshReader::load(const MeshRange& range, LoadedCells& out) const {
 }
 
 template <typename Loaded>
-void MeshReader::forEach(const std::vector<MeshRange>& ranges,
-                         const std::function<void(const Loaded&)>& use) const {
+void MeshReader::forEachWhile(const std::vector<MeshRange>& ranges,
+                              const std::function<bool(const Loaded&)>& use) const {
   size_t next = 0;
   ReadAhead<Loaded> ahead([&](Loaded& loaded) {
     if (next == ranges.size()) return false;
     load(ranges[next++], loaded);
     return true;
   });
-  while (const Loaded* loaded = ahead.next()) use(*loaded);
+  for (const Loaded* loaded = ahead.next(); loaded && use(*loaded);) loaded = ahead.next();
 }
 
 std::vector<MeshRange> MeshReader::pointRanges(uint64_t first, uint64_t count) const {
@@ -130,16 +130,19 @@ std::vector<MeshRange> MeshReader::cellRanges() const {
 }
 
 void MeshReader::forEachPoints(const std::function<void(const LoadedPoints&)>& use) const {
-  forEach<LoadedPoints>(pointRanges(0, points_), use);
+  readPoints(0, points_, use);
 }
 
 void MeshReader::readPoints(uint64_t first, uint64_t count,
                             const std::function<void(const LoadedPoints&)>& use) const {
-  forEach<LoadedPoints>(pointRanges(first, count), use);
+  forEachWhile<LoadedPoints>(pointRanges(first, count), [&](const LoadedPoints& loaded) {
+    use(loaded);
+    return true;
+  });
 }
 
 void MeshReader::forEachCells(const std::function<void(const LoadedCells&)>& use) const {
-  forEach<LoadedCells>(cellRanges(), use);
+  forEachCells(cellRanges(), use);
 }
 
 uint64_t MeshReader::largestChunk() const {
@@ -150,7 +153,15 @@ uint64_t MeshReader::largestChunk() const {
 
 void MeshReader::forEachCells(const std::vector<MeshRange>& ranges,
                               const std::function<void(const LoadedCells&)>& use) const {
-  forEach<LoadedCells>(ranges, use);
+  forEachCellsWhile(ranges, [&](const LoadedCells& loaded) {
+    use(loaded);
+    return true;
+  });
+}
+
+void MeshReader::forEachCellsWhile(const std::vector<MeshRange>& ranges,
+                                   const std::function<bool(const LoadedCells&)>& use) const {
+  forEachWhile<LoadedCells>(ranges, use);
 }
 
 }  // namespace curvisplat

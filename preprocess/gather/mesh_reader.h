@@ -66,6 +66,9 @@ class MeshReader {
   void forEachCells(const std::function<void(const LoadedCells&)>& use) const;
   void forEachCells(const std::vector<MeshRange>& ranges,
                     const std::function<void(const LoadedCells&)>& use) const;
+  /// Until use() returns false.
+  void forEachCellsWhile(const std::vector<MeshRange>& ranges,
+                         const std::function<bool(const LoadedCells&)>& use) const;
   /// Reads all cells: bytes of the largest chunk. Most of them where cells are polyhedra.
   uint64_t largestChunk() const;
   /// The chunks in which all cells are read.
@@ -76,7 +79,8 @@ class MeshReader {
   void load(const MeshRange& range, LoadedCells& out) const;
   std::vector<MeshRange> pointRanges(uint64_t first, uint64_t count) const;
   template <typename Loaded>
-  void forEach(const std::vector<MeshRange>& ranges, const std::function<void(const Loaded&)>& use) const;
+  void forEachWhile(const std::vector<MeshRange>& ranges,
+                    const std::function<bool(const Loaded&)>& use) const;
 
   const MeshSource* source_;
   std::vector<uint32_t> scalars_;

@@ -11,16 +11,14 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "preprocess/gather/streams_file.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr size_t kCellsPerTask = 256;
-// Points whose numbers differ in this many lowest bits are summed by one task.
-constexpr uint64_t kStripe = 4096;
 constexpr size_t kMomentBytes = size_t{16} << 20;  // of a batch of cells
 constexpr size_t kCellsPerRead = 8192;
 
@@ -70,46 +68,37 @@ void momentsOf(const GatheredCells& cells, size_t begin, size_t end, size_t fiel
 
 }  // namespace
 
-struct PointSums::Sums {
-  Sums(uint64_t first_point, uint64_t points, size_t fields)
-      : first(first_point),
-        at(points, glm::dvec3(std::numeric_limits<double>::quiet_NaN())),
-        values(points * fields),
-        moments(points * momentCount(fields)) {}
-
-  uint64_t first;
-  std::vector<glm::dvec3> at;   // NaN: no cell has come
-  std::vector<float> values;    // [point * fields + field]
-  std::vector<double> moments;  // [point * momentCount + moment]
-};
-
 PointSums::PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
                      const std::filesystem::path& folder)
-    : points_(points), fields_(fields) {
+    : points_(points), fields_(fields), folder_(folder) {
   const uint64_t border_bytes = memory_bytes / 8;
-  memory_bytes -= border_bytes + std::min(PointBorders::waitingBytes(cells), memory_bytes / 4);
-  const auto with_borders = [&] {
-    borders_ = std::make_unique<PointBorders>(points, range_points_, cells, border_bytes, folder);
-  };
-  const uint64_t bytes = sizeof(glm::dvec3) + fields * sizeof(float) + momentCount(fields) * sizeof(double);
-  if (points * bytes <= memory_bytes) {
-    range_points_ = std::max<uint64_t>(1, points);
-    sums_ = std::make_unique<Sums>(0, points, fields);
-    with_borders();
-    return;
-  }
-  // Ranges are summed once the corners' positions are no longer in memory.
-  range_points_ = std::max<uint64_t>(1, memory_bytes * 3 / 2 / bytes);
-  const uint64_t ranges = (points + range_points_ - 1) / range_points_;
-  waiting_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 4);
-  with_borders();
+  memory_bytes_ = memory_bytes - border_bytes - std::min(PointBorders::waitingBytes(cells), memory_bytes / 4);
+  const uint64_t page_bytes = SumPages::kPoints * SumPages::bytesOfPoint(fields, momentCount(fields));
+  const uint64_t pages = memory_bytes_ / page_bytes;
+  sums_ = std::make_unique<SumPages>(points, fields, momentCount(fields), pages, folder);
+  // Ranges are summed up, and become splats, once the corners' positions are no longer in memory.
+  const uint64_t range_pages = std::max<uint64_t>(1, memory_bytes_ * 3 / 2 / page_bytes);
+  range_points_ = range_pages * SumPages::kPoints;
+  borders_ = std::make_unique<PointBorders>(points, range_points_, cells, border_bytes, folder);
 }
 
 PointSums::~PointSums() = default;
 
 void PointSums::add(const GatheredCells& cells) {
-  tbb::parallel_invoke([&] { borders_->add(cells); },
-                       [&] { sums_ ? accumulate(cells, *sums_) : write(cells); });
+  tbb::parallel_invoke([&] { borders_->add(cells); }, [&] { sum(cells); });
+}
+
+void PointSums::sum(const GatheredCells& cells) {
+  if (!waiting_ && sums_->hold(cells.corners)) {
+    const TraceScope trace("sum cells");
+    return accumulate(cells, {0, points_});
+  }
+  if (!waiting_) {  // and so do all that come
+    sums_->putAside();
+    const uint64_t ranges = (points_ + range_points_ - 1) / range_points_;
+    waiting_ = std::make_unique<StreamsFile>(folder_, ranges, memory_bytes_ / 4);
+  }
+  write(cells);
 }
 
 void PointSums::write(const GatheredCells& cells) {
@@ -135,10 +124,9 @@ void PointSums::write(const GatheredCells& cells) {
   }
 }
 
-void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
+void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) {
   const size_t stride = momentCount(fields_);
   const size_t most_corners = std::max<size_t>(1, kMomentBytes / (stride * sizeof(double)));
-  const uint64_t end_point = sums.first + sums.at.size();
   const auto threads = static_cast<size_t>(tbb::this_task_arena::max_concurrency());
   // Each looks at all corners. A power of two: dividing by another number takes as long as adding moments.
   const size_t stripes = threads == 1 ? 1 : std::bit_ceil(2 * threads);
@@ -155,23 +143,22 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
                         momentsOf(cells, part.begin(), part.end(), fields_, scratch.local(),
                                   std::span(moments_).subspan(from * stride));
                       });
-    // Each point's sum has the order of the cells, whoever adds them.
+    // Each point's sum has the order of the cells, whoever adds them. A page is summed by one task.
     tbb::parallel_for(size_t{0}, stripes, [&](size_t stripe) {
       for (size_t n = begin; n < end; ++n) {
         if (cells.shapes[n] == CellKind::kNone) continue;
         for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner) {
           const uint64_t point = cells.corners[corner];
-          if ((point / kStripe & (stripes - 1)) != stripe || point < sums.first || point >= end_point)
+          if ((point >> SumPages::kShift & (stripes - 1)) != stripe || point < range.first ||
+              point >= range.end)
             continue;
-          const size_t to = point - sums.first;
-          if (std::isnan(sums.at[to].x)) {
-            sums.at[to] = cells.at[corner];
-            std::copy_n(cells.corner_values.data() + corner * fields_, fields_,
-                        sums.values.data() + to * fields_);
+          double* const sums = sums_->sums(point);
+          if (std::isnan(sums[0])) {
+            for (int axis = 0; axis < 3; ++axis) sums[axis] = cells.at[corner][axis];
+            std::copy_n(cells.corner_values.data() + corner * fields_, fields_, sums_->values(point));
           }
           const double* from = &moments_[(corner - first_corner) * stride];
-          double* sum = &sums.moments[to * stride];
-          for (size_t m = 0; m < stride; ++m) sum[m] += from[m];
+          for (size_t m = 0; m < stride; ++m) sums[3 + m] += from[m];
         }
       }
     });
@@ -179,24 +166,26 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
   }
 }
 
-void PointSums::flushRange(const Sums& sums, const OuterPlanes::OfRange& planes, const TakeSplat& take,
-                           Counts& counts) const {
+void PointSums::flushRange(const PointRange& range, const OuterPlanes::OfRange& planes, const TakeSplat& take,
+                           Counts& counts) {
   const size_t stride = momentCount(fields_);
   std::atomic<uint64_t> splats = 0, degenerate = 0;
   tbb::parallel_for(
-      tbb::blocked_range<size_t>(0, sums.at.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
+      tbb::blocked_range<uint64_t>(range.first, range.end, 1024),
+      [&](const tbb::blocked_range<uint64_t>& part) {
+        const TraceScope trace("splats of points");
         NodeSplat splat;
         std::vector<SplatScalar> values(fields_);
         std::vector<OuterPlane> of_point;
         uint64_t made = 0, flat = 0;
-        for (size_t n = part.begin(); n < part.end(); ++n) {
-          if (std::isnan(sums.at[n].x)) continue;
-          if (!(sums.moments[n * stride] > 0)) ++flat;
-          splatOfPoint(sums.first + n,
-                       {sums.at[n], std::span(sums.values).subspan(n * fields_, fields_),
-                        std::span(sums.moments).subspan(n * stride, stride)},
-                       splat, values);
-          splat.border_code = meshBorderCode(planes.of(sums.first + n, of_point), splat.splat, kNextOfPoints);
+        for (uint64_t point = part.begin(); point < part.end(); ++point) {
+          const double* const sums = sums_->sums(point);
+          if (std::isnan(sums[0])) continue;
+          const std::span<const double> moments(sums + 3, stride);
+          if (!(moments[0] > 0)) ++flat;
+          splatOfPoint(point, {{sums[0], sums[1], sums[2]}, {sums_->values(point), fields_}, moments}, splat,
+                       values);
+          splat.border_code = meshBorderCode(planes.of(point, of_point), splat.splat, kNextOfPoints);
           take(splat, values);
           ++made;
         }
@@ -207,45 +196,50 @@ void PointSums::flushRange(const Sums& sums, const OuterPlanes::OfRange& planes,
   counts.degenerate += degenerate;
 }
 
+void PointSums::sumWaiting(size_t stream, const PointRange& range, const Progress& progress) {
+  GatheredCells cells;
+  const auto sum = [&] {
+    progress.throwIfStopped();
+    accumulate(cells, range);
+    cells.clear();
+  };
+  waiting_->forEach(stream, [&](std::span<const std::byte> records) {
+    for (const std::byte* at = records.data(); at < records.data() + records.size();) {
+      CellRecord head;
+      std::memcpy(&head, at, sizeof head);
+      at += sizeof head;
+      cells.numbers.push_back(head.number);
+      cells.shapes.push_back(static_cast<CellKind>(head.shape));
+      at = takeBytes(at, head.corners, cells.corners);
+      at = takeBytes(at, head.corners, cells.at);
+      at = takeBytes(at, head.corners * fields_, cells.corner_values);
+      at = takeBytes(at, head.faces, cells.faces);
+      cells.corner_begin.push_back(cells.corners.size());
+      cells.face_begin.push_back(cells.faces.size());
+      if (cells.size() == kCellsPerRead) sum();
+    }
+  });
+  sum();
+  waiting_->forget(stream);
+}
+
 PointSums::Counts PointSums::finish(const TakeSplat& take, const Progress& progress) {
   Counts counts;
   borders_->finish(progress);
-  if (sums_) {
-    flushRange(*sums_, borders_->load(0), take, counts);
-    sums_.reset();
-    return counts;
+  if (waiting_) waiting_->close();
+  constexpr uint64_t kPoints = SumPages::kPoints;
+  sums_->setMost((std::min(range_points_, points_) + kPoints - 1) / kPoints);
+  size_t stream = 0;
+  for (uint64_t first = 0; first < points_; first += range_points_, ++stream) {
+    progress.throwIfStopped();
+    const PointRange range{first, std::min(first + range_points_, points_)};
+    const uint64_t first_page = range.first / kPoints, end_page = (range.end + kPoints - 1) / kPoints;
+    sums_->holdPages(first_page, end_page);
+    if (waiting_) sumWaiting(stream, range, progress);
+    flushRange(range, borders_->load(stream), take, counts);
+    for (uint64_t page = first_page; page < end_page; ++page) sums_->forget(page);
   }
-  waiting_->close();
-  GatheredCells cells;
-  for (size_t range = 0; range < waiting_->streams(); ++range) {
-    const uint64_t first = range * range_points_;
-    Sums sums(first, std::min(range_points_, points_ - first), fields_);
-    cells.clear();
-    const auto sum = [&] {
-      progress.throwIfStopped();
-      accumulate(cells, sums);
-      cells.clear();
-    };
-    waiting_->forEach(range, [&](std::span<const std::byte> records) {
-      for (const std::byte* at = records.data(); at < records.data() + records.size();) {
-        CellRecord head;
-        std::memcpy(&head, at, sizeof head);
-        at += sizeof head;
-        cells.numbers.push_back(head.number);
-        cells.shapes.push_back(static_cast<CellKind>(head.shape));
-        at = takeBytes(at, head.corners, cells.corners);
-        at = takeBytes(at, head.corners, cells.at);
-        at = takeBytes(at, head.corners * fields_, cells.corner_values);
-        at = takeBytes(at, head.faces, cells.faces);
-        cells.corner_begin.push_back(cells.corners.size());
-        cells.face_begin.push_back(cells.faces.size());
-        if (cells.size() == kCellsPerRead) sum();
-      }
-    });
-    sum();
-    waiting_->forget(range);
-    flushRange(sums, borders_->load(range), take, counts);
-  }
+  sums_.reset();
   return counts;
 }
 

@@ -1,6 +1,6 @@
 // Sums what cells give to their corners, in the order of the cells, and makes a splat of each point: the mesh's
-// node-centred splats. The sums of all points (144 bytes a point with one field) need not fit in memory: cells then
-// wait on disk, once for each range of points that they have corners in.
+// node-centred splats. The sums of all points (148 bytes a point with one field) need not fit in memory (sum_pages.h).
+// Where cells refer to points all over the mesh, they wait on disk, once for each range of points that they have corners in.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/point_borders.h"
+#include "preprocess/gather/sum_pages.h"
 #include "preprocess/moments/mesh_splats.h"
 
 namespace curvisplat {
@@ -36,17 +37,23 @@ class PointSums {
   Counts finish(const TakeSplat& take, const Progress& progress);
 
  private:
-  struct Sums;
-  void accumulate(const GatheredCells& cells, Sums& sums);
+  struct PointRange {
+    uint64_t first, end;
+  };
+  void sum(const GatheredCells& cells);
+  /// What they give to the points of the range, which are in memory.
+  void accumulate(const GatheredCells& cells, const PointRange& range);
   void write(const GatheredCells& cells);
-  void flushRange(const Sums& sums, const OuterPlanes::OfRange& planes, const TakeSplat& take,
-                  Counts& counts) const;
+  void sumWaiting(size_t stream, const PointRange& range, const Progress& progress);
+  void flushRange(const PointRange& range, const OuterPlanes::OfRange& planes, const TakeSplat& take,
+                  Counts& counts);
 
   const uint64_t points_;
   const size_t fields_;
-  uint64_t range_points_ = 0;
-  std::unique_ptr<Sums> sums_;                  // of all points, if they fit
-  std::unique_ptr<class StreamsFile> waiting_;  // otherwise: cells by ranges of points
+  uint64_t memory_bytes_, range_points_ = 0;
+  const std::filesystem::path folder_;
+  std::unique_ptr<SumPages> sums_;
+  std::unique_ptr<class StreamsFile> waiting_;  // cells by ranges of points; null: there are none
   std::unique_ptr<PointBorders> borders_;
   std::vector<double> moments_;
 };

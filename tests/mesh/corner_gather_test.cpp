@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <random>
 
 #include "tests/reference/array_mesh.h"
 #include "tests/support/temporary_folder.h"
@@ -75,6 +76,41 @@ TEST(CornerGather, GivesACellOfManyCornersAlone) {
   CornerGather(reader, numbers, uint64_t{1} << 30, folder.path(), progress)
       .forEach([&](const GatheredCells& cells) { sizes.push_back(cells.size()); });
   EXPECT_EQ(sizes, (std::vector<size_t>{1, 1, 1, 1}));
+}
+
+TEST(CornerGather, GivesAllCellsWherePagesAreLeftForStreams) {
+  // Up to a prism in the middle of a chunk, cells have points near those of the cell before.
+  constexpr size_t kPrisms = 20000, kNear = 7000, kCorners = 40;
+  ArrayPiece piece;
+  for (uint64_t n = 0; n < 4 * kPrisms; ++n) piece.points.emplace_back(n, 2 * n, 3 * n);
+  std::mt19937 random(1);
+  std::vector<uint64_t> points(kCorners);
+  std::vector<uint64_t> first_points;
+  for (size_t n = 0; n < kPrisms; ++n) {
+    first_points.push_back(n < kNear ? 3 * n : random() % (4 * kPrisms - kCorners));
+    std::iota(points.begin(), points.end(), first_points.back());
+    piece.cells.appendPrism(points);
+  }
+  setValues(piece, [](const glm::dvec3& x) { return x.x; });
+  const ArrayMesh mesh({piece});
+  const MeshReader reader(mesh, {0}, std::nullopt);
+  const TemporaryFolder folder;
+  Progress progress;
+  constexpr uint64_t kMemory = 1'000'000;  // two pages
+  const PointNumbers numbers(reader, kMemory, folder.path(), progress);
+  size_t next = 0;
+  CornerGather(reader, numbers, kMemory, folder.path(), progress).forEach([&](const GatheredCells& cells) {
+    for (size_t n = 0; n < cells.size(); ++n, ++next) {
+      ASSERT_EQ(cells.numbers[n], next);
+      ASSERT_EQ(cells.cornersOfCell(n).size(), kCorners);
+      for (size_t at = cells.corner_begin[n]; at < cells.corner_begin[n + 1]; ++at) {
+        const auto number = static_cast<double>(first_points[next] + at - cells.corner_begin[n]);
+        ASSERT_EQ(cells.at[at], glm::dvec3(number, 2 * number, 3 * number));
+        ASSERT_EQ(cells.corner_values[at], static_cast<float>(number));
+      }
+    }
+  });
+  EXPECT_EQ(next, kPrisms);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <random>
 
 #include "preprocess/convert/convert.h"
@@ -132,6 +134,35 @@ TEST_F(MeshConvert, BytesAreTheSameForAnyThreadsAndMemory) {
       }
       how.threads = 2;
       EXPECT_EQ(filesOf(mesh, how), expected) << "two threads and little memory";
+    }
+}
+
+/// Its cells from `first` on come in a random order.
+ArrayPiece shuffledFrom(size_t first, const ArrayPiece& piece) {
+  std::vector<size_t> order(piece.cells.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::shuffle(order.begin() + static_cast<ptrdiff_t>(first), order.end(), std::mt19937(5));
+  ArrayPiece out{piece.points, {}, piece.point_values, {}};
+  for (const size_t cell : order) {
+    out.cells.append(piece.cells.shapes[cell], piece.cells.cornersOfCell(cell));
+    out.cell_values.push_back(piece.cell_values[cell]);
+  }
+  return out;
+}
+
+TEST_F(MeshConvert, PagesOfPointsMakeTheSameBytes) {
+  // 16 pages of sums, 4 of positions: all fit, some of them, or those of the cells in order alone.
+  const ArrayPiece hexahedra = hexahedraOf(*scene_, 60, 30, 30);
+  const ArrayMesh meshes[] = {ArrayMesh({hexahedra}), ArrayMesh({shuffledFrom(30'000, hexahedra)}),
+                              ArrayMesh(split(hexahedra, 3, [](size_t cell) { return cell / 5000 % 3; }))};
+  for (const ArrayMesh& mesh : meshes)
+    for (const uint32_t scalar : {0u, 1u}) {
+      const Files expected = filesOf(mesh, options(scalar));
+      ConvertOptions how = options(scalar);
+      for (const uint64_t bytes : {30'000'000u, 16'000'000u, 3'000'000u}) {
+        how.mesh_bytes = bytes;
+        EXPECT_EQ(filesOf(mesh, how), expected) << bytes << " bytes";
+      }
     }
 }
 
