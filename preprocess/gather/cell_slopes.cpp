@@ -12,6 +12,7 @@
 
 #include "preprocess/gather/streams_file.h"
 #include "stream/base/freed_memory.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -28,6 +29,12 @@ struct FaceRecord {
   glm::dvec3 centre_of_cell, inward, centre;  // values follow
 };
 
+/// Cells of one range that share a face, by their places in it.
+struct PairRecord {
+  uint32_t first, second;
+};
+
+/// Of another range.
 struct NeighbourRecord {
   uint64_t cell, neighbour;
   glm::dvec3 centre;  // of the neighbour; values follow
@@ -75,6 +82,83 @@ void put(std::byte* to, const Record& record, std::span<const float> values) {
   std::memcpy(to + sizeof record, values.data(), values.size_bytes());
 }
 
+/// The cells of a range, each with those that it shares a face with.
+class RangeOfCells {
+ public:
+  explicit RangeOfCells(size_t fields) : bodies_(fields), beside_(fields), fields_(fields) {}
+
+  struct Streams {
+    const StreamsFile &bodies, &pairs, &neighbours;
+  };
+  /// Cells [first_cell, first_cell + cells).
+  void load(const Streams& streams, size_t range, uint64_t first_cell, uint64_t cells) {
+    bodies_.load(streams.bodies, range);
+    beside_.load(streams.neighbours, range);
+    places_.assign(cells, 0);
+    for (size_t n = 0; n < bodies_.size(); ++n)
+      places_[bodies_[n].cell - first_cell] = static_cast<uint32_t>(n);
+    begins_.assign(bodies_.size() + 1, 0);
+    const auto forEachEnd = [&](const auto& use) {
+      forEachPair(streams.pairs, range, [&](uint32_t first, uint32_t second) {
+        use(first, second);
+        use(second, first);
+      });
+      for (size_t n = 0; n < beside_.size(); ++n)
+        use(places_[beside_[n].cell - first_cell], static_cast<uint32_t>(bodies_.size() + n));
+    };
+    forEachEnd([&](uint32_t body, uint32_t) { ++begins_[body + 1]; });
+    for (size_t n = 1; n < begins_.size(); ++n) begins_[n] += begins_[n - 1];
+    ends_.assign(begins_.begin(), begins_.end() - 1);
+    neighbours_.resize(begins_.back());
+    forEachEnd([&](uint32_t body, uint32_t neighbour) { neighbours_[ends_[body]++] = neighbour; });
+  }
+
+  size_t size() const { return bodies_.size(); }
+  BodyRecord body(size_t n) const { return bodies_[n]; }
+  void values(size_t n, std::span<float> out) const { bodies_.values(n, out); }
+  /// Of cell n, in the order of their numbers. Any thread.
+  void neighbours(size_t n, std::vector<glm::dvec3>& steps, std::vector<float>& values) {
+    steps.clear();
+    values.clear();
+    const std::span<uint32_t> of_cell =
+        std::span(neighbours_).subspan(begins_[n], begins_[n + 1] - begins_[n]);
+    std::sort(of_cell.begin(), of_cell.end(),
+              [&](uint32_t a, uint32_t b) { return numberOf(a) < numberOf(b); });
+    const glm::dvec3 centre = bodies_[n].body.centre;
+    for (const uint32_t neighbour : of_cell) {
+      values.resize(values.size() + fields_);
+      const std::span<float> of_neighbour = std::span(values).last(fields_);
+      const bool here = neighbour < bodies_.size();
+      const size_t other = neighbour - bodies_.size();
+      here ? bodies_.values(neighbour, of_neighbour) : beside_.values(other, of_neighbour);
+      steps.push_back((here ? bodies_[neighbour].body.centre : beside_[other].centre) - centre);
+    }
+  }
+
+ private:
+  template <typename Use>
+  void forEachPair(const StreamsFile& pairs, size_t range, const Use& use) const {
+    pairs.forEach(range, [&](std::span<const std::byte> records) {
+      for (size_t at = 0; at < records.size(); at += sizeof(PairRecord)) {
+        const auto pair = recordIn<PairRecord>(records.subspan(at));
+        use(places_[pair.first], places_[pair.second]);
+      }
+    });
+  }
+  /// Of a body, or of a record of another range's behind them.
+  uint64_t numberOf(uint32_t neighbour) const {
+    return neighbour < bodies_.size() ? bodies_[neighbour].cell
+                                      : beside_[neighbour - bodies_.size()].neighbour;
+  }
+
+  RecordArray<BodyRecord> bodies_;
+  RecordArray<NeighbourRecord> beside_;
+  const size_t fields_;
+  std::vector<uint32_t> places_;         // [cell of the range], among the bodies
+  std::vector<uint32_t> begins_, ends_;  // [body], in neighbours_
+  std::vector<uint32_t> neighbours_;
+};
+
 /// Of cells [begin, end).
 void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<CellBody> out) {
   for (size_t n = begin; n < end;) {
@@ -105,7 +189,8 @@ CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes,
   range_cells_ = std::clamp<uint64_t>(memory_bytes / 2 / range_bytes, 1, uint64_t{1} << 26);
   const uint64_t ranges = std::max<uint64_t>(1, (cells + range_cells_ - 1) / range_cells_);
   bodies_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 8);
-  neighbours_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 8);
+  pairs_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 16);
+  neighbours_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 16);
   planes_ = std::make_unique<OuterPlanes>(ranges, range_cells_, memory_bytes / 16, folder);
   faces_ = std::make_unique<FaceMatcher>(face_bytes, faces, memory_bytes / 4, folder);
   neighbour_.resize(sizeof(NeighbourRecord) + value_bytes);
@@ -149,13 +234,16 @@ void CellSlopes::addFaces(const GatheredCells& cells) {
              valuesOf(cells, face.cell));
        },
        [&](size_t first, size_t second) {
-         if (cellOf(first) == cellOf(second)) return;
+         if (cellOf(first) == cellOf(second) ||
+             joinInRange(cells.numbers[cellOf(first)], cells.numbers[cellOf(second)]))
+           return;
          tellOf(cells.numbers[cellOf(first)], cellOf(second));
          tellOf(cells.numbers[cellOf(second)], cellOf(first));
        },
        [&](std::span<const std::byte> first, size_t second) {
          const FaceRecord earlier = recordIn<FaceRecord>(first);
          const uint64_t cell = cells.numbers[cellOf(second)];
+         if (joinInRange(earlier.cell, cell)) return;
          tellOf(earlier.cell, cellOf(second));
          tell(cell, earlier.cell, earlier.centre_of_cell, first.subspan(sizeof(FaceRecord)));
        }});
@@ -163,6 +251,14 @@ void CellSlopes::addFaces(const GatheredCells& cells) {
 
 std::span<const float> CellSlopes::valuesOf(const GatheredCells& cells, size_t n) const {
   return std::span(cells.cell_values).subspan(n * fields_, fields_);
+}
+
+bool CellSlopes::joinInRange(uint64_t a, uint64_t b) {
+  const uint64_t range = a / range_cells_;
+  if (b / range_cells_ != range) return false;
+  pairs_->appendRecord(
+      range, PairRecord{static_cast<uint32_t>(a % range_cells_), static_cast<uint32_t>(b % range_cells_)});
+  return true;
 }
 
 void CellSlopes::tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre,
@@ -174,25 +270,17 @@ void CellSlopes::tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centr
 }
 
 void CellSlopes::makeSplats(size_t range, const TakeSplat& take, PointSums::Counts& counts) {
-  RecordArray<BodyRecord> bodies(fields_);
-  RecordArray<NeighbourRecord> beside(fields_);
-  bodies.load(*bodies_, range);
-  beside.load(*neighbours_, range);
-  const OuterPlanes::OfRange planes = planes_->load(range);
-  // Neighbours by cell, in the order of their numbers: `begins` of each cell, among `sorted` records.
+  RangeOfCells cells(fields_);
   const uint64_t first_cell = range * range_cells_;
-  std::vector<uint32_t> begins(std::min(range_cells_, cells_ - first_cell) + 1, 0);
-  for (size_t n = 0; n < beside.size(); ++n) ++begins[beside[n].cell - first_cell + 1];
-  for (size_t n = 1; n < begins.size(); ++n) begins[n] += begins[n - 1];
-  std::vector<uint32_t> sorted(beside.size());
   {
-    std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
-    for (size_t n = 0; n < sorted.size(); ++n)
-      sorted[next[beside[n].cell - first_cell]++] = static_cast<uint32_t>(n);
+    const TraceScope trace("load cells");
+    cells.load({*bodies_, *pairs_, *neighbours_}, range, first_cell,
+               std::min(range_cells_, cells_ - first_cell));
   }
+  const OuterPlanes::OfRange planes = planes_->load(range);
   std::atomic<uint64_t> splats = 0, degenerate = 0;
   tbb::parallel_for(
-      tbb::blocked_range<size_t>(0, bodies.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
+      tbb::blocked_range<size_t>(0, cells.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
         NodeSplat splat;
         std::vector<SplatScalar> values(fields_);
         std::vector<float> own(fields_), others;
@@ -200,22 +288,9 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, PointSums::Coun
         std::vector<OuterPlane> of_border;
         uint64_t made = 0, flat = 0;
         for (size_t n = part.begin(); n < part.end(); ++n) {
-          const BodyRecord body = bodies[n];
-          bodies.values(n, own);
-          steps.clear();
-          others.clear();
-          const auto of_cell =
-              std::span(sorted).subspan(begins[body.cell - first_cell],
-                                        begins[body.cell - first_cell + 1] - begins[body.cell - first_cell]);
-          std::sort(of_cell.begin(), of_cell.end(), [&](uint32_t a, uint32_t b) {
-            const uint64_t cell_a = beside[a].neighbour, cell_b = beside[b].neighbour;
-            return cell_a != cell_b ? cell_a < cell_b : a < b;
-          });
-          for (const uint32_t neighbour : of_cell) {
-            others.resize(others.size() + fields_);
-            beside.values(neighbour, std::span(others).last(fields_));
-            steps.push_back(beside[neighbour].centre - body.body.centre);
-          }
+          const BodyRecord body = cells.body(n);
+          cells.values(n, own);
+          cells.neighbours(n, steps, others);
           if (!(body.body.volume > 0)) ++flat;
           splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
           splat.border_code = meshBorderCode(planes.of(body.cell, of_border), splat.splat, kNextOfCells);
@@ -235,7 +310,7 @@ PointSums::Counts CellSlopes::finish(const TakeSplat& take, const Progress& prog
   bodies_->close();
   const auto join = [&](std::span<const std::byte> first, std::span<const std::byte> second) {
     const FaceRecord a = recordIn<FaceRecord>(first), b = recordIn<FaceRecord>(second);
-    if (a.cell == b.cell) return;
+    if (a.cell == b.cell || joinInRange(a.cell, b.cell)) return;
     tell(a.cell, b.cell, b.centre_of_cell, second.subspan(sizeof(FaceRecord)));
     tell(b.cell, a.cell, a.centre_of_cell, first.subspan(sizeof(FaceRecord)));
   };
@@ -247,6 +322,7 @@ PointSums::Counts CellSlopes::finish(const TakeSplat& take, const Progress& prog
       },
       progress);
   faces_.reset();
+  pairs_->close();
   neighbours_->close();
   planes_->close();
   PointSums::Counts counts;
@@ -254,6 +330,7 @@ PointSums::Counts CellSlopes::finish(const TakeSplat& take, const Progress& prog
     progress.throwIfStopped();
     makeSplats(range, take, counts);
     bodies_->forget(range);
+    pairs_->forget(range);
     neighbours_->forget(range);
   }
   return counts;

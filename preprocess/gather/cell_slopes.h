@@ -1,9 +1,10 @@
 // Makes a splat of each cell: the mesh's cell-centred splats. Slopes are by least squares over the cells that share
 // a face. Nothing grows with the mesh but what is on disk:
 //
-//    cells --+-- bodies, values -------------------------------> streams by ranges of cells --+
-//            +-- faces --> face_matcher --+-- pairs: neighbours --> the same                  +--> splats
-//                                         +-- outer ones ---------> the same                --+
+//    cells --+-- bodies, values -----------------------------------> streams by ranges of cells --+
+//            +-- faces --> face_matcher --+-- pairs of a range --------> the same                 +--> splats
+//                                         +-- of others: neighbours ---> the same                 |
+//                                         +-- outer ones --------------> the same               --+
 #pragma once
 
 #include <cstdint>
@@ -34,13 +35,15 @@ class CellSlopes {
   std::span<const float> valuesOf(const GatheredCells& cells, size_t n) const;
   void addBodies(const GatheredCells& cells);
   void addFaces(const GatheredCells& cells);
+  /// Whether both cells are of one range, and know one another now.
+  bool joinInRange(uint64_t a, uint64_t b);
   void tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre, std::span<const std::byte> values);
   void makeSplats(size_t range, const TakeSplat& take, PointSums::Counts& counts);
 
   const uint64_t cells_;
   const size_t fields_;
   uint64_t range_cells_ = 0;
-  std::unique_ptr<class StreamsFile> bodies_, neighbours_;
+  std::unique_ptr<class StreamsFile> bodies_, pairs_, neighbours_;
   std::unique_ptr<FaceMatcher> faces_;
   std::unique_ptr<OuterPlanes> planes_;
   FaceList list_;
