@@ -51,7 +51,8 @@ class CgnsLayout:
 
     def zone(self, base, name, block):
         zone = self.block(base, name, block)
-        for name, location, values in (("nodes", "Vertex", block.p), ("cells", "CellCenter", block.c)):
-            solution = self.node(zone, name, "FlowSolution_t")
+        for kind, location, values in (("nodes", "Vertex", block.p), ("cells", "CellCenter", block.c)):
+            solution = self.node(zone, kind, "FlowSolution_t")
             self.node(solution, "GridLocation", "GridLocation_t", location)
             self.node(solution, "p" if location == "Vertex" else "c", "DataArray_t", values)
+        return zone

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """format_memory_test.py CURVISPLAT
 
-Converts one grid of two million nodes from every format within the least memory that is accepted, and prints the peak memory of each; and a
-thin one, of which not even a row and its neighbours fit in a slab, to the same bytes as with more memory. Exit status 77 (skipped) without
+Converts one grid of two million nodes from every format within the least memory that is accepted, and prints the peak memory of each; a thin
+one, of which not even a row and its neighbours fit in a slab, to the same bytes as with more memory; and one of which no row fits. Exit status 77 (skipped) without
 python3-vtk9, python3-netcdf4 or python3-h5py.
 """
 import gzip
@@ -93,6 +93,20 @@ class FormatMemory(StructuredFormats):
         layout.file.close()
         self.expect_within("CGNS, HDF5", path)
 
+    def test_overset_holes_of_cgns(self):
+        """Blanked nodes, and cells that blank what they surround."""
+        path, last = self.folder / "a.cgns", np.array(self.SHAPE[::-1])
+        layout = CgnsLayout(path)
+        base = layout.node(layout.file, "Base", "CGNSBase_t", np.array([3, 3], "i4"))
+        zone = layout.zone(base, "zone", self.block)
+        connectivity = layout.node(zone, "ZoneGridConnectivity", "ZoneGridConnectivity_t")
+        for name, location, first, end in (("nodes", "Vertex", last // 5 + 1, last // 4 + 1), ("cells", "CellCenter", last // 3 + 1, last // 2)):
+            hole = layout.node(connectivity, name, "OversetHoles_t")
+            layout.node(hole, "GridLocation", "GridLocation_t", location)
+            layout.node(hole, "PointRange", "IndexRange_t", np.array([np.minimum(first, end), end], "i4"))
+        layout.file.close()
+        self.expect_within("CGNS zones with holes", path)
+
     def write_netcdf(self, path, form, places=True, values=True, **options):
         with netCDF4.Dataset(path, "w", format=form) as f:
             for name, length in zip(("lev", "y", "x"), self.SHAPE):
@@ -117,6 +131,24 @@ class FormatMemory(StructuredFormats):
         places = self.write_netcdf(self.folder / "c.nc", "NETCDF4", values=False)
         values = self.write_netcdf(self.folder / "d.nc", "NETCDF3_CLASSIC", places=False)
         self.expect_within("NetCDF, coordinates in a second file", values, places)
+
+    def test_netcdf_around_the_earth(self):
+        """The last column is a step before the first."""
+        path, (nk, nj, ni) = self.folder / "a.nc", self.SHAPE
+        nj = max(nj, 4)  # fewer rows are not closed
+        with netCDF4.Dataset(path, "w", format="NETCDF3_CLASSIC") as f:
+            for name, length in zip(("lev", "y", "x"), (nk, nj, ni)):
+                f.createDimension(name, length)
+            f.createVariable("lev", "f8", ("lev",))[:] = 1e5 * np.arange(nk)
+            f["lev"].units, f["lev"].positive = "m", "up"
+            for name, array in (("lon", np.broadcast_to(np.arange(ni) * 360 / ni, (nj, ni))),
+                                ("lat", np.broadcast_to(np.linspace(-60, 60, nj)[:, np.newaxis], (nj, ni)))):
+                f.createVariable(name, "f8", ("y", "x"))[:] = array
+            f["lon"].units, f["lat"].units = "degrees_east", "degrees_north"
+            f.createVariable("p", "f4", ("lev", "y", "x"))[:] = np.random.default_rng(3).random((nk, nj, ni))
+        described = self.run_program("info", path)
+        self.assertIn("closed around the Earth", described.stdout)
+        self.expect_within("NetCDF around the Earth", path)
 
     @staticmethod
     def packed(path):
@@ -249,6 +281,16 @@ class LongRows(FormatMemory):
         for name in files:
             self.assertTrue((cut / name).read_bytes() == (whole / name).read_bytes(), f"{what}: {name}")
 
+
+class LongestRows(FormatMemory):
+    """A single row does not fit in a slab."""
+
+    SHAPE = SMALL = (2, 2, 1_000_000)
+    test_plot3d = test_vtk = test_tiles = test_several_blocks = test_tecplot = test_ensight = test_xdmf = None
+    test_compressed_files = test_compressed_tiles = None
+
+    def expect_within(self, what, *paths, scalar="p"):
+        super().expect_within(f"{what}, rows of a million nodes", *paths, scalar=scalar)
 
 
 if __name__ == "__main__":

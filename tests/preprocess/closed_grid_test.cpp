@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "preprocess/formats/netcdf/closed_grid.h"
+#include "tests/support/parts_of_rows.h"
 
 namespace curvisplat {
 namespace {
@@ -26,11 +27,18 @@ class Numbered final : public GridSource {
     std::vector<double> numbers;
     for (uint64_t k = box.k0; k < box.k1; ++k)
       for (uint64_t j = box.j0; j < box.j1; ++j)
-        for (uint64_t i = 0; i < kNi; ++i) numbers.push_back(numberOf(i, j, k));
+        for (uint64_t i = box.i0; i < box.endOfRow(kNi); ++i) numbers.push_back(numberOf(i, j, k));
     out.x = out.y = out.z = numbers;
     out.blank.assign(numbers.size(), 0);
     out.scalars.assign(scalars.size(), std::vector<float>(numbers.begin(), numbers.end()));
   }
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    EXPECT_LT(box.i0, box.i1);
+    EXPECT_LE(box.i1, kNi);
+    read(block, box, scalars, out);
+  }
+  uint64_t rowsInMemory(std::span<const uint32_t>) const override { return 0; }
 
  private:
   GridDescription description_;
@@ -44,6 +52,8 @@ void expectEveryBox(const GridClosure& closure) {
   ASSERT_EQ(block.ni, distinct + 1);
   ASSERT_EQ(block.nj, kNj + (closure.north == North::kAddRow) - (closure.north == North::kDropRow));
   const bool half = closure.north == North::kAddRow || closure.north == North::kHalfRow;
+  EXPECT_EQ(grid.rowsInMemory({}), 0u);
+  expectPartsOfRows(grid);
   const std::vector<uint32_t> scalars{0};
   for (uint64_t j0 = 0; j0 < block.nj; ++j0)
     for (uint64_t j1 = j0 + 1; j1 <= block.nj; ++j1)

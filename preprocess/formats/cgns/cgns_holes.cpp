@@ -63,47 +63,50 @@ void CgnsHoles::add(const CgnsFile& file, const CgnsNode& holes, const std::arra
 }
 
 template <typename Use>
-void CgnsHoles::forEachIn(const Holes& holes, uint64_t ni, const NodeBox& box, const Use& use) {
+void CgnsHoles::forEachIn(const Holes& holes, const WindowStrides& strides, const NodeBox& box,
+                          const Use& use) {
   for (const Hole& hole : holes)
     for (uint64_t k = std::max(hole.first[2], box.k0); k < std::min(hole.last[2] + 1, box.k1); ++k)
       for (uint64_t j = std::max(hole.first[1], box.j0); j < std::min(hole.last[1] + 1, box.j1); ++j)
-        for (uint64_t i = hole.first[0]; i <= hole.last[0]; ++i)
-          use(i + ni * (j - box.j0 + (box.j1 - box.j0) * (k - box.k0)));
+        for (uint64_t i = std::max(hole.first[0], box.i0); i < std::min(hole.last[0] + 1, box.i1); ++i)
+          use(strides.at(i, j, k));
 }
 
 void CgnsHoles::blankNodes(const std::array<uint64_t, 3>& nodes, const NodeBox& box,
                            std::vector<uint8_t>& blank) const {
-  const uint64_t ni = nodes[0];
-  forEachIn(nodes_, ni, box, [&](uint64_t n) { blank[n] = 1; });
+  const WindowStrides strides(box, nodes[0]);
+  forEachIn(nodes_, strides, box, [&](size_t n) { blank[n] = 1; });
   if (cells_.empty()) return;
   // The cells around the box's nodes.
-  const NodeBox around{box.j0 - std::min<uint64_t>(box.j0, 1), box.j1, box.k0 - std::min<uint64_t>(box.k0, 1),
-                       box.k1};
-  const uint64_t rows = around.j1 - around.j0;
-  std::vector<uint8_t> hidden(ni * rows * (around.k1 - around.k0));
-  forEachIn(cells_, ni, around, [&](uint64_t n) { hidden[n] = 1; });
+  const auto before = [](uint64_t n) { return n - std::min<uint64_t>(n, 1); };
+  const NodeBox around{before(box.j0), box.j1,         before(box.k0),
+                       box.k1,         before(box.i0), box.endOfRow(nodes[0])};
+  const WindowStrides strides_around(around, nodes[0]);
+  std::vector<uint8_t> hidden(strides_around.plane * (around.k1 - around.k0));
+  forEachIn(cells_, strides_around, around, [&](size_t n) { hidden[n] = 1; });
   const auto allHidden = [&](const std::array<uint64_t, 3>& node) {
     std::array<uint64_t, 3> first = node, last = node;
     for (size_t axis = 0; axis < 3; ++axis) {
-      first[axis] -= std::min<uint64_t>(first[axis], 1);
+      first[axis] = before(first[axis]);
       last[axis] = std::min(last[axis], nodes[axis] - 2);
     }
     for (uint64_t k = first[2]; k <= last[2]; ++k)
       for (uint64_t j = first[1]; j <= last[1]; ++j)
         for (uint64_t i = first[0]; i <= last[0]; ++i)
-          if (!hidden[i + ni * (j - around.j0 + rows * (k - around.k0))]) return false;
+          if (!hidden[strides_around.at(i, j, k)]) return false;
     return true;
   };
   size_t n = 0;
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j)
-      for (uint64_t i = 0; i < ni; ++i, ++n)
+      for (uint64_t i = box.i0; i < around.i1; ++i, ++n)
         if (!blank[n] && allHidden({i, j, k})) blank[n] = 1;
 }
 
 void CgnsHoles::blankCells(const std::array<uint64_t, 3>& nodes, const NodeBox& box,
                            std::vector<float>& values) const {
-  forEachIn(cells_, nodes[0], box, [&](uint64_t n) { values[n] = std::numeric_limits<float>::quiet_NaN(); });
+  forEachIn(cells_, WindowStrides(box, nodes[0]), box,
+            [&](size_t n) { values[n] = std::numeric_limits<float>::quiet_NaN(); });
 }
 
 }  // namespace curvisplat

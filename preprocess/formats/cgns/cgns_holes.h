@@ -7,6 +7,7 @@
 
 #include "preprocess/formats/cgns/cgns_file.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/slabs.h"
 
 namespace curvisplat {
 
@@ -33,9 +34,9 @@ class CgnsHoles {
 
   static void addRange(const std::vector<double>& ends, const std::array<uint64_t, 3>& counts, Holes& to);
   static void addList(const std::vector<double>& points, const std::array<uint64_t, 3>& counts, Holes& to);
-  /// Calls `use` with the index of each sample of `box`, rows of `ni`, that is in a hole; some more than once.
+  /// Calls `use` with the index of each sample of `box` that is in a hole; some more than once.
   template <typename Use>
-  static void forEachIn(const Holes& holes, uint64_t ni, const NodeBox& box, const Use& use);
+  static void forEachIn(const Holes& holes, const WindowStrides& strides, const NodeBox& box, const Use& use);
 
   Holes nodes_, cells_;
 };

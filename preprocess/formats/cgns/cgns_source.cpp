@@ -75,19 +75,6 @@ void CgnsSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
   }
 }
 
-void CgnsSource::readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                                NodeArrays& out) const {
-  if (tree_.zones.at(block).holes.empty())
-    read(block, box, scalars, out);
-  else
-    GridSource::readPartOfRows(block, box, scalars, out);
-}
-
-uint64_t CgnsSource::rowsInMemory(std::span<const uint32_t>) const {
-  const auto has_holes = [](const CgnsZone& zone) { return !zone.holes.empty(); };
-  return std::any_of(tree_.zones.begin(), tree_.zones.end(), has_holes) ? 1 : 0;
-}
-
 void CgnsSource::readScalar(const CgnsZone& zone, const NodeBox& box, const CgnsArrays& arrays,
                             Centring centring, std::vector<float>& to) const {
   if (arrays.empty()) return;

@@ -32,11 +32,12 @@ struct GridClosure {
           // it, modulo the number of distinct columns
 };
 
-/// The points of row j on the unit sphere, not finite where there is none.
-using RowOfPoints = std::function<std::vector<glm::dvec3>(uint64_t j)>;
+/// The points [begin, end) of row j on the unit sphere, not finite where there is none.
+using PointsOfRow = std::function<std::vector<glm::dvec3>(uint64_t j, uint64_t begin, uint64_t end)>;
 
-/// From a few rows of a block of ni x nj columns; nullopt if the grid needs nothing. Throws what `row` throws.
-std::optional<GridClosure> closureOf(uint64_t ni, uint64_t nj, const RowOfPoints& row);
+/// From a few rows of a block of ni x nj columns; nullopt if the grid needs nothing. Long rows are read in parts. Throws what
+/// `points` throws.
+std::optional<GridClosure> closureOf(uint64_t ni, uint64_t nj, const PointsOfRow& points);
 
 class ClosedGrid final : public GridSource {
  public:
@@ -46,8 +47,19 @@ class ClosedGrid final : public GridSource {
   /// Works in the arrays of `out`: needs no memory of its own.
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override;
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
+    return source_->rowsInMemory(scalars);
+  }
 
  private:
+  /// Columns [begin, end) of the source, which are the nodes from `to` on along i, or, backwards, those from `to` down.
+  struct Columns {
+    uint64_t begin = 0, end = 0, to = 0;
+    bool backwards = false;
+  };
+  std::vector<Columns> columnsOf(uint64_t i0, uint64_t i1, bool mirrored) const;
   template <typename Value>
   void rearrange(const NodeBox& box, uint64_t rows_read, std::vector<Value>& values) const;
   void blankHalfRow(const NodeBox& box, NodeArrays& out) const;

@@ -253,8 +253,8 @@ std::vector<glm::dvec3> NetcdfSource::pointsOf(uint32_t block, const CfRange& ra
 std::optional<GridClosure> NetcdfSource::closure() const {
   if (!onSphere() || blocks_.size() > 1) return std::nullopt;
   const GridBlock& block = description_.blocks[0];
-  return closureOf(block.ni, block.nj, [&](uint64_t j) {
-    return pointsOf(0, {{0, j, 0}, {block.ni, j + 1, 1}});
+  return closureOf(block.ni, block.nj, [&](uint64_t j, uint64_t begin, uint64_t end) {
+    return pointsOf(0, {{begin, j, 0}, {end, j + 1, 1}});
   });
 }
 
