@@ -541,6 +541,67 @@ class Arrays(PythonTest):
             self.assertEqual((first / name).read_bytes(), (second / name).read_bytes(), name)
         self.assertGreater(largest, 0)
 
+    def test_with_long_rows_are_read_in_parts(self):
+        """Rows that do not fit in a slab, of arrays and of a callable, to the bytes of whole rows."""
+        x, y, z, t = bent_duct(2, 2, 200_000)
+        blank = np.arange(t.size).reshape(t.shape) % 1013 == 5
+        shortest = t.shape[2]
+
+        def read(_, *rows, i0, i1):
+            nonlocal shortest
+            k0, k1, j0, j1, names = rows
+            piece = np.s_[k0:k1, j0:j1, i0:i1]
+            shortest = min(shortest, i1 - i0)
+            return x[piece], y[piece], z[piece], [t[piece] for _ in names], blank[piece]
+
+        block = curvisplat.Block(x, y, z, {"t": t}, blank=blank)
+        cells = curvisplat.Block(x, y, z, {"t": t[1:, 1:, 1:]}, blank=blank)
+        for name, convert in (("arrays", lambda out, **more: curvisplat.convert_arrays(out, block, **more)),
+                              ("cells", lambda out, **more: curvisplat.convert_arrays(out, cells, **more)),
+                              ("callable", lambda out, **more: curvisplat.convert_callable(out, [t.shape], read, {"t": ""}, **more))):
+            whole, parts = (self.folder / of / f"{name}.splats" for of in ("whole", "parts"))
+            for folder in (whole.parent, parts.parent):
+                folder.mkdir(exist_ok=True)
+            convert(whole, memory="2G")
+            convert(parts, memory="160M")
+            for file in ("bricks.bin", "geometry.bin", "var.0.bin"):
+                self.assertEqual((whole / file).read_bytes(), (parts / file).read_bytes(), f"{name}: {file}")
+        self.assertLess(shortest, t.shape[2])
+
+    def test_of_a_callable_fit_in_memory_or_are_refused_with_a_sufficient_size(self):
+        """A million nodes along i: the peak of a process that makes no other arrays."""
+        script = ("import curvisplat, numpy as np, os, re, sys\n"
+                  "def peak(): return int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1]) >> 10\n"
+                  "ni = 1_000_000\n"
+                  "def piece(k0, k1, j0, j1, i0, i1, names):\n"
+                  "    k, j, i = np.meshgrid(np.arange(k0, k1), np.arange(j0, j1), 1e-3 * np.arange(i0, i1), indexing='ij')\n"
+                  "    k, j = k.astype('f8'), j.astype('f8')\n"
+                  "    return i, j, k, [i for _ in names], None\n"
+                  "def parts(block, k0, k1, j0, j1, names, *, i0, i1): return piece(k0, k1, j0, j1, i0, i1, names)\n"
+                  "def rows(block, k0, k1, j0, j1, names): return piece(k0, k1, j0, j1, 0, ni, names)\n"
+                  "read = {'parts': parts, 'rows': rows}[sys.argv[2]]\n"
+                  "before = peak()\n"
+                  "try:\n"
+                  "    curvisplat.convert_callable(sys.argv[1], [(2, 2, ni)], read, ['t'], memory=sys.argv[3], threads=2)\n"
+                  "    print(peak(), before)\n"
+                  "except curvisplat.Error as error:\n"
+                  "    print(error)\n")
+
+        def convert(kind, memory):
+            run = subprocess.run([sys.executable, "-c", script, self.folder / f"{kind}.splats", kind, memory], capture_output=True, text=True)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            return run.stdout
+
+        def expect_within(kind, memory):
+            peak, before = map(int, convert(kind, memory).split())
+            print(f"a callable, {kind}, memory {memory}: {peak} MiB, {before} before")
+            self.assertLessEqual(peak, int(memory[:-1]) + before)
+
+        expect_within("parts", "160M")
+        refused = convert("rows", "160M")
+        self.assertRegex(refused, r"read by whole rows.*at least \d+ MiB")
+        expect_within("rows", re.search(r"at least (\d+) MiB", refused)[1] + "M")
+
     def test_are_appended_as_steps(self):
         x, y, z, t = bent_duct()
         steps = self.folder / "appended.splats"

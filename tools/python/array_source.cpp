@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 
+#include "preprocess/grid/slabs.h"
 #include "stream/base/error.h"
 
 namespace py = pybind11;
@@ -20,6 +21,11 @@ using Shape = std::array<uint64_t, 3>;  // k, j, i
 std::string textOf(const Shape& shape) {
   return fmt::format("({}, {}, {})", shape[0], shape[1], shape[2]);
 }
+
+/// Indices along i.
+struct Range {
+  uint64_t begin, end;
+};
 
 /// A numpy array of three dimensions that is read without Python: it keeps what it looks at alive.
 class ArrayView {
@@ -48,18 +54,20 @@ class ArrayView {
   bool isBool() const { return kind_ == Kind::kBool; }
   bool isDouble() const { return kind_ == Kind::kDouble; }
 
-  /// The row (k, j, all i) into `out`, which has shape()[2] elements.
+  /// The elements (k, j, i0 to i1) into `out`. Those beyond the end of the row are not there.
   template <typename T>
-  void copyRow(uint64_t k, uint64_t j, T* out) const {
-    const std::byte* row =
-        data_ + static_cast<ptrdiff_t>(k) * strides_[0] + static_cast<ptrdiff_t>(j) * strides_[1];
+  void copyRow(uint64_t k, uint64_t j, const Range& i, T* out) const {
+    const uint64_t end = std::min(i.end, shape_[2]), count = end - std::min(i.begin, end);
+    const std::byte* first = data_ + static_cast<ptrdiff_t>(k) * strides_[0] +
+                             static_cast<ptrdiff_t>(j) * strides_[1] +
+                             static_cast<ptrdiff_t>(i.begin) * strides_[2];
     switch (kind_) {
       case Kind::kFloat:
-        return copyRowOf<float>(row, out);
+        return copyElements<float>(first, count, out);
       case Kind::kDouble:
-        return copyRowOf<double>(row, out);
+        return copyElements<double>(first, count, out);
       case Kind::kBool:
-        return copyRowOf<bool>(row, out);
+        return copyElements<bool>(first, count, out);
     }
   }
 
@@ -67,10 +75,10 @@ class ArrayView {
   enum class Kind { kFloat, kDouble, kBool };
 
   template <typename Stored, typename T>
-  void copyRowOf(const std::byte* row, T* out) const {
-    for (uint64_t i = 0; i < shape_[2]; ++i)
-      out[i] =
-          static_cast<T>(*reinterpret_cast<const Stored*>(row + static_cast<ptrdiff_t>(i) * strides_[2]));
+  void copyElements(const std::byte* first, uint64_t count, T* out) const {
+    for (uint64_t n = 0; n < count; ++n)
+      out[n] =
+          static_cast<T>(*reinterpret_cast<const Stored*>(first + static_cast<ptrdiff_t>(n) * strides_[2]));
   }
 
   py::array array_;
@@ -167,25 +175,31 @@ class ArraySource : public GridSource {
   void read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
     const BlockViews& views = views_[number];
-    const uint64_t ni = views.x.shape()[2], rows = (box.j1 - box.j0) * (box.k1 - box.k0);
-    for (std::vector<double>* coordinate : {&out.x, &out.y, &out.z}) coordinate->resize(rows * ni);
-    out.blank.assign(rows * ni, 0);
+    const uint64_t ni = views.x.shape()[2], row = box.rowNodes(ni), nodes = row * rowsOf(box);
+    const Range part{box.i0, box.endOfRow(ni)};
+    for (std::vector<double>* coordinate : {&out.x, &out.y, &out.z}) coordinate->resize(nodes);
+    out.blank.assign(nodes, 0);
     out.scalars.resize(scalars.size());
     for (std::vector<float>& values : out.scalars)
-      values.assign(rows * ni, std::numeric_limits<float>::quiet_NaN());
+      values.assign(nodes, std::numeric_limits<float>::quiet_NaN());
     uint64_t at = 0;
     for (uint64_t k = box.k0; k < box.k1; ++k)
-      for (uint64_t j = box.j0; j < box.j1; ++j, at += ni) {
-        views.x.copyRow(k, j, &out.x[at]);
-        views.y.copyRow(k, j, &out.y[at]);
-        views.z.copyRow(k, j, &out.z[at]);
-        if (views.blank) views.blank->copyRow(k, j, &out.blank[at]);
+      for (uint64_t j = box.j0; j < box.j1; ++j, at += row) {
+        views.x.copyRow(k, j, part, &out.x[at]);
+        views.y.copyRow(k, j, part, &out.y[at]);
+        views.z.copyRow(k, j, part, &out.z[at]);
+        if (views.blank) views.blank->copyRow(k, j, part, &out.blank[at]);
         for (size_t n = 0; n < scalars.size(); ++n) {
           const ArrayView& values = views.scalars[scalars[n]];
-          if (k < values.shape()[0] && j < values.shape()[1]) values.copyRow(k, j, &out.scalars[n][at]);
+          if (k < values.shape()[0] && j < values.shape()[1]) values.copyRow(k, j, part, &out.scalars[n][at]);
         }
       }
   }
+  void readPartOfRows(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    read(number, box, scalars, out);
+  }
+  uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const override { return 0; }
 
  private:
   GridDescription description_;
@@ -194,7 +208,7 @@ class ArraySource : public GridSource {
 
 class CallableSource : public GridSource {
  public:
-  CallableSource(const std::vector<Shape>& shapes, const ScalarNames& names, py::object read)
+  CallableSource(const std::vector<Shape>& shapes, const ScalarNames& names, PythonRead read)
       : read_(std::move(read)) {
     description_.format = "a Python callable";
     description_.coordinate_bytes = 8;
@@ -205,47 +219,92 @@ class CallableSource : public GridSource {
   }
   ~CallableSource() override {
     const py::gil_scoped_acquire locked;
-    read_ = py::object();
+    read_.function = py::object();
   }
 
   const GridDescription& description() const override { return description_; }
 
+  /// In pieces, since Python's arrays take as much memory as `out`.
   void read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
-    const GridBlock& block = description_.blocks[number];
-    const Shape shape{box.k1 - box.k0, box.j1 - box.j0, block.ni};
-    const py::gil_scoped_acquire locked;
-    py::list wanted;
-    for (const uint32_t scalar : scalars) wanted.append(description_.scalars[scalar].name);
-    const auto result = py::cast<py::tuple>(read_(number, box.k0, box.k1, box.j0, box.j1, wanted));
-    if (result.size() != 5)
-      throw Error("read() returned {} items; expected (x, y, z, [values], blank)", result.size());
-    copy(result[0], "x", shape, out.x);
-    copy(result[1], "y", shape, out.y);
-    copy(result[2], "z", shape, out.z);
-    const auto values = py::cast<py::list>(result[3]);
-    if (values.size() != scalars.size())
-      throw Error("read() returned {} arrays of values; expected {}", values.size(), scalars.size());
+    const uint64_t ni = description_.blocks[number].ni, end = box.endOfRow(ni);
+    const WindowStrides strides(box, ni);
+    const size_t nodes = strides.plane * (box.k1 - box.k0);
+    for (std::vector<double>* axis : {&out.x, &out.y, &out.z}) axis->resize(nodes);
+    out.blank.assign(nodes, 0);
     out.scalars.resize(scalars.size());
-    for (size_t n = 0; n < scalars.size(); ++n)
-      copy(values[n], description_.scalars[scalars[n]].name, shape, out.scalars[n]);
-    out.blank.assign(out.x.size(), 0);
-    if (!result[4].is_none()) copy(result[4], "blank", shape, out.blank);
+    for (std::vector<float>& values : out.scalars) values.resize(nodes);
+    const uint64_t part = read_.parts_of_rows ? std::min(strides.row, kNodesAtATime) : strides.row;
+    for (uint64_t i = box.i0; i < end; i += part) {
+      const uint64_t i1 = std::min(i + part, end);
+      for (NodeBox piece : cutForTasks(i1 - i, box, kNodesAtATime)) {
+        piece.i0 = i;
+        piece.i1 = i1;
+        readPiece(number, piece, scalars, {strides, out});
+      }
+    }
+  }
+  void readPartOfRows(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    if (read_.parts_of_rows)
+      read(number, box, scalars, out);
+    else
+      GridSource::readPartOfRows(number, box, scalars, out);
+  }
+  /// Python's arrays may be of double precision.
+  uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const override {
+    return read_.parts_of_rows ? 0 : 2;
   }
 
  private:
-  template <typename T>
-  static void copy(const py::handle& object, const std::string& what, const Shape& shape,
-                   std::vector<T>& out) {
-    const ArrayView view(py::cast<py::array>(object), "read(): " + what);
-    requireShape(view, shape, "read(): " + what);
-    out.resize(shape[0] * shape[1] * shape[2]);
-    for (uint64_t k = 0; k < shape[0]; ++k)
-      for (uint64_t j = 0; j < shape[1]; ++j) view.copyRow(k, j, &out[(k * shape[1] + j) * shape[2]]);
+  static constexpr uint64_t kNodesAtATime = 1 << 18;
+
+  struct Target {
+    const WindowStrides& strides;
+    NodeArrays& nodes;
+  };
+
+  void readPiece(uint32_t number, const NodeBox& piece, std::span<const uint32_t> scalars,
+                 const Target& target) const {
+    const py::gil_scoped_acquire locked;
+    py::list wanted;
+    for (const uint32_t scalar : scalars) wanted.append(description_.scalars[scalar].name);
+    const auto result = py::cast<py::tuple>(
+        read_.parts_of_rows ? read_.function(number, piece.k0, piece.k1, piece.j0, piece.j1, wanted,
+                                             py::arg("i0") = piece.i0, py::arg("i1") = piece.i1)
+                            : read_.function(number, piece.k0, piece.k1, piece.j0, piece.j1, wanted));
+    if (result.size() != 5)
+      throw Error("read() returned {} items; expected (x, y, z, [values], blank)", result.size());
+    const Destination to{target.strides, piece};
+    NodeArrays& out = target.nodes;
+    to.copy(result[0], "x", out.x);
+    to.copy(result[1], "y", out.y);
+    to.copy(result[2], "z", out.z);
+    const auto values = py::cast<py::list>(result[3]);
+    if (values.size() != scalars.size())
+      throw Error("read() returned {} arrays of values; expected {}", values.size(), scalars.size());
+    for (size_t n = 0; n < scalars.size(); ++n)
+      to.copy(values[n], description_.scalars[scalars[n]].name, out.scalars[n]);
+    if (!result[4].is_none()) to.copy(result[4], "blank", out.blank);
   }
 
+  struct Destination {
+    const WindowStrides& strides;
+    const NodeBox& piece;
+
+    template <typename T>
+    void copy(const py::handle& object, const std::string& what, std::vector<T>& out) const {
+      const ArrayView view(py::cast<py::array>(object), "read(): " + what);
+      const Shape shape{piece.k1 - piece.k0, piece.j1 - piece.j0, piece.i1 - piece.i0};
+      requireShape(view, shape, "read(): " + what);
+      for (uint64_t k = 0; k < shape[0]; ++k)
+        for (uint64_t j = 0; j < shape[1]; ++j)
+          view.copyRow(k, j, {0, shape[2]}, &out[strides.at(piece.i0, piece.j0 + j, piece.k0 + k)]);
+    }
+  };
+
   GridDescription description_;
-  py::object read_;
+  PythonRead read_;
 };
 
 }  // namespace
@@ -256,7 +315,7 @@ std::unique_ptr<GridSource> sourceOfArrays(std::vector<BlockArrays> blocks, cons
 }
 
 std::unique_ptr<GridSource> sourceOfCallable(const std::vector<std::array<uint64_t, 3>>& shapes,
-                                             const ScalarNames& names, py::object read) {
+                                             const ScalarNames& names, PythonRead read) {
   return std::make_unique<CallableSource>(shapes, names, std::move(read));
 }
 

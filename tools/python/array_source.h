@@ -31,10 +31,17 @@ using ScalarNames = std::vector<std::pair<std::string, std::string>>;
 std::unique_ptr<GridSource> sourceOfArrays(std::vector<BlockArrays> blocks, const ScalarNames& names,
                                            std::optional<double> time = {});
 
-/// A grid that Python reads box by box. `shapes`: (nk, nj, ni) of each block. `read`: called with (block, k0, k1, j0, j1, [scalar]),
-/// returns (x, y, z, values, blank): arrays of shape (k1 - k0, j1 - j0, ni), `values` a list of them, `blank` None or of bool. Takes the interpreter's lock for each
-/// call; throws Error if the arrays have other shapes, and what the callable raises.
+/// What reads a grid in Python, box by box: called with (block, k0, k1, j0, j1, [scalar]), returns (x, y, z, values, blank), arrays
+/// of shape (k1 - k0, j1 - j0, ni), `values` a list of them, `blank` None or of bool. `parts_of_rows`: it takes i0 and i1, too,
+/// and the arrays have i1 - i0 elements along i.
+struct PythonRead {
+  pybind11::object function;
+  bool parts_of_rows = false;
+};
+
+/// `shapes`: (nk, nj, ni) of each block. Takes the interpreter's lock for each call; throws Error if the arrays have other shapes,
+/// and what the callable raises.
 std::unique_ptr<GridSource> sourceOfCallable(const std::vector<std::array<uint64_t, 3>>& shapes,
-                                             const ScalarNames& names, pybind11::object read);
+                                             const ScalarNames& names, PythonRead read);
 
 }  // namespace curvisplat::python

@@ -236,7 +236,8 @@ py::dict convertCallable(const std::filesystem::path& output,
                          const py::object& read, const py::dict& given_options, const py::object& progress) {
   ConvertOptions options = convertOptions(output, given_options);
   options.scalars = allScalars(names);
-  const auto source = sourceOfCallable(shapes, names, read);
+  const bool parts = py::cast<bool>(given_options["parts_of_rows"]);
+  const auto source = sourceOfCallable(shapes, names, {read, parts});
   return convertSource(*source, std::move(options), progress);
 }
 

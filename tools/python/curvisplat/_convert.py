@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -135,6 +136,13 @@ def append_arrays(cache: Path, *blocks: Block, time: Optional[float] = None, bla
     return _core.append_arrays(os.fspath(cache), tuples, units, options, progress)
 
 
+def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
+    try:
+        return {"i0", "i1"} <= inspect.signature(read).parameters.keys()
+    except (TypeError, ValueError):  # built in, without a signature
+        return False
+
+
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
                      scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None,
                      overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
@@ -142,11 +150,13 @@ def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read:
     """Converts a grid larger than memory that `read` hands out piece by piece.
 
     shapes: (nk, nj, ni) of each block. scalars: names, or units by name. read(block, k0, k1, j0, j1, names) returns (x, y, z, [values of
-    each name], blank): arrays of shape (k1 - k0, j1 - j0, ni); blank is None or of bool. It is called three times for each piece, in any thread, one call at a
-    time. Raises as convert() does, and what `read` raises.
+    each name], blank): arrays of shape (k1 - k0, j1 - j0, ni); blank is None or of bool. If `read` has parameters i0 and i1, it is
+    called with them, too, and returns arrays of i1 - i0 elements along i: then rows may be longer than what fits in `memory`. It is
+    called three times for each piece, in any thread, one call at a time. Raises as convert() does, and what `read` raises.
     """
     units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in scalars]
     options = _options(overwrite, False, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
+    options["parts_of_rows"] = _takes_parts_of_rows(read)
     return Report(**_core.convert_callable(os.fspath(output), [tuple(shape) for shape in shapes], units, read, options,
                                            progress))
