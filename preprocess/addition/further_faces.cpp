@@ -23,12 +23,14 @@ std::vector<IndexPlane> planesOf(const CacheReader& cache) {
 std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryPlan& plan,
                                           Progress& progress) {
   if (!FacesReader::open(job.cache.path(), job.cache.manifest())) return std::nullopt;
+  const std::vector<IndexPlane> planes = planesOf(job.cache);
+  plan.requireFaces(memoryOfFaces(job.reader.source().description().blocks, planes));
   const std::filesystem::path output = job.cache.cachePath() / job.name;
   removeAll(output);  // a killed program's
   try {
     return writeGridFaces(job.reader,
                           {output, job.scratch, job.cache.manifest().lower, job.cache.manifest().upper,
-                           planesOf(job.cache), job.variables, plan.slab_bytes, plan.seam_bytes},
+                           planes, job.variables, plan.slab_bytes, plan.seam_bytes},
                           progress);
   } catch (...) {
     removeAll(output);

@@ -75,7 +75,10 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given_opti
       throw UsageError("--surface: {} has no index planes", source.description().format);
     options.surfaces = false;
   }
-  if (options.surfaces) checkPlanes(source.description(), options.planes);
+  if (options.surfaces) {
+    checkPlanes(source.description(), options.planes);
+    plan.requireFaces(memoryOfFaces(source.description().blocks, options.planes));
+  }
   std::vector<ConversionFact> facts =
       factsOf(source.description(), options.scalars, options.blank_value, options.overlap);
   facts.push_back({"--value-precision", options.precision == ValuePrecision::kFine ? "fine" : "normal"});

@@ -115,6 +115,14 @@ void MemoryPlan::requireRow(const std::string& block, uint64_t nodes, uint64_t b
         byteText(cap_bytes), block, nodes, (cap >> 20) + 1);
 }
 
+void MemoryPlan::requireFaces(uint64_t bytes) const {
+  if (const uint64_t cap = capFor(bytes); cap > cap_bytes)
+    throw Error(
+        "--memory {}: the outer faces of this grid take up to {} MiB; give at least {} MiB, or add "
+        "--no-surfaces",
+        byteText(cap_bytes), (bytes >> 20) + 1, (cap >> 20) + 1);
+}
+
 uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
   // Cells fill a bucket to three quarters, mostly; two are in memory.
   const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);

@@ -44,6 +44,9 @@ struct MemoryPlan {
   /// its block; `nodes`: its nodes along i.
   void requireRow(const std::string& block, uint64_t nodes, uint64_t bytes) const;
 
+  /// Throws Error that names a sufficient limit if cutting the grid's faces into patches takes more than there is.
+  void requireFaces(uint64_t bytes) const;
+
   /// Makes slabs and buckets no larger than serves a grid of `samples`: then one is read while another is worked on, and
   /// memory is used again instead of being asked for, which costs a page fault every 4 KiB.
   void suit(uint64_t samples, size_t variables);

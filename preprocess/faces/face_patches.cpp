@@ -39,11 +39,16 @@ std::array<double, 2> meanEdges(const FaceSpool& spool, uint32_t number) {
   };
   const uint64_t step = std::max<uint64_t>(1, (face.nodes[1] - 1) / kRows);
   for (uint64_t v = 0; v + 1 < face.nodes[1]; v += step) {
-    const LatticeRow here = spool.row(number, v), next = spool.row(number, v + 1);
-    for (uint64_t u = 0; u < face.nodes[0]; ++u) {
-      if (u > 0) add(0, here.codes[u - 1], here.codes[u]);
-      add(1, here.codes[u], next.codes[u]);
-    }
+    std::array<uint32_t, 3> left{};
+    forRowParts(face.nodes[0], [&](const RowRange& part) {
+      const LatticeRow here = spool.row(number, v, part), next = spool.row(number, v + 1, part);
+      for (uint64_t u = part.begin; u < part.end; ++u) {
+        const std::array<uint32_t, 3>& node = here.codes[u - part.begin];
+        if (u > 0) add(0, left, node);
+        add(1, node, next.codes[u - part.begin]);
+        left = node;
+      }
+    });
   }
   return {count[0] ? sum[0] / static_cast<double>(count[0]) : 0,
           count[1] ? sum[1] / static_cast<double>(count[1]) : 0};

@@ -198,9 +198,9 @@ std::vector<float> FaceSpool::storedScalars(size_t face, uint64_t v, const RowRa
   return values;
 }
 
-std::vector<uint8_t> FaceSpool::cellsOfRow(size_t face, uint64_t v) const {
-  const std::vector<float> values = storedScalars(face, v, {0, faces_[face].nodes[0]});
-  std::vector<uint8_t> there(faces_[face].nodes[0] - 1);
+std::vector<uint8_t> FaceSpool::cellsOfRow(size_t face, uint64_t v, const RowRange& quads) const {
+  const std::vector<float> values = storedScalars(face, v, quads);
+  std::vector<uint8_t> there(quads.end - quads.begin);
   for (size_t u = 0; u < there.size(); ++u) there[u] = !std::isnan(values[u * scalars()]);
   return there;
 }

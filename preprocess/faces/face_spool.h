@@ -34,6 +34,14 @@ struct LatticeRow {
   std::vector<std::vector<float>> scalars;     // [scalar][node]; anything where there is no node
 };
 
+/// Calls `use` with ranges of `count` nodes, one after the other: long rows are read in parts.
+template <typename Use>
+void forRowParts(uint64_t count, const Use& use) {
+  constexpr uint64_t kNodesAtATime = 1 << 16;
+  for (uint64_t begin = 0; begin < count; begin += kNodesAtATime)
+    use(RowRange{begin, begin + kNodesAtATime < count ? begin + kNodesAtATime : count});
+}
+
 class FaceSpool {
  public:
   /// `faces`: their lattices.
@@ -52,8 +60,8 @@ class FaceSpool {
   LatticeRow row(size_t face, uint64_t v, const RowRange& range = {}) const;
   /// Every `stride`-th node of the range, from its first on, and its last.
   LatticeRow thinnedRow(size_t face, uint64_t v, const RowRange& range, uint32_t stride) const;
-  /// Whether the cells behind the quads of a row are there; nodes decide otherwise. Of cells only.
-  std::vector<uint8_t> cellsOfRow(size_t face, uint64_t v) const;
+  /// Whether the cells behind a range of the quads of a row are there; nodes decide otherwise. Of cells only.
+  std::vector<uint8_t> cellsOfRow(size_t face, uint64_t v, const RowRange& quads) const;
   bool ofCells() const { return reader_.centring() == Centring::kCell; }
 
  private:

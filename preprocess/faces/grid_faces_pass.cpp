@@ -85,9 +85,8 @@ class FacesPass {
       // A body without thickness is a side that abuts on itself.
       if (quads.folds && !isPlane(n)) add(n, FaceSide::kPlane, quads.with_folds, {}, writer, written);
     }
-    const auto& [faces, patches, regions] = written;
-    const FileInfo info = writer.finish(faces, patches, regions);
-    if (!faces.empty()) return info;
+    const FileInfo info = writer.finish(written.faces, written.patches, written.regions);
+    if (!written.faces.empty()) return info;
     removeFile(job_.output);
     return std::nullopt;
   }
@@ -103,23 +102,23 @@ class FacesPass {
 
   struct Written {
     std::vector<GridFace> faces;
-    std::vector<FacePatch> patches;
+    std::vector<std::vector<FacePatch>> patches;  // [face]
     std::vector<FaceRegion> regions;
+    uint32_t patch_count = 0;
   };
 
   void add(uint32_t spooled, FaceSide side, const QuadMask& quads, std::vector<FaceRegion> regions,
            FacesWriter& writer, Written& written) const {
-    std::vector<FacePatch> patches = writePatches(
-        spool_, spooled, quads, static_cast<uint32_t>(written.patches.size()), writer, progress_);
+    std::vector<FacePatch> patches =
+        writePatches(spool_, spooled, quads, written.patch_count, writer, progress_);
     if (patches.empty()) return;
     const auto number = static_cast<uint32_t>(written.faces.size());
     GridFace& face = written.faces.emplace_back(spool_.faces()[spooled]);
     face.side = side;
-    face.root = static_cast<uint32_t>(written.patches.size());
-    for (FacePatch& patch : patches) {
-      patch.face = number;
-      written.patches.push_back(patch);
-    }
+    face.root = written.patch_count;
+    for (FacePatch& patch : patches) patch.face = number;
+    written.patch_count += static_cast<uint32_t>(patches.size());
+    written.patches.push_back(std::move(patches));
     for (FaceRegion& region : regions) {
       region.face = number;
       written.regions.push_back(std::move(region));
@@ -145,18 +144,26 @@ class FacesPass {
   Quads quadsOf(uint32_t number, std::span<const FaceRegion> regions) const {
     const GridFace& face = spool_.faces()[number];
     Quads quads{QuadMask(face), QuadMask(face)};
-    QuadMask& drawn = quads.drawn;
-    LatticeRow before = spool_.row(number, 0);
-    for (uint64_t v = 0; v < drawn.rows(); ++v) {
+    forRowParts(quads.drawn.columns(), [&](const RowRange& part) { drawPart(number, regions, part, quads); });
+    return quads;
+  }
+
+  /// Of a range of the columns.
+  void drawPart(uint32_t number, std::span<const FaceRegion> regions, const RowRange& part,
+                Quads& quads) const {
+    const GridFace& face = spool_.faces()[number];
+    const RowRange nodes{part.begin, part.end + 1};
+    LatticeRow before = spool_.row(number, 0, nodes);
+    for (uint64_t v = 0; v < quads.drawn.rows(); ++v) {
       progress_.throwIfStopped();
-      LatticeRow next = spool_.row(number, v + 1);
-      std::vector<uint8_t> there(drawn.columns(), 1);
-      if (spool_.ofCells()) there = spool_.cellsOfRow(number, v);
-      for (uint64_t u = 0; u < drawn.columns(); ++u) {
-        bool is_there = there[u];
+      LatticeRow next = spool_.row(number, v + 1, nodes);
+      std::vector<uint8_t> there(part.end - part.begin, 1);
+      if (spool_.ofCells()) there = spool_.cellsOfRow(number, v, part);
+      for (uint64_t u = part.begin; u < part.end; ++u) {
+        bool is_there = there[u - part.begin];
         for (const LatticeRow* row : {&before, &next})
           for (const uint64_t node : {u, u + 1})
-            is_there = is_there && row->codes[node][0] != LatticeRow::kNone;
+            is_there = is_there && row->codes[node - part.begin][0] != LatticeRow::kNone;
         const auto in_region = [&](const FaceRegion& r) {
           return u >= r.first[0] && u < r.last[0] && v >= r.first[1] && v < r.last[1];
         };
@@ -164,12 +171,11 @@ class FacesPass {
         const bool is_outer = face.side == FaceSide::kPlane || !abutting_.abuts(cellOf(face, u, v));
         const bool folds = face.side != FaceSide::kPlane && abutting_.folds(cellOf(face, u, v));
         quads.folds |= folds;
-        if (is_outer || std::any_of(regions.begin(), regions.end(), in_region)) drawn.draw(u, v);
+        if (is_outer || std::any_of(regions.begin(), regions.end(), in_region)) quads.drawn.draw(u, v);
         if (is_outer || folds) quads.with_folds.draw(u, v);
       }
       before = std::move(next);
     }
-    return quads;
   }
 
   static CellFace cellOf(const GridFace& face, uint64_t u, uint64_t v) {
@@ -195,6 +201,20 @@ uint64_t temporaryBytesOfFaces(std::span<const GridBlock> blocks, std::span<cons
   uint64_t nodes = 0;
   for (const GridFace& face : facesOf(blocks, planes)) nodes += face.nodes[0] * face.nodes[1];
   return nodes * (12 + 4 * scalars) + AbuttingFaces::needsOf(blocks).disk_bytes;
+}
+
+uint64_t memoryOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes) {
+  // While a face is cut, its patches are in a map, and in two vectors with their places.
+  constexpr uint64_t kWhileCut = sizeof(FacePatch) + 2 * (sizeof(FacePatch) + 64);
+  uint64_t all = 0, most = 0;
+  for (const GridFace& face : facesOf(blocks, planes)) {
+    const auto along = [&](size_t axis) { return (face.nodes[axis] - 1 + kPatchQuads - 1) / kPatchQuads; };
+    const uint64_t finest = along(0) * along(1);
+    const uint64_t patches = finest > 1 ? 2 * finest : 1;  // each level has half as many or fewer
+    all += patches;
+    most = std::max(most, patches);
+  }
+  return all * sizeof(FacePatch) + most * kWhileCut;
 }
 
 void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes) {

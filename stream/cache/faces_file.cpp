@@ -185,13 +185,15 @@ Extent FacesWriter::append(std::span<const std::byte> stream) {
   return {offset, static_cast<uint32_t>(stream.size()), checksumOf(stream)};
 }
 
-FileInfo FacesWriter::finish(std::span<const GridFace> faces, std::span<const FacePatch> patches,
+FileInfo FacesWriter::finish(std::span<const GridFace> faces, std::span<const std::vector<FacePatch>> patches,
                              std::span<const FaceRegion> regions) {
   padToPage(file_);
   FacesHeader header;
   header.variables = static_cast<uint32_t>(variables_.size());
   header.faces = static_cast<uint32_t>(faces.size());
-  header.patches = static_cast<uint32_t>(patches.size());
+  uint64_t count = 0;
+  for (const std::vector<FacePatch>& of_face : patches) count += of_face.size();
+  header.patches = static_cast<uint32_t>(count);
   header.regions = static_cast<uint32_t>(regions.size());
   header.table_offset = file_.size();
   for (int axis = 0; axis < 3; ++axis) {
@@ -200,17 +202,28 @@ FileInfo FacesWriter::finish(std::span<const GridFace> faces, std::span<const Fa
   }
   std::vector<FaceRecord> face_records;
   for (const GridFace& face : faces) face_records.push_back(recordOf(face));
-  std::vector<PatchRecord> patch_records;
-  for (const FacePatch& patch : patches) patch_records.push_back(recordOf(patch));
   std::vector<RegionRecord> region_records;
   for (const FaceRegion& region : regions) region_records.push_back(recordOf(region));
   Checksum checksum;
   checksum.add(bytesOf(header));
-  for (const std::span<const std::byte> part :
-       {bytesOf(variables_), bytesOf(face_records), bytesOf(patch_records), bytesOf(region_records)}) {
+  const auto append = [&](std::span<const std::byte> part) {
     file_.append(part);
     checksum.add(part);
-  }
+  };
+  append(bytesOf(variables_));
+  append(bytesOf(face_records));
+  // A few at a time: long thin grids have a million.
+  constexpr size_t kRecordsAtOnce = 4096;
+  std::vector<PatchRecord> records;
+  for (const std::vector<FacePatch>& of_face : patches)
+    for (const FacePatch& patch : of_face) {
+      records.push_back(recordOf(patch));
+      if (records.size() < kRecordsAtOnce) continue;
+      append(bytesOf(records));
+      records.clear();
+    }
+  append(bytesOf(records));
+  append(bytesOf(region_records));
   file_.writeAt(0, bytesOf(header));
   const FileInfo info{file_.path().filename().string(), file_.size(), checksum.value()};
   file_.close();

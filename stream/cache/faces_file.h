@@ -84,8 +84,8 @@ class FacesWriter {
   FacesWriter(const std::filesystem::path& path, const FaceBox& box, std::vector<uint32_t> variables);
   /// Returns the number of the patch's stream, for finish(). One thread at a time.
   Extent append(std::span<const std::byte> stream);
-  /// `patches` in the order of the file. Returns the manifest's entry.
-  FileInfo finish(std::span<const GridFace> faces, std::span<const FacePatch> patches,
+  /// `patches`: of each face, in the order of the file. Returns the manifest's entry.
+  FileInfo finish(std::span<const GridFace> faces, std::span<const std::vector<FacePatch>> patches,
                   std::span<const FaceRegion> regions);
 
  private:

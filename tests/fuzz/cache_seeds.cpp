@@ -127,7 +127,7 @@ void writeFaces(const Seeds& seeds) {
   face.nodes = {5, 3};
   face.root = 0;
   const FaceRegion region{0, {1, 0}, {3, 2}, "Wing", "BCWall"};
-  writer.finish({&face, 1}, patches, {&region, 1});
+  writer.finish({&face, 1}, {&patches, 1}, {&region, 1});
   seeds.write("faces", "two_levels", bytesOfFile(path));
 }
 

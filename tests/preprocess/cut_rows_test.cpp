@@ -10,6 +10,7 @@
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/scenes/scenes.h"
 #include "preprocess/splats/cell_splats.h"
 #include "preprocess/survey/grid_checksum.h"
@@ -267,6 +268,26 @@ TEST_F(CutRows, OfASourceThatReadsWholeOnesAreRefusedWithASufficientSize) {
   const uint64_t least = std::stoull(error.substr(error.find(before) + before.size()));
   EXPECT_NO_THROW(GridOrigin::requireMemory(rows, {0}, MemoryPlan::of(least * kMiB, 1, 2)));
   EXPECT_THROW(GridOrigin::requireMemory(rows, {0}, MemoryPlan::of((least - 2) * kMiB, 1, 2)), Error);
+}
+
+TEST_F(CutRows, TakeFacesThatDoNotFitAndAreRefusedWithASufficientSize) {
+  constexpr uint64_t kMiB = 1 << 20;
+  const std::vector<GridBlock> long_block{gridBlock(6'000'000, 2, 2)};
+  const auto require = [&](uint64_t mebibytes) {
+    MemoryPlan::of(mebibytes * kMiB, 1, 2).requireFaces(memoryOfFaces(long_block, {}));
+  };
+  std::string error;
+  try {
+    require(160);
+  } catch (const Error& thrown) {
+    error = thrown.what();
+  }
+  const std::string before = "give at least ";
+  ASSERT_NE(error.find(before), std::string::npos) << error;
+  const uint64_t least = std::stoull(error.substr(error.find(before) + before.size()));
+  EXPECT_NO_THROW(require(least));
+  EXPECT_THROW(require(least - 2), Error);
+  EXPECT_LT(memoryOfFaces(std::vector{gridBlock(4000, 4000, 4000)}, {}), 16 * kMiB);
 }
 
 }  // namespace
