@@ -20,8 +20,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Appends the step to the series and replaces the manifest. `files`: further ones of the step.
-void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep step, const NewStep& added,
+void putStep(const CacheLock& lock, const Manifest& old, Series series, SeriesStep step, const NewStep& added,
              std::span<const FileInfo> files) {
+  Manifest manifest = old;
   for (size_t v = 0; v < manifest.variables.size(); ++v) {
     step.values[v].min = added.ranges[v].min;
     step.values[v].max = added.ranges[v].max;
@@ -31,14 +32,21 @@ void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep
   }
   series.add(std::move(step));
   manifest.files.insert(manifest.files.end(), files.begin(), files.end());
-  const FileInfo info = appendStep(lock.cache(), manifest, series);
-  std::erase_if(manifest.files, [](const FileInfo& file) { return file.name == kStepsFileName; });
-  manifest.files.push_back(info);
-  if (!manifest.hasFeature(kSteps) || !files.empty())
-    syncDirectory(lock.cache());  // names must be on the disk before a manifest that lists them
-  if (!manifest.hasFeature(kSteps)) manifest.requirements.push_back(kSteps);
-  addSources(added.sources, manifest);
-  replaceManifest(lock.cache(), manifest);
+  try {
+    const FileInfo info = appendStep(lock.cache(), manifest, series);
+    std::erase_if(manifest.files, [](const FileInfo& file) { return file.name == kStepsFileName; });
+    manifest.files.push_back(info);
+    if (!manifest.hasFeature(kSteps) || !files.empty())
+      syncDirectory(lock.cache());  // names must be on the disk before a manifest that lists them
+    if (!manifest.hasFeature(kSteps)) manifest.requirements.push_back(kSteps);
+    addSources(added.sources, manifest);
+    replaceManifest(lock.cache(), manifest);
+  } catch (const NameNotSynced&) {
+    throw;
+  } catch (...) {
+    if (lock.isStillThere()) cutAppended(lock.cache(), old);
+    throw;
+  }
 }
 
 /// The variables with their ranges at the new step.
@@ -62,22 +70,31 @@ StepWriter::StepWriter(const CacheLock& lock, const CacheReader& cache, NewStep 
       series_(cache.series()),
       geometry_(cache.series().steps[cache.step()].geometry),
       added_(std::move(step)) {
-  for (const VariableInfo& variable : manifest_.variables) {
-    const fs::path path = folder_ / fmt::format("var.{}.{}.bin", variable.number, series_.steps.size());
-    fs::path part = path;
-    part += ".part";
-    SystemCalls::current().remove(part.c_str());  // a killed program's; which may be a link
-    files_.push_back({path, part, OutputFile(part), {}, false});
-    beginVariableFile(files_.back().file);
-    files_.back().table.resize(cache.bricks().size());
+  try {
+    for (const VariableInfo& variable : manifest_.variables) {
+      const fs::path path = folder_ / fmt::format("var.{}.{}.bin", variable.number, series_.steps.size());
+      fs::path part = path;
+      part += ".part";
+      SystemCalls::current().remove(part.c_str());  // a killed program's; which may be a link
+      files_.push_back({path, part, OutputFile(part), {}, false});
+      beginVariableFile(files_.back().file);
+      files_.back().table.resize(cache.bricks().size());
+    }
+  } catch (...) {
+    removeFiles();
+    throw;
   }
 }
 
 StepWriter::~StepWriter() {
   // If another cache has replaced this one, files of these names are that cache's.
   if (in_place_ || !lock_->isStillThere()) return;
-  for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
+  removeFiles();
   for (const FileInfo& other : others_) removeAll(lock_->cache() / other.name);
+}
+
+void StepWriter::removeFiles() const {
+  for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
 }
 
 void StepWriter::append(uint32_t brick, std::span<const EncodedValues> values) {

@@ -56,6 +56,8 @@ class StepWriter : public ValuesWriter {
     bool is_renamed = false;
   };
 
+  void removeFiles() const;
+
   const CacheLock* lock_;
   const std::filesystem::path folder_;
   const Manifest manifest_;  // of the series

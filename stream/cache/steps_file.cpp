@@ -226,4 +226,16 @@ FileInfo appendStep(const fs::path& cache, const Manifest& manifest, const Serie
   return {kStepsFileName, bytes.size(), checksumOf(bytes)};
 }
 
+void cutAppended(const fs::path& cache, const Manifest& manifest) noexcept {
+  try {
+    const fs::path path = cacheFile(cache, kStepsFileName);
+    if (!manifest.hasFeature(kSteps)) removeAll(path);
+    for (const FileInfo& file : manifest.files)
+      if (file.name == kStepsFileName && fs::file_size(path) > file.size)
+        OutputFile(path, Caching::kPages, OutputFile::Existing::kKeep).truncate(file.size);
+  } catch (...) {
+    // The next addition cuts it.
+  }
+}
+
 }  // namespace curvisplat

@@ -80,4 +80,7 @@ Series readSeries(const std::filesystem::path& cache, const Manifest& manifest);
 /// syncs it. Cuts what an interrupted addition has left behind the manifest's size. Returns the manifest's entry.
 FileInfo appendStep(const std::filesystem::path& cache, const Manifest& manifest, const Series& series);
 
+/// Cuts what appendStep() has appended and no manifest lists. `manifest`: the cache's. If that fails it stays there without harm.
+void cutAppended(const std::filesystem::path& cache, const Manifest& manifest) noexcept;
+
 }  // namespace curvisplat

@@ -113,6 +113,44 @@ TEST_F(ConversionSweep, AnAdditionIsThereOrNot) {
   }
 }
 
+/// A second and a third time step: the first addition makes the file of steps, the next appends to it.
+TEST_F(ConversionSweep, AStepIsThereOrNot) {
+  setUp(twoBlocks(10));
+  writeFiles(output_, both_);
+  Files before = both_;
+  for (int step = 1; step < 3; ++step) {
+    addStepNow();
+    const Files after = filesOf(output_);
+    faults::FaultSweep sweep = converting({});
+    sweep.prepare = [&] {
+      startAnew();
+      writeFiles(output_, before);
+    };
+    sweep.job = [this] { addStepNow(); };
+    bool is_gone = false;
+    sweep.check = [&](const FaultOutcome& outcome) {
+      Files files = filesOf(output_);
+      const bool is_done = holdsAllOf(files, after);
+      // On a disk that is gone, what was appended cannot be cut. No manifest lists it.
+      if (const auto steps = before.find("steps.bin");
+          is_gone && !is_done && steps != before.end() && files["steps.bin"].starts_with(steps->second))
+        files["steps.bin"] = steps->second;
+      EXPECT_TRUE(is_done || (!outcome.error.empty() && holdsAllOf(files, before))) << outcome.error;
+      if (outcome.has_refused_removal) return;
+      EXPECT_TRUE(files == (is_done ? after : before));
+      for (const auto& entry : fs::directory_iterator(work_)) EXPECT_EQ(entry.path(), output_);
+    };
+    for (const Fault& fault : kFaults) {
+      is_gone = fault.at == faults::kFailsFromThenOn.at;
+      EXPECT_GE(sweep.run(fault), 2) << fault.name;
+      if (HasFailure()) return;
+    }
+    startAnew();
+    writeFiles(output_, after);
+    before = after;
+  }
+}
+
 /// A text goes through a temporary file.
 TEST_F(ConversionSweep, ATextIsConvertedOrNot) {
   const FunctionGridSource grid = twoBlocks(6);

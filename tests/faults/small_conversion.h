@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "preprocess/addition/add_scalar.h"
+#include "preprocess/addition/add_step.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/formats/open/open_grid.h"
@@ -101,6 +102,17 @@ class SmallConversion : public ::testing::Test {
     options.memory_bytes = leastMemory(2);
     Progress progress;
     addScalars(*source, options, progress);
+  }
+
+  void addStepNow() const {
+    const auto source = open();
+    AddStepOptions options;
+    options.cache = output_;
+    options.threads = 1;
+    options.bucket_splats = 9000;
+    options.memory_bytes = leastMemory(2);
+    Progress progress;
+    addStep(*source, options, progress);
   }
 
   std::unique_ptr<GridSource> open() const {
