@@ -38,7 +38,7 @@ class SeriesConversion {
         runTogether(*ranks_);
       } else {
         if (!options_.to_part) removeLeftOfRanks(options_.convert.output, options_.convert.temporary_folder);
-        for (uint64_t number = 0; number < input_.count; ++number) takeOrLeaveOut(number);
+        for (uint64_t number = stepsAddedBefore(); number < input_.count; ++number) takeOrLeaveOut(number);
       }
     } catch (const Interrupted& interrupted) {
       throw Interrupted(interrupted.signal(), whereItStands(interrupted.what()));
@@ -71,7 +71,7 @@ class SeriesConversion {
 
   /// All ranks together up to the first step, which decides what is converted; then in rounds (shared_series.h).
   void runTogether(Ranks& ranks) {
-    uint64_t next = 0;
+    uint64_t next = stepsAddedBefore();
     for (; next < input_.count && (times_.empty() || next_ < known_); ++next)
       if (const std::optional<OpenStep> step = openTogether(ranks, next)) useTogether(next, *step);
     if (next == input_.count) return;
@@ -165,6 +165,28 @@ class SeriesConversion {
     sums_.nodes = cache.manifest().nodes;
     expect_new_geometry_ = cache.series().geometries() > 1 &&
                            cache.series().first_steps.back() == cache.series().steps.size() - 1;
+  }
+
+  /// How many of the steps to add, from the first on, an interrupted addition of the same steps has added.
+  uint64_t stepsAddedBefore() const {
+    if (!options_.add || !options_.convert.resume) return 0;
+    uint64_t number = 0;
+    while (number < input_.count && isInCache(number)) ++number;
+    return number;
+  }
+
+  bool isInCache(uint64_t number) const {
+    try {
+      const std::unique_ptr<DataSource> source = input_.open(number);
+      const GridDescription& description = source->description();
+      const std::vector<std::string>& files = description.files;
+      const std::optional<double> time = timeOf(description);
+      return std::all_of(files.begin(), files.end(),
+                         [&](const std::string& file) { return sources_.contains(file); }) &&
+             (!time || std::find(times_.begin(), times_.end(), *time) != times_.end());
+    } catch (const Error&) {
+      return false;  // which is reported where it is to be added
+    }
   }
 
   void take(uint64_t number) { use(number, open(number)); }

@@ -11,6 +11,7 @@
 
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
+#include "tests/support/folder_files.h"
 #include "tests/support/folder_watch.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
@@ -133,6 +134,27 @@ TEST_F(SeriesCommand, SelectsAddsAndLists) {
   ASSERT_EQ(json["steps"].size(), 7u);
   EXPECT_EQ(json["steps"][6]["time"], 6);
   EXPECT_EQ(json["variables"][0]["max"], json["steps"][2]["variables"][0]["max"]);
+}
+
+TEST_F(SeriesCommand, AnInterruptedAdditionGoesOnWhereItStood) {
+  generate("f", 5);
+  const std::vector<std::string> addition{"convert",          "--add-steps",      file("f.xyz"),
+                                          file("f_0002.fun"), file("f_0003.fun"), file("f_0004.fun"),
+                                          "--resume"};
+  const auto resumed = [&](int added_before) {
+    const std::string cache = file("to.splats");
+    run({"convert", file("f.xyz"), file("f_0000.fun"), file("f_0001.fun"), "-o", cache, "--overwrite"});
+    // What an addition that was stopped after some of its steps leaves behind.
+    for (int n = 0; n < added_before; ++n)
+      run({"convert", "--add-steps", file("f.xyz"), file(fmt::format("f_{:04}.fun", 2 + n)), "--to", cache});
+    std::vector<std::string> words = addition;
+    words.insert(words.end(), {"--to", cache});
+    run(words);
+    return filesOf(cache);
+  };
+  const Files expected = resumed(0);
+  EXPECT_EQ(CacheReader(file("to.splats")).series().steps.size(), 5u);
+  for (int added_before = 1; added_before < 4; ++added_before) EXPECT_TRUE(resumed(added_before) == expected);
 }
 
 TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {
