@@ -103,7 +103,7 @@ SharedSteps::SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ra
 SharedSteps::~SharedSteps() {
   // After a failure the others still write into the folder, until they hear of it.
   if (std::uncaught_exceptions() > 0 && ranks_.isFirst() && !ranks_.alone()) {
-    ranks_.transport()->announceFailure();
+    ranks_.announceFailure();
     ranks_.waitForFailures(std::chrono::seconds(3));
   }
   if (ranks_.isFirst()) return;

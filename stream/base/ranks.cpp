@@ -43,6 +43,12 @@ void Ranks::throwIfOneFailed() {
   throw Error("another rank has failed");
 }
 
+void Ranks::announceFailure() {
+  if (alone()) return;
+  failed_first_ = transport_->failedCount() == 0;
+  transport_->announceFailure();
+}
+
 bool Ranks::waitForFailures(std::chrono::milliseconds longest) {
   if (alone()) return true;
   const auto end = std::chrono::steady_clock::now() + longest;

@@ -100,6 +100,10 @@ class Ranks {
   void sum(std::span<int64_t> values);
   void sum(std::span<uint64_t> values);
 
+  /// Tells the others that this rank fails, before it ends: they stop meanwhile.
+  void announceFailure();
+  /// Whether it was the first to fail, when it announced that.
+  bool failedFirst() const { return failed_first_; }
   /// Waits until all others have announced their failure, but no longer than `longest`. Returns whether they have.
   bool waitForFailures(std::chrono::milliseconds longest);
 
@@ -113,6 +117,7 @@ class Ranks {
 
   std::unique_ptr<RankTransport> transport_;
   std::function<void()> check_;
+  bool failed_first_ = false;
 };
 
 /// Numbers, and structures of numbers, as a message; and back.

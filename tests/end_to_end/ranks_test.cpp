@@ -94,6 +94,22 @@ TEST_F(RanksCommand, ReportAFailureOnce) {
   EXPECT_EQ(lineCount(first.err), 1) << first.err;
 }
 
+TEST_F(RanksCommand, ReportADamagedStepOfASeriesOnce) {
+  ASSERT_EQ(runProgram({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")}).status,
+            0);
+  for (const int damaged : {1, 2, 3}) {  // of rank 0, and of another, which rank 0 tries again
+    const std::string name = file(fmt::format("s_{:04}.fun", damaged));
+    const auto size = fs::file_size(name);
+    fs::resize_file(name, size - 7);
+    const ProgramResult result = runAsRanks(3, {"convert", file("s.xyz"), file("s_%04d.fun"), "-o",
+                                                file("s.splats"), "--overwrite", "--threads", "1"});
+    fs::resize_file(name, size);
+    EXPECT_EQ(result.status, 1);
+    EXPECT_NE(result.err.find("rank 0 of 3"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(fmt::format("s_{:04}.fun", damaged)), std::string::npos) << result.err;
+  }
+}
+
 TEST_F(RanksCommand, AreEndedByTheOneThatFails) {
   // Rank 1 sees no cache, as on a machine where the file system is not mounted.
   const std::string script = file("one_blind.sh");

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -113,9 +114,12 @@ void endRanksAfter(const std::string& line, int status) {
   using namespace std::chrono_literals;
   RankTransport& transport = *started->transport();
   const bool was_stopped = status > 128;  // by a signal, as the launcher sends when another rank has ended
-  // The lowest rank of those that fail of the same cause prints.
-  const bool silent = anotherFails(transport, started->isFirst() && !was_stopped ? 0ms : 300ms) ||
-                      (was_stopped && !started->isFirst());
+  // The lowest rank of those that fail of the same cause prints: each waits longer than those before it. One that has
+  // announced its failure already has waited for those of the others.
+  const auto moment = 300ms + 100ms * std::min(started->rank(), 17u);
+  const bool silent = !started->failedFirst() &&
+                      (anotherFails(transport, started->isFirst() && !was_stopped ? 0ms : moment) ||
+                       (was_stopped && !started->isFirst()));
   transport.announceFailure();
   if (!silent) {
     muteMessages(false);
