@@ -113,9 +113,12 @@ InputFile::InputFile(std::filesystem::path path, Caching caching) : path_(std::m
   fd_ = openWith(caching, path_, O_RDONLY | O_NONBLOCK, 0);
   if (fd_ < 0) throw Error("{}: cannot be opened for reading: {}", path_.string(), reason());
   struct stat status {};
-  if (::fstat(fd_, &status) < 0 || !S_ISREG(status.st_mode)) {
+  const std::string why = ::fstat(fd_, &status) < 0 ? "the file size cannot be determined: " + reason()
+                          : S_ISREG(status.st_mode) ? ""
+                                                    : "is not a regular file";
+  if (!why.empty()) {
     SystemCalls::current().close(std::exchange(fd_, -1));
-    throw Error("{}: is not a regular file", path_.string());
+    throw Error("{}: {}", path_.string(), why);
   }
   size_ = static_cast<uint64_t>(status.st_size);
 }

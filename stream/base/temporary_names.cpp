@@ -37,8 +37,10 @@ bool TemporaryNames::areOfThisMachine(std::string_view name) const {
 
 bool lockNew(int fd) {
   const bool busy = ::flock(fd, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK;
+  if (busy) return false;
   struct stat status {};
-  return !busy && ::fstat(fd, &status) == 0 && status.st_nlink > 0;
+  // If it cannot be examined, the next call on it or its name fails with a reason; another file would be no better.
+  return ::fstat(fd, &status) < 0 || status.st_nlink > 0;
 }
 
 void removeAbandoned(const std::filesystem::path& folder, const TemporaryNames& names, int flags,

@@ -137,7 +137,7 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
     if (rest == Rest::kRemove)
       clear();
     else
-      leave();
+      leave(!is_new);
   } catch (...) {
     SystemCalls::current().close(lock_);
     throw;
@@ -161,15 +161,19 @@ void PartialFolder::lock(bool is_new) {
   const fs::path name = path_ / kPartialLock;
   const int fd = openRetrying(name, O_RDWR | O_CREAT | O_NOFOLLOW, 0666);
   if (fd < 0) throw Error("{}: cannot be opened: {}", name.string(), reason());
-  const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
-  const std::string why = reason();
+  bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
+  std::string why = reason();
   const bool busy = !locked && errno == EWOULDBLOCK;
   // A conversion that ended between open and flock has removed the file: then the locked file is no longer
   // the one of this name.
   struct stat ours {
   }, theirs{};
-  const bool same = ::fstat(fd, &ours) == 0 && ::stat(name.c_str(), &theirs) == 0 &&
-                    ours.st_ino == theirs.st_ino && ours.st_dev == theirs.st_dev;
+  const bool named = ::fstat(fd, &ours) == 0 && ::stat(name.c_str(), &theirs) == 0;
+  if (locked && !named && errno != ENOENT) {
+    locked = false;
+    why = reason();
+  }
+  const bool same = named && ours.st_ino == theirs.st_ino && ours.st_dev == theirs.st_dev;
   if (locked && same) {
     lock_ = fd;
     return;

@@ -31,7 +31,7 @@ class PartialFolder {
   enum class Rest { kRemove, kKeep };
 
   /// Creates and locks the folder. `rest`: remove the files of an unfinished conversion, or keep them, which
-  /// implies leave(). Throws Error as checkReplaceable(), if another conversion to `target` is running, and if
+  /// implies leave() where there are any. Throws Error as checkReplaceable(), if another conversion to `target` is running, and if
   /// the folder's name is a link or a folder that no conversion has made.
   PartialFolder(std::filesystem::path target, bool overwrite, Rest rest = Rest::kRemove);
   /// Removes the folder, unless putIntoPlace() or leave() was called.

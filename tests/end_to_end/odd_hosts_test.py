@@ -210,6 +210,36 @@ int statx(int fd, const char* path, int flags, unsigned mask, struct statx* to) 
 }
 """
 
+# Of open files in a folder: what fstat() finds is not known at one call, or from one on.
+UNKNOWN = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define NEXT(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
+static atomic_long calls;
+
+static int refuses(int fd) {
+  char name[64], path[PATH_MAX];
+  snprintf(name, sizeof name, "/proc/self/fd/%d", fd);
+  ssize_t length = readlink(name, path, sizeof path - 1);
+  const char* folder = getenv("UNKNOWN_FOLDER");
+  if (length <= 0 || strncmp(path, folder, strlen(folder)) != 0) return 0;
+  long call = ++calls, from = atol(getenv("UNKNOWN_FROM")), to = atol(getenv("UNKNOWN_TO"));
+  errno = ESTALE;
+  return call >= from && call <= to;
+}
+int fstat(int fd, struct stat* to) { return refuses(fd) ? -1 : NEXT(fstat)(fd, to); }
+int fstat64(int fd, struct stat64* to) { return refuses(fd) ? -1 : NEXT(fstat64)(fd, to); }
+"""
+
 
 def opens(folder, flags):
     try:
@@ -428,6 +458,41 @@ class OddHosts(unittest.TestCase):
                     for path in made:
                         shutil.rmtree(path) if path.is_dir() else path.unlink()
             print(f"ESTALE: {name}: {failures} ended with one line", flush=True)
+            self.assertGreater(failures, 0, name)
+
+    def test_a_file_that_cannot_be_examined_is_one_line_and_leaves_nothing(self):
+        """fstat() fails once, or from one call on, and everything else goes on."""
+        compiler = shutil.which("cc") or shutil.which("gcc")
+        if not compiler:
+            self.skipTest("no C compiler")
+        source, library, folder = self.folder / "unknown.c", self.folder / "unknown.so", self.folder / "unknown"
+        source.write_text(UNKNOWN)
+        subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True)
+        folder.mkdir()
+        run = lambda *words, at=(0, 0): subprocess.run([PROGRAM, *words], cwd=folder, capture_output=True, text=True, check=False, timeout=60, env={
+            **os.environ, "LD_PRELOAD": str(library), "UNKNOWN_FOLDER": str(folder), "UNKNOWN_FROM": str(at[0]), "UNKNOWN_TO": str(at[1])})
+        self.assertEqual(run("generate", "o-grid", "--size", "12x10x8", "-o", "o").returncode, 0)
+        self.assertEqual(run("convert", "o.xyz", "o.fun", "-o", "whole.splats").returncode, 0)
+        jobs = {"convert": ["convert", "o.xyz", "o.fun", "-o", "new.splats", "--threads", "1"],
+                "render": ["render", "whole.splats", "-o", "new.png", "--size", "48x32", "--threads", "1"]}
+        for name, words in jobs.items():
+            failures, before = 0, sorted(folder.iterdir())
+            for at in range(1, 60):
+                for end in (at, 1 << 40):
+                    with self.subTest(name, at=at, end=end):
+                        result = run(*words, at=(at, end))
+                        made = [path for path in folder.iterdir() if path not in before]
+                        self.assertIn(result.returncode, (0, 1), result.stderr)
+                        if result.returncode == 0:
+                            self.assertLessEqual({path.name for path in made}, {"new.splats", "new.png"})
+                        else:
+                            failures += 1
+                            lines = [line for line in result.stderr.splitlines() if not line.startswith("curvisplat: note")]
+                            self.assertEqual(len(lines), 1, result.stderr)
+                            self.assertEqual(made, [], result.stderr)
+                        for path in made:
+                            shutil.rmtree(path) if path.is_dir() else path.unlink()
+            print(f"fstat: {name}: {failures} ended with one line", flush=True)
             self.assertGreater(failures, 0, name)
 
 

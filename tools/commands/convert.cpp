@@ -40,8 +40,7 @@
 namespace curvisplat {
 namespace {
 
-void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds,
-                  const CacheReader& cache) {
+void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds) {
   const auto samples = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
   fmt::print("{}: {}, {} in {}, {}\n", arguments.output.string(), countText(report.nodes, "sample"),
@@ -52,7 +51,6 @@ void printSummary(const ConvertArguments& arguments, const ConvertReport& report
                                           : fmt::format(", {:.2f} M samples/s", 1e-6 * samples / seconds);
   fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes per sample{}\n", seconds, rate, mebibytes(bytes),
              static_cast<double>(bytes) / samples, peakMemoryText());
-  printStoredPrecision(cache);
 }
 
 /// Prints warnings and notes on the grid to standard error.
@@ -123,10 +121,12 @@ void runConvert(ConvertArguments arguments) {
   nlohmann::json numbers = statistics(report, progress);
   numbers["ranks"] = ranks.count();
   printWarnings(source->description(), arguments.grid.time_step, report);
-  const CacheReader cache(options.output);
-  for (size_t n = 0; n < cache.manifest().variables.size(); ++n)
-    numbers["stored_within"].push_back(storedWithin(cache, n));
-  printSummary(arguments, report, secondsOf(progress), cache);
+  printSummary(arguments, report, secondsOf(progress));
+  if (const auto cache = openWritten(options.output)) {
+    for (size_t n = 0; n < cache->manifest().variables.size(); ++n)
+      numbers["stored_within"].push_back(storedWithin(*cache, n));
+    printStoredPrecision(*cache);
+  }
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 

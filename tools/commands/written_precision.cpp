@@ -2,9 +2,19 @@
 
 #include <fmt/format.h>
 
+#include "stream/base/message.h"
 #include "stream/cache/stored_precision.h"
 
 namespace curvisplat {
+
+std::unique_ptr<CacheReader> openWritten(const std::filesystem::path& cache, uint64_t step) {
+  try {
+    return std::make_unique<CacheReader>(cache, step);
+  } catch (const std::exception& error) {
+    printMessage("warning: the cache is complete, but it cannot be read back: {}", error.what());
+    return nullptr;
+  }
+}
 
 void printStoredPrecision(const CacheReader& cache, std::string_view where) {
   const auto& variables = cache.manifest().variables;
