@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <new>
@@ -236,6 +237,23 @@ TEST(VtkDamageOfSets, AreRefusedOrReadOtherwise) {
 }
 
 // Heads that promise far more than a file has.
+TEST(VtkDamageOfNames, BytesThatATerminalDoesNotPrintAreLeftOut) {
+  const TestFolder folder("vtk-names");
+  const std::string name = "\x1b[2J\xff\x80" + std::string(200, 'n');
+  for (const std::string& end : {std::string(), "</" + name + "x>"}) {
+    const std::filesystem::path path =
+        folder.write("a.vts", "<VTKFile type=\"StructuredGrid\"><" + name + ">" + end);
+    try {
+      contentOf(path);
+      FAIL();
+    } catch (const Error& error) {
+      const std::string line = error.what();
+      EXPECT_TRUE(std::all_of(line.begin(), line.end(), [](char c) { return c >= ' ' && c <= '~'; })) << line;
+      EXPECT_LT(line.size(), 300u) << line;
+    }
+  }
+}
+
 TEST(VtkDamageOfSizes, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
   const TestFolder folder("vtk-huge");
   for (const VtsEncoding& encoding : allVtsEncodings()) {

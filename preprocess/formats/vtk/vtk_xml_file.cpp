@@ -229,7 +229,10 @@ std::shared_ptr<const ByteSource> VtkXmlFile::stored(const pugi::xml_node& node,
   std::shared_ptr<const ByteSource> behind;  // the bytes after the header
   uint64_t head_bytes = header_.bytes;
   if (compressor_) {
-    if (first >= all->size() / header_.bytes) fail(fmt::format("array {} has {} blocks", array.name, first));
+    if (first >= all->size() / header_.bytes)
+      fail(fmt::format(
+          "array {} should have {} compressed blocks, more than its bytes have room for; the file is damaged",
+          array.name, first));
     head_bytes = (3 + first) * header_.bytes;
   }
   if (encoded && (compressor_ || encoded->endsWith(head_bytes)))

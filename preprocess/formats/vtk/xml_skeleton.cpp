@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -56,9 +57,14 @@ class Scanner {
     return {&buffer_[used], filled_ - used};
   }
 
+  /// A name in a message: in a damaged file, it may be any bytes.
+  static std::string shown(std::string_view name) {
+    constexpr size_t kLongest = 40;
+    return printable(name.substr(0, kLongest)) + (name.size() > kLongest ? "..." : "");
+  }
   [[noreturn]] void failTruncated() const {
     throw Error("{}: ends at byte {}, inside {}; the file is truncated", file_.name(), file_.size(),
-                open_.empty() ? "its first tag" : "<" + open_.back() + ">");
+                open_.empty() ? "its first tag" : "<" + shown(open_.back()) + ">");
   }
 
   /// Skips to the next tag and appends the range of the skipped text to the skeleton. False at the end of the
@@ -111,7 +117,8 @@ class Scanner {
     const std::string name = tag.substr(name_begin, tag.find_first_of(" \t\r\n/>", name_begin) - name_begin);
     if (closes) {
       if (open_.empty() || open_.back() != name)
-        throw Error("{}: byte {}: </{}> without <{}>; the file is damaged", file_.name(), at_, name, name);
+        throw Error("{}: byte {}: </{}> without <{}>; the file is damaged", file_.name(), at_, shown(name),
+                    shown(name));
       open_.pop_back();
       skeleton_.text += tag;
       return !open_.empty();
