@@ -31,7 +31,9 @@ StopOnSignals::StopOnSignals(Progress& progress) {
   if (const int signal = received) progress.stop(signal);
 }
 
-StopOnSignals::~StopOnSignals() { job = nullptr; }
+StopOnSignals::~StopOnSignals() {
+  job = nullptr;
+}
 
 void ignoreFileSizeSignal() {
   struct sigaction action {};
