@@ -97,14 +97,17 @@ void resize(GrowthAxes& growth, const Shape& shape, const glm::vec3& q, const Bo
 
 size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderStyle& style,
                      BorderPieces& pieces) {
-  const InwardAxes inward = inwardAxes(border_code);
+  return partsAtBorder(whole, inwardAxes(border_code), layersOf(border_code), style, pieces);
+}
+
+size_t partsAtBorder(const SplatPiece& whole, const InwardAxes& inward, uint32_t layers,
+                     const BorderStyle& style, BorderPieces& pieces) {
   if (inward.behind) {
     pieces[0] = whole;
     pieces[0].faces.add({inward.axis[0], inward.distance, true});
     return 1;
   }
   const bool pairs = isOfPairs(style) && inward.ratio == 0;
-  const uint32_t layers = layersOf(border_code);
   size_t count = 1;
   for (int a = 0; a < inward.count; ++a)
     if (pairs || !inward.hasFace(a)) count *= 2;

@@ -17,5 +17,8 @@ using BorderPieces = std::array<SplatPiece, 8>;
 /// Writes the parts of `whole` to pieces[0 .. n - 1] and returns n: 1, 2, 4 or 8.
 size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderStyle& style,
                      BorderPieces& pieces);
+/// By inwardAxes() and layersOf() of its code.
+size_t partsAtBorder(const SplatPiece& whole, const InwardAxes& inward, uint32_t layers,
+                     const BorderStyle& style, BorderPieces& pieces);
 
 }  // namespace curvisplat

@@ -9,16 +9,6 @@
 
 namespace curvisplat {
 
-uint32_t FootprintSkew::pack() const {
-  constexpr float kShift = 0x1.8p23f;  // rounds as std::nearbyint(), which is a call
-  uint32_t skew = 0;
-  for (size_t n = 0; n < 4; ++n) {
-    const float steps = (std::clamp(t[n] * (1 / kSkewStep), -127.0f, 127.0f) + kShift) - kShift;
-    skew |= static_cast<uint32_t>(static_cast<uint8_t>(static_cast<int>(steps))) << 8 * n;
-  }
-  return skew;
-}
-
 FootprintSkew FootprintSkew::unpack(uint32_t skew) {
   FootprintSkew result;
   for (size_t n = 0; n < 4; ++n)
@@ -50,16 +40,27 @@ GrowthAxes growthAxes(const Shape& shape, uint32_t growth_code) {
 uint32_t skewOf(const ScreenRows& rows, const GrowthAxes& axes, const Ellipse& ellipse) {
   FootprintSkew skew;
   for (size_t a = 0; a < axes.count; ++a) {
-    const glm::vec3& e = axes.along[a];
-    const float p0 = (rows.x0 * e.x + rows.y0 * e.y + rows.z0 * e.z) / ellipse.l11;
-    const float p1 = (rows.x1 * e.x + rows.y1 * e.y + rows.z1 * e.z - ellipse.l21 * p0) / ellipse.l22;
-    const float gamma = kSkewOfGrowth * axes.growth[a];
-    skew.t[0] += gamma * p0 * p0 * p0;
-    skew.t[1] += gamma * p0 * p0 * p1;
-    skew.t[2] += gamma * p0 * p1 * p1;
-    skew.t[3] += gamma * p1 * p1 * p1;
+    const std::array<float, 4> added =
+        skewOfAxis(rows, axes.along[a], axes.growth[a], {ellipse.l11, ellipse.l21, ellipse.l22});
+    for (size_t t = 0; t < 4; ++t) skew.t[t] += added[t];
   }
   return skew.pack();
+}
+
+bool GrowthBlock::fill(std::span<const uint32_t> growth_codes) {
+  uint32_t any = kNoGrowth;
+  for (const uint32_t code : growth_codes) any |= code;
+  if (any == kNoGrowth) return false;
+  for (size_t n = 0; n < growth_codes.size(); ++n) {
+    const CellGrowth cell = cellGrowth(growth_codes[n]);
+    for (size_t a = 0; a < axes_.size(); ++a) {
+      axes_[a].x[n] = cell.axis[a].x;
+      axes_[a].y[n] = cell.axis[a].y;
+      axes_[a].z[n] = cell.axis[a].z;
+      axes_[a].growth[n] = cell.growth[a];
+    }
+  }
+  return true;
 }
 
 }  // namespace curvisplat

@@ -9,12 +9,15 @@
 // part is -3 (t30 + t12, t21 + t03). They are kept in 8 bits each, the lowest t30's, in steps of 1/100.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 
 #include "render/project/splat_ellipse.h"
+#include "stream/model/growth_code.h"
 
 namespace curvisplat {
 
@@ -24,7 +27,7 @@ struct FootprintSkew {
   std::array<float, 4> t{};  // t30, t21, t12, t03
 
   /// Clamped to what 8 bits hold.
-  uint32_t pack() const;
+  [[gnu::always_inline]] inline uint32_t pack() const;
   static FootprintSkew unpack(uint32_t skew);
   /// The factor at u.
   double at(double u0, double u1) const;
@@ -42,5 +45,61 @@ GrowthAxes growthAxes(const Shape& shape, uint32_t growth_code);
 
 /// As the ellipse has it under `rows`, packed.
 uint32_t skewOf(const ScreenRows& rows, const GrowthAxes& axes, const Ellipse& ellipse);
+
+/// L of an ellipse.
+struct LowerTriangle {
+  float l11, l21, l22;
+};
+
+/// The growth of the cells of many splats: an array for each number, so that a loop over skewOf() vectorises.
+class GrowthBlock {
+ public:
+  static constexpr size_t kMost = 256;  // splats
+
+  /// False if the cells of none grow.
+  bool fill(std::span<const uint32_t> growth_codes);
+  /// As skewOf() with growthAxes() gives it, of number `n` of those filled in.
+  [[gnu::always_inline]] uint32_t skewOf(size_t n, const ScreenRows& rows, const Shape& shape,
+                                         const LowerTriangle& l) const;
+
+ private:
+  struct Axis {
+    std::array<float, kMost> x, y, z, growth;
+  };
+  std::array<Axis, 3> axes_;
+};
+
+// Inline, for the loop over a brick's splats.
+
+inline uint32_t FootprintSkew::pack() const {
+  constexpr float kShift = 0x1.8p23f;  // rounds as std::nearbyint(), which is a call
+  uint32_t skew = 0;
+  for (size_t n = 0; n < 4; ++n) {
+    const float steps = (std::clamp(t[n] * (1 / kSkewStep), -127.0f, 127.0f) + kShift) - kShift;
+    skew |= static_cast<uint32_t>(static_cast<uint8_t>(static_cast<int>(steps))) << 8 * n;
+  }
+  return skew;
+}
+
+/// The part that an axis adds, `along` in space.
+[[gnu::always_inline]] inline std::array<float, 4> skewOfAxis(const ScreenRows& rows, const glm::vec3& along,
+                                                              float growth, const LowerTriangle& l) {
+  const float p0 = (rows.x0 * along.x + rows.y0 * along.y + rows.z0 * along.z) / l.l11;
+  const float p1 = (rows.x1 * along.x + rows.y1 * along.y + rows.z1 * along.z - l.l21 * p0) / l.l22;
+  const float gamma = kSkewOfGrowth * growth;
+  return {gamma * p0 * p0 * p0, gamma * p0 * p0 * p1, gamma * p0 * p1 * p1, gamma * p1 * p1 * p1};
+}
+
+inline uint32_t GrowthBlock::skewOf(size_t n, const ScreenRows& rows, const Shape& shape,
+                                    const LowerTriangle& l) const {
+  FootprintSkew skew;
+  for (const Axis& axis : axes_) {
+    const float growth = axis.growth[n];
+    const std::array<float, 4> added =
+        skewOfAxis(rows, inSpace(shape, {axis.x[n], axis.y[n], axis.z[n]}), growth, l);
+    for (size_t t = 0; t < 4; ++t) skew.t[t] += growth == 0 ? 0.0f : added[t];
+  }
+  return skew.pack();
+}
 
 }  // namespace curvisplat

@@ -35,6 +35,7 @@ struct Block {
   float amplitude[kBlock];
   float slope0[kBlock], slope1[kBlock], half_width[kBlock];
   int32_t too_wide[kBlock];  // perspective: to be cut up, or before the near plane
+  uint32_t skew[kBlock];     // of splats that are drawn as they are
 
   Ellipse ellipse(size_t n) const {
     return {l11[n], l21[n], l22[n], amplitude[n], slope0[n], slope1[n], half_width[n]};
@@ -86,6 +87,22 @@ void computeBlock(const PerspectiveMap& map, const GeometryArrays<const float>& 
   }
 }
 
+/// As skewOf() has them.
+template <typename Map>
+void computeSkews(const Map& map, const GeometryArrays<const float>& geometry, size_t begin, size_t count,
+                  GrowthBlock& growth, Block& block) {
+  if (!growth.fill({geometry.growth_code + begin, count})) {
+    std::fill_n(block.skew, count, 0u);
+    return;
+  }
+#pragma GCC ivdep
+  for (size_t n = 0; n < count; ++n) {
+    const size_t i = begin + n;
+    block.skew[n] = growth.skewOf(n, rowsAt(map, geometry.x[i], geometry.y[i], geometry.z[i]),
+                                  shapeOf(geometry, i), {block.l11[n], block.l21[n], block.l22[n]});
+  }
+}
+
 /// What parts and cutting may still give for a brick: pieces that are drawn, and looks at any.
 struct CutBudget {
   size_t pieces = BrickProjector::kMaxPieces;
@@ -124,6 +141,8 @@ struct BrickPass {
   SplatChooser& chooser;
   ProjectionCounts& counts;
   CutBudget left = {};
+  BorderPieces parts = {},
+               coloured_parts = {};  // of the splat in hand: clearing them takes as long as filling them
 };
 
 /// How one splat is cut.
@@ -143,16 +162,17 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   SplatChooser& chooser = pass.chooser;
   CutBudget& left = pass.left;
   const VariableArrays<const float>& variable = brick.variable;
-  const uint32_t border_code = how.border_code;
+  const InwardAxes inward = inwardAxes(how.border_code);
+  const uint32_t layers = layersOf(how.border_code);
   const SplatPiece whole = wholeOf(brick.geometry, variable, i);
   const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
-  if (chooser.transparentThroughout(whole.mean, static_cast<float>(drawnSlope(slope, border_code)),
+  if (chooser.transparentThroughout(whole.mean, static_cast<float>(drawnSlope(slope, inward)),
                                     variable.variance[i]))
     return SplatChooser::Fate::kTransparent;
   auto best = SplatChooser::Fate::kOffScreen;
   // A splat that is cut has a record of its own, as any splat; what it takes beyond that counts.
   const size_t least = brick.colours ? 2 : 1;
-  const bool has_faces = inwardAxes(border_code).faces != 0 || layersOf(border_code) != 0;
+  const bool has_faces = inward.faces != 0 || layers != 0;
   size_t own = how.clipped || how.layered || has_faces ? least : 0;
   const SplatPiece* coloured = nullptr;  // the part that is placed, with the scalar of the colours
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
@@ -193,17 +213,16 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     return true;
   };
   const auto divide = [&](const SplatPiece& piece, BorderPieces& parts) {
-    if (border_code != kNoBorder) return partsAtBorder(piece, border_code, *cutting.borders, parts);
+    if (how.border_code != kNoBorder) return partsAtBorder(piece, inward, layers, *cutting.borders, parts);
     parts[0] = piece;
     return size_t{1};
   };
-  BorderPieces parts, coloured_parts;
-  const size_t count = divide(whole, parts);
-  if (brick.colours) divide(wholeOf(brick.geometry, *brick.colours, i), coloured_parts);
+  const size_t count = divide(whole, pass.parts);
+  if (brick.colours) divide(wholeOf(brick.geometry, *brick.colours, i), pass.coloured_parts);
   for (size_t n = 0; n < count; ++n) {
-    if (brick.colours) coloured = &coloured_parts[n];
-    if (how.clipped) cutting.clip.addFaces(parts[n]);
-    if (!place(map, parts[n], left.looks, take)) return {};
+    if (brick.colours) coloured = &pass.coloured_parts[n];
+    if (how.clipped) cutting.clip.addFaces(pass.parts[n]);
+    if (!place(map, pass.parts[n], left.looks, take)) return {};
   }
   return best;
 }
@@ -217,10 +236,12 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
   const GeometryArrays<const float>& geometry = brick.geometry;
   const VariableArrays<const float>& variable = brick.variable;
   Block block;
+  GrowthBlock growth;
   std::array<ClipSide, kBlock> sides{};
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
     computeBlock(map, geometry, variable, begin, count, block);
+    computeSkews(map, geometry, begin, count, growth, block);
     if (!cutting.clip.empty()) cutting.clip.sidesOf(geometry, begin, count, sides);
     for (size_t n = 0; n < count; ++n) {
       const size_t i = begin + n;
@@ -257,9 +278,7 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
       } else {
         const Ellipse ellipse = block.ellipse(n);
         ScreenSplat splat = screenSplat(block.x[n], block.y[n], ellipse, variable.mean[i]);
-        if (const uint32_t code = geometry.growth_code[i]; code != kNoGrowth)
-          splat.skew = skewOf(rowsAt(map, geometry.x[i], geometry.y[i], geometry.z[i]),
-                              growthAxes(shapeOf(geometry, i), code), ellipse);
+        splat.skew = block.skew[n];
         if (brick.colours) {
           const ScreenColour colour = colourOf(map, geometry, *brick.colours, i);
           fate = pass.chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.depth[n], lit);

@@ -86,14 +86,28 @@ PackedRotation packRotation(const glm::dquat& rotation) {
   return packed;
 }
 
+/// What the codes of a quaternion's numbers stand for.
+class RotationNumbers {
+ public:
+  RotationNumbers() {
+    for (uint32_t code = 0; code < numbers_.size(); ++code)
+      numbers_[code] = static_cast<float>((code / kSteps * 2 - 1) * kLargest);
+  }
+  float of(uint32_t code) const { return numbers_[code & 0xff]; }
+
+ private:
+  std::array<float, 256> numbers_;
+};
+
 /// Number `largest` of the quaternion is left out of the code.
 glm::mat3 unpackRotation(uint32_t code, uint32_t largest) {
+  static const RotationNumbers unpacked;
   std::array<float, 4> numbers{};
   float sum = 0;
   int shift = 8;
   for (uint32_t n = 0; n < 4; ++n) {
     if (n == largest) continue;
-    numbers[n] = static_cast<float>(((code >> shift & 0xff) / kSteps * 2 - 1) * kLargest);
+    numbers[n] = unpacked.of(code >> shift);
     sum += numbers[n] * numbers[n];
     shift += 8;
   }
@@ -195,10 +209,12 @@ double borderReach(uint32_t border_code) {
 }
 
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code) {
+  return drawnSlope(slope, inwardAxes(border_code));
+}
+
+double drawnSlope(const glm::dvec3& slope, const InwardAxes& inward) {
   double squared = glm::dot(slope, slope);
-  if (border_code == kNoBorder) return std::sqrt(squared);
   constexpr double kWidest = kHalfCellStyle.cut.size + kWidening;
-  const InwardAxes inward = inwardAxes(border_code);
   if (inward.behind) return std::sqrt(squared);
   const double widest = inward.ratio > 0 ? std::max(mergedPart(inward).size, 1.0f) : kWidest;
   for (int n = 0; n < inward.count; ++n) {

@@ -101,6 +101,8 @@ inline constexpr double kPartsReach = 0.52, kCutReach = 1.25, kMergedReach = 2.9
 double borderReach(uint32_t border_code);
 /// |w|, as stream/model/splats.h has it, of the splat as it is drawn, at the most.
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code);
+/// By inwardAxes() of its code.
+double drawnSlope(const glm::dvec3& slope, const InwardAxes& inward);
 /// What half cells that shrink inwards add to the size of a cut (render/project/border_parts.cpp). Caches without
 /// kMergedBorders recorded slopes without it: drawnSlope() is at most kEarlierSlopes times as large.
 inline constexpr double kWidening = 0.13;
