@@ -5,7 +5,7 @@
 #include <glm/vec3.hpp>
 
 #include "render/project/kernel.h"
-#include "stream/model/growth_code.h"
+#include "stream/model/growth_frames.h"
 
 namespace curvisplat {
 
@@ -48,16 +48,18 @@ uint32_t skewOf(const ScreenRows& rows, const GrowthAxes& axes, const Ellipse& e
 }
 
 bool GrowthBlock::fill(std::span<const uint32_t> growth_codes) {
+  const std::span<const GrowthFrame> frames = growthFrames();
   uint32_t any = kNoGrowth;
   for (const uint32_t code : growth_codes) any |= code;
   if (any == kNoGrowth) return false;
   for (size_t n = 0; n < growth_codes.size(); ++n) {
-    const CellGrowth cell = cellGrowth(growth_codes[n]);
+    const uint32_t code = growth_codes[n];
+    const GrowthFrame& frame = frames[frameNumber(code)];
     for (size_t a = 0; a < axes_.size(); ++a) {
-      axes_[a].x[n] = cell.axis[a].x;
-      axes_[a].y[n] = cell.axis[a].y;
-      axes_[a].z[n] = cell.axis[a].z;
-      axes_[a].growth[n] = cell.growth[a];
+      axes_[a].x[n] = frame[a].x;
+      axes_[a].y[n] = frame[a].y;
+      axes_[a].z[n] = frame[a].z;
+      axes_[a].growth[n] = growthOf(code, a);
     }
   }
   return true;

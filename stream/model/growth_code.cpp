@@ -7,15 +7,17 @@
 #include <glm/mat3x3.hpp>
 #include <numeric>
 
+#include "stream/model/growth_frames.h"
+
 namespace curvisplat {
 namespace {
 
 constexpr double kGrowthSteps = 32;
 constexpr int kLargestGrowth = 20;  // in steps
-constexpr int kGrowthBits = 6;
 constexpr double kRotationStep = 0.08;
 constexpr int kLargestRotation = 7;  // in steps
-constexpr int kRotationBits = 4, kRotationShift = 3 * kGrowthBits;
+constexpr int kRotationBits = 4, kRotationShift = kGrowthFrameShift;
+static_assert(3 * kRotationBits == kGrowthFrameBits);
 
 /// std::nearbyint() of a number far below 2^51, without a call.
 int nearestInteger(double x) {
@@ -98,12 +100,10 @@ class RotatedAxes {
       axes_[rotation] = {frame[0], frame[1], frame[2]};
     }
   }
-  const std::array<glm::vec3, 3>& of(uint32_t growth_code) const {
-    return axes_[growth_code >> kRotationShift & (axes_.size() - 1)];
-  }
+  const auto& all() const { return axes_; }
 
  private:
-  std::array<std::array<glm::vec3, 3>, 1 << 3 * kRotationBits> axes_;
+  std::array<GrowthFrame, 1 << kGrowthFrameBits> axes_;
 };
 
 }  // namespace
@@ -135,13 +135,15 @@ uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> gr
   return code;
 }
 
-CellGrowth cellGrowth(uint32_t growth_code) {
+std::span<const GrowthFrame> growthFrames() {
   static const RotatedAxes axes;
+  return axes.all();
+}
+
+CellGrowth cellGrowth(uint32_t growth_code) {
   CellGrowth result;
-  for (int n = 0; n < 3; ++n)
-    result.growth[n] =
-        static_cast<float>(signedBits(growth_code, n * kGrowthBits, kGrowthBits) * (1 / kGrowthSteps));
-  result.axis = axes.of(growth_code);
+  for (size_t n = 0; n < 3; ++n) result.growth[n] = growthOf(growth_code, n);
+  result.axis = growthFrames()[frameNumber(growth_code)];
   return result;
 }
 

@@ -6,6 +6,9 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
+#include <memory>
+#include <random>
+#include <vector>
 
 #include "render/project/kernel.h"
 #include "stream/model/growth_code.h"
@@ -38,6 +41,33 @@ TEST(FootprintSkew, NeitherWeighsNorMoves) {
   EXPECT_NEAR(x, 0, 2e-3);
   EXPECT_NEAR(y, 0, 2e-3);
   EXPECT_NEAR(third, 0.2, 0.02);
+}
+
+TEST(FootprintSkew, OfManySplatsAtOnceIsThatOfEach) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> any(-1, 1);
+  std::vector<uint32_t> codes(GrowthBlock::kMost, kNoGrowth);
+  std::vector<Shape> shapes;
+  for (uint32_t& code : codes) {
+    const auto number = [&] { return static_cast<float>(any(random)); };
+    shapes.push_back(
+        {1.1f + number(), 0.01f * (1.1f + number()), 100 * (1.1f + number()), number(), number(), number()});
+    if (random() % 4 == 0) continue;
+    const glm::dquat turn = glm::normalize(glm::dquat(any(random), any(random), any(random), any(random)));
+    const glm::dmat3 axes = glm::mat3_cast(turn);
+    code = packGrowthCode({axes[0], axes[1], axes[2]},
+                          {0.5 * any(random), random() % 2 * any(random), random() % 2 * any(random)});
+  }
+  const auto block = std::make_unique<GrowthBlock>();
+  ASSERT_TRUE(block->fill(codes));
+  const ScreenRows rows{5, 1, -2, 0.5f, 4, 3};
+  for (size_t n = 0; n < codes.size(); ++n) {
+    const Ellipse e = ellipseOf(rows, shapes[n], {}, 0, 1, {0.3f, 1e-6f});
+    EXPECT_EQ(block->skewOf(n, rows, shapes[n], {e.l11, e.l21, e.l22}),
+              skewOf(rows, growthAxes(shapes[n], codes[n]), e))
+        << n;
+  }
+  EXPECT_FALSE(block->fill(std::vector<uint32_t>(3, kNoGrowth)));
 }
 
 TEST(FootprintSkew, IsTheSkewedKernelsIntegralAlongTheRay) {
