@@ -73,6 +73,7 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
   pass.owners = owners ? &*owners : nullptr;
   pass.ranks = ranks_;
   pass.octants = cache_->manifest().hasFeature(kCellOctants);
+  pass.values_alone = true;
   streamSplats(
       reader, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, pass);
   for (ValueSink& sink : sinks) sink.flush();

@@ -39,6 +39,7 @@ class SplatStream {
           return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size())};
         }) {
     corrections_.octants = pass.octants;
+    corrections_.growth_codes = !pass.values_alone;
   }
 
   /// `covered`: of the slab, as BlockOwners::cover() sets it.

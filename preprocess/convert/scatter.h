@@ -56,6 +56,7 @@ struct SlabPass {
   BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
   Ranks* ranks = nullptr;         // of which each makes the splats of a share; the counts are the whole's
   bool octants = true;            // NodeSplatCorrections::octants
+  bool values_alone = false;      // are wanted: NodeSplatCorrections::growth_codes
 };
 
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go

@@ -211,8 +211,10 @@ void Window::takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrd
   node.splat.weight = splats.weight[n];
   node.regular = true;
   node.border_code = kNoBorder;
-  node.growth_code = growthCode(
-      {scratch_.growth[0][in_part], scratch_.growth[1][in_part], scratch_.growth[2][in_part]}, rotate);
+  node.growth_code = kNoGrowth;
+  if (corrections_.growth_codes)
+    node.growth_code = growthCode(
+        {scratch_.growth[0][in_part], scratch_.growth[1][in_part], scratch_.growth[2][in_part]}, rotate);
   node.on_block_face = node.behind_face = false;
   node.layers = 0;
   node.node_position = lattice_.position(at);
@@ -334,7 +336,9 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         node.splat.weight = std::abs(frame.determinant()) * weight_factor * shrink;
         node.regular = !frame.floored() && weight_factor == 1;
         node.border_code = borderCode(inwards, corrections_.faces && !frame.floored(), rotate);
-        node.growth_code = frame.floored() ? kNoGrowth : growthCode(growth, rotate);
+        const bool has_growth =
+            !frame.floored() && (corrections_.growth_codes || on_face || layers != Layers{});
+        node.growth_code = has_growth ? growthCode(growth, rotate) : kNoGrowth;
         for (int axis = 0; axis < 3; ++axis) {
           if (frame.floored()) node.lines[axis] = {};
           if (!node.lines[axis].isThere()) continue;

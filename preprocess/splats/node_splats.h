@@ -142,6 +142,8 @@ struct NodeSplatCorrections {
   bool growth = true;   // else kernels are symmetric; takes stretch
   bool lines = true;    // else cells at joints know their own block alone; takes growth and stretch
   bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
+  // Else splats that are not for seams have none: values do not depend on them, and they take a sixth of the time.
+  bool growth_codes = true;
 
   bool all() const {
     return border_codes && faces && layers && middles && bends && stretch && growth && lines;
