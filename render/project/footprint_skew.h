@@ -54,7 +54,7 @@ struct LowerTriangle {
 /// The growth of the cells of many splats: an array for each number, so that a loop over skewOf() vectorises.
 class GrowthBlock {
  public:
-  static constexpr size_t kMost = 256;  // splats
+  static constexpr size_t kMaxSplats = 256;  // splats
 
   /// False if the cells of none grow.
   bool fill(std::span<const uint32_t> growth_codes);
@@ -64,7 +64,7 @@ class GrowthBlock {
 
  private:
   struct Axis {
-    std::array<float, kMost> x, y, z, growth;
+    std::array<float, kMaxSplats> x, y, z, growth;
   };
   std::array<Axis, 3> axes_;
 };

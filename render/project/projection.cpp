@@ -27,6 +27,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBlock = 256;  // splats at a time: the arrays between the two loops stay in the L1 cache
+static_assert(kBlock <= GrowthBlock::kMaxSplats);
 
 /// The results that the arithmetic loop passes to the loop that chooses.
 struct Block {

@@ -7,8 +7,6 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-#include "stream/model/growth_code.h"
-
 namespace curvisplat {
 
 /// Unit vectors at right angles.

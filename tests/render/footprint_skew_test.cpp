@@ -46,7 +46,7 @@ TEST(FootprintSkew, NeitherWeighsNorMoves) {
 TEST(FootprintSkew, OfManySplatsAtOnceIsThatOfEach) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> any(-1, 1);
-  std::vector<uint32_t> codes(GrowthBlock::kMost, kNoGrowth);
+  std::vector<uint32_t> codes(GrowthBlock::kMaxSplats, kNoGrowth);
   std::vector<Shape> shapes;
   for (uint32_t& code : codes) {
     const auto number = [&] { return static_cast<float>(any(random)); };
