@@ -55,7 +55,7 @@ FaceCorners lowestOf(std::span<const uint64_t> corners, std::span<const uint32_t
 
 void measure(std::span<const glm::dvec3> at, const glm::dvec3& middle, HalfFace& face) {
   const std::span<const uint32_t> corners = face.corners;
-  const glm::dvec3 first = at[corners[0]];
+  const glm::dvec3& first = at[corners[0]];
   glm::dvec3 sum(0.0), area(0.0);
   for (size_t n = 0; n < corners.size(); ++n) {
     sum += at[corners[n]] - first;
