@@ -16,8 +16,8 @@ class PointPages {
   /// Keeps to `memory_bytes`. `fields`: values of each point. `reader` must outlive it.
   PointPages(const MeshReader& reader, size_t fields, uint64_t memory_bytes);
 
-  /// Reads those of these points that are not in memory. Returns false, and reads nothing, if they do not fit together, or if so
-  /// many points were read again that cells refer to points all over the mesh: then streams are faster.
+  /// Reads those of these points that are not in memory. Returns false, and reads nothing, if they do not fit together, or if
+  /// pages were read again so often that streams are faster: cells refer to points all over the mesh then.
   bool hold(std::span<const uint64_t> points);
 
   /// Of a point that hold() was last called with. Any thread.

@@ -27,8 +27,8 @@ class SumPages {
     return sizeof(glm::dvec3) + values * sizeof(float) + moments * sizeof(double);
   }
 
-  /// Reads those of these points that are not in memory. Returns false, and reads nothing, if they do not fit together, or
-  /// if so many were read again that cells refer to points all over the mesh: then streams are faster.
+  /// Reads those of these points that are not in memory. Returns false, and reads nothing, if they do not fit together, or if
+  /// pages were read again so often that streams are faster: cells refer to points all over the mesh then.
   bool hold(std::span<const uint64_t> points);
   /// All of pages [first, end), as many as there may be in memory.
   void holdPages(uint64_t first, uint64_t end);
