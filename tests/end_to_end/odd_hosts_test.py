@@ -428,6 +428,20 @@ class OddHosts(unittest.TestCase):
         self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
         self.assertEqual(sorted(folder.iterdir()), before)
 
+    def failed_with_one_line(self, result, folder, before):
+        """Whether it failed; then with status 1 and one line, and nothing is left. Removes what it has made in `folder`."""
+        made = [path for path in folder.iterdir() if path not in before]
+        if result.returncode == 0:
+            self.assertLessEqual({path.name for path in made}, {"new.splats", "new.png"})
+        else:
+            self.assertEqual(result.returncode, 1, result.stderr)
+            lines = [line for line in result.stderr.splitlines() if not line.startswith("curvisplat: note")]
+            self.assertEqual(len(lines), 1, result.stderr)
+            self.assertEqual(made, [], result.stderr)
+        for path in made:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        return result.returncode != 0
+
     def test_a_stale_handle_is_one_line_and_leaves_nothing(self):
         """The server has forgotten a file, at one of its reads or writes."""
         environment = self.network()
@@ -445,18 +459,7 @@ class OddHosts(unittest.TestCase):
             before = sorted(folder.iterdir())
             for at in (*range(1, 30), 35, 40, 50, 60, 80, 100, 130, 160, 200, 250, 300, 400):
                 with self.subTest(name, at=at):
-                    result = run(*words, at=at)
-                    made = [path for path in folder.iterdir() if path not in before]
-                    if result.returncode == 0:
-                        self.assertLessEqual({path.name for path in made}, {"new.splats", "new.png"})
-                    else:
-                        failures += 1
-                        self.assertEqual(result.returncode, 1, result.stderr)
-                        lines = [line for line in result.stderr.splitlines() if not line.startswith("curvisplat: note")]
-                        self.assertEqual(len(lines), 1, result.stderr)
-                        self.assertEqual(made, [], result.stderr)
-                    for path in made:
-                        shutil.rmtree(path) if path.is_dir() else path.unlink()
+                    failures += self.failed_with_one_line(run(*words, at=at), folder, before)
             print(f"ESTALE: {name}: {failures} ended with one line", flush=True)
             self.assertGreater(failures, 0, name)
 
@@ -469,8 +472,10 @@ class OddHosts(unittest.TestCase):
         source.write_text(UNKNOWN)
         subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True)
         folder.mkdir()
-        run = lambda *words, at=(0, 0): subprocess.run([PROGRAM, *words], cwd=folder, capture_output=True, text=True, check=False, timeout=60, env={
-            **os.environ, "LD_PRELOAD": str(library), "UNKNOWN_FOLDER": str(folder), "UNKNOWN_FROM": str(at[0]), "UNKNOWN_TO": str(at[1])})
+        environment = {**os.environ, "LD_PRELOAD": str(library), "UNKNOWN_FOLDER": str(folder)}
+        run = lambda *words, at=(0, 0): subprocess.run(
+            [PROGRAM, *words], cwd=folder, capture_output=True, text=True, check=False, timeout=60,
+            env={**environment, "UNKNOWN_FROM": str(at[0]), "UNKNOWN_TO": str(at[1])})
         self.assertEqual(run("generate", "o-grid", "--size", "12x10x8", "-o", "o").returncode, 0)
         self.assertEqual(run("convert", "o.xyz", "o.fun", "-o", "whole.splats").returncode, 0)
         jobs = {"convert": ["convert", "o.xyz", "o.fun", "-o", "new.splats", "--threads", "1"],
@@ -480,18 +485,7 @@ class OddHosts(unittest.TestCase):
             for at in range(1, 60):
                 for end in (at, 1 << 40):
                     with self.subTest(name, at=at, end=end):
-                        result = run(*words, at=(at, end))
-                        made = [path for path in folder.iterdir() if path not in before]
-                        self.assertIn(result.returncode, (0, 1), result.stderr)
-                        if result.returncode == 0:
-                            self.assertLessEqual({path.name for path in made}, {"new.splats", "new.png"})
-                        else:
-                            failures += 1
-                            lines = [line for line in result.stderr.splitlines() if not line.startswith("curvisplat: note")]
-                            self.assertEqual(len(lines), 1, result.stderr)
-                            self.assertEqual(made, [], result.stderr)
-                        for path in made:
-                            shutil.rmtree(path) if path.is_dir() else path.unlink()
+                        failures += self.failed_with_one_line(run(*words, at=(at, end)), folder, before)
             print(f"fstat: {name}: {failures} ended with one line", flush=True)
             self.assertGreater(failures, 0, name)
 
