@@ -71,6 +71,15 @@ class ShortForms(unittest.TestCase):
         self.assertEqual(lines[0], "blocks: the same")
         self.assertRegex(lines[1], r"^old: \d+\.\d+ \+ \d+\.\d+ s, least ")
 
+    def test_lod_pixels(self):
+        made = FOLDER / "levels"
+        subprocess.run([PROGRAM, "generate", "half-annulus", "--size", "64x32x32", "-o", made], check=True, capture_output=True)
+        subprocess.run([PROGRAM, "convert", f"{made}.xyz", f"{made}.fun", "-o", f"{made}.splats"], check=True, capture_output=True)
+        lines = run("lod_pixels.py", f"{made}.splats", "--size", "32x32", "--lod-pixels", "0,4").splitlines()
+        for line, function in zip(lines[2:], ["default", "step"], strict=True):
+            self.assertRegex(line, rf"^\| levels \| {function} \| \d+ splats, \S+ s \| the same "
+                                   r"\| (the same|\d+\.\d dB, \d+ splats, \S+ s) \|$")
+
     def test_many_steps(self):
         lines = output([SCRIPTS / "many_steps.py", FOLDER / "many", "--steps", 20, "--program", PROGRAM]).splitlines()
         self.assertRegex(lines[0], r"^20 steps: manifest.json \d+ KiB, steps.bin \d+ KiB$")

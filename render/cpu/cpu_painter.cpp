@@ -94,6 +94,8 @@ struct CpuPainter::State {
   void clear(size_t number);
   void allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_);
   void paintBatch();
+  void paintBorrowed(std::span<const ScreenSplat>& splats);
+  void paintTiles();
 };
 
 CpuPainter::CpuPainter() : state_(std::make_unique<State>()) {}
@@ -187,6 +189,19 @@ void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t bat
 void CpuPainter::State::paintBatch() {
   const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
   arena->execute([this] { bins->sort(); });
+  paintTiles();
+}
+
+/// As many as fit into a batch of their own, which are taken off the span's beginning.
+void CpuPainter::State::paintBorrowed(std::span<const ScreenSplat>& splats) {
+  const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
+  size_t taken = 0;
+  arena->execute([&] { taken = bins->sortBorrowed(splats); });
+  splats = splats.subspan(taken);
+  paintTiles();
+}
+
+void CpuPainter::State::paintTiles() {
   forTiles([this](size_t number) {
     const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
     if (order.empty() || stop.stop_requested()) return;
@@ -205,6 +220,11 @@ void CpuPainter::State::paintBatch() {
 void CpuPainter::draw(std::span<const ScreenSplat> splats) {
   State& state = *state_;
   while (!splats.empty() && !state.stop.stop_requested()) {
+    if (2 * splats.size() >= state.batch_splats && !state.bins->awaitsSplat()) {
+      if (!state.bins->empty()) state.paintBatch();
+      state.paintBorrowed(splats);
+      continue;
+    }
     size_t added;
     {
       const StageTimer timer(state.upload_s, "bin splats");

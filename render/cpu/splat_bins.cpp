@@ -7,6 +7,7 @@
 
 #include "render/cpu/tile.h"
 #include "render/project/kernel.h"
+#include "stream/base/check.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -22,18 +23,21 @@ size_t tileCount(ImageSize size) {
 
 }  // namespace
 
+// Of records, too, which are in no list.
+constexpr SplatBins::Tiles SplatBins::kNoTiles{1, 1, 0, 0};
+
 SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pieces)
     : columns_(tilesAlong(size.width)),
       rows_(tilesAlong(size.height)),
       most_splats_(splats),
       most_entries_(std::max(entries, tileCount(size))),
       pieces_(pieces),
+      tiles_(std::make_unique_for_overwrite<Tiles[]>(splats + 3)),
       entries_(std::make_unique_for_overwrite<uint32_t[]>(most_entries_)),
       begins_(tileCount(size) + 1),
       piece_ends_(pieces * tileCount(size)),
       closed_(tileCount(size)) {
   splats_.reserve(splats + 3);
-  tiles_.reserve(splats + 3);
 }
 
 uint64_t SplatBins::bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces) {
@@ -56,7 +60,7 @@ SplatBins::Tiles SplatBins::tilesOf(const ScreenSplat& splat) const {
     return static_cast<int>(std::clamp(x * kTile + 1, 0.0f, most)) - 1;
   };
   const int x1 = last(splat.x + reach_x, columns), y1 = last(splat.y + reach_y, rows);
-  if (x1 < 0 || y1 < 0) return {1, 1, 0, 0};
+  if (x1 < 0 || y1 < 0) return kNoTiles;
   return {first(splat.x - reach_x, columns), first(splat.y - reach_y, rows), static_cast<uint16_t>(x1),
           static_cast<uint16_t>(y1)};
 }
@@ -82,42 +86,84 @@ size_t SplatBins::add(std::span<const ScreenSplat> splats) {
       continue;
     }
     if (entry_count_ + tiles.count() > most_entries_) break;
-    for (size_t n = 0; n < record_count_; ++n) {
-      tiles_.push_back({1, 1, 0, 0});
-      splats_.push_back(records_[n]);
-    }
+    for (size_t n = 0; n < record_count_; ++n) push(records_[n], kNoTiles);
     record_count_ = 0;
     entry_count_ += tiles.count();
-    tiles_.push_back(tiles);
-    splats_.push_back(splats[added]);
+    push(splats[added], tiles);
   }
+  batch_ = splats_;
   return added;
 }
 
+void SplatBins::push(const ScreenSplat& splat, const Tiles& tiles) {
+  tiles_[splats_.size()] = tiles;
+  splats_.push_back(splat);
+}
+
+/// visit(piece, its first splat, its end)
 template <typename Visit>
-void SplatBins::forPiece(size_t piece, const Visit& visit) const {
-  const size_t begin = splats_.size() * piece / pieces_, end = splats_.size() * (piece + 1) / pieces_;
-  for (size_t n = begin; n < end; ++n) {
-    const Tiles& tiles = tiles_[n];
-    for (int y = tiles.y0; y <= tiles.y1; ++y)
-      for (int x = tiles.x0; x <= tiles.x1; ++x) {
-        const auto tile = static_cast<size_t>(y * columns_ + x);
-        if (!closed_[tile]) visit(tile, n);
-      }
-  }
+void SplatBins::forPieces(const Visit& visit) const {
+  tbb::parallel_for(size_t{0}, size_t{pieces_}, [&](size_t piece) {
+    const TraceScope trace("sort bins");
+    visit(piece, batch_.size() * piece / pieces_, batch_.size() * (piece + 1) / pieces_);
+  });
+}
+
+/// Returns how many there are.
+template <typename Visit>
+size_t SplatBins::forOpenTiles(size_t n, const Visit& visit) const {
+  const Tiles& tiles = tiles_[n];
+  size_t open = 0;
+  for (int y = tiles.y0; y <= tiles.y1; ++y)
+    for (int x = tiles.x0; x <= tiles.x1; ++x) {
+      const auto tile = static_cast<size_t>(y * columns_ + x);
+      if (closed_[tile]) continue;
+      visit(tile);
+      ++open;
+    }
+  return open;
+}
+
+size_t SplatBins::sortBorrowed(std::span<const ScreenSplat> splats) {
+  CURVISPLAT_CHECK(empty() && !awaitsSplat());
+  const auto withoutLastRecords = [](std::span<const ScreenSplat> of) {
+    while (!of.empty() && isRecord(of.back())) of = of.first(of.size() - 1);
+    return of;
+  };
+  size_t most = std::min(splats.size(), most_splats_);
+  while (most < splats.size() && isRecord(splats[most - 1])) ++most;
+  batch_ = withoutLastRecords(splats.first(most));
+  std::atomic<uint64_t> entries = 0;
+  forPieces([&](size_t, size_t begin, size_t end) {
+    uint64_t of_piece = 0;
+    for (size_t n = begin; n < end; ++n) {
+      tiles_[n] = isRecord(batch_[n]) ? kNoTiles : tilesOf(batch_[n]);
+      of_piece += tiles_[n].count();
+    }
+    entries += of_piece;
+  });
+  if (entries > most_entries_) batch_ = withoutLastRecords(batch_.first(fitting()));
+  sort();
+  return batch_.size();
+}
+
+/// How many of the batch's splats, from the first on, there is space for.
+size_t SplatBins::fitting() const {
+  size_t entries = 0, n = 0;
+  while (n < batch_.size() && (entries += tiles_[n].count()) <= most_entries_) ++n;
+  return n;
 }
 
 void SplatBins::sort() {
   const size_t tiles = begins_.size() - 1;
   std::fill(piece_ends_.begin(), piece_ends_.end(), 0);
-  const auto forPieces = [&](const auto& visit) {
-    tbb::parallel_for(size_t{0}, size_t{pieces_}, [&](size_t piece) {
-      const TraceScope trace("sort bins");
-      uint32_t* ends = &piece_ends_[piece * tiles];
-      forPiece(piece, [&](size_t tile, size_t n) { visit(ends[tile], n); });
-    });
-  };
-  forPieces([](uint32_t& count, size_t) { ++count; });
+  forPieces([&](size_t piece, size_t begin, size_t end) {
+    uint32_t* const counts = &piece_ends_[piece * tiles];
+    uint64_t hidden = 0;
+    for (size_t n = begin; n < end; ++n)
+      if (forOpenTiles(n, [&](size_t tile) { ++counts[tile]; }) == 0 && !isRecord(batch_[n])) ++hidden;
+    hidden_ += hidden;
+  });
   uint32_t sum = 0;
   for (size_t tile = 0; tile < tiles; ++tile) {
     begins_[tile] = sum;
@@ -128,7 +174,11 @@ void SplatBins::sort() {
     }
   }
   begins_[tiles] = sum;
-  forPieces([this](uint32_t& end, size_t n) { entries_[end++] = static_cast<uint32_t>(n); });
+  forPieces([&](size_t piece, size_t begin, size_t end) {
+    uint32_t* const ends = &piece_ends_[piece * tiles];
+    for (size_t n = begin; n < end; ++n)
+      forOpenTiles(n, [&](size_t tile) { entries_[ends[tile]++] = static_cast<uint32_t>(n); });
+  });
 }
 
 void SplatBins::open() {
@@ -139,7 +189,7 @@ void SplatBins::open() {
 
 void SplatBins::clear() {
   splats_.clear();
-  tiles_.clear();
+  batch_ = {};
   entry_count_ = 0;
 }
 

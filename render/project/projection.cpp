@@ -53,7 +53,7 @@ struct Block {
 };
 
 ScreenSplat screenSplat(float x, float y, const Ellipse& e, float mean) {
-  return {x, y, e.l11, e.l21, e.l22, e.amplitude, mean, e.slope0, e.slope1, e.half_width};
+  return {x, y, e.l11, e.l21, e.l22, e.amplitude, mean, e.slope0, e.slope1, e.half_width, 0};
 }
 
 void computeBlock(const OrthographicMap& map, const GeometryArrays<const float>& geometry,

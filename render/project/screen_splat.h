@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <type_traits>
 
 namespace curvisplat {
 
@@ -19,9 +20,11 @@ struct ScreenSplat {
   float mean;            // the scalar's unit, and so for the rest
   float slope0, slope1;  // along the columns of L
   float half_width;      // √3 deviations along the ray at rho = 0; in lit pictures with the light (light.h)
-  uint32_t skew = 0;     // of the footprint, packed (footprint_skew.h); 0: none
+  uint32_t skew;         // of the footprint, packed (footprint_skew.h); 0: none
 };
 static_assert(sizeof(ScreenSplat) == 44);
+// So that the large buffers of a frame take no memory before they are filled.
+static_assert(std::is_trivially_default_constructible_v<ScreenSplat>);
 
 /// The faces that a splat is cut at: a record of its own, directly before the splat where splats come from
 /// the nearest to the farthest, and directly behind it where they come from the farthest to the nearest. The
@@ -97,7 +100,7 @@ inline ScreenSplat ScreenCut::record() const {
   return {f[0][0], f[0][1], -(4 * static_cast<float>(far_sides) + 2 + correlation),
           f[0][2], f[1][0], f[1][1],
           f[1][2], f[2][0], f[2][1],
-          f[2][2]};
+          f[2][2], 0};
 }
 inline ScreenCut ScreenCut::of(const ScreenSplat& r) {
   ScreenCut cut;
@@ -109,7 +112,7 @@ inline ScreenCut ScreenCut::of(const ScreenSplat& r) {
 
 // The correlation is found as that of a ScreenCut, with far_sides 8 or 24.
 inline ScreenSplat ScreenDepth::record() const {
-  return {middle, by[0], -(has_cut ? 98.0f : 34.0f) - correlation, by[1], per_depth, 0, 0, 0, 0, 0};
+  return {middle, by[0], -(has_cut ? 98.0f : 34.0f) - correlation, by[1], per_depth, 0, 0, 0, 0, 0, 0};
 }
 inline ScreenDepth ScreenDepth::of(const ScreenSplat& r) {
   ScreenDepth depth;
@@ -122,7 +125,7 @@ inline ScreenDepth ScreenDepth::of(const ScreenSplat& r) {
 }
 
 inline ScreenSplat ScreenColour::record() const {
-  return {mean, slope[0], -194.0f - correlation, slope[1], half_width, 0, 0, 0, 0, 0};
+  return {mean, slope[0], -194.0f - correlation, slope[1], half_width, 0, 0, 0, 0, 0, 0};
 }
 inline ScreenColour ScreenColour::of(const ScreenSplat& r) {
   return {r.x, {r.y, r.l21}, r.l22, -r.l11 - 194.0f};

@@ -38,7 +38,7 @@ std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, 
     if (n % 31 == 0) l11 = 0.1f, l21 = 0.3f * around(random), l22 = 0.2f;
     splats.push_back({width * (1.4f * unit(random) - 0.2f), height * (1.4f * unit(random) - 0.2f), l11, l21,
                       l22, opacity * unit(random), 1.4f * unit(random) - 0.2f, slope * around(random),
-                      slope * around(random), 0.2f * unit(random)});
+                      slope * around(random), 0.2f * unit(random), 0});
   }
   // Half of them skewed, without a change to the numbers above.
   for (size_t n = 0; n < splats.size(); n += 2) {

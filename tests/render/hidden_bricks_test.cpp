@@ -86,7 +86,7 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
   painter.begin({100, 100}, glm::vec4(1), table, {}, {1, 1});
   hidden.ask(&painter);
   EXPECT_FALSE(hidden.hides(0));
-  const std::vector<ScreenSplat> walls(2, {50, 50, 1e4f, 0, 1e4f, 1e4f, 0.5f, 0, 0, 0});
+  const std::vector<ScreenSplat> walls(2, {50, 50, 1e4f, 0, 1e4f, 1e4f, 0.5f, 0, 0, 0, 0});
   painter.draw(walls);
   for (uint32_t id = 0; id < cache.bricks().size(); ++id) EXPECT_TRUE(hidden.hides(id)) << id;
   hidden.begin(cache.bricks(), view);

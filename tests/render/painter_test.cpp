@@ -43,7 +43,7 @@ INSTANTIATE_TEST_SUITE_P(Painters, PainterTest, testing::Values(Backend::kCpu, B
 
 TEST_P(PainterTest, DrawsOneSplatAsSpecified) {
   const ImageSize size{48, 40};
-  const ScreenSplat splat{21.3f, 17.8f, 9.0f, -4.0f, 5.0f, 0.8f, 0.55f, 0.2f, -0.1f, 0.03f};
+  const ScreenSplat splat{21.3f, 17.8f, 9.0f, -4.0f, 5.0f, 0.8f, 0.55f, 0.2f, -0.1f, 0.03f, 0};
   for (const bool per_pixel : {true, false}) {
     const auto difference = compareImages(paint({&splat, 1}, lively(), per_pixel, size),
                                           compositeSplats({&splat, 1}, lively(), {per_pixel}, size, kWhite));
@@ -189,7 +189,7 @@ TEST_P(PainterTest, AFaceAcrossTheRayLeavesItsShare) {
   const ClassificationTable even([](double) { return TransferFunction::Value{glm::dvec3(0.0), 1}; }, 0, 1);
   ScreenCut cut;
   cut.faces[0] = {0, 0, 0};
-  const ScreenSplat splat{8, 8, 4, 0, 4, -1, 0.5f, 0, 0, 0};
+  const ScreenSplat splat{8, 8, 4, 0, 4, -1, 0.5f, 0, 0, 0, 0};
   const std::vector<ScreenSplat> pair{splat, cut.record()};
   const Image half = paint(pair, even, true, {16, 16});
   ScreenSplat uncut = splat;
@@ -199,7 +199,7 @@ TEST_P(PainterTest, AFaceAcrossTheRayLeavesItsShare) {
 }
 
 TEST_P(PainterTest, TopOfTheImageIsTheFirstRow) {
-  const ScreenSplat splat{10, 3, 2, 0, 2, 1, 0.9f, 0, 0, 0};
+  const ScreenSplat splat{10, 3, 2, 0, 2, 1, 0.9f, 0, 0, 0, 0};
   const Image image = paint({&splat, 1}, lively(), false, {20, 20});
   EXPECT_LT(image.pixel(10, 3)[2], 0.8f);
   EXPECT_EQ(image.pixel(10, 16)[2], 1.0f);
@@ -211,8 +211,8 @@ TEST_P(PainterTest, BlendsNearerSplatsOverFartherOnes) {
         return TransferFunction::Value{{f > 0.5, 0, f < 0.5}, 100};
       },
       0, 1);
-  const std::vector<ScreenSplat> splats{{10, 10, 4, 0, 4, 1, 0.2f, 0, 0, 0},
-                                        {10, 10, 4, 0, 4, 1, 0.8f, 0, 0, 0}};
+  const std::vector<ScreenSplat> splats{{10, 10, 4, 0, 4, 1, 0.2f, 0, 0, 0, 0},
+                                        {10, 10, 4, 0, 4, 1, 0.8f, 0, 0, 0, 0}};
   const Image image = paint(splats, table, true, {20, 20});
   EXPECT_NEAR(image.pixel(10, 10)[0], 1, 1e-5);
   EXPECT_NEAR(image.pixel(10, 10)[2], 0, 1e-5);
@@ -226,7 +226,7 @@ TEST_P(PainterTest, KeepsVeryThinSplats) {
   std::vector<ScreenSplat> splats;
   double depth = 0;
   for (int layer = 0; layer < 50000; ++layer) {
-    splats.push_back({2.5f, 2.5f, 1e4f, 0, 1e4f, amplitude(random), 0.5f, 0, 0, 0});
+    splats.push_back({2.5f, 2.5f, 1e4f, 0, 1e4f, amplitude(random), 0.5f, 0, 0, 0, 0});
     depth += splats.back().amplitude * footprint(0);
   }
   const Image image = paint(splats, table, true, {5, 5});
@@ -242,7 +242,7 @@ TEST_P(PainterTest, FarOutsideTheRangeLooksAsJustOutside) {
       0, 1);
   const ImageSize size{20, 20};
   for (const float side : {-1.0f, 1.0f}) {
-    const ScreenSplat near{10, 10, 4, 0, 4, 0.7f, 0.5f + side, 0, 0, 0};
+    const ScreenSplat near{10, 10, 4, 0, 4, 0.7f, 0.5f + side, 0, 0, 0, 0};
     const Image expected = paint({&near, 1}, table, true, size);
     EXPECT_LT(expected.pixel(10, 10)[2], 0.9f);
     for (const float away : {1e2f, 1e4f, 3e5f, 1.9e7f, 1e12f, 1e25f})
