@@ -266,8 +266,10 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
   command
-      ->add_option("--lod-pixels", arguments->frame.lod_pixels,
-                   "Largest screen error of merged splats, in pixels; 0 draws the finest level")
+      ->add_option(
+          "--lod-pixels", arguments->frame.lod_pixels,
+          "Largest screen error of merged splats, in pixels; 0 draws the finest level, against which 1 "
+          "held 50 dB in every picture tried")
       ->capture_default_str()
       ->group(what);
   command
