@@ -53,10 +53,9 @@ void ValuePasses::scatter(SplatOrigin& origin) {
   openFile();
   if (!isFirst()) return;
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
-  origin.scatter([&]() -> SplatSink& { return sinks.local(); }, *progress_);
-  ValueSink last = newSink();
-  origin.finish(last, *progress_);
-  last.flush();
+  const SinkOfThread sink_of_thread = [&]() -> SplatSink& { return sinks.local(); };
+  origin.scatter(sink_of_thread, *progress_);
+  origin.finish(sink_of_thread, *progress_);
   for (ValueSink& sink : sinks) sink.flush();
 }
 
@@ -82,12 +81,13 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
 void ValuePasses::mergeSeams() {
   if (seams_ && ranks_) seams_->sendToFirst(*ranks_);
   if (seams_ && isFirst()) {
-    ValueSink sink = newSink();
-    seams_->finish(coordinate_bytes_, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
-      sink.add(splat, values);
-      progress_->advance(1);
-    });
-    sink.flush();
+    tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
+    seams_->finishInParallel(coordinate_bytes_,
+                             [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
+                               sinks.local().add(splat, values);
+                               progress_->advance(1);
+                             });
+    for (ValueSink& sink : sinks) sink.flush();
   }
   seams_.reset();
   file_->close(ranks_ != nullptr);

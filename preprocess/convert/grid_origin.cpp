@@ -105,17 +105,17 @@ ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& 
   return counts;
 }
 
-uint64_t GridOrigin::finish(SplatSink& sink, Progress& progress) {
+uint64_t GridOrigin::finish(const SinkOfThread& sink_of_thread, Progress& progress) {
   if (ranks_) seams_->sendToFirst(*ranks_);
   if (ranks_ && !ranks_->isFirst()) {
     seams_.reset();
     return 0;
   }
-  const uint64_t merged = seams_->finish(description().coordinate_bytes,
-                                         [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
-                                           sink.add(splat, values);
-                                           progress.advance(1);
-                                         });
+  const uint64_t merged = seams_->finishInParallel(
+      description().coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
+        sink_of_thread().add(splat, values);
+        progress.advance(1);
+      });
   seams_.reset();
   return merged;
 }

@@ -105,7 +105,7 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& 
   return {counts.degenerate, 0};
 }
 
-uint64_t MeshOrigin::finish(SplatSink&, Progress&) {
+uint64_t MeshOrigin::finish(const SinkOfThread&, Progress&) {
   return numbers_->merged();
 }
 

@@ -35,7 +35,7 @@ class MeshOrigin final : public SplatOrigin {
   std::vector<std::string> warnings() override;
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
-  uint64_t finish(SplatSink& sink, Progress& progress) override;
+  uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
 
  private:
   const MeshReader reader_;

@@ -156,6 +156,15 @@ class RecordSink : public SplatSink {
   std::vector<std::byte> record_;
 };
 
+/// What `run` returns, which gets the sinks.
+template <typename Run>
+auto withSinks(const SplatTarget& target, const Run& run) {
+  tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(target); });
+  const auto result = run([&]() -> SplatSink& { return sinks.local(); });
+  for (RecordSink& sink : sinks) sink.finish();
+  return result;
+}
+
 }  // namespace
 
 void RecordRouter::add(std::span<const std::byte> record, const RootPosition& position) {
@@ -196,18 +205,11 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
 }
 
 ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {
-  tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(target); });
-  const ScatterCounts counts = origin.scatter([&]() -> SplatSink& { return sinks.local(); }, progress);
-  for (RecordSink& sink : sinks) sink.finish();
-  return counts;
+  return withSinks(target, [&](const SinkOfThread& sinks) { return origin.scatter(sinks, progress); });
 }
 
 uint64_t scatterRest(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {
-  RecordSink sink(target);
-  const TraceScope trace("merge seams");
-  const uint64_t merged = origin.finish(sink, progress);
-  sink.finish();
-  return merged;
+  return withSinks(target, [&](const SinkOfThread& sinks) { return origin.finish(sinks, progress); });
 }
 
 }  // namespace curvisplat

@@ -78,7 +78,7 @@ class SplatOrigin {
   virtual void count(const RootCube& root, CountingGrid& counts, Progress& progress) = 0;
   virtual ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) = 0;
   /// Returns how many samples became part of another one's splat.
-  virtual uint64_t finish(SplatSink&, Progress&) { return 0; }
+  virtual uint64_t finish(const SinkOfThread&, Progress&) { return 0; }
   /// At any time, after a resumed conversion too: writes the surfaces of what the splats fill, if it has any.
   virtual std::optional<FileInfo> writeFaces(const FacesJob&, Progress&) { return std::nullopt; }
 };

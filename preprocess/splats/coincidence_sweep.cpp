@@ -49,6 +49,10 @@ double coordinateRounding(const glm::dvec3& position, int coordinate_bytes) {
   return largest > 0 ? std::ldexp(4.0, std::ilogb(largest) - (digits - 1)) : 0.0;
 }
 
+double reachOf(const SweptNode& node, int coordinate_bytes) {
+  return toleranceOf(node, coordinate_bytes) + slackOf(node);
+}
+
 CoincidenceSweep::CoincidenceSweep(int coordinate_bytes, Sink sink)
     : coordinate_bytes_(coordinate_bytes), sink_(std::move(sink)) {}
 

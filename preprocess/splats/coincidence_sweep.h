@@ -29,6 +29,9 @@ struct SweptNode {
   double spacing = 0;  // NodeSplat's
 };
 
+/// How far behind a node, along the sweep, another may lie that coincides with it.
+double reachOf(const SweptNode& node, int coordinate_bytes);
+
 /// Not for several threads at once.
 class CoincidenceSweep {
  public:

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <queue>
+#include <ranges>
 #include <span>
 #include <utility>
 
@@ -12,18 +14,21 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMaxReadBytes = 1 << 20;  // of a run at a time
-constexpr size_t kWriteSize = 32 << 10;      // doubles
-constexpr size_t kRecordsAhead = 12;         // to prefetch
+constexpr size_t kFirstRead = 16;            // records: a visit may end soon
+constexpr size_t kSamplesOfRun = 64;
+constexpr size_t kWriteSize = 32 << 10;  // doubles
+constexpr size_t kRecordsAhead = 12;     // to prefetch
 constexpr size_t kEntriesOfBucket = 8;  // on average; a bucket takes a size_t, so an entry takes another byte
 constexpr size_t kFewEntries = 1024;    // sorted without buckets
 constexpr size_t kCacheLineDoubles = 8;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void prefetch(const double* record, size_t size) {
   for (size_t n = 0; n < size; n += kCacheLineDoubles) __builtin_prefetch(record + n);
   __builtin_prefetch(record + size - 1);
 }
 
-/// Reads a run from the file, a buffer of whole records at a time.
+/// Reads a part of a run from the file, a buffer of whole records at a time, the first of them short.
 class RunReader {
  public:
   RunReader(const InputFile& file, uint64_t begin, uint64_t end, size_t record_size, size_t buffer_records)
@@ -32,6 +37,7 @@ class RunReader {
         end_(end),
         record_size_(record_size),
         size_(std::min<uint64_t>(buffer_records * record_size, (end - begin) / sizeof(double))),
+        to_read_(kFirstRead * record_size),
         buffer_(std::make_unique_for_overwrite<double[]>(size_)) {
     fill();
   }
@@ -46,14 +52,16 @@ class RunReader {
  private:
   void fill() {
     at_ = 0;
-    filled_ = static_cast<size_t>(std::min<uint64_t>(size_, (end_ - next_) / sizeof(double)));
+    filled_ =
+        static_cast<size_t>(std::min<uint64_t>(std::min(size_, to_read_), (end_ - next_) / sizeof(double)));
     file_->readAt(next_, std::span(buffer_.get(), filled_));
     next_ += filled_ * sizeof(double);
+    to_read_ = std::min(4 * to_read_, size_);
   }
 
   const InputFile* file_;
-  uint64_t next_, end_;        // bytes of the file
-  size_t record_size_, size_;  // in doubles
+  uint64_t next_, end_;                  // bytes of the file
+  size_t record_size_, size_, to_read_;  // in doubles
   std::unique_ptr<double[]> buffer_;
   size_t at_ = 0, filled_ = 0;
 };
@@ -111,13 +119,16 @@ void RecordSorter::sortEntries() {
   entries_.swap(sorted_);
 }
 
-void RecordSorter::forEachInMemory(const Visit& visit) {
-  sortEntries();
-  for (size_t n = 0; n < entries_.size(); ++n) {
-    if (n + kRecordsAhead < entries_.size()) prefetch(record(entries_[n + kRecordsAhead]), record_size_);
-    visit(record(entries_[n]));
+void RecordSorter::visitInMemory(double from, double to, const VisitOrStop& visit) const {
+  const auto placeOf = [&](double along) {
+    return static_cast<size_t>(std::ranges::lower_bound(entries_, along, {}, &Entry::along) -
+                               entries_.begin());
+  };
+  const size_t end = to < kInfinity ? placeOf(to) : entries_.size();
+  for (size_t n = from > -kInfinity ? placeOf(from) : 0; n < end; ++n) {
+    if (n + kRecordsAhead < end) prefetch(record(entries_[n + kRecordsAhead]), record_size_);
+    if (!visit(record(entries_[n]))) return;
   }
-  entries_.clear();
 }
 
 void RecordSorter::spill() {
@@ -125,37 +136,77 @@ void RecordSorter::spill() {
   OutputFile& out = file_->out();
   const uint64_t begin = out.size();
   std::vector<double> block;
-  forEachInMemory([&](const double* record) {
+  sortEntries();
+  visitInMemory(-kInfinity, kInfinity, [&](const double* record) {
     block.insert(block.end(), record, record + record_size_);
-    if (block.size() < kWriteSize) return;
+    if (block.size() < kWriteSize) return true;
     out.append(std::span<const double>(block));
     block.clear();
+    return true;
   });
+  entries_.clear();
   out.append(std::span<const double>(block));
   runs_.push_back({begin, out.size()});
 }
 
-void RecordSorter::drain(const Visit& visit) {
-  if (!runs_.empty()) return drainRuns(visit);
-  forEachInMemory(visit);
+void RecordSorter::drain(const Visit& visit_one) {
+  sort();
+  visit(-kInfinity, kInfinity, [&](const double* record) {
+    visit_one(record);
+    return true;
+  });
   forget();
 }
 
+void RecordSorter::sort(unsigned visitors) {
+  visitors_ = visitors;
+  if (runs_.empty()) return sortEntries();
+  if (!entries_.empty()) spill();
+  forgetMemory();
+}
+
 void RecordSorter::forget() {
+  forgetMemory();
+  runs_.clear();
+  file_.reset();
+}
+
+void RecordSorter::forgetMemory() {
   entries_ = std::vector<Entry>();
   sorted_ = std::vector<Entry>();
   records_.reset();
 }
 
-void RecordSorter::drainRuns(const Visit& visit) {
-  if (!entries_.empty()) spill();
-  forget();
+void RecordSorter::visit(double from, double to, const VisitOrStop& visit) const {
+  if (runs_.empty())
+    visitInMemory(from, to, visit);
+  else
+    visitRuns(from, to, visit);
+}
 
-  const size_t buffer_bytes = std::min(kMaxReadBytes, memory_bytes_ / runs_.size());
+double RecordSorter::alongAt(const Run& run, uint64_t record) const {
+  double along;
+  file_->in().readAt(run.begin + record * record_size_ * sizeof(double), std::span(&along, 1));
+  return along;
+}
+
+RecordSorter::Run RecordSorter::partOf(const Run& run, double from, double to) const {
+  const auto at = [&](double along) {
+    const auto records = std::views::iota(uint64_t{0}, recordsOf(run));
+    const auto is_before = [&](uint64_t record) { return alongAt(run, record) < along; };
+    return run.begin + *std::ranges::partition_point(records, is_before) * record_size_ * sizeof(double);
+  };
+  return {from > -kInfinity ? at(from) : run.begin, to < kInfinity ? at(to) : run.end};
+}
+
+void RecordSorter::visitRuns(double from, double to, const VisitOrStop& visit) const {
+  const size_t buffer_bytes = std::min(kMaxReadBytes, memory_bytes_ / runs_.size() / visitors_);
   const size_t buffer_records = std::max<uint64_t>(1, buffer_bytes / (record_size_ * sizeof(double)));
   std::vector<RunReader> readers;
-  for (const Run& run : runs_)
-    readers.emplace_back(file_->in(), run.begin, run.end, record_size_, buffer_records);
+  for (const Run& run : runs_) {
+    const Run part = partOf(run, from, to);
+    readers.emplace_back(file_->in(), part.begin, part.end, record_size_, buffer_records);
+  }
 
   struct Head {
     double along;
@@ -175,12 +226,25 @@ void RecordSorter::drainRuns(const Visit& visit) {
   while (!heads.empty()) {
     const size_t run = heads.top().run;
     heads.pop();
-    visit(readers[run].record());
+    if (!visit(readers[run].record())) return;
     readers[run].advance();
     push_head(run);
   }
-  runs_.clear();
-  file_.reset();
+}
+
+std::vector<double> RecordSorter::cutsInto(size_t parts) const {
+  std::vector<double> sample;
+  const auto add = [&](uint64_t records, const auto& along_at) {
+    const uint64_t step = std::max<uint64_t>(1, records / kSamplesOfRun);
+    for (uint64_t n = step / 2; n < records; n += step) sample.push_back(along_at(n));
+  };
+  if (runs_.empty()) add(entries_.size(), [&](uint64_t n) { return entries_[n].along; });
+  for (const Run& run : runs_) add(recordsOf(run), [&](uint64_t n) { return alongAt(run, n); });
+  std::sort(sample.begin(), sample.end());
+  std::vector<double> cuts;
+  for (size_t n = 1; n < parts && parts <= sample.size(); ++n)
+    cuts.push_back(sample[n * sample.size() / parts]);
+  return cuts;
 }
 
 }  // namespace curvisplat

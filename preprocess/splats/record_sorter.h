@@ -1,5 +1,5 @@
 // External sort along the seams' direction: sorted runs in one temporary file once memory is full, then a merge of all
-// runs at once. The order is total (position, then number), so it does not depend on the order of adding or on the
+// runs at once, or of ranges of them by several threads. The order is total (position, then number), so it does not depend on the order of adding or on the
 // memory.
 //
 // A record is of doubles, the first three of which are these:
@@ -22,10 +22,11 @@
 
 namespace curvisplat {
 
-/// Not for several threads at once. Throws Error if the disk fails.
+/// Not for several threads at once, except for visit(). Throws Error if the disk fails.
 class RecordSorter {
  public:
   using Visit = std::function<void(const double* record)>;
+  using VisitOrStop = std::function<bool(const double* record)>;  // false: stop
 
   /// `record_size`: in doubles, 3 or more. Keeps to `memory_bytes`, except that it holds a record a run at least.
   RecordSorter(size_t record_size, uint64_t memory_bytes, std::filesystem::path temporary_folder);
@@ -35,13 +36,21 @@ class RecordSorter {
   /// Visits all that was added, by (along, number), and forgets it.
   void drain(const Visit& visit);
 
+  /// In place of drain(): ends adding. Then up to `visitors` threads may visit() at the same time, and cutsInto() is known.
+  void sort(unsigned visitors = 1);
+  /// Visits the records with from <= along < to, by (along, number), until `visit` returns false.
+  void visit(double from, double to, const VisitOrStop& visit) const;
+  /// Positions that divide the records into about `parts` of equal size, rising; fewer where records are few.
+  std::vector<double> cutsInto(size_t parts) const;
+  void forget();
+
   static double alongOf(const double* record) { return record[0]; }
   static double acrossOf(const double* record) { return record[1]; }
   static uint64_t numberOf(const double* record) { return std::bit_cast<uint64_t>(record[2]); }
 
  private:
   struct Run {
-    uint64_t begin, end;  // bytes of the file
+    uint64_t begin = 0, end = 0;  // bytes of the file
   };
   struct Entry {
     double along;
@@ -53,10 +62,13 @@ class RecordSorter {
     return a.along != b.along ? a.along < b.along : numberOf(record(a)) < numberOf(record(b));
   }
   void sortEntries();
-  void forEachInMemory(const Visit& visit);
+  void visitInMemory(double from, double to, const VisitOrStop& visit) const;
+  void visitRuns(double from, double to, const VisitOrStop& visit) const;
   void spill();
-  void drainRuns(const Visit& visit);
-  void forget();
+  void forgetMemory();
+  uint64_t recordsOf(const Run& run) const { return (run.end - run.begin) / (record_size_ * sizeof(double)); }
+  double alongAt(const Run& run, uint64_t record) const;
+  Run partOf(const Run& run, double from, double to) const;
 
   size_t record_size_;
   uint64_t memory_bytes_;
@@ -66,6 +78,7 @@ class RecordSorter {
   std::vector<Entry> entries_, sorted_;  // [record], until they are sorted; both of the same capacity
   std::unique_ptr<NamelessFile> file_;
   std::vector<Run> runs_;
+  unsigned visitors_ = 1;
 };
 
 }  // namespace curvisplat

@@ -87,11 +87,27 @@ size_t SeamSorter::recordBytes(size_t variables) {
 
 void SeamSorter::add(const SeamPosition& sweep, const NodeSplat& splat, std::span<const SplatScalar> values) {
   CURVISPLAT_CHECK_OP(values.size(), ==, variables_);
+  reach_.add(splat.node_position, splat.spacing);
   pack(splat, values, records_.add(sweep.along, sweep.across, splat.node) + 3);
 }
 
 void SeamSorter::drain(const Visit& visit) {
   records_.drain([&](const double* record) { visit(SeamRecord(record)); });
+}
+
+std::vector<SweepRange> SeamSorter::sort(unsigned visitors, int coordinate_bytes) {
+  constexpr unsigned kRangesOfVisitor = 4;  // they do not take equally long
+  records_.sort(visitors);
+  return coincidenceRanges(
+      records_, visitors * kRangesOfVisitor, [](const double* record) { return SeamRecord(record).swept(); },
+      reach_, coordinate_bytes);
+}
+
+void SeamSorter::visit(const SweepRange& range, const Visit& visit) const {
+  records_.visit(range.from, range.to, [&](const double* record) {
+    visit(SeamRecord(record));
+    return true;
+  });
 }
 
 void SeamSorter::drainPacked(const std::function<void(std::span<const double>)>& visit) {
@@ -104,6 +120,8 @@ void SeamSorter::addPacked(std::span<const double> records) {
     double* added = records_.add(RecordSorter::alongOf(record), RecordSorter::acrossOf(record),
                                  RecordSorter::numberOf(record));
     std::copy(record + 3, record + record_size_, added + 3);
+    const SweptNode node = SeamRecord(record).swept();
+    reach_.add(node.position, node.spacing);
   }
 }
 

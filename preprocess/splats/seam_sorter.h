@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <functional>
 #include <span>
+#include <vector>
 
+#include "preprocess/splats/coincidence_ranges.h"
 #include "preprocess/splats/coincidence_sweep.h"
 #include "preprocess/splats/node_splats.h"
 #include "preprocess/splats/record_sorter.h"
@@ -43,6 +45,11 @@ class SeamSorter {
   void add(const SeamPosition& sweep, const NodeSplat& splat, std::span<const SplatScalar> values);
   /// Visits all that was added, by (along, node), and forgets it.
   void drain(const Visit& visit);
+  /// In place of drain(): ends adding, for `visitors` threads to visit ranges at the same time. Coordinates are of
+  /// `coordinate_bytes` bytes.
+  std::vector<SweepRange> sort(unsigned visitors, int coordinate_bytes);
+  void visit(const SweepRange& range, const Visit& visit) const;
+  void forget() { records_.forget(); }
 
   /// The same as records of recordBytes(), in doubles, which the sorter of another process can take.
   void drainPacked(const std::function<void(std::span<const double>)>& visit);
@@ -52,6 +59,7 @@ class SeamSorter {
   size_t variables_;
   size_t record_size_;  // in doubles
   RecordSorter records_;
+  LargestReach reach_;
 };
 
 }  // namespace curvisplat

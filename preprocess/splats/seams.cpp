@@ -1,13 +1,19 @@
 #include "preprocess/splats/seams.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <utility>
 #include <vector>
 
 #include "preprocess/splats/coincidence_sweep.h"
 #include "preprocess/splats/joint_sides.h"
 #include "preprocess/splats/seam_sorter.h"
+#include "stream/base/mutex.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
@@ -21,12 +27,15 @@ class WaitingSplats {
   WaitingSplats(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder)
       : variables_(variables), sorter_(variables, memory_bytes, std::move(temporary_folder)) {}
 
+  /// Any thread.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) {
+    const MutexLock lock(mutex_);
     sorter_.add({static_cast<double>(splat.node), 0}, splat, values);
   }
 
   /// Gives out all splats, without the layers behind seams.
   void finish(const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
+    const TraceScope trace("merge splats that wait");
     SplatWithValues waiting;
     NodeSplat probe;
     waiting.values.resize(variables_);
@@ -47,6 +56,7 @@ class WaitingSplats {
       any = false;
       seams = 0;
     };
+    const MutexLock lock(mutex_);
     sorter_.drain([&](const SeamRecord& next) {
       if (next.node() != node) release();
       node = next.node();
@@ -64,7 +74,8 @@ class WaitingSplats {
 
  private:
   const size_t variables_;
-  SeamSorter sorter_;
+  Mutex mutex_;
+  SeamSorter sorter_ GUARDED_BY(mutex_);
 };
 
 }  // namespace
@@ -81,8 +92,10 @@ struct SeamMerger::State {
         sorter(variables, memory_bytes - memory_bytes / kWaitingShare, folder),
         waiting(variables, memory_bytes / kWaitingShare, folder) {}
 
+  using ForEachRecord = std::function<void(const SeamSorter::Visit&)>;  // in the order of the sweep
+
   /// `sink` does not get what waits.
-  void sweep(int coordinate_bytes, const JointNodes::Sink& sink) {
+  void sweep(int coordinate_bytes, const ForEachRecord& for_each, const JointNodes::Sink& sink) {
     const JointNodes::Sink sink_or_wait = [&](const NodeSplat& splat, std::span<const SplatScalar> values,
                                               std::span<const uint64_t> nodes) {
       if (splat.is_probe) {
@@ -95,7 +108,7 @@ struct SeamMerger::State {
     CoincidenceSweep sweep(coordinate_bytes, [&](size_t set) { sets[set].finish(sink_or_wait); });
     NodeSplat splat;
     std::vector<SplatScalar> values(variables);
-    sorter.drain([&](const SeamRecord& node) {
+    for_each([&](const SeamRecord& node) {
       node.unpack(splat, values);
       if (!splat.on_block_face && !splat.behind_face) return waiting.add(splat, values);
       const size_t set = sweep.add(node.swept());
@@ -103,6 +116,43 @@ struct SeamMerger::State {
       sets[set].add(splat, values);
     });
     sweep.finish();
+  }
+
+  void sweepAll(int coordinate_bytes, const JointNodes::Sink& sink) {
+    sweep(
+        coordinate_bytes, [&](const SeamSorter::Visit& visit) { sorter.drain(visit); }, sink);
+  }
+
+  std::vector<SweepRange> sortedRanges(unsigned threads, int coordinate_bytes) {
+    const TraceScope trace("sort seams");
+    return sorter.sort(threads, coordinate_bytes);
+  }
+
+  /// The same by several threads.
+  void sweepRanges(int coordinate_bytes, const JointNodes::Sink& sink) {
+    const auto threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
+    const std::vector<SweepRange> ranges = sortedRanges(threads, coordinate_bytes);
+    tbb::parallel_for(size_t{0}, ranges.size(), [&](size_t n) {
+      const TraceScope trace("merge seams");
+      sweep(
+          coordinate_bytes, [&](const SeamSorter::Visit& visit) { sorter.visit(ranges[n], visit); }, sink);
+    });
+    sorter.forget();
+  }
+
+  uint64_t finish(void (State::*sweep_with)(int, const JointNodes::Sink&), int coordinate_bytes,
+                  const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
+    std::atomic<uint64_t> merged = 0;
+    (this->*sweep_with)(coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values,
+                                              std::span<const uint64_t> nodes) {
+      if (nodes.size() > 1) merged += nodes.size() - 1;
+      if (splat.layers == 0)
+        sink(splat, values);
+      else
+        waiting.add(splat, values);
+    });
+    waiting.finish(sink);
+    return merged;
   }
 };
 
@@ -165,29 +215,24 @@ void SeamMerger::sendToFirst(Ranks& ranks) {
 
 uint64_t SeamMerger::finish(int coordinate_bytes,
                             const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
-  uint64_t merged = 0;
-  state_->sweep(coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values,
-                                      std::span<const uint64_t> nodes) {
-    if (!nodes.empty()) merged += nodes.size() - 1;
-    if (splat.layers == 0)
-      sink(splat, values);
-    else
-      state_->waiting.add(splat, values);
-  });
-  state_->waiting.finish(sink);
-  return merged;
+  return state_->finish(&State::sweepAll, coordinate_bytes, sink);
+}
+
+uint64_t SeamMerger::finishInParallel(
+    int coordinate_bytes, const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
+  return state_->finish(&State::sweepRanges, coordinate_bytes, sink);
 }
 
 void SeamMerger::forEachSet(int coordinate_bytes,
                             const std::function<void(std::span<const uint64_t>)>& visit) {
   std::vector<uint64_t> rising;
-  state_->sweep(coordinate_bytes,
-                [&](const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes) {
-                  if (nodes.size() < 2) return;
-                  rising.assign(nodes.begin(), nodes.end());
-                  std::sort(rising.begin(), rising.end());
-                  visit(rising);
-                });
+  state_->sweepAll(coordinate_bytes,
+                   [&](const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes) {
+                     if (nodes.size() < 2) return;
+                     rising.assign(nodes.begin(), nodes.end());
+                     std::sort(rising.begin(), rising.end());
+                     visit(rising);
+                   });
 }
 
 }  // namespace curvisplat

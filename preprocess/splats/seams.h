@@ -49,6 +49,10 @@ class SeamMerger {
   uint64_t finish(int coordinate_bytes,
                   const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink);
 
+  /// The same by several threads, which call `sink` at the same time and in any order.
+  uint64_t finishInParallel(int coordinate_bytes,
+                            const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink);
+
   /// In place of finish(): calls `visit` for each set of nodes that it would merge, in rising order.
   void forEachSet(int coordinate_bytes, const std::function<void(std::span<const uint64_t>)>& visit);
 

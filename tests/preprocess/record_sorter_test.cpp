@@ -1,11 +1,13 @@
 #include "preprocess/splats/record_sorter.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <random>
@@ -84,6 +86,45 @@ TEST_F(RecordSorterTest, SortsInRunsOnDisk) {
     SCOPED_TRACE(name);
     expectSorted(along, 100'000);
     expectSorted(along, 3000);
+  }
+}
+
+TEST_F(RecordSorterTest, VisitsRangesThatAreAllTogether) {
+  for (const auto& [name, along] : positions())
+    for (const uint64_t memory_bytes : {1 << 20, 3000}) {
+      SCOPED_TRACE(fmt::format("{}, {} bytes", name, memory_bytes));
+      RecordSorter sorter(kSize, memory_bytes, folder_.path());
+      for (size_t n = 0; n < along.size(); ++n) sorter.add(along[n], 0, n);
+      sorter.sort(3);
+      std::vector<double> ends = sorter.cutsInto(7);
+      EXPECT_EQ(ends.size(), 6u);
+      EXPECT_TRUE(std::is_sorted(ends.begin(), ends.end()));
+      ends.push_back(std::numeric_limits<double>::infinity());
+      double from = -ends.back();
+      std::vector<std::pair<double, uint64_t>> found, expected;
+      for (const double to : ends) {
+        sorter.visit(from, to, [&](const double* record) {
+          EXPECT_TRUE(RecordSorter::alongOf(record) >= from && RecordSorter::alongOf(record) < to);
+          found.emplace_back(RecordSorter::alongOf(record), RecordSorter::numberOf(record));
+          return true;
+        });
+        from = to;
+      }
+      for (size_t n = 0; n < along.size(); ++n) expected.emplace_back(along[n], n);
+      std::sort(expected.begin(), expected.end());
+      EXPECT_EQ(found, expected);
+    }
+}
+
+TEST_F(RecordSorterTest, EndsAVisitWhenItIsToldTo) {
+  for (const uint64_t memory_bytes : {1 << 20, 3000}) {
+    RecordSorter sorter(kSize, memory_bytes, folder_.path());
+    for (size_t n = 0; n < kCount; ++n) sorter.add(static_cast<double>(n), 0, n);
+    sorter.sort();
+    uint64_t last = 0;
+    sorter.visit(10.5, 4000,
+                 [&](const double* record) { return (last = RecordSorter::numberOf(record)) < 100; });
+    EXPECT_EQ(last, 100u);
   }
 }
 

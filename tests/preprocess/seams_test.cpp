@@ -1,6 +1,7 @@
 #include "preprocess/splats/seams.h"
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
@@ -15,6 +16,7 @@
 #include "preprocess/splats/shape.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/mutex.h"
 #include "stream/model/border_code.h"
 #include "stream/model/layers_code.h"
 #include "tests/preprocess/merged_seams.h"
@@ -269,6 +271,32 @@ TEST_F(Seams, DependNeitherOnTheOrderNorOnTheMemory) {
   for (const uint64_t memory_bytes : {uint64_t{1}, uint64_t{1000}, uint64_t{100000}, uint64_t{64} << 20}) {
     std::shuffle(faces.begin(), faces.end(), random);
     expectIdentical(merge(faces, memory_bytes), expected);
+    EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+  }
+}
+
+TEST_F(Seams, AreTheSameByManyThreads) {
+  const auto by_node = [](std::vector<Piece> pieces) {
+    std::ranges::sort(pieces, {}, [](const Piece& piece) { return piece.node.node; });
+    return pieces;
+  };
+  const std::vector<Piece> faces = randomFaces(20000, 5);
+  const std::vector<Piece> expected = by_node(merge(faces));
+  const auto merged = merged_;
+  for (const uint64_t memory_bytes : {uint64_t{100000}, uint64_t{64} << 20}) {
+    SeamMerger seams(1, memory_bytes, folder_.path());
+    for (const Piece& face : faces) seams.add(face.node, {&face.value, 1});
+    Mutex mutex;
+    std::vector<Piece> out;
+    tbb::task_arena(8).execute([&] {
+      EXPECT_EQ(seams.finishInParallel(8,
+                                       [&](const NodeSplat& node, std::span<const SplatScalar> values) {
+                                         const MutexLock lock(mutex);
+                                         out.push_back({node, values[0]});
+                                       }),
+                merged);
+    });
+    expectIdentical(by_node(out), expected);
     EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
   }
 }
