@@ -30,8 +30,8 @@ std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryP
   try {
     return writeGridFaces(job.reader,
                           {output, job.scratch, job.cache.manifest().lower, job.cache.manifest().upper,
-                           planes, job.variables, plan.slab_bytes, plan.seam_bytes},
-                          progress);
+                           planes, job.variables, plan.seam_bytes},
+                          plan.slab_bytes, progress);
   } catch (...) {
     removeAll(output);
     throw;

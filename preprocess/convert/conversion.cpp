@@ -303,7 +303,6 @@ class Conversion {
                        splats_.survey.upper,
                        options_.planes,
                        std::move(numbers),
-                       plan_.slab_bytes,
                        plan_.seam_bytes};
     faces_file_ = origin_->writeFaces(job, progress_);
   }

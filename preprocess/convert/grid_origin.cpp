@@ -46,10 +46,14 @@ AbuttingFaces::Needs GridOrigin::needsOfFaces() const {
   return needs;
 }
 
-/// Of passes that read each node once. The nodes of such a slab are still in the processor's cache when they are worked on.
-uint64_t GridOrigin::smallSlabBytes() const {
-  constexpr uint64_t kBytes = uint64_t{16} << 20;
-  return std::min(plan_.slab_bytes, std::max(kBytes, leastSlabBytes(blocks(), reader_.scalars(), kNoHalo)));
+/// Of passes that do little with a node. The nodes of such a slab are still in the processor's cache when they are worked
+/// on; as many threads read as there is memory for slabs.
+SlabBuffers GridOrigin::smallSlabs(Halo halo) const {
+  constexpr uint64_t kBytes = uint64_t{16} << 20, kMaxReaders = 4;
+  const uint64_t bytes =
+      std::min(plan_.slab_bytes, std::max(kBytes, leastSlabBytes(blocks(), reader_.scalars(), halo)));
+  return {bytes, static_cast<unsigned>(
+                     std::min<uint64_t>({2 * plan_.slab_bytes / bytes - 1, plan_.threads, kMaxReaders}))};
 }
 
 bool GridOrigin::shareWith(Ranks& ranks) {
@@ -62,7 +66,7 @@ GridSurvey GridOrigin::survey(Progress& progress) {
   if (centring() == Centring::kCell)
     faces_ = std::make_unique<AbuttingFaces>(blocks(), description().coordinate_bytes,
                                              plan_.seam_bytes - needsOfFaces().memory_bytes, scratch_);
-  GridSurvey survey = surveyGrid(reader_, smallSlabBytes(), faces_.get(), progress, ranks_);
+  GridSurvey survey = surveyGrid(reader_, smallSlabs(kNoHalo), faces_.get(), progress, ranks_);
   if (faces_) faces_->match(progress);
   has_values_everywhere_ = survey.blanked.by_value == 0 && survey.blanked.not_finite == 0;
   if (!ranks_ || ranks_->isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.slab_bytes, progress);
@@ -88,7 +92,8 @@ std::string GridOrigin::overlap() const {
 }
 
 void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
-  countNodes(reader_.source(), root, smallSlabBytes(), counts, progress, shareOf(ranks_));
+  // Adding up keeps one thread busy for longer than reading does another.
+  countNodes(reader_.source(), root, smallSlabs(kNoHalo).slab_bytes, counts, progress, shareOf(ranks_));
 }
 
 ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {

@@ -42,12 +42,12 @@ class GridOrigin final : public SplatOrigin {
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
   uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
   std::optional<FileInfo> writeFaces(const FacesJob& job, Progress& progress) override {
-    return writeGridFaces(reader_, job, progress);
+    return writeGridFaces(reader_, job, smallSlabs(kCornerHalo), progress);
   }
 
  private:
   AbuttingFaces::Needs needsOfFaces() const;
-  uint64_t smallSlabBytes() const;
+  SlabBuffers smallSlabs(Halo halo) const;
 
   bool hasOwners() const { return overlap_ == Overlap::kOwner && !overlaps_.empty(); }
 

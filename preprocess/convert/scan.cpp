@@ -108,10 +108,10 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description) {
                 kSmallestExtent, kLargestExtent);
 }
 
-GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces, Progress& progress,
-                      Ranks* ranks) {
+GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, AbuttingFaces* faces,
+                      Progress& progress, Ranks* ranks) {
   if (reader.centring() == Centring::kCell) {
-    const GridSurvey survey = surveyCells(reader, slab_bytes, faces, progress);
+    const GridSurvey survey = surveyCells(reader, slabs.slab_bytes, faces, progress);
     checkExtent(survey, reader.source().description());
     return survey;
   }
@@ -120,9 +120,9 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
   GridSurvey survey = none;
   SlabShare share = shareOf(ranks);
   share.whole_rows = true;  // for the checksum
-  SlabStream slabs(reader, slab_bytes, kNoHalo, share);
+  SlabStream stream(reader, slabs, kNoHalo, share);
   GridChecksum checksum;
-  while (const LoadedSlab* loaded = slabs.next()) {
+  while (const LoadedSlab* loaded = stream.next()) {
     const size_t count = loaded->nodes.x.size();
     // The smallest and the largest do not depend on how the work is divided.
     GridSurvey of_slab = tbb::parallel_reduce(
@@ -157,12 +157,12 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
   }
 }
 
-void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
-                Progress& progress, const SlabShare& share) {
+void countNodes(const GridSource& source, const RootCube& root, const SlabBuffers& slabs,
+                CountingGrid& counts, Progress& progress, const SlabShare& share) {
   const NodeReader coordinates(source, {}, std::nullopt);
-  SlabStream slabs(coordinates, slab_bytes, kNoHalo, share);
+  SlabStream stream(coordinates, slabs, kNoHalo, share);
   PartCounter counter(root, counts);
-  while (const LoadedSlab* loaded = slabs.next()) {
+  while (const LoadedSlab* loaded = stream.next()) {
     counter.add(loaded->nodes);
     progress.advance(loaded->nodes.x.size());
   }

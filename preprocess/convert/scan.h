@@ -19,13 +19,13 @@ namespace curvisplat {
 
 class AbuttingFaces;
 
-/// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
+/// Reads all nodes once. Memory: the slabs. Throws Error if no node is there, or if the grid is larger or
 /// smaller than single precision can say. Where scalars are cell-centred, those at the blocks' ends are added
 /// to `faces`, unless that is null.
 ///
 /// With `ranks` each reads a share of the nodes, and all get the result. Cells are read by every rank as a whole.
-GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces, Progress& progress,
-                      Ranks* ranks = nullptr);
+GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, AbuttingFaces* faces,
+                      Progress& progress, Ranks* ranks = nullptr);
 
 /// Throws Error if no sample is left, or if the grid is larger or smaller than single precision can say.
 void checkExtent(const GridSurvey& survey, const GridDescription& description);
@@ -38,8 +38,8 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
 /// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for
 /// its scalar's sake is counted, which makes the plan no worse than a little uneven.
 /// `share`: those of a part of the grid's slabs.
-void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
-                Progress& progress, const SlabShare& share = {});
+void countNodes(const GridSource& source, const RootCube& root, const SlabBuffers& slabs,
+                CountingGrid& counts, Progress& progress, const SlabShare& share = {});
 
 /// The level to begin counting at: of voxels that nodes spread evenly over a box of `extent` would have to themselves. Nodes
 /// may lie thousands of times as densely without more of them in a voxel than in a bucket.

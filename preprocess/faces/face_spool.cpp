@@ -10,7 +10,6 @@ namespace curvisplat {
 namespace {
 
 constexpr std::array<std::array<size_t, 2>, 3> kAlong{{{1, 2}, {0, 2}, {0, 1}}};
-constexpr Halo kCorners{0, 1};
 constexpr uint64_t kPositionBytes = 3 * sizeof(uint32_t);
 
 using Node = std::array<uint64_t, 3>;
@@ -72,8 +71,8 @@ FaceSpool::FaceSpool(const NodeReader& reader, std::vector<GridFace> faces, cons
   }
 }
 
-void FaceSpool::fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& progress) {
-  SlabStream slabs(reader_, slab_bytes, kCorners);
+void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progress& progress) {
+  SlabStream slabs(reader_, buffers, kCornerHalo);
   size_t first_face = 0, end_face = 0;
   uint32_t block = std::numeric_limits<uint32_t>::max();
   while (const LoadedSlab* loaded = slabs.next()) {

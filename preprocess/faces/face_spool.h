@@ -50,8 +50,8 @@ class FaceSpool {
   FaceSpool(const FaceSpool&) = delete;
   FaceSpool& operator=(const FaceSpool&) = delete;
 
-  /// Reads the grid, in slabs of `slab_bytes`, and adds the faces of its cells at blocks' ends to `abutting`.
-  void fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& progress);
+  /// Reads the grid, and adds the faces of its cells at blocks' ends to `abutting`.
+  void fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progress& progress);
 
   std::span<const GridFace> faces() const { return faces_; }
   const FaceBox& box() const { return box_; }

@@ -69,8 +69,8 @@ class FacesPass {
         abutting_(grid_.blocks, grid_.coordinate_bytes, sortBytes(), job.temporary),
         spool_(reader, facesOf(grid_.blocks, job.planes), FaceBox::of(job.lower, job.upper), job.temporary) {}
 
-  std::optional<FileInfo> write() {
-    spool_.fill(job_.slab_bytes, abutting_, progress_);
+  std::optional<FileInfo> write(const SlabBuffers& slabs) {
+    spool_.fill(slabs, abutting_, progress_);
     abutting_.keepFolds();
     abutting_.match(progress_);
     const std::vector<FaceRegion> all_regions = regionsOf(grid_, spool_.faces());
@@ -234,10 +234,11 @@ void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes
   }
 }
 
-std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job, Progress& progress) {
+std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job,
+                                       const SlabBuffers& slabs, Progress& progress) {
   const auto& blocks = reader.source().description().blocks;
   if (facesOf(blocks, job.planes).empty()) return std::nullopt;
-  return FacesPass(reader, job, progress).write();
+  return FacesPass(reader, job, progress).write(slabs);
 }
 
 }  // namespace curvisplat

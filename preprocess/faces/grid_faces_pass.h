@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
 #include "stream/base/progress.h"
 #include "stream/cache/manifest.h"
 #include "stream/model/grid_faces.h"
@@ -33,7 +34,7 @@ struct FacesJob {
   glm::dvec3 lower{0.0}, upper{0.0};  // of the grid
   std::vector<IndexPlane> planes;
   std::vector<uint32_t> variables;  // their numbers in the cache
-  uint64_t slab_bytes = 0, sort_bytes = 0;
+  uint64_t sort_bytes = 0;
 };
 
 /// What it takes on disk besides the result.
@@ -48,6 +49,7 @@ void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes
 
 /// Returns the manifest's entry; none, and no file, if there is no face to draw. The bytes depend neither on
 /// threads nor on memory. Throws Error if the disk fails or the faces do not fit in memory.
-std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job, Progress& progress);
+std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job,
+                                       const SlabBuffers& slabs, Progress& progress);
 
 }  // namespace curvisplat

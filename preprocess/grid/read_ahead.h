@@ -1,14 +1,15 @@
-// Reads the next value in a thread of its own while the caller processes the current one. Conversion's disk
-// reads need no more concurrency, and blocking reads stay off the TBB workers. There are two values, which
-// are reused and keep their capacity.
+// Reads the next values in threads of its own while the caller processes the current one: blocking reads stay off the TBB
+// workers. Mostly one thread is enough. There is one value more than threads; values are reused and keep their capacity.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <limits>
+#include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "stream/base/mutex.h"
 #include "stream/base/thread_name.h"
@@ -19,8 +20,19 @@ namespace curvisplat {
 template <typename T>
 class ReadAhead {
  public:
-  /// `fill` runs in the reading thread: it overwrites a value and returns true, or returns false at the end.
-  explicit ReadAhead(std::function<bool(T&)> fill) : fill_(std::move(fill)), thread_([this] { fillAll(); }) {}
+  /// `fill` overwrites a value and returns true, or returns false at the end.
+  explicit ReadAhead(std::function<bool(T&)> fill)
+      : ReadAhead([fill = std::move(fill)](T& value, uint64_t) { return fill(value); }, 1) {}
+
+  /// The same by `readers` threads, which call `fill` at the same time, with the numbers of the values: 0, 1, ...
+  ReadAhead(std::function<bool(T&, uint64_t)> fill, unsigned readers)
+      : fill_(std::move(fill)), values_(readers + 1), is_filled_(values_.size()) {
+    try {
+      while (threads_.size() < readers) threads_.emplace_back([this] { fillAll(); });
+    } catch (const std::system_error&) {
+      if (threads_.empty()) throw;  // fewer do, too
+    }
+  }
 
   ~ReadAhead() {
     {
@@ -28,7 +40,7 @@ class ReadAhead {
       stopped_ = true;
     }
     changed_.notify_all();
-    thread_.join();
+    for (std::thread& thread : threads_) thread.join();
   }
 
   ReadAhead(const ReadAhead&) = delete;
@@ -40,11 +52,16 @@ class ReadAhead {
     MutexLock lock(mutex_);
     given_back_ = taken_;
     changed_.notify_all();
+    const size_t place = taken_ % values_.size();
     {
       const TraceScope trace("wait for reading", TraceKind::kWait);
-      while (filled_ <= taken_ && !ended_) changed_.wait(lock);
+      while (!is_filled_[place] && taken_ < end_) changed_.wait(lock);
     }
-    if (filled_ > taken_) return &values_[taken_++ % values_.size()];
+    if (taken_ < end_) {
+      is_filled_[place] = false;
+      ++taken_;
+      return &values_[place];
+    }
     if (error_) std::rethrow_exception(error_);
     return nullptr;
   }
@@ -52,37 +69,45 @@ class ReadAhead {
  private:
   void fillAll() {
     nameThisThread("read-ahead");
-    for (uint64_t filled = 0;; ++filled) {
+    for (;;) {
+      uint64_t number;
       {
         MutexLock lock(mutex_);
-        while (!stopped_ && filled >= given_back_ + values_.size()) changed_.wait(lock);
-        if (stopped_) return;
+        while (!stopped_ && begun_ < end_ && begun_ >= given_back_ + values_.size()) changed_.wait(lock);
+        if (stopped_ || begun_ >= end_) return;
+        number = begun_++;
       }
+      const size_t place = number % values_.size();
       bool more = false;
       std::exception_ptr error;
       try {
         const TraceScope trace("read ahead");
-        more = fill_(values_[filled % values_.size()]);
+        more = fill_(values_[place], number);
       } catch (...) {
         error = std::current_exception();
       }
       const MutexLock lock(mutex_);
-      if (more) ++filled_;
-      ended_ = !more;
-      error_ = error;
+      if (more) {
+        is_filled_[place] = true;
+      } else if (number < end_) {
+        end_ = number;
+        error_ = error;
+      }
       changed_.notify_all();
-      if (ended_) return;
     }
   }
 
-  std::function<bool(T&)> fill_;
-  std::array<T, 2> values_;
+  const std::function<bool(T&, uint64_t)> fill_;
+  std::vector<T> values_;
   Mutex mutex_;
   ConditionVariable changed_;
-  uint64_t filled_ GUARDED_BY(mutex_) = 0, taken_ GUARDED_BY(mutex_) = 0, given_back_ GUARDED_BY(mutex_) = 0;
-  bool ended_ GUARDED_BY(mutex_) = false, stopped_ GUARDED_BY(mutex_) = false;
-  std::exception_ptr error_ GUARDED_BY(mutex_);
-  std::thread thread_;  // last, since it uses the other members
+  std::vector<bool> is_filled_ GUARDED_BY(mutex_);  // by place
+  // Numbers of values: to be filled next, back from the caller, to be given to it next.
+  uint64_t begun_ GUARDED_BY(mutex_) = 0, given_back_ GUARDED_BY(mutex_) = 0, taken_ GUARDED_BY(mutex_) = 0;
+  uint64_t end_ GUARDED_BY(mutex_) = std::numeric_limits<uint64_t>::max();  // the first that is not there
+  bool stopped_ GUARDED_BY(mutex_) = false;
+  std::exception_ptr error_ GUARDED_BY(mutex_);  // instead of value end_
+  std::vector<std::thread> threads_;             // last, since they use the other members
 };
 
 }  // namespace curvisplat

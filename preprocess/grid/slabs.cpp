@@ -109,20 +109,23 @@ std::vector<NodeBox> cutForTasks(uint64_t row_nodes, const NodeBox& box, uint64_
   return tasks;
 }
 
-SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share)
+SlabStream::SlabStream(const NodeReader& reader, const SlabBuffers& buffers, Halo halo,
+                       const SlabShare& share)
     : slabs_(cutIntoSlabs(reader.source().description().blocks,
-                          slab_bytes / slabBytesPerNode(reader.scalars()), halo)),
-      position_(beginOf(share.index, share)),
+                          buffers.slab_bytes / slabBytesPerNode(reader.scalars()), halo)),
+      begin_(beginOf(share.index, share)),
       end_(beginOf(share.index + 1, share)),
-      ahead_([this, &reader](LoadedSlab& loaded) {
-        if (position_ == end_) return false;
-        loaded.slab = slabs_[position_++];
-        const NodeBox& window = loaded.slab.window;
-        const uint64_t ni = reader.source().description().blocks[loaded.slab.block].ni;
-        makeRoom(rowsOf(window) * window.rowNodes(ni), reader.scalars(), loaded.nodes);
-        loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
-        return true;
-      }) {}
+      ahead_(
+          [this, &reader](LoadedSlab& loaded, uint64_t number) {
+            if (number >= end_ - begin_) return false;
+            loaded.slab = slabs_[begin_ + number];
+            const NodeBox& window = loaded.slab.window;
+            const uint64_t ni = reader.source().description().blocks[loaded.slab.block].ni;
+            makeRoom(rowsOf(window) * window.rowNodes(ni), reader.scalars(), loaded.nodes);
+            loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
+            return true;
+          },
+          buffers.readers) {}
 
 size_t SlabStream::beginOf(unsigned index, const SlabShare& share) const {
   size_t begin = slabs_.size() * index / share.count;

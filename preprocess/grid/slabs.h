@@ -19,6 +19,7 @@ struct Halo {
 
 /// The nodes of a cell and of its neighbours.
 inline constexpr Halo kCellHalo{1, 2};
+inline constexpr Halo kCornerHalo{0, 1};  // the corners of the cells whose lowest nodes are in a box
 inline constexpr Halo kNoHalo{0, 0};
 inline constexpr Halo kNodeHalo{1, 1};  // a node's neighbours
 
@@ -78,11 +79,19 @@ struct SlabShare {
   bool whole_rows = false;  // all parts of a row are in one share
 };
 
-/// Reads all slabs of a grid, or a share of them, in order, one ahead. `reader` must outlive it. Two slabs of
-/// `slab_bytes` are in memory at any time.
+/// How large slabs are, and how many threads read them. One more slab than these is in memory.
+struct SlabBuffers {
+  SlabBuffers(uint64_t bytes, unsigned reading_threads = 1)
+      : slab_bytes(bytes), readers(reading_threads) {}  // implicit
+
+  uint64_t slab_bytes;
+  unsigned readers;
+};
+
+/// Reads all slabs of a grid, or a share of them, ahead, and gives them in order. `reader` must outlive it.
 class SlabStream {
  public:
-  SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share = {});
+  SlabStream(const NodeReader& reader, const SlabBuffers& buffers, Halo halo, const SlabShare& share = {});
 
   /// The next slab, valid until the next call; null at the end. Throws Error if a slab cannot be read.
   const LoadedSlab* next() { return ahead_.next(); }
@@ -92,7 +101,7 @@ class SlabStream {
   size_t beginOf(unsigned index, const SlabShare& share) const;
 
   std::vector<Slab> slabs_;
-  size_t position_, end_;
+  const size_t begin_, end_;
   ReadAhead<LoadedSlab> ahead_;
 };
 

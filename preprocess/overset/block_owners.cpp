@@ -11,7 +11,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr Halo kCorners{0, 1};
 constexpr uint64_t kTreeBytesPerNode = 24;               // of a CellTree, beside the nodes
 constexpr uint64_t kTilesInMemory = 4;                   // at least
 constexpr uint64_t kMaxLeastBytes = uint64_t{64} << 10;  // of a tile; longer rows are cut
@@ -45,7 +44,7 @@ BlockOwners::BlockOwners(NodeReader reader, const std::vector<BlockOverlap>& ove
   const uint64_t window_nodes =
       std::max(memory_bytes / kTilesInMemory, leastBytes(reader_.source().description(), reader_.scalars())) /
       bytes_per_node;
-  for (const Slab& slab : cutIntoSlabs(blocks, window_nodes, kCorners)) {
+  for (const Slab& slab : cutIntoSlabs(blocks, window_nodes, kCornerHalo)) {
     if (partners_[slab.block].empty()) continue;
     const LoadedSlab loaded = read(slab);
     BoundingBox box;
@@ -62,7 +61,7 @@ NodeReader ownersReader(const NodeReader& reader, bool everywhere) {
 }
 
 uint64_t BlockOwners::leastBytes(const GridDescription& grid, size_t scalars) {
-  const uint64_t bytes = leastSlabBytes(grid.blocks, scalars, kCorners);
+  const uint64_t bytes = leastSlabBytes(grid.blocks, scalars, kCornerHalo);
   return std::min(bytes + bytes / slabBytesPerNode(scalars) * kTreeBytesPerNode, kMaxLeastBytes);
 }
 

@@ -25,7 +25,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr Halo kCorners{0, 1};
 constexpr double kPoints = 100'000;  // approximate number of points inside all blocks; more at their faces
 constexpr size_t kMaxBlocks = 100'000;
 constexpr uint64_t kBinsAlongAxis = 64;
@@ -185,7 +184,7 @@ std::vector<BlockPoint> pickPoints(const NodeReader& reader, uint64_t slab_bytes
     cells += static_cast<double>((block.ni - 1) * (block.nj - 1) * (block.nk - 1));
   using Numbered = std::pair<std::pair<uint32_t, uint64_t>, std::vector<BlockPoint>>;  // of (block, cell)
   std::vector<Numbered> of_cells;
-  SlabStream slabs(reader, slab_bytes, kCorners);
+  SlabStream slabs(reader, slab_bytes, kCornerHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     progress.throwIfStopped();
     const uint32_t number = loaded->slab.block;
@@ -290,7 +289,7 @@ std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, 
   const std::vector<GridBlock>& blocks = reader.source().description().blocks;
   Holders holders(points);
   uint32_t block = 0;
-  SlabStream slabs(reader, slab_bytes, kCorners);
+  SlabStream slabs(reader, slab_bytes, kCornerHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     progress.throwIfStopped();
     const uint32_t number = loaded->slab.block;

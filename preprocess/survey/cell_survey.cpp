@@ -17,7 +17,6 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kNodesPerTask = 16384;
-constexpr Halo kCorners{0, 1};
 
 /// Adds a cell to the survey. Returns whether the cell is drawn.
 bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
@@ -57,7 +56,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
   nothing.ranges.resize(reader.scalars());
   GridSurvey survey = nothing;
   GridChecksum checksum;
-  SlabStream slabs(reader, slab_bytes, kCorners);
+  SlabStream slabs(reader, slab_bytes, kCornerHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     const Slab& slab = loaded->slab;
     const NodeArrays& nodes = loaded->nodes;

@@ -13,7 +13,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr Halo kCorners{0, 1};
 // Smaller volumes between the unit vectors of the edges at a corner are rounding errors.
 constexpr double kNoVolume = 1e-12;
 
@@ -145,7 +144,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
 
   const NodeReader coordinates(source, {}, std::nullopt);
   std::vector<CellCounts> counts(description.blocks.size());
-  SlabStream cells(coordinates, slab_bytes, kCorners);
+  SlabStream cells(coordinates, slab_bytes, kCornerHalo);
   while (const LoadedSlab* loaded = cells.next()) {
     const uint32_t block = loaded->slab.block;
     counts[block] = sum(counts[block], countCells(description.blocks[block], *loaded));

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
@@ -163,9 +165,49 @@ TEST(ReadAhead, HandsOnWhatWentWrong) {
 }
 
 TEST(ReadAhead, CanBeLeftAtAnyTime) {
-  for (int taken = 0; taken < 4; ++taken) {
-    ReadAhead<int> ahead([](int& value) { return ++value > 0; });
-    for (int n = 0; n < taken; ++n) ahead.next();
+  for (int taken = 0; taken < 4; ++taken)
+    for (const unsigned readers : {1u, 3u}) {
+      ReadAhead<int> ahead([](int& value, uint64_t) { return ++value > 0; }, readers);
+      for (int n = 0; n < taken; ++n) ahead.next();
+    }
+}
+
+TEST(ReadAhead, ReadsInOrderByManyThreads) {
+  constexpr unsigned kReaders = 4;
+  constexpr uint64_t kValues = 1000;
+  std::atomic<unsigned> reading = 0, most = 0;
+  ReadAhead<uint64_t> ahead(
+      [&](uint64_t& value, uint64_t number) {
+        const unsigned now = ++reading;
+        for (unsigned before = most; before < now && !most.compare_exchange_weak(before, now);) {
+        }
+        if (number % 3 == 0) std::this_thread::yield();
+        value = number * number;
+        --reading;
+        return number < kValues;
+      },
+      kReaders);
+  for (uint64_t n = 0; n < kValues; ++n) ASSERT_EQ(*ahead.next(), n * n);
+  EXPECT_EQ(ahead.next(), nullptr);
+  EXPECT_LE(most, kReaders);
+}
+
+TEST(ReadAhead, HandsOnTheFirstThatWentWrongByManyThreads) {
+  for (int round = 0; round < 100; ++round) {
+    ReadAhead<uint64_t> ahead(
+        [](uint64_t& value, uint64_t number) {
+          if (number >= 5) throw std::runtime_error(std::to_string(number));
+          value = number;
+          return true;
+        },
+        4);
+    for (uint64_t n = 0; n < 5; ++n) ASSERT_EQ(*ahead.next(), n);
+    try {
+      ahead.next();
+      FAIL() << "nothing went wrong";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "5");
+    }
   }
 }
 
