@@ -1,6 +1,7 @@
 #include "preprocess/convert/build_octree.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -108,6 +109,7 @@ void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint3
         if (!too_large) buildLoaded(*loaded);
       }
     }
+    appendBuilt();
     if (!too_large) continue;
     buildTooLarge(file, next, leaves_of[next]);
     ++next;
@@ -144,11 +146,19 @@ void OctreeBuilder::buildLoaded(LoadedBucket& loaded) {
   }
 
   std::vector<BuiltCell> cells(jobs.size());
-  tbb::parallel_for(size_t{0}, jobs.size(),
-                    [&](size_t n) { cells[n] = cells_.build((*tree_)[jobs[n].unit].cell, jobs[n].records); });
-  for (size_t n = 0; n < jobs.size(); ++n) {
-    append(jobs[n].unit, std::move(cells[n]));
-    completeParents(jobs[n].unit);
+  tbb::parallel_invoke([this] { appendBuilt(); },
+                       [&] {
+                         tbb::parallel_for(size_t{0}, jobs.size(), [&](size_t n) {
+                           cells[n] = cells_.build((*tree_)[jobs[n].unit].cell, jobs[n].records);
+                         });
+                       });
+  for (size_t n = 0; n < jobs.size(); ++n) to_append_.emplace_back(jobs[n].unit, std::move(cells[n]));
+}
+
+void OctreeBuilder::appendBuilt() {
+  for (auto& [unit, cell] : std::exchange(to_append_, {})) {
+    append(unit, std::move(cell));
+    completeParents(unit);
   }
 }
 

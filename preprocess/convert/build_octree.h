@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "preprocess/convert/bucket_file.h"
@@ -62,6 +63,7 @@ class OctreeBuilder {
   void buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves, uint32_t first,
                     uint32_t end);
   void buildLoaded(LoadedBucket& loaded);
+  void appendBuilt();
   void buildTooLarge(const BucketFile& file, uint32_t bucket, const std::vector<uint32_t>& leaves);
   void buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf);
   void append(uint32_t node, BuiltCell&& cell);
@@ -80,6 +82,8 @@ class OctreeBuilder {
   std::vector<Built> built_;  // [node of the tree]
   // Cells that fit a brick but whose records lie in several buckets: what was seen of them so far.
   std::map<uint32_t, std::vector<std::byte>> carried_;
+  // Cells of the bucket built last, by node: appended while the next one's are built.
+  std::vector<std::pair<uint32_t, BuiltCell>> to_append_;
   unsigned files_made_ = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <utility>
@@ -15,15 +16,20 @@ BuiltCell buildFromChildren(const RootCube& root, size_t variables, const Cell& 
                             const std::array<ChildBricks, 8>& children) {
   std::array<MergedOctant, 8> octants;
   tbb::enumerable_thread_specific<OctantMerger> mergers([&] { return OctantMerger(root, variables); });
-  tbb::parallel_for(size_t{0}, size_t{8}, [&](size_t octant) {
-    const ChildBricks& child = children[octant];
-    if (child.bricks == 0) return;
-    const TraceScope trace("merge octant");
-    OctantMerger& merger = mergers.local();
-    merger.begin(child.cell);
-    for (uint64_t n = 0; n < child.bricks; ++n) merger.add(child.read(n));
-    octants[octant] = merger.finish();
-  });
+  // Of its own: where a loop around this one is cancelled, this one would end early as well, with children missing.
+  tbb::task_group_context own(tbb::task_group_context::isolated);
+  tbb::parallel_for(
+      size_t{0}, size_t{8},
+      [&](size_t octant) {
+        const ChildBricks& child = children[octant];
+        if (child.bricks == 0) return;
+        const TraceScope trace("merge octant");
+        OctantMerger& merger = mergers.local();
+        merger.begin(child.cell);
+        for (uint64_t n = 0; n < child.bricks; ++n) merger.add(child.read(n));
+        octants[octant] = merger.finish();
+      },
+      own);
   const TraceScope trace("build parent");
   BuiltCell built;
   for (size_t octant = 0; octant < 8; ++octant)
