@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 
+#include "stream/base/trace.h"
 #include "stream/codec/face_codec.h"
 
 namespace curvisplat {
@@ -90,11 +91,17 @@ class PatchBuilder {
     for (size_t n = 0; n < built.size(); ++n) begin(built[n], stride, {first[0] + n, first[1]});
     const FacePatch &left = built.front().patch, &right = built.back().patch;
     const RowRange range{left.first[0], latticeIndex(face_, right, 0, right.nodes[0] - 1u) + 1};
-    for (uint64_t r = 0; r < left.nodes[1]; ++r) {
-      const LatticeRow nodes = rowOf(latticeIndex(face_, left, 1, r), range, stride[0]);
-      for (Built& b : built) append(b, nodes, range.begin);
+    {
+      const TraceScope trace("read faces");
+      for (uint64_t r = 0; r < left.nodes[1]; ++r) {
+        const LatticeRow nodes = rowOf(latticeIndex(face_, left, 1, r), range, stride[0]);
+        for (Built& b : built) append(b, nodes, range.begin);
+      }
     }
-    tbb::parallel_for(size_t{0}, built.size(), [&](size_t n) { complete(built[n]); });
+    tbb::parallel_for(size_t{0}, built.size(), [&](size_t n) {
+      const TraceScope trace("complete patch");
+      complete(built[n]);
+    });
     return built;
   }
 
@@ -265,6 +272,7 @@ std::vector<FacePatch> writePatches(const FaceSpool& spool, uint32_t face, const
       std::vector<Built> part = builder.part(stride, first);
       std::vector<std::vector<std::byte>> streams(part.size());
       tbb::parallel_for(size_t{0}, part.size(), [&](size_t n) {
+        const TraceScope trace("encode patch");
         if (is_needed(part[n])) streams[n] = encodePatch(part[n].lattice);
       });
       for (size_t n = 0; n < part.size(); ++n) {

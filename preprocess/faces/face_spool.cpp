@@ -1,10 +1,14 @@
 #include "preprocess/faces/face_spool.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "preprocess/grid/hexahedron.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -83,14 +87,16 @@ void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progre
       end_face = first_face;
       while (end_face < faces_.size() && in_block(faces_[end_face])) ++end_face;
     }
-    for (size_t face = first_face; face < end_face; ++face) take(*loaded, face);
-    addEnds(*loaded, abutting);
+    tbb::parallel_invoke(
+        [&] { addEnds(*loaded, abutting); },
+        [&] { tbb::parallel_for(first_face, end_face, [&](size_t face) { take(*loaded, face); }); });
     progress.advance(rowsOf(loaded->slab.box) *
                      loaded->slab.box.rowNodes(reader_.source().description().blocks[block].ni));
   }
 }
 
 void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
+  const TraceScope trace("take faces");
   const GridFace& face = faces_[face_number];
   const NodeArrays& nodes = loaded.nodes;
   const Node size = sizeOf(reader_.source().description().blocks[face.block]);
@@ -146,6 +152,7 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
 
 /// Of the cells whose lowest nodes are in the slab's box, and which have their corners at the end.
 void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const {
+  const TraceScope trace("take ends of blocks");
   const Slab& slab = loaded.slab;
   const NodeArrays& nodes = loaded.nodes;
   const Node size = sizeOf(reader_.source().description().blocks[slab.block]);

@@ -6,6 +6,7 @@
 #include "preprocess/faces/face_spool.h"
 #include "preprocess/splats/abutting_faces.h"
 #include "stream/base/error.h"
+#include "stream/base/trace.h"
 #include "stream/cache/faces_file.h"
 
 namespace curvisplat {
@@ -142,6 +143,7 @@ class FacesPass {
 
   /// Of a face: those that another block does not close, and those of boundaries, whose nodes and cells are there.
   Quads quadsOf(uint32_t number, std::span<const FaceRegion> regions) const {
+    const TraceScope trace("find drawn quads");
     const GridFace& face = spool_.faces()[number];
     Quads quads{QuadMask(face), QuadMask(face)};
     forRowParts(quads.drawn.columns(), [&](const RowRange& part) { drawPart(number, regions, part, quads); });

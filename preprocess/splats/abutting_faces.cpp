@@ -1,5 +1,8 @@
 #include "preprocess/splats/abutting_faces.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,6 +11,8 @@
 
 #include "preprocess/splats/coincidence_sweep.h"
 #include "stream/base/check.h"
+#include "stream/base/mutex.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -26,6 +31,12 @@ uint64_t facesOfSide(const std::array<uint64_t, 3>& cells, size_t axis) {
 
 // A centre's record in the sorter: along, across, the face's number, three coordinates, spacing.
 constexpr size_t kCentreSize = 7;
+
+SweptNode sweptCentre(const double* record) {
+  return {{RecordSorter::alongOf(record), RecordSorter::acrossOf(record)},
+          {record[3], record[4], record[5]},
+          record[6]};
+}
 
 /// The mean of the corners whose bits under `mask` are those of `bits`.
 template <size_t mask, size_t bits>
@@ -115,6 +126,7 @@ void AbuttingFaces::add(std::span<const Centre> centres) {
       abutting_[centre.face] = true;
       continue;
     }
+    reach_.add(centre.at, centre.spacing);
     const auto [along, across] = seamPosition(centre.at);
     double* const rest = centres_.add(along, across, centre.face) + 3;
     rest[0] = centre.at.x;
@@ -125,22 +137,32 @@ void AbuttingFaces::add(std::span<const Centre> centres) {
 }
 
 void AbuttingFaces::match(const Progress& progress) {
-  std::vector<std::vector<uint64_t>> sets;
-  CoincidenceSweep sweep(coordinate_bytes_, [&](size_t set) {
-    if (sets[set].size() > 1) {
-      progress.throwIfStopped();
-      noteSet(sets[set]);
-    }
-    sets[set].clear();
+  constexpr unsigned kRangesOfThread = 4;  // they do not take equally long
+  const auto threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
+  centres_.sort(threads);
+  const std::vector<SweepRange> ranges =
+      coincidenceRanges(centres_, threads * kRangesOfThread, sweptCentre, reach_, coordinate_bytes_);
+  Mutex noting;
+  tbb::parallel_for(size_t{0}, ranges.size(), [&](size_t n) {
+    const TraceScope trace("match faces");
+    std::vector<std::vector<uint64_t>> sets;
+    CoincidenceSweep sweep(coordinate_bytes_, [&](size_t set) {
+      if (sets[set].size() > 1) {
+        progress.throwIfStopped();
+        const MutexLock lock(noting);
+        noteSet(sets[set]);
+      }
+      sets[set].clear();
+    });
+    centres_.visit(ranges[n].from, ranges[n].to, [&](const double* record) {
+      const size_t set = sweep.add(sweptCentre(record));
+      if (set == sets.size()) sets.emplace_back();
+      sets[set].push_back(RecordSorter::numberOf(record));
+      return true;
+    });
+    sweep.finish();
   });
-  centres_.drain([&](const double* record) {
-    const size_t set = sweep.add({{RecordSorter::alongOf(record), RecordSorter::acrossOf(record)},
-                                  {record[3], record[4], record[5]},
-                                  record[6]});
-    if (set == sets.size()) sets.emplace_back();
-    sets[set].push_back(RecordSorter::numberOf(record));
-  });
-  sweep.finish();
+  centres_.forget();
 }
 
 void AbuttingFaces::noteSet(std::span<const uint64_t> faces) {

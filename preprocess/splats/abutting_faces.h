@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/splats/coincidence_ranges.h"
 #include "preprocess/splats/record_sorter.h"
 #include "stream/base/progress.h"
 
@@ -78,6 +79,7 @@ class AbuttingFaces {
   std::vector<Block> blocks_;
   int coordinate_bytes_;
   RecordSorter centres_;
+  LargestReach reach_;                   // of the centres
   std::vector<bool> abutting_, folded_;  // [face at a block's end]
   std::vector<uint64_t> sides_;          // the first face of every side
 };
