@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Writes a cube of hexahedra, or of tetrahedra, as .vtu (raw, appended), plane by plane: any size, little memory.
 
-    bench/big_mesh.py OUT.vtu --size 216 [--tetrahedra] [--second]
+    bench/big_mesh.py OUT.vtu --size 216 [--tetrahedra] [--second] [--shuffled]
 
 SIZE x SIZE x SIZE cubes, each of them a hexahedron or six tetrahedra; a scalar "f" at points and one "c" in cells, both smooth; a
-second one at points, "g", with --second. Inner points are
-moved by up to a tenth of a cube. Needs numpy.
+second one at points, "g", with --second. Inner points are moved by up to a tenth of a cube. --shuffled puts the cells into a random
+order, in memory. Needs numpy.
 """
 import argparse
 import sys
@@ -27,6 +27,7 @@ def main():
     parser.add_argument("--size", type=int, default=64)
     parser.add_argument("--tetrahedra", action="store_true")
     parser.add_argument("--second", action="store_true")
+    parser.add_argument("--shuffled", action="store_true")
     arguments = parser.parse_args()
     n, m = arguments.size, arguments.size + 1
     shapes = TETRAHEDRA if arguments.tetrahedra else [CORNERS]
@@ -57,6 +58,12 @@ def main():
     lowest = i + m * j
     steps = np.array([a + m * b + m * m * c for c in (0, 1) for b in (0, 1) for a in (0, 1)])
     pattern = steps[np.array(shapes)].reshape(1, -1)
+
+    def ordered(planes):
+        if not arguments.shuffled:
+            return planes
+        return [np.concatenate(list(planes))[np.random.default_rng(0).permutation(cells)]]
+
     with open(arguments.out, "wb") as out:
         out.write(head.encode())
 
@@ -66,9 +73,9 @@ def main():
                 out.write(np.ascontiguousarray(part).tobytes())
 
         put(arrays[0][3], (field(*plane(k).T) for k in range(m)))
-        put(arrays[1][3], (np.repeat(field((i + 0.5) / n, (j + 0.5) / n, (k + 0.5) / n), len(shapes)) for k in range(n)))
+        put(arrays[1][3], ordered(np.repeat(field((i + 0.5) / n, (j + 0.5) / n, (k + 0.5) / n), len(shapes)) for k in range(n)))
         put(arrays[2][3], (plane(k) for k in range(m)))
-        put(arrays[3][3], ((lowest[:, None] + m * m * k + pattern).astype("i8") for k in range(n)))
+        put(arrays[3][3], ordered((lowest[:, None] + m * m * k + pattern).astype("i8").reshape(-1, corners) for k in range(n)))
         ends = np.arange(1, n * n * len(shapes) + 1) * corners
         put(arrays[4][3], (ends + k * n * n * len(shapes) * corners for k in range(n)))
         put(arrays[5][3], (np.full(n * n * len(shapes), 10 if arguments.tetrahedra else 12, "u1") for k in range(n)))

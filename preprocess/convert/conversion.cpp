@@ -27,6 +27,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/freed_memory.h"
+#include "stream/base/nameless_file.h"
 #include "stream/base/paths.h"
 #include "stream/base/trace.h"
 #include "stream/cache/cache_writer.h"
@@ -66,11 +67,11 @@ Unfinished unfinishedOf(const ConvertOptions& options) {
 }
 
 std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOptions& options,
-                                      const MemoryPlan& plan, const std::filesystem::path& scratch) {
+                                      const MemoryPlan& plan, const ScratchFiles& scratch) {
   if (const auto* mesh = dynamic_cast<const MeshSource*>(&source))
     return std::make_unique<MeshOrigin>(*mesh, options.scalars, options.blank_value, plan, scratch);
   return std::make_unique<GridOrigin>(dynamic_cast<const GridSource&>(source), options.scalars,
-                                      options.blank_value, options.overlap, plan, scratch);
+                                      options.blank_value, options.overlap, plan, scratch.folder());
 }
 
 /// A conversion under way: what each pass leaves for the next.
@@ -83,7 +84,8 @@ class Conversion {
       workspace_.emplace(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
                          std::move(facts));
     shareFolders();
-    origin_ = originOf(source, options, plan, own_scratch_);
+    scratch_files_.emplace(own_scratch_);
+    origin_ = originOf(source, options, plan, *scratch_files_);
     nodes_ = nodesOf(*origin_);
     if (ranks_) shares_splats_ = origin_->shareWith(*ranks_);
   }
@@ -222,6 +224,7 @@ class Conversion {
   SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_}; }
 
   void scatter() {
+    const auto counted = scratch_files_->countBeside([this] { return file_->size(); });
     if (makesSplats()) splats_.counts = scatterSplats(*origin_, target(), progress_);
   }
 
@@ -320,22 +323,29 @@ class Conversion {
     report_.degenerate = splats_.counts.degenerate;
     report_.inverted = splats_.counts.inverted;
     report_.merged_nodes = splats_.merged_nodes;
-    report_.temporary_bytes = splats_.temporaryBytes();
+    report_.temporary_bytes = std::max(splats_.temporaryBytes(), origin_->temporaryBytes());
     report_.resumed = workspace_->resumed();
   }
 
   void checkRoom() const {
+    const TemporaryNeeds most = workspace_->splats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
+    if (!options_.check_disk_space) return;
+    const std::filesystem::path folder = temporaryFolder(options_);
+    if (hasDiskSpace(needsWith(most), options_.output, folder)) return;
+    const TemporaryNeeds forecast =
+        workspace_->splats() ? TemporaryNeeds{} : origin_->temporaryNeeds(progress_);
+    checkDiskSpace(needsWith(forecast), options_.output, folder);
+  }
+
+  DiskNeeds needsWith(const TemporaryNeeds& temporary) const {
     DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
-    if (workspace_->splats())
-      needs.temporary_bytes = 0;
-    else
-      needs.temporary_bytes = std::max(needs.temporary_bytes, origin_->temporaryBytes());
+    if (workspace_->splats()) needs.temporary_bytes = 0;
     if (ranks_) needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
     if (options_.surfaces)
       needs.temporary_bytes +=
           temporaryBytesOfFaces(origin_->blocks(), options_.planes, options_.scalars.size());
     needs.cache_bytes -= std::min(needs.cache_bytes, workspace_->bytesInPartial());
-    if (options_.check_disk_space) checkDiskSpace(needs, options_.output, temporaryFolder(options_));
+    return with(temporary, needs);
   }
 
   /// Needs the survey.
@@ -369,6 +379,7 @@ class Conversion {
   std::optional<ConversionWorkspace> workspace_;  // before what has files in it; rank 0's alone
   std::filesystem::path scratch_, partial_;       // rank 0's
   std::filesystem::path own_scratch_;
+  std::optional<ScratchFiles> scratch_files_;
   std::unique_ptr<SplatOrigin> origin_;
   bool shares_splats_ = false;
   uint64_t nodes_ = 0;

@@ -63,7 +63,7 @@ struct ConvertReport {
   uint64_t splats = 0, bricks = 0;
   uint32_t levels = 0;
   double volume = 0;
-  uint64_t temporary_bytes = 0;  // of the scattered splats
+  uint64_t temporary_bytes = 0;  // in temporary files, when they were the most
   bool resumed = false;          // an interrupted conversion was continued
   uint64_t resumed_bricks = 0;   // bricks that the interrupted one had made
   unsigned threads = 0;          // that worked: memory may allow fewer than asked for

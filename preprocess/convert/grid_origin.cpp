@@ -34,8 +34,8 @@ void GridOrigin::requireMemory(const GridSource& source, const std::vector<uint3
   plan.requireRow(longest->name, longest->ni, rows * longest->ni * slabBytesPerNode(scalars.size()));
 }
 
-uint64_t GridOrigin::temporaryBytes() const {
-  return centring() == Centring::kCell ? needsOfFaces().disk_bytes : 0;
+TemporaryNeeds GridOrigin::mostTemporaryNeeds() const {
+  return {centring() == Centring::kCell ? needsOfFaces().disk_bytes : 0, 0, 0};
 }
 
 AbuttingFaces::Needs GridOrigin::needsOfFaces() const {

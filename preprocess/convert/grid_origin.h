@@ -30,7 +30,7 @@ class GridOrigin final : public SplatOrigin {
   const GridDescription& description() const override { return reader_.source().description(); }
   Centring centring() const override { return reader_.centring(); }
   const std::vector<GridBlock>& blocks() const override { return description().blocks; }
-  uint64_t temporaryBytes() const override;
+  TemporaryNeeds mostTemporaryNeeds() const override;
 
   bool shareWith(Ranks& ranks) override;
   GridSurvey survey(Progress& progress) override;

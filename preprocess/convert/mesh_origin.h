@@ -6,13 +6,13 @@
 //    scatter   cells with their corners (corner_gather) --> point_sums or cell_slopes --> splats
 #pragma once
 
-#include <filesystem>
-#include <memory>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_origin.h"
+#include "preprocess/gather/gather_forecast.h"
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/gather/point_numbers.h"
 
@@ -23,12 +23,14 @@ class MeshOrigin final : public SplatOrigin {
   /// `source` must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and cell-centred
   /// scalars are mixed.
   MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
-             const MemoryPlan& plan, std::filesystem::path scratch);
+             const MemoryPlan& plan, ScratchFiles scratch);
 
   const GridDescription& description() const override { return reader_.source().description(); }
   Centring centring() const override { return reader_.centring(); }
   /// One row of samples: the points, or the cells, of all pieces.
   const std::vector<GridBlock>& blocks() const override { return blocks_; }
+  TemporaryNeeds mostTemporaryNeeds() const override;
+  TemporaryNeeds temporaryNeeds(const Progress& progress) const override;
   uint64_t temporaryBytes() const override;
 
   GridSurvey survey(Progress& progress) override;
@@ -38,9 +40,14 @@ class MeshOrigin final : public SplatOrigin {
   uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
 
  private:
+  using NeedsOf = std::function<GatherNeeds(const MeshReader&, const GatherJob&)>;
+  TemporaryNeeds needsBy(const NeedsOf& needs_of) const;
+  uint64_t samples() const { return centring() == Centring::kCell ? reader_.cells() : reader_.points(); }
+
   const MeshReader reader_;
   const MemoryPlan plan_;
-  const std::filesystem::path scratch_;
+  const ScratchFiles scratch_;
+  const MeshSource::Preparation preparation_;
   std::vector<GridBlock> blocks_;
   std::optional<PointNumbers> numbers_;
   std::vector<bool> used_;  // [point]: a cell that is drawn has it

@@ -27,6 +27,8 @@ constexpr uint64_t kTemporaryMarginPercent = 8;
 
 // Between what grids took that were measured (3.9 to 5.0 bytes; 1.2 to 1.6 million splats a second on two
 // threads).
+// Of meshes: points 7.5 to 13, cells 8 to 18 and, where they have a random order, 14 to 23.
+constexpr double kUsualBytesPerMeshPoint = 11, kUsualBytesPerMeshCell = 13;
 constexpr double kUsualBytesPerSplat = 5, kUsualBytesPerScalar = 1.5;
 constexpr double kUsualStartSeconds = 0.1, kUsualSplatsPerSecond = 0.7e6;
 
@@ -58,18 +60,27 @@ uint64_t withMargin(uint64_t temporary) {
 DiskNeeds diskNeeds(uint64_t nodes, size_t variables) {
   const uint64_t further = variables > 1 ? variables - 1 : 0;
   return {withMargin(nodes * regularRecordBytes(variables)),
-          nodes * (kCacheBytesPerNode + further * kCacheBytesPerScalar)};
+          nodes * (kCacheBytesPerNode + further * kCacheBytesPerScalar), 0};
 }
 
-ConversionEstimate estimateConversion(uint64_t splats, unsigned threads) {
+ConversionEstimate estimateConversion(uint64_t splats, unsigned threads, SplatsOf what) {
   const auto count = static_cast<double>(splats);
-  return {static_cast<uint64_t>(count * kUsualBytesPerSplat),
-          static_cast<uint64_t>(count * kUsualBytesPerScalar),
+  const double bytes = what == SplatsOf::kGrid         ? kUsualBytesPerSplat
+                       : what == SplatsOf::kMeshPoints ? kUsualBytesPerMeshPoint
+                                                       : kUsualBytesPerMeshCell;
+  return {static_cast<uint64_t>(count * bytes), static_cast<uint64_t>(count * kUsualBytesPerScalar),
           kUsualStartSeconds + count / (kUsualSplatsPerSecond * std::max(1u, threads))};
 }
 
+DiskNeeds with(const TemporaryNeeds& temporary, DiskNeeds needs) {
+  needs.before_cache_bytes =
+      temporary.lasting + std::max(temporary.before_splats, temporary.beside_splats + needs.temporary_bytes);
+  needs.temporary_bytes += temporary.lasting;
+  return needs;
+}
+
 DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables, size_t record_bytes) {
-  return {withMargin(splats * record_bytes), splats * variables * kCacheBytesPerScalar};
+  return {withMargin(splats * record_bytes), splats * variables * kCacheBytesPerScalar, 0};
 }
 
 void checkWritable(const std::filesystem::path& folder, const char* hint) {
@@ -93,13 +104,23 @@ void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
   const std::optional<Disk> cache = diskOf(folder), temporary = diskOf(temporary_folder);
   if (!cache || !temporary) return;  // a file system that does not tell is no reason to refuse
   if (cache->device == temporary->device) {
-    checkRoom(folder, *cache, needs.cache_bytes + needs.temporary_bytes, "the cache and temporary files",
-              "make room, name a folder on another disk with --tmp");
+    checkRoom(folder, *cache, std::max(needs.cache_bytes + needs.temporary_bytes, needs.before_cache_bytes),
+              "the cache and temporary files", "make room, name a folder on another disk with --tmp");
     return;
   }
   checkRoom(folder, *cache, needs.cache_bytes, "the cache's files", "make room");
-  checkRoom(temporary_folder, *temporary, needs.temporary_bytes, "temporary files",
+  checkRoom(temporary_folder, *temporary, needs.mostTemporary(), "temporary files",
             "make room, name another folder with --tmp");
+}
+
+bool hasDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
+                  const std::filesystem::path& temporary_folder) {
+  try {
+    checkDiskSpace(needs, output, temporary_folder);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 }  // namespace curvisplat

@@ -2,19 +2,27 @@
 // its folders are writable, and that their disks have room.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+
+#include "preprocess/convert/splat_origin.h"
 
 namespace curvisplat {
 
 /// Bytes that conversion of a grid will need on disk: the temporary data for certain, the cache by
 /// experience.
 struct DiskNeeds {
-  uint64_t temporary_bytes = 0;
+  uint64_t temporary_bytes = 0;  // while the cache is written
   uint64_t cache_bytes = 0;
+  uint64_t before_cache_bytes = 0;  // temporary, before the first byte of the cache
+
+  uint64_t mostTemporary() const { return std::max(temporary_bytes, before_cache_bytes); }
 };
 DiskNeeds diskNeeds(uint64_t nodes, size_t variables);
+/// With what the grid's passes need beside its splats.
+DiskNeeds with(const TemporaryNeeds& temporary, DiskNeeds needs);
 /// The same for adding variables to a cache; `record_bytes`: what a splat takes in the temporary file.
 DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables, size_t record_bytes);
 
@@ -24,7 +32,8 @@ struct ConversionEstimate {
   uint64_t cache_bytes = 0, bytes_per_further_scalar = 0;
   double seconds = 0;
 };
-ConversionEstimate estimateConversion(uint64_t splats, unsigned threads);
+enum class SplatsOf { kGrid, kMeshPoints, kMeshCells };
+ConversionEstimate estimateConversion(uint64_t splats, unsigned threads, SplatsOf what);
 
 /// Throws Error if something stands at `output` that may not be replaced, or if its folder or
 /// `temporary_folder` is missing or not writable. Changes nothing.
@@ -34,8 +43,11 @@ void checkOutput(const std::filesystem::path& output, bool overwrite,
 /// Throws Error if `folder` is missing or cannot be written; `hint` says what to do about it.
 void checkWritable(const std::filesystem::path& folder, const char* hint);
 
-/// Throws Error if the disks of `output` and `temporary_folder` (one, perhaps) have too little room.
+/// Throws Error if the disks of `output` and `temporary_folder` (one, perhaps) have too little room; the second function
+/// returns false.
 void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                     const std::filesystem::path& temporary_folder);
+bool hasDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
+                  const std::filesystem::path& temporary_folder);
 
 }  // namespace curvisplat

@@ -39,6 +39,13 @@ class SplatSink {
 /// Gives a sink of the calling thread's own, always the same one.
 using SinkOfThread = std::function<SplatSink&()>;
 
+/// Bytes.
+struct TemporaryNeeds {
+  uint64_t before_splats = 0,
+           beside_splats = 0;  // until the first splat is made, and from there until the last one
+  uint64_t lasting = 0;        // until the cache is done
+};
+
 struct ScatterCounts {
   uint64_t degenerate = 0;  // splats with a floored axis
   uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
@@ -55,7 +62,11 @@ class SplatOrigin {
   virtual Centring centring() const = 0;
   /// The samples' numbers count through these, i fastest; NodeSplat::node is one.
   virtual const std::vector<GridBlock>& blocks() const = 0;
-  /// Bytes of temporary files that survey() and scatter() need beside the splats', at the most.
+  /// Of temporary files that survey() and scatter() need beside the splats': at the most, and as a forecast, for which the grid
+  /// may be read once.
+  virtual TemporaryNeeds mostTemporaryNeeds() const { return {}; }
+  virtual TemporaryNeeds temporaryNeeds(const Progress&) const { return mostTemporaryNeeds(); }
+  /// Bytes of all temporary files together, and of those that are counted beside them, at the moment when they were the most.
   virtual uint64_t temporaryBytes() const { return 0; }
 
   /// Several ranks convert together: each has an origin of the same files. Returns whether they can make the splats

@@ -18,6 +18,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kCellsPerTask = 256;
+constexpr uint64_t kUsualFaces = 6;  // of a cell, each of which two cells have
 
 struct BodyRecord {
   uint64_t cell;
@@ -174,26 +175,33 @@ void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<C
 
 }  // namespace
 
-CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes,
-                       const std::filesystem::path& folder)
-    : cells_(cells), fields_(fields) {
-  // A cell with about six faces, each of which two cells have.
-  constexpr uint64_t kUsualFaces = 6;
-  const uint64_t value_bytes = fields * sizeof(float);
-  const size_t face_bytes = sizeof(FaceRecord) + value_bytes;
-  const uint64_t range_bytes = sizeof(BodyRecord) + value_bytes +
-                               kUsualFaces * (sizeof(NeighbourRecord) + value_bytes + 3 * sizeof(uint64_t));
-  const uint64_t faces = cells * kUsualFaces;
-  memory_bytes -= std::min(FaceMatcher::waitingBytes(face_bytes, faces), memory_bytes / 4);
-  // Places in a range are of 32 bits.
-  range_cells_ = std::clamp<uint64_t>(memory_bytes / 2 / range_bytes, 1, uint64_t{1} << 26);
+CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch)
+    : cells_(cells), fields_(fields), range_cells_(sharesOf(cells, fields, memory_bytes).range_cells) {
+  const Shares shares = sharesOf(cells, fields, memory_bytes);
+  const RecordBytes records = recordBytes(fields);
   const uint64_t ranges = std::max<uint64_t>(1, (cells + range_cells_ - 1) / range_cells_);
-  bodies_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 8);
-  pairs_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 16);
-  neighbours_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 16);
-  planes_ = std::make_unique<OuterPlanes>(ranges, range_cells_, memory_bytes / 16, folder);
-  faces_ = std::make_unique<FaceMatcher>(face_bytes, faces, memory_bytes / 4, folder);
-  neighbour_.resize(sizeof(NeighbourRecord) + value_bytes);
+  bodies_ = std::make_unique<StreamsFile>(scratch, ranges, shares.body_bytes);
+  pairs_ = std::make_unique<StreamsFile>(scratch, ranges, shares.pair_bytes);
+  neighbours_ = std::make_unique<StreamsFile>(scratch, ranges, shares.neighbour_bytes);
+  planes_ = std::make_unique<OuterPlanes>(ranges, range_cells_, shares.plane_bytes, scratch);
+  faces_ = std::make_unique<FaceMatcher>(records.face, cells * kUsualFaces, shares.face_bytes, scratch);
+  neighbour_.resize(records.neighbour);
+}
+
+CellSlopes::RecordBytes CellSlopes::recordBytes(size_t fields) {
+  const uint64_t value_bytes = fields * sizeof(float);
+  return {sizeof(BodyRecord) + value_bytes, sizeof(FaceRecord) + value_bytes, sizeof(PairRecord),
+          sizeof(NeighbourRecord) + value_bytes};
+}
+
+CellSlopes::Shares CellSlopes::sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes) {
+  const RecordBytes records = recordBytes(fields);
+  memory_bytes -= std::min(FaceMatcher::waitingBytes(records.face, cells * kUsualFaces), memory_bytes / 4);
+  const uint64_t range_bytes = records.body + kUsualFaces * (records.neighbour + 3 * sizeof(uint64_t));
+  // Places in a range are of 32 bits.
+  const auto range_cells = std::clamp<uint64_t>(memory_bytes / 2 / range_bytes, 1, uint64_t{1} << 26);
+  return {memory_bytes / 8,  memory_bytes / 16, memory_bytes / 16,
+          memory_bytes / 16, memory_bytes / 4,  range_cells};
 }
 
 CellSlopes::~CellSlopes() = default;

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -16,14 +15,27 @@
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/outer_planes.h"
 #include "preprocess/gather/point_sums.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
 class CellSlopes {
  public:
   /// For cells with numbers below `cells`; `fields`: at least one value each.
-  CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const std::filesystem::path& folder);
+  CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch);
   ~CellSlopes();
+
+  /// How a pass shares its memory.
+  struct Shares {
+    uint64_t body_bytes, pair_bytes, neighbour_bytes, plane_bytes, face_bytes;
+    uint64_t range_cells;  // that become splats together
+  };
+  static Shares sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes);
+  /// Records, in temporary files.
+  struct RecordBytes {
+    uint64_t body, face, pair, neighbour;
+  };
+  static RecordBytes recordBytes(size_t fields);
 
   /// Cells in the mesh's order.
   void add(const GatheredCells& cells);
@@ -42,7 +54,7 @@ class CellSlopes {
 
   const uint64_t cells_;
   const size_t fields_;
-  uint64_t range_cells_ = 0;
+  const uint64_t range_cells_;
   std::unique_ptr<class StreamsFile> bodies_, pairs_, neighbours_;
   std::unique_ptr<FaceMatcher> faces_;
   std::unique_ptr<OuterPlanes> planes_;

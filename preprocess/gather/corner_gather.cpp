@@ -100,20 +100,12 @@ uint64_t halfBesideChunks(uint64_t memory_bytes, uint64_t chunk_bytes) {
   return (memory_bytes - std::min(2 * chunk_bytes, memory_bytes / 2)) / 2;
 }
 
-uint64_t gatherBytes(const MeshReader& reader, size_t scalars, uint64_t memory_bytes) {
-  // Of hexahedra whose points do not fit: references and corners, then cells that wait for their sums.
-  constexpr uint64_t kUsualCorners = 8;
-  const uint64_t corner_bytes = sizeof(glm::dvec3) + sizeof(uint64_t) + scalars * sizeof(float);
-  const bool fit = reader.points() * corner_bytes <= memory_bytes / 2;
-  return fit ? 0 : reader.cells() * kUsualCorners * 2 * corner_bytes;
-}
-
 CornerGather::CornerGather(const MeshReader& reader, const PointNumbers& numbers, uint64_t memory_bytes,
-                           std::filesystem::path folder, Progress& progress)
+                           ScratchFiles scratch, Progress& progress)
     : reader_(&reader),
       numbers_(&numbers),
       memory_bytes_(memory_bytes),
-      folder_(std::move(folder)),
+      scratch_(std::move(scratch)),
       progress_(&progress),
       corner_fields_(reader.centring() == Centring::kNode ? reader.scalars() : 0),
       cell_fields_(reader.centring() == Centring::kCell ? reader.scalars() : 0) {}
@@ -206,7 +198,7 @@ void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedB
   const uint64_t ranges = (reader_->points() + range_points - 1) / range_points;
   const uint64_t group_slots = std::max<uint64_t>(1, memory_bytes_ / 4 / (point_bytes + sizeof(uint64_t)));
 
-  StreamsFile references(folder_, ranges, memory_bytes_ / 4);
+  StreamsFile references(scratch_, ranges, memory_bytes_ / 4);
   std::vector<Group> groups(1);
   GatheredCells cells;
   reader_->forEachCells(of_cells, [&](const LoadedCells& loaded) {
@@ -226,7 +218,7 @@ void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedB
   });
   references.close();
 
-  StreamsFile corners(folder_, groups.size(), memory_bytes_ / 4);
+  StreamsFile corners(scratch_, groups.size(), memory_bytes_ / 4);
   {
     std::vector<std::byte> points, record(record_bytes);
     for (uint64_t range = 0; range < ranges; ++range) {

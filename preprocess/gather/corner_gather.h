@@ -12,7 +12,6 @@
 
 #include <array>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/gather/point_numbers.h"
 #include "preprocess/moments/four_cells.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
@@ -56,16 +56,12 @@ struct GatheredCells {
 /// seven times as large as of hexahedra), and of the rest a half each for the corners and for what is made of them.
 uint64_t halfBesideChunks(uint64_t memory_bytes, uint64_t chunk_bytes);
 
-/// Bytes of temporary files that a gather, and sums or slopes of its cells, need at the most; 0 where the points
-/// fit. `scalars`: of points or cells, whichever there are.
-uint64_t gatherBytes(const MeshReader& reader, size_t scalars, uint64_t memory_bytes);
-
 class CornerGather {
  public:
   /// Reads the cells and the points unless the latter fit. Keeps to `memory_bytes` besides a few chunks. All
   /// references must outlive it.
   CornerGather(const MeshReader& reader, const PointNumbers& numbers, uint64_t memory_bytes,
-               std::filesystem::path folder, Progress& progress);
+               ScratchFiles scratch, Progress& progress);
 
   /// Calls `use` for all cells, in order, some at a time; in any thread, while the next ones are gathered. A cell with a
   /// blanked corner is left out. Once.
@@ -90,7 +86,7 @@ class CornerGather {
   const MeshReader* reader_;
   const PointNumbers* numbers_;
   const uint64_t memory_bytes_;
-  const std::filesystem::path folder_;
+  const ScratchFiles scratch_;
   Progress* progress_;
   const size_t corner_fields_, cell_fields_;
 };

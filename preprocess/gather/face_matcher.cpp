@@ -32,8 +32,7 @@ bool areSame(const FaceCorners& a, const FaceCorners& b) {
 
 }  // namespace
 
-FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes,
-                         std::filesystem::path folder)
+FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes, ScratchFiles scratch)
     : record_bytes_(record_bytes) {
   const uint64_t most = std::min<uint64_t>(std::max<uint64_t>(faces, 1), kMaxWaiting);
   buckets_.assign(std::bit_ceil(2 * most), kNone);
@@ -41,8 +40,8 @@ FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_by
   const uint64_t bytes = faces * (sizeof(FaceCorners) + record_bytes + 2 * sizeof(uint64_t));
   const uint64_t streams = bytes / std::max<uint64_t>(1, memory_bytes / 2) + 1;
   spilled_ = std::make_unique<StreamsFile>(
-      std::move(folder), std::min<uint64_t>(streams, StreamsFile::mostStreams(memory_bytes / 4)),
-      memory_bytes / 4);
+      std::move(scratch), std::min<uint64_t>(streams, StreamsFile::mostStreams(streamBytes(memory_bytes))),
+      streamBytes(memory_bytes));
   scratch_.resize(sizeof(FaceCorners) + record_bytes);
 }
 

@@ -13,7 +13,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -21,6 +20,7 @@
 #include <vector>
 
 #include "preprocess/gather/streams_file.h"
+#include "stream/base/nameless_file.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
@@ -43,7 +43,7 @@ class FaceMatcher {
   using TakeSingle = std::function<void(std::span<const std::byte>)>;
 
   /// For about `faces` of them. Streams keep to `memory_bytes`, beside the faces that wait (waitingBytes()).
-  FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes, std::filesystem::path folder);
+  FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes, ScratchFiles scratch);
   ~FaceMatcher();
 
   /// Calls for some of the pairs, in this thread. Records are made of the faces that have no second one among these.
@@ -51,6 +51,10 @@ class FaceMatcher {
   /// The others, and those without another. Once, after all faces.
   void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
 
+  /// Of the stream that a face takes which does not wait in memory.
+  static uint64_t spilledBytes(size_t record_bytes) { return sizeof(FaceCorners) + record_bytes; }
+  /// The memory of all streams.
+  static uint64_t streamBytes(uint64_t memory_bytes) { return memory_bytes / 4; }
   static constexpr uint32_t kMaxWaiting = uint32_t{1} << 17;
   /// Of as many faces as wait at the most.
   static uint64_t waitingBytes(size_t record_bytes, uint64_t faces);

@@ -16,7 +16,6 @@
 #include "preprocess/gather/point_sums.h"
 #include "preprocess/splats/shape.h"
 #include "stream/base/check.h"
-#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 namespace {
@@ -115,7 +114,7 @@ class FlowMesh final : public MeshSource {
 /// differ from NaN's.
 class GradientMesh::Values {
  public:
-  Values(const std::filesystem::path& folder, uint64_t samples) : file_(folder) {
+  Values(const ScratchFiles& scratch, uint64_t samples) : file_(scratch) {
     if (samples > 0) put(samples - 1, std::vector<float>{kNone});
   }
 
@@ -152,7 +151,7 @@ class GradientMesh::Values {
 
 GradientMesh::GradientMesh(std::unique_ptr<MeshSource> source, const DerivedOptions& options,
                            std::filesystem::path folder)
-    : source_(std::move(source)), description_(source_->description()), folder_(std::move(folder)) {
+    : source_(std::move(source)), description_(source_->description()), scratch_(std::move(folder)) {
   GridDescription unchanged = description_;
   gas_ = gasOf(options, unchanged);
   if (options.blank_value) blank_value_ = static_cast<float>(*options.blank_value);
@@ -216,6 +215,20 @@ void GradientMesh::prepare(std::span<const uint32_t> scalars, uint64_t memory_by
   }
 }
 
+MeshSource::Preparation GradientMesh::preparationFor(std::span<const uint32_t> scalars) const {
+  Preparation preparation = source_->preparationFor(storedOf(scalars));
+  preparation.centring = inputs_.centring;
+  const auto stored = static_cast<uint32_t>(source_->description().scalars.size());
+  const MutexLock lock(mutex_);
+  for (const uint32_t scalar : scalars) {
+    if (scalar < stored || values_.contains(scalar - stored)) continue;
+    const FlowMesh flow_mesh(*source_, inputs_, gas_, blank_value_, quantities_.at(scalar - stored).needs);
+    preparation.fields = std::max(preparation.fields, flow_mesh.description().scalars.size());
+    ++preparation.values;
+  }
+  return preparation;
+}
+
 const GradientMesh::Values& GradientMesh::valuesOf(uint32_t quantity_number) const {
   const MutexLock lock(mutex_);
   const auto found = values_.find(quantity_number);
@@ -232,10 +245,10 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
   for (uint32_t n = 0; n < fields; ++n) all[n] = n;
   const MeshReader reader(flow_mesh, all, std::nullopt);
   const bool cells = inputs_.centring == Centring::kCell;
-  auto values = std::make_unique<Values>(folder_, cells ? reader.cells() : reader.points());
+  auto values = std::make_unique<Values>(scratch_, cells ? reader.cells() : reader.points());
   Progress progress;  // the outer one counts samples of another pass
   progress.stopWith(outer_progress);
-  const PointNumbers numbers(reader, memory_bytes / 2, folder_, progress);
+  const PointNumbers numbers(reader, memory_bytes / 2, scratch_, progress);
 
   struct Run {  // samples that follow one another
     uint64_t first = 0;
@@ -263,13 +276,13 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
   };
   if (!chunk_bytes_) chunk_bytes_ = MeshReader(*source_, {}, std::nullopt).largestChunk();
   const uint64_t half = halfBesideChunks(memory_bytes, *chunk_bytes_);
-  CornerGather gather(reader, numbers, half, folder_, progress);
+  CornerGather gather(reader, numbers, half, scratch_, progress);
   if (cells) {
-    CellSlopes slopes(reader.cells(), fields, half, folder_);
+    CellSlopes slopes(reader.cells(), fields, half, scratch_);
     gather.forEach([&](const GatheredCells& some) { slopes.add(some); });
     slopes.finish(take, progress);
   } else {
-    PointSums sums(reader.points(), reader.cells(), fields, half, folder_);
+    PointSums sums(reader.points(), reader.cells(), fields, half, scratch_);
     gather.forEach([&](const GatheredCells& some) { sums.add(some); });
     sums.finish(take, progress);
   }

@@ -20,6 +20,7 @@
 #include "preprocess/formats/derived/flow_inputs.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/mutex.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
@@ -40,6 +41,9 @@ class GradientMesh final : public MeshSource {
   void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
                const Progress& progress) const override;
 
+  Preparation preparationFor(std::span<const uint32_t> scalars) const override;
+  uint64_t preparedBytes() const override { return scratch_.mostBytes(); }
+
  private:
   class Values;
   /// The source's scalars among `scalars`.
@@ -56,7 +60,7 @@ class GradientMesh final : public MeshSource {
   PerfectGas gas_;
   FlowInputs inputs_;
   std::optional<float> blank_value_;
-  const std::filesystem::path folder_;
+  const ScratchFiles scratch_;
   std::vector<QuantityInfo> quantities_;
   std::vector<uint64_t> first_points_, first_cells_;  // [piece]
   mutable Mutex mutex_;

@@ -3,19 +3,22 @@
 
 #include <array>
 #include <cstdint>
-#include <filesystem>
 #include <vector>
 
 #include "preprocess/gather/streams_file.h"
 #include "preprocess/moments/mesh_borders.h"
+#include "stream/base/nameless_file.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
 
 class OuterPlanes {
  public:
-  OuterPlanes(size_t ranges, uint64_t range_size, uint64_t memory_bytes, std::filesystem::path folder)
-      : range_size_(range_size), file_(std::move(folder), ranges, memory_bytes) {}
+  OuterPlanes(size_t ranges, uint64_t range_size, uint64_t memory_bytes, ScratchFiles scratch)
+      : range_size_(range_size), file_(std::move(scratch), ranges, memory_bytes) {}
+
+  /// Of a plane in the file.
+  static constexpr uint64_t bytesOfPlane() { return sizeof(OfRange::Record); }
 
   /// One thread. A plane without area is left out. `face`: its number, the same for all that it is added to.
   void add(uint64_t number, const OuterPlane& plane, uint64_t face = 0);

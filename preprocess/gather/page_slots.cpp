@@ -10,7 +10,8 @@ PageSlots::PageSlots(uint64_t items, unsigned shift, uint64_t slots)
     : shift_(shift),
       most_(slots),
       slots_((items + (uint64_t{1} << shift) - 1) >> shift, kNone),
-      used_at_(slots_.size(), 0) {}
+      used_at_(slots_.size(), 0),
+      was_in_memory_(slots_.size()) {}
 
 void PageSlots::wantPage(uint64_t page) {
   if (used_at_[page] == now_) return;
@@ -30,6 +31,18 @@ bool PageSlots::want(std::span<const uint64_t> items) {
   missing_.clear();
   for (const uint64_t item : items) wantPage(item >> shift_);
   return wantsFit();
+}
+
+bool PageSlots::hold(std::span<const uint64_t> items, double most_again) {
+  if (!want(items)) return false;
+  uint64_t again = again_;
+  for (const uint64_t page : missing_)
+    if (was_in_memory_[page]) again += uint64_t{1} << shift_;
+  const uint64_t held = held_ + items.size();
+  if (static_cast<double>(again) > most_again * static_cast<double>(held)) return false;
+  held_ = held;
+  again_ = again;
+  return true;
 }
 
 bool PageSlots::wantPages(uint64_t first, uint64_t end) {
@@ -58,6 +71,7 @@ std::span<const PageSlots::Left> PageSlots::place() {
   for (const uint64_t page : missing_) {
     if (free_.empty()) free_.push_back(slots_made_++);
     slots_[page] = free_.back();
+    was_in_memory_[page] = true;
     free_.pop_back();
     in_memory_.push_back(page);
   }

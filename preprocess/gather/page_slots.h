@@ -22,7 +22,10 @@ class PageSlots {
 
   /// The pages of these items are wanted, and no others. Returns whether they fit.
   bool want(std::span<const uint64_t> items);
-  /// The same of pages [first, end).
+  /// The same, if all items that have been held allow it: the items of pages that were in memory before, over the items that
+  /// were wanted, are at most `most_again`. Where it returns false nothing is held.
+  bool hold(std::span<const uint64_t> items, double most_again);
+  /// want() of pages [first, end).
   bool wantPages(uint64_t first, uint64_t end);
   /// Those of them that are not in memory, rising.
   std::span<const uint64_t> missing() const { return missing_; }
@@ -44,6 +47,8 @@ class PageSlots {
   uint64_t most_, now_ = 0, wanted_ = 0;
   std::vector<uint32_t> slots_, free_;
   std::vector<uint64_t> used_at_;              // [page]
+  std::vector<bool> was_in_memory_;            // [page]
+  uint64_t held_ = 0, again_ = 0;              // items, by hold()
   std::vector<uint64_t> in_memory_, missing_;  // pages
   std::vector<Left> left_;
   uint32_t slots_made_ = 0;

@@ -7,7 +7,7 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kFacesOfCell = 6;
-constexpr size_t kMaxCorners = 8;  // of a polyhedron's the first
+constexpr size_t kMaxCorners = PointBorders::kMaxPlanesOfFace;  // of a polyhedron's the first
 
 struct FaceRecord {
   std::array<uint64_t, kMaxCorners> corners;  // those of the face, then the cell's others
@@ -48,12 +48,16 @@ FaceRecord recordOf(const GatheredCells& cells, const HalfFace& face) {
 }  // namespace
 
 PointBorders::PointBorders(uint64_t points, uint64_t range_points, uint64_t cells, uint64_t memory_bytes,
-                           const std::filesystem::path& folder)
-    : faces_(sizeof(FaceRecord), cells * kFacesOfCell, memory_bytes / 2, folder),
-      planes_((points + range_points - 1) / range_points, range_points, memory_bytes / 2, folder) {}
+                           const ScratchFiles& scratch)
+    : faces_(sizeof(FaceRecord), cells * kFacesOfCell, memory_bytes / 2, scratch),
+      planes_((points + range_points - 1) / range_points, range_points, memory_bytes / 2, scratch) {}
 
 uint64_t PointBorders::waitingBytes(uint64_t cells) {
   return FaceMatcher::waitingBytes(sizeof(FaceRecord), cells * kFacesOfCell);
+}
+
+size_t PointBorders::faceBytes() {
+  return sizeof(FaceRecord);
 }
 
 void PointBorders::add(const GatheredCells& cells) {

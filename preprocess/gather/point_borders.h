@@ -3,11 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 
 #include "preprocess/gather/cell_faces.h"
 #include "preprocess/gather/outer_planes.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
@@ -15,7 +15,7 @@ class PointBorders {
  public:
   /// For ranges of `range_points` numbers. `cells`: about how many there will be.
   PointBorders(uint64_t points, uint64_t range_points, uint64_t cells, uint64_t memory_bytes,
-               const std::filesystem::path& folder);
+               const ScratchFiles& scratch);
 
   /// Cells in the mesh's order.
   void add(const GatheredCells& cells);
@@ -25,6 +25,9 @@ class PointBorders {
 
   /// Of the faces that wait for their second cell, whatever memory there is.
   static uint64_t waitingBytes(uint64_t cells);
+  /// Of the record of a face.
+  static size_t faceBytes();
+  static constexpr uint64_t kMaxPlanesOfFace = 8;
 
  private:
   FaceMatcher faces_;

@@ -23,13 +23,13 @@ struct Point {
 
 }  // namespace
 
-PointNumbers::PointNumbers(const MeshReader& reader, uint64_t memory_bytes,
-                           const std::filesystem::path& folder, const Progress& progress) {
+PointNumbers::PointNumbers(const MeshReader& reader, uint64_t memory_bytes, const ScratchFiles& scratch,
+                           const Progress& progress) {
   if (reader.pieces().size() < 2) return;
   const uint64_t all_bytes = reader.points() * sizeof(Point);
   const size_t streams = std::min<uint64_t>(all_bytes / std::max<uint64_t>(1, memory_bytes / 4) + 1,
                                             StreamsFile::mostStreams(memory_bytes / 4));
-  StreamsFile file(folder, streams, memory_bytes / 4);
+  StreamsFile file(scratch, streams, memory_bytes / 4);
   reader.forEachPoints([&](const LoadedPoints& loaded) {
     progress.throwIfStopped();
     const MeshPoints& points = loaded.points;

@@ -4,12 +4,12 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "preprocess/gather/mesh_reader.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
@@ -17,7 +17,7 @@ class PointNumbers {
  public:
   /// One piece has no such points and takes no time. Otherwise reads all points; external, except for 16 bytes a
   /// point that has become another one. Throws Error if these are more than `memory_bytes`.
-  PointNumbers(const MeshReader& reader, uint64_t memory_bytes, const std::filesystem::path& folder,
+  PointNumbers(const MeshReader& reader, uint64_t memory_bytes, const ScratchFiles& scratch,
                const Progress& progress);
 
   /// Of a point by its number, piece after piece. Any thread.

@@ -15,27 +15,12 @@ constexpr size_t kPointsPerTask = 4096;
 }  // namespace
 
 PointPages::PointPages(const MeshReader& reader, size_t fields, uint64_t memory_bytes)
-    : reader_(&reader),
-      fields_(fields),
-      slots_(reader.points(), kShift, memory_bytes / (sizeof(glm::dvec3) + fields * sizeof(float)) / kPoints),
-      was_read_(slots_.pages()) {}
+    : reader_(&reader), fields_(fields), slots_(slotsFor(reader.points(), fields, memory_bytes)) {}
 
 bool PointPages::hold(std::span<const uint64_t> points) {
-  if (!slots_.want(points)) return false;
+  if (!slots_.hold(points, kMaxAgain)) return false;
   const std::span<const uint64_t> missing = slots_.missing();
-  if (missing.empty()) {
-    wanted_ += points.size();
-    return true;
-  }
-  uint64_t again = read_again_;
-  for (const uint64_t page : missing)
-    if (was_read_[page]) again += kPoints;
-  // With streams a reference is written and read, and its point, too.
-  constexpr uint64_t kReadsOfStreams = 4;
-  if (again > kReadsOfStreams * (wanted_ + points.size())) return false;
-  wanted_ += points.size();
-  read_again_ = again;
-
+  if (missing.empty()) return true;
   const TraceScope trace("read points");
   slots_.place();
   for (size_t first = 0; first < missing.size();) {
@@ -43,7 +28,6 @@ bool PointPages::hold(std::span<const uint64_t> points) {
     while (end < missing.size() && missing[end] == missing[end - 1] + 1) ++end;
     for (size_t n = first; n < end; ++n) {
       const uint64_t page = missing[n], begin = page * kPoints;
-      was_read_[page] = true;
       if (pages_.size() <= slots_.slotOf(page)) pages_.resize(slots_.slotOf(page) + size_t{1});
       Page& to = pages_[slots_.slotOf(page)];
       const uint64_t count = std::min(kPoints, reader_->points() - begin);

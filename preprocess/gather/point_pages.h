@@ -26,6 +26,13 @@ class PointPages {
     return pageOf(point).values.data() + (point & (kPoints - 1)) * fields_;
   }
 
+  /// What decides which pages are in memory: PageSlots::hold(points, kMaxAgain) of these.
+  static PageSlots slotsFor(uint64_t points, size_t fields, uint64_t memory_bytes) {
+    return {points, kShift, memory_bytes / (sizeof(glm::dvec3) + fields * sizeof(float)) / kPoints};
+  }
+  // With streams a reference is written and read, and its point, too.
+  static constexpr double kMaxAgain = 4;
+
  private:
   static constexpr unsigned kShift = 14;
   static constexpr uint64_t kPoints = uint64_t{1} << kShift;  // of a page
@@ -39,9 +46,7 @@ class PointPages {
   const MeshReader* reader_;
   const size_t fields_;
   PageSlots slots_;
-  std::vector<Page> pages_;               // [slot]
-  uint64_t wanted_ = 0, read_again_ = 0;  // points
-  std::vector<bool> was_read_;            // [page]
+  std::vector<Page> pages_;  // [slot]
 };
 
 }  // namespace curvisplat

@@ -69,17 +69,30 @@ void momentsOf(const GatheredCells& cells, size_t begin, size_t end, size_t fiel
 }  // namespace
 
 PointSums::PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
-                     const std::filesystem::path& folder)
-    : points_(points), fields_(fields), folder_(folder) {
-  const uint64_t border_bytes = memory_bytes / 8;
-  memory_bytes_ = memory_bytes - border_bytes - std::min(PointBorders::waitingBytes(cells), memory_bytes / 4);
+                     const ScratchFiles& scratch)
+    : points_(points),
+      fields_(fields),
+      shares_(sharesOf(cells, fields, memory_bytes)),
+      scratch_(scratch),
+      sums_(std::make_unique<SumPages>(points, fields, momentCount(fields), shares_.pages, scratch)),
+      borders_(std::make_unique<PointBorders>(points, shares_.range_points, cells, shares_.border_bytes,
+                                              scratch)) {}
+
+PointSums::Shares PointSums::sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes) {
+  Shares shares{};
+  shares.border_bytes = memory_bytes / 8;
+  shares.sum_bytes =
+      memory_bytes - shares.border_bytes - std::min(PointBorders::waitingBytes(cells), memory_bytes / 4);
   const uint64_t page_bytes = SumPages::kPoints * SumPages::bytesOfPoint(fields, momentCount(fields));
-  const uint64_t pages = memory_bytes_ / page_bytes;
-  sums_ = std::make_unique<SumPages>(points, fields, momentCount(fields), pages, folder);
+  shares.pages = shares.sum_bytes / page_bytes;
   // Ranges are summed up, and become splats, once the corners' positions are no longer in memory.
-  const uint64_t range_pages = std::max<uint64_t>(1, memory_bytes_ * 3 / 2 / page_bytes);
-  range_points_ = range_pages * SumPages::kPoints;
-  borders_ = std::make_unique<PointBorders>(points, range_points_, cells, border_bytes, folder);
+  shares.range_points = std::max<uint64_t>(1, shares.sum_bytes * 3 / 2 / page_bytes) * SumPages::kPoints;
+  return shares;
+}
+
+uint64_t PointSums::bytesOfWaiting(uint64_t corners, uint64_t face_words, size_t fields) {
+  return sizeof(CellRecord) + corners * (sizeof(uint64_t) + sizeof(glm::dvec3) + fields * sizeof(float)) +
+         face_words * sizeof(uint32_t);
 }
 
 PointSums::~PointSums() = default;
@@ -95,8 +108,8 @@ void PointSums::sum(const GatheredCells& cells) {
   }
   if (!waiting_) {  // and so do all that come
     sums_->putAside();
-    const uint64_t ranges = (points_ + range_points_ - 1) / range_points_;
-    waiting_ = std::make_unique<StreamsFile>(folder_, ranges, memory_bytes_ / 4);
+    const uint64_t ranges = (points_ + shares_.range_points - 1) / shares_.range_points;
+    waiting_ = std::make_unique<StreamsFile>(scratch_, ranges, shares_.cell_bytes());
   }
   write(cells);
 }
@@ -117,7 +130,7 @@ void PointSums::write(const GatheredCells& cells) {
     appendBytes(record, view.values.data(), view.values.size_bytes());
     appendBytes(record, view.faces.data(), view.faces.size_bytes());
     ranges.clear();
-    for (const uint64_t corner : corners) ranges.push_back(corner / range_points_);
+    for (const uint64_t corner : corners) ranges.push_back(corner / shares_.range_points);
     std::sort(ranges.begin(), ranges.end());
     ranges.erase(std::unique(ranges.begin(), ranges.end()), ranges.end());
     for (const uint64_t range : ranges) waiting_->append(range, record);
@@ -228,11 +241,11 @@ PointSums::Counts PointSums::finish(const TakeSplat& take, const Progress& progr
   borders_->finish(progress);
   if (waiting_) waiting_->close();
   constexpr uint64_t kPoints = SumPages::kPoints;
-  sums_->setMost((std::min(range_points_, points_) + kPoints - 1) / kPoints);
+  sums_->setMost((std::min(shares_.range_points, points_) + kPoints - 1) / kPoints);
   size_t stream = 0;
-  for (uint64_t first = 0; first < points_; first += range_points_, ++stream) {
+  for (uint64_t first = 0; first < points_; first += shares_.range_points, ++stream) {
     progress.throwIfStopped();
-    const PointRange range{first, std::min(first + range_points_, points_)};
+    const PointRange range{first, std::min(first + shares_.range_points, points_)};
     const uint64_t first_page = range.first / kPoints, end_page = (range.end + kPoints - 1) / kPoints;
     sums_->holdPages(first_page, end_page);
     if (waiting_) sumWaiting(stream, range, progress);

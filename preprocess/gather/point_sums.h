@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "preprocess/gather/point_borders.h"
 #include "preprocess/gather/sum_pages.h"
 #include "preprocess/moments/mesh_splats.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
@@ -23,8 +23,19 @@ class PointSums {
  public:
   /// `points`: how many points there are; their numbers are below it. `cells`: about how many cells will be added.
   PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
-            const std::filesystem::path& folder);
+            const ScratchFiles& scratch);
   ~PointSums();
+
+  /// How a pass shares its memory.
+  struct Shares {
+    uint64_t border_bytes, sum_bytes;
+    uint64_t pages;                                        // of sums, in memory
+    uint64_t range_points;                                 // that become splats together
+    uint64_t cell_bytes() const { return sum_bytes / 4; }  // of streams of cells that wait
+  };
+  static Shares sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes);
+  /// What a cell takes that waits for the sums of a range.
+  static uint64_t bytesOfWaiting(uint64_t corners, uint64_t face_words, size_t fields);
 
   /// Cells in the mesh's order.
   void add(const GatheredCells& cells);
@@ -50,8 +61,8 @@ class PointSums {
 
   const uint64_t points_;
   const size_t fields_;
-  uint64_t memory_bytes_, range_points_ = 0;
-  const std::filesystem::path folder_;
+  const Shares shares_;
+  const ScratchFiles scratch_;
   std::unique_ptr<SumPages> sums_;
   std::unique_ptr<class StreamsFile> waiting_;  // cells by ranges of points; null: there are none
   std::unique_ptr<PointBorders> borders_;

@@ -5,12 +5,23 @@
 #include "stream/base/freed_memory.h"
 
 namespace curvisplat {
-StreamsFile::StreamsFile(std::filesystem::path folder, size_t streams, uint64_t memory_bytes)
-    : folder_(std::move(folder)),
+StreamsFile::StreamsFile(ScratchFiles scratch, size_t streams, uint64_t memory_bytes)
+    : scratch_(std::move(scratch)),
       streams_(streams),
-      buffer_bytes_(
-          std::clamp<uint64_t>(memory_bytes / 2 / std::max<size_t>(1, streams), kMinBuffer, kMaxBuffer)),
-      may_stay_(memory_bytes - std::min<uint64_t>(memory_bytes, streams * buffer_bytes_)) {}
+      buffer_bytes_(bufferBytes(streams, memory_bytes)),
+      may_stay_(bytesThatStay(streams, memory_bytes)) {}
+
+uint64_t StreamsFile::bufferBytes(size_t streams, uint64_t memory_bytes) {
+  return std::clamp<uint64_t>(memory_bytes / 2 / std::max<size_t>(1, streams), kMinBuffer, kMaxBuffer);
+}
+
+uint64_t StreamsFile::bytesThatStay(size_t streams, uint64_t memory_bytes) {
+  return memory_bytes - std::min(memory_bytes, streams * bufferBytes(streams, memory_bytes));
+}
+
+uint64_t StreamsFile::bytesInFile(uint64_t bytes, size_t streams, uint64_t memory_bytes) {
+  return bytes - std::min(bytes, bytesThatStay(streams, memory_bytes));
+}
 
 StreamsFile::~StreamsFile() = default;
 
@@ -29,7 +40,7 @@ void StreamsFile::flush(Stream& stream) {
     may_stay_ -= chunk.bytes;
     chunk.in_memory.swap(stream.buffer);
   } else {
-    if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
+    if (!file_) file_ = std::make_unique<NamelessFile>(scratch_);
     chunk.offset = file_->out().size();
     file_->out().append(std::span<const std::byte>(stream.buffer));
     stream.buffer.clear();

@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -24,7 +23,7 @@ class StreamsFile {
  public:
   /// Each stream has a buffer; all of them, and the chunks that stay, are within `memory_bytes`, but for records
   /// that are larger than a buffer.
-  StreamsFile(std::filesystem::path folder, size_t streams, uint64_t memory_bytes);
+  StreamsFile(ScratchFiles scratch, size_t streams, uint64_t memory_bytes);
   ~StreamsFile();
 
   size_t streams() const { return streams_.size(); }
@@ -44,6 +43,8 @@ class StreamsFile {
   void forget(size_t stream) { streams_[stream] = {}; }
 
   static constexpr size_t kMinBuffer = size_t{16} << 10, kMaxBuffer = size_t{256} << 10;
+  /// Of `bytes` in streams alike, those that do not stay in memory.
+  static uint64_t bytesInFile(uint64_t bytes, size_t streams, uint64_t memory_bytes);
   /// The number of streams whose buffers fit in that memory.
   static size_t mostStreams(uint64_t memory_bytes) { return memory_bytes / (2 * kMinBuffer) + 1; }
 
@@ -58,8 +59,10 @@ class StreamsFile {
     uint64_t bytes = 0;
   };
   void flush(Stream& stream);
+  static uint64_t bufferBytes(size_t streams, uint64_t memory_bytes);
+  static uint64_t bytesThatStay(size_t streams, uint64_t memory_bytes);
 
-  std::filesystem::path folder_;
+  ScratchFiles scratch_;
   std::vector<Stream> streams_;
   size_t buffer_bytes_;
   uint64_t may_stay_;  // bytes of further chunks that may stay in memory

@@ -8,25 +8,16 @@
 
 namespace curvisplat {
 
-SumPages::SumPages(uint64_t points, size_t values, size_t moments, uint64_t pages,
-                   std::filesystem::path folder)
+SumPages::SumPages(uint64_t points, size_t values, size_t moments, uint64_t pages, ScratchFiles scratch)
     : points_(points),
       fields_(values),
       moments_(moments),
-      folder_(std::move(folder)),
+      scratch_(std::move(scratch)),
       slots_(points, kShift, pages),
       in_file_(slots_.pages()) {}
 
 bool SumPages::hold(std::span<const uint64_t> points) {
-  if (!slots_.want(points)) return false;
-  uint64_t again = read_again_;
-  for (const uint64_t page : slots_.missing())
-    if (in_file_[page]) again += kPoints;
-  // A page is read and written, a cell in a stream as well, but once for all of its corners.
-  constexpr uint64_t kCornersOfStreams = 4;
-  if (kCornersOfStreams * again > wanted_ + points.size()) return false;
-  wanted_ += points.size();
-  read_again_ = again;
+  if (!slots_.hold(points, kMaxAgain)) return false;
   read();
   return true;
 }
@@ -61,7 +52,7 @@ void SumPages::read() {
 }
 
 void SumPages::write(uint64_t page, const Page& from) {
-  if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
+  if (!file_) file_ = std::make_unique<NamelessFile>(scratch_);
   const uint64_t offset = page * kPoints * bytesOfPoint(fields_, moments_);
   file_->out().writeAt(offset, std::as_bytes(std::span(from.sums)));
   file_->out().writeAt(offset + from.sums.size() * sizeof(double), std::as_bytes(std::span(from.values)));

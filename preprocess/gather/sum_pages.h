@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <memory>
@@ -19,9 +18,11 @@ class SumPages {
  public:
   static constexpr unsigned kShift = 12;
   static constexpr uint64_t kPoints = uint64_t{1} << kShift;  // of a page
+  // A page is read and written, a cell in a stream as well, but once for all of its corners.
+  static constexpr double kMaxAgain = 0.25;
 
   /// Of points below `points`, each with as many `values` and `moments`. At most `pages` are in memory.
-  SumPages(uint64_t points, size_t values, size_t moments, uint64_t pages, std::filesystem::path folder);
+  SumPages(uint64_t points, size_t values, size_t moments, uint64_t pages, ScratchFiles scratch);
 
   static uint64_t bytesOfPoint(size_t values, size_t moments) {
     return sizeof(glm::dvec3) + values * sizeof(float) + moments * sizeof(double);
@@ -57,11 +58,10 @@ class SumPages {
 
   const uint64_t points_;
   const size_t fields_, moments_;
-  const std::filesystem::path folder_;
+  const ScratchFiles scratch_;
   PageSlots slots_;
-  std::vector<Page> pages_;               // [slot]
-  std::vector<bool> in_file_;             // [page]
-  uint64_t wanted_ = 0, read_again_ = 0;  // points
+  std::vector<Page> pages_;    // [slot]
+  std::vector<bool> in_file_;  // [page]
   std::unique_ptr<NamelessFile> file_;
 };
 

@@ -39,6 +39,16 @@ class MeshSource : public DataSource {
   /// within `memory_bytes`. May be called again. Throws Interrupted once `progress` is stopped.
   virtual void prepare(std::span<const uint32_t> /*scalars*/, uint64_t /*memory_bytes*/,
                        const Progress& /*progress*/) const {}
+
+  /// What prepare() has to do for these scalars that is not done yet.
+  struct Preparation {
+    size_t fields = 0;  // that are gathered at once, at the most
+    size_t values = 0;  // of each sample that stay on disk, 4 bytes each
+    Centring centring = Centring::kNode;
+  };
+  virtual Preparation preparationFor(std::span<const uint32_t> /*scalars*/) const { return {}; }
+  /// Bytes of prepare()'s temporary files at the moment when they were the most.
+  virtual uint64_t preparedBytes() const { return 0; }
 };
 
 }  // namespace curvisplat

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scratch_folder.h"
 #include "preprocess/faces/grid_faces_pass.h"
@@ -99,7 +100,8 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
     fmt::print("{} samples{}; estimated from {} of them, converted in {}:\n", forecast.samples, of_steps,
                forecast.sampled, timeText(forecast.sampling_seconds));
   else
-    fmt::print("{} samples; estimated from conversions of other unstructured grids:\n", forecast.samples);
+    fmt::print("{} samples; estimated from its cells, and from conversions of other unstructured grids:\n",
+               forecast.samples);
   fmt::print("  cache      {} in {}{}, {:.2f} bytes per sample{}\n", byteText(forecast.cache_bytes),
              output.string(), freeText(output), static_cast<double>(forecast.cache_bytes) / samples,
              forecast.steps > 1 ? " and step" : "");
@@ -146,17 +148,23 @@ void useOwnPeak(Forecast& forecast, const GridDescription& whole, const GridDesc
   if (nodesOf(whole) == nodesOf(sample)) forecast.memory_bytes = ProcessUsage::now().peak_memory_bytes;
 }
 
-Forecast forecastOfMesh(const GridDescription& mesh, const ConvertOptions& options) {
+Forecast forecastOfMesh(const MeshSource& mesh, const ConvertOptions& options) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   Forecast forecast;
-  forecast.samples = nodesOf(mesh);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  const MeshOrigin origin(mesh, options.scalars, options.blank_value, plan, temporaryFolderOf(options));
+  forecast.samples = origin.blocks().front().ni;
   plan.suit(forecast.samples, options.scalars.size());
   forecast.threads = plan.threads;
-  const ConversionEstimate estimate = estimateConversion(forecast.samples, plan.threads);
-  const DiskNeeds needs = diskNeeds(forecast.samples, options.scalars.size());
+  const ConversionEstimate estimate =
+      estimateConversion(forecast.samples, plan.threads,
+                         origin.centring() == Centring::kCell ? SplatsOf::kMeshCells : SplatsOf::kMeshPoints);
+  const DiskNeeds needs =
+      with(origin.temporaryNeeds(progress), diskNeeds(forecast.samples, options.scalars.size()));
   forecast.cache_bytes =
       estimate.cache_bytes + (options.scalars.size() - 1) * estimate.bytes_per_further_scalar;
-  forecast.temporary_bytes = needs.temporary_bytes;
+  forecast.temporary_bytes = needs.mostTemporary();
   forecast.memory_bytes = plan.expectedPeak(forecast.samples, options.scalars.size());
   forecast.seconds = estimate.seconds;
   return forecast;
@@ -168,8 +176,8 @@ void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
             const ConvertArguments& arguments) {
   checkOutput(options.output, options.overwrite || options.resume, temporaryFolderOf(options));
   const GridDescription whole = source->description();
-  if (!dynamic_cast<GridSource*>(source.get()))
-    return finish(forecastOfMesh(whole, options), options, arguments);
+  if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get()))
+    return finish(forecastOfMesh(*mesh, options), options, arguments);
   checkPlanes(whole, options.planes);
   const std::unique_ptr<GridSource> sample =
       sampleOf(std::unique_ptr<GridSource>(dynamic_cast<GridSource*>(source.release())), kSampledNodes);

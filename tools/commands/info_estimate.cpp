@@ -10,10 +10,10 @@
 
 namespace curvisplat {
 
-InfoEstimate::InfoEstimate(uint64_t splats)
+InfoEstimate::InfoEstimate(uint64_t splats, SplatsOf what)
     : splats_(splats),
       threads_(static_cast<unsigned>(tbb::info::default_concurrency())),
-      needs_(estimateConversion(splats, threads_)) {}
+      needs_(estimateConversion(splats, threads_, what)) {}
 
 nlohmann::ordered_json InfoEstimate::toJson() const {
   return {{"splats", splats_},

@@ -13,7 +13,7 @@ namespace curvisplat {
 class InfoEstimate {
  public:
   InfoEstimate() = default;
-  explicit InfoEstimate(uint64_t splats);
+  explicit InfoEstimate(uint64_t splats, SplatsOf what);
 
   nlohmann::ordered_json toJson() const;
   /// "a cache of about 2.1 MiB with one scalar, ..."

@@ -49,8 +49,8 @@ GridInfo inspect(const GridSource& source) {
   info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
   info.overlaps = findOverlaps(source, kSlabBytes, progress);
   const bool by_cell = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
-  info.estimate =
-      InfoEstimate(by_cell ? info.statistics.cells() : info.nodes - info.statistics.blank().total());
+  info.estimate = InfoEstimate(
+      by_cell ? info.statistics.cells() : info.nodes - info.statistics.blank().total(), SplatsOf::kGrid);
   return info;
 }
 

@@ -79,7 +79,8 @@ MeshInfo inspect(const MeshSource& source) {
   measure(source, Centring::kCell, info);
   const bool by_cell =
       !info.description->scalars.empty() && info.description->scalars.front().centring == Centring::kCell;
-  info.estimate = InfoEstimate(by_cell ? info.survey.drawn_cells : info.points - info.survey.unused_points);
+  info.estimate = by_cell ? InfoEstimate(info.survey.drawn_cells, SplatsOf::kMeshCells)
+                          : InfoEstimate(info.points - info.survey.unused_points, SplatsOf::kMeshPoints);
   return info;
 }
 
