@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Draws the same grid, camera and transfer function with curvisplat and with VTK, in one run.
 
-    bench/peers/compare_peers.py FOLDER [--sizes 40x32x32,100x100x100] [--tetrahedra 64x32x32] [--fin GRID SOLUTION] [--functions smooth]
+    bench/peers/compare_peers.py FOLDER [--sizes 40x32x32,100x100x100] [--tetrahedra 64x32x32]
+                                 [--body-centred 50x25x25 [--cells]] [--fin GRID SOLUTION] [--functions smooth]
                                  [--json OUT.json] [--plot OUT.png] [--table OUT.md]
 
 The half-annulus scene is generated in FOLDER in each of --sizes; for --tetrahedra its cells are cut into tetrahedra by VTK, and all programs read
-the same .vtu file; --fin draws the density of a PLOT3D grid with a Q file, such as
+the same .vtu file, as for --body-centred, the scene in the tetrahedra of a body-centred lattice of so many cubes (half_annulus_mesh.py),
+with the scalar at points or, with --cells, in the cells; --fin draws the density of a PLOT3D grid with a Q file, such as
 the blunt fin (40x32x32). Every picture is compared with the reference march of curvisplat_reference: of the analytic field for
 the scene, of the trilinear field in the grid's own cells for --fin. All programs get the extinctions and colours of
 tests/data/half_annulus_*.json over white, an orthographic camera and one sample a pixel, and write PNG.
@@ -98,6 +100,14 @@ def tetrahedra_case(arguments, size):
     return dataclasses.replace(case, name=f"half-annulus-tetrahedra-{size}", grid=grid, solution=None, scalar="scalar", array="scalar")
 
 
+def body_centred_case(arguments, cubes):
+    of_cells = "-cells" if arguments.cells else ""
+    grid = arguments.folder / f"half_annulus_body_centred{of_cells}_{cubes}.vtu"
+    results.run([arguments.vtk_python, HERE / "half_annulus_mesh.py", grid, "--cubes", cubes, *(["--cells"] if of_cells else [])])
+    return dataclasses.replace(scene_case(arguments, "9x9x9"), name=f"half-annulus-body-centred{of_cells}-{cubes}", grid=grid,
+                               solution=None, scalar="scalar", array="scalar")
+
+
 def fin_case(arguments, grid, solution):
     told = json.loads(results.run([arguments.program, "info", grid, solution, "--json"]))
     lower, upper = told["bounds"]["lower"], told["bounds"]["upper"]
@@ -171,7 +181,7 @@ def drawn_by_us(arguments, case, made, function, technique, picture):
 def truth_of(arguments, case, function):
     """The reference picture; made once."""
     # One picture serves all grids of an analytic field; any other grid has its own.
-    what = re.sub("(-tetrahedra)?-[0-9x]+$", "", case.name) if case.name != "fin" else f"fin_{pathlib.Path(case.grid).stem}"
+    what = re.sub("(-tetrahedra|-body-centred(-cells)?)?-[0-9x]+$", "", case.name) if case.name != "fin" else f"fin_{pathlib.Path(case.grid).stem}"
     path = arguments.folder / f"truth_{what}_{function}_{arguments.picture}.pfm"
     if not path.exists():
         print(f"marching {path}", flush=True)
@@ -292,6 +302,8 @@ def parsed():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--sizes", default="40x32x32,100x100x100", help="nodes of the half-annulus; '' for none")
     parser.add_argument("--tetrahedra", default="", help="the same, cut into tetrahedra: nodes of the grid")
+    parser.add_argument("--body-centred", default="", help="tetrahedra of a body-centred lattice: numbers of cubes")
+    parser.add_argument("--cells", action="store_true", help="the scalar of --body-centred in its cells")
     parser.add_argument("--fin", nargs=2, metavar=("GRID", "SOLUTION"), help="a PLOT3D grid and Q file")
     parser.add_argument("--functions", default=["smooth"], type=one_of(["smooth", "band", "step"]))
     parser.add_argument("--techniques", default=[one for one in every if one != "zsweep"], type=one_of(every))
@@ -319,6 +331,7 @@ def main():
     cases = [fin_case(arguments, *map(pathlib.Path, arguments.fin))] if arguments.fin else []
     cases += [scene_case(arguments, size) for size in arguments.sizes.split(",") if size]
     cases += [tetrahedra_case(arguments, size) for size in arguments.tetrahedra.split(",") if size]
+    cases += [body_centred_case(arguments, cubes) for cubes in arguments.body_centred.split(",") if cubes]
     out, rows = results.Results(), []
     print(HEADING)
     with display(arguments.display):

@@ -22,7 +22,7 @@ def read_tetrahedra(job):
     reader.SetFileName(job["grid"])
     reader.Update()
     grid = reader.GetOutput()
-    if not grid.GetPointData().SetActiveScalars("scalar") + 1:
+    if grid.GetPointData().SetActiveScalars("scalar") < 0 and grid.GetCellData().SetActiveScalars("scalar") < 0:
         sys.exit(f"{job['grid']}: VTK does not find 'scalar' in it")
     return grid
 
