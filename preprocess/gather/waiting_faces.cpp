@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMaxFollowed = uint64_t{1} << 20;
+constexpr uint64_t kMaxFollowed = uint64_t{1} << 19;
 
 }  // namespace
 

@@ -10,7 +10,7 @@
 namespace curvisplat {
 
 /// Follows the faces whose lowest corner is one of a share of all points, through a table that is as much smaller as
-/// FaceMatcher's. Small meshes are followed whole. One thread. Memory: some 100 bytes for each of 2^20 faces at the most.
+/// FaceMatcher's. Small meshes are followed whole. One thread. Memory: some 80 bytes for each of 2^19 faces, mostly fewer.
 class WaitingFaces {
  public:
   /// Of a mesh with `faces` in all, each of them counted in both of its cells. `range_cells`: that become splats together.
