@@ -50,6 +50,8 @@ TEST_F(InfoGrid, InfoAndConvertReportOverlaps) {
   const ProgramResult info = runProgram({"info", overlapping, "--json"});
   EXPECT_EQ(info.status, 0) << info.err;
   EXPECT_FALSE(nlohmann::json::parse(info.out)["overlaps"].empty());
+  EXPECT_TRUE(contains(runProgram({"info", overlapping}).out, "each point is drawn once"))
+      << "as convert does";
   const ProgramResult converted =
       runProgram({"convert", overlapping, "-o", folder_ / "o.splats", "--scalar", "volume"});
   EXPECT_EQ(converted.status, 0) << converted.err;

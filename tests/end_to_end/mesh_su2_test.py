@@ -64,6 +64,10 @@ class Su2Meshes(MeshFormats):
                 self.assertIn("boundaries: lower, upper", info["notes"])
                 self.expect_same([self.path, self.restart], grid, {"c": None})
 
+    def test_a_mesh_alone_asks_for_its_restart(self):
+        self.write(Mesh(2))
+        self.expect_line(self.path, scalar="p", words="there are none; give a restart file")
+
     def test_derived_scalars(self):
         mesh = Mesh(2)
         self.write(mesh)

@@ -70,6 +70,11 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("a.npy", "a NumPy array without a grid");
   write("a.msh", "$MeshFormat\n4.1 1 8\n\1\0\0\0\n$EndMeshFormat\n"s);
   expectNamed("a.msh", "a Gmsh mesh");
+  for (const char* text :
+       {"(0 \"GAMBIT to Fluent File\")\n(2 3)\n", "(1 \"meshio 5.0.0\")\n(2 3)\n(10 (0 1 8 0))\n"}) {
+    write("b.msh", text);
+    expectNamed("b.msh", "a Fluent mesh or case");
+  }
   write("a.inp", "*HEADING\nAbaqus\n*NODE\n1, 0, 0, 0\n");
   expectNamed("a.inp", "an Abaqus mesh");
   write("a.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n8\n");

@@ -216,7 +216,7 @@ void printAsText(const GridInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
-  if (!info.overlaps.empty()) printLine("warning: {}", overlapWarning(description, info.overlaps));
+  if (!info.overlaps.empty()) printLine("note: {}", overlapNote(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
   printLine("nodes     {} in {}; {} blanked by the grid, {} not finite", info.nodes,
             countText(description.blocks.size(), "block"), blank.by_grid, blank.not_finite);

@@ -35,6 +35,8 @@ constexpr Magic kMagics[] = {
     {"MATLAB 7.3 MAT-file"sv, "a MATLAB file (HDF5), whose arrays an XDMF file has to describe"},
     {"\x93NUMPY"sv, "a NumPy array without a grid, which is not read (an XDMF file describes arrays)"},
     {"$MeshFormat"sv, "a Gmsh mesh, which is not read (meshio convert FILE mesh.vtu)"},
+    {"(0 \""sv, "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)"},
+    {"(1 \""sv, "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)"},
     {"GRIB"sv, "a GRIB file, which is not read"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
     {"{"sv, "a JSON file (give a .p3d file alone, instead of the grid)"},

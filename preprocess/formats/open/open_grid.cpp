@@ -122,7 +122,11 @@ std::vector<uint32_t> candidatesFor(const GridDescription& description, const st
 }
 
 std::string namesIn(const GridDescription& description) {
-  if (description.scalars.empty()) return "there are none; give a Q or function file";
+  if (description.scalars.empty()) {
+    const bool is_su2 = description.format.starts_with("SU2");
+    if (!is_su2 && !description.pieces.empty()) return "there are none";
+    return fmt::format("there are none; give a {} file", is_su2 ? "restart" : "Q or function");
+  }
   std::string names = "available: ";
   for (size_t n = 0; n < description.scalars.size(); ++n) {
     const GridScalar& scalar = description.scalars[n];
