@@ -46,7 +46,8 @@ std::vector<ScreenSplat> roundSplats(float radius) {
              unit(random),
              0.02f * around(random),
              0.02f * around(random),
-             0.01f * unit(random), 0};
+             0.01f * unit(random),
+             0};
   return splats;
 }
 
