@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <queue>
-#include <ranges>
 #include <span>
 #include <utility>
 
@@ -192,9 +191,15 @@ double RecordSorter::alongAt(const Run& run, uint64_t record) const {
 
 RecordSorter::Run RecordSorter::partOf(const Run& run, double from, double to) const {
   const auto at = [&](double along) {
-    const auto records = std::views::iota(uint64_t{0}, recordsOf(run));
-    const auto is_before = [&](uint64_t record) { return alongAt(run, record) < along; };
-    return run.begin + *std::ranges::partition_point(records, is_before) * record_size_ * sizeof(double);
+    uint64_t low = 0, high = recordsOf(run);
+    while (low < high) {
+      const uint64_t middle = (low + high) / 2;
+      if (alongAt(run, middle) < along)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    return run.begin + low * record_size_ * sizeof(double);
   };
   return {from > -kInfinity ? at(from) : run.begin, to < kInfinity ? at(to) : run.end};
 }
