@@ -30,7 +30,7 @@ class MeshFiles(MeshCase):
         grid = cube(3)
         path = self.folder / "mesh.vtu"
         for mode, raw in (("Ascii", True), ("Binary", True), ("Appended", True), ("Appended", False)):
-            for compressor in ("None", "ZLib", "LZ4"):
+            for compressor in ("None", "ZLib", "LZ4", "LZMA"):
                 for order, header in (("LittleEndian", "UInt32"), ("BigEndian", "UInt64")):
                     with self.subTest(mode=mode, raw=raw, compressor=compressor, order=order):
                         write_xml(grid, path, mode, compressor, raw=raw, order=order, header=header)

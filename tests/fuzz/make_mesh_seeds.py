@@ -72,13 +72,13 @@ def vtk_seeds(folder):
         return (folder / name).read_bytes()
 
     for mode in ("Ascii", "Binary", "Appended"):
-        for packed in ("None", "ZLib", "LZ4"):
+        for packed in ("None", "ZLib", "LZ4", "LZMA"):
             if packed != "None" and mode == "Ascii":
                 continue
             writer = vtk.vtkXMLUnstructuredGridWriter()
             getattr(writer, f"SetDataModeTo{mode}")()
             getattr(writer, f"SetCompressorTypeTo{packed}")()
-            writer.SetEncodeAppendedData(packed == "ZLib")
+            writer.SetEncodeAppendedData(packed in ("ZLib", "LZMA"))
             of = with_values(polyhedra(), ghosts=packed == "None")
             put("vtk_xml", f"mesh_{mode}_{packed}".lower(), written(writer, of, "a.vtu"))
     for version in (42, 51):

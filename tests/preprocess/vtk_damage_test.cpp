@@ -148,7 +148,9 @@ std::vector<DamagedFile> damagedFiles() {
     if (encoding.format == VtsEncoding::Format::kAppendedBase64) file.most_changed = 4;
     if (encoding.compressor == VtsEncoding::Compressor::kLz4 && file.most_changed > 0)
       file.most_changed = 2 * 50 + 2;
-    if (encoding.compressor == VtsEncoding::Compressor::kZlib) file.most_changed = 0;
+    if (encoding.compressor == VtsEncoding::Compressor::kZlib ||
+        encoding.compressor == VtsEncoding::Compressor::kLzma)
+      file.most_changed = 0;
     files.push_back(std::move(file));
   }
   for (const char* const name :

@@ -193,7 +193,8 @@ TEST(VtkEncodings, FacesOfAnOceanGiveTheSameCacheInEachEncoding) {
           VtsEncoding{Format::kAppendedRaw, Compressor::kNone, 4, true},
           VtsEncoding{Format::kAppendedBase64, Compressor::kZlib},
           VtsEncoding{Format::kAppendedRaw, Compressor::kZlib},
-          VtsEncoding{Format::kAppendedRaw, Compressor::kLz4, 8}}) {
+          VtsEncoding{Format::kAppendedRaw, Compressor::kLz4, 8},
+          VtsEncoding{Format::kInlineBase64, Compressor::kLzma}}) {
       SCOPED_TRACE(encoding.describe());
       const auto again = openText(folder, vtsFile(grid, encoding));
       EXPECT_EQ(checksumsOf(*again, {"T"}, folder.path() / "grid.splats"), expected);
@@ -201,8 +202,7 @@ TEST(VtkEncodings, FacesOfAnOceanGiveTheSameCacheInEachEncoding) {
   }
 }
 
-// Writers other than VTK make one block of all. One of zlib's is unpacked on disk; LZ4's cannot be, in
-// pieces.
+// Writers other than VTK make one block of all. One of zlib's is unpacked on disk; those of LZ4 and LZMA are not.
 TEST(VtkEncodings, BlocksLargerThanMemoryAllows) {
   const TestFolder folder("vts-large-blocks");
   VtsGrid grid = annulusVtsGrid(64, 64, 64);
@@ -238,8 +238,8 @@ TEST(VtkEncodings, UnsupportedEncodingsAreRefusedByName) {
     return errorOf(folder, other);
   };
   const std::tuple<const char*, const char*, const char*> cases[] = {
-      {"version=\"1.0\" byte", "compressor=\"vtkLZMADataCompressor\" byte",
-       "compressed by vtkLZMADataCompressor"},
+      {"version=\"1.0\" byte", "compressor=\"vtkZstdDataCompressor\" byte",
+       "compressed by vtkZstdDataCompressor"},
       {"StructuredGrid", "Unstructured", "of type Unstructured; expected StructuredGrid"},
       {"LittleEndian", "MiddleEndian", "byte_order MiddleEndian"},
       {"UInt32", "UInt31", "header_type UInt31"},

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <lz4.h>
+#include <lzma.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -56,6 +57,12 @@ std::string compressed(const std::string& bytes, Compressor compressor) {
     packed.resize(size);
     compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
              bytes.size());
+    packed.resize(size);
+  } else if (compressor == Compressor::kLzma) {
+    size_t size = 0;
+    packed.resize(lzma_stream_buffer_bound(bytes.size()));
+    lzma_easy_buffer_encode(5, LZMA_CHECK_CRC32, nullptr, reinterpret_cast<const uint8_t*>(bytes.data()),
+                            bytes.size(), reinterpret_cast<uint8_t*>(packed.data()), &size, packed.size());
     packed.resize(size);
   } else {
     packed.resize(static_cast<size_t>(LZ4_compressBound(static_cast<int>(bytes.size()))));
@@ -129,7 +136,7 @@ class VtsText {
 
 std::string VtsEncoding::describe() const {
   const char* const formats[] = {"ascii", "inline base64", "appended raw", "appended base64"};
-  const char* const compressors[] = {"", " zlib", " lz4"};
+  const char* const compressors[] = {"", " zlib", " lz4", " lzma"};
   return fmt::format("{}{} {}-bit {}", formats[static_cast<int>(format)],
                      compressors[static_cast<int>(compressor)], 8 * header_bytes,
                      big_endian ? "big" : "little");
@@ -143,7 +150,8 @@ std::string packedNumbers(const std::vector<double>& values, const std::string& 
 
 std::string vtsFile(const VtsGrid& grid, const VtsEncoding& encoding, size_t* data_begins) {
   const char* const compressors[] = {"", " compressor=\"vtkZLibDataCompressor\"",
-                                     " compressor=\"vtkLZ4DataCompressor\""};
+                                     " compressor=\"vtkLZ4DataCompressor\"",
+                                     " compressor=\"vtkLZMADataCompressor\""};
   const std::string extent = fmt::format("{}", fmt::join(grid.extent, " "));
   VtsText text(encoding);
   std::string file = fmt::format(
@@ -169,7 +177,8 @@ std::string vtsFile(const VtsGrid& grid, const VtsEncoding& encoding, size_t* da
 std::vector<VtsEncoding> allVtsEncodings() {
   std::vector<VtsEncoding> encodings = {{Format::kAscii}};
   for (const Format format : {Format::kInlineBase64, Format::kAppendedRaw, Format::kAppendedBase64})
-    for (const Compressor compressor : {Compressor::kNone, Compressor::kZlib, Compressor::kLz4})
+    for (const Compressor compressor :
+         {Compressor::kNone, Compressor::kZlib, Compressor::kLz4, Compressor::kLzma})
       for (const size_t header_bytes : {4, 8})
         for (const bool big_endian : {false, true})
           encodings.push_back({format, compressor, header_bytes, big_endian,

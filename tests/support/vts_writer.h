@@ -11,7 +11,7 @@ namespace curvisplat {
 
 struct VtsEncoding {
   enum class Format { kAscii, kInlineBase64, kAppendedRaw, kAppendedBase64 };
-  enum class Compressor { kNone, kZlib, kLz4 };
+  enum class Compressor { kNone, kZlib, kLz4, kLzma };
 
   Format format = Format::kAppendedRaw;
   Compressor compressor = Compressor::kNone;

@@ -1,6 +1,7 @@
 #include "preprocess/formats/vtk/compressed_bytes.h"
 
 #include <lz4.h>
+#include <lzma.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -22,9 +23,12 @@ struct Table {
 };
 
 /// The largest size that `packed` bytes can decompress to. zlib: the ratio in its documentation; LZ4: each
-/// further byte of a length encodes up to 255 bytes.
+/// further byte of a length encodes up to 255 bytes; LZMA: a match of 273 bytes takes ten bits of a probability of
+/// 31/32 and more.
 uint64_t maxUnpackedBytes(BlockCompressor compressor, uint64_t packed) {
-  const uint64_t ratio = compressor == BlockCompressor::kZlib ? 1032 : 255;
+  const uint64_t ratio = compressor == BlockCompressor::kZlib  ? 1032
+                         : compressor == BlockCompressor::kLz4 ? 255
+                                                               : 16384;
   return packed > UINT64_MAX / ratio - 64 ? UINT64_MAX : packed * ratio + 64;
 }
 
@@ -134,6 +138,20 @@ void unpackLz4(const std::string& place, uint64_t block, std::span<const std::by
   if (static_cast<size_t>(bytes) != to.size()) failBlock(place, block, "its size differs from the table");
 }
 
+void unpackLzma(const std::string& place, uint64_t block, std::span<const std::byte> packed,
+                std::span<std::byte> to) {
+  uint64_t memory =
+      uint64_t{128} << 20;  // of a dictionary, of which no more is touched than the block has bytes
+  size_t read = 0, written = 0;
+  const lzma_ret result =
+      lzma_stream_buffer_decode(&memory, 0, nullptr, reinterpret_cast<const uint8_t*>(packed.data()), &read,
+                                packed.size(), reinterpret_cast<uint8_t*>(to.data()), &written, to.size());
+  if (result == LZMA_MEM_ERROR) failBlock(place, block, "liblzma is out of memory");
+  if (result == LZMA_BUF_ERROR || (result == LZMA_OK && written != to.size()))
+    failBlock(place, block, "its size differs from the table");
+  if (result != LZMA_OK) failBlock(place, block, "not an LZMA stream");
+}
+
 /// Decompresses one zlib block of any size in pieces.
 void spoolZlib(const CompressedBytes::Parts& parts, uint64_t block, uint64_t offset, uint64_t packed,
                uint64_t unpacked, const SpoolFile::Sink& sink) {
@@ -222,10 +240,17 @@ std::span<const std::byte> CompressedBytes::unpacked(uint64_t block) const {
   kept.packed.resize(static_cast<size_t>(place.bytes));
   kept.bytes.resize(static_cast<size_t>(bytesOf(block)));
   parts_.blocks->readAt(place.offset, kept.packed);
-  if (parts_.compressor == BlockCompressor::kZlib)
-    unpackZlib(parts_.place, block, kept.packed, kept.bytes);
-  else
-    unpackLz4(parts_.place, block, kept.packed, kept.bytes);
+  switch (parts_.compressor) {
+    case BlockCompressor::kZlib:
+      unpackZlib(parts_.place, block, kept.packed, kept.bytes);
+      break;
+    case BlockCompressor::kLz4:
+      unpackLz4(parts_.place, block, kept.packed, kept.bytes);
+      break;
+    case BlockCompressor::kLzma:
+      unpackLzma(parts_.place, block, kept.packed, kept.bytes);
+      break;
+  }
   kept.id = id_;
   kept.block = block;
   return kept.bytes;

@@ -1,7 +1,7 @@
 // Data in compressed blocks, as stored in VTK's XML files: a table followed by the blocks.
 //
 //   table    | n | block size | size of the last block | compressed size of block 0 | of 1 | ... | of n - 1 |
-//   blocks   | block 0 | block 1 | ... | block n - 1 |       each a zlib stream or an LZ4 block of its own
+//   blocks   | block 0 | block 1 | ... | block n - 1 |       each a zlib or LZMA stream or an LZ4 block of its own
 //
 // The table consists of integers of one size and byte order; a last size of 0 means a full block. The offset
 // of every 1024th block is kept in memory; the table is read again for those between.
@@ -15,7 +15,7 @@
 
 namespace curvisplat {
 
-enum class BlockCompressor { kZlib, kLz4 };
+enum class BlockCompressor { kZlib, kLz4, kLzma };
 
 /// The integers in the headers of a file's arrays.
 struct HeaderIntegers {
@@ -62,7 +62,7 @@ class CompressedBytes final : public ByteSource {
 
 /// The `size` decompressed bytes of `parts`: a CompressedBytes; or, for zlib blocks larger than
 /// kLargestBlockInMemory, a spool file that is filled at the first read. Throws Error as CompressedBytes
-/// does, and for LZ4 blocks of that size.
+/// does, and for other blocks of that size.
 std::shared_ptr<const ByteSource> compressedBytes(CompressedBytes::Parts parts, uint64_t size,
                                                   const std::shared_ptr<SpoolFile>& spool);
 

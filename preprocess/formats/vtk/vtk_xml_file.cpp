@@ -79,8 +79,11 @@ VtkXmlFile::VtkXmlFile(const VtkFiles& files, const std::filesystem::path& path)
     compressor_ = BlockCompressor::kZlib;
   else if (compressor == "vtkLZ4DataCompressor")
     compressor_ = BlockCompressor::kLz4;
+  else if (compressor == "vtkLZMADataCompressor")
+    compressor_ = BlockCompressor::kLzma;
   else if (!compressor.empty())
-    fail(fmt::format("is compressed by {}; expected zlib or LZ4; write it with one of these", compressor));
+    fail(fmt::format("is compressed by {}; expected zlib, LZ4 or LZMA; write it with one of these",
+                     compressor));
 
   const std::string encoding = root_.child("AppendedData").attribute("encoding").as_string("base64");
   if (encoding != "base64" && encoding != "raw")
@@ -103,7 +106,10 @@ std::string VtkXmlFile::encoding(const pugi::xml_node& node) const {
   if (format == "ascii") return "ASCII";
   std::string words = header_.order == ByteOrder::kBig ? "big-endian" : "little-endian";
   words += format == "binary" ? ", inline base64" : appended_base64_ ? ", appended base64" : ", appended raw";
-  if (compressor_) words += *compressor_ == BlockCompressor::kZlib ? ", zlib" : ", LZ4";
+  if (compressor_)
+    words += *compressor_ == BlockCompressor::kZlib  ? ", zlib"
+             : *compressor_ == BlockCompressor::kLz4 ? ", LZ4"
+                                                     : ", LZMA";
   return words;
 }
 
