@@ -10,7 +10,6 @@ import argparse
 import json
 import pathlib
 import re
-import subprocess
 import tempfile
 
 import results
@@ -28,7 +27,7 @@ def draw(program, cache, picture, size, pixels, function):
 
 def psnr(program, finest, picture):
     """Of single precision; None where the pictures are the same."""
-    said = subprocess.run([program, "compare", finest, picture], capture_output=True, text=True, check=False).stdout
+    said = results.run([program, "compare", finest, picture])
     found = re.search(r"PSNR ([\d.]+) dB", said)
     if not found and "identical" not in said:
         raise SystemExit(f"{program} compare: {said}")

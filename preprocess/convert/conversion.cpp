@@ -328,8 +328,8 @@ class Conversion {
   }
 
   void checkRoom() const {
-    const TemporaryNeeds most = workspace_->splats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
     if (!options_.check_disk_space) return;
+    const TemporaryNeeds most = workspace_->splats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
     const std::filesystem::path folder = temporaryFolder(options_);
     if (hasDiskSpace(needsWith(most), options_.output, folder)) return;
     const TemporaryNeeds forecast =

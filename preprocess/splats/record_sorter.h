@@ -1,6 +1,6 @@
 // External sort along the seams' direction: sorted runs in one temporary file once memory is full, then a merge of all
-// runs at once, or of ranges of them by several threads. The order is total (position, then number), so it does not depend on the order of adding or on the
-// memory.
+// runs at once, or of ranges of them by several threads. The order is total (position, then number), so it does not
+// depend on the order of adding or on the memory.
 //
 // A record is of doubles, the first three of which are these:
 //
