@@ -27,10 +27,13 @@ OctreeBuilder::OctreeBuilder(const OctreePlan& plan, BucketTree& tree, CacheWrit
       progress_(&progress),
       cells_(plan.root, plan.blocks, plan.variables, writer.histograms(), progress, plan.precision) {}
 
-void OctreeBuilder::build(const BucketFile& file) {
-  const std::vector<uint32_t> leaves = tree_->leavesBelow(0);
-  takeUpBricks();
-  buildBuckets(file, leaves, finishTakenUp(leaves, file.buckets()), file.buckets());
+uint32_t OctreeBuilder::takeUpBricks(uint32_t buckets) {
+  matchBricks();
+  return finishTakenUp(tree_->leavesBelow(0), buckets);
+}
+
+void OctreeBuilder::build(const BucketFile& file, uint32_t first) {
+  buildBuckets(file, tree_->leavesBelow(0), first, file.buckets());
   CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
 }
 
@@ -51,7 +54,7 @@ uint64_t OctreeBuilder::bricksOf(uint32_t node) const {
 /// Notes which nodes the writer's bricks are of. Those behind the last that completes a node are of one that
 /// is to be built again. The histograms become those of the bricks that stay: a build that was given up may have
 /// added others.
-void OctreeBuilder::takeUpBricks() {
+void OctreeBuilder::matchBricks() {
   built_.resize(tree_->size());
   const std::span<const Brick> bricks = writer_->bricks();
   uint64_t complete = 0;

@@ -42,9 +42,12 @@ class OctreeBuilder {
   /// All references must outlive it. `tree` grows where a bucket has to be divided.
   OctreeBuilder(const OctreePlan& plan, BucketTree& tree, CacheWriter& writer, Progress& progress);
 
-  /// Builds and appends what is in `file`, which holds the splats of all of the tree, and not yet in the
-  /// writer. Throws Error if a disk fails.
-  void build(const BucketFile& file);
+  /// Takes the writer's bricks for those of the first cells of the tree, and merges what these complete. Returns the
+  /// first bucket with more to build, of `buckets`; their number if there is nothing.
+  uint32_t takeUpBricks(uint32_t buckets);
+  /// Builds and appends the buckets of `file`, which holds the splats of all of the tree, from `first` on. Throws
+  /// Error if a disk fails.
+  void build(const BucketFile& file, uint32_t first);
   /// The same for the buckets first .. end - 1, into a writer that has nothing: their bricks, and those of all
   /// cells above them that lie in these buckets as a whole.
   void buildShare(const BucketFile& file, uint32_t first, uint32_t end);
@@ -56,7 +59,7 @@ class OctreeBuilder {
     double error = 0;
   };
 
-  void takeUpBricks();
+  void matchBricks();
   uint32_t finishTakenUp(const std::vector<uint32_t>& leaves, uint32_t buckets);
   uint64_t bricksOf(uint32_t node) const;
   bool isBuilt(uint32_t node) const { return node < built_.size() && built_[node].bricks > 0; }

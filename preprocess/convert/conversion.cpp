@@ -1,9 +1,11 @@
 #include "preprocess/convert/conversion.h"
 
 #include <algorithm>
+#include <future>
 #include <memory>
 #include <optional>
 #include <span>
+#include <system_error>
 
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_tree.h"
@@ -29,6 +31,7 @@
 #include "stream/base/freed_memory.h"
 #include "stream/base/nameless_file.h"
 #include "stream/base/paths.h"
+#include "stream/base/thread_name.h"
 #include "stream/base/trace.h"
 #include "stream/cache/cache_writer.h"
 #include "stream/cache/faces_file.h"
@@ -263,7 +266,7 @@ class Conversion {
       shareSplats();
     else
       splats_ = *workspace_->splats();
-    if (!file_) openSplats();
+    if (ranks_ && !file_) openSplats();
     openWriter();
   }
 
@@ -280,7 +283,26 @@ class Conversion {
 
   void build() {
     if (ranks_) return buildTogether();
-    OctreeBuilder(octreePlan(), splats_.tree, *writer_, progress_).build(*file_);
+    const auto buckets = static_cast<uint32_t>(splats_.buckets.chains.size());
+    OctreeBuilder builder(octreePlan(), splats_.tree, *writer_, progress_);
+    if (const uint32_t first = builder.takeUpBricks(buckets); first < buckets) {
+      if (!file_) openSplats();
+      builder.build(*file_, first);
+    }
+    removeSplats();
+  }
+
+  /// In a thread, beside the passes that follow: a disk may take half a second for gigabytes.
+  void removeSplats() {
+    try {
+      splats_removed_ = std::async(std::launch::async, [file = std::move(file_)]() mutable {
+        nameThisThread("splats-removal");
+        const TraceScope trace("remove splats", TraceKind::kWait);
+        file.reset();
+      });
+    } catch (const std::system_error&) {
+      // No further thread: they are removed by now, since the function that had them is gone.
+    }
   }
 
   /// Bricks that were appended by an interrupted conversion are made again.
@@ -318,7 +340,8 @@ class Conversion {
   void finishCache() {
     reportCache(writer_->finish(manifest()), report_);
     writer_.reset();
-    file_.reset();
+    file_.reset();  // of ranks, which all read it
+    if (splats_removed_.valid()) splats_removed_.wait();
     report_.blanked = splats_.survey.blanked;
     report_.degenerate = splats_.counts.degenerate;
     report_.inverted = splats_.counts.inverted;
@@ -390,6 +413,7 @@ class Conversion {
   std::unique_ptr<CacheWriter> writer_;
   std::optional<FileInfo> faces_file_;
   ConvertReport report_;
+  std::future<void> splats_removed_;  // last: waits for the end of its thread
 };
 
 constexpr const char* kKept = "; finished work is kept: continue with --resume";
