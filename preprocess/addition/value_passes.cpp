@@ -54,7 +54,7 @@ void ValuePasses::scatter(SplatOrigin& origin) {
   if (!isFirst()) return;
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
   const SinkOfThread sink_of_thread = [&]() -> SplatSink& { return sinks.local(); };
-  origin.scatter(sink_of_thread, *progress_);
+  origin.scatter(sink_of_thread, {}, *progress_);
   origin.finish(sink_of_thread, *progress_);
   for (ValueSink& sink : sinks) sink.flush();
 }

@@ -76,6 +76,13 @@ class ChunkWriter {
     return buffer;
   }
 
+  /// Waits until all is written. Throws what writing threw.
+  void drain() {
+    MutexLock lock(mutex_);
+    while (!waiting_.empty() && !error_) changed_.wait(lock);
+    if (error_) std::rethrow_exception(error_);
+  }
+
   /// Writes what waits. Throws what writing threw.
   void finish() {
     stop();
@@ -152,7 +159,11 @@ struct BucketFile::State {
     CURVISPLAT_CHECK_OP(chunk_bytes % kDirectAlignment, ==, 0u);
   }
   State(const std::filesystem::path& file, const BucketChains& chains)
-      : path(file), chunk_bytes(chains.chunk_bytes), buckets(chains.chains.size()), end(chains.size) {
+      : path(file),
+        chunk_bytes(chains.chunk_bytes),
+        buckets(chains.chains.size()),
+        end(chains.size),
+        is_foreign(true) {
     for (size_t n = 0; n < buckets.size(); ++n) {
       buckets[n].last_chunk = chains.chains[n].last_chunk;
       buckets[n].bytes = chains.chains[n].bytes;
@@ -163,7 +174,8 @@ struct BucketFile::State {
   const size_t chunk_bytes;
   std::vector<Bucket> buckets;
   std::atomic<uint64_t> end = 0;
-  std::optional<OutputFile> output;   // of a new file
+  const bool is_foreign = false;      // another process has written at least a part of it
+  std::optional<OutputFile> output;   // unless it is only read
   std::optional<ChunkWriter> writer;  // to it
   std::optional<InputFile> input;     // after close(), or of another's file
   std::vector<std::unique_ptr<BucketFile>> joined;
@@ -200,7 +212,7 @@ struct BucketFile::State {
       std::memcpy(&header, whole.data(), sizeof header);
       require(header.bytes <= whole.size() - sizeof header, at);
       const auto records = std::span<const std::byte>(whole).subspan(sizeof header, header.bytes);
-      if (!output) require(checksumOf(header, records) == header.checksum, at);
+      if (is_foreign) require(checksumOf(header, records) == header.checksum, at);
       use(records);
       at = header.previous;
     }
@@ -223,12 +235,19 @@ struct BucketFile::State {
 BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes)
     : state_(std::make_unique<State>(path, buckets, chunk_bytes)) {}
 
-BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
+BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains, Use use)
     : state_(std::make_unique<State>(path, chains)) {
   if (!std::filesystem::exists(path))
     throw LostBuckets("{}: was removed while it was needed; run the same command again", path.string());
-  state_->input.emplace(path, Caching::kDirect);
-  state_->require(state_->input->size() >= chains.size, state_->input->size());
+  {
+    InputFile input(path, Caching::kDirect);
+    state_->require(input.size() >= chains.size, input.size());
+    if (use == Use::kRead) state_->input = std::move(input);
+  }
+  if (use == Use::kRead) return;
+  state_->output.emplace(path, Caching::kDirect, OutputFile::Existing::kKeep);
+  state_->output->truncate(chains.size);
+  state_->writer.emplace(*state_->output);
 }
 
 BucketFile::~BucketFile() {
@@ -275,11 +294,16 @@ void BucketFile::join(const std::filesystem::path& path, BucketChains chains) {
   state_->joined.back()->leave();
 }
 
-void BucketFile::close(bool sync) {
+void BucketFile::flush() {
   for (Bucket& bucket : state_->buckets) {
     const MutexLock lock(bucket.mutex);
     if (!bucket.buffer.empty()) state_->flush(bucket);
   }
+  state_->writer->drain();
+}
+
+void BucketFile::close(bool sync) {
+  flush();
   state_->writer->finish();
   if (sync) state_->output->close();
   state_->input.emplace(state_->path, Caching::kDirect);

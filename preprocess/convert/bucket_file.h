@@ -46,9 +46,10 @@ class BucketFile {
   /// Makes `path`. A bucket has a buffer of `chunk_bytes`, a multiple of kDirectAlignment, while it has unwritten
   /// records. Up to four more buffers may be waiting for the disk.
   BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes);
-  /// Opens a file that another process has made. Checks each chunk that is read: throws LostBuckets here or
-  /// when reading if the file has changed.
-  BucketFile(const std::filesystem::path& path, BucketChains chains);
+  /// Opens a file that another process has made, to read or to append more. Checks each chunk that is read: throws LostBuckets
+  /// here or when reading if the file has changed.
+  enum class Use { kRead, kAppend };
+  BucketFile(const std::filesystem::path& path, BucketChains chains, Use use = Use::kRead);
   /// Removes the file, unless it is to be left.
   ~BucketFile();
   void leave();
@@ -61,6 +62,8 @@ class BucketFile {
   /// Throws Error once the disk has failed.
   void append(uint32_t bucket, std::span<const std::byte> records);
 
+  /// Writes what is in the buffers: chains() then has all that was appended. Nothing may be appended meanwhile.
+  void flush();
   /// Writes what is left in the buffers and frees them. Reading is possible from here on, by any thread;
   /// nothing can be appended. `sync`: another machine will read it.
   void close(bool sync = false);

@@ -13,6 +13,7 @@
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/counting_grid.h"
 #include "preprocess/convert/grid_origin.h"
+#include "preprocess/convert/interrupted_scatter.h"
 #include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/new_manifest.h"
 #include "preprocess/convert/plan_buckets.h"
@@ -173,9 +174,9 @@ class Conversion {
 
   /// Whether an interrupted conversion has left splats that are all there.
   bool hasSplats() {
-    if (!ranks_) return workspace_->splats().has_value();
+    if (!ranks_) return workspace_->hasAllSplats();
     std::vector<uint8_t> has(1);
-    if (isFirst() && workspace_->splats()) {
+    if (isFirst() && workspace_->hasAllSplats()) {
       try {
         splats_ = *workspace_->splats();
         openSplats();
@@ -207,6 +208,7 @@ class Conversion {
   }
 
   void count() {
+    if (takeUpScattered()) return;
     CountingGrid counts(countingLevel(nodes_, splats_.survey.upper - splats_.survey.lower),
                         plan_.counting_bytes);
     if (makesSplats()) origin_->count(root_, counts, progress_);
@@ -224,11 +226,44 @@ class Conversion {
     contents_.assign(splats_.tree.size(), {});
   }
 
+  /// Whether an interrupted conversion has left some of the splats, and this one adds the others.
+  bool takeUpScattered() {
+    if (ranks_ || !workspace_->splats()) return false;
+    const ScatteredSplats& left = *workspace_->splats();
+    try {
+      file_ = openScattered(workspace_->splatsFile(), left, plan_);
+    } catch (const LostBuckets& error) {
+      report_.notes.emplace_back(error.what());
+      workspace_->forgetSplats();
+      return false;
+    }
+    splats_.tree = left.tree;
+    splats_.unfinished = left.unfinished;
+    contents_.assign(splats_.tree.size(), {});
+    for (const uint32_t leaf : splats_.tree.leavesBelow(0)) contents_[leaf] = splats_.tree[leaf].contents;
+    return true;
+  }
+
+  void noteScattered(const ScatterState& state) {
+    ScatteredSplats so_far = splats_;
+    so_far.unfinished = state;
+    so_far.buckets = file_->chains();
+    so_far.tree.setContents(so_far.tree.leavesBelow(0), contents_);
+    workspace_->noteSplats(std::move(so_far));
+  }
+
   SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_}; }
+
+  ScatterNotes scatterNotes() {
+    if (ranks_) return {};
+    return timedNotes(options_.note_interval, splats_.unfinished ? &*splats_.unfinished : nullptr,
+                      [this](const ScatterState& state) { noteScattered(state); });
+  }
 
   void scatter() {
     const auto counted = scratch_files_->countBeside([this] { return file_->size(); });
-    if (makesSplats()) splats_.counts = scatterSplats(*origin_, target(), progress_);
+    if (makesSplats()) splats_.counts = scatterSplats(*origin_, target(), scatterNotes(), progress_);
+    splats_.unfinished.reset();
   }
 
   void mergeSeams() {
@@ -352,17 +387,19 @@ class Conversion {
 
   void checkRoom() const {
     if (!options_.check_disk_space) return;
-    const TemporaryNeeds most = workspace_->splats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
+    const TemporaryNeeds most = workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
     const std::filesystem::path folder = temporaryFolder(options_);
     if (hasDiskSpace(needsWith(most), options_.output, folder)) return;
     const TemporaryNeeds forecast =
-        workspace_->splats() ? TemporaryNeeds{} : origin_->temporaryNeeds(progress_);
+        workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->temporaryNeeds(progress_);
     checkDiskSpace(needsWith(forecast), options_.output, folder);
   }
 
   DiskNeeds needsWith(const TemporaryNeeds& temporary) const {
     DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
-    if (workspace_->splats()) needs.temporary_bytes = 0;
+    if (workspace_->splats())
+      needs.temporary_bytes -= std::min(needs.temporary_bytes, workspace_->splats()->buckets.size);
+    if (workspace_->hasAllSplats()) needs.temporary_bytes = 0;
     if (ranks_) needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
     if (options_.surfaces)
       needs.temporary_bytes +=

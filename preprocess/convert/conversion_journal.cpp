@@ -169,17 +169,36 @@ BucketChains bucketsOf(const JsonField& from) {
   return buckets;
 }
 
+json jsonOf(const ScatterState& state) {
+  json handedness = json::array();
+  for (const Handedness& of_block : state.handedness) handedness.push_back({of_block.right, of_block.left});
+  return {{"slab_bytes", state.slab_bytes},
+          {"slabs", state.slabs},
+          {"degenerate", state.degenerate},
+          {"handedness", handedness}};
+}
+
+ScatterState stateOf(const JsonField& from) {
+  ScatterState state{
+      from.at("slab_bytes").count(), from.at("slabs").count(), from.at("degenerate").count(), {}};
+  for (const JsonField& of_block : from.at("handedness").elements())
+    state.handedness.push_back({of_block[0].count(), of_block[1].count()});
+  return state;
+}
+
 json jsonOf(const ScatteredSplats& splats) {
   json of_ranks = json::array();
   for (const BucketChains& buckets : splats.buckets_of_ranks) of_ranks.push_back(jsonOf(buckets));
-  return {{"buckets_of_ranks", of_ranks},
-          {"survey", jsonOf(splats.survey)},
-          {"degenerate", splats.counts.degenerate},
-          {"inverted", splats.counts.inverted},
-          {"overlap", splats.overlap},
-          {"merged_nodes", splats.merged_nodes},
-          {"tree", jsonOf(splats.tree)},
-          {"buckets", jsonOf(splats.buckets)}};
+  json of_splats = {{"buckets_of_ranks", of_ranks},
+                    {"survey", jsonOf(splats.survey)},
+                    {"degenerate", splats.counts.degenerate},
+                    {"inverted", splats.counts.inverted},
+                    {"overlap", splats.overlap},
+                    {"merged_nodes", splats.merged_nodes},
+                    {"tree", jsonOf(splats.tree)},
+                    {"buckets", jsonOf(splats.buckets)}};
+  if (splats.unfinished) of_splats["unfinished"] = jsonOf(*splats.unfinished);
+  return of_splats;
 }
 
 ScatteredSplats splatsOf(const JsonField& from) {
@@ -196,6 +215,7 @@ ScatteredSplats splatsOf(const JsonField& from) {
         buckets.fail("as many chains as 'buckets'");
     }
   splats.tree = treeOf(from.at("tree"), splats.buckets.chains.size());
+  if (const auto unfinished = from.find("unfinished")) splats.unfinished = stateOf(*unfinished);
   return splats;
 }
 

@@ -1,5 +1,5 @@
 // The state of an unfinished conversion, for the one that resumes it: its input, its temporary folder and,
-// once all splats are on disk, where they are. A JSON file with a checksum in the partial folder, replaced
+// where splats are on disk, where they are. A JSON file with a checksum in the partial folder, replaced
 // atomically. Only the version of the program that wrote it reads it.
 #pragma once
 

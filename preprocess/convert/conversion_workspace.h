@@ -44,8 +44,9 @@ class ConversionWorkspace {
   ~ConversionWorkspace();
 
   bool resumed() const { return resumed_; }
-  /// The splats that an interrupted conversion has left; nullopt: they have to be made.
+  /// The splats that an interrupted conversion has left, all or some; nullopt: they have to be made.
   const std::optional<ScatteredSplats>& splats() const { return journal_.splats; }
+  bool hasAllSplats() const { return journal_.splats && !journal_.splats->unfinished; }
   PartialFolder& partial() { return *partial_; }
   std::filesystem::path splatsFile() const { return splatsFileOf(scratch_->path(), 0); }
   /// The splats that a rank has scattered, in the scratch folder.

@@ -1,6 +1,7 @@
 // What a conversion is asked for, and what it reports.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -44,6 +45,8 @@ struct ConvertOptions {
   std::optional<uint64_t> owner_bytes;
   /// For tests: slabs smaller than memory would allow, so that even the rows of a small grid are cut.
   std::optional<uint64_t> slab_bytes;
+  /// For tests: how often scatter notes what is on disk.
+  std::chrono::milliseconds note_interval{10'000};
 };
 
 /// A file of the cache, and its size.

@@ -96,13 +96,15 @@ void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
   countNodes(reader_.source(), root, smallSlabs(kNoHalo).slab_bytes, counts, progress, shareOf(ranks_));
 }
 
-ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
+ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
+                                  Progress& progress) {
   seams_ = std::make_unique<SeamMerger>(reader_.scalars(), plan_.seam_bytes, scratch_);
   std::optional<BlockOwners> owners;
   if (hasOwners())
     owners.emplace(ownersReader(reader_, has_values_everywhere_), overlaps_, plan_.owner_bytes);
   SlabPass pass(progress);
   pass.ranks = ranks_;
+  pass.notes = notes;
   pass.owners = owners ? &*owners : nullptr;
   const ScatterCounts counts =
       streamSplats(reader_, faces_.get(), plan_.slab_bytes, sink_of_thread, *seams_, pass);

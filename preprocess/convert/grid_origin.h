@@ -39,7 +39,8 @@ class GridOrigin final : public SplatOrigin {
   std::string overlap() const override;
   bool cutsOctants() const override { return centring() == Centring::kNode; }
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
-  ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
+  ScatterCounts scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
+                        Progress& progress) override;
   uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
   std::optional<FileInfo> writeFaces(const FacesJob& job, Progress& progress) override {
     return writeGridFaces(reader_, job, smallSlabs(kCornerHalo), progress);

@@ -110,7 +110,8 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
   });
 }
 
-ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
+ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, const ScatterNotes&,
+                                  Progress& progress) {
   freeMemory(used_);
   const uint64_t half = halfBesideChunks(plan_.mesh_bytes, chunk_bytes_);
   CornerGather gather(reader_, *numbers_, half, scratch_, progress);

@@ -36,7 +36,8 @@ class MeshOrigin final : public SplatOrigin {
   GridSurvey survey(Progress& progress) override;
   std::vector<std::string> warnings() override;
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
-  ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
+  ScatterCounts scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
+                        Progress& progress) override;
   uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
 
  private:

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_record.h"
@@ -18,10 +19,8 @@ namespace {
 constexpr uint64_t kNodesPerTask = 1024;        // their splats stay in a core's cache until they are sent
 constexpr uint64_t kNodesOfRowPerTask = 16384;  // longer rows are cut
 constexpr size_t kGatheredBytes = 32 << 10;
-
-struct Handedness {
-  uint64_t right = 0, left = 0;
-};
+constexpr uint64_t kSeamReach =
+    2;  // nodes of a row or column, from a face of the block on, that may be for seams
 
 /// Makes splats of slabs.
 class SplatStream {
@@ -40,52 +39,64 @@ class SplatStream {
         }) {
     corrections_.octants = pass.octants;
     corrections_.growth_codes = !pass.values_alone;
+    if (pass.notes.from) before_ = *pass.notes.from;
+    before_.handedness.resize(blocks_->size());
   }
 
+  enum class Send {
+    kAll,
+    kSeams,  // the others were sent before
+  };
+
   /// `covered`: of the slab, as BlockOwners::cover() sets it.
-  void add(const LoadedSlab& loaded, std::span<const uint64_t> covered) {
+  void add(const LoadedSlab& loaded, std::span<const uint64_t> covered, Send what) {
     const Slab& slab = loaded.slab;
     const GridBlock& block = (*blocks_)[slab.block];
-    const uint64_t row_nodes = slab.box.rowNodes(block.ni);
-    const std::vector<NodeBox> boxes = cutForTasks(row_nodes, slab.box, kNodesPerTask);
-    const uint64_t parts = (row_nodes + kNodesOfRowPerTask - 1) / kNodesOfRowPerTask;
-    tbb::parallel_for(size_t{0}, boxes.size() * parts, [&](size_t task) {
+    const std::vector<Task> tasks = tasksOf(slab.box, block, what);
+    tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t n) {
       progress_->throwIfStopped();
       const TraceScope trace("make splats");
-      const uint64_t i0 = slab.box.i0 + task % parts * kNodesOfRowPerTask;
-      const uint64_t i1 = std::min(i0 + kNodesOfRowPerTask, slab.box.i1);
-      const NodeBox& box = boxes[task / parts];
-      BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes, i0, i1};
+      const Task& task = tasks[n];
+      BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes, task.i0, task.i1};
       if (!covered.empty()) window.covered = covered.data();
       Worker& worker = workers_.local();
       if (centring_ == Centring::kCell)
-        computeCellSplats(window, box, {slab.block, faces_}, worker.cells, worker.splats);
+        computeCellSplats(window, task.box, {slab.block, faces_}, worker.cells, worker.splats);
       else
-        computeNodeSplats(window, box, worker.nodes, worker.splats, corrections_);
-      worker.degenerate += worker.splats.degenerate;
-      worker.handedness[slab.block].right += worker.splats.right_handed;
-      worker.handedness[slab.block].left += worker.splats.left_handed;
-      send(worker.splats);
+        computeNodeSplats(window, task.box, worker.nodes, worker.splats, corrections_);
+      if (what == Send::kAll) {
+        worker.degenerate += worker.splats.degenerate;
+        worker.handedness[slab.block].right += worker.splats.right_handed;
+        worker.handedness[slab.block].left += worker.splats.left_handed;
+      }
+      send(worker.splats, what);
     });
+  }
+
+  /// Of all that was sent. Not while slabs are added.
+  ScatterState state() const {
+    ScatterState state = before_;
+    for (const Worker& worker : workers_) {
+      state.degenerate += worker.degenerate;
+      for (size_t block = 0; block < state.handedness.size(); ++block) {
+        state.handedness[block].right += worker.handedness[block].right;
+        state.handedness[block].left += worker.handedness[block].left;
+      }
+    }
+    return state;
   }
 
   /// All ranks have to call it.
   ScatterCounts counts(Ranks* ranks) const {
-    ScatterCounts counts;
-    std::vector<Handedness> of_blocks(blocks_->size());
-    for (const Worker& worker : workers_) {
-      counts.degenerate += worker.degenerate;
-      for (size_t block = 0; block < of_blocks.size(); ++block) {
-        of_blocks[block].right += worker.handedness[block].right;
-        of_blocks[block].left += worker.handedness[block].left;
-      }
-    }
+    ScatterState all = state();
     if (ranks) {
       static_assert(sizeof(Handedness) == 2 * sizeof(uint64_t));
-      ranks->sum(std::span(&counts.degenerate, 1));
-      ranks->sum(std::span(&of_blocks.front().right, 2 * of_blocks.size()));
+      ranks->sum(std::span(&all.degenerate, 1));
+      ranks->sum(std::span(&all.handedness.front().right, 2 * all.handedness.size()));
     }
-    for (const Handedness& of_block : of_blocks) counts.inverted += std::min(of_block.right, of_block.left);
+    ScatterCounts counts{all.degenerate, 0};
+    for (const Handedness& of_block : all.handedness)
+      counts.inverted += std::min(of_block.right, of_block.left);
     return counts;
   }
 
@@ -99,17 +110,45 @@ class SplatStream {
     std::vector<Handedness> handedness;  // [block]
   };
 
+  /// The nodes i0 .. i1 - 1 of each row of a box.
+  struct Task {
+    NodeBox box;
+    uint64_t i0, i1;
+  };
+
+  static std::vector<Task> tasksOf(const NodeBox& slab, const GridBlock& block, Send what) {
+    std::vector<Task> tasks;
+    for (const NodeBox& box : cutForTasks(slab.rowNodes(block.ni), slab, kNodesPerTask)) {
+      const auto add = [&](uint64_t begin, uint64_t end) {
+        for (uint64_t i0 = begin; i0 < end; i0 += kNodesOfRowPerTask)
+          tasks.push_back({box, i0, std::min(i0 + kNodesOfRowPerTask, end)});
+      };
+      const auto isInside = [](uint64_t begin, uint64_t end, uint64_t nodes) {
+        return begin >= kSeamReach && end + kSeamReach <= nodes;
+      };
+      const uint64_t i0 = slab.i0, i1 = std::min(slab.i1, block.ni);
+      if (what == Send::kAll || !isInside(box.j0, box.j1, block.nj) || !isInside(box.k0, box.k1, block.nk)) {
+        add(i0, i1);
+      } else {
+        const uint64_t first_end = std::clamp(kSeamReach, i0, i1);
+        add(i0, first_end);
+        add(std::clamp(block.ni - std::min(block.ni, kSeamReach), first_end, i1), i1);
+      }
+    }
+    return tasks;
+  }
+
   std::span<const SplatScalar> valuesOf(const NodeSplats& splats, size_t n) const {
     return std::span(splats.values).subspan(n * variables_, variables_);
   }
 
-  void send(const NodeSplats& splats) {
+  void send(const NodeSplats& splats, Send what) {
     SplatSink& sink = (*sink_of_thread_)();
     bool has_faces = false;
     for (size_t n = 0; n < splats.splats.size(); ++n) {
       if (splats.splats[n].isForSeams())
         has_faces = true;
-      else
+      else if (what == Send::kAll)
         sink.add(splats.splats[n], valuesOf(splats, n));
     }
     if (!has_faces) return;
@@ -125,6 +164,7 @@ class SplatStream {
   const AbuttingFaces* faces_;
   const SinkOfThread* sink_of_thread_;
   NodeSplatCorrections corrections_;
+  ScatterState before_;  // of an interrupted run
   Mutex adding_to_seams_;
   SeamMerger* seams_ PT_GUARDED_BY(adding_to_seams_);
   tbb::enumerable_thread_specific<Worker> workers_;
@@ -143,10 +183,11 @@ class RecordSink : public SplatSink {
     router_.add(record_, position);
   }
 
-  /// Sends what is gathered, and adds what was sent to the contents.
-  void finish() {
+  /// Sends what is gathered, and adds what was sent since the last call to the contents.
+  void flush() {
     router_.flush();
-    for (size_t node = 0; node < contents_->size(); ++node) (*contents_)[node].add(router_.contents()[node]);
+    for (size_t node = 0; node < contents_->size(); ++node)
+      (*contents_)[node].add(std::exchange(router_.contents()[node], {}));
   }
 
  private:
@@ -156,14 +197,23 @@ class RecordSink : public SplatSink {
   std::vector<std::byte> record_;
 };
 
-/// What `run` returns, which gets the sinks.
-template <typename Run>
-auto withSinks(const SplatTarget& target, const Run& run) {
-  tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(target); });
-  const auto result = run([&]() -> SplatSink& { return sinks.local(); });
-  for (RecordSink& sink : sinks) sink.finish();
-  return result;
-}
+/// The sinks of all threads.
+class RecordSinks {
+ public:
+  explicit RecordSinks(const SplatTarget& target)
+      : sinks_([&target] { return RecordSink(target); }),
+        of_thread_([this]() -> SplatSink& { return sinks_.local(); }) {}
+
+  const SinkOfThread& ofThread() const { return of_thread_; }
+  /// To be called at the end, and at any time when no thread adds to its sink.
+  void flush() {
+    for (RecordSink& sink : sinks_) sink.flush();
+  }
+
+ private:
+  tbb::enumerable_thread_specific<RecordSink> sinks_;
+  const SinkOfThread of_thread_;
+};
 
 }  // namespace
 
@@ -188,28 +238,56 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
   SplatStream splats(reader, faces, sink_of_thread, seams, pass);
   SlabShare share = shareOf(pass.ranks);
   share.whole_rows = pass.see != nullptr;  // a checksum of the grid needs them
-  SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo,
-                   share);
+  const bool cells = reader.centring() == Centring::kCell;
+  if (pass.notes.from) slab_bytes = pass.notes.from->slab_bytes;
+  const uint64_t sent = pass.notes.from ? pass.notes.from->slabs : 0;
+  SlabStream slabs(reader, slab_bytes, cells ? kCellSplatHalo : kNodeSplatHalo, share);
   std::vector<uint64_t> covered;
-  while (const LoadedSlab* loaded = slabs.next()) {
+  for (uint64_t n = 0; const LoadedSlab* loaded = slabs.next(); ++n) {
     if (pass.see) {
       const TraceScope trace("see slab");
       pass.see(*loaded);
     }
     if (pass.owners) pass.owners->cover(*loaded, covered);
-    splats.add(*loaded, covered);
+    if (n >= sent)
+      splats.add(*loaded, covered, SplatStream::Send::kAll);
+    else if (!cells)  // which have no seams
+      splats.add(*loaded, covered, SplatStream::Send::kSeams);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
-    pass.progress.advance(rowsOf(loaded->slab.box) * loaded->slab.box.rowNodes(block.ni));
+    const uint64_t nodes = rowsOf(loaded->slab.box) * loaded->slab.box.rowNodes(block.ni);
+    if (n < sent) {
+      pass.progress.skip(nodes);
+      continue;
+    }
+    pass.progress.advance(nodes);
+    if (!pass.notes.is_due || !pass.notes.is_due()) continue;
+    ScatterState state = splats.state();
+    state.slab_bytes = slab_bytes;
+    state.slabs = n + 1;
+    pass.notes.note(state);
   }
   return splats.counts(pass.ranks);
 }
 
-ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {
-  return withSinks(target, [&](const SinkOfThread& sinks) { return origin.scatter(sinks, progress); });
+ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, const ScatterNotes& notes,
+                            Progress& progress) {
+  RecordSinks sinks(target);
+  ScatterNotes complete = notes;
+  complete.note = [&](const ScatterState& state) {
+    sinks.flush();
+    target.file->flush();
+    notes.note(state);
+  };
+  const ScatterCounts counts = origin.scatter(sinks.ofThread(), complete, progress);
+  sinks.flush();
+  return counts;
 }
 
 uint64_t scatterRest(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {
-  return withSinks(target, [&](const SinkOfThread& sinks) { return origin.finish(sinks, progress); });
+  RecordSinks sinks(target);
+  const uint64_t merged = origin.finish(sinks.ofThread(), progress);
+  sinks.flush();
+  return merged;
 }
 
 }  // namespace curvisplat

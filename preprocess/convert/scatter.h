@@ -34,7 +34,7 @@ class RecordRouter {
   /// Sends what is gathered. To be called at the end.
   void flush();
   /// [node of the tree]: what went to each leaf.
-  const std::vector<CellContents>& contents() const { return contents_; }
+  std::vector<CellContents>& contents() { return contents_; }
 
  private:
   const BucketTree* tree_;
@@ -55,6 +55,7 @@ struct SlabPass {
       see;                        // each slab, in order, before its splats are made; may be empty
   BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
   Ranks* ranks = nullptr;         // of which each makes the splats of a share; the counts are the whole's
+  ScatterNotes notes;             // of a scatter() without ranks
   bool octants = true;            // NodeSplatCorrections::octants
   bool values_alone = false;      // are wanted: NodeSplatCorrections::growth_codes
 };
@@ -73,8 +74,10 @@ struct SplatTarget {
   std::vector<CellContents>* contents = nullptr;  // [node of the tree]: what was routed is added
 };
 
-/// Routes all splats that the origin makes in scatter().
-ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, Progress& progress);
+/// Routes all splats that the origin makes in scatter(). When it notes how far it has come, all splats until then are in
+/// the file and in the target's contents.
+ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, const ScatterNotes& notes,
+                            Progress& progress);
 
 /// Routes those that it makes in finish(). Returns how many samples were merged into another one.
 uint64_t scatterRest(SplatOrigin& origin, const SplatTarget& target, Progress& progress);

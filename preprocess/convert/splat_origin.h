@@ -7,7 +7,8 @@
 //    scatter()  --> splats, from any number of threads
 //    finish()   --> the splats that had to wait for all others
 //
-// and writeFaces(). A conversion that is resumed calls none of the others once all splats are on disk.
+// and writeFaces(). A conversion that is resumed calls none of the others once all splats are on disk. While only
+// some are, survey() comes again, and scatter() goes on.
 #pragma once
 
 #include <cstdint>
@@ -44,6 +45,28 @@ struct TemporaryNeeds {
   uint64_t before_splats = 0,
            beside_splats = 0;  // until the first splat is made, and from there until the last one
   uint64_t lasting = 0;        // until the cache is done
+};
+
+/// Cells of each handedness.
+struct Handedness {
+  uint64_t right = 0, left = 0;
+};
+
+/// How far scatter() has come: all that it makes of the first `slabs` was sent, but what waits for finish().
+struct ScatterState {
+  uint64_t slab_bytes = 0;  // that the grid was cut into slabs for
+  uint64_t slabs = 0;
+  uint64_t degenerate = 0;
+  std::vector<Handedness> handedness;  // [block]
+};
+
+/// For a scatter() that may be interrupted: where it goes on, and how it notes what is done.
+struct ScatterNotes {
+  const ScatterState* from = nullptr;  // null: at the beginning
+  /// Whether it is time for a note; empty: never.
+  std::function<bool()> is_due;
+  /// Called by the thread of scatter() while no splat is being made.
+  std::function<void(const ScatterState&)> note;
 };
 
 struct ScatterCounts {
@@ -87,7 +110,9 @@ class SplatOrigin {
   virtual bool cutsOctants() const { return false; }
   /// Counts the splats by cells of `root`, about: a wrong count makes buckets of uneven sizes, no other cache.
   virtual void count(const RootCube& root, CountingGrid& counts, Progress& progress) = 0;
-  virtual ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) = 0;
+  /// An origin need not note anything. Where it goes on, survey() has been called, too.
+  virtual ScatterCounts scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
+                                Progress& progress) = 0;
   /// Returns how many samples became part of another one's splat.
   virtual uint64_t finish(const SinkOfThread&, Progress&) { return 0; }
   /// At any time, after a resumed conversion too: writes the surfaces of what the splats fill, if it has any.
