@@ -129,7 +129,7 @@ class Addition {
 
   void survey() {
     if (grid_) {
-      survey_ = surveyGrid(*reader_, plan_.slab_bytes, nullptr, progress_, ranks_);
+      survey_ = surveyGrid(*reader_, plan_.slab_bytes, {}, progress_, ranks_);
       return;
     }
     if (isFirst()) survey_ = origin_->survey(progress_);

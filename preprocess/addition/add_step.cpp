@@ -186,8 +186,7 @@ class StepAddition {
     if (grid_) scratch_.reset();
     GridSurvey survey;
     pass("scan", report_.nodes, "nodes", [&] {
-      survey =
-          grid_ ? surveyGrid(*reader_, plan_.slab_bytes, nullptr, progress_) : origin_->survey(progress_);
+      survey = grid_ ? surveyGrid(*reader_, plan_.slab_bytes, {}, progress_) : origin_->survey(progress_);
     });
     checkRanges(survey, source_.description(), scalars_);
     ranges_ = survey.ranges;

@@ -209,7 +209,8 @@ class Conversion {
 
   void count() {
     if (takeUpScattered()) return;
-    CountingGrid counts(countingLevel(nodes_, splats_.survey.upper - splats_.survey.lower),
+    const uint64_t counted = nodes_ / origin_->splatsPerCounted();
+    CountingGrid counts(countingLevel(counted, splats_.survey.upper - splats_.survey.lower),
                         plan_.counting_bytes);
     if (makesSplats()) origin_->count(root_, counts, progress_);
     if (ranks_ && shares_splats_) sendCountsToFirst(counts, *ranks_);

@@ -3,6 +3,7 @@
 // allows where the data are, whatever their clustering.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -60,6 +61,11 @@ class VoxelRuns {
     if (runs_.empty() || !isSame(runs_.back().voxel, cell.at) || runs_.back().count == UINT32_MAX)
       runs_.push_back({cell.at, 0});
     ++runs_.back().count;
+  }
+  /// Each position stands for so many.
+  void multiply(uint32_t factor) {
+    for (VoxelRun& run : runs_)
+      run.count = static_cast<uint32_t>(std::min<uint64_t>(uint64_t{run.count} * factor, UINT32_MAX));
   }
   uint32_t level() const { return level_; }
   std::span<const VoxelRun> runs() const { return runs_; }

@@ -56,6 +56,14 @@ SlabBuffers GridOrigin::smallSlabs(Halo halo) const {
                      std::min<uint64_t>({2 * plan_.slab_bytes / bytes - 1, plan_.threads, kMaxReaders}))};
 }
 
+/// Fits in half of what counting may take, which it needs only after the slabs of the survey are gone.
+PositionSample GridOrigin::newSample() const {
+  constexpr uint64_t kMost = uint64_t{1} << 21;
+  uint64_t nodes = 0;
+  for (const GridBlock& block : blocks()) nodes += block.nodes();
+  return {nodes, std::clamp<uint64_t>(plan_.counting_bytes / 2 / PositionSample::kBytesEach, 1024, kMost)};
+}
+
 bool GridOrigin::shareWith(Ranks& ranks) {
   ranks_ = &ranks;
   plan_.slab_bytes = slabBytesOfRanks(reader_, plan_.slab_bytes, ranks);
@@ -66,7 +74,13 @@ GridSurvey GridOrigin::survey(Progress& progress) {
   if (centring() == Centring::kCell)
     faces_ = std::make_unique<AbuttingFaces>(blocks(), description().coordinate_bytes,
                                              plan_.seam_bytes - needsOfFaces().memory_bytes, scratch_);
-  GridSurvey survey = surveyGrid(reader_, smallSlabs(kNoHalo), faces_.get(), progress, ranks_);
+  sample_ = newSample();
+  // Less would not tell how full a bucket gets within the margin that buckets are planned with.
+  constexpr uint64_t kLeastInBucket = 2000;
+  if (sample_->nodesEach() > 1 && plan_.plannedBucketSplats() / sample_->nodesEach() < kLeastInBucket)
+    sample_.reset();
+  GridSurvey survey = surveyGrid(reader_, smallSlabs(kNoHalo), {faces_.get(), sample_ ? &*sample_ : nullptr},
+                                 progress, ranks_);
   if (faces_) faces_->match(progress);
   has_values_everywhere_ = survey.blanked.by_value == 0 && survey.blanked.not_finite == 0;
   if (!ranks_ || ranks_->isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.slab_bytes, progress);
@@ -92,6 +106,12 @@ std::string GridOrigin::overlap() const {
 }
 
 void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
+  if (sample_) {
+    const bool is_of_share = centring() == Centring::kNode;
+    if (!ranks_ || is_of_share || ranks_->isFirst()) countSample(*sample_, root, counts);
+    sample_.reset();
+    return;
+  }
   // Adding up keeps one thread busy for longer than reading does another.
   countNodes(reader_.source(), root, smallSlabs(kNoHalo).slab_bytes, counts, progress, shareOf(ranks_));
 }

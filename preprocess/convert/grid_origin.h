@@ -13,6 +13,7 @@
 #include "preprocess/overset/block_owners.h"
 #include "preprocess/splats/abutting_faces.h"
 #include "preprocess/splats/seams.h"
+#include "preprocess/survey/position_sample.h"
 
 namespace curvisplat {
 
@@ -38,6 +39,7 @@ class GridOrigin final : public SplatOrigin {
   std::vector<std::string> notes() override;
   std::string overlap() const override;
   bool cutsOctants() const override { return centring() == Centring::kNode; }
+  uint32_t splatsPerCounted() const override { return sample_ ? sample_->nodesEach() : 1; }
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
                         Progress& progress) override;
@@ -49,6 +51,7 @@ class GridOrigin final : public SplatOrigin {
  private:
   AbuttingFaces::Needs needsOfFaces() const;
   SlabBuffers smallSlabs(Halo halo) const;
+  PositionSample newSample() const;
 
   bool hasOwners() const { return overlap_ == Overlap::kOwner && !overlaps_.empty(); }
 
@@ -60,6 +63,7 @@ class GridOrigin final : public SplatOrigin {
   std::vector<BlockOverlap> overlaps_;
   bool has_values_everywhere_ = false;    // where the grid has nodes
   std::unique_ptr<AbuttingFaces> faces_;  // of cells
+  std::optional<PositionSample> sample_;  // from survey() to count(), if it is large enough to plan by
   std::unique_ptr<SeamMerger> seams_;     // of nodes
 };
 

@@ -13,7 +13,6 @@
 
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/survey/cell_survey.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/trace.h"
@@ -108,10 +107,10 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description) {
                 kSmallestExtent, kLargestExtent);
 }
 
-GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, AbuttingFaces* faces,
+GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const SurveyExtras& extras,
                       Progress& progress, Ranks* ranks) {
   if (reader.centring() == Centring::kCell) {
-    const GridSurvey survey = surveyCells(reader, slabs.slab_bytes, faces, progress);
+    const GridSurvey survey = surveyCells(reader, slabs.slab_bytes, extras, progress);
     checkExtent(survey, reader.source().description());
     return survey;
   }
@@ -135,7 +134,9 @@ GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, Abutti
         unitedSurvey);
     of_slab.nodes = count;
     of_slab.blanked = loaded->blanked;
-    checksum.add(*loaded, reader.source().description().blocks[loaded->slab.block]);
+    const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
+    checksum.add(*loaded, block);
+    if (extras.sample) extras.sample->add(*loaded, block);
     survey = unitedSurvey(std::move(survey), of_slab);
     progress.advance(count);
   }
@@ -167,6 +168,19 @@ void countNodes(const GridSource& source, const RootCube& root, const SlabBuffer
     progress.advance(loaded->nodes.x.size());
   }
   counter.finish();
+}
+
+void countSample(const PositionSample& sample, const RootCube& root, CountingGrid& counts) {
+  const TraceScope trace("count sample");
+  constexpr size_t kAtOnce = 4096;
+  const std::span<const glm::dvec3> positions = sample.positions();
+  for (size_t begin = 0; begin < positions.size(); begin += kAtOnce) {
+    VoxelRuns runs(counts.level());
+    for (const glm::dvec3& position : positions.subspan(begin, std::min(kAtOnce, positions.size() - begin)))
+      runs.add(root.fromWorld(position));
+    runs.multiply(sample.nodesEach());
+    counts.add(runs.level(), runs.runs());
+  }
 }
 
 uint32_t countingLevel(uint64_t nodes, const glm::dvec3& extent) {

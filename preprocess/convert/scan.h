@@ -10,6 +10,7 @@
 #include "preprocess/convert/counting_grid.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/survey/cell_survey.h"
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"
@@ -17,14 +18,12 @@
 
 namespace curvisplat {
 
-class AbuttingFaces;
-
 /// Reads all nodes once. Memory: the slabs. Throws Error if no node is there, or if the grid is larger or
-/// smaller than single precision can say. Where scalars are cell-centred, those at the blocks' ends are added
-/// to `faces`, unless that is null.
+/// smaller than single precision can say.
 ///
-/// With `ranks` each reads a share of the nodes, and all get the result. Cells are read by every rank as a whole.
-GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, AbuttingFaces* faces,
+/// With `ranks` each reads a share of the nodes, and all get the result; the sample is of the share. Cells are read by every
+/// rank as a whole.
+GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const SurveyExtras& extras,
                       Progress& progress, Ranks* ranks = nullptr);
 
 /// Throws Error if no sample is left, or if the grid is larger or smaller than single precision can say.
@@ -40,6 +39,9 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
 /// `share`: those of a part of the grid's slabs.
 void countNodes(const GridSource& source, const RootCube& root, const SlabBuffers& slabs,
                 CountingGrid& counts, Progress& progress, const SlabShare& share = {});
+
+/// The same from a sample, without reading.
+void countSample(const PositionSample& sample, const RootCube& root, CountingGrid& counts);
 
 /// The level to begin counting at: of voxels that nodes spread evenly over a box of `extent` would have to themselves. Nodes
 /// may lie thousands of times as densely without more of them in a voxel than in a bucket.

@@ -108,6 +108,8 @@ class SplatOrigin {
   virtual std::string overlap() const { return ""; }
   /// Whether splats lose what reaches into blanked cells (kCellOctants).
   virtual bool cutsOctants() const { return false; }
+  /// As one in how many splats count() looks at, the same at all ranks. After survey().
+  virtual uint32_t splatsPerCounted() const { return 1; }
   /// Counts the splats by cells of `root`, about: a wrong count makes buckets of uneven sizes, no other cache.
   virtual void count(const RootCube& root, CountingGrid& counts, Progress& progress) = 0;
   /// An origin need not note anything. Where it goes on, survey() has been called, too.

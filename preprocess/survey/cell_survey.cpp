@@ -49,8 +49,9 @@ bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane
 
 }  // namespace
 
-GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
+GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, const SurveyExtras& extras,
                        Progress& progress) {
+  AbuttingFaces* const faces = extras.faces;
   Mutex adding_faces;  // guards *faces
   GridSurvey nothing;
   nothing.ranges.resize(reader.scalars());
@@ -99,6 +100,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
             },
             unitedSurvey));
     checksum.add(*loaded, block);
+    if (extras.sample) extras.sample->add(*loaded, block);
     progress.advance(rowsOf(slab.box) * row_nodes);
   }
   survey.grid_checksum = checksum.value();

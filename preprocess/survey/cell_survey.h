@@ -3,14 +3,21 @@
 
 #include "preprocess/splats/abutting_faces.h"
 #include "preprocess/survey/grid_survey.h"
+#include "preprocess/survey/position_sample.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
 
+/// What a survey fills beside its result; null: not that.
+struct SurveyExtras {
+  AbuttingFaces* faces = nullptr;  // of cells
+  PositionSample* sample = nullptr;
+};
+
 /// surveyGrid() (preprocess/convert/scan.h) for a reader of cell-centred scalars. Counts, bounds (of the
 /// corners) and ranges refer to cells. A cell with a blanked corner or without a value counts as blanked by
-/// the grid. The faces of all other cells at the ends of their blocks are added to `faces` unless it is null.
-GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
+/// the grid. The extra faces are those of all other cells at the ends of their blocks.
+GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, const SurveyExtras& extras,
                        Progress& progress);
 
 }  // namespace curvisplat

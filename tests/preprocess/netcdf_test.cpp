@@ -152,7 +152,7 @@ TEST_P(Netcdf, AGridWithoutAnyValueIsExplained) {
   const NodeReader reader(*source, {0}, std::nullopt);
   Progress progress;
   try {
-    surveyGrid(reader, 1 << 20, nullptr, progress);
+    surveyGrid(reader, 1 << 20, {}, progress);
     FAIL();
   } catch (const Error& error) {
     const std::string words = error.what();

@@ -174,8 +174,8 @@ TEST_F(ResumeScatter, AgainAndAgain) {
   uint64_t slabs = 0;
   int further = 0;
   interruptInScatter(source, writes);
-  for (int turn = 0; turn < 4; ++turn) {
-    if (turn > 0 && !interruptedInScatter(source, 12, true)) break;
+  for (int turn = 0; turn < 12; ++turn) {
+    if (turn > 0 && !interruptedInScatter(source, 8 + 2 * turn, true)) break;
     const uint64_t now = readJournal(partial())->splats->unfinished->slabs;
     EXPECT_GE(now, slabs);
     further += now > slabs;
