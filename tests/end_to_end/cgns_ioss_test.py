@@ -129,6 +129,18 @@ class CgnsIoss(StructuredFormats):
                 CellCenter=["Null", "CellCenterSolutionAtStep2", "CellCenterSolutionAtStep3"], **flow))
             self.expect_steps(steps)
 
+    def test_pointers_alone_that_name_nothing(self):
+        """Without a table for each location the numbers of IOSS tell the steps, in descriptors or at the ends of names."""
+        block = Block()
+        steps = [Step(block, c=False), Step(block), Step(block)]
+        for habits in ({}, {"descriptor": None}, {"numbers": [9, 10, 11]}):
+            with self.subTest(habits):
+                self.write(block, steps, self.tables(Flow=[f"SolutionAtStep{n}" for n in (1, 2, 3)]), **habits)
+                self.expect_steps(steps)
+        # No numbers: which solution is which step is a guess.
+        self.write(block, steps, self.tables(Flow=["A", "B", "C"]), descriptor=None, names="{}Solution{}")
+        self.expect_line(self.path, words="names A for time step 0, but the zone has no such node")
+
     def test_conditions_of_families(self):
         """Notes name them, and the cache has their faces."""
         block = Block()

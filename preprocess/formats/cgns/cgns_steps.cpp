@@ -41,12 +41,16 @@ std::vector<std::vector<std::string>> zonesOfSteps(const CgnsFile& file, const C
   return zones;
 }
 
+bool isNull(const std::string& name) {
+  return name.empty() || name == "Null";
+}
+
 /// The node that a table of names, one per time step, names for `step`; null where the entry is "Null".
 const CgnsNode* pointedAt(const CgnsFile& file, const std::vector<CgnsNode>& zone, const CgnsNode& pointers,
                           size_t steps, uint32_t step) {
   const std::vector<std::string> names = file.texts(pointers);
   checkCount(file, pointers, names.size(), steps);
-  if (step >= names.size() || names[step].empty() || names[step] == "Null") return nullptr;
+  if (step >= names.size() || isNull(names[step])) return nullptr;
   const CgnsNode* const node = named(zone, names[step].c_str());
   if (!node)
     throw Error("{}: {} names {} for time step {}, but the zone has no such node", file.path().string(),
@@ -58,31 +62,6 @@ struct StepOf {
   size_t steps;
   uint32_t step;
 };
-
-/// Adds the solutions of a step that FlowSolutionPointers names. IOSS has a table of its own for each location
-/// besides (VertexSolutionPointers, CellCenterSolutionPointers), and FlowSolutionPointers may then name
-/// nothing that exists. False if there is no such table.
-bool pointedSolutions(const CgnsFile& file, const std::vector<CgnsNode>& zone,
-                      const std::vector<CgnsNode>& data, const StepOf& at, std::vector<CgnsNode>& solutions) {
-  const CgnsNode* const standard = named(data, "FlowSolutionPointers");
-  bool other = false;
-  for (const CgnsNode& pointers : data) {
-    if (!pointers.name.ends_with("SolutionPointers") || &pointers == standard) continue;
-    other = true;
-    if (const CgnsNode* const solution = pointedAt(file, zone, pointers, at.steps, at.step))
-      solutions.push_back(*solution);
-  }
-  if (!standard) return other;
-  if (other) {
-    const std::vector<std::string> names = file.texts(*standard);
-    const bool known = at.step < names.size() && named(zone, names[at.step].c_str());
-    if (!known) return true;
-  }
-  const CgnsNode* const solution = pointedAt(file, zone, *standard, at.steps, at.step);
-  const auto listed = [&](const CgnsNode& one) { return one.path == solution->path; };
-  if (solution && std::none_of(solutions.begin(), solutions.end(), listed)) solutions.push_back(*solution);
-  return true;
-}
 
 /// Assigns each solution to the first time step that has none of its fields yet.
 std::vector<std::vector<CgnsNode>> inOrder(const CgnsFile& file, const std::vector<CgnsNode>& zone) {
@@ -149,6 +128,46 @@ std::vector<std::vector<CgnsNode>> asIossNumbers(const CgnsFile& file, const std
     for (auto& [step, solutions] : numbered) steps.push_back(std::move(solutions));
   }
   return steps;
+}
+
+/// Whether a table names nodes, and the zone has none of them.
+bool namesWhatIsNotThere(const CgnsFile& file, const std::vector<CgnsNode>& zone, const CgnsNode& pointers) {
+  std::vector<std::string> names = file.texts(pointers);
+  std::erase_if(names, [](const std::string& name) { return isNull(name); });
+  return !names.empty() && std::none_of(names.begin(), names.end(), [&](const std::string& name) {
+    return named(zone, name.c_str()) != nullptr;
+  });
+}
+
+/// Adds the solutions of a step that FlowSolutionPointers names. IOSS has a table of its own for each location
+/// besides (VertexSolutionPointers, CellCenterSolutionPointers), and FlowSolutionPointers may then name
+/// nothing that exists; without those tables, its numbers tell the steps. False if there is no such table.
+bool pointedSolutions(const CgnsFile& file, const std::vector<CgnsNode>& zone,
+                      const std::vector<CgnsNode>& data, const StepOf& at, std::vector<CgnsNode>& solutions) {
+  const CgnsNode* const standard = named(data, "FlowSolutionPointers");
+  bool other = false;
+  for (const CgnsNode& pointers : data) {
+    if (!pointers.name.ends_with("SolutionPointers") || &pointers == standard) continue;
+    other = true;
+    if (const CgnsNode* const solution = pointedAt(file, zone, pointers, at.steps, at.step))
+      solutions.push_back(*solution);
+  }
+  if (!standard) return other;
+  if (other) {
+    const std::vector<std::string> names = file.texts(*standard);
+    const bool known = at.step < names.size() && named(zone, names[at.step].c_str());
+    if (!known) return true;
+  } else if (at.step < at.steps && namesWhatIsNotThere(file, zone, *standard)) {
+    std::vector<std::vector<CgnsNode>> numbered = asIossNumbers(file, zone, at.steps);
+    if (numbered.size() == at.steps) {
+      solutions = std::move(numbered[at.step]);
+      return true;
+    }
+  }
+  const CgnsNode* const solution = pointedAt(file, zone, *standard, at.steps, at.step);
+  const auto listed = [&](const CgnsNode& one) { return one.path == solution->path; };
+  if (solution && std::none_of(solutions.begin(), solutions.end(), listed)) solutions.push_back(*solution);
+  return true;
 }
 
 }  // namespace
