@@ -144,6 +144,19 @@ TEST_F(SeriesCommand, AnInterruptedAdditionGoesOnWhereItStood) {
   const auto resumed = [&](int added_before) {
     const std::string cache = file("to.splats");
     run({"convert", file("f.xyz"), file("f_0000.fun"), file("f_0001.fun"), "-o", cache, "--overwrite"});
+TEST_F(SeriesCommand, PatternsLeaveOutCaches) {
+  generate("f", 3);
+  for (const char* step : {"0", "1", "2"})
+    fs::rename(file(std::string("f_000") + step + ".fun"), file(std::string("q.") + step));
+  const std::vector<std::string> words{"convert", file("f.xyz"), file("q.*"), "-o", file("q.splats")};
+  run(words);
+  for (const char* again : {"--resume", "--overwrite"}) {
+    std::vector<std::string> more = words;
+    more.push_back(again);
+    EXPECT_NE(run(more).out.find("3 steps"), std::string::npos);
+  }
+}
+
     // What an addition that was stopped after some of its steps leaves behind.
     for (int n = 0; n < added_before; ++n)
       run({"convert", "--add-steps", file("f.xyz"), file(fmt::format("f_{:04}.fun", 2 + n)), "--to", cache});

@@ -96,12 +96,19 @@ std::string patternOf(const fs::path& path) {
   return is_pattern ? pattern : "";
 }
 
+/// "q.splats", where the steps q.* are converted to, and what an interrupted conversion has left.
+bool isCache(const fs::directory_entry& entry) {
+  std::error_code error;
+  return entry.path().filename().string().find(".splats") != std::string::npos && entry.is_directory(error);
+}
+
 std::vector<fs::path> filesLike(const fs::path& path, const std::string& pattern) {
   std::vector<fs::path> files;
   std::error_code error;
   const fs::path folder = folderOf(path);
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
+    if (isCache(entry)) continue;
     if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0)
       files.push_back(path.has_parent_path() ? folder / name : fs::path(name));
   }

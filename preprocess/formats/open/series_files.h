@@ -39,8 +39,8 @@ StepSelection parseSteps(const std::string& option, const std::string& text);
 std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelection& selection,
                                     uint64_t count);
 
-/// Replaces patterns among the grid and the solutions by the files that match, in natural order. Throws Error if a
-/// pattern matches none. Where the grid is a pattern, the first file stays the grid and the others follow first
+/// Replaces patterns among the grid and the solutions by the files that match, in natural order; caches do not. Throws
+/// Error if a pattern matches none. Where the grid is a pattern, the first file stays the grid and the others follow first
 /// among the solutions.
 void expandPatterns(OpenGridOptions& options);
 
