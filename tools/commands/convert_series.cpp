@@ -128,7 +128,7 @@ void follow(const ConvertArguments& arguments) {
   const std::filesystem::path manifest = options.convert.output / "manifest.json";
   if (options.add || (options.convert.resume && std::filesystem::exists(manifest))) {
     const CacheReader cache(options.convert.output);
-    files.markDone(cache.seriesManifest().sources);
+    files.markDone(cache.seriesManifest().sources, options.convert.resume);
     steps = cache.series().steps.size();
     options.add = true;
   }
@@ -138,18 +138,19 @@ void follow(const ConvertArguments& arguments) {
       events.wait(files.untilNext(), progress);
       continue;
     }
-    progress.throwIfStopped();
-    const std::vector<StepFiles> one{*step};
-    if (!options.add) options.convert.title = titleOf(step->options);
-    SeriesInput input = seriesInput(arguments, one);
-    input.first_number = steps;
-    const SeriesReport report =
-        convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
-    if (report.converted > 0) fmt::print("step {}: {}\n", report.steps - 1, step->name);
-    std::fflush(stdout);
-    steps = report.steps;
-    options.add = true;
-    options.convert.overwrite = false;
+    for (const StepFiles& one : stepsIn(*step)) {
+      if (arguments.until && steps >= *arguments.until) break;
+      progress.throwIfStopped();
+      if (!options.add) options.convert.title = titleOf(one.options);
+      const std::vector<StepFiles> only{one};
+      const SeriesReport report = convertSeries(seriesInput(arguments, only), options, progress,
+                                                [&](const SeriesEvent& event) { log.add(event); });
+      if (report.converted > 0) fmt::print("step {}: {}\n", report.steps - 1, one.name);
+      std::fflush(stdout);
+      steps = report.steps;
+      options.add = true;
+      options.convert.overwrite = false;
+    }
   }
   fmt::print("{}: {}\n", options.convert.output.string(), countText(steps, "step"));
 }

@@ -1,6 +1,7 @@
 #include "tools/commands/written_files.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
@@ -47,6 +48,11 @@ std::vector<fs::path> foldersOf(const OpenGridOptions& options) {
   return folders;
 }
 
+void WrittenFiles::markDone(const std::vector<std::string>& files, bool but_the_last) {
+  done_.insert(files.begin(), files.end());
+  begins_at_last_ = but_the_last;
+}
+
 std::optional<StepFiles> WrittenFiles::next() {
   until_next_ = kLongestWait;
   std::vector<StepFiles> steps;
@@ -56,6 +62,11 @@ std::optional<StepFiles> WrittenFiles::next() {
     steps = stepsByName(files);
   } catch (const Error&) {
     return std::nullopt;  // none has been written yet, or not every kind of file
+  }
+  if (std::exchange(begins_at_last_, false)) {
+    const auto last = std::find_if(steps.rbegin(), steps.rend(),
+                                   [&](const StepFiles& step) { return done_.contains(step.name); });
+    if (last != steps.rend()) done_.erase(last->name);
   }
   for (const StepFiles& step : steps) {
     if (done_.contains(step.name)) continue;

@@ -20,7 +20,9 @@ class WrittenFiles {
   /// `options`, whose patterns are expanded at each look, outlive it.
   explicit WrittenFiles(const OpenGridOptions& options) : options_(options) {}
 
-  void markDone(const std::vector<std::string>& files) { done_.insert(files.begin(), files.end()); }
+  /// Steps of these files are not returned. With `but_the_last` the last step is: its file may hold several, and be done in
+  /// part.
+  void markDone(const std::vector<std::string>& files, bool but_the_last);
 
   /// The next step whose files are all written: none has changed for two seconds. nullopt if there is none yet.
   /// Steps come in their order.
@@ -30,7 +32,8 @@ class WrittenFiles {
 
  private:
   const OpenGridOptions& options_;
-  std::set<std::string> done_;  // names of steps
+  std::set<std::string> done_;   // names of steps
+  bool begins_at_last_ = false;  // of those that are done
   std::chrono::milliseconds until_next_{0};
 };
 

@@ -174,6 +174,16 @@ std::optional<uint64_t> numberOf(std::string_view text) {
   return number;
 }
 
+std::vector<StepFiles> stepsAt(size_t times, const StepFiles& files) {
+  if (times <= 1) return {files};
+  std::vector<StepFiles> steps(times, files);
+  for (size_t time = 0; time < times; ++time) {
+    steps[time].name += fmt::format(", time step {}", time);
+    steps[time].options.time_step = static_cast<uint32_t>(time);
+  }
+  return steps;
+}
+
 }  // namespace
 
 StepSelection parseSteps(const std::string& option, const std::string& text) {
@@ -259,23 +269,22 @@ std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
   return steps;
 }
 
-std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
-  std::vector<StepFiles> steps;
-  bool may_hold_several = true;
-  for (StepFiles& step : stepsByName(options)) {
-    size_t times = 1;
-    if (may_hold_several) {
-      times = std::max<size_t>(1, openData(step.options)->description().times.size());
-      // Files of one kind are alike: it is the first that tells whether they hold several steps.
-      may_hold_several = times > 1 || !steps.empty();
-    }
-    for (size_t time = 0; time < times; ++time) {
-      steps.push_back(step);
-      if (times == 1) continue;
-      steps.back().name += fmt::format(", time step {}", time);
-      steps.back().options.time_step = static_cast<uint32_t>(time);
-    }
+std::vector<StepFiles> stepsIn(const StepFiles& files) {
+  try {
+    return stepsAt(openData(files.options)->description().times.size(), files);
+  } catch (const Error&) {
+    return {files};  // the error is reported where the step is converted, or left out there
   }
+}
+
+std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
+  const std::vector<StepFiles> files = stepsByName(options);
+  const size_t times = openData(files.front().options)->description().times.size();
+  // Files of one kind are alike. Those of a kind that has no times, of which there may be many, are not opened.
+  if (times == 0) return files;
+  std::vector<StepFiles> steps = stepsAt(times, files.front());
+  for (size_t n = 1; n < files.size(); ++n)
+    for (StepFiles& step : stepsIn(files[n])) steps.push_back(std::move(step));
   return steps;
 }
 

@@ -50,8 +50,11 @@ bool hasSeveralStepFiles(const OpenGridOptions& options);
 /// The steps that the names of the files tell, without opening any but a SU2 mesh: a file with several steps counts as one.
 std::vector<StepFiles> stepsByName(const OpenGridOptions& options);
 
+/// The steps in one of these: one that cannot be opened counts as one.
+std::vector<StepFiles> stepsIn(const StepFiles& files);
+
 /// All steps of the files, whose patterns have been expanded. One at least. Opens files that may hold several
-/// steps. Throws Error.
+/// steps. Throws Error if the first cannot be opened.
 std::vector<StepFiles> stepsOf(const OpenGridOptions& options);
 
 }  // namespace curvisplat
