@@ -178,6 +178,8 @@ class StepAddition {
     }
     if (survey.grid_checksum.value() != expected) return false;
     ranges_ = survey.ranges;
+    } catch (const OutputError&) {
+      throw;
     finishValues(passes, cache_);
     return true;
   }

@@ -43,9 +43,7 @@ class SeriesConversion {
     } catch (const Interrupted& interrupted) {
       throw Interrupted(interrupted.signal(), whereItStands(interrupted.what()));
     }
-    if (times_.empty())
-      throw Error("{}: none of the {} steps could be converted", options_.convert.output.string(),
-                  input_.count);
+    if (times_.empty()) throw Error("{}: no step could be converted", options_.convert.output.string());
     sums_.steps = times_.size();
     return std::move(sums_);
   }
@@ -64,6 +62,8 @@ class SeriesConversion {
       throw;
     } catch (const UsageError&) {
       throw;
+    } catch (const OutputError& error) {
+      throw OutputError(whyNot(number, error.what()));
     } catch (const Error& error) {
       leaveOut(number, error.what());
     }
@@ -112,7 +112,7 @@ class SeriesConversion {
       const char* const advice =
           "; ranks that have begun to convert the first step cannot leave it out: choose "
           "another with --steps, or convert in one process";
-      throw Error("{}{}", refusal(number, error.what()), options_.keep_going ? advice : "");
+      throw Error("{}{}", whyNot(number, error.what()), options_.keep_going ? advice : "");
     }
   }
 
@@ -138,7 +138,7 @@ class SeriesConversion {
       });
       if (!theirs.error.empty() && next == ranges[rank].begin + theirs.steps.size())
         printMessage("warning: rank {} could not convert step {} ({}): {}; rank 0 tries again", rank,
-                     input_.first_number + next, input_.name(next), theirs.error);
+                     numberOf(next), input_.name(next), theirs.error);
     }
     std::vector<uint64_t> nexts{next};
     next = fromBytes<uint64_t>(ranks.broadcast(toBytes(nexts)))[0];
@@ -168,10 +168,11 @@ class SeriesConversion {
   }
 
   /// How many of the steps to add, from the first on, an interrupted addition of the same steps has added.
-  uint64_t stepsAddedBefore() const {
-    if (!options_.add || !options_.convert.resume) return 0;
+  uint64_t stepsAddedBefore() {
+    if (!options_.add) return 0;
     uint64_t number = 0;
-    while (number < input_.count && isInCache(number)) ++number;
+    while (options_.convert.resume && number < input_.count && isInCache(number)) ++number;
+    first_number_ = times_.size() - number;
     return number;
   }
 
@@ -322,23 +323,27 @@ class SeriesConversion {
 
   /// In messages.
   uint64_t numberOf(uint64_t number) const {
-    return input_.places.empty() ? input_.first_number + number : input_.places[number];
+    return input_.places.empty() ? first_number_ + number : input_.places[number];
   }
 
-  std::string refusal(uint64_t number, const std::string& reason) const {
+  std::string whyNot(uint64_t number, const std::string& reason) const {
     std::string text =
         fmt::format("{}: step {} ({}) cannot be converted: {}", options_.convert.output.string(),
                     numberOf(number), input_.name(number), reason);
     if (!times_.empty()) text += fmt::format("; the cache has {}", countText(times_.size(), "step"));
-    const bool may_leave_out = input_.places.empty() && !options_.keep_going;
-    if (!times_.empty() && may_leave_out) text += "; --keep-going leaves out such steps";
     return text;
+  }
+
+  /// Of a step that could be left out.
+  std::string refusal(uint64_t number, const std::string& reason) const {
+    const bool may_leave_out = !times_.empty() && input_.places.empty() && !options_.keep_going;
+    return whyNot(number, reason) + (may_leave_out ? "; --keep-going leaves out such steps" : "");
   }
 
   std::string whereItStands(const std::string& of_first) const {
     if (times_.empty()) return of_first;
-    return fmt::format("{}: interrupted after {} steps; continue with the same command and --resume",
-                       options_.convert.output.string(), times_.size());
+    return fmt::format("{}: interrupted after {}; continue with the same command and --resume",
+                       options_.convert.output.string(), countText(times_.size(), "step"));
   }
 
   const SeriesInput& input_;
@@ -350,8 +355,9 @@ class SeriesConversion {
   std::vector<std::string> names_;  // of the first step's blocks
   std::set<std::string> first_files_;
   bool names_said_ = false;
-  uint64_t known_ = 0;  // steps of the cache that the input has to begin with
-  uint64_t next_ = 0;   // of those, the next one
+  uint64_t first_number_ = 0;  // of the input's first step in the cache
+  uint64_t known_ = 0;         // steps of the cache that the input has to begin with
+  uint64_t next_ = 0;          // of those, the next one
   bool expect_new_geometry_ = false;
   Ranks* ranks_ = nullptr;  // null: this process alone
   SeriesReport sums_;

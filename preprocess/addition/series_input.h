@@ -14,7 +14,6 @@ namespace curvisplat {
 /// The steps of a series, in order.
 struct SeriesInput {
   uint64_t count = 0;
-  uint64_t first_number = 0;  // of the first step, in messages
   /// Names a step for messages: "q.0100" or "run.nc, time step 3".
   std::function<std::string(uint64_t)> name;
   /// Throws Error.

@@ -474,7 +474,10 @@ ConvertReport runConversion(const DataSource& source, const ConvertOptions& opti
         "{}: no room for the cache and its temporary files: {}; make room, or name a folder on another disk "
         "with --tmp",
         conversion.folderOf(full.file()).string(), full.reason());
-    throw Error("{}{}", text, options.resume && conversion.leaveForResuming() ? kKept : "");
+    throw OutputError("{}{}", text, options.resume && conversion.leaveForResuming() ? kKept : "");
+  } catch (const OutputError& error) {
+    if (options.resume && conversion.leaveForResuming()) throw OutputError("{}{}", error.what(), kKept);
+    throw;
   } catch (const Error& error) {
     if (options.resume && conversion.leaveForResuming()) throw Error("{}{}", error.what(), kKept);
     throw;

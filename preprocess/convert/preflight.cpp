@@ -47,8 +47,9 @@ std::optional<Disk> diskOf(const std::filesystem::path& folder) {
 void checkRoom(const std::filesystem::path& folder, const Disk& disk, uint64_t bytes, const char* what,
                const char* hint) {
   if (disk.free_bytes < bytes)
-    throw Error("{}: {} need about {}, but only {} are free; {}, or skip this check with --no-preflight",
-                folder.string(), what, byteText(bytes), byteText(disk.free_bytes), hint);
+    throw OutputError(
+        "{}: {} need about {}, but only {} are free; {}, or skip this check with --no-preflight",
+        folder.string(), what, byteText(bytes), byteText(disk.free_bytes), hint);
 }
 
 uint64_t withMargin(uint64_t temporary) {
@@ -86,9 +87,9 @@ DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables, size_t record_byt
 void checkWritable(const std::filesystem::path& folder, const char* hint) {
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error))
-    throw Error("{}: is not a folder{}", folder.string(), hint);
+    throw OutputError("{}: is not a folder{}", folder.string(), hint);
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
-    throw Error("{}: cannot be written to: {}{}", folder.string(), std::strerror(errno), hint);
+    throw OutputError("{}: cannot be written to: {}{}", folder.string(), std::strerror(errno), hint);
 }
 
 void checkOutput(const std::filesystem::path& output, bool overwrite,

@@ -9,11 +9,11 @@
 
 namespace curvisplat {
 
-class DiskFull : public Error {
+class DiskFull : public OutputError {
  public:
   /// `reason`: the system's words. `text`: the whole message, of this file.
   DiskFull(std::filesystem::path file, std::string reason, const std::string& text)
-      : Error(text), file_(std::move(file)), reason_(std::move(reason)) {}
+      : OutputError(text), file_(std::move(file)), reason_(std::move(reason)) {}
 
   const std::filesystem::path& file() const { return file_; }
   const std::string& reason() const { return reason_; }

@@ -34,4 +34,11 @@ class UsageError : public Error {
   using Error::Error;
 };
 
+/// What is written has failed, whatever is read: a disk, a folder, another program that changes the same cache. More input
+/// would fail in the same way.
+class OutputError : public Error {
+ public:
+  using Error::Error;
+};
+
 }  // namespace curvisplat

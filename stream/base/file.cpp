@@ -52,7 +52,7 @@ void syncRetrying(int fd, const std::filesystem::path& path) {
   } while (result < 0 && errno == EINTR);
   // EINVAL and ENOTSUP: the file system cannot sync a directory or a pipe. The disk has not failed.
   if (result < 0 && errno != EINVAL && errno != ENOTSUP)
-    throw Error("{}: cannot be synced to the disk: {}", path.string(), reason());
+    throw OutputError("{}: cannot be synced to the disk: {}", path.string(), reason());
 }
 
 }  // namespace
@@ -159,12 +159,12 @@ OutputFile::OutputFile(std::filesystem::path path, Caching caching, Existing exi
     : path_(std::move(path)) {
   const int empty = existing == Existing::kEmpty ? O_TRUNC : 0;
   fd_ = openWith(caching, path_, O_RDWR | O_CREAT | empty, 0666);
-  if (fd_ < 0) throw Error("{}: cannot be opened for writing: {}", path_.string(), reason());
+  if (fd_ < 0) throw OutputError("{}: cannot be opened for writing: {}", path_.string(), reason());
   struct stat status {};
   if (::fstat(fd_, &status) < 0) {
     const std::string why = reason();
     SystemCalls::current().close(std::exchange(fd_, -1));
-    throw Error("{}: cannot determine the file size: {}", path_.string(), why);
+    throw OutputError("{}: cannot determine the file size: {}", path_.string(), why);
   }
   size_ = static_cast<uint64_t>(status.st_size);
 }
@@ -200,7 +200,7 @@ void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
       const std::string text = fmt::format("{}: cannot write {} bytes at offset {}: {}", path_.string(),
                                            count, offset + done, why);
       if (full) throw DiskFull(path_, why, text);
-      throw Error(text);
+      throw OutputError(text);
     }
     done += static_cast<size_t>(put);
   }
@@ -216,7 +216,8 @@ void OutputFile::truncate(uint64_t size) {
   do {
     result = SystemCalls::current().truncate(fd_, static_cast<int64_t>(size));
   } while (result < 0 && errno == EINTR);
-  if (result < 0) throw Error("{}: cannot be truncated to {} bytes: {}", path_.string(), size, reason());
+  if (result < 0)
+    throw OutputError("{}: cannot be truncated to {} bytes: {}", path_.string(), size, reason());
   size_ = size;
 }
 
@@ -224,7 +225,7 @@ void OutputFile::close() {
   CURVISPLAT_CHECK(fd_ >= 0);
   syncRetrying(fd_, path_);
   if (SystemCalls::current().close(std::exchange(fd_, -1)) < 0 && errno != EINTR)
-    throw Error("{}: cannot be closed: {}", path_.string(), reason());
+    throw OutputError("{}: cannot be closed: {}", path_.string(), reason());
 }
 
 std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
@@ -246,7 +247,7 @@ void writeFileAtomically(const std::filesystem::path& path, std::span<const std:
     file.append(bytes);
     file.close();
     if (SystemCalls::current().rename(temporary.c_str(), path.c_str()) < 0)
-      throw Error("{}: cannot be renamed to {}: {}", temporary.string(), path.string(), reason());
+      throw OutputError("{}: cannot be renamed to {}: {}", temporary.string(), path.string(), reason());
   } catch (...) {
     removeAll(temporary);
     throw;
@@ -259,7 +260,7 @@ void writeFileAtomically(const std::filesystem::path& path, const std::string& t
 
 void syncDirectory(const std::filesystem::path& path) {
   const int fd = openRetrying(path, O_RDONLY | O_DIRECTORY, 0);
-  if (fd < 0) throw Error("{}: cannot be opened: {}", path.string(), reason());
+  if (fd < 0) throw OutputError("{}: cannot be opened: {}", path.string(), reason());
   try {
     syncRetrying(fd, path);
   } catch (...) {
@@ -271,12 +272,12 @@ void syncDirectory(const std::filesystem::path& path) {
 
 void makeFolder(const std::filesystem::path& path) {
   if (SystemCalls::current().mkdir(path.c_str(), 0777) < 0)
-    throw Error("{}: the directory cannot be created: {}", path.string(), reason());
+    throw OutputError("{}: the directory cannot be created: {}", path.string(), reason());
 }
 
 void removeFile(const std::filesystem::path& path) {
   if (SystemCalls::current().remove(path.c_str()) < 0)
-    throw Error("{}: cannot be removed: {}", path.string(), reason());
+    throw OutputError("{}: cannot be removed: {}", path.string(), reason());
 }
 
 std::error_code removeAll(const std::filesystem::path& path) noexcept {

@@ -19,16 +19,18 @@ CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manife
   // Opened for writing because network file systems require that for an exclusive lock.
   fd_ = openRetrying(manifest_, O_RDWR);
   if (fd_ < 0)
-    throw Error("{}: cannot be opened for writing: {}; expected a complete splat cache with write permission",
-                manifest_.string(), std::strerror(errno));
+    throw OutputError(
+        "{}: cannot be opened for writing: {}; expected a complete splat cache with write permission",
+        manifest_.string(), std::strerror(errno));
   if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 && isStillThere()) return;
   const bool is_busy = errno == EWOULDBLOCK;
   const std::string reason = std::strerror(errno);
   const bool is_there = isStillThere();
   SystemCalls::current().close(fd_);
   if (is_busy || !is_there)
-    throw Error("{}: another program is changing this cache; wait until it has finished", cache_.string());
-  throw Error("{}: cannot be locked: {}", manifest_.string(), reason);
+    throw OutputError("{}: another program is changing this cache; wait until it has finished",
+                      cache_.string());
+  throw OutputError("{}: cannot be locked: {}", manifest_.string(), reason);
 }
 
 CacheLock::~CacheLock() {
@@ -44,7 +46,7 @@ bool CacheLock::isStillThere() const {
 
 void CacheLock::requireStillThere() const {
   if (isStillThere()) return;
-  throw Error(
+  throw OutputError(
       "{}: another program has replaced the cache; the new cache was not changed: add the step to it again",
       cache_.string());
 }

@@ -52,7 +52,7 @@ std::error_code removeMarked(const fs::path& path) {
 }
 
 void requireRemoved(std::error_code error, const fs::path& path, const char* what) {
-  if (error) throw Error("{}: the {} cannot be removed: {}", path.string(), what, error.message());
+  if (error) throw OutputError("{}: the {} cannot be removed: {}", path.string(), what, error.message());
 }
 
 /// Text of the lock in `folder`; nullopt if it is missing, no regular file or too long for a mark. Throws Error
@@ -92,14 +92,15 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
   if (target.empty()) throw UsageError("the output has no name");
   if (!fs::exists(fs::symlink_status(target))) return;
   if (!overwrite)
-    throw Error("{}: exists already; choose another output, or replace it with --overwrite", target.string());
+    throw OutputError("{}: exists already; choose another output, or replace it with --overwrite",
+                      target.string());
   try {
     const fs::path manifest = target / "manifest.json";
     Manifest::fromJson(readTextFile(manifest), manifest);
   } catch (const OtherVersion&) {
     // Still a cache.
   } catch (const Error& error) {
-    throw Error(
+    throw OutputError(
         "{}: is not a complete splat cache and will not be overwritten; remove it, or choose another output "
         "({})",
         target.string(), error.what());
@@ -119,10 +120,11 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
   checkReplaceable(target_, overwrite);
   const bool is_new = SystemCalls::current().mkdir(path_.c_str(), 0777) == 0;
   if (!is_new && errno != EEXIST)
-    throw Error("{}: the directory cannot be created: {}; choose another output", path_.string(), reason());
+    throw OutputError("{}: the directory cannot be created: {}; choose another output", path_.string(),
+                      reason());
   if (!is_new && !isOurs(path_, target_))
-    throw Error("{}: exists and was not made by curvisplat; remove it, or choose another output",
-                path_.string());
+    throw OutputError("{}: exists and was not made by curvisplat; remove it, or choose another output",
+                      path_.string());
   try {
     lock(is_new);
     mark();
@@ -160,7 +162,7 @@ PartialFolder::~PartialFolder() {
 void PartialFolder::lock(bool is_new) {
   const fs::path name = path_ / kPartialLock;
   const int fd = openRetrying(name, O_RDWR | O_CREAT | O_NOFOLLOW, 0666);
-  if (fd < 0) throw Error("{}: cannot be opened: {}", name.string(), reason());
+  if (fd < 0) throw OutputError("{}: cannot be opened: {}", name.string(), reason());
   bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
   std::string why = reason();
   const bool busy = !locked && errno == EWOULDBLOCK;
@@ -180,11 +182,12 @@ void PartialFolder::lock(bool is_new) {
   }
   SystemCalls::current().close(fd);
   if (busy || locked)
-    throw Error("{}: another conversion to this output is running; wait for it, or choose another output",
-                path_.string());
+    throw OutputError(
+        "{}: another conversion to this output is running; wait for it, or choose another output",
+        path_.string());
   if (is_new) SystemCalls::current().remove(name.c_str());  // no other conversion can have locked it either
-  throw Error("{}: cannot be locked: {}; choose an output on a file system that supports flock",
-              name.string(), why);
+  throw OutputError("{}: cannot be locked: {}; choose an output on a file system that supports flock",
+                    name.string(), why);
 }
 
 void PartialFolder::mark() {
@@ -202,20 +205,20 @@ void PartialFolder::putIntoPlace() {
   const fs::path aside = withSuffix(target_, ".replaced");
   if (!fs::exists(fs::symlink_status(target_))) {
     if (calls.rename(path_.c_str(), target_.c_str()) < 0)
-      throw Error("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), reason());
+      throw OutputError("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), reason());
   } else if (calls.exchange(path_.c_str(), target_.c_str()) == 0) {
     replaced_ = path_;
   } else if (errno == EINVAL || errno == ENOSYS || errno == ENOTSUP) {
     if (calls.rename(target_.c_str(), aside.c_str()) < 0)
-      throw Error("{}: cannot be moved aside to {}: {}", target_.string(), aside.string(), reason());
+      throw OutputError("{}: cannot be moved aside to {}: {}", target_.string(), aside.string(), reason());
     if (calls.rename(path_.c_str(), target_.c_str()) < 0) {
       const std::string why = reason();
       calls.rename(aside.c_str(), target_.c_str());
-      throw Error("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), why);
+      throw OutputError("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), why);
     }
     replaced_ = aside;
   } else {
-    throw Error("{}: cannot replace {}: {}", path_.string(), target_.string(), reason());
+    throw OutputError("{}: cannot replace {}: {}", path_.string(), target_.string(), reason());
   }
   try {
     // Synced before the old cache is removed: a power loss must not lose both caches.

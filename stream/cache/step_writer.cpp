@@ -115,8 +115,8 @@ std::vector<FileInfo> StepWriter::finish() {
   lock_->requireStillThere();
   for (NewFile& file : files_) {
     if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
-      throw Error("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
-                  std::strerror(errno));
+      throw OutputError("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
+                        std::strerror(errno));
     file.is_renamed = true;
   }
   syncDirectory(folder_);

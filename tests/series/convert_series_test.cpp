@@ -17,6 +17,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "tests/series/step_series.h"
+#include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -137,6 +138,44 @@ TEST(ConvertSeries, StepsThatDoNotFitAreNamedOrLeftOut) {
     ASSERT_EQ(run.left_out.size(), 1u);
     convertQuietly(inputOf({{0}, {2}}), optionsFor(folder / "c.splats"));
     EXPECT_TRUE(allFilesOf(folder / "b.splats") == allFilesOf(folder / "c.splats"));
+  }
+}
+
+TEST(ConvertSeries, AddedStepsAreCountedFromThoseOfTheCache) {
+  const TemporaryFolder folder;
+  SeriesOptions options = optionsFor(folder / "a.splats");
+  convertQuietly(inputOf({{0}, {1}}), options);
+  options.add = true;
+  const auto expectStep = [&](const std::vector<StepKind>& kinds, const char* words) {
+    const std::string message = refusal(kinds, options);
+    EXPECT_NE(message.find(words), std::string::npos) << message;
+  };
+  expectStep({{2}, {3, 0, true}}, "step 3 (file 1)");
+  options.convert.resume = true;  // step 2 is there
+  expectStep({{2}, {3, 0, true}}, "step 3 (file 1)");
+  expectStep({{3, 0, true}}, "step 3 (file 0)");
+}
+
+TEST(ConvertSeries, FailuresOfTheOutputLeaveNothingOut) {
+  const TemporaryFolder folder;
+  SeriesOptions options = optionsFor(folder / "a.splats");
+  convertQuietly(inputOf({{0}, {1}}), options);
+  for (const bool keep_going : {false, true}) {
+    options.keep_going = keep_going;
+    options.add = false;
+    const std::string exists = refusal({{0}, {1}}, options);
+    EXPECT_NE(exists.find("step 0 (file 0)"), std::string::npos) << exists;
+    EXPECT_NE(exists.find("exists already"), std::string::npos) << exists;
+    options.add = true;
+    for (const StepKind& added : {StepKind{2}, StepKind{2, 0.5}}) {
+      faults::FaultySystemCalls disk;
+      disk.fail_write_at = 3;
+      const ScopedSystemCalls in_place(disk);
+      const std::string message = refusal({added, {3}}, options);
+      EXPECT_NE(message.find("step 2 (file 0)"), std::string::npos) << message;
+      EXPECT_NE(message.find("No space left"), std::string::npos) << message;
+      EXPECT_EQ(message.find("--keep-going"), std::string::npos) << message;
+    }
   }
 }
 

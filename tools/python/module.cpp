@@ -225,7 +225,6 @@ uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks
   input.scalars = [&](const GridDescription&) { return allScalars(names); };
   SeriesReport report;
   runInterruptibly(progress, [&](Progress& of_work) {
-    input.first_number = CacheReader(cache).series().steps.size();
     report = convertSeries(input, options, of_work, [](const SeriesEvent&) {});
   });
   return report.steps;

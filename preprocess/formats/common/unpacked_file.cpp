@@ -163,8 +163,8 @@ UnpackedFile::UnpackedFile(const fs::path& path, const fs::path& folder)
     : begin.starts_with(kXz) ? unpackXz(input, sink)
                              : unpackZstd(input, sink);
   } catch (const DiskFull& full) {
-    throw Error("{}: is decompressed into {}, where there is no room: {}; make room there", path.string(),
-                folder.string(), full.reason());
+    throw OutputError("{}: is decompressed into {}, where there is no room: {}; make room there",
+                      path.string(), folder.string(), full.reason());
   }
 }
 
