@@ -1,5 +1,6 @@
 #include "preprocess/addition/add_step.h"
 
+#include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_reduce.h>
@@ -21,6 +22,7 @@
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scratch_folder.h"
 #include "preprocess/grid/reordered_source.h"
+#include "preprocess/grid/time_steps.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
@@ -140,9 +142,12 @@ class StepAddition {
  private:
   Centring centring() const { return grid_ ? reader_->centring() : origin_->centring(); }
 
+  TimeUnit unit() const { return {cache_.seriesManifest().time_unit, cache_.seriesManifest().calendar}; }
+
   void chooseTime() {
     const double last = cache_.series().steps.back().time;
-    const std::optional<double> stated = options_.time ? options_.time : timeOf(source_.description());
+    const std::optional<double> stated =
+        options_.time ? options_.time : timeOf(source_.description(), unit());
     report_.time = stated.value_or(last + 1);
     if (!(report_.time > last) || !std::isfinite(report_.time))
       throw Error("its time {:g} is not after {:g}, the time of the step before it", report_.time, last);
@@ -173,13 +178,13 @@ class StepAddition {
       });
     } catch (const Interrupted&) {
       throw;
+    } catch (const OutputError&) {
+      throw;
     } catch (const Error&) {
       return false;  // its splats lie elsewhere; or it cannot be read, which the scan reports
     }
     if (survey.grid_checksum.value() != expected) return false;
     ranges_ = survey.ranges;
-    } catch (const OutputError&) {
-      throw;
     finishValues(passes, cache_);
     return true;
   }
@@ -253,6 +258,7 @@ class StepAddition {
     options.temporary_folder = temporaryFolder();
     options.title = cache_.seriesManifest().title;
     options.time = report_.time;
+    options.time_unit = unit();
     if (cache_.manifest().overlap == kOverlapAll) options.overlap = Overlap::kAll;
     options.bucket_splats = options_.bucket_splats;
     ConvertReport converted = convert(source_, options, progress_);
@@ -287,12 +293,22 @@ class StepAddition {
   AddStepReport report_;
 };
 
+std::string textOf(const TimeUnit& unit) {
+  return fmt::format("'{}'{}", unit.name,
+                     unit.calendar.empty() ? "" : fmt::format(" ({} calendar)", unit.calendar));
+}
+
 }  // namespace
 
-std::optional<double> timeOf(const GridDescription& description) {
-  if (!description.times.empty()) return description.times[description.time_step];
-  if (!description.flow.empty() && description.flow.front().time != 0) return description.flow.front().time;
-  return std::nullopt;
+std::optional<double> timeOf(const GridDescription& description, const TimeUnit& of_series) {
+  const std::optional<double> time = statedTime(description);
+  const TimeUnit unit{description.time_unit, description.calendar};
+  if (!time || unit.name.empty() || of_series.name.empty()) return time;
+  const std::optional<double> converted = timeInUnit(*time, unit, of_series);
+  if (!converted)
+    throw Error("its times are in {}, which cannot be converted to {}, the unit of the steps before it",
+                textOf(unit), textOf(of_series));
+  return converted;
 }
 
 AddStepReport addStep(const DataSource& source, const AddStepOptions& options, Progress& progress) {

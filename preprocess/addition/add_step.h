@@ -9,6 +9,7 @@
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/grid/grid_source.h"
+#include "stream/base/calendar.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
@@ -37,9 +38,9 @@ struct AddStepReport {
   std::vector<FileReport> files;  // the new ones
 };
 
-/// The time that the files state for the open step: that of the step, or that in the Q file's header unless it is
-/// 0, which many programs write for all steps.
-std::optional<double> timeOf(const GridDescription& description);
+/// statedTime() in the unit of the series, where both have one: each file of a model may count from a date of its own.
+/// Throws Error if it cannot be converted to that.
+std::optional<double> timeOf(const GridDescription& description, const TimeUnit& of_series);
 
 /// Adds. The cache's scalars are found in the source by name. Throws Error if the step does not fit: other blocks, a
 /// missing scalar, a time that is not after the last; or if something outside fails. Then the cache is as it was.

@@ -159,6 +159,7 @@ class SeriesConversion {
     const CacheReader cache(options_.convert.output);
     for (const SeriesStep& step : cache.series().steps) times_.push_back(step.time);
     for (const BlockInfo& block : cache.seriesManifest().blocks) names_.push_back(block.name);
+    unit_ = {cache.seriesManifest().time_unit, cache.seriesManifest().calendar};
     const std::vector<std::string>& sources = cache.seriesManifest().sources;
     sources_.insert(sources.begin(), sources.end());
     first_files_ = sources_;
@@ -181,7 +182,7 @@ class SeriesConversion {
       const std::unique_ptr<DataSource> source = input_.open(number);
       const GridDescription& description = source->description();
       const std::vector<std::string>& files = description.files;
-      const std::optional<double> time = timeOf(description);
+      const std::optional<double> time = timeOf(description, unit_);
       return std::all_of(files.begin(), files.end(),
                          [&](const std::string& file) { return sources_.contains(file); }) &&
              (!time || std::find(times_.begin(), times_.end(), *time) != times_.end());
@@ -201,7 +202,7 @@ class SeriesConversion {
       requireKnown(timeFor(number, description), description);
     } else if (times_.empty()) {
       step.first.scalars = input_.scalars(description);
-      step.first.time = timeOf(description).value_or(0);
+      step.first.time = timeOf(description, unit_).value_or(0);
       if (!std::isfinite(*step.first.time))
         throw Error("its time is {:g}; expected a number", *step.first.time);
     }
@@ -233,11 +234,12 @@ class SeriesConversion {
     const uint64_t away = places.empty() || number == 0 ? 1 : places[number] - places[number - 1];
     const size_t before = next_ < known_ ? next_ : times_.size();
     const double last = before == 0 ? -1 : times_[before - 1];
-    return timeOf(description).value_or(last + static_cast<double>(away));
+    return timeOf(description, unit_).value_or(last + static_cast<double>(away));
   }
 
   void noteOrigin(const GridDescription& description) {
-    if (!input_.places.empty()) sums_.origins.push_back({timeOf(description).has_value(), description.files});
+    if (!input_.places.empty())
+      sums_.origins.push_back({timeOf(description, unit_).has_value(), description.files});
   }
 
   void convertFirst(uint64_t number, const OpenStep& step) {
@@ -250,6 +252,7 @@ class SeriesConversion {
     for (const GridBlock& block : step.source->description().blocks) names_.push_back(block.name);
     first_files_.insert(step.source->description().files.begin(), step.source->description().files.end());
     times_.push_back(*options.time);
+    unit_ = {step.source->description().time_unit, step.source->description().calendar};
     next_ = known_ = 1;
     sums_.nodes = converted.nodes;
     ++sums_.converted;
@@ -351,6 +354,7 @@ class SeriesConversion {
   Progress& progress_;
   const std::function<void(const SeriesEvent&)>& report_event_;
   std::vector<double> times_;       // of the cache's steps
+  TimeUnit unit_;                   // of these
   std::set<std::string> sources_;   // of a cache that is there
   std::vector<std::string> names_;  // of the first step's blocks
   std::set<std::string> first_files_;

@@ -132,11 +132,12 @@ ConvertedSteps SharedSteps::convertPart(const Start& start) const {
     removeAll(options.cache);
     const CacheReader series(add_.cache, start.step);
     double last = series.series().steps[start.step].time + static_cast<double>(own.begin - start.next);
+    const TimeUnit unit{series.seriesManifest().time_unit, series.seriesManifest().calendar};
     makePart(series, options.cache, progress_);
     for (uint64_t number = own.begin; number < own.end; ++number) {
       progress_.throwIfStopped();
       const std::unique_ptr<DataSource> source = input_.open(number);
-      const std::optional<double> stated = timeOf(source->description());
+      const std::optional<double> stated = timeOf(source->description(), unit);
       options.time = stated.value_or(last + 1);
       const AddStepReport added = addStep(*source, options, progress_);
       last = added.time;

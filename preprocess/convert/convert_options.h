@@ -12,6 +12,7 @@
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/overset/block_owners.h"
+#include "stream/base/calendar.h"
 #include "stream/base/ranks.h"
 #include "stream/codec/values_codec.h"
 
@@ -29,6 +30,7 @@ struct ConvertOptions {
   std::filesystem::path temporary_folder;  // empty: the folder of the output
   std::string title;                       // empty: the output's name
   std::optional<double> time;              // of the step; otherwise the source's, or 0
+  std::optional<TimeUnit> time_unit;       // of `time`; otherwise the source's
   ValuePrecision precision = ValuePrecision::kNormal;  // of the samples' values
   bool surfaces = true;                                // store the grid's outer faces in the cache
   std::vector<IndexPlane> planes;                      // and these index planes

@@ -1,5 +1,8 @@
 #include "preprocess/convert/new_manifest.h"
 
+#include <cmath>
+
+#include "preprocess/grid/time_steps.h"
 #include "stream/cache/border_style.h"
 #include "stream/cache/cell_octants.h"
 
@@ -40,10 +43,10 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.grid_checksum = survey.grid_checksum;
   manifest.variables = variablesOf(description, options.scalars, survey);
   StepInfo step;
-  if (!description.times.empty()) step.time = description.times[description.time_step];
-  if (options.time) step.time = *options.time;
-  manifest.time_unit = description.time_unit;
-  manifest.calendar = description.calendar;
+  step.time = options.time ? *options.time : statedTime(description).value_or(0);
+  if (!std::isfinite(step.time)) step.time = 0;  // of one step it does not matter
+  manifest.time_unit = options.time_unit ? options.time_unit->name : description.time_unit;
+  manifest.calendar = options.time_unit ? options.time_unit->calendar : description.calendar;
   for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
   manifest.steps = {step};
   return manifest;

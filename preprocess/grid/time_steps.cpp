@@ -25,4 +25,10 @@ std::optional<std::string> timeStepNote(const GridDescription& description, std:
                      times.size(), times.front(), times.back(), times.size() - 1);
 }
 
+std::optional<double> statedTime(const GridDescription& description) {
+  if (!description.times.empty()) return description.times[description.time_step];
+  if (!description.flow.empty() && description.flow.front().time != 0) return description.flow.front().time;
+  return std::nullopt;
+}
+
 }  // namespace curvisplat

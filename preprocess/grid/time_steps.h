@@ -19,4 +19,8 @@ uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
 /// choose with --time-step 0..2". nullopt if there is a single step, or if the user chose one.
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked);
 
+/// The time that the files state for the open step: that of the step, or that in the Q file's header unless it is 0, which
+/// many programs write for all steps.
+std::optional<double> statedTime(const GridDescription& description);
+
 }  // namespace curvisplat

@@ -107,6 +107,24 @@ TEST(ConvertSeries, BytesDependNeitherOnThreadsNorMemoryNorTheOrderOfAdding) {
   EXPECT_TRUE(allFilesOf(folder / "c.splats") == wanted);
 }
 
+TEST(ConvertSeries, AStepThatWasConvertedAloneHasItsTime) {
+  for (const bool in_header : {false, true}) {
+    const std::vector<StepKind> kinds{{7, 0, false, false, false, in_header},
+                                      {9, 0, false, false, false, in_header}};
+    const TemporaryFolder folder;
+    convertQuietly(inputOf(kinds), optionsFor(folder / "a.splats"));
+    ConvertOptions alone = optionsFor(folder / "b.splats").convert;
+    alone.scalars = {0, 1};
+    Progress progress;
+    convert(StepSource(kinds[0]), alone, progress);
+    EXPECT_EQ(CacheReader(folder / "b.splats").series().steps[0].time, 7);
+    SeriesOptions added = optionsFor(folder / "b.splats");
+    added.add = true;
+    convertQuietly(inputOf({kinds[1]}), added);
+    EXPECT_TRUE(allFilesOf(folder / "b.splats") == allFilesOf(folder / "a.splats"));
+  }
+}
+
 /// What converting throws, as text.
 std::string refusal(const std::vector<StepKind>& kinds, const SeriesOptions& options) {
   try {

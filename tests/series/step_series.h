@@ -35,6 +35,7 @@ struct StepKind {
   bool other_blocks = false;
   bool lacks_scalar = false;
   bool blanks_more = false;
+  bool time_in_header = false;  // as in a Q file
 };
 
 /// Two blocks that share a face, with blanked nodes, and two scalars that move with time.
@@ -57,6 +58,10 @@ class StepSource : public GridSource {
         description_(grid_.description()) {
     description_.times = {kind.time};
     description_.files = {"step " + std::to_string(kind.time)};
+    if (kind.time_in_header) {
+      description_.times.clear();
+      description_.flow.emplace_back().time = kind.time;
+    }
     if (kind.lacks_scalar) description_.scalars[1].name = "other";
   }
 

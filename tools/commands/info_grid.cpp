@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "preprocess/grid/calendar.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
+#include "stream/base/calendar.h"
 #include "stream/base/count_text.h"
 #include "stream/base/progress.h"
 #include "tools/commands/info_estimate.h"
@@ -74,7 +74,7 @@ std::string blankingRule(const GridDescription& description) {
 
 std::optional<std::string> dateOfStep(const GridDescription& description, size_t step) {
   if (step >= description.times.size()) return std::nullopt;
-  return dateOf(description.times[step], description.time_unit, description.calendar);
+  return dateOf(description.times[step], {description.time_unit, description.calendar});
 }
 
 /// "36 days since 1950-01-01 (1950-02-06 00:00:00)"

@@ -13,7 +13,7 @@
 #include "preprocess/formats/netcdf/foreign_netcdf.h"
 #include "preprocess/formats/netcdf/supergrid.h"
 #include "preprocess/formats/netcdf/tile_number.h"
-#include "preprocess/grid/calendar.h"
+#include "stream/base/calendar.h"
 
 namespace curvisplat {
 namespace {

@@ -64,6 +64,8 @@ std::unique_ptr<DataSource> openFileSeries(
   description.files.push_back(options.grid.string());
   description.times = std::move(times);
   description.time_step = step;
+  description.time_unit.clear();  // that of the times in the listed files
+  description.calendar.clear();
   return described(std::move(source), std::move(description));
 }
 

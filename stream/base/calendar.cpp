@@ -1,4 +1,4 @@
-#include "preprocess/grid/calendar.h"
+#include "stream/base/calendar.h"
 
 #include <fmt/format.h>
 
@@ -131,26 +131,57 @@ std::optional<Moment> momentIn(const std::string& text) {
   return moment;
 }
 
+/// What a unit counts, and from when.
+struct Clock {
+  Calendar calendar;
+  double seconds = 1;           // of the unit
+  std::optional<double> begin;  // seconds from the calendar's begin; none: the unit has no date
+};
+
+bool isStandard(Calendar calendar) {
+  return calendar == Calendar::kStandard;
+}
+
+std::optional<Clock> clockOf(const TimeUnit& unit) {
+  const auto calendar = calendarNamed(unit.calendar);
+  const size_t since = unit.name.find(" since ");
+  const auto seconds = secondsOf(unit.name.substr(0, since));
+  if (!calendar || !seconds) return std::nullopt;
+  if (since == std::string::npos) return Clock{*calendar, *seconds, std::nullopt};
+  const auto from = momentIn(unit.name.substr(unit.name.find_first_not_of(' ', since + 7)));
+  if (!from) return std::nullopt;
+  const int64_t days = isStandard(*calendar) ? standardDays(from->date) : daysOf(from->date, *calendar);
+  return Clock{*calendar, *seconds, std::fma(kSecondsPerDay, static_cast<double>(days), from->seconds)};
+}
+
+/// Both count the days of the Gregorian calendar, or they are the same calendar.
+bool countTheSameDays(Calendar a, Calendar b) {
+  const auto days = [](Calendar calendar) { return isStandard(calendar) ? Calendar::kGregorian : calendar; };
+  return days(a) == days(b);
+}
+
 }  // namespace
 
-std::optional<std::string> dateOf(double time, const std::string& unit, const std::string& calendar) {
-  const size_t since = unit.find(" since ");
-  const auto known = calendarNamed(calendar);
-  if (since == std::string::npos || !known) return std::nullopt;
-  const auto seconds = secondsOf(unit.substr(0, since));
-  const auto from = momentIn(unit.substr(unit.find_first_not_of(' ', since + 7)));
-  if (!seconds || !from) return std::nullopt;
-  const bool standard = *known == Calendar::kStandard;
-  const double begin = std::fma(
-      kSecondsPerDay, static_cast<double>(standard ? standardDays(from->date) : daysOf(from->date, *known)),
-      from->seconds);
-  const double moment = std::round(begin + time * *seconds);
+std::optional<std::string> dateOf(double time, const TimeUnit& unit) {
+  const auto clock = clockOf(unit);
+  if (!clock || !clock->begin) return std::nullopt;
+  const double moment = std::round(*clock->begin + time * clock->seconds);
   if (!(std::abs(moment) < kSecondsPerDay * 366 * kMaxYear)) return std::nullopt;
   const auto days = static_cast<int64_t>(std::floor(moment / kSecondsPerDay));
   const auto left = static_cast<int64_t>(moment - kSecondsPerDay * static_cast<double>(days));
-  const Date date = standard ? standardDate(days) : dateOfDays(days, *known);
+  const Date date = isStandard(clock->calendar) ? standardDate(days) : dateOfDays(days, clock->calendar);
   return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}:{:02}", date.year, date.month, date.day, left / 3600,
                      left / 60 % 60, left % 60);
+}
+
+std::optional<double> timeInUnit(double time, const TimeUnit& from, const TimeUnit& to) {
+  if (from == to) return time;
+  const auto clock = clockOf(from), other = clockOf(to);
+  if (!clock || !other || clock->begin.has_value() != other->begin.has_value()) return std::nullopt;
+  if (clock->begin && !countTheSameDays(clock->calendar, other->calendar)) return std::nullopt;
+  const double later = clock->begin ? *clock->begin - *other->begin : 0;
+  if (clock->seconds == other->seconds) return time + later / clock->seconds;
+  return (time * clock->seconds + later) / other->seconds;
 }
 
 std::optional<double> secondsBetween(const std::string& from, const std::string& to) {
