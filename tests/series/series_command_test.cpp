@@ -130,20 +130,20 @@ TEST_F(SeriesCommand, SelectsAddsAndLists) {
 
   const ProgramResult info = run({"info", file("all.splats")});
   EXPECT_NE(info.out.find("steps      7, times 0 to 6, 1 geometry"), std::string::npos) << info.out;
+  const std::string at_step = run({"info", file("all.splats"), "--step", "2"}).out;
+  for (const char* own : {"faces.bin ", "faces.step2.bin ", "this step ", "all steps "})
+    EXPECT_NE(at_step.find(std::string("\n") + own), std::string::npos) << at_step;
+  EXPECT_EQ(at_step.find("faces.step3.bin"), std::string::npos) << at_step;
   const auto json = nlohmann::json::parse(run({"info", file("all.splats"), "--json", "--step", "2"}).out);
   ASSERT_EQ(json["steps"].size(), 7u);
   EXPECT_EQ(json["steps"][6]["time"], 6);
+  uint64_t bytes = 0;
+  for (const auto& entry : fs::directory_iterator(file("all.splats")))
+    if (entry.path().filename() != "manifest.json") bytes += entry.file_size();
+  EXPECT_EQ(json["series_bytes"], bytes);
   EXPECT_EQ(json["variables"][0]["max"], json["steps"][2]["variables"][0]["max"]);
 }
 
-TEST_F(SeriesCommand, AnInterruptedAdditionGoesOnWhereItStood) {
-  generate("f", 5);
-  const std::vector<std::string> addition{"convert",          "--add-steps",      file("f.xyz"),
-                                          file("f_0002.fun"), file("f_0003.fun"), file("f_0004.fun"),
-                                          "--resume"};
-  const auto resumed = [&](int added_before) {
-    const std::string cache = file("to.splats");
-    run({"convert", file("f.xyz"), file("f_0000.fun"), file("f_0001.fun"), "-o", cache, "--overwrite"});
 TEST_F(SeriesCommand, PatternsLeaveOutCaches) {
   generate("f", 3);
   for (const char* step : {"0", "1", "2"})
@@ -157,6 +157,14 @@ TEST_F(SeriesCommand, PatternsLeaveOutCaches) {
   }
 }
 
+TEST_F(SeriesCommand, AnInterruptedAdditionGoesOnWhereItStood) {
+  generate("f", 5);
+  const std::vector<std::string> addition{"convert",          "--add-steps",      file("f.xyz"),
+                                          file("f_0002.fun"), file("f_0003.fun"), file("f_0004.fun"),
+                                          "--resume"};
+  const auto resumed = [&](int added_before) {
+    const std::string cache = file("to.splats");
+    run({"convert", file("f.xyz"), file("f_0000.fun"), file("f_0001.fun"), "-o", cache, "--overwrite"});
     // What an addition that was stopped after some of its steps leaves behind.
     for (int n = 0; n < added_before; ++n)
       run({"convert", "--add-steps", file("f.xyz"), file(fmt::format("f_{:04}.fun", 2 + n)), "--to", cache});

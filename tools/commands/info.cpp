@@ -183,6 +183,35 @@ void printProbe(const CacheReader& reader, const InfoOptions& options, const Fin
   }
 }
 
+/// The first ones and the last.
+void printSources(const std::vector<std::string>& names) {
+  constexpr size_t kFirst = 8;
+  const bool all = names.size() <= kFirst + 2;
+  for (size_t n = 0; n < (all ? names.size() : kFirst); ++n) fmt::print(" {}", names[n]);
+  if (!all) fmt::print(" ... ({} more) {}", names.size() - kFirst - 1, names.back());
+}
+
+/// Those of the step that the reader is at.
+void printFiles(const CacheReader& reader) {
+  const Manifest& m = reader.manifest();
+  const uint64_t steps = reader.series().steps.size();
+  const auto line = [&](const std::string& name, uint64_t bytes) {
+    fmt::print("{:<18} {:>12} {:>18.3f}\n", name, bytes, bytesPerSample(m, bytes));
+  };
+  fmt::print("\nfile                      bytes   per drawn sample\n");
+  uint64_t bytes = 0;
+  for (const FileInfo& file : m.files) {
+    if (isOfAnotherStep(file.name, reader.step())) continue;
+    bytes += file.size;
+    line(file.name, file.size);
+  }
+  line(steps == 1 ? "all" : "this step", bytes);
+  if (steps == 1) return;
+  const uint64_t of_series = seriesBytes(reader);
+  fmt::print("{:<18} {:>12} {:>18.3f} and step\n", "all steps", of_series,
+             bytesPerSample(m, of_series) / static_cast<double>(steps));
+}
+
 void printAsText(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& m = reader.manifest();
   if (!options.point.empty()) {
@@ -191,7 +220,7 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   }
   fmt::print("{}\n", m.title);
   fmt::print("written by {} from", m.program);
-  for (const std::string& source : m.sources) fmt::print(" {}", source);
+  printSources(m.sources);
   fmt::print("\n{}\n\n", m.reader);
   fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
              m.lower.y, m.upper.y, m.lower.z, m.upper.z);
@@ -212,10 +241,7 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   for (size_t n = 0; n < levels.size(); ++n)
     fmt::print("{:>5} {:>9} {:>9} {:>13} {:>12} {:>12} {:>10.3g}\n", n, levels[n].bricks, levels[n].leaves,
                levels[n].splats, levels[n].geometry_bytes, levels[n].values_bytes, levels[n].largest_error);
-  fmt::print("\nfile                      bytes   per drawn sample\n");
-  for (const FileInfo& file : m.files)
-    fmt::print("{:<18} {:>12} {:>18.3f}\n", file.name, file.size, bytesPerSample(m, file.size));
-  fmt::print("{:<18} {:>12} {:>18.3f}\n", "all", totalBytes(m), bytesPerSample(m, totalBytes(m)));
+  printFiles(reader);
   if (options.verify && found.verification.findings.empty())
     fmt::print("\nverified: all {} bricks are intact{}\n", m.bricks,
                reader.series().steps.size() > 1

@@ -4,9 +4,12 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
+#include "stream/base/calendar.h"
 #include "stream/base/error.h"
+#include "stream/cache/faces_file.h"
 
 namespace curvisplat {
 namespace {
@@ -19,9 +22,16 @@ std::string unitOf(const Manifest& manifest) {
   return unit.empty() ? "" : " [" + unit + "]";
 }
 
-void printStep(const CacheReader& reader, uint64_t number) {
+std::optional<std::string> dateOfStep(const CacheReader& reader, uint64_t step) {
+  const Manifest& manifest = reader.seriesManifest();
+  return dateOf(reader.series().steps[step].time, {manifest.time_unit, manifest.calendar});
+}
+
+void printStep(const CacheReader& reader, uint64_t number, bool has_dates) {
   const SeriesStep& step = reader.series().steps[number];
-  fmt::print("  {:>6} {:>14.8g} {:>9}", number, step.time, step.geometry);
+  fmt::print("  {:>6} {:>14.8g}", number, step.time);
+  if (has_dates) fmt::print(" {:>20}", dateOfStep(reader, number).value_or(""));
+  fmt::print(" {:>9}", step.geometry);
   for (const StepValues& values : step.values) fmt::print("   {:.6g} .. {:.6g}", values.min, values.max);
   fmt::print("\n");
 }
@@ -39,7 +49,8 @@ void printSteps(const CacheReader& reader) {
   fmt::print("steps      {}, times {:g} to {:g}{}, {} {}\n", steps, series.steps.front().time,
              series.steps.back().time, unitOf(manifest), series.geometries(),
              series.geometries() == 1 ? "geometry" : "geometries");
-  fmt::print("    step           time  geometry   range of");
+  const bool has_dates = dateOfStep(reader, 0).has_value();
+  fmt::print("    step           time{}  geometry   range of", has_dates ? "                 date" : "");
   for (const VariableInfo& variable : manifest.variables) fmt::print(" {}", variable.name);
   fmt::print("\n");
   for (uint64_t step = 0; step < steps; ++step) {
@@ -47,15 +58,17 @@ void printSteps(const CacheReader& reader) {
       fmt::print("     ...\n");
       step = steps - kMaxLines / 2;
     }
-    printStep(reader, step);
+    printStep(reader, step, has_dates);
   }
 }
 
 nlohmann::ordered_json stepsAsJson(const CacheReader& reader) {
   auto json = nlohmann::ordered_json::array();
   const Manifest& manifest = reader.seriesManifest();
-  for (const SeriesStep& step : reader.series().steps) {
+  for (uint64_t number = 0; number < reader.series().steps.size(); ++number) {
+    const SeriesStep& step = reader.series().steps[number];
     nlohmann::ordered_json entry = {{"time", step.time}, {"geometry", step.geometry}};
+    if (const auto date = dateOfStep(reader, number)) entry["date"] = *date;
     for (size_t v = 0; v < step.values.size(); ++v)
       entry["variables"].push_back({{"number", manifest.variables[v].number},
                                     {"name", manifest.variables[v].name},
@@ -67,6 +80,10 @@ nlohmann::ordered_json stepsAsJson(const CacheReader& reader) {
   return json;
 }
 
+bool isOfAnotherStep(const std::string& file, uint64_t step) {
+  return isFacesFile(file) && file.starts_with("faces.step") && file != facesFileOfStep(step);
+}
+
 uint64_t seriesBytes(const CacheReader& reader) {
   const Series& series = reader.series();
   uint64_t bytes = 0;
@@ -76,7 +93,7 @@ uint64_t seriesBytes(const CacheReader& reader) {
     if (!file.name.starts_with("var.")) bytes += file.size;
   for (uint32_t geometry = 1; geometry < series.geometries(); ++geometry) {
     const std::filesystem::path folder = reader.cachePath() / geometryFolderName(geometry);
-    for (const char* name : {"manifest.json", "bricks.bin", "geometry.bin", "bricks.vdb"}) {
+    for (const char* name : {"manifest.json", "bricks.bin", "geometry.bin", "bricks.vdb", "faces.bin"}) {
       std::error_code error;
       const uint64_t size = std::filesystem::file_size(folder / name, error);
       if (!error) bytes += size;
