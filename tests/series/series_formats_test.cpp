@@ -91,13 +91,14 @@ TEST_F(SeriesFormats, TimeDimensionOfNetcdf) {
                     {"--scalar", "temp"});
 }
 
-/// A history of a grid that has a file of its own; `times` in days.
-void writeHistory(const std::string& path, const std::vector<double>& times) {
+/// A history of a grid that has a file of its own; `times` in `unit`.
+void writeHistory(const std::string& path, const std::vector<double>& times,
+                  const std::string& unit = "days since 2000-01-01") {
   NetcdfWriter writer(path, NetcdfFileType::kClassic);
   writer.dimension("time", times.size(), true);
   for (const auto& [name, length] : {std::pair("z", 5), {"y", 6}, {"x", 7}})
     writer.dimension(name, static_cast<size_t>(length));
-  writer.variable("time", NetcdfNumbers::kDoublePrecision, {"time"}, {{"units", "days since 2000-01-01"}},
+  writer.variable("time", NetcdfNumbers::kDoublePrecision, {"time"}, {{"units", unit}},
                   [&](const std::vector<size_t>& at) { return times[at[0]]; });
   writer.variable("temp", NetcdfNumbers::kSinglePrecision, {"time", "z", "y", "x"},
                   {{"coordinates", "lon lat z"}}, [&](const std::vector<size_t>& at) {
@@ -105,24 +106,31 @@ void writeHistory(const std::string& path, const std::vector<double>& times) {
                   });
 }
 
+/// The grid of these; with `times`, which are not those of the histories.
+void writeGrid(const std::string& path, const std::vector<double>& times = {}) {
+  NetcdfWriter writer(path, NetcdfFileType::kClassic);
+  for (const auto& [name, length] : {std::pair("z", 5), {"y", 6}, {"x", 7}})
+    writer.dimension(name, static_cast<size_t>(length));
+  const auto degrees = [](const char* name, const char* unit) {
+    return NetcdfAttributes{{"standard_name", name}, {"units", unit}};
+  };
+  writer.variable("lon", NetcdfNumbers::kDoublePrecision, {"y", "x"}, degrees("longitude", "degrees_east"),
+                  [](const std::vector<size_t>& at) {
+                    return static_cast<double>(at[1]) + 0.1 * static_cast<double>(at[0]);
+                  });
+  writer.variable("lat", NetcdfNumbers::kDoublePrecision, {"y", "x"}, degrees("latitude", "degrees_north"),
+                  [](const std::vector<size_t>& at) { return 40 + static_cast<double>(at[0]); });
+  writer.variable("z", NetcdfNumbers::kDoublePrecision, {"z"},
+                  {{"units", "m"}, {"positive", "down"}, {"axis", "Z"}},
+                  [](const std::vector<size_t>& at) { return 10 * static_cast<double>(at[0]); });
+  if (times.empty()) return;
+  writer.dimension("time", times.size());
+  writer.variable("time", NetcdfNumbers::kDoublePrecision, {"time"}, {{"units", "days since 1900-01-01"}},
+                  [&](const std::vector<size_t>& at) { return times[at[0]]; });
+}
+
 TEST_F(SeriesFormats, NetcdfGridWithHistoryFilesOneAfterTheOther) {
-  {
-    NetcdfWriter writer(file("grid.nc"), NetcdfFileType::kClassic);
-    for (const auto& [name, length] : {std::pair("z", 5), {"y", 6}, {"x", 7}})
-      writer.dimension(name, static_cast<size_t>(length));
-    const auto degrees = [](const char* name, const char* unit) {
-      return NetcdfAttributes{{"standard_name", name}, {"units", unit}};
-    };
-    writer.variable("lon", NetcdfNumbers::kDoublePrecision, {"y", "x"}, degrees("longitude", "degrees_east"),
-                    [](const std::vector<size_t>& at) {
-                      return static_cast<double>(at[1]) + 0.1 * static_cast<double>(at[0]);
-                    });
-    writer.variable("lat", NetcdfNumbers::kDoublePrecision, {"y", "x"}, degrees("latitude", "degrees_north"),
-                    [](const std::vector<size_t>& at) { return 40 + static_cast<double>(at[0]); });
-    writer.variable("z", NetcdfNumbers::kDoublePrecision, {"z"},
-                    {{"units", "m"}, {"positive", "down"}, {"axis", "Z"}},
-                    [](const std::vector<size_t>& at) { return 10 * static_cast<double>(at[0]); });
-  }
+  writeGrid(file("grid.nc"));
   writeHistory(file("his_0001.nc"), {0, 1});
   writeHistory(file("his_0002.nc"), {2, 3.5});
   expectEachAsAlone(file("his_*.nc"), {0, 0, 0, 0},
@@ -143,6 +151,88 @@ TEST_F(SeriesFormats, NetcdfGridWithHistoryFilesOneAfterTheOther) {
   EXPECT_NE(back.err.find("his_0003.nc, time step 1"), std::string::npos) << back.err;
   EXPECT_NE(back.err.find("its time 3 is not after 4"), std::string::npos) << back.err;
   EXPECT_EQ(CacheReader(file("c.splats")).series().steps.size(), 5u);
+}
+
+/// Times of the steps of a cache.
+std::vector<double> timesOf(const std::string& cache) {
+  std::vector<double> times;
+  for (const SeriesStep& step : CacheReader(cache).series().steps) times.push_back(step.time);
+  return times;
+}
+
+TEST_F(SeriesFormats, FilesThatCountTheirTimesFromOtherDates) {
+  writeGrid(file("grid.nc"));
+  writeHistory(file("his_0001.nc"), {0, 1});
+  writeHistory(file("his_0002.nc"), {0, 36}, "hours since 2000-01-03 00:00:00");
+  run({"convert", file("his_*.nc"), file("grid.nc"), "-o", file("a.splats")});
+  EXPECT_EQ(timesOf(file("a.splats")), (std::vector<double>{0, 1, 2, 3.5}));
+  EXPECT_EQ(CacheReader(file("a.splats")).seriesManifest().time_unit, "days since 2000-01-01");
+  const ProgramResult info = runProgram({"info", file("a.splats")});
+  EXPECT_NE(info.out.find("3.5  2000-01-04 12:00:00         0"), std::string::npos) << info.out;
+  // Added later, resumed, and in parts.
+  run({"convert", file("his_0001.nc"), file("grid.nc"), "--steps", "all", "-o", file("b.splats")});
+  run({"convert", file("his_0002.nc"), file("grid.nc"), "--add-steps", "--to", file("b.splats")});
+  run({"convert", file("his_*.nc"), file("grid.nc"), "--resume", "-o", file("b.splats")});
+  EXPECT_EQ(timesOf(file("b.splats")), timesOf(file("a.splats")));
+  for (const char* part : {"1/2", "2/2"})
+    run({"convert", file("his_*.nc"), file("grid.nc"), "--part", part, "-o", file("c.splats")});
+  run({"convert", file("c.splats.parts"), "--join", "-o", file("c.splats")});
+  EXPECT_EQ(timesOf(file("c.splats")), timesOf(file("a.splats")));
+
+  writeHistory(file("his_0003.nc"), {5, 6}, "months since 2000-01-01");
+  const ProgramResult result =
+      runProgram({"convert", file("his_0003.nc"), file("grid.nc"), "--add-steps", "--to", file("a.splats")});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("step 4"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("its times are in 'months since 2000-01-01', which cannot be converted to 'days "
+                            "since 2000-01-01', the unit of the steps before it"),
+            std::string::npos)
+      << result.err;
+}
+
+TEST_F(SeriesFormats, TimesAreThoseOfTheDataNotOfAGridFile) {
+  writeHistory(file("his_0001.nc"), {1, 2});
+  writeHistory(file("his_0002.nc"), {4});
+  for (const std::vector<double>& times : {std::vector<double>{7}, {7, 8}, {7, 8, 9}}) {
+    writeGrid(file("grid.nc"), times);
+    for (const bool grid_first : {true, false}) {
+      const std::vector<std::string> files = grid_first ? std::vector{file("grid.nc"), file("his_*.nc")}
+                                                        : std::vector{file("his_*.nc"), file("grid.nc")};
+      run({"convert", files[0], files[1], "-o", file("a.splats"), "--overwrite"});
+      EXPECT_EQ(timesOf(file("a.splats")), (std::vector<double>{1, 2, 4})) << times.size() << grid_first;
+      EXPECT_EQ(CacheReader(file("a.splats")).seriesManifest().time_unit, "days since 2000-01-01");
+    }
+  }
+}
+
+TEST_F(SeriesFormats, FilesHoldDifferentNumbersOfSteps) {
+  writeGrid(file("grid.nc"));
+  writeHistory(file("his_0001.nc"), {0});  // such as the state that a run begins with
+  writeHistory(file("his_0002.nc"), {1, 2});
+  writeHistory(file("his_0003.nc"), {3, 4, 5});
+  for (const auto& entry : fs::directory_iterator(folder.path()))
+    fs::last_write_time(entry.path(), fs::file_time_type::clock::now() - std::chrono::hours(1));
+  run({"convert", file("his_*.nc"), file("grid.nc"), "-o", file("a.splats")});
+  EXPECT_EQ(timesOf(file("a.splats")), (std::vector<double>{0, 1, 2, 3, 4, 5}));
+  // Followed, stopped within a file, and followed again.
+  std::vector<std::string> follow{"convert", file("his_*.nc"), file("grid.nc"), "--follow", "--until", "2",
+                                  "-o",      file("b.splats")};
+  run(follow);
+  EXPECT_EQ(timesOf(file("b.splats")), (std::vector<double>{0, 1}));
+  follow[5] = "6";
+  follow.push_back("--resume");
+  run(follow);
+  EXPECT_EQ(timesOf(file("b.splats")), timesOf(file("a.splats")));
+
+  // One that cannot be opened is left out like any other step.
+  fs::resize_file(file("his_0002.nc"), 100);
+  const std::vector<std::string> broken{"convert", file("his_*.nc"), file("grid.nc"), "-o", file("c.splats")};
+  const ProgramResult stopped = runProgram(broken);
+  EXPECT_EQ(stopped.status, 1);
+  EXPECT_NE(stopped.err.find("step 1 (" + file("his_0002.nc") + ")"), std::string::npos) << stopped.err;
+  run({"convert", file("his_*.nc"), file("grid.nc"), "-o", file("d.splats"), "--keep-going"});
+  EXPECT_EQ(timesOf(file("d.splats")), (std::vector<double>{0, 3, 4, 5}));
 }
 
 TEST_F(SeriesFormats, BaseIterativeDataOfCgns) {

@@ -359,8 +359,8 @@ CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
   const NetcdfDimension& time = file.dimensions()[*grid.dims.time];
   times.values.resize(time.length);
   for (size_t n = 0; n < time.length; ++n) times.values[n] = static_cast<double>(n);
-  const NetcdfVariable* const coordinate = file.find(time.name);
-  if (coordinate && coordinate->numeric && coordinate->dims == std::vector<size_t>{*grid.dims.time}) {
+  const NetcdfVariable* const coordinate = file.coordinateOf(*grid.dims.time, *grid.variables.front());
+  if (coordinate && coordinate->numeric) {
     file.read(*coordinate, {{0}, {time.length}}, times.values);
     times.unit = coordinate->text("units");
     times.calendar = lowerCase(coordinate->text("calendar"));

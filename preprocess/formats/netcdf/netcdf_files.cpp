@@ -11,6 +11,11 @@ namespace {
 
 constexpr size_t kNamesListed = 3;
 
+/// The times of a file's data are its own, whatever those of a grid file before it are.
+bool countsTime(const NetcdfVariable& variable) {
+  return variable.dims.size() == 1 && variable.text("units").find(" since ") != std::string::npos;
+}
+
 }  // namespace
 
 NetcdfFiles::NetcdfFiles(const std::vector<std::filesystem::path>& paths) {
@@ -34,7 +39,7 @@ void NetcdfFiles::add(const NetcdfFile& file) {
   }
   std::vector<std::string> twice;
   for (const NetcdfVariable& variable : file.variables()) {
-    if (find(variable.name)) {
+    if (find(variable.name) && !countsTime(variable)) {
       if (variable.dims.size() >= 3) twice.push_back(variable.name);
       continue;
     }
@@ -61,6 +66,15 @@ const NetcdfVariable* NetcdfFiles::find(std::string_view name) const {
   const auto found = std::find_if(variables_.begin(), variables_.end(),
                                   [&](const NetcdfVariable& variable) { return variable.name == name; });
   return found == variables_.end() ? nullptr : &*found;
+}
+
+const NetcdfVariable* NetcdfFiles::coordinateOf(size_t dimension, const NetcdfVariable& data) const {
+  const NetcdfVariable* found = nullptr;
+  for (const NetcdfVariable& variable : variables_) {
+    if (variable.name != dimensions_[dimension].name || variable.dims != std::vector{dimension}) continue;
+    if (!found || variable.file == data.file) found = &variable;
+  }
+  return found;
 }
 
 const NetcdfDimension& NetcdfFiles::dimension(const NetcdfVariable& variable, size_t axis) const {

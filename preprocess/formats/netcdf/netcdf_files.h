@@ -18,7 +18,7 @@ namespace curvisplat {
 class NetcdfFiles {
  public:
   /// Dimensions of the same name and length are one dimension. Of variables with the same name the first
-  /// file's is taken; duplicates() lists the others. Throws Error as NetcdfFile does, and for a file that is
+  /// file's is taken, but of times since a date each file's; duplicates() lists the others. Throws Error as NetcdfFile does, and for a file that is
   /// not NetCDF.
   explicit NetcdfFiles(const std::vector<std::filesystem::path>& paths);
 
@@ -30,6 +30,8 @@ class NetcdfFiles {
   const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
   const std::vector<NetcdfVariable>& variables() const { return variables_; }
   const NetcdfVariable* find(std::string_view name) const;
+  /// The coordinate of a dimension: in the file of `data` if it is there.
+  const NetcdfVariable* coordinateOf(size_t dimension, const NetcdfVariable& data) const;
   const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
   /// One sentence for each further file with variables that an earlier file has too.
   const std::vector<std::string>& duplicates() const { return duplicates_; }
