@@ -101,6 +101,37 @@ TEST(Playback, StopsBetweenStepsOfOneGeometry) {
   EXPECT_EQ(playback.position(), StepPosition{});
 }
 
+TEST(Playback, PlaysBackwards) {
+  Playback playback(4, {true, false, true});
+  playback.setStepsPerSecond(10);
+  playback.setInterpolates(true);
+  playback.setBackwards(true);
+  playback.goTo(StepPosition{2, 0.6});
+  playback.toggle();
+  EXPECT_EQ(playback.next(), (StepPosition{2, 0.5}));  // which is read ahead
+  double now_s = 0;
+  std::vector<StepPosition> seen;
+  std::vector<double> times_s;
+  for (int n = 0; n < 9; ++n) {
+    while (!playback.tick(now_s)) now_s += 0.001;
+    seen.push_back(playback.position());
+    times_s.push_back(now_s);
+  }
+  EXPECT_EQ(seen, (std::vector<StepPosition>{
+                      {2, 0.5}, {2, 0.25}, {2}, {1}, {0, 0.75}, {0, 0.5}, {0, 0.25}, {0}, {3}}));
+  EXPECT_NEAR(times_s[3] - times_s[2], 0.1, 0.01);  // between steps 2 and 1 there is nothing
+  EXPECT_NEAR(times_s[7] - times_s[3], 0.1, 0.01);
+
+  // Without a loop it ends at the first step, and begins again at the last.
+  playback.setLoop(false);
+  playback.goTo(0);
+  EXPECT_FALSE(playback.next());
+  playback.toggle();
+  playback.toggle();
+  EXPECT_TRUE(playback.isPlaying());
+  EXPECT_EQ(playback.position(), StepPosition{3});
+}
+
 class WindowPlayback : public WindowTest {
  protected:
   void SetUp() override {
@@ -138,6 +169,24 @@ TEST_F(WindowPlayback, KeysChooseTheStepAndPlay) {
   expectDraws(commands[1], second);
   expectDraws(commands[2], last);
   expectDraws(commands[3], stopped);
+}
+
+TEST_F(WindowPlayback, PlaysBackwards) {
+  open();
+  const Image first = saveAndCopy();
+  press("comma");  // round to the last
+  const Image last = saveAndCopy();
+  EXPECT_LT(difference(first, last), 60);
+  click("loop");
+  click("backwards");
+  moveTo(rest_);
+  press("space");
+  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), first) >= 60; }));
+  saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 3u);
+  EXPECT_EQ(valueOf(commands[1], "--step"), "3");
+  EXPECT_EQ(valueOf(commands[2], "--step"), "0");
 }
 
 TEST_F(WindowPlayback, OpensAtAStep) {

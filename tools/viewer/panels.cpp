@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stream/base/calendar.h"
 #include "tools/viewer/labels.h"
 #include "tools/viewer/marker_panel.h"
 #include "tools/viewer/widget_places.h"
@@ -58,7 +59,11 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   nameWidget("step");
   actions.dragging |= ImGui::IsItemActive();
   label("time");
-  ImGui::Text("%g %s", time, cache_.seriesManifest().time_unit.c_str());
+  const Manifest& series = cache_.seriesManifest();
+  const auto date = dateOf(time, {series.time_unit, series.calendar});
+  ImGui::Text("%g %s", time, series.time_unit.c_str());
+  if (date) label("date");
+  if (date) ImGui::TextUnformatted(date->c_str());
   label("steps per second");
   float speed = static_cast<float>(playback.stepsPerSecond());
   if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f")) playback.setStepsPerSecond(speed);
@@ -66,6 +71,8 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   ImGui::SameLine(8.5f * ImGui::GetFontSize());
   bool loops = playback.loops();
   if (option("loop", loops)) playback.setLoop(loops);
+  bool backwards = playback.isBackwards();
+  if (option("backwards", backwards)) playback.setBackwards(backwards);
   bool interpolates = playback.interpolates();
   if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
   commandButton(Command::kSaveStepsMovie, actions, "save movie of all steps...");

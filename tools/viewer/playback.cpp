@@ -29,15 +29,25 @@ bool Playback::advance(bool forwards) {
 void Playback::toggle() {
   playing_ = !playing_ && steps_ > 1;
   shown_since_s_.reset();
-  if (playing_ && !loops_ && step_ + 1 == steps_) step_ = 0;
+  if (playing_ && !next()) goTo(backwards_ ? steps_ - 1 : 0);
 }
 
 std::optional<StepPosition> Playback::next() const {
   if (!playing_) return std::nullopt;
+  return backwards_ ? nextBackwards() : nextForwards();
+}
+
+std::optional<StepPosition> Playback::nextForwards() const {
   const double part = std::floor(part_ * kParts + 1) / kParts;
   if (dividesAfter(step_) && part < 1) return StepPosition{step_, part};
   if (step_ + 1 < steps_) return StepPosition{step_ + 1};
   return loops_ ? std::optional(StepPosition{}) : std::nullopt;
+}
+
+std::optional<StepPosition> Playback::nextBackwards() const {
+  if (part_ > 0) return StepPosition{step_, std::ceil(part_ * kParts - 1) / kParts};
+  if (step_ == 0) return loops_ ? std::optional(StepPosition{steps_ - 1}) : std::nullopt;
+  return StepPosition{step_ - 1, dividesAfter(step_ - 1) ? 1 - 1.0 / kParts : 0};
 }
 
 bool Playback::tick(double now_s) {
@@ -53,7 +63,8 @@ bool Playback::tick(double now_s) {
 }
 
 double Playback::wait(double now_s) const {
-  const double for_s = 1 / steps_per_s_ / (dividesAfter(step_) ? kParts : 1);
+  const uint64_t from = backwards_ && part_ == 0 && step_ > 0 ? step_ - 1 : step_;
+  const double for_s = 1 / steps_per_s_ / (dividesAfter(from) ? kParts : 1);
   return shown_since_s_ ? *shown_since_s_ + for_s - now_s : 0;
 }
 

@@ -2,7 +2,7 @@
 //
 // While it plays, a step follows the one before as soon as its picture has been shown for 1/speed seconds: steps are
 // not left out, a slow machine plays slowly. If it interpolates, it also stops kParts - 1 times between two steps of one
-// geometry, for as short as lets the speed be the same.
+// geometry, for as short as lets the speed be the same. It plays in either direction.
 #pragma once
 
 #include <cstdint>
@@ -30,6 +30,7 @@ class Playback {
   bool interpolates() const { return interpolates_; }
   bool isPlaying() const { return playing_; }
   bool loops() const { return loops_; }
+  bool isBackwards() const { return backwards_; }
   double stepsPerSecond() const { return steps_per_s_; }
 
   /// Goes to a step, or to the last one if it lies behind it. Returns whether that changes the step.
@@ -38,9 +39,10 @@ class Playback {
   bool goTo(const StepPosition& position);
   /// Goes to the next or the previous step; at an end to the other end if it loops. Returns whether that changes it.
   bool advance(bool forwards);
-  /// Starts or stops. At the last step it starts from the first.
+  /// Starts or stops. If it does not loop, it starts from the other end where it could not go on.
   void toggle();
   void setLoop(bool loops) { loops_ = loops; }
+  void setBackwards(bool backwards) { backwards_ = backwards; }
   /// Returns whether that changes the position.
   bool setInterpolates(bool interpolates);
   void setStepsPerSecond(double steps_per_s) { steps_per_s_ = steps_per_s; }
@@ -55,11 +57,13 @@ class Playback {
  private:
   /// Whether there are positions between `step` and the next one.
   bool dividesAfter(uint64_t step) const { return interpolates_ && joined_[step] && step + 1 < steps_; }
+  std::optional<StepPosition> nextForwards() const;
+  std::optional<StepPosition> nextBackwards() const;
 
   uint64_t steps_, step_ = 0;
   double part_ = 0;  // of the way to the next step
   std::vector<bool> joined_;
-  bool playing_ = false, loops_ = true, interpolates_ = false;
+  bool playing_ = false, loops_ = true, interpolates_ = false, backwards_ = false;
   double steps_per_s_ = 10;
   std::optional<double> shown_since_s_;
 };
