@@ -181,6 +181,12 @@ TEST_F(InterpolationCommand, DrawsTimesBetweenSteps) {
   EXPECT_FALSE(bytesOf("half.pfm") == bytesOf("s0.pfm"));
   EXPECT_FALSE(bytesOf("half.pfm") == bytesOf("s1.pfm"));
 
+  const ProgramResult late = render("late.pfm", {"--time", "7", "--view", "+z"});
+  EXPECT_TRUE(bytesOf("late.pfm") == bytesOf("s2.pfm"));
+  EXPECT_NE(late.err.find("note: --time 7: the series has times from 0 to 2; step 2 is taken"),
+            std::string::npos)
+      << late.err;
+
   draw("f%d.pfm", {"--steps", "all", "--interpolate", "--frames", "5"});
   EXPECT_TRUE(bytesOf("f0.pfm") == bytesOf("s0.pfm"));
   EXPECT_TRUE(bytesOf("f1.pfm") == bytesOf("half.pfm"));

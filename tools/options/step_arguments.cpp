@@ -2,9 +2,23 @@
 
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/error.h"
+#include "stream/base/message.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {
+
+namespace {
+
+/// That a time lies outside of the series: perhaps it is in another unit.
+void noteTimeOutside(const std::string& time, const Series& series, const StepPosition& position) {
+  const double number = parseNumber("--time", time), first = series.steps.front().time,
+               last = series.steps.back().time;
+  if (number < first || number > last)
+    printMessage("note: --time {}: the series has times from {:g} to {:g}; step {} is taken", time, first,
+                 last, position.step);
+}
+
+}  // namespace
 
 void addStepOptions(CLI::App& command, StepArguments& arguments, const std::string& group) {
   CLI::Option* const step =
@@ -57,6 +71,7 @@ std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const Cach
 CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments) {
   CacheReader cache(path);
   const StepPosition position = chosenSteps(arguments, cache).front();
+  if (arguments.time) noteTimeOutside(*arguments.time, cache.series(), position);
   return position == cache.position() ? std::move(cache) : cache.at(position);
 }
 
