@@ -189,6 +189,33 @@ TEST_F(WindowPlayback, PlaysBackwards) {
   EXPECT_EQ(valueOf(commands[2], "--step"), "0");
 }
 
+TEST_F(WindowPlayback, RangesAreOfTheSeriesOrOfTheStep) {
+  // The last node of the last step.
+  const auto raise = [](const char* name) {
+    std::fstream last(name, std::ios::binary | std::ios::in | std::ios::out);
+    const float value = 5;
+    last.seekp(-4, std::ios::end).write(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  raise("w_0003.fun");
+  run({"convert", "w.xyz", "w_%04d.fun", "-o", "a.splats", "--overwrite"});
+  open();
+  saveAndCopy();
+  for (const char* button : {"full range", "range of this step"}) {
+    click(button);
+    moveTo(rest_);
+    saveAndCopy();
+  }
+  press("comma");  // round to the last
+  click("range of this step");
+  moveTo(rest_);
+  saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 4u);
+  EXPECT_EQ(valueOf(commands[1], "--range"), "0,5");
+  EXPECT_LT(std::stod(valueOf(commands[2], "--range").substr(2)), 1);
+  EXPECT_EQ(valueOf(commands[3], "--range"), "0,5");
+}
+
 TEST_F(WindowPlayback, OpensAtAStep) {
   open({"--step", "2"});
   const Image picture = saveAndCopy();

@@ -188,8 +188,8 @@ std::string FunctionPanel::updateHistogram(const EditedFunction& function, size_
   return failure;
 }
 
-FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t variable, Shows shows) {
-  const VariableInfo& info = cache_.manifest().variables[variable];
+FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t variable, Shows shows,
+                                          uint64_t step) {
   Result result;
   ImGui::PushID(this);
   result.error = updateHistogram(function, variable);
@@ -200,7 +200,7 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
   paintNumbers(function);
   if (left > 0) ImGui::Unindent(left);
   if (shows != Shows::kOpacities) result.changed |= drawMaps(function, result);
-  drawRange(function, info, result);
+  drawRange(function, variable, step, result);
   if (shows != Shows::kColours) result.changed |= drawUnit(function);
   if (shows != Shows::kColours && ImGui::TreeNode("opacity points")) {
     nameWidget("opacity points");
@@ -398,7 +398,7 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
   return changed;
 }
 
-void FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& variable, Result& result) {
+void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_t step, Result& result) {
   const std::array ends{function.range().first, function.range().second};
   const auto set = [&](double low, double high) {
     if (function.setRange(low, high))
@@ -417,10 +417,18 @@ void FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
     else
       result.error = fmt::format("log scale: the range begins at {:.6g}; expected above zero", ends[0]);
   }
+  const bool is_series = cache_.series().steps.size() > 1;
+  const VariableInfo& all = cache_.seriesManifest().variables[variable];
   ImGui::SameLine();
-  if (ImGui::Button("full range")) set(variable.min, variable.max);
+  if (ImGui::Button("full range")) set(all.min, all.max);
   nameWidget("full range");
+  if (is_series) hint("of all time steps");
   ImGui::SameLine();
+  if (is_series) {
+    const StepValues& shown = cache_.series().steps[step].values[variable];
+    if (ImGui::Button("range of this step")) set(shown.min, shown.max);
+    nameWidget("range of this step");
+  }
   const bool resets = ImGui::Button("reset points");
   nameWidget("reset points");
   hint("the colour map with its own opacities");

@@ -27,15 +27,16 @@ class FunctionPanel {
     bool load = false, save = false;  // the user asked to load a function, or to save this one
     std::string error;                // of reading the histogram, or why what the user asked for cannot be
   };
-  /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables.
-  Result draw(EditedFunction& function, size_t variable, Shows shows);
+  /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables. `step`: the one that is
+  /// shown.
+  Result draw(EditedFunction& function, size_t variable, Shows shows, uint64_t step);
 
  private:
   bool drawCurve(EditedFunction& function);
   bool drawPoints(EditedFunction& function);
   bool drawMaps(EditedFunction& function, Result& result);
   bool drawColours(EditedFunction& function);
-  void drawRange(EditedFunction& function, const VariableInfo& variable, Result& result);
+  void drawRange(EditedFunction& function, size_t variable, uint64_t step, Result& result);
   bool drawUnit(EditedFunction& function);
   /// Takes the finished histogram, and starts computing another one if the function's range has changed.
   /// Returns why it cannot be read, once; the one before is kept then.

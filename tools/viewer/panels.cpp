@@ -27,7 +27,8 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   if (facts.playback && facts.playback->steps() > 1 && section("Time", true))
     drawTime(actions, *facts.playback);
   if (section("Scalar", true)) drawScalars(state, facts.further, actions);
-  if (section("Colours and opacities", true)) drawFunctions(state, actions);
+  if (section("Colours and opacities", true))
+    drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
   actions.changed |= actions.function_changed;
   if (section("Picture", true)) drawPicture(state, actions);
   if (section("View", true)) drawView(state, actions, facts);
@@ -141,11 +142,11 @@ void Panels::drawScalars(const ViewState& state, const FurtherScalars* further, 
   ImGui::EndDisabled();
 }
 
-void Panels::drawFunctions(ViewState& state, PanelActions& actions) {
+void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t step) {
   using Shows = FunctionPanel::Shows;
   const auto draw = [&](FunctionPanel& panel, EditedFunction& function, const std::string& variable,
                         Shows shows) {
-    const FunctionPanel::Result result = panel.draw(function, cache_.variableNamed(variable), shows);
+    const FunctionPanel::Result result = panel.draw(function, cache_.variableNamed(variable), shows, step);
     actions.function_changed |= result.changed;
     actions.dragging |= result.dragging;
     actions.automatic_function |= result.automatic;

@@ -42,7 +42,7 @@ class Panels {
  private:
   void drawTime(PanelActions& actions, Playback& playback);
   void drawScalars(const ViewState& state, const FurtherScalars* further, PanelActions& actions);
-  void drawFunctions(ViewState& state, PanelActions& actions);
+  void drawFunctions(ViewState& state, PanelActions& actions, uint64_t step);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);
   void drawPicture(ViewState& state, PanelActions& actions);
