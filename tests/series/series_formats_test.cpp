@@ -156,7 +156,8 @@ TEST_F(SeriesFormats, NetcdfGridWithHistoryFilesOneAfterTheOther) {
 /// Times of the steps of a cache.
 std::vector<double> timesOf(const std::string& cache) {
   std::vector<double> times;
-  for (const SeriesStep& step : CacheReader(cache).series().steps) times.push_back(step.time);
+  const CacheReader reader(cache);
+  for (const SeriesStep& step : reader.series().steps) times.push_back(step.time);
   return times;
 }
 
