@@ -417,16 +417,15 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
     else
       result.error = fmt::format("log scale: the range begins at {:.6g}; expected above zero", ends[0]);
   }
-  const bool is_series = cache_.series().steps.size() > 1;
   const VariableInfo& all = cache_.seriesManifest().variables[variable];
+  const std::vector<SeriesStep>& steps = cache_.series().steps;
   ImGui::SameLine();
   if (ImGui::Button("full range")) set(all.min, all.max);
   nameWidget("full range");
-  if (is_series) hint("of all time steps");
   ImGui::SameLine();
-  if (is_series) {
-    const StepValues& shown = cache_.series().steps[step].values[variable];
-    if (ImGui::Button("range of this step")) set(shown.min, shown.max);
+  if (steps.size() > 1) {
+    const StepValues& of = steps[step].values[variable];
+    if (ImGui::Button("range of this step")) set(of.min, of.max);
     nameWidget("range of this step");
   }
   const bool resets = ImGui::Button("reset points");
