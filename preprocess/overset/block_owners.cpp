@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <compare>
+#include <limits>
 #include <utility>
 
 #include "preprocess/splats/covered_part.h"
@@ -51,7 +52,7 @@ BlockOwners::BlockOwners(NodeReader reader, const std::vector<BlockOverlap>& ove
     for (size_t n = 0; n < loaded.nodes.x.size(); ++n)
       if (!loaded.nodes.blank[n]) box.add({loaded.nodes.x[n], loaded.nodes.y[n], loaded.nodes.z[n]});
     tiles_of_[slab.block].push_back(tiles_.size());
-    tiles_.push_back({slab, box});
+    tiles_.push_back({slab, box, {}});
   }
 }
 
@@ -94,6 +95,7 @@ std::shared_ptr<const CellTree> BlockOwners::treeOf(size_t tile) {
   std::vector<uint8_t> fringe = fringeOf(slab);
   auto tree = std::make_shared<const CellTree>(reader_.source().description().blocks[slab.block],
                                                std::move(loaded), std::move(fringe), reader_.centring());
+  tiles_[tile].first.emplace(tree->isAllFringe(), tree->smallest());
   kept_bytes_ += tree->bytes();
   kept_.push_front({tile, std::move(tree)});
   while (kept_.size() > 1 && kept_bytes_ > memory_bytes_) {
@@ -121,11 +123,32 @@ class BlockOwners::SlabCover {
       BoundingBox& box = boxes_[rowAt(j, k)];
       forSamples(around_, j, k, [&](size_t sample) { samples_.addTo(box, sample); });
     });
+    for (const BoundingBox& box : boxes_) all_.add(box);
+    if (!all_.isEmpty()) all_ = twiceAsLarge(all_);
+    last_ = {false, std::numeric_limits<CellSize>::min(), number_};
+    for (uint64_t k = box_.k0; k < box_.k1; ++k)
+      for (uint64_t j = box_.j0; j < box_.j1; ++j)
+        forSamples(box_, j, k, [&](size_t sample) {
+          last_ = std::max(last_, Rank{samples_.isFringe(sample), samples_.largestAround(sample), number_});
+        });
+  }
+
+  /// Whether other blocks own all of the samples. Ends at the first one of which they do not.
+  bool isWhole() const {
+    for (uint64_t k = box_.k0; k < box_.k1; ++k)
+      for (uint64_t j = box_.j0; j < box_.j1; ++j) {
+        const size_t first = samples_.elementOf(box_.i0, j, k);
+        for (size_t sample = first; sample < first + box_.rowNodes(block_.ni); ++sample)
+          if (samples_.isThere(sample) && covered_[sample] != kAllCovered) return false;
+      }
+    return true;
   }
 
   void addPartner(uint32_t partner) {
-    std::fill(states_.begin(), states_.end(), uint8_t{0});
     const std::vector<size_t> tiles = tilesThatMeet(partner);
+    if (std::all_of(tiles.begin(), tiles.end(), [&](size_t tile) { return ownsNothing(tile, partner); }))
+      return;
+    std::fill(states_.begin(), states_.end(), uint8_t{0});
     for (const size_t tile : tiles) locateMiddles(*owners_.treeOf(tile), partner);
     for (const size_t tile : tiles) {
       const std::shared_ptr<const CellTree> tree = owners_.treeOf(tile);
@@ -177,14 +200,18 @@ class BlockOwners::SlabCover {
   }
 
   std::vector<size_t> tilesThatMeet(uint32_t partner) const {
-    BoundingBox all;
-    for (const BoundingBox& box : boxes_) all.add(box);
     std::vector<size_t> tiles;
-    if (all.isEmpty()) return tiles;
-    all = twiceAsLarge(all);
+    if (all_.isEmpty()) return tiles;
     for (const size_t tile : owners_.tiles_of_[partner])
-      if (owners_.tiles_[tile].box.meets(all)) tiles.push_back(tile);
+      if (owners_.tiles_[tile].box.meets(all_)) tiles.push_back(tile);
     return tiles;
+  }
+
+  /// Whether no cell of the tile comes before one of the samples'.
+  bool ownsNothing(size_t tile, uint32_t partner) const {
+    if (!owners_.tiles_[tile].first) owners_.treeOf(tile);
+    const auto [fringe, size] = *owners_.tiles_[tile].first;
+    return Rank{fringe, size, partner} >= last_;
   }
 
   /// Sets the states of the samples of which a cell of the tree holds the middle.
@@ -256,6 +283,8 @@ class BlockOwners::SlabCover {
   std::vector<uint64_t>& covered_;
   std::vector<uint8_t> states_;     // [sample], to one partner
   std::vector<BoundingBox> boxes_;  // [row of around_], of the samples' middles
+  BoundingBox all_;                 // around all of them, and as far again
+  Rank last_;                       // of the samples' cells
 };
 
 void BlockOwners::cover(const LoadedSlab& loaded, std::vector<uint64_t>& covered) {
@@ -263,7 +292,10 @@ void BlockOwners::cover(const LoadedSlab& loaded, std::vector<uint64_t>& covered
   const std::vector<uint32_t>& partners = partners_[loaded.slab.block];
   if (partners.empty()) return;
   SlabCover cover(*this, loaded, covered);
-  for (const uint32_t partner : partners) cover.addPartner(partner);
+  for (const uint32_t partner : partners) {
+    if (cover.isWhole()) return;
+    cover.addPartner(partner);
+  }
 }
 
 }  // namespace curvisplat

@@ -16,10 +16,13 @@
 #include <cstdint>
 #include <list>
 #include <memory>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/overset/cell_size.h"
 #include "preprocess/overset/cell_tree.h"
 #include "preprocess/overset/sample_cells.h"
 #include "preprocess/survey/block_overlap.h"
@@ -50,6 +53,8 @@ class BlockOwners {
   struct Tile {
     Slab slab;
     BoundingBox box;
+    // Whether all of its nodes are fringe, and its smallest cell; known once its tree has been built.
+    std::optional<std::pair<bool, CellSize>> first;
   };
   struct Kept {
     size_t tile;

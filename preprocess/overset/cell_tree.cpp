@@ -61,6 +61,15 @@ CellTree::CellTree(const GridBlock& block, LoadedSlab loaded, std::vector<uint8_
   build(all_);
 }
 
+CellSize CellTree::smallest() const {
+  return *std::min_element(sizes_.begin(), sizes_.end());
+}
+
+bool CellTree::isAllFringe() const {
+  return !fringe_.empty() &&
+         std::all_of(fringe_.begin(), fringe_.end(), [](uint8_t node) { return node != 0; });
+}
+
 uint64_t CellTree::bytes() const {
   return loaded_.nodes.x.size() * (3 * sizeof(double) + sizeof(CellSize)) + fringe_.size() +
          nodes_.size() * sizeof(Node);

@@ -49,11 +49,13 @@ class CellTree {
   bool meets(const BoundingBox& box) const;
 
   CellSize sizeOf(size_t cell) const { return sizes_[cell]; }
+  CellSize smallest() const;
   /// Whether the node next to the point is one of the fringe.
   bool isFringe(const Holder& holder) const {
     return !fringe_.empty() && fringe_[holder.cell + (holder.u.x > 0) + (holder.u.y > 0) * row_stride_ +
                                        (holder.u.z > 0) * plane_stride_] != 0;
   }
+  bool isAllFringe() const;
 
  private:
   struct Range {  // of lowest nodes, in the window

@@ -73,6 +73,23 @@ std::pair<CellSize, CellSize> SampleCells::sizes(size_t sample) const {
   return found;
 }
 
+CellSize SampleCells::largestAround(size_t sample) const {
+  if (centring_ == Centring::kCell) return sizes_[sample];
+  const auto place = placeOf(sample);
+  CellSize largest = std::numeric_limits<CellSize>::min();
+  for (size_t c = 0; c < 8; ++c) {
+    size_t cell = sample;
+    bool is_inside = true;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const bool before = c >> axis & 1;
+      is_inside &= before ? place[axis] > 0 : place[axis] + 1 < counts_[axis] || place[axis] == 0;
+      if (before) cell -= strides_[axis];
+    }
+    if (is_inside) largest = std::max(largest, sizes_[cell]);
+  }
+  return largest;
+}
+
 SampleCells::Piece SampleCells::pieceOf(size_t sample) const {
   Piece piece;
   piece.sample = sample;

@@ -32,6 +32,8 @@ class SampleCells {
   void addTo(BoundingBox& box, size_t sample) const;
   /// The sizes of the block's cells that the sample has a part of: the smallest and the largest.
   std::pair<CellSize, CellSize> sizes(size_t sample) const;
+  /// No less than the size of any of the sample's points (pointOf): kNoCell where a cell around it is none.
+  CellSize largestAround(size_t sample) const;
 
   /// What a sample's points need to know of it.
   struct Piece {

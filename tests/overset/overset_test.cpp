@@ -2,14 +2,22 @@
 // only meet.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <span>
 
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/addition/add_step.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
+#include "preprocess/overset/block_owners.h"
 #include "preprocess/scenes/scenes.h"
+#include "preprocess/splats/covered_part.h"
+#include "preprocess/survey/block_overlap.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/function_grid.h"
@@ -113,6 +121,43 @@ TEST_F(Overset, BlocksThatAbutLoseNothing) {
     }
   convertWith(boxes({{{0, 0, 0}, {1, 1, 1}, 9}}), optionsFor("one.splats"));
   EXPECT_EQ(manifestOf("one.splats").overlap, "");
+}
+
+/// Counts the windows that are read.
+class CountedReads : public FunctionGridSource {
+ public:
+  using FunctionGridSource::FunctionGridSource;
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    ++reads_;
+    FunctionGridSource::read(block, box, scalars, out);
+  }
+  uint64_t reads() const { return reads_; }
+
+ private:
+  mutable std::atomic<uint64_t> reads_{0};
+};
+
+// A set of blocks may name one file thousands of times. A block is compared with the first, which owns all of it.
+TEST_F(Overset, ABlockManyTimesIsComparedOnce) {
+  constexpr uint32_t kBlocks = 400, kPartners = 16;  // as many as findOverlaps() finds
+  const GridBlock block = gridBlock(5, 5, 5);
+  const CountedReads source(std::vector<GridBlock>(kBlocks, block), 1, [](const GridNode& node) {
+    return NodeValues{glm::dvec3(node.i, node.j, node.k), {1.0f}, false};
+  });
+  std::vector<BlockOverlap> overlaps;
+  for (uint32_t first = 0; first < kPartners; ++first)
+    for (uint32_t second = first + 1; second < kBlocks; ++second) overlaps.push_back({first, second, 64, 1});
+  const NodeReader reader(source, {0}, std::nullopt);
+  BlockOwners owners(reader, overlaps, 40 << 10);  // some trees at a time
+  SlabStream slabs(reader, 1 << 20, {1, 1});
+  std::vector<uint64_t> covered;
+  while (const LoadedSlab* loaded = slabs.next()) {
+    owners.cover(*loaded, covered);
+    const uint64_t expected = loaded->slab.block == 0 ? 0 : kAllCovered;
+    for (const uint64_t of_sample : covered) ASSERT_EQ(of_sample, expected) << loaded->slab.block;
+  }
+  EXPECT_LE(source.reads(), 4 * kBlocks);
 }
 
 // Every splat's plane is the field's.
