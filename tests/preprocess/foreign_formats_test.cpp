@@ -1,4 +1,5 @@
 // Files of formats that are not read: each is refused by its own name.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -89,6 +90,20 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("b.inp", "an AVS UCD mesh");
 }
 
+TEST_F(ForeignFormats, AvsUcdFilesAreNamedHoweverLateTheirCellsBegin) {
+  for (const int nodes : {8, 100, 5000})
+    for (const int first : {0, 1}) {
+      std::string text = fmt::format("# by AVS\n{} 1 1 0 0\n", nodes);
+      for (int n = 0; n < nodes; ++n) text += fmt::format("{} {} {} 0.5\n", first + n, 0.1 * n, n % 7);
+      text += "1 0 tet 1 2 3 4\n1 1\np, Pa\n";
+      write("late.inp", text);
+      expectNamed("late.inp", "an AVS UCD mesh");
+    }
+  write("comments.inp", std::string(100, '#') + "\n" + std::string(4000, '#') +
+                            "\n4 1 0 0 0\n1 0 0 0\n2 1 0 0\n" + "3 0 1 0\n4 0 0 1\n1 0 tet 1 2 3 4\n");
+  expectNamed("comments.inp", "an AVS UCD mesh");
+}
+
 TEST_F(ForeignFormats, FoldersOfZarrAreNamed) {
   for (const char* mark : {".zgroup", ".zarray", ".zmetadata", "zarr.json"}) {
     const std::filesystem::path store = folder_ / (std::string(mark) + ".zarr");
@@ -105,6 +120,12 @@ TEST_F(ForeignFormats, TextsOfNumbersAreStillTriedAsPlot3d) {
   OpenGridOptions options;
   options.grid = folder_ / "a.xyz";
   EXPECT_EQ(openGrid(options)->description().blocks.size(), 1u);
+  // Two blocks, of which five counts are in the first line, and four numbers in all others.
+  std::string text = "2 10 10 2 10\n10 2 0 1\n";
+  for (int n = 2; n < 1198; n += 4) text += fmt::format("{} {} {} {}\n", n % 10, n / 10 % 10, n / 100, n % 3);
+  write("two.xyz", text + "0 0\n");
+  options.grid = folder_ / "two.xyz";
+  EXPECT_EQ(openGrid(options)->description().blocks.size(), 2u);
 }
 
 TEST_F(ForeignFormats, UnstructuredNetcdfIsNamed) {

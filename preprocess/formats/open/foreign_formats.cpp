@@ -1,7 +1,10 @@
 #include "preprocess/formats/open/foreign_formats.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace curvisplat {
@@ -14,7 +17,7 @@ struct Magic {
 
 using namespace std::string_view_literals;
 
-constexpr uint64_t kLooked = 2048;
+constexpr uint64_t kLooked = 16 << 10;  // more than the comments before a text file's data
 
 constexpr Magic kMagics[] = {
     {"# vtk DataFile"sv, "a legacy VTK file"},
@@ -80,30 +83,48 @@ bool isNastran(std::string_view begin) {
          is_card("ctetra") || is_card("chexa") || is_card("cpenta");
 }
 
-/// Five counts, of which the fourth and the fifth may be 0, then the first node: its number and x, y, z.
+std::vector<std::string_view> wordsOf(std::string_view line) {
+  std::vector<std::string_view> words;
+  while (!line.empty()) {
+    const size_t end = std::min(line.find_first_of(" \t"), line.size());
+    words.push_back(line.substr(0, end));
+    line.remove_prefix(std::min(line.find_first_not_of(" \t", end), line.size()));
+  }
+  return words;
+}
+
+/// Nothing if the word has anything but digits, or too many.
+std::optional<uint64_t> countIn(std::string_view word) {
+  uint64_t count = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
+  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+  return count;
+}
+
+/// Five counts, of which the fourth and the fifth may be 0; then a line for each node: its number and x, y, z; then
+/// the cells, each with the name of its kind. Where `begin` ends within the nodes, they have to be numbered one after
+/// another: coordinates of a PLOT3D file do not follow one another so.
 bool isAvsUcd(std::string_view begin) {
-  const auto words = [](std::string_view line) {
-    std::vector<std::string_view> found;
-    while (!line.empty()) {
-      const size_t end = std::min(line.find_first_of(" \t"), line.size());
-      found.push_back(line.substr(0, end));
-      line.remove_prefix(std::min(line.find_first_not_of(" \t", end), line.size()));
-    }
-    return found;
-  };
-  const std::vector<std::string_view> counts = words(nextLine(begin, '#'));
-  const bool are_counts = counts.size() == 5 && std::ranges::all_of(counts, [](std::string_view count) {
-                            return count.find_first_not_of("0123456789") == std::string_view::npos;
-                          });
-  if (!are_counts || counts.front() == "1") return false;  // "1 ..." may be a PLOT3D file of one block
-  if (words(nextLine(begin, '#')).size() != 4) return false;
-  for (std::string_view rest = begin; !rest.empty();) {
-    const std::vector<std::string_view> line = words(nextLine(rest, '#'));
+  const std::vector<std::string_view> counts = wordsOf(nextLine(begin, '#'));
+  if (counts.size() != 5 ||
+      !std::ranges::all_of(counts, [](std::string_view count) { return countIn(count).has_value(); }))
+    return false;
+  if (counts.front() == "1") return false;  // "1 ..." may be a PLOT3D file of one block
+  const uint64_t nodes = *countIn(counts.front());
+  uint64_t seen = 0;
+  bool in_turn = true;
+  for (std::optional<uint64_t> last; begin.find('\n') != std::string_view::npos;) {  // whole lines
+    const std::vector<std::string_view> line = wordsOf(nextLine(begin, '#'));
     if (line.size() > 2)
       for (const std::string_view kind : {"tet", "hex", "prism", "pyr", "tri", "quad", "line", "pt"})
-        if (line[2] == kind) return true;
+        if (line[2] == kind) return seen > 0;
+    const std::optional<uint64_t> number = line.empty() ? std::nullopt : countIn(line.front());
+    if (seen++ == 0 && line.size() != 4) return false;
+    in_turn &= line.size() == 4 && number && (!last || *number == *last + 1);
+    last = number;
   }
-  return false;
+  constexpr uint64_t kSufficient = 8;
+  return in_turn && seen >= kSufficient && seen <= nodes;
 }
 
 /// The formats that are text, by the words that they begin with. `begin`: the first bytes of the file.
