@@ -364,11 +364,13 @@ std::string wordsOf(const GridDescription& description, const std::vector<BlockO
   double total = 0;
   for (const BlockOverlap& overlap : overlaps) total += overlap.volume;
   std::string pairs;
-  for (size_t n = 0; n < std::min(kPairsNamed, largest.size()); ++n)
-    pairs +=
-        fmt::format("{}{} and {}: {:.3g}, {:.2g} % of the smaller", n ? "; " : "",
-                    description.blocks[largest[n].first].name, description.blocks[largest[n].second].name,
-                    largest[n].volume, 100 * largest[n].share);
+  for (size_t n = 0; n < std::min(kPairsNamed, largest.size()); ++n) {
+    const double percent = 100 * largest[n].share;
+    pairs += fmt::format("{}{} and {}: {:.3g}, {} % of the smaller", n ? "; " : "",
+                         description.blocks[largest[n].first].name,
+                         description.blocks[largest[n].second].name, largest[n].volume,
+                         percent < 9.95 ? fmt::format("{:.2g}", percent) : fmt::format("{:.0f}", percent));
+  }
   if (largest.size() > kPairsNamed) pairs += fmt::format("; and {} more pairs", largest.size() - kPairsNamed);
   return fmt::format("in about {:.3g} cubic units ({})", total, pairs);
 }

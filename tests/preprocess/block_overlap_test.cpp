@@ -70,6 +70,8 @@ TEST(BlockOverlap, OfOneBlockManyTimesIsFoundInFewPairs) {
   EXPECT_GE(overlaps.size(), kBlocks);
   EXPECT_LE(overlaps.size(), 16 * kBlocks);
   for (const BlockOverlap& overlap : overlaps) ASSERT_NEAR(overlap.share, 1, 1e-9);
+  const std::string note = overlapNote(source.description(), overlaps);
+  EXPECT_NE(note.find(", 100 % of the smaller; "), std::string::npos) << note;
   EXPECT_EQ(overlapsIn(source, 2'000).size(), overlaps.size());  // however it is read
 }
 
