@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "preprocess/grid/hexahedron.h"
+#include "stream/base/check.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -64,9 +65,17 @@ bool cellIsThere(const NodeArrays& nodes, size_t at, size_t row_stride, size_t p
 
 }  // namespace
 
+std::span<const GridFace> facesOfBlock(std::span<const GridFace> faces, uint32_t block) {
+  const auto before = [](const GridFace& face, uint32_t number) { return face.block < number; };
+  const auto first = std::lower_bound(faces.begin(), faces.end(), block, before);
+  return {first, std::lower_bound(first, faces.end(), block + 1, before)};
+}
+
 FaceSpool::FaceSpool(const NodeReader& reader, std::vector<GridFace> faces, const FaceBox& box,
                      const std::filesystem::path& folder)
     : reader_(reader), faces_(std::move(faces)), box_(box), file_(folder) {
+  const auto before = [](const GridFace& a, const GridFace& b) { return a.block < b.block; };
+  CURVISPLAT_CHECK(std::is_sorted(faces_.begin(), faces_.end(), before));
   uint64_t end = 0;
   for (const GridFace& face : faces_) {
     const uint64_t nodes = face.nodes[0] * face.nodes[1];
@@ -82,10 +91,9 @@ void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progre
   while (const LoadedSlab* loaded = slabs.next()) {
     if (loaded->slab.block != block) {
       block = loaded->slab.block;
-      const auto in_block = [&](const GridFace& face) { return face.block == block; };
-      first_face = static_cast<size_t>(std::find_if(faces_.begin(), faces_.end(), in_block) - faces_.begin());
-      end_face = first_face;
-      while (end_face < faces_.size() && in_block(faces_[end_face])) ++end_face;
+      const std::span<const GridFace> of_block = facesOfBlock(faces_, block);
+      first_face = static_cast<size_t>(of_block.data() - faces_.data());
+      end_face = first_face + of_block.size();
     }
     tbb::parallel_invoke(
         [&] { addEnds(*loaded, abutting); },

@@ -42,6 +42,9 @@ void forRowParts(uint64_t count, const Use& use) {
     use(RowRange{begin, begin + kNodesAtATime < count ? begin + kNodesAtATime : count});
 }
 
+/// Those of a block, of faces in the order of their blocks. A grid may have 100,000 blocks.
+std::span<const GridFace> facesOfBlock(std::span<const GridFace> faces, uint32_t block);
+
 class FaceSpool {
  public:
   /// `faces`: their lattices.

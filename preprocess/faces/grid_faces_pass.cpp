@@ -43,13 +43,12 @@ std::vector<GridFace> facesOf(std::span<const GridBlock> blocks, std::span<const
 std::vector<FaceRegion> regionsOf(const GridDescription& grid, std::span<const GridFace> faces) {
   std::vector<FaceRegion> regions;
   for (const GridBoundary& boundary : grid.boundaries)
-    for (uint32_t n = 0; n < faces.size(); ++n) {
-      const GridFace& face = faces[n];
+    for (const GridFace& face : facesOfBlock(faces, boundary.block)) {
       const auto axis = static_cast<size_t>(face.axis);
-      if (face.side == FaceSide::kPlane || face.block != boundary.block ||
-          boundary.first[axis] != face.index || boundary.last[axis] != face.index)
+      if (face.side == FaceSide::kPlane || boundary.first[axis] != face.index ||
+          boundary.last[axis] != face.index)
         continue;
-      FaceRegion region{n, {}, {}, boundary.name, boundary.type};
+      FaceRegion region{static_cast<uint32_t>(&face - faces.data()), {}, {}, boundary.name, boundary.type};
       bool is_area = true;
       for (size_t along = 0; along < 2; ++along) {
         region.first[along] = boundary.first[kAlong[axis][along]];
@@ -129,10 +128,10 @@ class FacesPass {
   /// Whether the face was asked for as an index plane, too.
   bool isPlane(uint32_t number) const {
     const GridFace& face = spool_.faces()[number];
+    const std::span<const GridFace> of_block = facesOfBlock(spool_.faces(), face.block);
     return face.side == FaceSide::kPlane ||
-           std::any_of(spool_.faces().begin(), spool_.faces().end(), [&](const GridFace& other) {
-             return other.side == FaceSide::kPlane && other.block == face.block && other.axis == face.axis &&
-                    other.index == face.index;
+           std::any_of(of_block.begin(), of_block.end(), [&](const GridFace& other) {
+             return other.side == FaceSide::kPlane && other.axis == face.axis && other.index == face.index;
            });
   }
 

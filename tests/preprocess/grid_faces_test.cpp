@@ -6,8 +6,10 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <span>
 
 #include "preprocess/convert/convert.h"
+#include "preprocess/faces/face_spool.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
@@ -169,6 +171,17 @@ TEST_F(GridFacesTest, BytesDependOnTheGridAlone) {
   memory_ = 200 << 20;
   convertAndOpen(source);
   EXPECT_EQ(bytes(), once);
+}
+
+TEST(GridFacesOfBlock, AreFoundByItsNumber) {
+  std::vector<GridFace> faces;
+  for (const uint32_t block : {0u, 0u, 2u, 3u, 3u, 3u, 7u}) faces.emplace_back().block = block;
+  const size_t first[] = {0, 2, 2, 3, 6, 6, 6, 6, 7}, count[] = {2, 0, 1, 3, 0, 0, 0, 1, 0};
+  for (uint32_t block = 0; block < 9; ++block) {
+    const std::span<const GridFace> found = facesOfBlock(faces, block);
+    EXPECT_EQ(found.data() - faces.data(), static_cast<std::ptrdiff_t>(first[block])) << block;
+    EXPECT_EQ(found.size(), count[block]) << block;
+  }
 }
 
 TEST_F(GridFacesTest, ADamagedFileIsRefused) {
