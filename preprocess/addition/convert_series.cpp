@@ -55,6 +55,13 @@ class SeriesConversion {
     ConvertOptions first;
   };
 
+  /// A step that another rank could not convert.
+  struct FailedElsewhere {
+    uint64_t number = 0;
+    unsigned rank = 0;
+    std::string error;
+  };
+
   void takeOrLeaveOut(uint64_t number) {
     try {
       take(number);
@@ -125,7 +132,7 @@ class SeriesConversion {
     const auto ranges = dealSteps(next, input_.count, start.in_group, ranks.count());
     ConvertedSteps converted;
     if (ranks.isFirst())
-      for (; next < ranges[0].end; ++next) takeOrLeaveOut(next);
+      for (; next < ranges[0].end; ++next) takeAfterOthers(next);
     else
       converted = shared.convertPart(start);
     const std::vector<Ranks::Bytes> sent = ranks.gather(toBytes(converted));
@@ -137,12 +144,22 @@ class SeriesConversion {
         next = number + 1;
       });
       if (!theirs.error.empty() && next == ranges[rank].begin + theirs.steps.size())
-        printMessage("warning: rank {} could not convert step {} ({}): {}; rank 0 tries again", rank,
-                     numberOf(next), input_.name(next), theirs.error);
+        failed_elsewhere_ = FailedElsewhere{next, rank, theirs.error};
     }
     std::vector<uint64_t> nexts{next};
     next = fromBytes<uint64_t>(ranks.broadcast(toBytes(nexts)))[0];
     return next;
+  }
+
+  /// At rank 0. Where it can convert a step that another rank could not, something is wrong there. Where it cannot
+  /// either, its own line says why.
+  void takeAfterOthers(uint64_t number) {
+    const size_t steps = times_.size();
+    takeOrLeaveOut(number);
+    if (failed_elsewhere_ && failed_elsewhere_->number == number && times_.size() > steps)
+      printMessage("warning: rank {} could not convert step {} ({}): {}; rank 0 could",
+                   failed_elsewhere_->rank, numberOf(number), input_.name(number), failed_elsewhere_->error);
+    failed_elsewhere_.reset();
   }
 
   SharedSteps::Start startOfRound(uint64_t next) const {
@@ -362,6 +379,7 @@ class SeriesConversion {
   uint64_t first_number_ = 0;  // of the input's first step in the cache
   uint64_t known_ = 0;         // steps of the cache that the input has to begin with
   uint64_t next_ = 0;          // of those, the next one
+  std::optional<FailedElsewhere> failed_elsewhere_;
   bool expect_new_geometry_ = false;
   Ranks* ranks_ = nullptr;  // null: this process alone
   SeriesReport sums_;

@@ -3,6 +3,8 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <string>
+#include <vector>
 
 #include "preprocess/convert/conversion.h"
 #include "preprocess/convert/conversion_workspace.h"
@@ -10,6 +12,7 @@
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/shared_passes.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
@@ -24,6 +27,29 @@ uint64_t samplesOf(const GridDescription& description) {
   for (const GridBlock& block : description.blocks) samples += block.nodes();
   for (const MeshPiece& piece : description.pieces) samples += std::max(piece.points, piece.cells);
   return samples;
+}
+
+/// The shape of the grid and its scalars, in words. Without files' names and times, which may differ between machines.
+std::string shapeOf(const GridDescription& description, const std::vector<uint32_t>& scalars) {
+  std::string shape = description.blocks.empty() ? "" : countText(description.blocks.size(), "block") + " of";
+  for (const GridBlock& block : description.blocks)
+    shape += fmt::format(" {}x{}x{}", block.ni, block.nj, block.nk);
+  for (const MeshPiece& piece : description.pieces)
+    shape += fmt::format(" {} points and {} cells", piece.points, piece.cells);
+  shape += ", with";
+  for (const uint32_t scalar : scalars) shape += " " + description.scalars[scalar].name;
+  return shape;
+}
+
+/// Throws Error at ranks that see other files than rank 0: each converts its share of what it sees.
+void requireSameGrid(const GridDescription& description, const std::vector<uint32_t>& scalars, Ranks& ranks) {
+  const std::string own = shapeOf(description, scalars);
+  const auto sent = fromBytes<char>(ranks.broadcast(toBytes(std::vector<char>(own.begin(), own.end()))));
+  if (std::equal(own.begin(), own.end(), sent.begin(), sent.end())) return;
+  constexpr size_t kShown = 200;
+  throw Error("{}: is another grid here than at rank 0: {}; found there {}; give all ranks the same files",
+              description.files.empty() ? description.format : description.files.front(),
+              own.substr(0, kShown), std::string(sent.begin(), sent.end()).substr(0, kShown));
 }
 
 /// Some buckets for each rank, so that they can be dealt out evenly.
@@ -63,6 +89,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given_opti
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   plan.suit(samplesOf(source.description()), options.scalars.size());
   if (grid) GridOrigin::requireMemory(*grid, options.scalars, plan);
+  if (options.ranks) requireSameGrid(source.description(), options.scalars, *options.ranks);
   if (options.ranks) plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.owner_bytes) plan.owner_bytes = *options.owner_bytes;

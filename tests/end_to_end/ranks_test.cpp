@@ -105,9 +105,85 @@ TEST_F(RanksCommand, ReportADamagedStepOfASeriesOnce) {
                                                 file("s.splats"), "--overwrite", "--threads", "1"});
     fs::resize_file(name, size);
     EXPECT_EQ(result.status, 1);
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
     EXPECT_NE(result.err.find("rank 0 of 3"), std::string::npos) << result.err;
     EXPECT_NE(result.err.find(fmt::format("s_{:04}.fun", damaged)), std::string::npos) << result.err;
   }
+}
+
+TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
+  ASSERT_EQ(runProgram({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")}).status,
+            0);
+  // Rank 1 sees another version of the last step's file.
+  fs::create_directory(file("other"));
+  for (const char* name : {"s.xyz", "s_0000.fun", "s_0001.fun", "s_0002.fun", "s_0003.fun"})
+    fs::copy_file(file(name), file("other/") + name);
+  fs::resize_file(file("other/s_0003.fun"), 100);
+  const std::string script = file("one_old.sh");
+  writeFileAtomically(script,
+                      fmt::format("#!/bin/sh\n"
+                                  "cd \"{}\"\n"
+                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && cd other\n"
+                                  "exec \"{}\" convert s.xyz s_%04d.fun --threads 1 --overwrite -o \"{}\"\n",
+                                  file(""), CURVISPLAT_PROGRAM, file("s.splats")));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(3, {}, script);
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("warning: rank 1 could not convert step 3 (s_0003.fun)"), std::string::npos)
+      << result.err;
+  const ProgramResult alone = runProgram({"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1",
+                                          "--overwrite", "-o", file("alone.splats")});
+  ASSERT_EQ(alone.status, 0) << alone.err;
+  for (const auto& [name, bytes] : filesOf(file("alone.splats")))
+    if (name != "manifest.json") {
+      EXPECT_TRUE(readTextFile(file("s.splats/" + name)) == bytes) << name;
+    }
+}
+
+TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
+  fs::create_directory(file("elsewhere"));
+  ASSERT_EQ(runProgram({"generate", "half-annulus", "--size", "60x32x32", "-o", file("elsewhere/g")}).status,
+            0);
+  ASSERT_EQ(runProgram({"convert", file("elsewhere/g.xyz"), file("elsewhere/g.fun"), "-o",
+                        file("elsewhere/g.splats")})
+                .status,
+            0);
+  for (const std::string command : {"convert g.xyz g.fun --threads 1 -o ", "render g.splats -o "}) {
+    const std::string output = file(command.front() == 'c' ? "mixed.splats" : "mixed.png");
+    const std::string script = file("one_elsewhere.sh");
+    writeFileAtomically(script, fmt::format("#!/bin/sh\n"
+                                            "cd \"{}\"\n"
+                                            "[ \"$OMPI_COMM_WORLD_RANK\" = 2 ] && cd elsewhere\n"
+                                            "exec \"{}\" {} \"{}\"\n",
+                                            file(""), CURVISPLAT_PROGRAM, command, output));
+    fs::permissions(script, fs::perms::owner_all);
+    const ProgramResult result = runAsRanks(3, {}, script);
+    EXPECT_EQ(result.status, 1) << result.err;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find("rank 2 of 3"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("here than at rank 0"), std::string::npos) << result.err;
+    for (const auto& entry : fs::directory_iterator(file("")))
+      EXPECT_FALSE(entry.path().filename().string().starts_with("mixed")) << entry.path();
+  }
+}
+
+TEST_F(RanksCommand, OfSeveralThatFailOfOneCauseTheLowestReports) {
+  // All ranks but the first see no cache; rank 0 fails later than they do, as it hears of it.
+  const std::string script = file("first_sees.sh");
+  writeFileAtomically(
+      script, fmt::format("#!/bin/sh\n"
+                          "cache=\"{}\"\n"
+                          "[ \"$OMPI_COMM_WORLD_RANK\" = 0 ] && cache=\"{}\"\n"
+                          "exec \"{}\" render \"$cache\" -o \"{}\"\n",
+                          file("missing.splats"), file("g.splats"), CURVISPLAT_PROGRAM, file("never.png")));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(4, {}, script);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("rank 1 of 4"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("missing.splats"), std::string::npos) << result.err;
+  EXPECT_FALSE(fs::exists(file("never.png")));
 }
 
 TEST_F(RanksCommand, AreEndedByTheOneThatFails) {

@@ -142,6 +142,7 @@ void render(const RenderArguments& given) {
 
   arguments.cache = cacheToDraw(arguments);
   CacheReader cache = openAtStep(arguments.cache, arguments.steps);
+  requireSameCache(cache, ranks);
   const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step
   const size_t shown = chooseVariable(cache, arguments.scalar);

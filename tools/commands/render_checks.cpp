@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "render/image/image_file.h"
@@ -84,6 +85,15 @@ void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
   }
   others.insert(others.end(), {arguments.output, arguments.first_image});
   if (!arguments.statistics.empty()) checkOutputFile("--stats", arguments.statistics, others);
+}
+
+void requireSameCache(const CacheReader& cache, Ranks& ranks) {
+  if (ranks.alone()) return;
+  const std::string own = cache.seriesManifest().toJson();
+  const auto sent = fromBytes<char>(ranks.broadcast(toBytes(std::vector<char>(own.begin(), own.end()))));
+  if (!std::equal(own.begin(), own.end(), sent.begin(), sent.end()))
+    throw Error("{}: is another cache here than at rank 0, or another version of it; give all ranks the same",
+                cache.path().string());
 }
 
 }  // namespace curvisplat
