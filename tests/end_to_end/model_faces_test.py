@@ -173,6 +173,19 @@ class ModelFaces(ModelFileTest):
         self.write(np.ones((6, 8, 8, 3)) / np.sqrt(3), np.ones((2, 6, 8, 8), "f4"))
         self.assertEqual(len(self.info()["blocks"]), 6)
 
+    def test_edges_of_more_than_a_million_points(self):
+        """Edges are compared in memory: faces with too many points along them stay apart, and a line says so."""
+        for nodes, joined in ((87_378, True), (87_380, False)):  # 2 x 6 x (nodes + 2) points; 2^20 are compared
+            step = 90 / nodes
+            along = (np.arange(nodes) + 0.5) * step - 45  # bands of square cells
+            points = np.stack([on_face(face, along, np.array([-step, 0])) for face in range(6)])
+            self.write(points, np.broadcast_to(np.float32(1), (2, 6, 2, nodes)))
+            info = self.info()
+            self.assertEqual("joined at" in info["format"], joined)
+            line = f"the faces are not joined: their edges have {12 * (nodes + 2)} points; at most 1048576 are compared"
+            self.assertEqual(info["warnings"].count(line), not joined, info["warnings"])
+        self.assertEqual(self.converted()[1].count(line), 1)
+
 
 if __name__ == "__main__":
     unittest.main()
