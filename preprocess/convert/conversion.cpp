@@ -464,10 +464,11 @@ ConvertReport runConversion(const DataSource& source, const ConvertOptions& opti
   try {
     return conversion.run();
   } catch (const Interrupted& interrupted) {
-    const char* what =
-        conversion.leaveForResuming()
-            ? "interrupted; continue with the same command and --resume"
-            : "interrupted before there was anything to resume; its temporary files were removed";
+    const char* what = "interrupted; its temporary files were removed";
+    if (options.keep_interrupted)
+      what = conversion.leaveForResuming()
+                 ? "interrupted; continue with the same command and --resume"
+                 : "interrupted before there was anything to resume; its temporary files were removed";
     throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
   } catch (const DiskFull& full) {
     const std::string text = fmt::format(

@@ -23,6 +23,7 @@ struct ConvertOptions {
   bool check_disk_space = true;            // before the work
   bool overwrite = false;                  // an existing cache is replaced once the new one is complete
   bool resume = false;                     // continue an interrupted conversion, if there is one
+  bool keep_interrupted = true;            // leave finished work to be resumed; otherwise nothing
   std::vector<uint32_t> scalars;           // positions in the source's description; the cache's variables
   std::optional<double> blank_value;       // samples with this value of any scalar are blanked
   uint64_t memory_bytes = 0;               // 0: defaultMemory()

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
+#include <type_traits>
 
+#include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
 #include "stream/base/error.h"
 
@@ -32,11 +35,11 @@ class ArrayView {
  public:
   ArrayView(py::array array, const std::string& what) : array_(std::move(array)) {
     const py::dtype type = array_.dtype();
-    if (type.is(py::dtype::of<float>()))
+    if (type.equal(py::dtype::of<float>()))
       kind_ = Kind::kFloat;
-    else if (type.is(py::dtype::of<double>()))
+    else if (type.equal(py::dtype::of<double>()))
       kind_ = Kind::kDouble;
-    else if (type.is(py::dtype::of<bool>()))
+    else if (type.equal(py::dtype::of<bool>()))
       kind_ = Kind::kBool;
     else
       throw UsageError("{}: the array has the type {}; expected float32 or float64 (use .astype)", what,
@@ -67,18 +70,24 @@ class ArrayView {
       case Kind::kDouble:
         return copyElements<double>(first, count, out);
       case Kind::kBool:
-        return copyElements<bool>(first, count, out);
+        return copyElements<uint8_t>(first, count, out);
     }
   }
 
  private:
   enum class Kind { kFloat, kDouble, kBool };
 
+  /// Elements may lie at any address. Of bool, every byte but 0 is true: views of other arrays have all of them.
   template <typename Stored, typename T>
   void copyElements(const std::byte* first, uint64_t count, T* out) const {
-    for (uint64_t n = 0; n < count; ++n)
-      out[n] =
-          static_cast<T>(*reinterpret_cast<const Stored*>(first + static_cast<ptrdiff_t>(n) * strides_[2]));
+    for (uint64_t n = 0; n < count; ++n) {
+      Stored element;
+      std::memcpy(&element, first + static_cast<ptrdiff_t>(n) * strides_[2], sizeof element);
+      if constexpr (std::is_same_v<Stored, uint8_t>)
+        out[n] = static_cast<T>(element != 0);
+      else
+        out[n] = static_cast<T>(element);
+    }
   }
 
   py::array array_;
@@ -104,6 +113,8 @@ BlockViews viewsOf(const BlockArrays& block, const ScalarNames& names) {
   const auto named = [&](const char* what) { return fmt::format("{}: {}", block.name, what); };
   BlockViews views{{block.x, named("x")}, {block.y, named("y")}, {block.z, named("z")}, {}, {}};
   const Shape shape = views.x.shape();
+  if (std::min({shape[0], shape[1], shape[2]}) == 0)
+    throw UsageError("{}: the array has the shape {}; expected at least one node", named("x"), textOf(shape));
   requireShape(views.y, shape, named("y"));
   requireShape(views.z, shape, named("z"));
   for (const ArrayView* array : {&views.x, &views.y, &views.z})
@@ -131,6 +142,17 @@ Centring centringOf(const ArrayView& scalar, const Shape& nodes, const std::stri
                    textOf(scalar.shape()), textOf(nodes), textOf(cells));
 }
 
+/// Products of larger ones would not fit in 64 bits.
+void requireFewNodes(const Shape& shape) {
+  uint64_t nodes = 1;
+  for (const uint64_t length : shape) {
+    if (length > 0 && nodes > (kMaxNodes - 1) / length)
+      throw UsageError("the shape {} has too many nodes; at most {} can be converted", textOf(shape),
+                       kMaxNodes - 1);
+    nodes *= std::max<uint64_t>(length, 1);
+  }
+}
+
 std::vector<GridScalar> describedScalars(const ScalarNames& names) {
   std::vector<GridScalar> scalars;
   for (const auto& [name, unit] : names) {
@@ -145,6 +167,7 @@ class ArraySource : public GridSource {
  public:
   ArraySource(std::vector<BlockArrays> blocks, const ScalarNames& names, std::optional<double> time) {
     description_.format = "arrays in memory";
+    if (time && !std::isfinite(*time)) throw UsageError("time: {}; expected a finite number", *time);
     if (time) description_.times = {*time};
     description_.scalars = describedScalars(names);
     description_.coordinate_bytes = 4;
@@ -212,9 +235,11 @@ class CallableSource : public GridSource {
       : read_(std::move(read)) {
     description_.format = "a Python callable";
     description_.coordinate_bytes = 8;
-    for (const Shape& shape : shapes)
+    for (const Shape& shape : shapes) {
+      requireFewNodes(shape);
       description_.blocks.push_back(
           {fmt::format("block {}", description_.blocks.size() + 1), shape[2], shape[1], shape[0], true});
+    }
     description_.scalars = describedScalars(names);
   }
   ~CallableSource() override {
@@ -269,10 +294,13 @@ class CallableSource : public GridSource {
     const py::gil_scoped_acquire locked;
     py::list wanted;
     for (const uint32_t scalar : scalars) wanted.append(description_.scalars[scalar].name);
-    const auto result = py::cast<py::tuple>(
-        read_.parts_of_rows ? read_.function(number, piece.k0, piece.k1, piece.j0, piece.j1, wanted,
-                                             py::arg("i0") = piece.i0, py::arg("i1") = piece.i1)
-                            : read_.function(number, piece.k0, piece.k1, piece.j0, piece.j1, wanted));
+    const py::object returned = read_.parts_of_rows
+                                    ? read_.function(number, piece.k0, piece.k1, piece.j0, piece.j1, wanted,
+                                                     py::arg("i0") = piece.i0, py::arg("i1") = piece.i1)
+                                    : read_.function(number, piece.k0, piece.k1, piece.j0, piece.j1, wanted);
+    if (!py::isinstance<py::tuple>(returned) && !py::isinstance<py::list>(returned))
+      throw Error("read() returned {}; expected (x, y, z, [values], blank)", typeName(returned));
+    const auto result = py::cast<py::tuple>(returned);
     if (result.size() != 5)
       throw Error("read() returned {} items; expected (x, y, z, [values], blank)", result.size());
     const Destination to{target.strides, piece};
@@ -280,17 +308,31 @@ class CallableSource : public GridSource {
     to.copy(result[0], "x", out.x);
     to.copy(result[1], "y", out.y);
     to.copy(result[2], "z", out.z);
+    if (!py::isinstance<py::iterable>(result[3]))
+      throw Error("read(): values: {}; expected a list of arrays", typeName(result[3]));
     const auto values = py::cast<py::list>(result[3]);
     if (values.size() != scalars.size())
       throw Error("read() returned {} arrays of values; expected {}", values.size(), scalars.size());
     for (size_t n = 0; n < scalars.size(); ++n)
       to.copy(values[n], description_.scalars[scalars[n]].name, out.scalars[n]);
-    if (!result[4].is_none()) to.copy(result[4], "blank", out.blank);
+    if (!result[4].is_none()) to.copyBlank(result[4], out.blank);
+  }
+
+  static std::string typeName(const py::handle& object) {
+    return py::str(object.get_type().attr("__name__"));
   }
 
   struct Destination {
     const WindowStrides& strides;
     const NodeBox& piece;
+
+    void copyBlank(const py::handle& object, std::vector<uint8_t>& out) const {
+      const auto array = py::cast<py::array>(object);
+      if (!array.dtype().equal(py::dtype::of<bool>()))
+        throw UsageError("read(): blank: its values are {}; expected bool, True where a node is not there",
+                         std::string(py::str(py::handle(array.dtype()))));
+      copy(array, "blank", out);
+    }
 
     template <typename T>
     void copy(const py::handle& object, const std::string& what, std::vector<T>& out) const {

@@ -1,11 +1,17 @@
 #include "tools/python/interruptible.h"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <future>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "stream/base/error.h"
 #include "stream/base/mutex.h"
 
 namespace py = pybind11;
@@ -32,6 +38,45 @@ class LatestState {
   std::optional<Progress::State> state_ GUARDED_BY(mutex_);
 };
 
+/// What runs in all threads of this process.
+class AllWork {
+ public:
+  void add(Progress* progress) {
+    const MutexLock lock(mutex_);
+    if (ending_) throw Error("the interpreter is ending");
+    // A process that was forked has none of its parent's threads.
+    if (std::exchange(process_, ::getpid()) != ::getpid()) running_.clear();
+    running_.push_back(progress);
+  }
+  void remove(Progress* progress) {
+    const MutexLock lock(mutex_);
+    const auto found = std::find(running_.begin(), running_.end(), progress);
+    if (found != running_.end()) running_.erase(found);
+    ended_.notify_all();
+  }
+  void end() {
+    MutexLock lock(mutex_);
+    ending_ = true;
+    if (process_ != ::getpid()) return;
+    for (Progress* const progress : running_)
+      if (progress) progress->stop(SIGTERM);
+    while (!running_.empty()) ended_.wait(lock);
+  }
+
+ private:
+  Mutex mutex_;
+  ConditionVariable ended_;
+  pid_t process_ GUARDED_BY(mutex_) = 0;
+  bool ending_ GUARDED_BY(mutex_) = false;
+  std::vector<Progress*> running_ GUARDED_BY(mutex_);
+};
+
+/// Never destroyed: daemon threads may outlive static objects.
+AllWork& allWork() {
+  static AllWork& all = *new AllWork;
+  return all;
+}
+
 /// Lets Python handle its signals and shows it the progress. Throws what that raises.
 void visitPython(const py::object& report, LatestState& latest) {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -42,9 +87,26 @@ void visitPython(const py::object& report, LatestState& latest) {
 
 }  // namespace
 
+CountedWork::CountedWork(Progress* progress) : progress_(progress) {
+  allWork().add(progress);
+}
+
+CountedWork::~CountedWork() {
+  allWork().remove(progress_);
+}
+
+void endAllWork() {
+  const py::gil_scoped_release unlocked;
+  allWork().end();
+}
+
 void runInterruptibly(const py::object& report, const std::function<void(Progress&)>& work) {
+  if (!report.is_none() && PyCallable_Check(report.ptr()) == 0)
+    throw UsageError("progress: {} is not callable",
+                     std::string(py::str(report.get_type().attr("__name__"))));
   LatestState latest;
   Progress progress([&](const Progress::State* state) { latest.set(state); });
+  const CountedWork counted(&progress);
   std::future<void> done = std::async(std::launch::async, [&] { work(progress); });
   std::optional<py::error_already_set> raised;
   while (true) {

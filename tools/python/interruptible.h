@@ -13,6 +13,24 @@ namespace curvisplat::python {
 /// looks for signals every 50 ms. `report`: None, or a callable that gets (phase, done, total, unit), at most twenty times a
 /// second, in this thread. Throws what `work` throws; after Ctrl-C, or if `report` raises, stops the work and throws
 /// that Python exception.
+/// Where the interpreter ends, the work is stopped first, and the end waits for it.
 void runInterruptibly(const pybind11::object& report, const std::function<void(Progress&)>& work);
+
+/// To be called where the interpreter begins to end, with its lock: stops all work and waits for it without the lock. A
+/// thread that asked for the lock later would be ended by Python within a function of ours, which C++ takes for an error.
+void endAllWork();
+
+/// Work of the calling thread, as endAllWork() counts it.
+class CountedWork {
+ public:
+  /// Throws Error after endAllWork(). `progress` may be null: it cannot be stopped.
+  explicit CountedWork(Progress* progress);
+  ~CountedWork();
+  CountedWork(const CountedWork&) = delete;
+  CountedWork& operator=(const CountedWork&) = delete;
+
+ private:
+  Progress* const progress_;
+};
 
 }  // namespace curvisplat::python

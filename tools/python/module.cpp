@@ -78,8 +78,10 @@ std::vector<double> timesOf(const OpenCache& cache) {
   return times;
 }
 
-std::vector<double> histogramOfCache(const OpenCache& cache, const std::string& scalar,
+std::vector<double> histogramOfCache(OpenCache& cache, const std::string& scalar,
                                      const std::pair<double, double>& range, bool log, size_t bins) {
+  const auto busy = cache.use();
+  const CountedWork counted(nullptr);
   const py::gil_scoped_release released;
   return cache.histogram({scalar, range.first, range.second, log, bins});
 }
@@ -117,7 +119,8 @@ py::tuple orbitedCamera(const std::array<double, 3>& position, const std::array<
 }
 
 /// None where the point is outside of the data.
-py::object probeAt(const OpenCache& cache, const std::array<double, 3>& point) {
+py::object probeAt(OpenCache& cache, const std::array<double, 3>& point) {
+  const auto busy = cache.use();
   const CacheReader& reader = cache.reader();
   std::vector<size_t> variables;
   for (size_t n = 0; n < reader.manifest().variables.size(); ++n) variables.push_back(n);
@@ -134,12 +137,14 @@ py::object probeAt(const OpenCache& cache, const std::array<double, 3>& point) {
   return out;
 }
 
-py::tuple sample(const OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,
+py::tuple sample(OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,
                  const py::object& progress) {
+  const auto busy = cache.use();
   return sampledArrays(cache.reader(), choice, size, progress);
 }
 
-py::tuple points(const OpenCache& cache, const DataChoice& choice, const py::object& progress) {
+py::tuple points(OpenCache& cache, const DataChoice& choice, const py::object& progress) {
+  const auto busy = cache.use();
   return pointArrays(cache.reader(), choice, progress);
 }
 
@@ -148,7 +153,7 @@ ConvertOptions convertOptions(const std::filesystem::path& output, const py::dic
   ConvertOptions options;
   options.output = output.has_filename() ? output : output.parent_path();
   options.overwrite = py::cast<bool>(given_options["overwrite"]);
-  options.resume = py::cast<bool>(given_options["resume"]);
+  options.resume = options.keep_interrupted = py::cast<bool>(given_options["resume"]);
   options.blank_value = py::cast<std::optional<double>>(given_options["blank_value"]);
   options.threads = py::cast<unsigned>(given_options["threads"]);
   options.title = py::cast<std::string>(given_options["title"]);
@@ -390,6 +395,7 @@ PYBIND11_MODULE(_core, module) {
     return names;
   });
   module.def("write_image", &writePicture);
+  py::module_::import("atexit").attr("register")(py::cpp_function(&endAllWork));
 }
 
 }  // namespace curvisplat::python

@@ -1,5 +1,7 @@
 #include "tools/python/open_cache.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -15,21 +17,6 @@ namespace py = pybind11;
 
 namespace curvisplat::python {
 namespace {
-
-/// Marks the cache as busy for a call.
-class Busy {
- public:
-  explicit Busy(bool& busy) : busy_(busy) {
-    if (busy_) throw UsageError("the cache is drawing in another thread; open it once for each thread");
-    busy_ = true;
-  }
-  ~Busy() { busy_ = false; }
-  Busy(const Busy&) = delete;
-  Busy& operator=(const Busy&) = delete;
-
- private:
-  bool& busy_;
-};
 
 /// A numpy array that owns the image's pixels.
 py::array_t<float> arrayOf(Image image) {
@@ -56,6 +43,21 @@ std::vector<std::string> warningsOf(const PictureArguments& arguments, const Ima
 }
 
 }  // namespace
+
+OpenCache::OpenCache(const std::filesystem::path& path) : path_(path), process_(::getpid()), reader_(path) {}
+
+OpenCache::~OpenCache() {
+  // The player would wait for threads that only its own process has.
+  if (::getpid() != process_) player_.release();
+}
+
+OpenCache::Use OpenCache::use() {
+  if (::getpid() != process_)
+    throw UsageError("the cache was opened before this process was forked; open it again in each process");
+  if (busy_) throw UsageError("the cache is in use by another thread; open it once for each thread");
+  busy_ = true;
+  return Use(busy_);
+}
 
 FrameRenderer& OpenCache::rendererOf(const DrawnScalars& scalars, Backend backend) {
   const size_t variable = scalars.opacity.variable;
@@ -94,7 +96,7 @@ std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) co
 }
 
 DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::object& progress) {
-  const Busy busy(busy_);
+  const Use in_use = use();
   const bool has_opacities = !arguments.opacity.by.scalar.empty();
   checkCameraArguments(arguments.camera);
   checkFunctionArguments(arguments.scalar);
@@ -152,7 +154,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
 }
 
 void OpenCache::release() {
-  const Busy busy(busy_);
+  const Use in_use = use();
   player_.reset();
 }
 

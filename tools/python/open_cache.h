@@ -3,6 +3,7 @@
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <sys/types.h>
 
 #include <filesystem>
 #include <memory>
@@ -32,15 +33,30 @@ struct HistogramArguments {
   size_t bins = 0;
 };
 
-/// One call at a time: a second thread that calls render() gets a UsageError. Threads and decoded bricks are kept from one picture of a
+/// One call at a time: a second thread gets a UsageError, as does a process that was forked, which lacks the threads. Threads and decoded bricks are kept from one picture of a
 /// scalar to the next.
 class OpenCache {
  public:
   /// Throws Error.
-  explicit OpenCache(const std::filesystem::path& path) : path_(path), reader_(path) {}
+  explicit OpenCache(const std::filesystem::path& path);
+  ~OpenCache();
+  OpenCache(const OpenCache&) = delete;
+  OpenCache& operator=(const OpenCache&) = delete;
 
   const CacheReader& reader() const { return reader_; }
   const std::filesystem::path& path() const { return path_; }
+  /// The cache is busy as long as the result lives. With the interpreter's lock. Throws UsageError if it is.
+  class Use {
+   public:
+    explicit Use(bool& busy) : busy_(busy) {}
+    ~Use() { busy_ = false; }
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+
+   private:
+    bool& busy_;
+  };
+  Use use();
   /// Throws UsageError and Error as `curvisplat render` does, and what stops runInterruptibly().
   DrawnPicture render(const PictureArguments& arguments, const pybind11::object& progress);
   /// Of the step that was drawn last. Throws UsageError for a range that is empty, or not above zero where `log`.
@@ -53,6 +69,7 @@ class OpenCache {
   FrameRenderer& rendererOf(const DrawnScalars& scalars, Backend backend);
 
   const std::filesystem::path path_;
+  const pid_t process_;
   CacheReader reader_;
   std::unique_ptr<StepPlayer> player_;  // of reader_
   size_t variable_ = 0;                 // of the opacities

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import os
 from typing import Any, Callable, Sequence, Tuple
 
 from . import _core
@@ -24,6 +25,36 @@ def flag(name: str, value: Any) -> bool:
     if not isinstance(value, bool):
         raise _core.UsageError(f"{name}: {value!r} is neither True nor False")
     return value
+
+
+def text(name: str, value: Any) -> str:
+    """A string that UTF-8 can hold."""
+    if not isinstance(value, str):
+        raise _core.UsageError(f"{name}: {value!r} is not a string")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise _core.UsageError(f"{name}: {value!r} has characters that UTF-8 cannot hold") from None
+    return value
+
+
+def path(value: Any) -> Any:
+    """A file's name, as the module takes it."""
+    name = os.fspath(value)
+    if ("\0" if isinstance(name, str) else b"\0") in name:
+        raise _core.UsageError(f"{name!r}: a file's name cannot have a null character")
+    return name
+
+
+def shape(value: Any) -> Tuple[int, int, int]:
+    """(nk, nj, ni)."""
+    try:
+        lengths = tuple(operator.index(length) for length in value)
+    except TypeError:
+        lengths = ()
+    if len(lengths) != 3 or not all(0 < length < 1 << 63 for length in lengths):
+        raise _core.UsageError(f"shapes: {value!r}; expected (nk, nj, ni), three whole numbers above zero")
+    return lengths
 
 
 def numbers(name: str, value: Any, what: str, count: int) -> Tuple[float, ...]:

@@ -140,7 +140,7 @@ class Cache:
     """A splat cache, open for drawing. One thread may draw at a time; `close()` or `with` gives its memory back."""
 
     def __init__(self, path: Union[str, os.PathLike]):
-        self._core = _core.OpenCache(os.fspath(path))
+        self._core = _core.OpenCache(_arguments.path(path))
 
     def __enter__(self) -> "Cache":
         return self

@@ -34,7 +34,7 @@ class Report(NamedTuple):
 def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory: Union[str, int, None], threads: int,
              title: str) -> dict:
     return {"overwrite": _arguments.flag("overwrite", overwrite), "resume": _arguments.flag("resume", resume),
-            "blank_value": blank_value, "threads": _arguments.whole("threads", threads), "title": title,
+            "blank_value": blank_value, "threads": _arguments.whole("threads", threads), "title": _arguments.text("title", title),
             "memory": "" if memory is None else str(memory), "value_precision": "normal"}
 
 
@@ -80,9 +80,9 @@ def _convert_files(output: Path, grid: Path, solutions: Any, scalars: Any, optio
     options["steps"] = None if steps is None else str(steps)
     options["keep_going"] = _arguments.flag("keep_going", keep_going)
     options["vertical_scale"] = _arguments.numbers("vertical_scale", (vertical_scale,), "a number", 1)[0]
-    files = [os.fspath(path) for path in _arguments.several(solutions, (str, os.PathLike))]
-    return Report(**_core.convert_files(os.fspath(output), os.fspath(grid), files, list(_arguments.several(scalars)), options,
-                                        progress))
+    files = [_arguments.path(path) for path in _arguments.several(solutions, (str, os.PathLike))]
+    names = [_arguments.text("scalars", name) for name in _arguments.several(scalars)]
+    return Report(**_core.convert_files(_arguments.path(output), _arguments.path(grid), files, names, options, progress))
 
 
 def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
@@ -93,10 +93,10 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
         if not isinstance(block, Block):
             raise _core.UsageError(f"{type(block).__name__} is no Block; make one by Block() or from_xarray()")
     names = list(blocks[0].scalars)
-    units = [(name, blocks[0].units.get(name, "")) for name in names]
+    units = [(_arguments.text("scalars", name), _arguments.text("units", blocks[0].units.get(name, ""))) for name in names]
     tuples = []
     for number, block in enumerate(blocks, 1):
-        name = block.name or f"block {number}"
+        name = _arguments.text("name", block.name) or f"block {number}"
         missing = [scalar for scalar in names if scalar not in block.scalars]
         if missing:
             raise _core.UsageError(f"{name}: has no scalar '{missing[0]}', which the first block has")
@@ -120,7 +120,7 @@ def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = 
     options = _options(overwrite, False, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
     options["time"] = None if time is None else float(time)
-    return Report(**_core.convert_arrays(os.fspath(output), tuples, units, options, progress))
+    return Report(**_core.convert_arrays(_arguments.path(output), tuples, units, options, progress))
 
 
 def append_arrays(cache: Path, *blocks: Block, time: Optional[float] = None, blank_value: Optional[float] = None,
@@ -133,7 +133,7 @@ def append_arrays(cache: Path, *blocks: Block, time: Optional[float] = None, bla
     tuples, units = _tuples(blocks)
     options = _options(False, False, blank_value, memory, threads, "")
     options["time"] = None if time is None else float(time)
-    return _core.append_arrays(os.fspath(cache), tuples, units, options, progress)
+    return _core.append_arrays(_arguments.path(cache), tuples, units, options, progress)
 
 
 def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
@@ -155,8 +155,9 @@ def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read:
     called three times for each piece, in any thread, one call at a time. Raises as convert() does, and what `read` raises.
     """
     units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in scalars]
+    units = [(_arguments.text("scalars", name), _arguments.text("units", unit)) for name, unit in units]
     options = _options(overwrite, False, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
     options["parts_of_rows"] = _takes_parts_of_rows(read)
-    return Report(**_core.convert_callable(os.fspath(output), [tuple(shape) for shape in shapes], units, read, options,
-                                           progress))
+    return Report(**_core.convert_callable(_arguments.path(output), [_arguments.shape(shape) for shape in shapes], units, read,
+                                           options, progress))

@@ -1,0 +1,269 @@
+#!/usr/bin/env python3
+"""hostile_test.py
+
+What hostile scripts do to the Python package: arrays that are not what they seem, functions that raise or answer nonsense, names
+that files cannot have, Ctrl-C at any moment, processes that fork, and interpreters that end while threads draw and convert. Each
+attempt is a process of its own: no signal, no hang, an exception of one line, and no file left. The package is found by
+PYTHONPATH.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import textwrap
+import unittest
+
+PREAMBLE = """
+import os, shutil, signal, sys, threading, time, warnings
+import numpy as np, curvisplat
+from curvisplat import Block
+warnings.simplefilter("ignore")  # of empty pictures
+
+def grid(n=8, kind=np.float32):
+    k, j, i = np.meshgrid(*3 * [np.linspace(0, 1, n, dtype=kind)], indexing="ij")
+    return i.copy(), j.copy(), k.copy(), (i + j).astype(np.float32)
+
+def convert(*arrays, scalars=None, blank=None, **options):
+    x, y, z, s = arrays or grid()
+    scalars = {"s": s} if scalars is None else scalars
+    return curvisplat.convert_arrays("o.splats", Block(x, y, z, scalars, blank=blank), overwrite=True, **options)
+
+def reader(n=32):
+    x, y, z, s = grid(n)
+    def read(block, k0, k1, j0, j1, names):
+        part = np.s_[k0:k1, j0:j1]
+        return x[part], y[part], z[part], [s[part]] * len(names), None
+    return read
+
+def call(read, shapes=((32, 32, 32),), names=("s",), **options):
+    return curvisplat.convert_callable("o.splats", shapes, read, names, overwrite=True, **options)
+
+def expect(kind, saying, attempt):
+    try:
+        attempt()
+    except kind as error:
+        line = str(error)
+        assert saying in line and "\\n" not in line, line
+    else:
+        raise AssertionError("no " + saying)
+"""
+
+
+class HostileTest(unittest.TestCase):
+    def attempt(self, code):
+        with tempfile.TemporaryDirectory() as folder:
+            run = subprocess.run([sys.executable, "-c", PREAMBLE + textwrap.dedent(code)], cwd=folder, capture_output=True, text=True,
+                                 errors="replace", timeout=120)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual(run.stderr, "")
+            self.assertEqual([name for name in os.listdir(folder) if not name.endswith(".splats")], [])
+
+    def test_arrays_of_any_layout(self):
+        self.attempt("""
+            x, y, z, s = grid()
+            packed = np.zeros(x.shape, [("mark", "u1"), ("x", "f8"), ("y", "f4"), ("z", "f8"), ("s", "f4")])
+            for name, array in (("x", x), ("y", y), ("z", z), ("s", s)):
+                packed[name] = array
+            expected = convert()
+            assert convert(*(packed[name] for name in "xyzs")) == expected._replace(bytes=convert(*(packed[name] for name in "xyzs")).bytes)
+            like = np.dtype("f4", metadata={"a": 1})
+            assert convert(x.astype(like), y, z, s) == expected
+            turned = np.s_[::-1, ::-1, ::-1]
+            assert convert(x[turned], y[turned], z[turned], s[turned]).splats == expected.splats
+            class Strange(np.ndarray):
+                pass
+            assert convert(x.view(Strange), y, z, s) == expected
+            """)
+
+    def test_arrays_of_other_types_and_shapes(self):
+        self.attempt("""
+            x, y, z, s = grid()
+            for kind in (">f4", "f2", "c8", object, str, int):
+                expect(curvisplat.UsageError, "expected float32 or float64", lambda: convert(x, y, z, s.astype(kind)))
+            for arrays in ((x[0], y[0], z[0], s[0]), (x[None], y[None], z[None], s[None])):
+                expect(curvisplat.UsageError, "expected three, (k, j, i)", lambda: convert(*arrays))
+            for shape in ((0, 5, 5), (5, 0, 5), (5, 5, 0)):
+                expect(curvisplat.UsageError, "expected at least one node", lambda: convert(*4 * [np.zeros(shape, "f4")]))
+            expect(curvisplat.Error, "nothing to draw", lambda: convert(x * np.nan, y, z, s))
+            expect(curvisplat.Error, "units long", lambda: convert(x.astype("f8") * 1e300, y, z, s))
+            """)
+
+    def test_every_byte_of_a_bool_but_0_is_true(self):
+        self.attempt("""
+            marks = np.zeros((8, 8, 8), "u1")
+            marks[0], marks[1], marks[2] = 1, 2, 254
+            assert convert(blank=marks.view(bool)).blanked == 3 * 64
+            curvisplat.open("o.splats").render("s", size=(8, 8))
+            def read(*box):
+                answer = reader()(*box)
+                return answer[:4] + (np.full(answer[0].shape, 255, "u1").view(bool),)
+            expect(curvisplat.Error, "all 32768 samples are blanked", lambda: call(read))
+            for blank in (np.full, lambda shape, value: np.full(shape, 2.5)):
+                expect(curvisplat.UsageError, "blank: its values are", lambda: call(lambda *box: reader()(*box)[:4] + (blank((32, 32, 32), 1),)))
+            """)
+
+    def test_names_and_numbers(self):
+        self.attempt("""
+            x, y, z, s = grid()
+            for name in (3, None, "a\\udc80"):
+                expect(curvisplat.UsageError, "scalars: ", lambda: convert(scalars={name: s}))
+                expect(curvisplat.UsageError, "scalars: ", lambda: call(reader(), names=[name]))
+            expect(curvisplat.UsageError, "name: ", lambda: curvisplat.convert_arrays("o.splats", Block(x, y, z, {"s": s}, name=5)))
+            expect(curvisplat.UsageError, "title: ", lambda: convert(title="\\udc80"))
+            expect(curvisplat.UsageError, "null character", lambda: curvisplat.convert_arrays("o\\0", Block(x, y, z, {"s": s})))
+            expect(curvisplat.UsageError, "null character", lambda: curvisplat.open(b"o\\0"))
+            for time_of_step in (float("nan"), float("inf")):
+                expect(curvisplat.UsageError, "expected a finite number", lambda: convert(time=time_of_step))
+            expect(curvisplat.UsageError, "progress: int is not callable", lambda: convert(progress=5))
+            for shape in ((4, 2), (4.5, 2, 2), (-1, 2, 2), (0, 2, 2), (2**64, 2, 2), "abc", 5):
+                expect(curvisplat.UsageError, "three whole numbers above zero", lambda: call(reader(), [shape]))
+            for shape in ((2**40,) * 3, (2**32, 2**32, 1), (2**62, 2, 2)):
+                expect(curvisplat.UsageError, "too many nodes", lambda: call(reader(), [shape]))
+            convert(scalars={"\\x1b[2J\\0": s}, title="\\x1b[2J")
+            curvisplat.open("o.splats").render(size=(8, 8))
+            """)
+
+    def test_functions_that_answer_nonsense(self):
+        self.attempt("""
+            read = reader()
+            expect(curvisplat.Error, "read() returned NoneType", lambda: call(lambda *box: None))
+            expect(curvisplat.Error, "read() returned 3 items", lambda: call(lambda *box: (1, 2, 3)))
+            expect(curvisplat.Error, "read(): values: NoneType", lambda: call(lambda *box: read(*box)[:3] + (None, None)))
+            expect(curvisplat.UsageError, "read(): x", lambda: call(lambda *box: ([], [], [], [], [])))
+            expect(ZeroDivisionError, "division", lambda: call(lambda *box: 1 / 0))
+            expect(SystemExit, "7", lambda: call(lambda *box: sys.exit(7)))
+            def recursive(*box):
+                return recursive(*box)
+            expect(RecursionError, "recursion", lambda: call(recursive))
+            nothing = lambda *box: tuple(a * np.nan for a in read(*box)[:3]) + read(*box)[3:]
+            expect(curvisplat.Error, "nothing to draw", lambda: call(nothing))
+            def again(*box):
+                return call(read) and read(*box)
+            expect(curvisplat.Error, "another conversion to this output", lambda: call(again))
+            assert not os.listdir(), os.listdir()
+            """)
+
+    def test_data_that_changes_meanwhile(self):
+        """Other pictures, but no crash: the cache opens, or the error is of one line."""
+        self.attempt("""
+            x, y, z, s = grid(48, np.float64)
+            end = []
+            def change():
+                while not end:
+                    x[:] = 1e300; s[:] = np.nan; y[::2] = np.nan; x[:] = np.random.random(x.shape); y[:] = x[::-1]; s[::2] = 1e30
+            thread = threading.Thread(target=change)
+            thread.start()
+            for _ in range(8):
+                try:
+                    convert(x, y, z, s)
+                    curvisplat.open("o.splats").render("s", size=(8, 8))
+                except curvisplat.Error as error:
+                    assert "\\n" not in str(error)
+            end.append(1)
+            thread.join()
+            rounds = iter(range(1000))
+            def different(block, k0, k1, j0, j1, names):
+                random = np.random.default_rng(next(rounds))
+                part = lambda: random.random((k1 - k0, j1 - j0, 32)) * 10.0 ** random.integers(-3, 4)
+                return part(), part(), part(), [part() for _ in names], random.random((k1 - k0, j1 - j0, 32)) < 0.5
+            for _ in range(8):
+                try:
+                    call(different)
+                    curvisplat.open("o.splats").render("s", size=(8, 8))
+                except curvisplat.Error as error:
+                    assert "\\n" not in str(error)
+            """)
+
+    def test_ctrl_c_in_any_pass_leaves_nothing(self):
+        self.attempt("""
+            arrays = grid(128)
+            stopped = []
+            for phase in ("scan", "count", "scatter", "seams", "build", "faces"):
+                def report(now, *state):
+                    if now == phase:
+                        raise KeyboardInterrupt
+                try:
+                    convert(*arrays, progress=report)
+                    shutil.rmtree("o.splats")  # the pass is done before anyone looks
+                except KeyboardInterrupt:
+                    stopped.append(phase)
+                assert not os.listdir(), (phase, os.listdir())
+            assert "build" in stopped, stopped  # after which the command could go on
+            """)
+
+    def test_an_interpreter_that_ends_meanwhile(self):
+        for work in ("cache.render('s', size=(200, 200))", "cache.histogram('s', bins=64)", "cache.sample('s', size=32)",
+                     "curvisplat.convert_arrays(own, Block(*arrays[:3], {'s': arrays[3]}), overwrite=True)",
+                     "curvisplat.convert_callable(own, [(64, 64, 64)], reader(64), ['s'], overwrite=True)"):
+            with self.subTest(work=work):
+                self.attempt(f"""
+                    convert()
+                    arrays = grid(64)
+                    begun = threading.Barrier(3)
+                    threading.excepthook = lambda *_: None
+                    def work():
+                        cache = curvisplat.open("o.splats")
+                        own = f"{{threading.get_ident()}}.splats"
+                        begun.wait()
+                        while True:
+                            {work}
+                    for _ in range(2):
+                        threading.Thread(target=work, daemon=True).start()
+                    begun.wait()
+                    time.sleep(0.3)
+                    """)
+
+    def test_processes_that_fork(self):
+        self.attempt("""
+            convert()
+            cache = curvisplat.open("o.splats")
+            cache.render("s", size=(32, 32))
+            for attempt in ("cache.render('s', size=(8, 8))", "cache.sample('s', size=4)", "cache.close()"):
+                child = os.fork()
+                if child == 0:
+                    signal.alarm(30)
+                    expect(curvisplat.UsageError, "before this process was forked", lambda: eval(attempt))
+                    sys.exit(0)  # and the cache is destroyed
+                assert os.waitpid(child, 0)[1] == 0
+            child = os.fork()
+            if child == 0:
+                signal.alarm(30)
+                curvisplat.open("o.splats").render("s", size=(32, 32))
+                sys.exit(0)
+            assert os.waitpid(child, 0)[1] == 0
+            cache.render("s", size=(32, 32))
+            """)
+
+    def test_threads_that_share_a_cache(self):
+        """One gets what it asks for, the others are refused: data is not read while render() goes to another step."""
+        self.attempt("""
+            x, y, z, s = grid()
+            convert(time=0)
+            for step in range(1, 4):
+                curvisplat.append_arrays("o.splats", Block(x, y, z, {"s": s + step}))
+            cache = curvisplat.open("o.splats")
+            end = time.time() + 3
+            errors, done = set(), []
+            def work(what):
+                number = 0
+                while time.time() < end:
+                    number += 1
+                    try:
+                        what(number)
+                        done.append(1)
+                    except curvisplat.UsageError as error:
+                        errors.add(str(error))
+            def draw(number):
+                cache.close()
+                cache.render("s", size=(8, 8), step=number % 4)
+            works = [draw, draw, lambda n: cache.sample("s", size=8), lambda n: cache.histogram("s"), lambda n: cache.points("s")]
+            threads = [threading.Thread(target=work, args=(what,)) for what in works]
+            for thread in threads: thread.start()
+            for thread in threads: thread.join()
+            assert done and all("is in use by another thread" in error for error in errors), errors
+            """)
+
+
+if __name__ == "__main__":
+    unittest.main()
