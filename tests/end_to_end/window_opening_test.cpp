@@ -4,31 +4,12 @@
 #include <chrono>
 #include <thread>
 
-#include "tests/end_to_end/window_fixture.h"
+#include "tests/end_to_end/kept_caches_fixture.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-class KeptCaches : public WindowTest {
- protected:
-  void SetUp() override {
-    setenv("XDG_CACHE_HOME", file("kept").c_str(), 1);
-    unsetenv("CURVISPLAT_CACHE_SIZE");
-    fs::remove_all("kept");
-  }
-  static std::vector<fs::path> kept() {
-    std::vector<fs::path> caches;
-    if (!fs::exists("kept/curvisplat")) return caches;
-    for (const auto& entry : fs::recursive_directory_iterator("kept/curvisplat"))
-      if (entry.path().filename() == "manifest.json") caches.push_back(entry.path().parent_path());
-    return caches;
-  }
-  static ProgramResult render(const std::string& grid, const std::string& function) {
-    return runProgram({"render", grid, function, "-o", "grid.png", "--size", "100x80"});
-  }
-};
 
 TEST_F(KeptCaches, RenderDrawsAGridAsItsCache) {
   ASSERT_EQ(render("a.xyz", "a.fun").status, 0);

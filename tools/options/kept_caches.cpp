@@ -10,13 +10,17 @@
 #include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <optional>
+#include <set>
 #include <sstream>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/checksum.h"
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "tools/options/further_scalars.h"
@@ -55,20 +59,44 @@ uint64_t checksumOfFile(const fs::path& path, Progress& progress) {
   return checksum.value();
 }
 
-/// The checksum of a file's bytes, from `known` if it has not changed since.
-uint64_t checksumOf(const fs::path& path, const fs::path& known, Progress& progress) {
+/// Where a file's checksum and its stamp are noted.
+fs::path memoOf(const fs::path& path, const fs::path& known) {
   std::error_code ignored;
-  const fs::path whole = fs::weakly_canonical(path, ignored);
-  const fs::path memo = known / fmt::format("{:016x}", checksumOfText(whole.string()));
-  const std::string stamp = stampOf(path);
-  if (fs::exists(memo, ignored)) {
-    std::istringstream text(readTextFile(memo));
+  return known / fmt::format("{:016x}", checksumOfText(fs::weakly_canonical(path, ignored).string()));
+}
+
+std::optional<uint64_t> notedChecksum(const fs::path& memo, const std::string& stamp) {
+  constexpr uint64_t kMaxMemo = 1 << 16;
+  std::error_code error;
+  if (!fs::is_regular_file(memo, error)) return std::nullopt;
+  try {
+    std::istringstream text(readTextFile(memo, kMaxMemo));
     std::string before;
     uint64_t checksum = 0;
     if (std::getline(text, before) && before == stamp && text >> checksum) return checksum;
+  } catch (const Error&) {
+    // The file's own bytes are as good.
   }
+  return std::nullopt;
+}
+
+/// Under a name of its own first: several processes may open one file for the first time. A note that cannot be written
+/// is missed by the next one only.
+void noteChecksum(const fs::path& memo, const std::string& stamp, uint64_t checksum) {
+  try {
+    writeFileDurably(memo, fmt::format("{}\n{}\n", stamp, checksum));
+  } catch (const Error&) {
+    return;
+  }
+}
+
+/// The checksum of a file's bytes, from `known` if it has not changed since. `stamp`: of the file, before.
+uint64_t checksumOf(const fs::path& path, const std::string& stamp, const fs::path& known,
+                    Progress& progress) {
+  const fs::path memo = memoOf(path, known);
+  if (const std::optional<uint64_t> checksum = notedChecksum(memo, stamp)) return *checksum;
   const uint64_t checksum = checksumOfFile(path, progress);
-  if (stampOf(path) == stamp) writeFileAtomically(memo, fmt::format("{}\n{}\n", stamp, checksum));
+  if (stampOf(path) == stamp) noteChecksum(memo, stamp, checksum);
   return checksum;
 }
 
@@ -126,42 +154,78 @@ bool isSmallText(const fs::path& file, std::string& text) {
   return first != std::string::npos && (text[first] == '<' || text[first] == '{');
 }
 
-/// Adds `file`: of a folder all files; and those that a small text (.pvd, .vtm, .p3d) names between quotes.
-void addFilesOf(const fs::path& file, std::vector<fs::path>& all, int depth = 0) {
-  std::error_code error;
-  if (fs::is_directory(file, error)) {
-    const auto begin = static_cast<std::ptrdiff_t>(all.size());
-    for (fs::recursive_directory_iterator at(file, error), end; !error && at != end; at.increment(error))
-      if (std::error_code no_file; at->is_regular_file(no_file)) all.push_back(at->path());
-    std::sort(all.begin() + begin, all.end());
-    return;
+/// A grid's files with those that they name, and when these were changed last.
+class StampedFiles {
+ public:
+  /// Throws Interrupted.
+  StampedFiles(const std::vector<fs::path>& files, const Progress& progress) : progress_(progress) {
+    for (const fs::path& file : files) add(file, 0);
+    for (const fs::path& file : all_) stamps_.push_back(stampOf(file));
   }
-  all.push_back(file);
-  constexpr int kMaxDepth = 3;  // a .pvd of .vtm of .vts
-  std::string text;
-  if (depth == kMaxDepth || !isSmallText(file, text)) return;
-  for (size_t begin = text.find('"'); begin != std::string::npos;) {
-    const size_t end = text.find('"', begin + 1);
-    if (end == std::string::npos) return;
-    const std::string word = text.substr(begin + 1, std::min<size_t>(end - begin - 1, 4096));
-    const fs::path named = file.parent_path() / word;
-    if (word.find('.') != std::string::npos && fs::is_regular_file(named, error) && named != file)
-      addFilesOf(named, all, depth + 1);
-    begin = text.find('"', end + 1);
+
+  const std::vector<fs::path>& all() const { return all_; }
+  const std::vector<std::string>& stamps() const { return stamps_; }  // [file]
+
+ private:
+  /// Adds `file`: of a folder all files; and those that a small text (.pvd, .vtm, .p3d) names between quotes. At each
+  /// depth a file is looked at once: a text may name another one, which does the same, thousands of times.
+  void add(const fs::path& file, int depth) {
+    progress_.throwIfStopped();
+    std::error_code error;
+    if (fs::is_directory(file, error)) return addFolder(file);
+    if (!seen_.emplace(depth, file.lexically_normal()).second) return;
+    all_.push_back(file);
+    constexpr int kMaxDepth = 3;  // a .pvd of .vtm of .vts
+    std::string text;
+    if (depth == kMaxDepth || !isSmallText(file, text)) return;
+    for (size_t begin = text.find('"'); begin != std::string::npos;) {
+      const size_t end = text.find('"', begin + 1);
+      if (end == std::string::npos) return;
+      const std::string word = text.substr(begin + 1, std::min<size_t>(end - begin - 1, 4096));
+      const fs::path named = file.parent_path() / word;
+      if (word.find('.') != std::string::npos && fs::is_regular_file(named, error) && named != file)
+        add(named, depth + 1);
+      begin = text.find('"', end + 1);
+    }
   }
-}
+
+  void addFolder(const fs::path& folder) {
+    std::error_code error;
+    const auto begin = static_cast<std::ptrdiff_t>(all_.size());
+    for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+      progress_.throwIfStopped();
+      if (std::error_code no_file; at->is_regular_file(no_file)) all_.push_back(at->path());
+    }
+    std::sort(all_.begin() + begin, all_.end());
+  }
+
+  const Progress& progress_;
+  std::set<std::pair<int, fs::path>> seen_;
+  std::vector<fs::path> all_;
+  std::vector<std::string> stamps_;
+};
 
 /// What makes two grids the same: the program, the bytes of the files, and their names, since names of scalars can lie
 /// beside a file, and the grid's name becomes the cache's.
-uint64_t contentsOf(const std::vector<fs::path>& files, const fs::path& known, Progress& progress) {
+uint64_t contentsOf(const std::vector<fs::path>& files, const StampedFiles& stamped, const fs::path& known,
+                    Progress& progress) {
   progress.begin("looking for a kept cache", 0, "bytes");
-  std::vector<fs::path> all;
-  for (const fs::path& file : files) addFilesOf(file, all);
   std::string contents = CURVISPLAT_VERSION;
-  for (const fs::path& file : all) contents += fmt::format(" {:016x}", checksumOf(file, known, progress));
+  for (size_t n = 0; n < stamped.all().size(); ++n)
+    contents += fmt::format(" {:016x}", checksumOf(stamped.all()[n], stamped.stamps()[n], known, progress));
   contents += ' ';
   contents += namesOf(files);
   return checksumOfText(contents);
+}
+
+/// Beside a cache whose files changed while it was made: shown now, and made again when they are opened next.
+constexpr const char* kChanged = "changed";
+
+void removeChanged(const fs::path& place, const fs::path& cache) {
+  std::error_code error;
+  if (!fs::exists(place / kChanged, error)) return;
+  fs::remove_all(cache, error);  // of a series, the link to it
+  fs::remove(place / kChanged, error);
 }
 
 /// The files as paths that hold in any folder, with those that match a pattern.
@@ -225,7 +289,8 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
   fs::create_directories(*folder / "known", error);
   if (error) throw Error("{}: cannot create the directory: {}", folder->string(), error.message());
   const std::vector<fs::path> files = wholePaths(given_files);
-  const uint64_t contents = contentsOf(files, *folder / "known", progress);
+  const StampedFiles stamped(files, progress);
+  const uint64_t contents = contentsOf(files, stamped, *folder / "known", progress);
   const char* const suffix = precision == ValuePrecision::kFine ? "-fine" : "";
   const fs::path place = *folder / fmt::format("{:016x}{}", contents, suffix);
   const fs::path cache = place / (files.front().stem().string() + ".splats");
@@ -233,7 +298,17 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
   if (error) throw Error("{}: cannot create the directory: {}", place.string(), error.message());
   {
     const MakingLock lock(place / "used", progress);
-    if (!fs::exists(cache / "manifest.json", error)) makeKeptCache(files, cache, progress, events, precision);
+    removeChanged(place, cache);
+    if (!fs::exists(cache / "manifest.json", error)) {
+      makeKeptCache(files, cache, progress, events, precision);
+      if (const StampedFiles now(files, progress);
+          now.all() != stamped.all() || now.stamps() != stamped.stamps()) {
+        writeFileDurably(place / kChanged, "");
+        events.say(fmt::format(
+            "warning: {}: changed while it was converted; it is converted again when it is opened next",
+            namesOf(files)));
+      }
+    }
     addMissingScalars(cache, files, scalars, progress);
     fs::last_write_time(place / "used", fs::file_time_type::clock::now(), error);
   }

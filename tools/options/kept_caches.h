@@ -5,6 +5,7 @@
 //   <folder>/<key>/preview.*        a coarse cache, while the other is made and until the window has left it
 //   <folder>/<key>/series.*         the cache of a series, to which NAME.splats links once it is complete
 //   <folder>/<key>/used             its time: when it was opened last; locked while it is made
+//   <folder>/<key>/changed          the files changed meanwhile: the cache is made again by the next who opens them
 //   <folder>/known/<file>           checksum of a file that has not changed since, by its path
 //
 // When they take more than the limit (CURVISPLAT_CACHE_SIZE, default 20G), those that were not used for longest are

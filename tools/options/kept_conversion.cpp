@@ -26,6 +26,7 @@ ConvertOptions optionsFor(const fs::path& output, const std::string& title) {
   ConvertOptions options;
   options.output = output;
   options.overwrite = true;
+  options.keep_interrupted = false;  // it may never be opened again
   options.title = title;
   options.temporary_folder = output.parent_path();
   return options;

@@ -1,0 +1,102 @@
+// Kept caches where several programs make one, files change meanwhile, and what lies in their folder is damaged.
+#include <fmt/format.h>
+
+#include <csignal>
+#include <fstream>
+
+#include "tests/end_to_end/kept_caches_fixture.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST_F(KeptCaches, ProcessesMayOpenOneNewFileAtOnce) {
+  for (int round = 0; round < 10; ++round) {
+    fs::remove_all("kept");
+    std::vector<std::unique_ptr<RunningProgram>> programs;
+    for (int n = 0; n < 4; ++n)
+      programs.push_back(std::make_unique<RunningProgram>(std::vector<std::string>{
+          "render", "a.xyz", "a.fun", "-o", fmt::format("at_once_{}.png", n), "--size", "20x20"}));
+    for (const auto& program : programs) {
+      const ProgramResult result = program->wait();
+      EXPECT_EQ(result.status, 0) << result.err;
+    }
+  }
+}
+
+TEST_F(KeptCaches, WhatIsKnownOfAFileMayBeDamaged) {
+  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  const fs::path known = "kept/curvisplat/known";
+  std::vector<fs::path> notes(fs::directory_iterator(known), {});
+  ASSERT_EQ(notes.size(), 2u);
+  fs::remove(notes[0]);
+  fs::create_directory(notes[0]);
+  std::ofstream(notes[1]) << std::string(100'000, '1');
+  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  EXPECT_EQ(kept().size(), 1u);
+}
+
+TEST_F(KeptCaches, FilesThatChangeMeanwhileAreConvertedAgain) {
+  run({"generate", "half-annulus", "--size", "120x100x80", "-o", "changing"});
+  RunningProgram first({"render", "changing.xyz", "changing.fun", "-o", "grid.png", "--size", "20x20"});
+  ASSERT_TRUE(eventually([] {
+    if (!fs::exists("kept/curvisplat")) return false;
+    for (const auto& entry :
+         fs::recursive_directory_iterator("kept/curvisplat", fs::directory_options::skip_permission_denied))
+      if (entry.path().extension() == ".partial") return true;
+    return false;
+  }));
+  fs::last_write_time("changing.fun", fs::file_time_type::clock::now());
+  const ProgramResult changed = first.wait();
+  EXPECT_EQ(changed.status, 0) << changed.err;
+  EXPECT_NE(changed.err.find("changed while it was converted"), std::string::npos) << changed.err;
+  const auto made = fs::last_write_time(kept().at(0) / "manifest.json");
+  for (const bool again : {true, false}) {
+    const auto before = fs::last_write_time(kept().at(0) / "manifest.json");
+    const ProgramResult result = render("changing.xyz", "changing.fun");
+    EXPECT_EQ(result.status, 0);
+    EXPECT_EQ(result.err.find("changed while"), std::string::npos) << result.err;
+    EXPECT_EQ(fs::last_write_time(kept().at(0) / "manifest.json") != before, again);
+  }
+  EXPECT_NE(fs::last_write_time(kept().at(0) / "manifest.json"), made);
+}
+
+TEST_F(KeptCaches, OfAGridThatIsStoppedNothingStays) {
+  run({"generate", "half-annulus", "--size", "200x120x100", "-o", "stopped"});
+  RunningProgram render({"render", "stopped.xyz", "stopped.fun", "-o", "grid.png", "--size", "20x20"});
+  const auto bytes_of_partial = [] {
+    uint64_t bytes = 0;
+    std::error_code error;
+    for (fs::recursive_directory_iterator at("kept/curvisplat", error), end; !error && at != end;
+         at.increment(error))
+      if (at->path().string().find(".partial/geometry.bin") != std::string::npos)
+        bytes += at->file_size(error);
+    return bytes;
+  };
+  ASSERT_TRUE(eventually([&] { return bytes_of_partial() > 0; }));  // after which `convert` could go on
+  render.signal(SIGTERM);
+  EXPECT_EQ(render.wait().status, 128 + SIGTERM);
+  for (const auto& entry : fs::recursive_directory_iterator("kept/curvisplat"))
+    EXPECT_TRUE(entry.is_directory() || entry.path().filename() == "used" ||
+                entry.path().parent_path().filename() == "known")
+        << entry.path();
+}
+
+TEST_F(KeptCaches, SetsThatNameFilesThousandsOfTimesAreSearchedOnce) {
+  const auto naming = [](const std::string& set, const std::string& file, int times) {
+    std::ofstream out(set);
+    out << R"(<VTKFile type="vtkMultiBlockDataSet" version="1.0"><vtkMultiBlockDataSet>)";
+    for (int n = 0; n < times; ++n) out << fmt::format("<DataSet index=\"{}\" file=\"{}\"/>", n, file);
+    out << "</vtkMultiBlockDataSet></VTKFile>";
+  };
+  naming("outer.vtm", "middle.vtm", 3000);
+  naming("middle.vtm", "inner.vtm", 3000);
+  naming("inner.vtm", "none.vts", 3000);
+  const ProgramResult result = runProgram({"render", "outer.vtm", "-o", "grid.png", "--size", "20x20"});
+  EXPECT_EQ(result.status, 1);  // 27 thousand million files
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+}
+
+}  // namespace
+}  // namespace curvisplat
