@@ -1,13 +1,42 @@
 #include "stream/base/error.h"
 
-#include <algorithm>
+#include <cstddef>
+#include <string_view>
 
 namespace curvisplat {
+namespace {
 
-std::string oneLine(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
-  return text;
+/// The length of the UTF-8 sequence that `text` begins with; 1 where there is none.
+size_t sequenceAt(std::string_view text) {
+  const auto byte = [&](size_t n) { return static_cast<unsigned char>(text[n]); };
+  const size_t length = byte(0) < 0xc2 || byte(0) > 0xf4 ? 1 : byte(0) < 0xe0 ? 2 : byte(0) < 0xf0 ? 3 : 4;
+  if (length > text.size()) return 1;
+  for (size_t n = 1; n < length; ++n)
+    if (byte(n) < 0x80 || byte(n) > 0xbf) return 1;
+  return length;
+}
+
+/// Of a sequence: U+0000 to U+001F, U+007F to U+009F; of a byte that is not UTF-8, what it is in Latin-1.
+bool isControl(std::string_view sequence) {
+  const auto byte = [&](size_t n) { return static_cast<unsigned char>(sequence[n]); };
+  if (sequence.size() == 1) return byte(0) < ' ' || (byte(0) >= 0x7f && byte(0) < 0xa0);
+  return byte(0) == 0xc2 && byte(1) < 0xa0;
+}
+
+}  // namespace
+
+std::string oneLine(const std::string& text) {
+  std::string shown;
+  shown.reserve(text.size());
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::string_view sequence = rest.substr(0, sequenceAt(rest));
+    if (isControl(sequence))
+      shown += ' ';
+    else
+      shown += sequence;
+    rest.remove_prefix(sequence.size());
+  }
+  return shown;
 }
 
 }  // namespace curvisplat

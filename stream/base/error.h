@@ -12,9 +12,10 @@
 
 namespace curvisplat {
 
-/// Replaces each control character of `text` by a space. Messages quote names and words from files and are
-/// printed on a terminal.
-std::string oneLine(std::string text);
+/// Replaces each control character of `text` by a space: those of ASCII, and U+0080 to U+009F, of which a terminal
+/// takes U+009B for the beginning of an escape sequence. Messages quote names and words from files and are printed on
+/// a terminal.
+std::string oneLine(const std::string& text);
 
 /// The work failed: exit status 1. The text is one line: where, what is wrong, what was found and expected,
 /// and what to do.

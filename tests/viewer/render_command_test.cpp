@@ -52,6 +52,7 @@ TEST(RenderCommand, HasEveryOption) {
   state.lit = state.dark = true;
   state.annotations.axes = false;
   state.classification = Classification::kFlat;
+  expectParts(commandText(state, "it's\x1b[2J \\\u009b.splats"), {R"($'it\'s\033[2J \\\302\233.splats')"});
   expectParts(commandText(state, "it's.splats"), {"'it'\\''s.splats'",
                                                   "--scalar 'u v'",
                                                   "--tf viridis",

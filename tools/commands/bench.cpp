@@ -24,6 +24,7 @@
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
 #include "tools/output/output_paths.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
@@ -176,8 +177,8 @@ void benchRanks(const BenchArguments& arguments) {
   const Camera camera =
       chooseCameraMotion(arguments.camera, manifest.lower, manifest.upper, options.size).camera(0);
   const RankSimulation simulated = simulateRanks({cache, variable, function, options}, camera, counts);
-  fmt::print("{}: {} samples in {} bricks; scalar {}\n", arguments.cache.string(), manifest.nodes,
-             manifest.bricks, manifest.variables[variable].name);
+  printLine("{}: {} samples in {} bricks; scalar {}", arguments.cache.string(), manifest.nodes,
+            manifest.bricks, manifest.variables[variable].name);
   printSection(
       fmt::format("Simulated: one picture of {}x{} pixels at {:g} px, {} splats in {} parts of bricks",
                   options.size.width, options.size.height, options.lod_pixels,
@@ -217,8 +218,8 @@ void benchCache(const BenchArguments& arguments) {
   const Machine machine = Machine::here(cache.path());
   const Effort effort = arguments.quick ? kQuick : Effort{};
 
-  fmt::print("{}: {} samples as {} splats in {} bricks; scalar {}\n", arguments.cache.string(),
-             manifest.nodes, manifest.splats, manifest.bricks, info.name);
+  printLine("{}: {} samples as {} splats in {} bricks; scalar {}", arguments.cache.string(), manifest.nodes,
+            manifest.splats, manifest.bricks, info.name);
   printMachine(machine);
   std::fflush(stdout);
   Measurements measurements;

@@ -31,6 +31,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/output_paths.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
@@ -43,9 +44,9 @@ namespace {
 void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds) {
   const auto samples = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
-  fmt::print("{}: {}, {} in {}, {}\n", arguments.output.string(), countText(report.nodes, "sample"),
-             countText(report.splats, "splat"), countText(report.bricks, "brick"),
-             countText(report.levels, "level"));
+  printLine("{}: {}, {} in {}, {}", arguments.output.string(), countText(report.nodes, "sample"),
+            countText(report.splats, "splat"), countText(report.bricks, "brick"),
+            countText(report.levels, "level"));
   // The interrupted run did part of the work, so this run's time gives no rate.
   const std::string rate = report.resumed ? " since it was resumed"
                                           : fmt::format(", {:.2f} M samples/s", 1e-6 * samples / seconds);

@@ -25,6 +25,7 @@
 #include "tools/options/series_input.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/output_paths.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
@@ -145,21 +146,21 @@ void follow(const ConvertArguments& arguments) {
       const std::vector<StepFiles> only{one};
       const SeriesReport report = convertSeries(seriesInput(arguments, only), options, progress,
                                                 [&](const SeriesEvent& event) { log.add(event); });
-      if (report.converted > 0) fmt::print("step {}: {}\n", report.steps - 1, one.name);
+      if (report.converted > 0) printLine("step {}: {}", report.steps - 1, one.name);
       std::fflush(stdout);
       steps = report.steps;
       options.add = true;
       options.convert.overwrite = false;
     }
   }
-  fmt::print("{}: {}\n", options.convert.output.string(), countText(steps, "step"));
+  printLine("{}: {}", options.convert.output.string(), countText(steps, "step"));
 }
 
 void printSums(const SeriesReport& report, const std::filesystem::path& cache) {
-  fmt::print("{}: {}{}, {} of them converted now, {} with a geometry of their own\n", cache.string(),
-             countText(report.steps, "step"),
-             report.left_out > 0 ? fmt::format(" ({} left out)", report.left_out) : "", report.converted,
-             report.new_geometries);
+  printLine("{}: {}{}, {} of them converted now, {} with a geometry of their own", cache.string(),
+            countText(report.steps, "step"),
+            report.left_out > 0 ? fmt::format(" ({} left out)", report.left_out) : "", report.converted,
+            report.new_geometries);
 }
 
 /// To the --stats file, if there is one.
@@ -190,7 +191,7 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
     writePartRecord(folder, part, steps.size(), {});
     Progress nothing;
     writeSeriesStatistics(arguments, {}, StepLog(nothing), nothing);
-    fmt::print("{}: no steps in this part\n", folder.string());
+    printLine("{}: no steps in this part", folder.string());
     return;
   }
   std::vector<StepFiles> own;
@@ -222,8 +223,8 @@ void runJoinSeries(ConvertArguments arguments) {
   const StopOnSignals stopping(progress);
   const JoinReport report =
       joinParts({arguments.grid.grid, linkTarget(arguments.output), arguments.overwrite}, progress);
-  fmt::print("{}: {} from {}; {} may be removed\n", arguments.output.string(),
-             countText(report.steps, "step"), countText(report.parts, "part"), arguments.grid.grid.string());
+  printLine("{}: {} from {}; {} may be removed", arguments.output.string(), countText(report.steps, "step"),
+            countText(report.parts, "part"), arguments.grid.grid.string());
 }
 
 bool isSeries(ConvertArguments& arguments) {

@@ -19,6 +19,7 @@
 #include "stream/base/free_space.h"
 #include "stream/base/process_usage.h"
 #include "stream/cache/faces_file.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
@@ -102,12 +103,12 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
   else
     fmt::print("{} samples; estimated from its cells, and from conversions of other unstructured grids:\n",
                forecast.samples);
-  fmt::print("  cache      {} in {}{}, {:.2f} bytes per sample{}\n", byteText(forecast.cache_bytes),
-             output.string(), freeText(output), static_cast<double>(forecast.cache_bytes) / samples,
-             forecast.steps > 1 ? " and step" : "");
+  printLine("  cache      {} in {}{}, {:.2f} bytes per sample{}", byteText(forecast.cache_bytes),
+            output.string(), freeText(output), static_cast<double>(forecast.cache_bytes) / samples,
+            forecast.steps > 1 ? " and step" : "");
   const std::filesystem::path temporary = temporaryFolderOf(options);
-  fmt::print("  temporary  {} in {}{}\n", byteText(forecast.temporary_bytes), temporary.string(),
-             freeText(temporary));
+  printLine("  temporary  {} in {}{}", byteText(forecast.temporary_bytes), temporary.string(),
+            freeText(temporary));
   fmt::print("  memory     {}\n", byteText(forecast.memory_bytes));
   fmt::print("  time       {}, {}\n", timeText(forecast.seconds), countText(forecast.threads, "thread"));
 }

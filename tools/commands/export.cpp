@@ -26,6 +26,7 @@
 #include "tools/options/scalar_arguments.h"
 #include "tools/options/step_arguments.h"
 #include "tools/output/output_paths.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
 
@@ -106,9 +107,9 @@ void exportVdb(const ExportArguments& arguments) {
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const VdbReport report = writeVdb(cache, variable, options, arguments.output, progress);
-  fmt::print("{}: value and density of {} in {} voxels of {:g} units, {:.1f} MiB\n",
-             arguments.output.string(), cache.manifest().variables[variable].name, report.active,
-             report.voxel_size, mebibytesOf(arguments.output));
+  printLine("{}: value and density of {} in {} voxels of {:g} units, {:.1f} MiB", arguments.output.string(),
+            cache.manifest().variables[variable].name, report.active, report.voxel_size,
+            mebibytesOf(arguments.output));
 }
 
 /// Grids hold the scalar itself, as it is stored; splats are drawn.
@@ -150,8 +151,8 @@ void exportCache(const ExportArguments& arguments) {
         "smaller --opacity-unit",
         arguments.cache.string(), cache.manifest().variables[variable].name);
   writeGaussians(splats, arguments.output);
-  fmt::print("{}: {} splats of {}, {:.1f} MiB\n", arguments.output.string(), splats.size(),
-             cache.manifest().variables[variable].name, mebibytesOf(arguments.output));
+  printLine("{}: {} splats of {}, {:.1f} MiB", arguments.output.string(), splats.size(),
+            cache.manifest().variables[variable].name, mebibytesOf(arguments.output));
   if (!arguments.no_comparison) {
     const Comparison found = compare(cache, variable, function, splats, memory, progress);
     fmt::print("against curvisplat's own pictures from 12 directions: {:.1f} dB, {:.1f} dB at worst\n",
@@ -162,7 +163,7 @@ void exportCache(const ExportArguments& arguments) {
     fmt::print("a position p is stored as (p - ({:g}, {:g}, {:g})) * {:g}\n", frame.centre.x, frame.centre.y,
                frame.centre.z, frame.scale);
   }
-  if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
+  if (!choice.chosenOptions().empty()) printLine("chosen from the data: {}", choice.chosenOptions());
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
 #include "tools/commands/commands.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 
 namespace curvisplat {
@@ -63,7 +64,8 @@ void generateSteps(const GenerateOptions& options) {
     nodes += progress.phases().back().steps;
     seconds += progress.phases().back().seconds;
   }
-  fmt::print("{}{}\n{}_%04d.fun\n", options.prefix, options.moving ? "_%04d.xyz" : ".xyz", options.prefix);
+  printLine("{}{}", options.prefix, options.moving ? "_%04d.xyz" : ".xyz");
+  printLine("{}_%04d.fun", options.prefix);
   fmt::print("{} nodes of {} in {} steps, in {:.1f} s\n", nodes, options.scene, *options.steps, seconds);
 }
 
@@ -77,7 +79,7 @@ void generate(const GenerateOptions& options) {
   Progress progress{progressBar()};
   const auto paths = writePlot3d(source, options.prefix, progress);
   const Progress::Phase& phase = progress.phases().back();
-  for (const auto& path : paths) fmt::print("{}\n", path.string());
+  for (const auto& path : paths) printLine("{}", path.string());
   fmt::print("{} nodes of {} in {:.1f} s\n", phase.steps, options.scene, phase.seconds);
 }
 

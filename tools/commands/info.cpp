@@ -27,6 +27,7 @@
 #include "tools/commands/info_system.h"
 #include "tools/options/grid_options.h"
 #include "tools/options/step_arguments.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 
 namespace curvisplat {
@@ -178,17 +179,19 @@ void printProbe(const CacheReader& reader, const InfoOptions& options, const Fin
              probed.centre.y, probed.centre.z);
   for (size_t v = 0; v < probed.variables.size(); ++v) {
     const VariableInfo& variable = reader.manifest().variables[v];
-    fmt::print("  {:<20} {:.6g}{} ({:.6g} there)\n", variable.name, probed.variables[v].value,
-               variable.unit.empty() ? "" : " " + variable.unit, probed.variables[v].mean);
+    printLine("  {:<20} {:.6g}{} ({:.6g} there)", variable.name, probed.variables[v].value,
+              variable.unit.empty() ? "" : " " + variable.unit, probed.variables[v].mean);
   }
 }
 
 /// The first ones and the last.
-void printSources(const std::vector<std::string>& names) {
+std::string sourcesText(const std::vector<std::string>& names) {
   constexpr size_t kFirst = 8;
   const bool all = names.size() <= kFirst + 2;
-  for (size_t n = 0; n < (all ? names.size() : kFirst); ++n) fmt::print(" {}", names[n]);
-  if (!all) fmt::print(" ... ({} more) {}", names.size() - kFirst - 1, names.back());
+  std::string text;
+  for (size_t n = 0; n < (all ? names.size() : kFirst); ++n) text += " " + names[n];
+  if (!all) text += fmt::format(" ... ({} more) {}", names.size() - kFirst - 1, names.back());
+  return text;
 }
 
 /// Those of the step that the reader is at.
@@ -196,7 +199,7 @@ void printFiles(const CacheReader& reader) {
   const Manifest& m = reader.manifest();
   const uint64_t steps = reader.series().steps.size();
   const auto line = [&](const std::string& name, uint64_t bytes) {
-    fmt::print("{:<18} {:>12} {:>18.3f}\n", name, bytes, bytesPerSample(m, bytes));
+    printLine("{:<18} {:>12} {:>18.3f}", name, bytes, bytesPerSample(m, bytes));
   };
   fmt::print("\nfile                      bytes   per drawn sample\n");
   uint64_t bytes = 0;
@@ -218,10 +221,10 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
     printProbe(reader, options, found);
     fmt::print("\n");
   }
-  fmt::print("{}\n", m.title);
-  fmt::print("written by {} from", m.program);
-  printSources(m.sources);
-  fmt::print("\n{}\n\n", m.reader);
+  printLine("{}", m.title);
+  printLine("written by {} from{}", m.program, sourcesText(m.sources));
+  printLine("{}", m.reader);
+  fmt::print("\n");
   fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
              m.lower.y, m.upper.y, m.lower.z, m.upper.z);
   fmt::print("volume     {:.8g}\n", m.volume);
@@ -230,9 +233,9 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {
-    fmt::print("scalar     {} {}: {:.6g} .. {:.6g}, rounded within {:.1e}\n", m.variables[v].name,
-               m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit),
-               m.variables[v].min, m.variables[v].max, storedWithin(reader, v));
+    printLine("scalar     {} {}: {:.6g} .. {:.6g}, rounded within {:.1e}", m.variables[v].name,
+              m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit), m.variables[v].min,
+              m.variables[v].max, storedWithin(reader, v));
     printSpread("", stepHistogram(reader, v));
     if (reader.series().steps.size() > 1) printSpread(", all steps", seriesHistogram(reader, v));
   }
@@ -247,8 +250,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
                reader.series().steps.size() > 1
                    ? fmt::format(", at all {} time steps", reader.series().steps.size())
                    : "");
-  for (const std::string& finding : found.verification.findings) fmt::print("finding: {}\n", finding);
-  for (const std::string& note : found.verification.notes) fmt::print("note: {}\n", note);
+  for (const std::string& finding : found.verification.findings) printLine("finding: {}", finding);
+  for (const std::string& note : found.verification.notes) printLine("note: {}", note);
 }
 
 void printCacheInfo(const InfoOptions& options) {

@@ -10,6 +10,7 @@
 #include "stream/base/calendar.h"
 #include "stream/base/error.h"
 #include "stream/cache/faces_file.h"
+#include "tools/output/print_line.h"
 
 namespace curvisplat {
 namespace {
@@ -46,13 +47,13 @@ void printSteps(const CacheReader& reader) {
     fmt::print("steps      1\n");
     return;
   }
-  fmt::print("steps      {}, times {:g} to {:g}{}, {} {}\n", steps, series.steps.front().time,
-             series.steps.back().time, unitOf(manifest), series.geometries(),
-             series.geometries() == 1 ? "geometry" : "geometries");
+  printLine("steps      {}, times {:g} to {:g}{}, {} {}", steps, series.steps.front().time,
+            series.steps.back().time, unitOf(manifest), series.geometries(),
+            series.geometries() == 1 ? "geometry" : "geometries");
   const bool has_dates = dateOfStep(reader, 0).has_value();
-  fmt::print("    step           time{}  geometry   range of", has_dates ? "                 date" : "");
-  for (const VariableInfo& variable : manifest.variables) fmt::print(" {}", variable.name);
-  fmt::print("\n");
+  std::string names;
+  for (const VariableInfo& variable : manifest.variables) names += " " + variable.name;
+  printLine("    step           time{}  geometry   range of{}", has_dates ? "                 date" : "", names);
   for (uint64_t step = 0; step < steps; ++step) {
     if (steps > kMaxLines && step == kMaxLines / 2) {
       fmt::print("     ...\n");

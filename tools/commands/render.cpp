@@ -43,6 +43,7 @@
 #include "tools/output/frame_output.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/movie_writer.h"
+#include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
@@ -92,20 +93,20 @@ std::string howFar(const RenderReport& report, uint64_t frames, bool several) {
 
 void printResult(const RenderReport& report) {
   if (report.frames.empty()) {
-    fmt::print("{}: no frames in this part\n", report.output.string());
+    printLine("{}: no frames in this part", report.output.string());
     return;
   }
   const FrameStatistics& last = report.frames.back().statistics;
   if (report.frames.size() == 1) {
-    fmt::print("{}: {} of {} in {}, {:.2f} s, {}\n", report.output.string(),
-               countText(last.splats_drawn, "splat"), report.variable.name,
-               countText(last.bricks_drawn, "brick"), last.total_s, report.backend);
+    printLine("{}: {} of {} in {}, {:.2f} s, {}", report.output.string(),
+              countText(last.splats_drawn, "splat"), report.variable.name,
+              countText(last.bricks_drawn, "brick"), last.total_s, report.backend);
     return;
   }
   double total_s = 0;
   for (const FrameReport& frame : report.frames) total_s += frame.statistics.total_s;
-  fmt::print("{}: {} frames of {}, {:.2f} s per frame, {}\n", report.output.string(), report.frames.size(),
-             report.variable.name, total_s / static_cast<double>(report.frames.size()), report.backend);
+  printLine("{}: {} frames of {}, {:.2f} s per frame, {}", report.output.string(), report.frames.size(),
+            report.variable.name, total_s / static_cast<double>(report.frames.size()), report.backend);
 }
 
 /// The cache; of a grid the one that is kept for it.
@@ -230,7 +231,7 @@ void render(const RenderArguments& given) {
   writeReport();
   printResult(report);
   if (const std::string chosen = choice.chosenOptions(); !chosen.empty())
-    fmt::print("chosen from the data: {}\n", chosen);
+    printLine("chosen from the data: {}", chosen);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "stream/base/message.h"
 #include "stream/cache/stored_precision.h"
+#include "tools/output/print_line.h"
 
 namespace curvisplat {
 
@@ -19,9 +20,9 @@ std::unique_ptr<CacheReader> openWritten(const std::filesystem::path& cache, uin
 void printStoredPrecision(const CacheReader& cache, std::string_view where) {
   const auto& variables = cache.manifest().variables;
   for (size_t n = 0; n < variables.size(); ++n)
-    fmt::print("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}\n", variables[n].name, where,
-               variables[n].min, variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
-               storedWithin(cache, n));
+    printLine("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}", variables[n].name, where, variables[n].min,
+              variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
+              storedWithin(cache, n));
 }
 
 }  // namespace curvisplat

@@ -11,14 +11,30 @@
 #include <system_error>
 
 #include "render/automatic/rounded.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr int kDigits = 6;  // of the picture's height, or of the number itself
 
+/// `word` with escapes in place of what a terminal obeys, as bash, zsh and POSIX of 2024 read it.
+std::string quotedWithEscapes(const std::string& word) {
+  std::string text = "$'";
+  for (const char c : word) {
+    if (c == '\'' || c == '\\')
+      text += {'\\', c};
+    else if (c >= ' ' && c <= '~')
+      text += c;
+    else
+      text += fmt::format("\\{:03o}", static_cast<unsigned char>(c));
+  }
+  return text + "'";
+}
+
 /// `word` quoted for a shell.
 std::string quoted(const std::string& word) {
+  if (oneLine(word) != word) return quotedWithEscapes(word);
   const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
     return std::isalnum(c) ||
            std::string_view("_-./,:=+@%").find(static_cast<char>(c)) != std::string_view::npos;

@@ -1,0 +1,84 @@
+#!/usr/bin/python3
+"""odd_names_test.py CURVISPLAT
+
+File names with escape sequences, which a terminal would obey: nothing that the program prints has control characters in it,
+those of ASCII or of Latin-1 (U+0080 to U+009F), in whatever command. Bytes that are not UTF-8 do no harm either.
+"""
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
+
+# Erase the screen, set the window's title, the same by the one-byte introducers, line breaks; and bytes of no encoding.
+NAMES = [b"a\x1b[2Jb\x1b]0;owned\x07c", "a\u009b2Jb\u009d0;owned\u009cc\x7f".encode(), b"a\nb\rc\td",
+         b"a\x9b2Jb\x80\xff\xc3", "Größe 寸法 µ".encode()]
+
+
+def controls(text):
+    """What a terminal would obey besides line breaks."""
+    found = [c for c in text.decode("utf-8", "surrogateescape") if (c < " " and c != "\n") or "\x7f" <= c < "\xa0"]
+    # A terminal without UTF-8 takes such bytes for U+0080 to U+009F.
+    return found + [c for c in text.decode("utf-8", "surrogateescape") if "\udc80" <= c < "\udca0"]
+
+
+class OddNames(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def run_in(self, *words, status=0):
+        run = subprocess.run([PROGRAM, *words], cwd=self.folder.name, capture_output=True, stdin=subprocess.DEVNULL)
+        self.assertEqual(run.returncode, status, run.stderr)
+        for stream in (run.stdout, run.stderr):
+            self.assertEqual(controls(stream), [], stream)
+        return run.stdout
+
+    def test_no_command_prints_them(self):
+        for name in NAMES:
+            with self.subTest(name=name):
+                def of(ending):
+                    return name + ending.encode()
+                shown = self.run_in("generate", "o-grid", "--size", "9x8x7", "-o", name)
+                self.assertEqual(shown.count(b"\n"), 4)  # three files and a sum, a line each
+                self.run_in("generate", "wake", "--size", "9x8x7", "--steps", "2", "--moving", "-o", of("_s"))
+                grid = (of(".xyz"), of(".fun"))
+                self.run_in("info", *grid)
+                self.run_in("convert", *grid, "-o", of(".splats"), "--dry-run")
+                self.run_in("convert", *grid, "-o", of(".splats"))
+                self.run_in("convert", of("_s_0000.xyz"), of("_s_0000.fun"), of("_s_0001.fun"), "-o", of("_s.splats"))
+                for cache in (of(".splats"), of("_s.splats")):
+                    self.run_in("info", cache)
+                    self.run_in("info", cache, "--verify")
+                    self.run_in("info", cache, "--probe", "0.5,0.5,0.5")
+                self.run_in("render", of(".splats"), "-o", of(".png"), "--size", "32x32")
+                self.run_in("render", of(".splats"), "-o", of("_%d.png"), "--size", "32x32", "--orbit", "10", "--frames", "2")
+                self.run_in("export", of(".splats"), "-o", of(".ply"), "--no-comparison")
+                self.run_in("compare", of(".png"), of(".png"))
+                self.run_in("info", of(".png"), status=1)
+                self.run_in("render", of(".splats"), "-o", of(".png"), "--scalar", name, status=1)
+                for file in os.listdir(os.fsencode(self.folder.name)):
+                    if not os.path.isdir(os.path.join(os.fsencode(self.folder.name), file)):
+                        os.remove(os.path.join(os.fsencode(self.folder.name), file))
+
+    def test_nor_names_in_files(self):
+        """A function's name from a .nam file, as a scalar of grids, caches and series."""
+        for name in NAMES:
+            if b"\n" in name or b"\xff" in name:
+                continue
+            with self.subTest(name=name):
+                self.run_in("generate", "o-grid", "--size", "9x8x7", "-o", "g")
+                pathlib.Path(self.folder.name, "g.nam").write_bytes(name + b"\n")
+                self.run_in("info", "g.xyz", "g.fun")
+                self.run_in("convert", "g.xyz", "g.fun", "-o", "g.splats", "--overwrite")
+                self.run_in("info", "g.splats")
+                self.run_in("info", "g.splats", "--probe", "0.5,0.5,0.5")
+                self.run_in("render", "g.splats", "-o", "g.png", "--size", "32x32")
+                self.run_in("export", "g.splats", "-o", "g.ply", "--no-comparison")
+
+
+if __name__ == "__main__":
+    unittest.main()
