@@ -19,11 +19,13 @@ ValueBounds boundsOf(const BrickVariable& variable) {
 /// What a view says of single bricks.
 class BrickView {
  public:
-  BrickView(const CutTree& tree, const CutView& view, const TransparentBounds& transparent, double lod_pixels)
+  BrickView(const CutTree& tree, const CutView& view, const TransparentBounds& transparent,
+            const CutOptions& options)
       : tree_(tree),
         view_(view),
         transparent_(transparent),
-        lod_pixels_(lod_pixels),
+        lod_pixels_(options.lod_pixels),
+        weight_(options.error_weight),
         largest_scale_(std::max({view.scale.x, view.scale.y, view.scale.z})) {}
 
   const Brick& brick(uint32_t id) const { return tree_.bricks[id]; }
@@ -57,7 +59,15 @@ class BrickView {
 
   /// Whether the brick may stand for all below it.
   bool fineEnough(uint32_t id) const {
-    return tree_.bricks[id].isLeaf() || (lod_pixels_ > 0 && errorPixels(id) <= lod_pixels_);
+    if (tree_.bricks[id].isLeaf()) return true;
+    const double error_px = errorPixels(id);
+    return lod_pixels_ > 0 && (error_px <= lod_pixels_ || (weight_ && weight_(id) * error_px <= lod_pixels_));
+  }
+
+  /// As far as it counts.
+  double shownError(uint32_t id) const {
+    const double error_px = errorPixels(id);
+    return error_px > lod_pixels_ && fineEnough(id) ? lod_pixels_ : error_px;
   }
 
   /// The octant of the brick's cell that is nearest, for orthographic views in the viewer's direction.
@@ -85,6 +95,7 @@ class BrickView {
   const CutView& view_;
   const TransparentBounds& transparent_;
   const double lod_pixels_;
+  const std::function<double(uint32_t)>& weight_;
   const double largest_scale_;
 };
 
@@ -242,7 +253,7 @@ class CutWalk {
     cut_.splats += SplatRanges(brick, part.octants).splats();
     cut_.bytes += view_.bytes(part.brick);
     cut_.deepest_level = std::max(cut_.deepest_level, brick.cell.level);
-    cut_.largest_error_px = std::max(cut_.largest_error_px, view_.errorPixels(part.brick));
+    cut_.largest_error_px = std::max(cut_.largest_error_px, view_.shownError(part.brick));
   }
 
   const BrickView& view_;
@@ -274,7 +285,7 @@ Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds&
               const CutOptions& options) {
   CURVISPLAT_CHECK_OP(tree.bricks.size(), ==, tree.variables.size());
   CURVISPLAT_CHECK_OP(tree.bricks.size(), ==, tree.subtrees.size());
-  const BrickView bricks(tree, view, transparent, options.lod_pixels);
+  const BrickView bricks(tree, view, transparent, options);
   const bool limited =
       options.max_splats != CutOptions::kNoLimit || options.max_bytes != CutOptions::kNoLimit;
   const Refinement refinement =

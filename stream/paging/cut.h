@@ -1,7 +1,7 @@
 // Which bricks one view needs: a pure function, apart from reading and drawing them.
 // DESIGN.md, "The pipeline".
 //
-// The cut starts at the root and goes down until a brick's error is small enough on the screen, or it is a
+// The cut starts at the root and goes down until a brick's error counts little enough on the screen, or it is a
 // leaf; what is outside the image or transparent is left out with all that lies below it. The result's cells
 // are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree node
 // the child farther along every axis comes first), so that bricks which are needed about the same time are
@@ -68,6 +68,9 @@ struct CutOptions {
   static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
   double lod_pixels = 1;  // error allowed on the screen; at 0 only leaves are taken
+  /// A brick's error counts this much, from 0 to 1, when it is compared with lod_pixels; not in the order of refinement.
+  /// Null: all errors count whole.
+  std::function<double(uint32_t brick)> error_weight = nullptr;
   DrawingOrder order = DrawingOrder::kBackToFront;
   /// What the cut may hold, and what its bricks' streams may take on disk. The root is drawn even where it
   /// alone is more.
@@ -79,9 +82,11 @@ struct Cut {
   uint64_t splats = 0;
   uint64_t bytes = 0;  // of the parts' bricks
   uint32_t deepest_level = 0;
-  bool complete = true;         // false: a limit keeps some of it coarser than lod_pixels asks for
-  double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
-  uint64_t out_of_image = 0;    // bricks left out, each standing for all below it
+  bool complete = true;  // false: a limit keeps some of it coarser than lod_pixels asks for
+  /// On the screen, of what is drawn; at most lod_pixels where its weight makes it fine enough. Infinite around a
+  /// perspective eye.
+  double largest_error_px = 0;
+  uint64_t out_of_image = 0;  // bricks left out, each standing for all below it
   uint64_t transparent = 0;
 };
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/glm.hpp>
 #include <random>
 #include <set>
@@ -120,6 +121,47 @@ bool outOfImage(const Brick& brick, const CutView& view) {
     }
     return true;
   });
+}
+
+TEST(Cut, WeightsDecideWhatIsFineEnough) {
+  std::mt19937 random(14);
+  const CutTestTree tree(27);
+  // Powers of two: errors in single precision take them exactly.
+  CutTestTree lighter = tree;
+  std::vector<double> weights;
+  for (Brick& brick : lighter.bricks) {
+    weights.push_back(std::ldexp(1.0, -static_cast<int>(random() % 3)));
+    brick.error *= static_cast<float>(weights.back());
+  }
+  bool differs = false;
+  for (int n = 0; n < 20; ++n) {
+    const CutView view = randomView(random, n % 2 == 0);
+    for (const double lod_pixels : {0.0, 0.5, 1.0, 4.0}) {
+      CutOptions options;
+      options.lod_pixels = lod_pixels;
+      options.error_weight = [&](uint32_t brick) { return weights[brick]; };
+      const Cut cut = tree.cut(view, options), expected = lighter.cut(view, lod_pixels);
+      EXPECT_EQ(cut.parts, expected.parts);
+      EXPECT_EQ(cut.splats, expected.splats);
+      EXPECT_LE(cut.largest_error_px, lod_pixels);
+      EXPECT_LE(cut.splats, tree.cut(view, lod_pixels).splats);
+      differs |= cut.parts != tree.cut(view, lod_pixels).parts;
+      // Under limits the same cut comes nearer, and is reached.
+      const std::set<uint32_t> whole = wholeBricks(cut);
+      for (uint64_t limit = tree.bricks[0].splats; limit <= cut.splats; limit += 997) {
+        options.max_splats = limit;
+        for (const BrickPart& part : tree.cut(view, options).parts)
+          for (uint32_t up = tree.bricks[part.brick].parent; up != kNoBrick; up = tree.bricks[up].parent)
+            EXPECT_EQ(whole.count(up), 0u) << "brick " << part.brick << " refines one of the whole cut";
+      }
+      options.max_splats = std::max<uint64_t>(cut.splats, tree.bricks[0].splats) + 100'000;
+      const Cut limited = tree.cut(view, options);
+      EXPECT_TRUE(limited.complete);
+      EXPECT_EQ(limited.parts, cut.parts);
+      EXPECT_EQ(limited.largest_error_px, cut.largest_error_px);
+    }
+  }
+  EXPECT_TRUE(differs);
 }
 
 TEST(Cut, LeavesOutWhatIsOutOfTheImageAndNothingElse) {
