@@ -23,7 +23,7 @@ enum class Classification { kPixel, kFlat };  // flat: one colour and extinction
 struct FrameOptions {
   ImageSize size;
   Classification classification = Classification::kPixel;
-  double lod_pixels = 1;               // screen-space error allowed; 0 is the finest level
+  double lod_pixels = 1;               // screen-space error allowed (error_weight.h); 0 is the finest level
   std::optional<uint64_t> max_splats;  // splat limit; the largest screen error is refined first
   glm::dvec3 scale{1.0};               // stretches the data about the world's origin: D S Dᵀ, V det D
   std::optional<WorldBox> clip_box;    // nothing outside it is drawn

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "render/frame/error_weight.h"
 #include "render/frame/hidden_bricks.h"
 #include "render/frame/picture_shares.h"
 #include "render/project/kernel.h"
@@ -47,6 +48,11 @@ std::pair<double, double> spreadOf(const ValueBounds& bounds, double reach) {
   return {bounds.min - spread, bounds.max + spread};
 }
 
+/// The values of a brick's splats, as far as their slopes reach within a kernel's radius.
+std::pair<float, float> reachedBy(const BrickVariable& values) {
+  return {values.min - values.largest_slope, values.max + values.largest_slope};
+}
+
 CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
   CutOptions limits;
   limits.order = order;
@@ -69,10 +75,13 @@ FramePlanner::FramePlanner(const CacheReader& cache, const DrawnScalars& scalars
       coloured_by_(scalars.colour),
       colours_(coloured_by_ ? coloured_by_->function : transfer_function_),
       colour_classes_(colourClassesFor(cache, coloured_by_)),
+      change_(table_),
       scalar_range_(transfer_function_.range()),
       subtrees_(subtreesOf(cache, variable_)),
       colour_subtrees_(coloured_by_ ? subtreesOf(cache, coloured_by_->variable)
-                                    : std::vector<ValueBounds>()) {}
+                                    : std::vector<ValueBounds>()) {
+  if (colour_classes_) colour_change_.emplace(*colour_classes_);
+}
 
 uint64_t FramePlanner::bytes() const {
   return cache_.bricks().size() *
@@ -90,6 +99,8 @@ uint64_t FramePlanner::mostSplats() const {
 void FramePlanner::stepChanged() {
   table_ = tableFor(cache_, variable_, transfer_function_);
   colour_classes_ = colourClassesFor(cache_, coloured_by_);
+  change_ = ClassificationChange(table_);
+  if (colour_classes_) colour_change_.emplace(*colour_classes_);
   subtrees_ = subtreesOf(cache_, variable_);
   if (coloured_by_) colour_subtrees_ = subtreesOf(cache_, coloured_by_->variable);
 }
@@ -97,6 +108,7 @@ void FramePlanner::stepChanged() {
 void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
   transfer_function_ = transfer_function;
   table_ = tableFor(cache_, variable_, transfer_function);
+  change_ = ClassificationChange(table_);
   if (!coloured_by_) colours_ = ColourTable(transfer_function);
   scalar_range_ = transfer_function.range();
 }
@@ -174,10 +186,39 @@ void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions
             [](const BrickPart& a, const BrickPart& b) { return a.brick < b.brick; });
 }
 
+/// Null where all errors count: light shows the splats themselves.
+std::function<double(uint32_t)> FramePlanner::errorWeightIn(const ProjectionSettings& settings,
+                                                            const CutView& view, double lod_pixels) const {
+  const double least = leastErrorWeight(lod_pixels);
+  if (least >= 1 || settings.lit() || !settings.per_pixel) return nullptr;
+  const double scale = std::max({view.scale.x, view.scale.y, view.scale.z});
+  const double whole = glm::length(view.scale * (cache_.manifest().upper - cache_.manifest().lower));
+  return [this, view, least, scale, whole](uint32_t id) {
+    const Brick& brick = cache_.bricks()[id];
+    const BrickVariable& values = cache_.brickVariables(variable_)[id];
+    const double voxel = brick.error * scale;
+    const auto [low, high] = reachedBy(values);
+    const double extinction =
+        change_.largestExtinction(low - values.largest_deviation, high + values.largest_deviation);
+    double change = change_.largestChange(low, high, values.largest_deviation);
+    if (colour_change_) {
+      const BrickVariable& colours = cache_.brickVariables(coloured_by_->variable)[id];
+      const auto [first, last] = reachedBy(colours);
+      change += extinction * colour_change_->largestChange(first, last, colours.largest_deviation);
+    }
+    return errorWeight(
+        {change * voxel, extinction * lengthInStep(brick, view, voxel, whole), whole > 0 ? voxel / whole : 1},
+        least);
+  };
+}
+
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
                             const CutOptions& limits) const {
+  const CutView view = cutViewOf(settings);
+  CutOptions weighted = limits;
+  weighted.error_weight = errorWeightIn(settings, view, limits.lod_pixels);
   const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
-  Cut cut = curvisplat::chooseCut(tree, cutViewOf(settings), transparentIn(settings), limits);
+  Cut cut = curvisplat::chooseCut(tree, view, transparentIn(settings), weighted);
   if (options.max_splats && cut.splats > *options.max_splats)
     throw UsageError(
         "--max-splats {} is less than the coarsest picture of this cache takes ({} splats); give at least "

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -11,6 +12,7 @@
 
 #include "render/camera/camera.h"
 #include "render/colour/classification.h"
+#include "render/colour/classification_change.h"
 #include "render/frame/drawn_scalars.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
@@ -108,6 +110,8 @@ class FramePlanner {
 
  private:
   TransparentBounds transparentIn(const ProjectionSettings& settings) const;
+  std::function<double(uint32_t)> errorWeightIn(const ProjectionSettings& settings, const CutView& view,
+                                                double lod_pixels) const;
   void planIsosurfaces(const FrameOptions& options, const CutOptions& limits, FramePlan& plan) const;
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
   CutView cutViewOf(const ProjectionSettings& settings) const;
@@ -124,7 +128,9 @@ class FramePlanner {
   const std::optional<DrawnScalar> coloured_by_;
   ColourTable colours_;
   std::optional<ClassificationTable> colour_classes_;
-  std::pair<double, double> scalar_range_;  // of the transfer function
+  ClassificationChange change_;
+  std::optional<ClassificationChange> colour_change_;  // of colour_classes_
+  std::pair<double, double> scalar_range_;             // of the transfer function
   std::vector<ValueBounds> subtrees_;
   std::vector<ValueBounds> colour_subtrees_;  // of the scalar of the colours, if there is one
 };

@@ -268,10 +268,10 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
   command
-      ->add_option(
-          "--lod-pixels", arguments->frame.lod_pixels,
-          "Largest screen error of merged splats, in pixels; 0 draws the finest level, against which 1 "
-          "held 50 dB in every picture tried")
+      ->add_option("--lod-pixels", arguments->frame.lod_pixels,
+                   "Largest screen error of merged splats, in pixels, but up to 4 where the transfer "
+                   "function hides it; 0 "
+                   "draws the finest level, against which 1 held 50 dB in nearly every picture tried")
       ->capture_default_str()
       ->group(what);
   command
