@@ -58,10 +58,11 @@ SlabBuffers GridOrigin::smallSlabs(Halo halo) const {
 
 /// Fits in half of what counting may take, which it needs only after the slabs of the survey are gone.
 PositionSample GridOrigin::newSample() const {
-  constexpr uint64_t kMost = uint64_t{1} << 21;
+  constexpr uint64_t kMaxPositions = uint64_t{1} << 21;
   uint64_t nodes = 0;
   for (const GridBlock& block : blocks()) nodes += block.nodes();
-  return {nodes, std::clamp<uint64_t>(plan_.counting_bytes / 2 / PositionSample::kBytesEach, 1024, kMost)};
+  return {nodes,
+          std::clamp<uint64_t>(plan_.counting_bytes / 2 / PositionSample::kBytesEach, 1024, kMaxPositions)};
 }
 
 bool GridOrigin::shareWith(Ranks& ranks) {
@@ -76,8 +77,8 @@ GridSurvey GridOrigin::survey(Progress& progress) {
                                              plan_.seam_bytes - needsOfFaces().memory_bytes, scratch_);
   sample_ = newSample();
   // Less would not tell how full a bucket gets within the margin that buckets are planned with.
-  constexpr uint64_t kLeastInBucket = 2000;
-  if (sample_->nodesEach() > 1 && plan_.plannedBucketSplats() / sample_->nodesEach() < kLeastInBucket)
+  constexpr uint64_t kMinInBucket = 2000;
+  if (sample_->nodesEach() > 1 && plan_.plannedBucketSplats() / sample_->nodesEach() < kMinInBucket)
     sample_.reset();
   GridSurvey survey = surveyGrid(reader_, smallSlabs(kNoHalo), {faces_.get(), sample_ ? &*sample_ : nullptr},
                                  progress, ranks_);

@@ -53,7 +53,8 @@ void printSteps(const CacheReader& reader) {
   const bool has_dates = dateOfStep(reader, 0).has_value();
   std::string names;
   for (const VariableInfo& variable : manifest.variables) names += " " + variable.name;
-  printLine("    step           time{}  geometry   range of{}", has_dates ? "                 date" : "", names);
+  printLine("    step           time{}  geometry   range of{}", has_dates ? "                 date" : "",
+            names);
   for (uint64_t step = 0; step < steps; ++step) {
     if (steps > kMaxLines && step == kMaxLines / 2) {
       fmt::print("     ...\n");
