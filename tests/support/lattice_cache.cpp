@@ -12,8 +12,20 @@ namespace {
 constexpr int kBrickSide = 8;
 constexpr uint32_t kLeafLevel = 2;
 
-BrickSplats latticeBrick(const RootCube& root, const Cell& cell, double constant,
-                         const glm::dvec3& gradient) {
+/// Children before their parent, in Morton order.
+void append(CacheWriter& writer, const RootCube& root, const Cell& cell, double constant,
+            const glm::dvec3& gradient) {
+  const bool leaf = cell.level == kLeafLevel;
+  if (!leaf)
+    for (int octant = 0; octant < 8; ++octant) append(writer, root, cell.child(octant), constant, gradient);
+  BrickSplats brick = latticeBrick(root, cell, {constant, gradient, leaf});
+  const double merged = root.cellSize(cell.level) / kBrickSide;
+  writer.append(encodeBrick(root, brick), static_cast<float>(std::sqrt(merged * merged - 1)));
+}
+
+}  // namespace
+
+BrickSplats latticeBrick(const RootCube& root, const Cell& cell, const LatticeBrick& of) {
   const double side = root.cellSize(cell.level) / kBrickSide;  // of a splat's piece of space
   BrickSplats brick;
   brick.cell = cell;
@@ -30,26 +42,14 @@ BrickSplats latticeBrick(const RootCube& root, const Cell& cell, double constant
       splat.axis = {side, side, side};
       splat.weight = side * side * side;
       brick.splats.push_back(splat);
-      brick.variables[0].push_back({constant + glm::dot(gradient, position), side * gradient, 0});
+      brick.variables[0].push_back({of.constant + glm::dot(of.gradient, position), side * of.gradient, 0});
     }
-  if (cell.level == kLeafLevel) {
+  if (of.leaf) {
     const uint64_t number = cell.at[0] + 4 * (cell.at[1] + 4 * cell.at[2]);
     brick.runs.push_back({0, number * brick.size(), 0, 0, brick.size()});
   }
   return brick;
 }
-
-/// Children before their parent, in Morton order.
-void append(CacheWriter& writer, const RootCube& root, const Cell& cell, double constant,
-            const glm::dvec3& gradient) {
-  if (cell.level < kLeafLevel)
-    for (int octant = 0; octant < 8; ++octant) append(writer, root, cell.child(octant), constant, gradient);
-  BrickSplats brick = latticeBrick(root, cell, constant, gradient);
-  const double merged = root.cellSize(cell.level) / kBrickSide;
-  writer.append(encodeBrick(root, brick), static_cast<float>(std::sqrt(merged * merged - 1)));
-}
-
-}  // namespace
 
 void writeLatticeCache(const std::filesystem::path& path, double constant, const glm::dvec3& gradient) {
   const RootCube root{glm::dvec3(0), kLatticeSide};

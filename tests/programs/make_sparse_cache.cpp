@@ -1,0 +1,22 @@
+// make_sparse_cache OUT.splats BRICKS: a cache of so many bricks, with streams in the coarsest only (sparse_cache.h),
+// to be measured: `make_sparse_cache a.splats 1000000 && curvisplat render a.splats ...`
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+
+#include "tests/support/sparse_cache.h"
+
+int main(int count, char** words) {
+  if (count != 3) {
+    fmt::print(stderr, "usage: make_sparse_cache OUT.splats BRICKS\n");
+    return 2;
+  }
+  try {
+    curvisplat::writeSparseCache(words[1], std::strtoull(words[2], nullptr, 10));
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "make_sparse_cache: {}\n", error.what());
+    return 1;
+  }
+}
