@@ -33,9 +33,9 @@ T take(const std::byte*& at) {
 
 }  // namespace
 
-std::vector<AppendedBrick> readBrickLog(const std::filesystem::path& folder, size_t variables) {
-  std::vector<AppendedBrick> bricks;
-  if (!std::filesystem::exists(folder / kBrickLogName)) return bricks;
+void forEachLogged(const std::filesystem::path& folder, size_t variables,
+                   const std::function<bool(AppendedBrick&&)>& use) {
+  if (!std::filesystem::exists(folder / kBrickLogName)) return;
   const InputFile file(folder / kBrickLogName);
   const size_t entry_bytes = entryBytes(variables);
   const uint64_t entries = file.size() / entry_bytes, at_once = kReadBytes / entry_bytes + 1;
@@ -51,10 +51,18 @@ std::vector<AppendedBrick> readBrickLog(const std::filesystem::path& folder, siz
       brick.weight = take<double>(at);
       for (size_t v = 0; v < variables; ++v)
         brick.variables.push_back(brickVariableOf(take<VariableRecord>(at)));
-      if (take<uint64_t>(at) != checksumOf(entry.first(entry_bytes - sizeof(uint64_t)))) return bricks;
-      bricks.push_back(std::move(brick));
+      if (take<uint64_t>(at) != checksumOf(entry.first(entry_bytes - sizeof(uint64_t)))) return;
+      if (!use(std::move(brick))) return;
     }
   }
+}
+
+std::vector<AppendedBrick> readBrickLog(const std::filesystem::path& folder, size_t variables) {
+  std::vector<AppendedBrick> bricks;
+  forEachLogged(folder, variables, [&](AppendedBrick&& brick) {
+    bricks.push_back(std::move(brick));
+    return true;
+  });
   return bricks;
 }
 

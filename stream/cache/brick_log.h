@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "stream/base/file.h"
@@ -22,6 +23,11 @@ struct AppendedBrick {
   double weight = 0;  // EncodedBrick::weight
   std::vector<BrickVariable> variables;
 };
+
+/// Calls `use` for each entry of the log in `folder`, until it returns false or an entry is damaged; never without a log.
+/// Throws Error if the disk fails.
+void forEachLogged(const std::filesystem::path& folder, size_t variables,
+                   const std::function<bool(AppendedBrick&&)>& use);
 
 /// The entries of the log in `folder`, up to the first damaged one; empty if there is no log. Throws Error if
 /// the disk fails.

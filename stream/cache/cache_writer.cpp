@@ -27,6 +27,23 @@ std::vector<uint32_t> indexOrder(const std::vector<Brick>& bricks) {
   return order;
 }
 
+/// Puts values[order[n]] at n, without a second copy of all.
+template <typename T>
+void permute(std::vector<T>& values, const std::vector<uint32_t>& order) {
+  std::vector<bool> done(values.size());
+  for (uint32_t start = 0; start < values.size(); ++start) {
+    if (done[start]) continue;
+    const T first = values[start];
+    uint32_t at = start;
+    for (; order[at] != start; at = order[at]) {
+      values[at] = values[order[at]];
+      done[at] = true;
+    }
+    values[at] = first;
+    done[at] = true;
+  }
+}
+
 /// Links parents and children of `bricks`, which are in the order of the index. A brick without a parent, or
 /// two bricks of one cell that are not leaves, are bugs of the caller of append().
 void linkOctree(std::vector<Brick>& bricks) {
@@ -72,10 +89,11 @@ struct CacheWriter::State {
   bool isWhole(const AppendedBrick& appended) const;
   void keep(uint64_t count);
 
-  FileInfo writeIndex(const std::vector<Brick>& ordered);
-  FileInfo writeTable(size_t variable, const std::vector<uint32_t>& order);
-  FileInfo writeGrids(const std::vector<Brick>& ordered);
-  FileInfo closeGeometry(const std::vector<Brick>& ordered);
+  // Of finish(), once the bricks are in the order of the index.
+  FileInfo writeIndex();
+  FileInfo writeTable(size_t variable);
+  FileInfo writeGrids();
+  FileInfo closeGeometry();
 
   std::unique_ptr<PartialFolder> own_folder;  // null if the caller owns the folder
   PartialFolder& folder;
@@ -115,11 +133,12 @@ bool CacheWriter::State::isWhole(const AppendedBrick& appended) const {
 }
 
 void CacheWriter::State::resume(Progress& progress) {
-  for (AppendedBrick& appended : readBrickLog(folder.path(), variables.size())) {
-    if (!isWhole(appended)) break;
+  forEachLogged(folder.path(), variables.size(), [&](AppendedBrick&& appended) {
+    if (!isWhole(appended)) return false;
     add(std::move(appended));
     progress.advance(1);
-  }
+    return true;
+  });
   keep(bricks.size());
 }
 
@@ -242,21 +261,23 @@ Manifest CacheWriter::finish(Manifest manifest) {
   State& s = *state_;
   if (s.bricks.empty())
     throw Error("{}: the cache would be empty: no sample can be drawn", s.folder.path().string());
-  const std::vector<uint32_t> order = indexOrder(s.bricks);
-  std::vector<Brick> ordered;
-  ordered.reserve(order.size());
-  for (uint32_t id : order) ordered.push_back(s.bricks[id]);
-  linkOctree(ordered);
+  {
+    const std::vector<uint32_t> order = indexOrder(s.bricks);
+    permute(s.bricks, order);
+    permute(s.weights, order);
+    for (std::vector<BrickVariable>& table : s.tables) permute(table, order);
+  }
+  linkOctree(s.bricks);
 
   manifest.root = s.root;
-  manifest.bricks = ordered.size();
-  manifest.levels = ordered.back().cell.level + 1;
+  manifest.bricks = s.bricks.size();
+  manifest.levels = s.bricks.back().cell.level + 1;
   manifest.splats = 0;
   manifest.volume = 0;
-  for (size_t n = 0; n < ordered.size(); ++n) {
-    if (!ordered[n].isLeaf()) continue;
-    manifest.splats += ordered[n].splats;
-    manifest.volume += s.weights[order[n]];
+  for (size_t n = 0; n < s.bricks.size(); ++n) {
+    if (!s.bricks[n].isLeaf()) continue;
+    manifest.splats += s.bricks[n].splats;
+    manifest.volume += s.weights[n];
   }
   if (manifest.variables.empty()) manifest.variables = s.variables;
   CURVISPLAT_CHECK_OP(manifest.variables.size(), ==, s.variables.size());
@@ -268,10 +289,10 @@ Manifest CacheWriter::finish(Manifest manifest) {
   }
 
   const std::vector<FileInfo> further = std::move(manifest.files);
-  manifest.files = {s.writeIndex(ordered)};
-  manifest.files.push_back(s.closeGeometry(ordered));
-  for (size_t v = 0; v < s.variables.size(); ++v) manifest.files.push_back(s.writeTable(v, order));
-  manifest.files.push_back(s.writeGrids(ordered));
+  manifest.files = {s.writeIndex()};
+  manifest.files.push_back(s.closeGeometry());
+  for (size_t v = 0; v < s.variables.size(); ++v) manifest.files.push_back(s.writeTable(v));
+  manifest.files.push_back(s.writeGrids());
   manifest.files.insert(manifest.files.end(), further.begin(), further.end());
   writeFileAtomically(s.folder.path() / "manifest.json", manifest.toJson());
   s.folder.putIntoPlace();
@@ -280,41 +301,42 @@ Manifest CacheWriter::finish(Manifest manifest) {
   return manifest;
 }
 
-FileInfo CacheWriter::State::writeIndex(const std::vector<Brick>& ordered) {
-  std::vector<BrickRecord> records;
-  records.reserve(ordered.size());
-  for (const Brick& brick : ordered) records.push_back(recordOf(brick));
+FileInfo CacheWriter::State::writeIndex() {
+  constexpr size_t kAtOnce = (1 << 20) / sizeof(BrickRecord);
   BricksHeader header;
   header.record_bytes = sizeof(BrickRecord);
-  header.bricks = ordered.size();
+  header.bricks = bricks.size();
   OutputFile file(folder.path() / "bricks.bin");
-  file.append(bytesOf(header));
-  file.append(bytesOf(records));
   Checksum checksum;
+  file.append(bytesOf(header));
   checksum.add(bytesOf(header));
-  checksum.add(bytesOf(records));
+  std::vector<BrickRecord> records;
+  for (size_t first = 0; first < bricks.size(); first += records.size()) {
+    records.clear();
+    for (size_t n = first; n < std::min(first + kAtOnce, bricks.size()); ++n)
+      records.push_back(recordOf(bricks[n]));
+    file.append(bytesOf(records));
+    checksum.add(bytesOf(records));
+  }
   FileInfo info{"bricks.bin", file.size(), checksum.value()};
   file.close();
   return info;
 }
 
-FileInfo CacheWriter::State::closeGeometry(const std::vector<Brick>& ordered) {
+FileInfo CacheWriter::State::closeGeometry() {
   padToPage(geometry);
-  FileInfo info{"geometry.bin", geometry.size(), geometryChecksum(ordered)};
+  FileInfo info{"geometry.bin", geometry.size(), geometryChecksum(bricks)};
   geometry.close();
   return info;
 }
 
-FileInfo CacheWriter::State::writeTable(size_t variable, const std::vector<uint32_t>& order) {
-  std::vector<BrickVariable> table;
-  table.reserve(order.size());
-  for (uint32_t id : order) table.push_back(tables[variable][id]);
-  return finishVariableFile(values[variable], variableFileName(variables[variable]), table,
+FileInfo CacheWriter::State::writeTable(size_t variable) {
+  return finishVariableFile(values[variable], variableFileName(variables[variable]), tables[variable],
                             histograms.of(variable));
 }
 
-FileInfo CacheWriter::State::writeGrids(const std::vector<Brick>& ordered) {
-  const std::vector<std::byte> bytes = brickGridsFile(root, ordered);
+FileInfo CacheWriter::State::writeGrids() {
+  const std::vector<std::byte> bytes = brickGridsFile(root, bricks);
   OutputFile file(folder.path() / "bricks.vdb");
   file.append(std::span(bytes));
   file.close();
