@@ -17,6 +17,9 @@ constexpr double kLayerShare = 0.7;
 constexpr double kSlabShare = 0.6;
 // Between regions threads wait for one another: as long as preparing this number of splats takes.
 constexpr double kSplatsARegion = 100e3;
+// Of more parts a sample of at least this number stands for all. The choice only changes how the work is divided, and of a
+// million parts it would take seconds.
+constexpr size_t kSampledParts = size_t{1} << 15;
 // Shared tiles: regions are made of whole painters' tiles, as far as those are this rank's.
 constexpr int kUnit = kTileSide / kSharedTileSide;
 
@@ -43,8 +46,8 @@ double shareOf(float from, float to, int first, int last) {
   return to > from && std::isfinite(to - from) ? (high - low) / (double{to} - from) : 1;
 }
 
-/// What drawing a region takes, in splats to be prepared.
-double workOf(const std::vector<PartInRegion>& parts, double sweep_splats) {
+/// What drawing a region with such a layer takes, in splats to be prepared.
+double workOf(const std::vector<PartInRegion>& parts, double layer, double sweep_splats) {
   double all = 0, seen = 0, depth_first = std::numeric_limits<double>::infinity(), depth_last = 0;
   for (const PartInRegion& part : parts) {
     all += part.prepare;
@@ -52,14 +55,30 @@ double workOf(const std::vector<PartInRegion>& parts, double sweep_splats) {
     depth_first = std::min<double>(depth_first, part.keys.first);
     depth_last = std::max<double>(depth_last, part.keys.last);
   }
-  if (largestLayer(parts) <= kLayerShare * sweep_splats || depth_last <= depth_first)
-    return all + kSplatsARegion;
+  if (layer <= kLayerShare * sweep_splats || depth_last <= depth_first) return all + kSplatsARegion;
   const double slabs = std::max(2.0, seen / (kSlabShare * sweep_splats));
   double work = kSplatsARegion * slabs;
   for (const PartInRegion& part : parts)
     work += part.prepare * (1 + (slabs - 1) * static_cast<double>(part.keys.last - part.keys.first) /
                                     (depth_last - depth_first));
   return work;
+}
+
+/// Every `stride`-th part, which costs as much as all that it stands for.
+std::vector<PartCost> sampleOf(const std::vector<PartCost>& parts, size_t stride) {
+  if (stride == 1) return parts;
+  std::vector<PartCost> sample;
+  sample.reserve(parts.size() / stride + 1);
+  const auto weight = static_cast<double>(stride);
+  for (size_t n = 0; n < parts.size(); n += stride) {
+    PartCost part = parts[n];
+    part.prepare *= weight;
+    part.paint *= weight;
+    part.splats *= weight;
+    part.sort *= weight;
+    sample.push_back(part);
+  }
+  return sample;
 }
 
 }  // namespace
@@ -99,12 +118,15 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
   const TileBox all = plan.tiles ? plan.tiles->box()
                                  : TileBox{0, 0, TileSet::tilesAlong(size.width, kSharedTileSide),
                                            TileSet::tilesAlong(size.height, kSharedTileSide)};
+  const size_t stride = std::max<size_t>(1, costs.size() / kSampledParts);
+  const std::vector<PartCost> sample = sampleOf(costs, stride);
   const auto partsIn = [&](const TileBox& box) {
     std::vector<PartInRegion> parts;
-    for (size_t n = 0; n < costs.size(); ++n) {
-      const double share = shareOf(costs[n].box.x0, costs[n].box.x1, box.x0, box.x1) *
-                           shareOf(costs[n].box.y0, costs[n].box.y1, box.y0, box.y1);
-      if (share > 0) parts.push_back({plan.parts[n].keys, share * costs[n].prepare, costs[n].prepare});
+    for (size_t n = 0; n < sample.size(); ++n) {
+      const PartCost& cost = sample[n];
+      const double share = shareOf(cost.box.x0, cost.box.x1, box.x0, box.x1) *
+                           shareOf(cost.box.y0, cost.box.y1, box.y0, box.y1);
+      if (share > 0) parts.push_back({plan.parts[n * stride].keys, share * cost.prepare, cost.prepare});
     }
     return parts;
   };
@@ -113,13 +135,14 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
   uint32_t regions = 1;
   for (const uint32_t number : kNumbers) {
     if (number > std::max<size_t>(1, all.tiles() / (kUnit * kUnit))) break;
-    std::vector<uint32_t> dealt = dealTiles(costs, size, {all, kUnit, true}, number);
+    std::vector<uint32_t> dealt = dealTiles(sample, size, {all, kUnit, true}, number);
     double work = 0;
     bool fits = true;
     for (const TileBox& box : boxesOf(dealt, size, number)) {
       const std::vector<PartInRegion> parts = partsIn(box);
-      work += workOf(parts, capacity);
-      fits = fits && largestLayer(parts) <= kLayerShare * capacity;
+      const double layer = largestLayer(parts);
+      work += workOf(parts, layer, capacity);
+      fits = fits && layer <= kLayerShare * capacity;
     }
     if (work < least) {
       least = work;
