@@ -18,7 +18,7 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// The program, thread stacks and index records; and of the cap what the allocator holds back. Of these 80 MiB, 57 are pages of
+// The program, thread stacks and kUsualIndexBytes of index records; and of the cap what the allocator holds back. Of these 80 MiB, 57 are pages of
 // libraries (RssFile of a conversion of NetCDF tiles); the rest has room for what HDF5 keeps of its files.
 constexpr uint64_t kProgramBytes = 80 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
@@ -27,6 +27,9 @@ constexpr uint64_t kSeamShare = 8, kSlabShare = 8, kMeshShare = 2;  // of the re
 constexpr uint64_t kMinBucketSplats = 4 * kMaxBrickSplats;
 constexpr uint64_t kMinChunkBytes = kMiB / 8, kMaxChunkBytes = kMiB;
 constexpr uint32_t kMaxBuckets = 4096;
+// Samples for each brick of the cache: 17,000 to 25,000 in grids that fill their leaves.
+constexpr uint64_t kSamplesABrick = 16384;
+constexpr uint64_t kUsualIndexBytes = 16 * kMiB;
 
 /// Making a brick of kMaxBrickSplats: its splats in double, what the codec lays beside them, and the voxels
 /// that they merge into.
@@ -37,6 +40,14 @@ uint64_t brickScratchBytes(size_t variables) {
 /// Bytes for a splat of a bucket: its record, its place in two orders, and its encoded form.
 uint64_t bucketBytesPerSplat(size_t variables) {
   return regularRecordBytes(variables) + 2 * sizeof(uint32_t) + 12 + 10 * variables;
+}
+
+/// The index records that the writer of the cache holds, beyond the usual ones. They grow while bricks are appended: a vector
+/// that grows has twice of what it holds.
+uint64_t indexBytes(uint64_t samples, size_t variables) {
+  const uint64_t brick = sizeof(Brick) + sizeof(double) + variables * sizeof(BrickVariable);
+  const uint64_t bytes = samples / kSamplesABrick * 2 * brick;
+  return bytes - std::min(bytes, kUsualIndexBytes);
 }
 
 /// The cap that leaves `bytes` to be shared out.
@@ -126,7 +137,8 @@ void MemoryPlan::requireFaces(uint64_t bytes) const {
 uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
   // Cells fill a bucket to three quarters, mostly; two are in memory.
   const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);
-  const uint64_t build = in_buckets * bucketBytesPerSplat(variables) + threads * brickScratchBytes(variables);
+  const uint64_t build = in_buckets * bucketBytesPerSplat(variables) +
+                         threads * brickScratchBytes(variables) + indexBytes(splats, variables);
   const uint64_t slabs = 2 * std::min(slab_bytes, splats * slabBytesPerNode(variables));
   const uint64_t buckets = 3 * splats / (2 * plannedBucketSplats()) + 1;
   const uint64_t scatter = slabs + std::min({chunk_buffer_bytes, splats * regularRecordBytes(variables),
@@ -141,6 +153,21 @@ void MemoryPlan::suit(uint64_t samples, size_t variables) {
   constexpr uint64_t kBuckets = 4, kBricksOfThread = 10;
   slab_bytes = std::min(slab_bytes, std::max(kMinSlabBytes, samples * slabBytesPerNode(variables) / kSlabs));
   limitBuckets(std::max(samples / kBuckets, threads * kBricksOfThread * kMaxBrickSplats), variables);
+  leaveIndex(samples, variables);
+}
+
+void MemoryPlan::leaveIndex(uint64_t samples, size_t variables) {
+  const uint64_t index = indexBytes(samples, variables), scratch = brickScratchBytes(variables);
+  const uint64_t a_splat = 2 * bucketBytesPerSplat(variables), least_buckets = kMinBucketSplats * a_splat;
+  const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
+  const uint64_t least = index + scratch + least_buckets;
+  if (least > bytes)
+    throw Error(
+        "--memory {}: the index of {} samples takes {} beside what conversion takes; give at least {} MiB",
+        byteText(cap_bytes), samples, byteText(index), (capFor(least) >> 20) + 1);
+  const uint64_t affordable = std::max<uint64_t>(1, (bytes - index - least_buckets) / (2 * scratch));
+  threads = static_cast<unsigned>(std::min<uint64_t>(threads, affordable));
+  limitBuckets((bytes - index - threads * scratch) / a_splat, variables);
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {

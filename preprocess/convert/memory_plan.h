@@ -8,6 +8,7 @@
 //                  of a mesh: points and sums | chunk buffers | chunks of cells
 //    seams         chunk buffers | seams
 //    build         2 buckets (one is read while the other is built) | a brick's scratch a thread
+//                  index records, which grow with the samples
 #pragma once
 
 #include <cstddef>
@@ -48,7 +49,8 @@ struct MemoryPlan {
   void requireFaces(uint64_t bytes) const;
 
   /// Makes slabs and buckets no larger than serves a grid of `samples`: then one is read while another is worked on, and
-  /// memory is used again instead of being asked for, which costs a page fault every 4 KiB.
+  /// memory is used again instead of being asked for, which costs a page fault every 4 KiB. And leaves memory for
+  /// the index of very many samples: throws Error that names a sufficient limit if there is none.
   void suit(uint64_t samples, size_t variables);
   /// Makes buckets smaller than they could be.
   void limitBuckets(uint64_t splats, size_t variables);
@@ -58,6 +60,9 @@ struct MemoryPlan {
   uint64_t expectedPeak(uint64_t splats, size_t variables) const;
   /// The size that buckets are planned for, with a reserve for splats that the count of nodes misses.
   uint64_t plannedBucketSplats() const { return bucket_splats - bucket_splats / 5; }
+
+ private:
+  void leaveIndex(uint64_t samples, size_t variables);
 };
 
 /// The smallest limit within which `variables` can be converted.

@@ -6,12 +6,14 @@
 #include <map>
 #include <random>
 #include <set>
+#include <string>
 
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_tree.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/error.h"
+#include "stream/model/brick.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
 
@@ -234,6 +236,35 @@ TEST(MemoryPlan, SuitsTheGrid) {
   least.suit(500'000'000, 1);
   EXPECT_EQ(least.slab_bytes, least_slab);
   EXPECT_EQ(least.bucket_splats, least_bucket);
+}
+
+TEST(MemoryPlan, LeavesMemoryForALargeIndex) {
+  constexpr uint64_t kSamples = 10'000'000'000;
+  const MemoryPlan whole = MemoryPlan::of(uint64_t{1} << 30, 1, 2);
+  MemoryPlan large = whole;
+  large.suit(kSamples, 1);
+  // At least the records of the bricks that full leaves make, with an eighth for those above.
+  const uint64_t index = kSamples / 65536 * 9 / 8 * (sizeof(Brick) + sizeof(double) + sizeof(BrickVariable));
+  EXPECT_LE(2 * large.bucket_bytes + index, 2 * whole.bucket_bytes);
+  EXPECT_LE(large.expectedPeak(kSamples, 1), uint64_t{1} << 30);
+  // Too small a limit is refused, and the one that is named suffices for any number of threads.
+  for (const unsigned threads : {1u, 16u}) {
+    MemoryPlan small = MemoryPlan::of(leastMemory(1), 1, threads);
+    std::string message;
+    try {
+      small.suit(kSamples, 1);
+    } catch (const Error& error) {
+      message = error.what();
+    }
+    const std::string before = "at least ";
+    ASSERT_NE(message.find(before), std::string::npos);
+    const uint64_t least = std::stoull(message.substr(message.find(before) + before.size())) << 20;
+    MemoryPlan enough = MemoryPlan::of(least, 1, threads);
+    EXPECT_NO_THROW(enough.suit(kSamples, 1));
+    EXPECT_GE(enough.bucket_splats, 4 * 65536u);
+    MemoryPlan less = MemoryPlan::of(least - (uint64_t{8} << 20), 1, threads);
+    EXPECT_THROW(less.suit(kSamples, 1), Error);
+  }
 }
 
 TEST(MemoryPlan, RefusesLessThanTheLeast) {
