@@ -36,6 +36,7 @@ CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
 
 void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                            const std::filesystem::path& temporary_folder, Progress& progress) {
+  is_steep_ = cache.manifest().stretch == kSteepStretch;
   cuts_octants_ = cache.manifest().hasFeature(kCellOctants);
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
@@ -46,6 +47,7 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
   SeamMerger seams(0, plan.seam_bytes, temporary_folder, unlike);
   NoSink none;
   SlabPass pass(progress);
+  pass.steep = is_steep_;
   pass.octants = cuts_octants_;
   streamSplats(
       NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },

@@ -51,6 +51,7 @@ class CacheGrid : public GridSource {
   const GridSource* source_;
   std::vector<uint64_t> first_nodes_;  // [block]
   std::unique_ptr<DrawnNodes> drawn_;
+  bool is_steep_ = true;      // of the cache (kSteepStretch)
   bool cuts_octants_ = true;  // of the cache (kCellOctants)
   bool all_faces_ = false;    // while merged ones are looked for: nodes of block faces are not restricted
 };

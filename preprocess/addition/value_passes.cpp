@@ -71,6 +71,7 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
   SlabPass pass(*progress_, std::move(see));
   pass.owners = owners ? &*owners : nullptr;
   pass.ranks = ranks_;
+  pass.steep = cache_->manifest().stretch == kSteepStretch;
   pass.octants = cache_->manifest().hasFeature(kCellOctants);
   pass.values_alone = true;
   streamSplats(

@@ -57,6 +57,7 @@ struct SlabPass {
   Ranks* ranks = nullptr;         // of which each makes the splats of a share; the counts are the whole's
   ScatterNotes notes;             // of a scatter() without ranks
   bool octants = true;            // NodeSplatCorrections::octants
+  bool steep = true;              // NodeSplatCorrections::steep
   bool values_alone = false;      // are wanted: NodeSplatCorrections::growth_codes
 };
 

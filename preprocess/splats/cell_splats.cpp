@@ -152,18 +152,20 @@ Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cel
   if (!is_there(1, 0)) {
     if (!is_there(0, 2)) return {};
     const double near = own[stride], far = own[2 * stride], steady = steadyGrowth(*own, near, far);
-    return {1, stretchOf(*own / (steady * steady), *own / steady, *own, near, far).growth};
+    return {1,
+            stretchOf(*own / (steady * steady), *own / steady, *own, near, far, StretchFit::kGentle).growth};
   }
   if (!is_there(0, 1)) {
     if (!is_there(2, 0)) return {};
     const double near = *(own - stride), far = *(own - 2 * stride), steady = steadyGrowth(*own, near, far);
-    return {1, stretchOf(far, near, *own, *own / steady, *own / (steady * steady)).growth};
+    return {1,
+            stretchOf(far, near, *own, *own / steady, *own / (steady * steady), StretchFit::kGentle).growth};
   }
   const double before = *(own - stride), after = own[stride];
   // Beyond the last cell is its mirror image, less the steady growth.
   const double before2 = is_there(2, 0) ? *(own - 2 * stride) : before / steadyGrowth(before, *own, after);
   const double after2 = is_there(0, 2) ? own[2 * stride] : after / steadyGrowth(after, *own, before);
-  return stretchOf(before2, before, *own, after, after2);
+  return stretchOf(before2, before, *own, after, after2, StretchFit::kGentle);
 }
 
 /// A length for the shape of a cell without any extent: far below the grid's, and above zero.

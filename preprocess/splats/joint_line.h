@@ -36,8 +36,8 @@ namespace curvisplat {
 using CellRow = std::array<double, 5>;
 
 /// What a stretch is where `row` is all there is to know; the growth and the drift are towards the row's end.
-inline Stretch stretchOfRow(const CellRow& row) {
-  return stretchOf(row[0] * row[0], row[1] * row[1], row[2] * row[2], row[3] * row[3], row[4] * row[4]);
+inline Stretch stretchOfRow(const CellRow& row, StretchFit fit) {
+  return stretchOf(row[0] * row[0], row[1] * row[1], row[2] * row[2], row[3] * row[3], row[4] * row[4], fit);
 }
 
 /// The stretch of a half cell that ends at a border.
@@ -58,7 +58,7 @@ class JointLine {
   bool isThere() const { return unit_ > 0; }
   double unit() const { return unit_; }
   CellRow row() const;
-  Stretch stretch() const { return stretchOfRow(row()); }
+  Stretch stretch(StretchFit fit) const { return stretchOfRow(row(), fit); }
 
   /// Which way the row leads, away from the face, in the frame of the node's splat: to a hundredth.
   glm::dvec3 inward() const;

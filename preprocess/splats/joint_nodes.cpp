@@ -18,9 +18,9 @@ namespace {
 constexpr size_t kMaxParts = 64;
 constexpr double kStraight = -0.9;  // cosine of halves on about one line
 
-/// How thick a cell is at right angles to the face that q leaves inwards.
-double thickness(const Splat& splat, const glm::dvec3& q) {
-  return 1 / glm::length(gradientOf(splat, q));
+/// How thick a cell is at right angles to the face that q leaves inwards, before it was fitted to faces.
+double thickness(const NodeSplat& half, const glm::dvec3& q) {
+  return 1 / (glm::length(gradientOf(half.splat, q)) * fittedFactor(half, q));
 }
 
 bool isUnlike(double a, double b, double most) {
@@ -46,7 +46,7 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
     const glm::dvec3 inward(of_a.axis[static_cast<size_t>(n)]), other(of_b.axis[static_cast<size_t>(m)]);
     // Directions are coded to 0.01 of the cell, which is many times a thin cell's thickness: a joint across
     // such cells would look unlike. Weights are exact, and halves of one face differ in them as in thickness.
-    unlike |= isUnlike(thickness(a.splat, inward), thickness(b.splat, other), most) &&
+    unlike |= isUnlike(thickness(a, inward), thickness(b, other), most) &&
               isUnlike(a.splat.weight, b.splat.weight, most);
   });
   if (opposite == 0) return Neighbourhood::kOther;

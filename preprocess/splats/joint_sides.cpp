@@ -5,6 +5,7 @@
 
 #include "preprocess/splats/opposite_halves.h"
 #include "preprocess/splats/reshape.h"
+#include "preprocess/splats/several_layers.h"
 #include "preprocess/splats/shape.h"
 
 namespace curvisplat {
@@ -36,13 +37,19 @@ std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::spa
   return sides;
 }
 
+double fittedFactor(const NodeSplat& half, const glm::dvec3& inward) {
+  const JointLine* const line = half.fits_layers ? half.lineAlong(inward) : nullptr;
+  return line != nullptr ? fitAtFace(*line).factor : 1;
+}
+
 void unstretchHalves(const NodeSplat& half, std::span<const JointSide> sides, Splat& splat,
                      std::span<SplatScalar> values) {
   NodeSplat whole = half;
   Reshape reshape;
   for (const JointSide& side : sides) {
+    const Stretch stretch = half.lineAlong(side.inward)->stretch(half.fit);
     const double factor =
-        1 / stretchAtBorder(static_cast<double>(half.lineAlong(side.inward)->stretch().factor));
+        1 / (fittedFactor(half, side.inward) * stretchAtBorder(static_cast<double>(stretch.factor)));
     reshape.add(side.inward, {factor, kFaceOfHalf * (factor - 1), 0});
   }
   reshape.apply(whole, values);
@@ -59,7 +66,7 @@ void stretchWhole(const NodeSplat& part, std::span<const JointSide> sides, NodeS
   merged.growth_code = growthAlong(cellGrowth(part.growth_code), in_merged);
   Reshape reshape;
   for (const JointSide& side : sides) {
-    const Stretch stretch = stretchOfRow(side.row);
+    const Stretch stretch = stretchOfRow(side.row, part.fit);
     reshape.add(in_merged(side.inward),
                 {static_cast<double>(stretch.factor), static_cast<double>(stretch.drift),
                  static_cast<double>(stretch.growth)});
@@ -89,12 +96,13 @@ std::optional<JointLine> lineBehind(std::span<const NodeSplat* const> parts, std
 void goOnAcross(size_t axis, const JointLine& joined, NodeSplat& behind, std::span<SplatScalar> values) {
   const JointLine own = behind.lines[axis];
   if (!own.isThere() || !joined.isThere()) return;
-  const Stretch before = own.stretch(), after = joined.stretch();
-  const double factor = static_cast<double>(before.factor);
+  const Stretch before = own.stretch(behind.fit), after = joined.stretch(behind.fit);
+  const LayerFit fit = behind.fits_layers ? fitBehindFace(own) : LayerFit();
+  const double factor = static_cast<double>(before.factor) * fit.factor;
   Reshape reshape;
-  reshape.add(own.inward(),
-              {static_cast<double>(after.factor) / factor,
-               static_cast<double>(after.drift - before.drift) / factor, static_cast<double>(after.growth)});
+  reshape.add(own.inward(), {static_cast<double>(after.factor) / factor,
+                             (static_cast<double>(after.drift - before.drift) - fit.drift) / factor,
+                             static_cast<double>(after.growth)});
   reshape.apply(behind, values);
   behind.lines[axis] = {};
 }

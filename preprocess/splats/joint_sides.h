@@ -24,6 +24,9 @@ struct JointSide {
 /// The sides of parts of one group, by part and direction. `group`: [part]. Those without lines have none.
 std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::span<const size_t> group);
 
+/// By how much a half was made longer along a direction to fit where it is cut (several_layers.h).
+double fittedFactor(const NodeSplat& half, const glm::dvec3& inward);
+
 /// Makes the halves of `half`, which has `sides`, those of an unstretched cell: their borders stay. Only `splat` and `values` change.
 void unstretchHalves(const NodeSplat& half, std::span<const JointSide> sides, Splat& splat,
                      std::span<SplatScalar> values);

@@ -13,6 +13,7 @@
 #include "preprocess/splats/inner_nodes.h"
 #include "preprocess/splats/lq.h"
 #include "preprocess/splats/node_lattice.h"
+#include "preprocess/splats/several_layers.h"
 #include "preprocess/splats/shape.h"
 #include "preprocess/splats/window_lines.h"
 #include "stream/base/check.h"
@@ -27,7 +28,7 @@ class Window {
          NodeScratch& scratch, NodeSplats& out)
       : in_(in),
         corrections_(corrections),
-        lines_(in, box, scratch),
+        lines_(in, box, corrections.fit(), scratch),
         lattice_(lines_.lattice()),
         faces_(lattice_, corrections.middles),
         ni_(in.block.ni),
@@ -246,6 +247,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   node.behind_face = false;
   node.layers = 0;
   node.lines = {};
+  node.fit = corrections_.fit();
+  node.fits_layers = false;
   if ((on_face || layers != Layers{}) && corrections_.lines && corrections_.stretch)
     node.lines = lines_.atJoints({i, row_j_, row_k_});
 
@@ -293,6 +296,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       weight_factor *= 0.5;
     }
   }
+  if (corrections_.fitsLayers() && (on_face || layers != Layers{}))
+    node.fits_layers = fitToLayers({inwards, layers, node.lines}, {middle, stretch, growth});
   node.spacing = on_face && std::isfinite(nearest) ? nearest : 0.0;
   node.splat.position = node.node_position + jacobian * middle + aside;
   for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];

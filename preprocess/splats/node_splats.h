@@ -99,6 +99,8 @@ struct NodeSplat {
   std::array<JointLine, 3> lines{};
   // LayeredBorder's: layers behind faces that SeamMerger may find to be closed, where the code has several directions.
   uint8_t layers = 0;
+  StretchFit fit = StretchFit::kSteep;  // what the stretch was found by
+  bool fits_layers = false;             // it was made to fit where it is cut (several_layers.h)
   // No splat, but a FaceProbe of the node: node_position and spacing are of the face. See SeamMerger.
   bool is_probe = false;
 
@@ -141,6 +143,7 @@ struct NodeSplatCorrections {
   bool stretch = true;  // else splats are as long as their cells
   bool growth = true;   // else kernels are symmetric; takes stretch
   bool lines = true;    // else cells at joints know their own block alone; takes growth and stretch
+  bool steep = true;    // else stretches are StretchFit::kGentle (kSteepStretch)
   bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
   // Else splats that are not for seams have none: values do not depend on them, and they take a sixth of the time.
   bool growth_codes = true;
@@ -148,6 +151,8 @@ struct NodeSplatCorrections {
   bool all() const {
     return border_codes && faces && layers && middles && bends && stretch && growth && lines;
   }
+  StretchFit fit() const { return steep ? StretchFit::kSteep : StretchFit::kGentle; }
+  bool fitsLayers() const { return steep && layers && faces && growth && lines; }
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

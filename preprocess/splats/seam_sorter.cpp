@@ -18,7 +18,8 @@ constexpr size_t kNodePosition = 15;
 constexpr size_t kNodeSize = kNodePosition + 4 + kLinesSize;
 static_assert(std::is_trivially_copyable_v<decltype(NodeSplat::lines)>);
 constexpr size_t kScalarSize = 5;
-constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4, kProbe = 8;  // of the flags
+constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4, kProbe = 8, kGentle = 16,
+                   kFitsLayers = 32;  // of the flags
 constexpr int kLayersShift = 8, kBorderCodeShift = 32;
 
 /// `record`: behind its first three numbers.
@@ -27,6 +28,7 @@ void pack(const NodeSplat& n, std::span<const SplatScalar> values, double* recor
   const Splat& s = n.splat;
   const uint64_t flags = (n.regular ? kRegular : 0) | (n.on_block_face ? kOnBlockFace : 0) |
                          (n.behind_face ? kBehindFace : 0) | (n.is_probe ? kProbe : 0) |
+                         (n.fit == StretchFit::kGentle ? kGentle : 0) | (n.fits_layers ? kFitsLayers : 0) |
                          uint64_t{n.layers} << kLayersShift | uint64_t{n.border_code} << kBorderCodeShift;
   put(std::bit_cast<double>(flags), std::bit_cast<double>(uint64_t{n.growth_code}));
   put(s.position.x, s.position.y, s.position.z, s.axis[0], s.axis[1], s.axis[2]);
@@ -58,6 +60,8 @@ void SeamRecord::unpack(NodeSplat& n, std::span<SplatScalar> values) const {
   n.on_block_face = (flags & kOnBlockFace) != 0;
   n.behind_face = (flags & kBehindFace) != 0;
   n.is_probe = (flags & kProbe) != 0;
+  n.fit = (flags & kGentle) != 0 ? StretchFit::kGentle : StretchFit::kSteep;
+  n.fits_layers = (flags & kFitsLayers) != 0;
   n.layers = static_cast<uint8_t>(flags >> kLayersShift);
   n.border_code = static_cast<uint32_t>(flags >> kBorderCodeShift);
   n.growth_code = static_cast<uint32_t>(std::bit_cast<uint64_t>(get()));

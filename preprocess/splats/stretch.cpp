@@ -4,20 +4,39 @@
 
 namespace curvisplat {
 
-CURVISPLAT_VECTOR_CLONES void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride,
-                                           size_t count, const StretchRow& out) {
+namespace {
+
+/// stretchNodes(). Returns whether any cell may have terms for steep growth.
+template <StretchFit kFit>
+[[gnu::always_inline]] inline bool stretchRow(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride,
+                                              size_t count, const StretchRow& out) {
+  constexpr double kGentle =
+      5.3;  // of squared extents that are two cells apart: e to twice the slope is less
   float *const factor = out.factor, *const growth = out.growth, *const drift = out.drift;
   const auto last = at + static_cast<ptrdiff_t>(count);
+  int any_steep = 0;
   for (ptrdiff_t n = at; n < last; ++n) {
     // Twice the extents: their ratios count.
     const auto extent = [&](ptrdiff_t steps) {
       return nodes.squaredDistance(n + (steps - 1) * stride, n + (steps + 1) * stride);
     };
-    const Stretch found = stretchOf(extent(-2), extent(-1), extent(0), extent(1), extent(2));
+    const double before = extent(-1), after = extent(1);
+    const Stretch found = stretchOf(extent(-2), before, extent(0), after, extent(2), kFit);
     factor[n - at] = found.factor;
     growth[n - at] = found.growth;
     drift[n - at] = found.drift;
+    any_steep |= static_cast<int>(after > kGentle * before) | static_cast<int>(before > kGentle * after);
   }
+  return any_steep != 0;
+}
+
+}  // namespace
+
+CURVISPLAT_VECTOR_CLONES void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride,
+                                           size_t count, const StretchRow& out, StretchFit fit) {
+  // The terms for steep growth are zero in most rows, and take time.
+  if (stretchRow<StretchFit::kGentle>(nodes, at, stride, count, out) && fit == StretchFit::kSteep)
+    stretchRow<StretchFit::kSteep>(nodes, at, stride, count, out);
 }
 
 namespace {

@@ -25,6 +25,27 @@
 //     tanh, blocks of 8, three strengths    1.044 1.058 1.070                   1.079 1.107 1.139
 //     jumps by 1.5, by 2                    1.005 1.011                         1.010 1.025
 //
+// Cells that grow steadily by more than 1.52 are beyond that fit. With q = u max(0, slope² - 0.7) and u, from 0 to 1, by what ln h
+// goes on to fall beyond the smaller neighbour over by what it falls to it (0 in spectral elements, where it rises again),
+// and the signs of cells that grow along the axis:
+//
+//     ln s  += q (0.0948 - 0.1096 curve² + 0.0727 bend)      g -= 0.0654 q      drift += 0.0189 q
+//
+// By least squares over the lines above, lines that grow steadily up to 2.1, or to a shorter last cell, and those of the real grids.
+// rms % and p98/p2, over the nodes' numbers, without these terms and with them:
+//
+//     growing by 1.6, 1.75, 1.9, 2.1              without  1.5 2.2 2.8 3.6 %, 1.043 1.064 1.087 1.114
+//                                                    with  1.3 1.3 1.4 1.4 %, 1.036 1.037 1.042 1.043
+//     by 1.9 to a cell half as long, and back     2.2 %, 1.098; with 1.1 %, 1.047
+//     tanh, blocks of 8, growing by up to 3       1.8 %, 1.077; with 2.7 %, 1.101
+//
+// Wider splats blur the scalar, so that they are narrower than what would be most even (ln s of 0.32 at 1.9, with a drift of 0.21: 0.2 %).
+// Rejected: u = 1 (a grid of Chebyshev elements: rms 1.16 to 1.71 %; tanh 8.7 %); q = max(0, slope² - 0.7 - curve² - 1.2 bend²), with
+// no other terms (tanh 4.2 %, multi_bin 2.81 instead of 2.74 %); the same terms for cells that grow by 1.19 or more (the dome:
+// inside 39.1 to 39.7 dB, but p98/p2 1.045 to 1.054, scalar 36.0 to 35.7 dB); wider splats across an axis along which cells grow and
+// become wider, by what the logarithm of their width grows, squared (the spokes in multi_bin's rings are gone, and the dome's ripples;
+// but borders do not fit wider cells: the dome's scalar falls to 34.1 dB, delta_wing's rms rises from 3.31 to 3.48 %).
+//
 // A line ends at a block's face and beside a missing cell. There the extents are mirrored, less their steady
 // growth: the smaller of the two growths next to the end, 1 where they disagree or the line is short.
 //
@@ -50,12 +71,19 @@ inline constexpr int kStretchReach = 4;
 /// How far a splat lies from its cell's middle where cells grow by e^g, in the cell's length and for g = 1.
 inline constexpr double kDrift = 0.14;
 
+/// Whether the fit has the terms for steep growth. Caches without kSteepStretch (stream/cache/manifest.h) were made without
+/// them, and so are cells of cell-centred data.
+enum class StretchFit : uint8_t { kGentle, kSteep };
+
 /// What the extents along an axis tell of a splat.
 struct Stretch {
   float factor = 1;  // s: between 0.74 and 1.57
   float growth = 0;  // g
   float drift = 0;
 };
+
+/// The largest growth of any splat.
+inline constexpr float kLargestGrowth = 0.65f;
 
 /// ln √x of a positive number, to 1e-6. Single precision: it is quicker, and bits do not depend on vector instructions.
 [[gnu::always_inline]] inline float halfLogarithm(float x) {
@@ -70,9 +98,10 @@ struct Stretch {
 /// From the squared extents of five cells in a row, the third of which is the splat's own. s is 1 where it is nearly 1 (a stored
 /// shape cannot be told from it); all is as in an even grid where a cell has no extent.
 [[gnu::always_inline]] inline Stretch stretchOf(double before2, double before, double own, double after,
-                                                double after2) {
+                                                double after2, StretchFit fit = StretchFit::kSteep) {
   constexpr float kNearlyOne = 2e-4f;
   constexpr double kLargest = 1e6;  // of squared ratios
+  constexpr float kMinGrowth = 1e-3f;
   const double per_own = 1 / own;
   const auto is_usable = [](double x) { return x > 0 && x < 1e300; };
   const bool usable = is_usable(before2) & is_usable(before) & is_usable(own) & is_usable(after) &
@@ -85,14 +114,24 @@ struct Stretch {
   const float slope = l2 - l1;
   const float curve = std::clamp(l1 + l2, -1.25f, 1.25f), far_curve = std::clamp(l0 + l3, -2.0f, 2.0f);
   const float bend = std::clamp((l3 - l0) - 2 * slope, -1.5f, 1.5f);
-  const float x = std::clamp(curve * (0.1531f + 0.0828f * curve) - 0.0418f * (bend * slope), -0.3f, 0.45f);
+  const float smaller = slope > 0 ? l1 : l2, smallest = slope > 0 ? l0 : l3;
+  const float steadiness =
+      smaller < -kMinGrowth ? std::clamp((smallest - smaller) / smaller, 0.0f, 1.0f) : 0.0f;
+  const float over = std::max(std::min(slope * slope, 4.0f) - 0.7f, 0.0f);
+  const float steep = fit == StretchFit::kSteep ? over * steadiness : 0.0f;
+  const float x = std::clamp(
+      curve * (0.1531f + 0.0828f * curve) - 0.0418f * (bend * slope) +
+          steep * (0.0948f - 0.1096f * (curve * curve) + 0.0727f * std::copysign(1.0f, slope) * bend),
+      -0.3f, 0.45f);
   const float s = 1 + x * (1 + x * (1.0f / 2 + x * (1.0f / 6 + x * (1.0f / 24))));
-  return {
-      std::abs(x) < kNearlyOne ? 1.0f : s,
-      std::clamp(slope * (0.5f + 0.2892f * curve - 0.0667f * far_curve) + bend * (0.0676f + 0.1392f * curve),
-                 -0.65f, 0.65f),
-      std::clamp(slope * (0.5f * static_cast<float>(kDrift) + 0.0457f * curve) + 0.0033f * bend, -0.125f,
-                 0.125f)};
+  const float along = std::copysign(steep, slope);
+  return {std::abs(x) < kNearlyOne ? 1.0f : s,
+          std::clamp(slope * (0.5f + 0.2892f * curve - 0.0667f * far_curve) +
+                         bend * (0.0676f + 0.1392f * curve) - 0.0654f * along,
+                     -kLargestGrowth, kLargestGrowth),
+          std::clamp(slope * (0.5f * static_cast<float>(kDrift) + 0.0457f * curve) + 0.0033f * bend +
+                         0.0189f * along,
+                     -0.125f, 0.125f)};
 }
 
 /// The steady growth per sample of squared extents, from those of the three samples next to the end of a
@@ -123,7 +162,7 @@ struct StretchRow {
 /// Of `count` nodes that follow `at` in memory, along the axis of `stride`. Each has three neighbours on either side. The same
 /// bits as stretchOf(extentsOnLine()) would give. Any thread; never allocates.
 void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count,
-                  const StretchRow& out);
+                  const StretchRow& out, StretchFit fit = StretchFit::kSteep);
 
 /// Twice the extents, squared, of five cells in a row.
 using SquaredExtents = std::array<double, 5>;
@@ -133,8 +172,8 @@ using SquaredExtents = std::array<double, 5>;
 SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before,
                              int after);
 
-inline Stretch stretchOf(const SquaredExtents& e) {
-  return stretchOf(e[0], e[1], e[2], e[3], e[4]);
+inline Stretch stretchOf(const SquaredExtents& e, StretchFit fit = StretchFit::kSteep) {
+  return stretchOf(e[0], e[1], e[2], e[3], e[4], fit);
 }
 
 }  // namespace curvisplat

@@ -17,7 +17,7 @@ NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
 
 }  // namespace
 
-WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch)
+WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit fit, NodeScratch& scratch)
     : in_(in),
       near_(rowsAround(box, in.window)),
       lattice_{in.nodes->x.data(), in.nodes->y.data(), in.nodes->z.data(), in.nodes->blank.data()},
@@ -26,6 +26,7 @@ WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch&
       i1_(in.endOfPart(in.block.ni)),
       row_stride_(static_cast<ptrdiff_t>(in.window.rowNodes(ni_))),
       plane_stride_(row_stride_ * static_cast<ptrdiff_t>(in.window.j1 - in.window.j0)),
+      fit_(fit),
       scratch_(scratch) {
   for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
   for (auto* rows : {&scratch.growth, &scratch.drift})
@@ -72,7 +73,7 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
         const SquaredExtents extents =
             extentsOnLine({lattice_.x, lattice_.y, lattice_.z}, at, node.stride, node.before, node.after);
         const bool has_two = node.before + node.after == 1;
-        const Stretch stretch = has_two ? Stretch() : stretchOf(extents);
+        const Stretch stretch = has_two ? Stretch() : stretchOf(extents, fit_);
         if (isAtJoint(node.index, node.count)) scratch_.lines[axis][i - i0_] = lineOf(node, extents);
         out[i - i0_] = stretch.factor;
         growth[i - i0_] = stretch.growth;
@@ -82,7 +83,7 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
     const auto at_once = [&](uint64_t begin, uint64_t end) {
       if (begin >= end) return;
       stretchNodes({lattice_.x, lattice_.y, lattice_.z}, row + static_cast<ptrdiff_t>(begin), strides[axis],
-                   end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)});
+                   end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)}, fit_);
     };
     bool whole = true;
     if (axis == 0) {

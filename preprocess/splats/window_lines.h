@@ -22,7 +22,7 @@ inline bool isFace(uint64_t index, uint64_t count) {
 class WindowLines {
  public:
   /// Sets the scratch to cells that are not stretched.
-  WindowLines(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch);
+  WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit fit, NodeScratch& scratch);
 
   const NodeLattice& lattice() const { return lattice_; }
   /// The element of node 0 of a row: negative where the window begins beyond it.
@@ -59,6 +59,7 @@ class WindowLines {
   const NodeLattice lattice_;
   uint64_t ni_, i0_, i1_;  // of a row; its part
   ptrdiff_t row_stride_, plane_stride_;
+  const StretchFit fit_;
   NodeScratch& scratch_;
 };
 

@@ -198,6 +198,7 @@ std::string Manifest::toJson() const {
   json["levels"] = levels;
   json["volume"] = volume;
   if (!overlap.empty()) json["overlap"] = overlap;
+  if (!stretch.empty()) json["stretch"] = stretch;
   if (grid_checksum) json["grid_checksum"] = fmt::format("{:016x}", *grid_checksum);
   if (!time_unit.empty()) json["time_unit"] = time_unit;
   if (!calendar.empty()) json["calendar"] = calendar;
@@ -261,6 +262,7 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   manifest.volume = fields.at("volume").number();
   if (manifest.volume < 0) fields.at("volume").fail("0 or more");
   if (const auto overlap = fields.find("overlap")) manifest.overlap = lineOf(*overlap);
+  if (const auto stretch = fields.find("stretch")) manifest.stretch = lineOf(*stretch);
   if (const auto checksum = fields.find("grid_checksum")) manifest.grid_checksum = checksumIn(*checksum);
   if (const auto unit = fields.find("time_unit")) manifest.time_unit = lineOf(*unit);
   if (const auto calendar = fields.find("calendar")) manifest.calendar = lineOf(*calendar);

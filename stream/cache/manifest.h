@@ -64,6 +64,9 @@ inline constexpr const char* kOverlapAll = "all";      // every block is drawn
 inline constexpr const char* kOverlapOwner = "owner";  // each point is drawn once (preprocess/overset)
 inline constexpr const char* kOverlapNone = "none";    // that would have been done, but no blocks overlap
 
+// Manifest::stretch.
+inline constexpr const char* kSteepStretch = "steep";  // by StretchFit::kSteep (preprocess/splats/stretch.h)
+
 struct Manifest {
   std::vector<std::string> requirements;  // "requires"; none: version 1
   std::string title;
@@ -82,6 +85,7 @@ struct Manifest {
   double volume = 0;    // sum of the finest level's weights
   std::string
       overlap;  // what was done where the grid's blocks overlap: kOverlapAll ...; empty: of one block, or not known
+  std::string stretch;  // how long splats are where cells grow: kSteepStretch; empty: by StretchFit::kGentle
   std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
                                           // their geometry (preprocess/survey/grid_checksum.h)
   std::string time_unit;  // of the steps' times, such as "days since 1900-01-01"; may be empty

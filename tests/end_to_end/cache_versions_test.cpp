@@ -29,7 +29,7 @@ INSTANTIATE_TEST_SUITE_P(Versions, CacheVersion, ::testing::Values("version_1", 
 
 TEST_P(CacheVersion, IsStillRead) {
   std::vector<std::string> names{"blocks", "cells"};
-  if (GetParam() != std::string("version_1")) names.insert(names.end(), {"faces", "octants"});
+  if (GetParam() != std::string("version_1")) names.insert(names.end(), {"faces", "octants", "steep"});
   for (const std::string& name : names) {
     SCOPED_TRACE(name);
     const fs::path base = folder() / name;

@@ -242,6 +242,36 @@ TEST(AddScalar, CutsOctantsInCachesThatHaveThemOnly) {
             std::string::npos);
 }
 
+TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
+  // Two blocks that meet where cells are largest, so that seams are found in the same way, too.
+  constexpr uint64_t kNodes = 9;
+  const std::vector<GridBlock> blocks(2, gridBlock(kNodes, kNodes, kNodes));
+  const FunctionGridSource source(blocks, 2, [&](const GridNode& node) {
+    const double up =
+        std::pow(1.7, static_cast<double>(node.block == 0 ? node.i : 2 * (kNodes - 1) - node.i));
+    const double x = node.block == 0 ? up : 2 * std::pow(1.7, static_cast<double>(kNodes - 1)) - up;
+    const auto f = static_cast<float>(x);
+    return NodeValues{{x, static_cast<double>(node.j), static_cast<double>(node.k)}, {f, f}};
+  });
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  convertTo(cache, source, {0});
+  ASSERT_EQ(CacheReader(cache).manifest().stretch, kSteepStretch);
+  addQuietly(source, adding(cache, {1}));
+  const Files files = filesOf(cache);
+  EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
+
+  // Of a cache from before, splats as they were then are expected.
+  convertTo(folder / "older.splats", source, {0});
+  const fs::path manifest = folder / "older.splats/manifest.json";
+  auto json = nlohmann::ordered_json::parse(readTextFile(manifest));
+  json.erase("checksum");
+  json.erase("stretch");
+  writeFileAtomically(manifest, json.dump());
+  EXPECT_NE(refusal(source, adding(folder / "older.splats", {1})).find("another position"),
+            std::string::npos);
+}
+
 TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
   // The added ones have values in some of these nodes, and none in others.
   const auto blanked = [](const GridNode& node, NodeValues values) {

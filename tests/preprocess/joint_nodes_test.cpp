@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <random>
+#include <utility>
 
 #include "preprocess/splats/shape.h"
 #include "stream/model/border_code.h"
@@ -163,6 +164,25 @@ TEST_F(Joints, HalvesOfUnlikeThicknessStayApartAndEndAtTheFace) {
       EXPECT_NEAR(open.axis[0].x, piece.node.node < 64 ? -1 : 1, 0.01);
       EXPECT_NEAR(piece.node.splat.weight, piece.node.node < 64 ? 0.5 : 0.5 * ratio, 1e-12);
     }
+  }
+}
+
+// Halves at the edges of the joint are fitted to where they are cut, others are not.
+TEST_F(Joints, HalvesStayApartAtAllOfAJointOrNowhere) {
+  for (int step = 0; step < 100; ++step) {
+    const double last = 0.3 + 0.002 * step;
+    MappedBlock shortened(
+        6, 6, 6, [&](double i, double j, double k) { return glm::dvec3(i < 5 ? i : 4 + last, j, k); });
+    MappedBlock even(6, 6, 6, [&](double i, double j, double k) { return glm::dvec3(4 + last + i, j, k); });
+    for (MappedBlock* block : {&shortened, &even}) block->addScalar(field);
+    even.first_node = 216;
+    std::vector<Piece> faces = facesOf(shortened);
+    const std::vector<Piece> others = facesOf(even);
+    faces.insert(faces.end(), others.begin(), others.end());
+    const std::vector<Piece> joined = merge(faces);
+    const size_t inside = piecesAt(joined, {4 + last, 2, 2}).size();
+    for (const auto& [j, k] : {std::pair<double, double>{0, 2}, {1, 2}, {0, 0}})
+      EXPECT_EQ(piecesAt(joined, {4 + last, j, k}).size(), inside) << last;
   }
 }
 

@@ -9,7 +9,10 @@
 #include <vector>
 
 #include "preprocess/splats/node_splats.h"
+#include "preprocess/splats/several_layers.h"
 #include "preprocess/splats/shape.h"
+#include "stream/model/growth_code.h"
+#include "stream/model/layers_code.h"
 #include "tests/reference/mapped_block.h"
 
 namespace curvisplat {
@@ -164,7 +167,11 @@ TEST(NodeSplats, BesideABlankAreStretchedAsAtTheEndOfABlock) {
   MappedBlock holed(9, 8, 14, mapping);
   for (uint64_t j = 0; j < 8; ++j)
     for (uint64_t i = 0; i < 9; ++i) holed.nodes.blank[holed.at(i, j, 8)] = 1;
-  const NodeSplats found = holed.splats(), expected = MappedBlock(9, 8, 8, mapping).splats();
+  // Cells in the layers behind several faces are fitted to where they are cut; beside a blank there is no such layer.
+  NodeSplatCorrections corrections;
+  corrections.layers = false;
+  const NodeSplats found = holed.splats(corrections),
+                   expected = MappedBlock(9, 8, 8, mapping).splats(corrections);
   for (size_t n = 0; n < expected.splats.size(); ++n) {
     EXPECT_EQ(found.splats[n].splat.axis, expected.splats[n].splat.axis) << n;
     EXPECT_EQ(found.splats[n].splat.weight, expected.splats[n].splat.weight) << n;
@@ -198,6 +205,88 @@ TEST(NodeSplats, MeansStayWithinTheNeighboursValues) {
     EXPECT_GE(value.mean, 0);
     EXPECT_LE(value.mean, 1);
   }
+}
+
+/// Nodes at distances of 1 along i and j, the last half as far; along k they are even.
+MappedBlock withShortLastCells() {
+  const auto at = [](double n) { return n < 9 ? n : 8.5; };
+  return {10, 10, 9, [at](double i, double j, double k) { return glm::dvec3(at(i), at(j), k); }};
+}
+
+/// How far beyond the upper face of i the renderer takes the face to be that the node at (8, j, k) is behind.
+double beyondFace(const MappedBlock& grid, const NodeSplatCorrections& corrections, uint64_t j, uint64_t k) {
+  const NodeSplat node = grid.splats(corrections).splats[grid.at(8, j, k)];
+  EXPECT_NE(layersOf(node.border_code), 0u);
+  const CellGrowth growth = cellGrowth(node.growth_code);
+  float inwards = 0;
+  for (size_t n = 0; n < 3; ++n)
+    if (growth.growth[n] != 0) inwards -= growth.growth[n] * growth.axis[n].x;
+  return node.splat.position.x + node.splat.axis[0] * static_cast<double>(layerDistance(inwards)) - 8.5;
+}
+
+// Codes of cells behind several faces have no distances.
+TEST(NodeSplats, BehindSeveralFacesAreCutAtThem) {
+  const MappedBlock grid = withShortLastCells();
+  NodeSplatCorrections earlier;
+  earlier.steep = false;
+  for (const auto& [j, k] : {std::pair<uint64_t, uint64_t>{8, 4}, {4, 1}, {4, 0}}) {
+    EXPECT_GT(beyondFace(grid, earlier, j, k), 0.08) << j << " " << k;
+    EXPECT_LT(std::abs(beyondFace(grid, {}, j, k)), 0.055) << j << " " << k;
+  }
+}
+
+TEST(NodeSplats, BehindOneFaceAndElsewhereStayAsTheyAre) {
+  const MappedBlock grid = withShortLastCells();
+  NodeSplatCorrections earlier;
+  earlier.steep = false;
+  const NodeSplats before = grid.splats(earlier), after = grid.splats();
+  for (const auto& [i, j] : {std::pair<uint64_t, uint64_t>{8, 4}, {9, 4}, {4, 4}, {7, 5}}) {
+    const NodeSplat &a = before.splats[grid.at(i, j, 4)], &b = after.splats[grid.at(i, j, 4)];
+    EXPECT_EQ(a.splat.axis, b.splat.axis) << i << " " << j;
+    EXPECT_EQ(a.splat.position, b.splat.position) << i << " " << j;
+    EXPECT_EQ(a.growth_code, b.growth_code) << i << " " << j;
+  }
+}
+
+TEST(NodeSplats, BehindSeveralFacesHaveTheVolume) {
+  const MappedBlock grid = withShortLastCells();
+  double volume = 0;
+  for (const NodeSplat& node : grid.splats().splats) volume += node.splat.weight;
+  EXPECT_NEAR(volume, 8.5 * 8.5 * 8, 1e-9);
+}
+
+/// A line across a face: of the half cell at it, or of the cell one away.
+JointLine lineOfSteps(const std::array<double, 6>& steps, bool at_face) {
+  std::array<double, 7> x{};
+  for (size_t n = 0; n < steps.size(); ++n) x[n + 1] = x[n] + steps[n];
+  const std::array<double, 7> zero{};
+  const NodePositions nodes{x.data(), zero.data(), zero.data()};
+  const int before = at_face ? 0 : 1;
+  return JointLine::ofExtents(extentsOnLine(nodes, before, 1, before, kStretchReach),
+                              at_face ? 0.5 * steps[0] : 0.5 * (steps[0] + steps[1]));
+}
+
+TEST(LayerFit, LeavesCellsThatFitAlone) {
+  // Even cells, elements of three steps, and cells that grow from the face inwards and towards it.
+  for (const std::array<double, 6>& steps : {std::array<double, 6>{1, 1, 1, 1, 1, 1},
+                                             {1, 1.618, 1, 1, 1.618, 1},
+                                             {1, 1.2, 1.44, 1.728, 2.074, 2.488},
+                                             {1, 0.8, 0.64, 0.512, 0.41, 0.328}}) {
+    EXPECT_EQ(fitBehindFace(lineOfSteps(steps, false)).factor, 1);
+    EXPECT_EQ(fitBehindFace(lineOfSteps(steps, false)).drift, 0);
+    EXPECT_EQ(fitAtFace(lineOfSteps(steps, true)).factor, 1);
+  }
+}
+
+TEST(LayerFit, IsTheSameOfBothCellsAtAFace) {
+  for (const std::array<double, 6>& steps :
+       {std::array<double, 6>{0.5, 1, 1, 1, 1, 1}, {1.5, 3, 1.58, 0.83, 0.44, 0.23}}) {
+    const LayerFit behind = fitBehindFace(lineOfSteps(steps, false)),
+                   at = fitAtFace(lineOfSteps(steps, true));
+    EXPECT_NEAR(behind.drift, 0.012, 0.001);
+    EXPECT_NEAR(at.growth / 0.77, behind.growth / 0.96, 0.005);
+  }
+  EXPECT_GT(fitBehindFace(lineOfSteps({1e-9, 1, 1, 1, 1, 1}, false)).factor, 0.9);
 }
 
 }  // namespace

@@ -27,9 +27,10 @@ struct Line {
   }
 
   NodePositions nodes() const { return {x.data(), zero.data(), zero.data()}; }
-  Stretch at(size_t n) const {
+  Stretch at(size_t n, StretchFit fit = StretchFit::kSteep) const {
     return stretchOf(extentsOnLine(nodes(), static_cast<ptrdiff_t>(n), 1, static_cast<int>(n),
-                                   static_cast<int>(x.size() - 1 - n)));
+                                   static_cast<int>(x.size() - 1 - n)),
+                     fit);
   }
   float stretch(size_t n) const { return at(n).factor; }
 };
@@ -39,30 +40,42 @@ struct Exact {
 };
 
 /// The definition, by logarithms.
-Exact defined(const std::array<double, 5>& extents) {
+Exact defined(const std::array<double, 5>& extents, StretchFit fit = StretchFit::kSteep) {
   const auto l = [&](size_t n) { return std::log(extents[n] / extents[2]); };
   const double curve = l(1) + l(3), far_curve = l(0) + l(4), slope = l(3) - l(1);
   const double bend = l(4) - l(0) - 2 * slope;
-  return {std::exp(0.1531 * curve + 0.0828 * curve * curve - 0.0418 * bend * slope),
-          slope * (0.5 + 0.2892 * curve - 0.0667 * far_curve) + bend * (0.0676 + 0.1392 * curve),
-          slope * (0.07 + 0.0457 * curve) + 0.0033 * bend};
+  const double way = slope < 0 ? -1 : 1, smaller = slope < 0 ? l(3) : l(1),
+               smallest = slope < 0 ? l(4) : l(0);
+  const double steadiness = smaller < -1e-3 ? std::clamp(smallest / smaller - 1, 0.0, 1.0) : 0.0;
+  const double q = fit == StretchFit::kSteep ? steadiness * std::max(slope * slope - 0.7, 0.0) : 0.0;
+  const double along = way * q;
+  return {
+      std::exp(0.1531 * curve + 0.0828 * curve * curve - 0.0418 * bend * slope +
+               q * (0.0948 - 0.1096 * curve * curve + 0.0727 * way * bend)),
+      slope * (0.5 + 0.2892 * curve - 0.0667 * far_curve) + bend * (0.0676 + 0.1392 * curve) - 0.0654 * along,
+      slope * (0.07 + 0.0457 * curve) + 0.0033 * bend + 0.0189 * along};
 }
 
-Stretch ofExtents(const std::array<double, 5>& e) {
-  return stretchOf(e[0] * e[0], e[1] * e[1], e[2] * e[2], e[3] * e[3], e[4] * e[4]);
+Stretch ofExtents(const std::array<double, 5>& e, StretchFit fit) {
+  return stretchOf(e[0] * e[0], e[1] * e[1], e[2] * e[2], e[3] * e[3], e[4] * e[4], fit);
 }
 
 TEST(Stretch, IsAsItIsDefined) {
   std::mt19937_64 random(1);
-  std::uniform_real_distribution<double> log_extent(-0.2, 0.2);
+  std::uniform_real_distribution<double> log_extent(-0.25, 0.25), growth(-0.55, 0.55);
   for (int n = 0; n < 100; ++n) {
     std::array<double, 5> extents;
-    for (double& extent : extents) extent = 1e-5 * std::exp(log_extent(random));
-    const Stretch found = ofExtents(extents);
-    const Exact exact = defined(extents);
-    EXPECT_NEAR(found.factor, exact.factor, found.factor == 1 ? 3e-4 : 3e-6);
-    EXPECT_NEAR(found.growth, exact.growth, 3e-6);
-    EXPECT_NEAR(found.drift, exact.drift, 3e-6);
+    const double steady = n % 2 == 0 ? 0 : growth(random);
+    for (size_t m = 0; m < 5; ++m)
+      extents[m] =
+          1e-5 * std::exp(log_extent(random) * (n % 2 == 0 ? 0.8 : 0.1) + steady * static_cast<double>(m));
+    for (const StretchFit fit : {StretchFit::kGentle, StretchFit::kSteep}) {
+      const Stretch found = ofExtents(extents, fit);
+      const Exact exact = defined(extents, fit);
+      EXPECT_NEAR(found.factor, exact.factor, found.factor == 1 ? 3e-4 : 3e-6);
+      EXPECT_NEAR(found.growth, exact.growth, 3e-6);
+      EXPECT_NEAR(found.drift, exact.drift, 3e-6);
+    }
   }
 }
 
@@ -75,7 +88,11 @@ double kernel(double r) {
 
 /// Of a uniform medium on a line of these steps: rms of the density over its mean, away from the ends. `plain`: kernels as long as
 /// their cells, symmetric, in the middles.
-double rippleOf(const std::vector<double>& steps, bool plain) {
+struct RippleOptions {
+  bool plain = false;
+  StretchFit fit = StretchFit::kSteep;
+};
+double rippleOf(const std::vector<double>& steps, const RippleOptions& options) {
   const Line line = Line::ofSteps(steps);
   const auto marginal = [](double x) {  // of the kernel along two axes
     constexpr int kSamples = 60;
@@ -95,7 +112,7 @@ double rippleOf(const std::vector<double>& steps, bool plain) {
     const double x = std::lerp(line.x[node], line.x[node + 1], at - static_cast<double>(node));
     double density = 0;
     for (size_t n = 1; n < last; ++n) {
-      const Stretch stretch = plain ? Stretch{} : line.at(n);
+      const Stretch stretch = options.plain ? Stretch{} : line.at(n, options.fit);
       const double cell = 0.5 * (line.x[n + 1] - line.x[n - 1]);
       const double middle = 0.25 * (line.x[n - 1] + 2 * line.x[n] + line.x[n + 1]) + stretch.drift * cell;
       const double u = (x - middle) / (stretch.factor * cell), v = u / kKernelSigma;
@@ -121,32 +138,59 @@ TEST(Stretch, EvensOutAUniformMedium) {
   std::fill(jump.begin() + 20, jump.end(), 1.5);
   for (int n = 0; n < 40; ++n) steady.push_back(std::pow(1.25, n));
   const std::vector<double> three{1, 1.618, 1}, six{0.0849, 0.1808, 0.2343, 0.2343, 0.1808, 0.0849};
-  EXPECT_LT(rippleOf(elements(three, 1), false), 0.0035);
-  EXPECT_LT(rippleOf(elements(three, 1.42), false),
-            0.006);                                     // 0.0093 with a stretch and growth by a smoothed ln h
-  EXPECT_LT(rippleOf(elements(six, 1), false), 0.006);  // 0.0140 so
-  EXPECT_LT(rippleOf(jump, false), 0.0015);             // 0.0019 so
-  EXPECT_LT(rippleOf(steady, false), 0.004);            // 0.0034, the same
-  EXPECT_GT(rippleOf(elements(six, 1), true), 0.05);
-  EXPECT_GT(rippleOf(steady, true), 0.015);
+  const RippleOptions fitted, plain{true};
+  EXPECT_LT(rippleOf(elements(three, 1), fitted), 0.0035);
+  EXPECT_LT(rippleOf(elements(three, 1.42), fitted),
+            0.006);  // 0.0093 with a stretch and growth by a smoothed ln h
+  EXPECT_LT(rippleOf(elements(six, 1), fitted), 0.006);  // 0.0140 so
+  EXPECT_LT(rippleOf(jump, fitted), 0.0015);             // 0.0019 so
+  EXPECT_LT(rippleOf(steady, fitted), 0.004);            // 0.0034, the same
+  EXPECT_GT(rippleOf(elements(six, 1), plain), 0.05);
+  EXPECT_GT(rippleOf(steady, plain), 0.015);
 }
 
-TEST(Stretch, LeavesSteadyGrowthAloneWhateverItIs) {
-  for (const double growth : {1.0, 0.9, 1.05, 1.5, 0.5, 3.0}) {
+TEST(Stretch, EvensOutCellsThatGrowSteeply) {
+  const auto growing = [](double growth) {
+    std::vector<double> steps;
+    for (int n = 0; n < 30; ++n) steps.push_back(std::pow(growth, n));
+    return steps;
+  };
+  const RippleOptions gentle{false, StretchFit::kGentle}, steep{false, StretchFit::kSteep};
+  EXPECT_GT(rippleOf(growing(1.9), gentle), 0.024);
+  EXPECT_LT(rippleOf(growing(1.9), steep), 0.015);
+  EXPECT_GT(rippleOf(growing(1.75), gentle), 0.018);
+  EXPECT_LT(rippleOf(growing(1.75), steep), 0.0135);
+  // Chebyshev elements of eight steps, whose cells grow by 1.9 and 1.8 at their ends.
+  std::vector<double> elements;
+  while (elements.size() < 40)
+    for (const double step : {0.0761, 0.2168, 0.3244, 0.3827, 0.3827, 0.3244, 0.2168, 0.0761})
+      elements.push_back(step * 4);
+  EXPECT_LT(rippleOf(elements, steep), 1.05 * rippleOf(elements, gentle));
+}
+
+TEST(Stretch, LeavesSteadyGrowthAlone) {
+  const auto expect_alone = [](double growth, StretchFit fit) {
     std::vector<double> steps;
     for (int n = 0; n < 9; ++n) steps.push_back(std::pow(growth, n));
     const Line line = Line::ofSteps(steps);
-    for (size_t n = 0; n < line.x.size(); ++n) EXPECT_EQ(line.stretch(n), 1) << growth << " " << n;
-  }
+    for (size_t n = 0; n < line.x.size(); ++n) EXPECT_EQ(line.at(n, fit).factor, 1) << growth << " " << n;
+  };
+  for (const double growth : {1.0, 0.9, 1.05, 1.5, 0.5, 3.0}) expect_alone(growth, StretchFit::kGentle);
+  for (const double growth : {1.0, 0.9, 1.05, 1.5, 0.67}) expect_alone(growth, StretchFit::kSteep);
 }
 
 TEST(Stretch, KnowsSteadyGrowthUpToTheEnds) {
-  for (const double growth : {1.0, 0.9, 1.05, 1.25, 1.5, 0.6}) {
+  for (const double growth : {1.0, 0.9, 1.05, 1.25, 1.5, 0.6, 1.8}) {
     std::vector<double> steps;
     for (int n = 0; n < 9; ++n) steps.push_back(std::pow(growth, n));
     const Line line = Line::ofSteps(steps);
-    for (size_t n = 0; n < line.x.size(); ++n)
-      EXPECT_NEAR(line.at(n).growth, std::log(growth), 0.001) << growth << " " << n;
+    const double q = std::max(4 * std::log(growth) * std::log(growth) - 0.7, 0.0);
+    for (size_t n = 0; n < line.x.size(); ++n) {
+      EXPECT_NEAR(line.at(n, StretchFit::kGentle).growth, std::log(growth), 0.001) << growth << " " << n;
+      EXPECT_NEAR(line.at(n).growth, std::log(growth) - std::copysign(0.0654 * q, std::log(growth)), 0.001)
+          << growth << " " << n;
+      EXPECT_NEAR(line.stretch(n), std::exp(0.0948 * q), 0.001) << growth << " " << n;
+    }
   }
 }
 
@@ -161,14 +205,18 @@ TEST(Stretch, OfSpectralElementsIsTheSameWhereALineEndsBetweenTwo) {
   EXPECT_GT(whole.stretch(6), 1.05);
 }
 
-TEST(Stretch, OfARowIsThatOfItsNodes) {
+/// Of nodes whose distances grow by `factor` from one to the next, twelve times, and shrink again.
+void expectOneRow(double factor) {
   std::mt19937_64 random(2);
   std::uniform_real_distribution<double> jitter(-0.3, 0.3);
   std::vector<double> x, y, z;
+  double at_x = 0, step = 1;
   for (int n = 0; n < 200; ++n) {
-    x.push_back(n + jitter(random));
-    y.push_back(jitter(random));
-    z.push_back(1e3 + jitter(random));
+    x.push_back(at_x + step * jitter(random));
+    y.push_back(step * jitter(random));
+    z.push_back(1e3 + step * jitter(random));
+    at_x += step;
+    step *= n / 12 % 2 == 0 ? factor : 1 / factor;
   }
   const NodePositions nodes{x.data(), y.data(), z.data()};
   for (const ptrdiff_t stride : {1, 7}) {
@@ -186,6 +234,10 @@ TEST(Stretch, OfARowIsThatOfItsNodes) {
       EXPECT_EQ(drift[n], alone.drift) << stride << " " << n;
     }
   }
+}
+
+TEST(Stretch, OfARowIsThatOfItsNodes) {
+  for (const double factor : {1.0, 1.4, 1.8, 2.5}) expectOneRow(factor);
 }
 
 TEST(Stretch, IsBoundedAndOneWhereThereIsNothingToBlend) {

@@ -3,15 +3,17 @@
 //    make_version_caches tests/data/caches/version_<n>
 //
 // To be run once for each version, by the program that is the first to write it; never again for an older
-// one. A cache of a feature that came later (octants) is added beside the others, which stay.
+// one. Caches of features that came later (octants, steep) are added beside the others, which stay.
 //
 //    blocks.splats   three blocks, two of which share a face, and a hole; levels, two scalars
 //    cells.splats    a block with a scalar in its cells
 //    faces.splats    a block whose faces have levels of detail and a hole
 //    octants.splats  a block with a box of blanked nodes, at whose edges cells lose octants
+//    steep.splats    two blocks of cells that grow steeply, up to shorter last ones
 //    *.json, *.png   what a reader must get out of them (tests/support/cache_summary.h)
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -97,6 +99,14 @@ void makeAll(const fs::path& folder) {
         at, {static_cast<float>(at.x * at.y)}, inside(node.i) && inside(node.j) && inside(node.k)};
   });
   make(around_box, {0}, folder / "octants.splats");
+  const FunctionGridSource growing({gridBlock(6, 9, 8), gridBlock(5, 9, 8)}, 1, [](const GridNode& node) {
+    const auto steep = [](uint64_t index, uint64_t last) {
+      return std::pow(1.9, static_cast<double>(std::min(index, last - 1))) + (index == last ? 12.0 : 0.0);
+    };
+    const glm::dvec3 at(static_cast<double>(node.i + 5 * node.block), steep(node.j, 8), steep(node.k, 7));
+    return NodeValues{at, {static_cast<float>(at.x + 0.1 * at.y)}, false};
+  });
+  make(growing, {0}, folder / "steep.splats");
 }
 
 }  // namespace
