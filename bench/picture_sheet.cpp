@@ -60,16 +60,11 @@ void PictureSheet::addRow(const std::string& label, const std::vector<Image>& pi
   drawText(row, 2, 3, label);
   for (size_t n = 0; n < pictures.size(); ++n) {
     if (pictures[n].size.pixels() == 0) continue;
+    const Image tile = shrunk(pictures[n], shrink_);
     for (int y = 0; y < tile_.height; ++y)
       for (int x = 0; x < tile_.width; ++x)
-        for (int channel = 0; channel < 3; ++channel) {
-          float sum = 0;
-          for (int v = 0; v < shrink_; ++v)
-            for (int u = 0; u < shrink_; ++u)
-              sum += std::clamp(pictures[n].pixel(x * shrink_ + u, y * shrink_ + v)[channel], 0.0f, 1.0f);
-          row.pixel(static_cast<int>(n) * (tile_.width + kGap) + x, kLabelHeight + y)[channel] =
-              sum / static_cast<float>(shrink_ * shrink_);
-        }
+        std::copy_n(tile.pixel(x, y), 3,
+                    row.pixel(static_cast<int>(n) * (tile_.width + kGap) + x, kLabelHeight + y));
   }
   rows_.push_back(std::move(row));
 }
@@ -83,6 +78,20 @@ Image PictureSheet::image() const {
       std::copy_n(rows_[n].pixel(0, y), 4 * rows_[n].size.width,
                   sheet.pixel(0, static_cast<int>(n) * height + y));
   return sheet;
+}
+
+Image shrunk(const Image& picture, int factor) {
+  Image small({picture.size.width / factor, picture.size.height / factor});
+  for (int y = 0; y < small.size.height; ++y)
+    for (int x = 0; x < small.size.width; ++x)
+      for (int channel = 0; channel < 4; ++channel) {
+        float sum = 0;
+        for (int v = 0; v < factor; ++v)
+          for (int u = 0; u < factor; ++u)
+            sum += std::clamp(picture.pixel(x * factor + u, y * factor + v)[channel], 0.0f, 1.0f);
+        small.pixel(x, y)[channel] = sum / static_cast<float>(factor * factor);
+      }
+  return small;
 }
 
 Image signedDifference(const Image& a, const Image& b, float gain) {

@@ -27,6 +27,9 @@ class PictureSheet {
   std::vector<Image> rows_;
 };
 
+/// Means of `factor` x `factor` pixels, clamped to 0..1.
+Image shrunk(const Image& picture, int factor);
+
 /// `gain` times the difference of red, green and blue, around grey.
 Image signedDifference(const Image& a, const Image& b, float gain);
 

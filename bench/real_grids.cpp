@@ -144,7 +144,7 @@ Ripple rippleOf(const Image& picture, const Image& truth) {
 struct Settings {
   std::filesystem::path folder, data;
   std::string only = ".*", views = ".*", json;
-  int pixels = 256;
+  int pixels = 256, rays = 1;
   double lod_pixels = 0, voxel_pixels = 0;
   bool for_vtk = false, keep_drawn = false;
 };
@@ -228,7 +228,7 @@ class Measurement {
     return views;
   }
 
-  std::filesystem::path pathOf(const OpenGrid& grid, const NamedView& view, const char* what,
+  std::filesystem::path pathOf(const OpenGrid& grid, const NamedView& view, const std::string& what,
                                const char* extension) const {
     std::string name = fmt::format("{}_{}_{}_{}.{}", grid.name, view.name, what, size_.width, extension);
     std::replace(name.begin(), name.end(), ' ', '_');
@@ -238,13 +238,16 @@ class Measurement {
   /// The marched picture. Marched once, and kept in the folder.
   Image truth(const OpenGrid& grid, const NamedView& view, const char* what, const OpticalFunction& function,
               bool is_uniform) const {
-    const auto path = pathOf(grid, view, what, "pfm");
+    const int rays = is_uniform ? settings_.rays : 1;
+    const auto path = pathOf(grid, view, rays > 1 ? fmt::format("{}_{}rays", what, rays) : what, "pfm");
     if (!std::filesystem::exists(path)) {
       MarchSteps steps;
       if (is_uniform) {  // one step from end to end is exact
         steps.step = 1e3 * grid.length;
         steps.cells = std::numeric_limits<double>::infinity();
-        writeImage(toImage(referenceMarch(grid.field, function, view.camera, size_, steps)), path);
+        const ImageSize size{rays * size_.width, rays * size_.height};
+        writeImage(shrunk(toImage(referenceMarch(grid.field, function, view.camera, size, steps)), rays),
+                   path);
       } else {
         constexpr double kAgreementDb = 60;
         steps.step = 0.016 * grid.length;
@@ -380,6 +383,9 @@ int run(int argc, char** argv) {
   app.add_option("--views", settings.views, "Regular expression of the views to measure");
   app.add_option("--pixels", settings.pixels, "Width and height of the pictures (default 256)")
       ->check(CLI::Range(16, 2048));
+  app.add_option("--rays", settings.rays,
+                 "Average the marched pictures of the uniform medium over N x N rays a pixel (default 1)")
+      ->check(CLI::Range(1, 16));
   app.add_option("--lod-pixels", settings.lod_pixels, "Screen error (default 0: the finest level)");
   app.add_option("--voxel-pixels", settings.voxel_pixels,
                  "Merge the finest splats into voxels of this size instead, as coarse levels do; not for "
