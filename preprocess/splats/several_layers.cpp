@@ -35,12 +35,12 @@ CellRow rowOfNext(const JointLine& line) {
 
 LayerFit fitBehindFace(const JointLine& line) {
   const double x = excessOf(line.row());
-  return {std::exp(-0.26 * x), 0.96 * x, 0.1 * x};
+  return {std::exp(-0.34 * x), 1.25 * x, 0.13 * x};
 }
 
 LayerFit fitAtFace(const JointLine& line) {
   const double x = excessOf(rowOfNext(line));
-  return {std::exp(-0.31 * x), 0.77 * x, 0};
+  return {std::exp(-0.4 * x), x, 0};
 }
 
 bool fitToLayers(const CellAtFaces& at, const CellOnLattice& cell) {

@@ -283,8 +283,8 @@ TEST(LayerFit, IsTheSameOfBothCellsAtAFace) {
        {std::array<double, 6>{0.5, 1, 1, 1, 1, 1}, {1.5, 3, 1.58, 0.83, 0.44, 0.23}}) {
     const LayerFit behind = fitBehindFace(lineOfSteps(steps, false)),
                    at = fitAtFace(lineOfSteps(steps, true));
-    EXPECT_NEAR(behind.drift, 0.012, 0.001);
-    EXPECT_NEAR(at.growth / 0.77, behind.growth / 0.96, 0.005);
+    EXPECT_NEAR(behind.drift, 0.016, 0.001);
+    EXPECT_NEAR(at.growth, behind.growth / 1.25, 0.005);
   }
   EXPECT_GT(fitBehindFace(lineOfSteps({1e-9, 1, 1, 1, 1, 1}, false)).factor, 0.9);
 }
