@@ -328,12 +328,14 @@ class Conversion {
     removeSplats();
   }
 
-  /// In a thread, beside the passes that follow: a disk may take half a second for gigabytes.
+  /// In a thread, beside the faces: a disk may take half a second for gigabytes. The bricks are synced before, so that a
+  /// crash of the machine does not lose both.
   void removeSplats() {
     try {
-      splats_removed_ = std::async(std::launch::async, [file = std::move(file_)]() mutable {
+      splats_removed_ = std::async(std::launch::async, [this, file = std::move(file_)]() mutable {
         nameThisThread("splats-removal");
         const TraceScope trace("remove splats", TraceKind::kWait);
+        writer_->sync();
         file.reset();
       });
     } catch (const std::system_error&) {
@@ -374,10 +376,10 @@ class Conversion {
   }
 
   void finishCache() {
+    if (splats_removed_.valid()) splats_removed_.get();
     reportCache(writer_->finish(manifest()), report_);
     writer_.reset();
     file_.reset();  // of ranks, which all read it
-    if (splats_removed_.valid()) splats_removed_.wait();
     report_.blanked = splats_.survey.blanked;
     report_.degenerate = splats_.counts.degenerate;
     report_.inverted = splats_.counts.inverted;

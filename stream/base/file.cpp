@@ -221,9 +221,13 @@ void OutputFile::truncate(uint64_t size) {
   size_ = size;
 }
 
-void OutputFile::close() {
+void OutputFile::sync() {
   CURVISPLAT_CHECK(fd_ >= 0);
   syncRetrying(fd_, path_);
+}
+
+void OutputFile::close() {
+  sync();
   if (SystemCalls::current().close(std::exchange(fd_, -1)) < 0 && errno != EINTR)
     throw OutputError("{}: cannot be closed: {}", path_.string(), reason());
 }

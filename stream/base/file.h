@@ -118,6 +118,8 @@ class OutputFile {
   void writeAt(uint64_t offset, std::span<const std::byte> from);
   /// Keeps the first `size` bytes and discards the rest.
   void truncate(uint64_t size);
+  /// Syncs (fsync). Throws Error if it fails.
+  void sync();
   /// Syncs (fsync) and closes. Nothing may be written afterwards. Throws Error if either fails.
   void close();
 

@@ -40,6 +40,7 @@ class BrickLog {
   BrickLog(const std::filesystem::path& folder, size_t variables);
 
   void append(const AppendedBrick& brick);
+  void sync() { file_.sync(); }
   /// Syncs and closes it, so that another machine may read it. Nothing may follow.
   void close() { file_.close(); }
   /// Truncates the log to its first `count` entries.

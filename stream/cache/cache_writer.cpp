@@ -209,6 +209,12 @@ AppendedBrick CacheWriter::appended(uint64_t id) const {
   return brick;
 }
 
+void CacheWriter::sync() {
+  state_->geometry.sync();
+  for (OutputFile& file : state_->values) file.sync();
+  state_->log.sync();
+}
+
 void CacheWriter::closeStreams() {
   state_->geometry.close();
   for (OutputFile& file : state_->values) file.close();

@@ -56,6 +56,8 @@ class CacheWriter {
 
   /// What append() has noted of a brick.
   AppendedBrick appended(uint64_t id) const;
+  /// Syncs the streams and the log: what was appended outlasts a crash of the machine. Not while something is appended.
+  void sync();
   /// Syncs and closes the streams and the log, so that another machine may read them. Only readBack() may follow.
   void closeStreams();
 
