@@ -116,7 +116,8 @@ TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
             0);
   // Rank 1 sees another version of the last step's file.
   fs::create_directory(file("other"));
-  for (const char* name : {"s.xyz", "s.nam", "s_0000.fun", "s_0001.fun", "s_0002.fun", "s_0003.fun"})
+  for (const char* name : {"s.xyz", "s_0000.fun", "s_0000.nam", "s_0001.fun", "s_0001.nam", "s_0002.fun",
+                           "s_0002.nam", "s_0003.fun", "s_0003.nam"})
     fs::copy_file(file(name), file("other/") + name);
   fs::resize_file(file("other/s_0003.fun"), 100);
   const std::string script = file("one_old.sh");
