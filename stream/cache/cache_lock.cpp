@@ -12,6 +12,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/open_retrying.h"
+#include "stream/cache/replace_manifest.h"
 
 namespace curvisplat {
 
@@ -22,7 +23,10 @@ CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manife
     throw OutputError(
         "{}: cannot be opened for writing: {}; expected a complete splat cache with write permission",
         manifest_.string(), std::strerror(errno));
-  if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 && isStillThere()) return;
+  if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 && isStillThere()) {
+    removeReplacedManifest(cache_);
+    return;
+  }
   const bool is_busy = errno == EWOULDBLOCK;
   const std::string reason = std::strerror(errno);
   const bool is_there = isStillThere();

@@ -9,7 +9,7 @@ namespace curvisplat {
 class CacheLock {
  public:
   /// Throws Error if `cache` has no manifest that can be opened for writing, or if another program holds the
-  /// lock.
+  /// lock. Removes the old manifest that a program left which was killed just after it had put a new one in place.
   explicit CacheLock(const std::filesystem::path& cache);
   ~CacheLock();
   CacheLock(const CacheLock&) = delete;

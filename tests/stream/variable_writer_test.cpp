@@ -1,7 +1,10 @@
 // Variables that are added to a cache that is whole.
 #include "stream/cache/variable_writer.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
@@ -121,6 +124,18 @@ TEST_F(AddedVariable, IsLockedAgainstOtherPrograms) {
   const CacheLock lock(path);
   EXPECT_THROW(CacheLock{path}, Error);
   EXPECT_NO_THROW(CacheReader{path});
+}
+
+TEST_F(AddedVariable, TheOldManifestThatAKilledProgramLeftIsRemoved) {
+  const std::filesystem::path left = path / "manifest.json.part";
+  std::filesystem::copy_file(path / "manifest.json", left);
+  const int running = ::open(left.c_str(), O_RDONLY);
+  ASSERT_EQ(::flock(running, LOCK_EX), 0);
+  { const CacheLock lock(path); }
+  EXPECT_TRUE(std::filesystem::exists(left));  // which its program may have to put back
+  ::close(running);
+  { const CacheLock lock(path); }
+  EXPECT_FALSE(std::filesystem::exists(left));
 }
 
 }  // namespace
