@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "bench/picture_sheet.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
@@ -151,26 +152,31 @@ std::vector<NamedCase> allCases() {
   return cases;
 }
 
+struct Settings {
+  std::filesystem::path folder;
+  std::string only = ".*", views = ".*";
+  int pixels = kPixels, rays = 1;
+  Backend backend = Backend::kCpu;
+  double low_pass_px2 = FrameOptions().low_pass_px2;
+  bool pictures = false, quick = false;
+};
+
 class Measurement {
  public:
-  Measurement(std::filesystem::path folder, int pixels, Backend backend, double low_pass_px2, bool pictures,
-              bool quick)
-      : folder_(std::move(folder)),
-        size_{pixels, pixels},
-        backend_(backend),
-        low_pass_px2_(low_pass_px2),
-        pictures_(pictures),
-        quick_(quick) {
+  explicit Measurement(const Settings& settings)
+      : settings_(settings), folder_(settings.folder), size_{settings.pixels, settings.pixels} {
     std::filesystem::create_directories(folder_);
   }
 
   void measure(const Case& grid) {
     const std::filesystem::path cache = folder_ / (fileName(grid.name) + ".splats");
     convertGrid(*grid.source, cache, grid.scalar);
-    for (const View& view : grid.views)
+    for (const View& view : grid.views) {
+      if (!std::regex_search(view.name, std::regex(settings_.views))) continue;
       for (const std::string function : {"smooth", "band", "step"})
         // The constant scene has its value at the step's jump, where the result means nothing.
         if (!(grid.name == "constant" && function == "step")) measure(grid, view, function, cache);
+    }
   }
 
   nlohmann::json rows() const { return rows_; }
@@ -185,19 +191,22 @@ class Measurement {
   /// The reference picture; marched on the first call and kept in the folder.
   Image reference(const Case& grid, const View& view, const std::string& function_name,
                   const KnownFunction& function) {
-    const auto path =
-        folder_ / fmt::format("{}_{}_{}{}_reference.pfm", fileName(grid.name), fileName(view.name),
-                              function_name, size_.width == kPixels ? "" : fmt::format("_{}", size_.width));
+    const std::string kind = (size_.width == kPixels ? "" : fmt::format("_{}", size_.width)) +
+                             (settings_.rays == 1 ? "" : fmt::format("_{}rays", settings_.rays));
+    const auto path = folder_ / fmt::format("{}_{}_{}{}_reference.pfm", fileName(grid.name),
+                                            fileName(view.name), function_name, kind);
     if (!std::filesystem::exists(path)) {
       MarchSteps steps;
       steps.step = 0.016 * grid.length;
       steps.cells = 2;
+      const ImageSize rays{settings_.rays * size_.width, settings_.rays * size_.height};
       const ConvergedImage reference =
-          convergedMarch(*grid.field, function.exact, view.camera, size_, steps, 75);
+          convergedMarch(*grid.field, function.exact, view.camera, rays, steps, 75);
       if (reference.agreement_db < 75)
         fmt::print(stderr, "{}: successive references agree to {:.1f} dB only\n", path.string(),
                    reference.agreement_db);
-      writeImage(toImage(reference.image), path);
+      const Image image = toImage(reference.image);
+      writeImage(settings_.rays == 1 ? image : shrunk(image, settings_.rays), path);
     }
     return readImage(path);
   }
@@ -211,13 +220,14 @@ class Measurement {
     std::string line = fmt::format("{:<18} {:<10} {:<7}", grid.name, view.name, function_name);
     for (const auto classification : {Classification::kPixel, Classification::kFlat}) {
       for (const double lod_pixels : {0.0, 4.0, 8.0}) {
-        if (quick_ && (lod_pixels > 0 || classification == Classification::kFlat)) continue;
+        if (settings_.quick && (lod_pixels > 0 || classification == Classification::kFlat)) continue;
         FrameOptions options = knownFrame(size_);
-        options.low_pass_px2 = low_pass_px2_;
+        options.low_pass_px2 = settings_.low_pass_px2;
         options.lod_pixels = lod_pixels;
         options.classification = classification;
         uint64_t splats = 0;
-        const Image picture = drawCache(cache, function.table, view.camera, options, &splats, backend_);
+        const Image picture =
+            drawCache(cache, function.table, view.camera, options, &splats, settings_.backend);
         const ImageDifference difference = compareImages(picture, exact);
         const bool flat = classification == Classification::kFlat;
         line +=
@@ -230,7 +240,7 @@ class Measurement {
                          {"splats", splats},
                          {"psnr_db", difference.psnr_db},
                          {"largest", difference.largest}});
-        if (pictures_ && lod_pixels == 0 && !flat) leave(picture, exact, grid, view, function_name);
+        if (settings_.pictures && lod_pixels == 0 && !flat) leave(picture, exact, grid, view, function_name);
       }
       line += "  ";
     }
@@ -250,11 +260,9 @@ class Measurement {
     writeImage(difference, folder_ / (prefix + "_difference_x20.png"));
   }
 
+  Settings settings_;
   std::filesystem::path folder_;
   ImageSize size_;
-  Backend backend_;
-  double low_pass_px2_;
-  bool pictures_, quick_;
   nlohmann::json rows_ = nlohmann::json::array();
 };
 
@@ -262,30 +270,31 @@ int run(int argc, char** argv) {
   CLI::App app(
       "Compare pictures with the reference march: dB, and splats drawn.\n"
       "Columns: the finest level, 4 pixels, 8 pixels.");
-  std::string folder, only = ".*", json;
-  double low_pass_px2 = FrameOptions().low_pass_px2;
-  bool pictures = false, quick = false;
-  Backend backend = Backend::kCpu;
-  int pixels = kPixels;
+  Settings settings;
+  std::string json;
   const std::map<std::string, Backend> backends{{"cpu", Backend::kCpu},
                                                 {"osmesa", Backend::kOsmesa},
                                                 {"egl", Backend::kEgl},
                                                 {"auto", Backend::kAutomatic}};
-  app.add_option("FOLDER", folder, "Folder for caches and references; references are reused")->required();
-  app.add_option("--only", only, "Regular expression of the cases to measure");
-  app.add_option("--pixels", pixels,
+  app.add_option("FOLDER", settings.folder, "Folder for caches and references; references are reused")
+      ->required();
+  app.add_option("--only", settings.only, "Regular expression of the cases to measure");
+  app.add_option("--views", settings.views, "Regular expression of the views to measure");
+  app.add_option("--pixels", settings.pixels,
                  "Width and height of the pictures (default 256, for which figures are published)")
       ->check(CLI::Range(8, 4096));
+  app.add_option("--rays", settings.rays, "Average the references over N x N rays a pixel (default 1)")
+      ->check(CLI::Range(1, 16));
   app.add_option("--json", json, "Write the table as JSON to this file");
-  app.add_option("--backend", backend, "Backend: cpu, osmesa, egl or auto")
+  app.add_option("--backend", settings.backend, "Backend: cpu, osmesa, egl or auto")
       ->transform(CLI::CheckedTransformer(backends));
-  app.add_option("--low-pass", low_pass_px2, "Low-pass of the projection, in pixels squared");
-  app.add_flag("--pictures", pictures, "Keep pictures, references and differences in FOLDER");
-  app.add_flag("--quick", quick, "Only the finest level, classified per pixel");
+  app.add_option("--low-pass", settings.low_pass_px2, "Low-pass of the projection, in pixels squared");
+  app.add_flag("--pictures", settings.pictures, "Keep pictures, references and differences in FOLDER");
+  app.add_flag("--quick", settings.quick, "Only the finest level, classified per pixel");
   CLI11_PARSE(app, argc, argv);
-  Measurement measurement(folder, pixels, backend, low_pass_px2, pictures, quick);
+  Measurement measurement(settings);
   for (const NamedCase& named : allCases())
-    if (std::regex_search(named.name, std::regex(only))) measurement.measure(named.make());
+    if (std::regex_search(named.name, std::regex(settings.only))) measurement.measure(named.make());
   if (!json.empty()) writeFileAtomically(json, measurement.rows().dump(1) + "\n");
   return 0;
 }
