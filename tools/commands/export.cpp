@@ -29,6 +29,7 @@
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -142,6 +143,7 @@ void exportCache(const ExportArguments& arguments) {
   const TransferFunction function = choice.function(arguments.scalar);
   for (const std::string& note : function.notes()) printMessage("note: {}", note);
 
+  if (!arguments.no_comparison) requireThreads();  // before the file is written
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const std::vector<GaussianSplat> splats = gaussianSplats(cache, variable, function, max_splats, progress);
