@@ -395,7 +395,8 @@ class Conversion {
     if (hasDiskSpace(needsWith(most), options_.output, folder)) return;
     const TemporaryNeeds forecast =
         workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->temporaryNeeds(progress_);
-    checkDiskSpace(needsWith(forecast), options_.output, folder);
+    checkDiskSpace(needsWith(forecast), options_.output, folder,
+                   options_.full_disk_hint.empty() ? kSmallDiskHint : options_.full_disk_hint);
   }
 
   DiskNeeds needsWith(const TemporaryNeeds& temporary) const {
@@ -473,10 +474,10 @@ ConvertReport runConversion(const DataSource& source, const ConvertOptions& opti
                  : "interrupted before there was anything to resume; its temporary files were removed";
     throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
   } catch (const DiskFull& full) {
-    const std::string text = fmt::format(
-        "{}: no room for the cache and its temporary files: {}; make room, or name a folder on another disk "
-        "with --tmp",
-        conversion.folderOf(full.file()).string(), full.reason());
+    const std::string text =
+        fmt::format("{}: no room for the cache and its temporary files: {}; {}",
+                    conversion.folderOf(full.file()).string(), full.reason(),
+                    options.full_disk_hint.empty() ? kFullDiskHint : options.full_disk_hint);
     throw OutputError("{}{}", text, options.resume && conversion.leaveForResuming() ? kKept : "");
   } catch (const OutputError& error) {
     if (options.resume && conversion.leaveForResuming()) throw OutputError("{}{}", error.what(), kKept);

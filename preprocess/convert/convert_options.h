@@ -29,6 +29,7 @@ struct ConvertOptions {
   uint64_t memory_bytes = 0;               // 0: defaultMemory()
   unsigned threads = 0;                    // 0: as many as the machine has
   std::filesystem::path temporary_folder;  // empty: the folder of the output
+  std::string full_disk_hint;              // what to do about it; empty: as for `convert`
   std::string title;                       // empty: the output's name
   std::optional<double> time;              // of the step; otherwise the source's, or 0
   std::optional<TimeUnit> time_unit;       // of `time`; otherwise the source's

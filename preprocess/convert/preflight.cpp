@@ -45,11 +45,10 @@ std::optional<Disk> diskOf(const std::filesystem::path& folder) {
 }
 
 void checkRoom(const std::filesystem::path& folder, const Disk& disk, uint64_t bytes, const char* what,
-               const char* hint) {
+               const std::string& hint) {
   if (disk.free_bytes < bytes)
-    throw OutputError(
-        "{}: {} need about {}, but only {} are free; {}, or skip this check with --no-preflight",
-        folder.string(), what, byteText(bytes), byteText(disk.free_bytes), hint);
+    throw OutputError("{}: {} need about {}, but only {} are free; {}", folder.string(), what,
+                      byteText(bytes), byteText(disk.free_bytes), hint);
 }
 
 uint64_t withMargin(uint64_t temporary) {
@@ -100,18 +99,19 @@ void checkOutput(const std::filesystem::path& output, bool overwrite,
 }
 
 void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
-                    const std::filesystem::path& temporary_folder) {
+                    const std::filesystem::path& temporary_folder, const std::string& hint) {
   const std::filesystem::path folder = folderOf(output);
   const std::optional<Disk> cache = diskOf(folder), temporary = diskOf(temporary_folder);
   if (!cache || !temporary) return;  // a file system that does not tell is no reason to refuse
   if (cache->device == temporary->device) {
     checkRoom(folder, *cache, std::max(needs.cache_bytes + needs.temporary_bytes, needs.before_cache_bytes),
-              "the cache and temporary files", "make room, name a folder on another disk with --tmp");
+              "the cache and temporary files", hint);
     return;
   }
-  checkRoom(folder, *cache, needs.cache_bytes, "the cache's files", "make room");
+  checkRoom(folder, *cache, needs.cache_bytes, "the cache's files",
+            "make room, or skip this check with --no-preflight");
   checkRoom(temporary_folder, *temporary, needs.mostTemporary(), "temporary files",
-            "make room, name another folder with --tmp");
+            "make room, name another folder with --tmp, or skip this check with --no-preflight");
 }
 
 bool hasDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "preprocess/convert/splat_origin.h"
 
@@ -43,10 +44,14 @@ void checkOutput(const std::filesystem::path& output, bool overwrite,
 /// Throws Error if `folder` is missing or cannot be written; `hint` says what to do about it.
 void checkWritable(const std::filesystem::path& folder, const char* hint);
 
-/// Throws Error if the disks of `output` and `temporary_folder` (one, perhaps) have too little room; the second function
-/// returns false.
+inline constexpr const char* kFullDiskHint = "make room, or name a folder on another disk with --tmp";
+inline constexpr const char* kSmallDiskHint =
+    "make room, name a folder on another disk with --tmp, or skip this check with --no-preflight";
+
+/// Throws Error if the disks of `output` and `temporary_folder` have too little room; the second function returns false.
+/// `hint` says what to do if both are one disk.
 void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
-                    const std::filesystem::path& temporary_folder);
+                    const std::filesystem::path& temporary_folder, const std::string& hint = kSmallDiskHint);
 bool hasDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                   const std::filesystem::path& temporary_folder);
 

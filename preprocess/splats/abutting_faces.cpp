@@ -8,6 +8,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "preprocess/splats/coincidence_sweep.h"
 #include "stream/base/check.h"
@@ -168,12 +170,15 @@ void AbuttingFaces::match(const Progress& progress) {
 void AbuttingFaces::noteSet(std::span<const uint64_t> faces) {
   for (const uint64_t face : faces) abutting_[face] = true;
   if (folded_.empty()) return;
-  const auto side_of = [&](uint64_t face) {
-    return std::upper_bound(sides_.begin(), sides_.end(), face) - sides_.begin();
-  };
-  for (size_t n = 1; n < faces.size(); ++n)
-    for (size_t other = 0; other < n; ++other)
-      if (side_of(faces[n]) == side_of(faces[other])) folded_[faces[n]] = folded_[faces[other]] = true;
+  // Thousands of faces coincide where a set names one file thousands of times: not each with each.
+  std::vector<std::pair<ptrdiff_t, uint64_t>> by_side;
+  by_side.reserve(faces.size());
+  for (const uint64_t face : faces)
+    by_side.emplace_back(std::upper_bound(sides_.begin(), sides_.end(), face) - sides_.begin(), face);
+  std::sort(by_side.begin(), by_side.end());
+  for (size_t n = 1; n < by_side.size(); ++n)
+    if (by_side[n].first == by_side[n - 1].first)
+      folded_[by_side[n].second] = folded_[by_side[n - 1].second] = true;
 }
 
 }  // namespace curvisplat

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <iterator>
@@ -13,6 +14,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "preprocess/grid/hexahedron.h"
@@ -20,6 +22,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/box_tree.h"
+#include "preprocess/survey/point_tree.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
@@ -116,18 +119,28 @@ class Bins {
     for (const uint32_t n : numbers) sorted_[next[binOf(points[n].position)]++] = n;
   }
 
-  /// Numbers of the points, by bin.
-  const std::vector<uint32_t>& numbers() const { return sorted_; }
-
+  /// Calls each(number) for the points of the bins that the box touches. False, and calls nothing, if there are many bins or points.
   template <typename Each>
-  void forEachIn(const BoundingBox& box, const Each& each) const {
-    if (!box_.meets(box)) return;
+  bool forEachOfFew(const BoundingBox& box, const Each& each) const {
+    constexpr uint64_t kFewBins = 64, kFewPoints = 64;
+    if (!box_.meets(box)) return true;
     const auto low = place(box.lower), high = place(box.upper);
-    for (uint64_t z = low[2]; z <= high[2]; ++z)
-      for (uint64_t y = low[1]; y <= high[1]; ++y) {
-        const uint64_t row = (z * kBinsAlongAxis + y) * kBinsAlongAxis;
-        for (uint32_t n = first_[row + low[0]]; n < first_[row + high[0] + 1]; ++n) each(sorted_[n]);
-      }
+    if ((high[0] - low[0] + 1) * (high[1] - low[1] + 1) * (high[2] - low[2] + 1) > kFewBins) return false;
+    const auto for_each_row = [&](const auto& visit) {
+      for (uint64_t z = low[2]; z <= high[2]; ++z)
+        for (uint64_t y = low[1]; y <= high[1]; ++y) {
+          const uint64_t row = (z * kBinsAlongAxis + y) * kBinsAlongAxis;
+          visit(first_[row + low[0]], first_[row + high[0] + 1]);
+        }
+    };
+    uint64_t count = 0;
+    for_each_row([&](uint32_t begin, uint32_t end) { count += end - begin; });
+    if (count > kFewPoints) return false;
+    if (count == 0) return true;
+    for_each_row([&](uint32_t begin, uint32_t end) {
+      for (uint32_t n = begin; n < end; ++n) each(sorted_[n]);
+    });
+    return true;
   }
 
  private:
@@ -230,38 +243,56 @@ std::vector<BlockPoint> pickPoints(const NodeReader& reader, uint64_t slab_bytes
 class Holders {
  public:
   explicit Holders(const std::vector<BlockPoint>& points)
-      : points_(points), counts_(points.size(), 0), bins_(points, allOf(points)) {}
+      : points_(points),
+        counts_(points.size(), 0),
+        latest_(points.size()),
+        bins_(points, allOf(points)),
+        tree_(treeOf(allOf(points))) {}
 
-  const Bins& bins() const { return bins_; }
-  bool isWanted(uint32_t point) const { return counts_[point] < kMaxHolders; }
-  bool areAllFound() const { return bins_.numbers().empty(); }
+  bool areAllFound() const { return tree_.size() == 0; }
 
-  /// Adds points that a part of `block` contains.
+  /// Calls each(number) for points that may lie in the cell, among them all that do. Any thread.
+  template <typename Each>
+  void forEachNear(const std::array<glm::dvec3, 8>& corner, const Each& each) const {
+    BoundingBox box;
+    for (const glm::dvec3& node : corner) box.add(node);
+    const auto each_in_box = [&](uint32_t n) {
+      if (box.holds(points_[n].position)) each(n);
+    };
+    if (!bins_.forEachOfFew(box, each_in_box)) tree_.forEachNear(corner, each);
+  }
+
+  /// Whether the point is to be located in the cells of `block`. Any thread.
+  bool isWanted(uint32_t point, uint32_t block) const {
+    return points_[point].block != block && counts_[point] < kMaxHolders &&
+           latest_[point].load(std::memory_order_relaxed) != block + 1;
+  }
+  /// `block` contains the point. Returns whether that is new: two cells may both contain a point of their common face. Any thread.
+  bool note(uint32_t point, uint32_t block) {
+    return latest_[point].exchange(block + 1, std::memory_order_relaxed) != block + 1;
+  }
+
+  /// Adds points that a part of `block` contains, as noted.
   void add(uint32_t block, const std::vector<uint32_t>& points) {
-    block_ = block;
-    in_block_.insert(in_block_.end(), points.begin(), points.end());
+    for (const uint32_t point : points) {
+      inside_.push_back({point, block});
+      if (++counts_[point] == kMaxHolders) ++finished_;
+    }
   }
   /// To be called after each block.
   void finishBlock() {
-    // Two cells may both contain a point of their common face.
-    std::sort(in_block_.begin(), in_block_.end());
-    in_block_.erase(std::unique(in_block_.begin(), in_block_.end()), in_block_.end());
-    for (const uint32_t point : in_block_) {
-      inside_.push_back({point, block_});
-      if (++counts_[point] == kMaxHolders) ++finished_;
-    }
-    in_block_.clear();
-    if (2 * finished_ <= bins_.numbers().size()) return;
+    if (2 * finished_ <= tree_.size()) return;
     std::vector<uint32_t> wanted;
-    std::copy_if(bins_.numbers().begin(), bins_.numbers().end(), std::back_inserter(wanted),
-                 [this](uint32_t point) { return isWanted(point); });
+    tree_.forEach([&](uint32_t point) {
+      if (counts_[point] < kMaxHolders) wanted.push_back(point);
+    });
     bins_ = Bins(points_, wanted);
+    tree_ = treeOf(wanted);
     finished_ = 0;
   }
 
   /// (point, block), sorted.
   std::vector<std::pair<uint32_t, uint32_t>> take() {
-    finishBlock();
     std::sort(inside_.begin(), inside_.end());
     return std::move(inside_);
   }
@@ -272,13 +303,17 @@ class Holders {
     std::iota(numbers.begin(), numbers.end(), 0u);
     return numbers;
   }
+  PointTree treeOf(const std::vector<uint32_t>& numbers) const {
+    return PointTree(std::span<const BlockPoint>(points_), numbers);
+  }
 
   const std::vector<BlockPoint>& points_;
   std::vector<uint8_t> counts_;  // [point]
-  Bins bins_;                    // the points still to be located, and few others
-  uint32_t block_ = 0;
-  std::vector<uint32_t> in_block_;
-  size_t finished_ = 0;  // of the points in bins_
+  std::vector<std::atomic<uint32_t>>
+      latest_;           // [point]: 1 + the latest block that is known to contain it; 0: none
+  Bins bins_;            // the points still to be located, and few others
+  PointTree tree_;       // the same: for cells in whose bins many lie
+  size_t finished_ = 0;  // of the points in tree_
   std::vector<std::pair<uint32_t, uint32_t>> inside_;
 };
 
@@ -295,18 +330,17 @@ std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, 
     const uint32_t number = loaded->slab.block;
     if (number != std::exchange(block, number)) holders.finishBlock();
     if (holders.areAllFound()) break;
-    const Bins& bins = holders.bins();
     tbb::enumerable_thread_specific<std::vector<uint32_t>> found;
     forEachCell(
-        blocks[number], *loaded, [](uint64_t, uint64_t) { return true; },
+        blocks[number], *loaded,
+        [&](uint64_t, uint64_t) {
+          progress.throwIfStopped();
+          return true;
+        },
         [&](size_t at, size_t row, size_t plane, uint64_t, uint64_t, uint64_t) {
           const std::array<glm::dvec3, 8> corner = cornersIn(*loaded, at, row, plane);
-          BoundingBox box;
-          for (const glm::dvec3& node : corner) box.add(node);
-          bins.forEachIn(box, [&](uint32_t n) {
-            const BlockPoint& point = points[n];
-            if (point.block != number && holders.isWanted(n) && box.holds(point.position) &&
-                holds(corner, point.position))
+          holders.forEachNear(corner, [&](uint32_t n) {
+            if (holders.isWanted(n, number) && holds(corner, points[n].position) && holders.note(n, number))
               found.local().push_back(n);
           });
         });

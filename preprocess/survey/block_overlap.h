@@ -5,9 +5,9 @@
 // blocks. Abutting blocks share no volume, whether or not their nodes match on the common face; overlaps of
 // up to a five-hundredth of a block, where two blocks approximate a curved face by different chords, are
 // ignored. The coordinates are read twice, or once if the blocks' bounding boxes are disjoint. Memory: two
-// slabs, and a hundred bytes for each point: about 100,000 points, and some more at each block's corners,
-// edges and faces. Time: n log n in the blocks, plus the points around each cell; a point is located in at
-// most 16 other blocks. Grids of more than 100,000 blocks are not checked.
+// slabs, and 150 bytes for each point: about 100,000 points, and some more at each block's corners, edges and
+// faces. Time: n log n in the blocks, and for each cell what finding the points near it takes, however long and
+// slanted it is; a point is located in at most 16 other blocks. Grids of more than 100,000 blocks are not checked.
 #pragma once
 
 #include <cstdint>

@@ -2,7 +2,7 @@
 """early_signals_test.py CURVISPLAT
 
 Signals before there is anything to show: in the first 0.12 s of each command (some are done by then), and while `info` reads a
-sparse grid of 192 GB, which shows how far it has come.
+sparse grid of 192 GB, which shows how far it has come. Also while `generate` writes, `bench` converts and `export` compares.
 """
 import os
 import pathlib
@@ -99,6 +99,44 @@ class EarlySignals(unittest.TestCase):
                         self.assertEqual(self.files(), before)
         print(f"{ended_early} runs ended by a signal", flush=True)
         self.assertGreater(ended_early, 10)
+
+    def stopped(self, words, begun):
+        """Sends Ctrl-C once begun() is true. The status and the message."""
+        program = subprocess.Popen([PROGRAM, *words], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        self.addCleanup(program.kill)
+        deadline = time.monotonic() + MOST_SECONDS
+        while not begun() and program.poll() is None:
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.001)
+        program.send_signal(signal.SIGINT)
+        message = program.communicate(timeout=MOST_SECONDS)[1]
+        return program.returncode, message
+
+    def test_generate_that_is_stopped_leaves_nothing(self):
+        for further in ([], ["--steps", "3"]):
+            status, message = self.stopped(["generate", "wake", "--size", "400x300x100", "-o", "g", *further],
+                                           lambda: list(self.folder.glob("g*.part")))
+            self.assertEqual(status, 128 + signal.SIGINT, message)
+            self.assertEqual(message.count("\n"), 1, message)
+            self.assertEqual(self.files(), ["temporary"])
+
+    def test_bench_that_is_stopped_does_not_offer_to_go_on(self):
+        status, message = self.stopped(["bench", "--convert", "--nodes", "4M", "--tmp", "temporary"],
+                                       lambda: any(path.stat().st_size > 0
+                                                   for path in self.folder.glob("temporary/*/grid.splats.partial/geometry.bin")))
+        self.assertEqual(status, 128 + signal.SIGINT, message)
+        self.assertNotIn("--resume", message)
+        self.assertEqual(self.files(), ["temporary"])
+
+    def test_an_export_that_is_stopped_while_it_is_compared_is_complete_and_says_so(self):
+        self.run_program("generate", "o-grid", "--size", "40x30x20", "-o", "o")
+        self.run_program("convert", "o.xyz", "o.fun", "-o", "o.splats")
+        self.run_program("export", "o.splats", "-o", "whole.ply", "--no-comparison")
+        status, message = self.stopped(["export", "o.splats", "-o", "a.ply"], (self.folder / "a.ply").exists)
+        self.assertEqual(status, 128 + signal.SIGINT, message)
+        self.assertIn("a.ply: is complete", message)
+        self.assertEqual((self.folder / "a.ply").read_bytes(), (self.folder / "whole.ply").read_bytes())
 
 
 if __name__ == "__main__":

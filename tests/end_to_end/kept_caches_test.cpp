@@ -1,6 +1,7 @@
 // Kept caches where several programs make one, files change meanwhile, and what lies in their folder is damaged.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <csignal>
 #include <fstream>
 
@@ -35,6 +36,27 @@ TEST_F(KeptCaches, WhatIsKnownOfAFileMayBeDamaged) {
   std::ofstream(notes[1]) << std::string(100'000, '1');
   ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
   EXPECT_EQ(kept().size(), 1u);
+}
+
+// The commands that keep caches have neither --tmp nor --no-preflight.
+TEST_F(KeptCaches, AFullDiskIsRefusedWithWhatHelpsThere) {
+  run({"generate", "half-annulus", "--size", "60x50x40", "-o", "large"});
+  fs::create_directory("kept");
+  const ProgramResult result =
+      RunningProgram({"unshare", "--mount", "sh", "-c",
+                      "mount -t tmpfs -o size=8m none kept && exec " CURVISPLAT_PROGRAM
+                      " render large.xyz large.fun -o full.png --size 20x20"},
+                     "/usr/bin/env")
+          .wait();
+  if (result.err.find("curvisplat: ") != 0)
+    GTEST_SKIP() << "no file system can be mounted here: " << result.err;
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_NE(result.err.find("make room, or set XDG_CACHE_HOME to a folder on another disk"),
+            std::string::npos)
+      << result.err;
+  EXPECT_EQ(result.err.find("--"), std::string::npos) << result.err;
+  EXPECT_FALSE(fs::exists("full.png"));
 }
 
 TEST_F(KeptCaches, FilesThatChangeMeanwhileAreConvertedAgain) {

@@ -136,5 +136,39 @@ TEST(AbuttingFaces, OfARingAreItsOwn) {
             (std::vector<std::string>{"0 0 0 0 i-", "0 7 0 0 i+", "0 0 1 0 i-", "0 7 1 0 i+"}));
 }
 
+// A set may name one file thousands of times: each face with each would take an hour.
+TEST(AbuttingFaces, OfOneBlockManyTimesFoldIfTheBlockDoes) {
+  constexpr size_t kBlocks = 50'000;
+  // Around a body without thickness, or beside it.
+  for (const bool around : {true, false}) {
+    const std::vector<GridBlock> blocks(kBlocks, gridBlock(3, 2, 2));
+    const TemporaryFolder folder;
+    AbuttingFaces faces(blocks, kFloat, 16 << 20, folder.path());
+    faces.keepFolds();
+    const auto each_face = [&](const auto& visit) {
+      for (size_t block = 0; block < kBlocks; ++block)
+        for (const uint64_t i : {0u, 1u}) visit(CellFace{block, {i, 0, 0}, 1, false});  // of the side j-
+    };
+    each_face([&](const CellFace& face) {
+      std::array<glm::dvec3, 8> corners;
+      for (size_t n = 0; n < 8; ++n) {
+        const double x = static_cast<double>(face.cell[0] + (n & 1)) - (around ? 1 : 0);
+        const double y = static_cast<double>(n >> 1 & 1);
+        corners[n] = {std::abs(x), x < 0 ? -y : y, static_cast<double>(n >> 2)};
+      }
+      const AbuttingFaces::Centre centre = faces.centreOf(face, corners);
+      faces.add({&centre, 1});
+    });
+    faces.match(Progress());
+    size_t abutting = 0, folded = 0;
+    each_face([&](const CellFace& face) {
+      abutting += faces.abuts(face);
+      folded += faces.folds(face);
+    });
+    EXPECT_EQ(abutting, 2 * kBlocks);
+    EXPECT_EQ(folded, around ? 2 * kBlocks : 0);
+  }
+}
+
 }  // namespace
 }  // namespace curvisplat

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <utility>
 
 #include "preprocess/formats/open/open_grid.h"
 #include "tests/reference/function_grid.h"
@@ -86,6 +87,29 @@ TEST(BlockOverlap, IsFoundAmongAHundredThousandBlocks) {
   EXPECT_EQ(overlaps[0].first, 1234u);
   EXPECT_EQ(overlaps[0].second, 99'999u);
   EXPECT_NEAR(overlaps[0].share, 1, 1e-9);
+}
+
+// Needles and plates across all of the grid, slanted to all axes: their boxes hold nearly every point, and locating each point in
+// each cell would take many minutes.
+TEST(BlockOverlap, IsFoundAmongSlenderCellsThatAreSlanted) {
+  const glm::dmat3 turn(glm::dvec3(1, 1, 1) / std::sqrt(3.0), glm::dvec3(1, -1, 0) / std::sqrt(2.0),
+                        glm::dvec3(1, 1, -2) / std::sqrt(6.0));
+  const auto overlapsOf = [&](const GridBlock& block, const glm::dvec3& spacing) {
+    const double shift = 0.25 * static_cast<double>(block.ni - 1);
+    return overlapsIn(FunctionGridSource({block, block}, 0,
+                                         [=](const GridNode& node) {
+                                           const glm::dvec3 at(node.i + (node.block == 1 ? shift : 0.0),
+                                                               node.j, node.k);
+                                           return NodeValues{turn * (at * spacing), {}, false};
+                                         }),
+                      4 << 20);
+  };
+  for (const auto& [name, overlaps] :
+       {std::pair("needles", overlapsOf(gridBlock(201, 201, 4), {1, 1, 1e4})),
+        std::pair("plates", overlapsOf(gridBlock(40'001, 3, 3), {1e-3, 50, 50}))}) {
+    ASSERT_EQ(overlaps.size(), 1u) << name;
+    EXPECT_NEAR(overlaps[0].share, 0.75, 0.01) << name;
+  }
 }
 
 TEST(BlockOverlap, IsNoneOfBlocksThatAbut) {

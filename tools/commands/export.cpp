@@ -17,6 +17,7 @@
 #include "render/export/vdb_file.h"
 #include "render/frame/frame.h"
 #include "stream/base/error.h"
+#include "stream/base/interrupted.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
@@ -29,6 +30,7 @@
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -142,6 +144,7 @@ void exportCache(const ExportArguments& arguments) {
   const TransferFunction function = choice.function(arguments.scalar);
   for (const std::string& note : function.notes()) printMessage("note: {}", note);
 
+  if (!arguments.no_comparison) requireThreads();  // before the file is written
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const std::vector<GaussianSplat> splats = gaussianSplats(cache, variable, function, max_splats, progress);
@@ -154,9 +157,14 @@ void exportCache(const ExportArguments& arguments) {
   printLine("{}: {} splats of {}, {:.1f} MiB", arguments.output.string(), splats.size(),
             cache.manifest().variables[variable].name, mebibytesOf(arguments.output));
   if (!arguments.no_comparison) {
-    const Comparison found = compare(cache, variable, function, splats, memory, progress);
-    fmt::print("against curvisplat's own pictures from 12 directions: {:.1f} dB, {:.1f} dB at worst\n",
-               found.mean_db, found.least_db);
+    try {
+      const Comparison found = compare(cache, variable, function, splats, memory, progress);
+      fmt::print("against curvisplat's own pictures from 12 directions: {:.1f} dB, {:.1f} dB at worst\n",
+                 found.mean_db, found.least_db);
+    } catch (const Interrupted& interrupted) {
+      throw Interrupted(interrupted.signal(), fmt::format("{}: is complete; its comparison was interrupted",
+                                                          arguments.output.string()));
+    }
   }
   if (arguments.output.extension() == ".spz") {
     const SpzFrame frame = spzFrameOf(splats);

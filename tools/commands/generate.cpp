@@ -15,6 +15,7 @@
 #include "tools/commands/commands.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/stop_signals.h"
 
 namespace curvisplat {
 namespace {
@@ -49,6 +50,7 @@ SceneGridSize parseSize(const std::string& text) {
 void generateSteps(const GenerateOptions& options) {
   const SceneGridSize size = parseSize(options.size);
   Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
   uint64_t nodes = 0;
   double seconds = 0;
   for (uint64_t step = options.first_step; step < options.first_step + *options.steps; ++step) {
@@ -77,6 +79,7 @@ void generate(const GenerateOptions& options) {
   if (options.first_step > 0) throw UsageError("--first-step needs --steps");
   const SceneGridSource source(makeScenes(options.scene, options.clustering), parseSize(options.size));
   Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
   const auto paths = writePlot3d(source, options.prefix, progress);
   const Progress::Phase& phase = progress.phases().back();
   for (const auto& path : paths) printLine("{}", path.string());

@@ -18,6 +18,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 #include "tools/serve/access.h"
 #include "tools/serve/server.h"
 
@@ -66,6 +67,7 @@ void serve(const ServeArguments& arguments) {
   const ServerOptions options = optionsFrom(arguments);
   warnOfNetwork(options);
   const ServedCaches caches(arguments.caches);
+  requireThreads();
   Progress progress;
   const StopOnSignals stopping(progress);
   runServer(caches, options, progress, [&](const std::string& address) {

@@ -26,6 +26,7 @@
 #include "tools/output/frame_output.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 #include "tools/viewer/viewer.h"
 
 namespace curvisplat {
@@ -153,6 +154,7 @@ void view(const ViewArguments& arguments) {
     options.files = arguments.files;
     checkGridOptions(arguments);
   }
+  requireThreads();  // without them, Mesa waits for ever
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {

@@ -29,6 +29,7 @@ ConvertOptions optionsFor(const fs::path& output, const std::string& title) {
   options.keep_interrupted = false;  // it may never be opened again
   options.title = title;
   options.temporary_folder = output.parent_path();
+  options.full_disk_hint = "make room, or set XDG_CACHE_HOME to a folder on another disk";
   return options;
 }
 

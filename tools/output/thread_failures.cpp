@@ -53,6 +53,33 @@ void print(std::string_view text) {
   std::abort();
 }
 
+void tryThreads(unsigned count, const char* hint) {
+  if (count == 0) count = std::max(1u, std::thread::hardware_concurrency());
+  count = std::min(count, kMaxTried) + kOwnThreads;
+  Mutex mutex;  // guards `ending`
+  bool ending = false;
+  ConditionVariable changed;
+  std::vector<std::thread> threads;
+  threads.reserve(count);
+  int error = 0;
+  try {
+    while (threads.size() < count)
+      threads.emplace_back([&] {
+        MutexLock lock(mutex);
+        while (!ending) changed.wait(lock);
+      });
+  } catch (const std::system_error& failure) {
+    error = failure.code().value();
+  }
+  {
+    const MutexLock lock(mutex);
+    ending = true;
+  }
+  changed.notify_all();
+  for (std::thread& thread : threads) thread.join();
+  if (error != 0) throw Error("cannot start {} threads: {}; {}", count, std::strerror(error), hint);
+}
+
 void prepare(int, char**, char**) {
   std::set_terminate(onTerminate);
   pthread_attr_t attributes;
@@ -77,35 +104,11 @@ void endLoadingOfLibraries() {
 }
 
 void requireThreads(unsigned count) {
-  if (count == 0) count = std::max(1u, std::thread::hardware_concurrency());
-  count = std::min(count, kMaxTried) + kOwnThreads;
-  Mutex mutex;  // guards `ending`
-  bool ending = false;
-  ConditionVariable changed;
-  std::vector<std::thread> threads;
-  threads.reserve(count);
-  int error = 0;
-  try {
-    while (threads.size() < count)
-      threads.emplace_back([&] {
-        MutexLock lock(mutex);
-        while (!ending) changed.wait(lock);
-      });
-  } catch (const std::system_error& failure) {
-    error = failure.code().value();
-  }
-  {
-    const MutexLock lock(mutex);
-    ending = true;
-  }
-  changed.notify_all();
-  for (std::thread& thread : threads) thread.join();
-  if (error != 0)
-    throw Error(
-        "cannot start {} threads: {}; lower --threads, or raise the limits of processes and memory (ulimit "
-        "-u, "
-        "ulimit -v)",
-        count, std::strerror(error));
+  tryThreads(count, "lower --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)");
+}
+
+void requireThreads() {
+  tryThreads(0, "raise the limits of processes and memory (ulimit -u, ulimit -v)");
 }
 
 }  // namespace curvisplat

@@ -144,6 +144,7 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
   ConvertOptions options;
   options.output = folder / "grid.splats";
   options.scalars = {0};
+  options.keep_interrupted = false;
   options.memory_bytes = effort.memory_bytes;
   options.threads = effort.threads;
   std::vector<Run> runs;

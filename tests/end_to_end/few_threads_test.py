@@ -1,0 +1,93 @@
+#!/usr/bin/python3
+"""few_threads_test.py CURVISPLAT
+
+Each command as a user who may have few processes and threads (ulimit -u): it works, or ends with one line and status 1, and
+leaves nothing. The limit does not bind root, so that the test needs the right to become another user.
+"""
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
+USER = 0x5EED0000 | os.getpid() & 0xFFFF  # has no other process
+MOST_SECONDS = 120  # until the program counts as stuck
+
+
+class FewThreads(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        if os.geteuid() != 0:
+            raise unittest.SkipTest("needs the right to become another user")
+        cls.temporary = tempfile.TemporaryDirectory(prefix="curvisplat_threads_")
+        cls.addClassCleanup(cls.temporary.cleanup)
+        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.folder.chmod(0o755)
+        (cls.folder / "work").mkdir()
+        os.chown(cls.folder / "work", USER, USER)
+        for words in (["generate", "o-grid", "--size", "20x15x10", "-o", "o"], ["convert", "o.xyz", "o.fun", "-o", "o.splats"]):
+            subprocess.run([PROGRAM, *words], cwd=cls.folder, capture_output=True, check=True)
+
+    def limited(self, words, processes):
+        """The program with so many processes and threads; stopped once it has printed, if it does not end by itself."""
+        def limit():
+            resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
+            os.setgroups([])
+            os.setgid(USER)
+            os.setuid(USER)
+        work = self.folder / "work"
+        environment = {"PATH": os.environ["PATH"], "HOME": str(work), "TMPDIR": str(work)}
+        try:
+            program = subprocess.Popen([PROGRAM, *words], cwd=work, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                       text=True, preexec_fn=limit)
+        except (PermissionError, subprocess.SubprocessError) as error:
+            self.skipTest(f"another user cannot run the program here: {error}")
+        self.addCleanup(program.kill)
+        if words[0] == "serve":
+            if program.stdout.readline():
+                program.send_signal(signal.SIGTERM)
+        message = program.communicate(timeout=MOST_SECONDS)[1]
+        return program.returncode, message
+
+    def test_every_command_works_or_ends_with_one_line(self):
+        commands = (["info", "../o.splats"], ["info", "../o.xyz", "../o.fun"], ["convert", "../o.xyz", "../o.fun", "-o", "a.splats"],
+                    ["render", "../o.splats", "-o", "a.png", "--size", "64x48"],
+                    ["render", "../o.xyz", "../o.fun", "-o", "a.png", "--size", "64x48"], ["export", "../o.splats", "-o", "a.ply"],
+                    ["serve", "../o.splats", "--port", "0"])
+        for command in commands:
+            succeeded = False
+            for processes in range(24):
+                with self.subTest(" ".join(command), processes=processes):
+                    status, message = self.limited(command, processes)
+                    made = sorted(path.name for path in (self.folder / "work").iterdir() if path.name != ".cache")
+                    for name in made:
+                        path = self.folder / "work" / name
+                        shutil.rmtree(path) if path.is_dir() else path.unlink()
+                    shutil.rmtree(self.folder / "work" / ".cache", ignore_errors=True)
+                    succeeded = status in (0, 128 + signal.SIGTERM)
+                    if not succeeded:
+                        self.assertEqual(status, 1, message)
+                        self.assertEqual(message.count("\n"), 1, message)
+                        self.assertIn("thread", message)
+                        self.assertEqual(made, [])
+                if succeeded:
+                    break
+            # On machines of many cores more threads are needed.
+            self.assertTrue(succeeded or os.cpu_count() > 8, command)
+
+    def test_the_window_ends_with_one_line_before_it_opens(self):
+        for processes in range(4 + os.cpu_count()):
+            with self.subTest(processes=processes):
+                status, message = self.limited(["view", "../o.splats"], processes)
+                self.assertEqual(status, 1, message)
+                self.assertEqual(message.count("\n"), 1, message)
+                self.assertIn("thread", message)
+
+
+if __name__ == "__main__":
+    unittest.main()
