@@ -230,6 +230,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("volume     {:.8g}\n", m.volume);
   fmt::print("samples    {} at {} in {}, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
              countText(m.blocks.size(), "block"), m.blanked_nodes);
+  if (m.refined > 1)
+    fmt::print("refined    each cell of the files' grid is {0} x {0} x {0} here\n", m.refined);
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {
