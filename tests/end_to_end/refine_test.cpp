@@ -55,6 +55,8 @@ TEST_F(RefineCommand, CutsEachCellAndSaysSo) {
   EXPECT_EQ(fine["upper"], whole["upper"]);
   const ProgramResult info = runProgram({"info", file("2.splats")});
   EXPECT_NE(info.out.find("2 x 2 x 2"), std::string::npos) << info.out;
+  const ProgramResult probe = runProgram({"info", file("2.splats"), "--probe", "0.5,0.5,0.5"});
+  EXPECT_NE(probe.out.find("in the refined grid"), std::string::npos) << probe.out;
   EXPECT_EQ(runProgram({"info", file("1.splats")}).out.find("refined"), std::string::npos);
 
   const Files one = filesOf(folder_ / "2.splats");
