@@ -30,6 +30,7 @@
 #include "bench/real_grids_cases.h"
 #include "bench/vtk_job.h"
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/refined_source.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
@@ -145,6 +146,7 @@ struct Settings {
   std::filesystem::path folder, data;
   std::string only = ".*", views = ".*", json;
   int pixels = 256, rays = 1;
+  uint32_t refine = 1;
   double lod_pixels = 0, voxel_pixels = 0;
   bool for_vtk = false, keep_drawn = false;
 };
@@ -199,7 +201,8 @@ class Measurement {
   void measure(const RealGrid& named) {
     const OpenGrid grid(named);
     const std::filesystem::path cache = settings_.folder / (grid.name + ".splats");
-    if (settings_.voxel_pixels == 0) convertGrid(*grid.source, cache, grid.scalar);
+    if (settings_.voxel_pixels == 0)
+      convertGrid(*refined(named.open(), settings_.refine), cache, grid.scalar);
     PictureSheet sheet(size_, 1);
     for (const NamedView& view : chosenViews(grid)) {
       std::vector<Image> pictures;
@@ -385,6 +388,9 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(16, 2048));
   app.add_option("--rays", settings.rays,
                  "Average the marched pictures of the uniform medium over N x N rays a pixel (default 1)")
+      ->check(CLI::Range(1, 16));
+  app.add_option("--refine", settings.refine,
+                 "Convert each grid with its cells cut into N x N x N by their trilinear map (default 1)")
       ->check(CLI::Range(1, 16));
   app.add_option("--lod-pixels", settings.lod_pixels, "Screen error (default 0: the finest level)");
   app.add_option("--voxel-pixels", settings.voxel_pixels,

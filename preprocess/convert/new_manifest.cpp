@@ -39,6 +39,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.cells = origin.centring() == Centring::kCell;
   if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);
   if (!manifest.cells && description.pieces.empty()) manifest.stretch = kSteepStretch;
+  manifest.refined = description.refined;
   manifest.nodes = survey.nodes;
   manifest.blanked_nodes = survey.blanked.total();
   manifest.grid_checksum = survey.grid_checksum;

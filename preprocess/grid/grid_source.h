@@ -88,6 +88,7 @@ struct GridDescription {
   std::vector<double> times;          // of every time step; empty: the files have none
   uint32_t time_step = 0;             // index of the open one
   std::string time_unit, calendar;    // of the times, by the CF conventions; may be empty
+  uint32_t refined = 1;               // parts of a cell of the files' grid, along an axis
   std::string blanking;               // the files' rule for blanking in words; empty: iblank or the like
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
   std::vector<std::string> notes;     // what the files say besides: "boundaries BCWall 3, BCInflow 1"

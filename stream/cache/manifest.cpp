@@ -28,7 +28,7 @@ constexpr const char* kFormat = "curvisplat splat cache";
 constexpr size_t kLargestText = 16 << 20;
 // Squares and cubes of lengths up to this are finite, and so are sums of positions.
 constexpr double kLargestCoordinate = 1e100;
-constexpr uint64_t kLargestVariableNumber = 0x7fffffff;
+constexpr uint64_t kLargestVariableNumber = 0x7fffffff, kLargestRefinement = 0xffff;
 constexpr const char* kChecksum = "checksum";
 // Names of files and blocks may be in any encoding, but JSON is UTF-8: invalid bytes are replaced.
 constexpr auto kReplace = Json::error_handler_t::replace;
@@ -191,6 +191,7 @@ std::string Manifest::toJson() const {
   for (const BlockInfo& block : blocks)
     json["blocks"].push_back({{"name", block.name}, {"ni", block.ni}, {"nj", block.nj}, {"nk", block.nk}});
   if (cells) json["centring"] = "cell";
+  if (refined > 1) json["refined"] = refined;
   json["nodes"] = nodes;
   json["blanked_nodes"] = blanked_nodes;
   json["splats"] = splats;
@@ -254,6 +255,8 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
     manifest.blocks.push_back({lineOf(block.at("name")), block.at("ni").count(1), block.at("nj").count(1),
                                block.at("nk").count(1)});
   manifest.cells = readCentring(fields);
+  if (const auto refined = fields.find("refined"))
+    manifest.refined = static_cast<uint32_t>(refined->count(1, kLargestRefinement));
   manifest.nodes = fields.at("nodes").count();
   manifest.blanked_nodes = fields.at("blanked_nodes").count(0, manifest.nodes);
   manifest.splats = fields.at("splats").count(1);

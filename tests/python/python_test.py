@@ -490,6 +490,15 @@ class Arrays(PythonTest):
             self.assertIn("fine-values", json.loads((path / "manifest.json").read_text())["requires"])
         with self.assertRaises(curvisplat.UsageError):
             curvisplat.convert(of_files, grid, [function], overwrite=True, value_precision="finer")
+        convert_both = ((curvisplat.convert_arrays, whole, (curvisplat.Block(x, y, z, {"t": t}),)),
+                        (curvisplat.convert, of_files, (grid, [function])))
+        for convert, path, words in convert_both:
+            convert(path, *words, overwrite=True, refine=2)
+            self.assertEqual(json.loads((path / "manifest.json").read_text())["refined"], 2)
+            with self.assertRaises(curvisplat.UsageError):
+                convert(path, *words, overwrite=True, refine=17)
+        for name in ("bricks.bin", "geometry.bin", "var.0.bin"):
+            self.assertEqual((whole / name).read_bytes(), (of_files / name).read_bytes(), name)
 
     def test_of_any_strides_and_layouts_are_the_same(self):
         x, y, z, t = bent_duct()

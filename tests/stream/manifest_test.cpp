@@ -54,6 +54,10 @@ TEST(Manifest, RoundTrips) {
   EXPECT_EQ(back.files[1].checksum, ~uint64_t{0});
   EXPECT_EQ(back.blocks[1].ni, uint64_t{1} << 40);
   EXPECT_EQ(back.steps[0].variables, m.steps[0].variables);
+  EXPECT_EQ(back.refined, 1u) << "of a manifest that does not say";
+  Manifest refined = m;
+  refined.refined = 4;
+  EXPECT_EQ(Manifest::fromJson(refined.toJson(), "manifest.json").refined, 4u);
 }
 
 TEST(Manifest, IsReadWithoutItsChecksumAndInAnyLayout) {
@@ -179,6 +183,7 @@ TEST(Manifest, RefusesWhatIsOutOfRange) {
   refused([](Json& j) { j["blocks"][0]["ni"] = -5; });
   refused([](Json& j) { j["nodes"] = 1.5; });
   refused([](Json& j) { j["blanked_nodes"] = j["nodes"].get<uint64_t>() + 1; });
+  refused([](Json& j) { j["refined"] = 0; });
   refused([](Json& j) { j["splats"] = 0; });
   refused([](Json& j) { j["bricks"] = uint64_t{1} << 32; });
   refused([](Json& j) { j["levels"] = 26; });

@@ -226,6 +226,11 @@ void addConvert(CLI::App& app) {
   command->add_option("--to", arguments->to, "Splat cache that --add-scalar or --add-steps changes");
   addSeriesOptions(*command, *arguments);
   command->add_option("--blank", arguments->blank_value, "Treat samples with this value as blanked");
+  command
+      ->add_option("--refine", arguments->refine,
+                   "Cut each cell into N x N x N by its own trilinear map: for grids of few cells that grow "
+                   "or bend steeply from one to the next (default 1: as they are)")
+      ->check(CLI::Range(1u, kMaxRefinement));
   command->add_option(
       "--value-precision", arguments->precision,
       "Precision of stored values: normal (16 bits over the local range of values) or fine (24 bits, as in a "

@@ -174,9 +174,10 @@ void printProbe(const CacheReader& reader, const InfoOptions& options, const Fin
   const ProbeResult& probed = *found.probe;
   const std::string block =
       reader.manifest().blocks.size() > 1 ? fmt::format("block {}, ", probed.block + 1) : "";
-  fmt::print("{}: nearest {} {}i {}, j {}, k {} (counted from 0) at {:.6g}, {:.6g}, {:.6g}\n", point,
-             reader.manifest().cells ? "cell" : "node", block, probed.i, probed.j, probed.k, probed.centre.x,
-             probed.centre.y, probed.centre.z);
+  const char* const of_refined = reader.manifest().refined > 1 ? " in the refined grid" : "";
+  fmt::print("{}: nearest {} {}i {}, j {}, k {} (counted from 0{}) at {:.6g}, {:.6g}, {:.6g}\n", point,
+             reader.manifest().cells ? "cell" : "node", block, probed.i, probed.j, probed.k, of_refined,
+             probed.centre.x, probed.centre.y, probed.centre.z);
   for (size_t v = 0; v < probed.variables.size(); ++v) {
     const VariableInfo& variable = reader.manifest().variables[v];
     printLine("  {:<20} {:.6g}{} ({:.6g} there)", variable.name, probed.variables[v].value,
@@ -230,6 +231,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("volume     {:.8g}\n", m.volume);
   fmt::print("samples    {} at {} in {}, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
              countText(m.blocks.size(), "block"), m.blanked_nodes);
+  if (m.refined > 1)
+    fmt::print("refined    each cell of the files' grid is {0} x {0} x {0} here\n", m.refined);
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {

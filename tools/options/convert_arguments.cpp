@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <set>
+#include <system_error>
 
+#include "preprocess/grid/refined_source.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/process_usage.h"
+#include "stream/cache/geometry_folder.h"
 #include "tools/options/choices.h"
 #include "tools/options/face_names.h"
 #include "tools/options/grid_options.h"
@@ -58,6 +61,20 @@ std::vector<uint32_t> storedScalars(const GridDescription& description) {
   return positions;
 }
 
+/// What --refine says, or how the cache is refined that is added to or continued. Throws UsageError if these differ.
+uint32_t partsFor(const ConvertArguments& arguments, const std::filesystem::path& cache) {
+  const bool adds = arguments.adds_steps || !arguments.added_scalars.empty();
+  const bool continues = arguments.resume && !arguments.overwrite;
+  std::error_code ignored;  // what is wrong with a cache is said where it is changed
+  if (!(adds || continues) || !std::filesystem::exists(cache / "manifest.json", ignored))
+    return arguments.refine.value_or(1);
+  const uint32_t parts = readManifest(cache).refined;
+  if (arguments.refine && *arguments.refine != parts)
+    throw UsageError("--refine {}: {} was converted with --refine {}; leave the option out",
+                     *arguments.refine, cache.string(), parts);
+  return parts;
+}
+
 }  // namespace
 
 void takeScalarsFromSolutions(ConvertArguments& arguments) {
@@ -86,7 +103,15 @@ std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments,
       const std::vector<std::string> parts = splitAtCommas(word);
       if (parts.size() > 1) grid.scalars.insert(grid.scalars.end(), parts.begin(), parts.end());
     }
-  return openWithDerived(grid, {arguments.gas, arguments.blank_value});
+  std::unique_ptr<DataSource> source = openWithDerived(grid, {arguments.gas, arguments.blank_value});
+  return refinedBy(partsFor(arguments, cache), std::move(source), arguments.blank_value);
+}
+
+std::unique_ptr<DataSource> refinedBy(uint32_t parts, std::unique_ptr<DataSource> source,
+                                      std::optional<double> blank_value) {
+  if (parts == 1) return source;
+  return refined(requireGrid(std::move(source), "cannot be refined; --refine is for structured grids"), parts,
+                 blank_value);
 }
 
 std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,

@@ -19,6 +19,9 @@
 
 namespace curvisplat {
 
+/// Of --refine: a cell becomes 4096.
+inline constexpr uint32_t kMaxRefinement = 16;
+
 /// Command-line arguments as given; checked and parsed later.
 struct ConvertArguments {
   OpenGridOptions grid;
@@ -26,6 +29,7 @@ struct ConvertArguments {
   std::vector<std::string> scalars, added_scalars;
   std::filesystem::path output, to, temporary_folder, statistics, trace;
   std::optional<double> blank_value;
+  std::optional<uint32_t> refine;  // parts of a cell along each axis
   std::optional<std::string> memory;
   unsigned threads = 0;
   bool overwrite = false, resume = false, no_preflight = false, dry_run = false;
@@ -41,8 +45,13 @@ struct ConvertArguments {
   std::optional<uint64_t> until;    // steps of a cache that follows a simulation
 };
 
-/// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.
+/// Opens the grid, refined as --refine says, or as the cache is that is added to or continued. Temporary files go to --tmp, or beside
+/// `cache` without it.
 std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
+
+/// With each cell cut into parts x parts x parts. Throws Error for an unstructured grid, unless `parts` is 1.
+std::unique_ptr<DataSource> refinedBy(uint32_t parts, std::unique_ptr<DataSource> source,
+                                      std::optional<double> blank_value);
 
 /// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names all that
 /// the files store, at most 16 of one centring; a note says what is left out. Prints a note for each number

@@ -21,6 +21,7 @@
 #include "render/colour/published_maps.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
+#include "stream/cache/geometry_folder.h"
 #include "stream/cache/probe.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/option_parsers.h"
@@ -148,6 +149,15 @@ py::tuple points(OpenCache& cache, const DataChoice& choice, const py::object& p
   return pointArrays(cache.reader(), choice, progress);
 }
 
+/// 1 where it is not given.
+uint32_t refinementOf(const py::dict& given_options) {
+  if (!given_options.contains("refine")) return 1;
+  const auto parts = py::cast<uint64_t>(given_options["refine"]);
+  if (parts < 1 || parts > kMaxRefinement)
+    throw UsageError("refine: {} parts of a cell; expected 1 to {}", parts, kMaxRefinement);
+  return static_cast<uint32_t>(parts);
+}
+
 /// The options of a conversion that both kinds of input have.
 ConvertOptions convertOptions(const std::filesystem::path& output, const py::dict& given_options) {
   ConvertOptions options;
@@ -210,7 +220,8 @@ py::dict convertArrays(const std::filesystem::path& output, const py::list& bloc
                        const py::dict& given_options, const py::object& progress) {
   ConvertOptions options = convertOptions(output, given_options);
   options.scalars = allScalars(names);
-  const auto source = sourceOf(blocks, names, given_options);
+  const auto source =
+      refinedBy(refinementOf(given_options), sourceOf(blocks, names, given_options), options.blank_value);
   options.time = py::cast<std::optional<double>>(given_options["time"]);
   return convertSource(*source, std::move(options), progress);
 }
@@ -222,7 +233,9 @@ uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks
   options.convert = convertOptions(cache, given_options);
   options.add = true;
   // Opened at once: its errors name the array.
-  std::unique_ptr<GridSource> source = sourceOf(blocks, names, given_options);
+  std::unique_ptr<DataSource> source = sourceOf(blocks, names, given_options);
+  source =
+      refinedBy(readManifest(options.convert.output).refined, std::move(source), options.convert.blank_value);
   SeriesInput input;
   input.count = 1;
   input.name = [](uint64_t) { return std::string("arrays in memory"); };
@@ -241,7 +254,8 @@ py::dict convertCallable(const std::filesystem::path& output,
   ConvertOptions options = convertOptions(output, given_options);
   options.scalars = allScalars(names);
   const bool parts = py::cast<bool>(given_options["parts_of_rows"]);
-  const auto source = sourceOfCallable(shapes, names, {read, parts});
+  const auto source = refinedBy(refinementOf(given_options), sourceOfCallable(shapes, names, {read, parts}),
+                                options.blank_value);
   return convertSource(*source, std::move(options), progress);
 }
 
@@ -302,8 +316,10 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   arguments.steps = py::cast<std::optional<std::string>>(given_options["steps"]);
   arguments.keep_going = py::cast<bool>(given_options["keep_going"]);
   arguments.adds_steps = py::cast<bool>(given_options["add"]);
+  if (!arguments.adds_steps) arguments.refine = refinementOf(given_options);
   ConvertOptions options = convertOptions(output, given_options);
   arguments.output = arguments.to = options.output;
+  arguments.blank_value = options.blank_value;
   const std::vector<StepFiles> steps = stepsIn(arguments);
   if (options.title.empty()) options.title = arguments.grid.grid.stem().string();
   if (!steps.empty()) return convertSteps(arguments, steps, std::move(options), progress);

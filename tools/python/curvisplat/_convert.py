@@ -40,7 +40,7 @@ def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory
 
 def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, scalars: Union[str, Sequence[str]] = (),
             time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False, vertical_scale: float = 1,
-            blank_value: Optional[float] = None, overwrite: bool = False, resume: bool = False,
+            blank_value: Optional[float] = None, refine: int = 1, overwrite: bool = False, resume: bool = False,
             memory: Union[str, int, None] = None, threads: int = 0, title: str = "", value_precision: str = "normal",
             progress: Optional[Progress] = None) -> Report:
     """Converts grid files of any kind that `curvisplat convert` reads to the cache `output`, with the same bytes.
@@ -50,15 +50,17 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
     keep_going: leave out those that cannot be converted; time_step: one of a file's.
 
     scalars: names (default: all that the files store). vertical_scale: the exaggeration of heights on the globe.
-    blank_value: samples with this value are not drawn. resume: go on from an interrupted conversion. memory: the limit of
-    this process, in bytes or as "2G". value_precision: "normal" (16 bits for the range of a brick) or "fine" (24). progress:
-    called with (phase, done, total, unit).
+    blank_value: samples with this value are not drawn. refine: cut each cell into so many parts along each axis, by its own
+    trilinear map (1 to 16). resume: go on from an interrupted conversion. memory: the limit of this process, in bytes or as
+    "2G". value_precision: "normal" (16 bits for the range of a brick) or "fine" (24). progress: called with (phase, done,
+    total, unit).
 
     Raises Error, UsageError and, after Ctrl-C, KeyboardInterrupt; then no partial cache is left unless `resume` was given,
     and of a series the steps so far.
     """
     options = _options(overwrite, resume, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
+    options["refine"] = _arguments.whole("refine", refine)
     return _convert_files(output, grid, solutions, scalars, options, time_step=time_step, steps=steps, keep_going=keep_going,
                           vertical_scale=vertical_scale, progress=progress)
 
@@ -108,17 +110,18 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
     return tuples, units
 
 
-def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, overwrite: bool = False,
-                   memory: Union[str, int, None] = None, threads: int = 0, title: str = "", time: Optional[float] = None,
-                   value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
+def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, refine: int = 1,
+                   overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
+                   time: Optional[float] = None, value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
     """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
 
-    time: of this step, if others are to follow by append_arrays(), with the same value_precision. Raises as convert() does;
-    UsageError for arrays whose types or shapes do not fit.
+    refine: as in convert(). time: of this step, if others are to follow by append_arrays(), with the same value_precision.
+    Raises as convert() does; UsageError for arrays whose types or shapes do not fit.
     """
     tuples, units = _tuples(blocks)
     options = _options(overwrite, False, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
+    options["refine"] = _arguments.whole("refine", refine)
     options["time"] = None if time is None else float(time)
     return Report(**_core.convert_arrays(_arguments.path(output), tuples, units, options, progress))
 
@@ -144,7 +147,7 @@ def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
 
 
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
-                     scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None,
+                     scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None, refine: int = 1,
                      overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
                      value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
     """Converts a grid larger than memory that `read` hands out piece by piece.
@@ -152,12 +155,14 @@ def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read:
     shapes: (nk, nj, ni) of each block. scalars: names, or units by name. read(block, k0, k1, j0, j1, names) returns (x, y, z, [values of
     each name], blank): arrays of shape (k1 - k0, j1 - j0, ni); blank is None or of bool. If `read` has parameters i0 and i1, it is
     called with them, too, and returns arrays of i1 - i0 elements along i: then rows may be longer than what fits in `memory`. It is
-    called three times for each piece, in any thread, one call at a time. Raises as convert() does, and what `read` raises.
+    called three times for each piece, in any thread, one call at a time. refine: as in convert(). Raises as convert() does,
+    and what `read` raises.
     """
     units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in scalars]
     units = [(_arguments.text("scalars", name), _arguments.text("units", unit)) for name, unit in units]
     options = _options(overwrite, False, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
+    options["refine"] = _arguments.whole("refine", refine)
     options["parts_of_rows"] = _takes_parts_of_rows(read)
     return Report(**_core.convert_callable(_arguments.path(output), [_arguments.shape(shape) for shape in shapes], units, read,
                                            options, progress))

@@ -1,0 +1,289 @@
+#include "preprocess/grid/refined_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMaxCount = std::numeric_limits<uint64_t>::max();
+
+uint64_t productOf(uint64_t a, uint64_t b, const GridBlock& block, uint32_t parts) {
+  if (b != 0 && a > kMaxCount / b)
+    throw Error("block {} has {}x{}x{} nodes, too many to be refined {} times", block.name, block.ni,
+                block.nj, block.nk, parts);
+  return a * b;
+}
+
+GridBlock refinedBlock(const GridBlock& block, uint32_t parts) {
+  GridBlock out = block;
+  for (uint64_t* const count : {&out.ni, &out.nj, &out.nk})
+    if (*count > 1) *count = productOf(*count - 1, parts, block, parts) + 1;
+  productOf(productOf(out.ni, out.nj, block, parts), out.nk, block, parts);
+  return out;
+}
+
+/// The planes of the grid around the refined ones from begin to end: with those before and behind a plane of the grid
+/// itself, since the cells on both of its sides decide whether a node is blanked.
+std::pair<uint64_t, uint64_t> planesAround(uint64_t begin, uint64_t end, uint64_t count, uint32_t parts) {
+  return {(std::max<uint64_t>(begin, 1) - 1) / parts, std::min((end - 1) / parts + 2, count)};
+}
+
+/// Interpolation by the parts of a cell: exact where both ends are equal, and the same from either end.
+class PartsBetween {
+ public:
+  explicit PartsBetween(uint32_t parts) : parts_(parts) {
+    for (uint32_t part = 0; part <= parts; ++part) shares_.push_back(static_cast<double>(part) / parts);
+  }
+
+  double operator()(double first, double last, uint32_t part) const {
+    return first <= last ? first + shares_[part] * (last - first)
+                         : last + shares_[parts_ - part] * (first - last);
+  }
+
+ private:
+  uint32_t parts_;
+  std::vector<double> shares_;
+};
+
+/// A refined node between nodes of the grid, in arrays of a box of these.
+struct PlaceBetween {
+  size_t at = 0;                    // of the lowest of them
+  size_t axes = 0;                  // along which it lies between two
+  std::array<size_t, 3> steps{};    // [axis] from the lower to the higher one
+  std::array<uint32_t, 3> parts{};  // [axis] from the lower one
+
+  /// Of the 1, 2, 4 or 8 nodes around it.
+  size_t corners() const { return size_t{1} << axes; }
+  size_t corner(size_t number) const {
+    size_t node = at;
+    for (size_t axis = 0; axis < axes; ++axis) node += (number >> axis & 1) * steps[axis];
+    return node;
+  }
+};
+
+/// A face's nodes are the mean of both orders of its axes: another block may have them the other way round.
+template <typename Value>
+double valueBetween(const Value* values, const PlaceBetween& place, const PartsBetween& between) {
+  const std::array<size_t, 3>& step = place.steps;
+  const std::array<uint32_t, 3>& part = place.parts;
+  const auto line = [&](size_t at, size_t axis) {
+    return between(values[at], values[at + step[axis]], part[axis]);
+  };
+  const auto face = [&](size_t at) {
+    return 0.5 * (between(line(at, 0), line(at + step[1], 0), part[1]) +
+                  between(line(at, 1), line(at + step[0], 1), part[0]));
+  };
+  if (place.axes == 1) return line(place.at, 0);
+  if (place.axes == 2) return face(place.at);
+  return between(face(place.at), face(place.at + step[2]), part[2]);
+}
+
+/// The nodes of the grid around a box of refined ones, and the way from the refined indices into their arrays.
+class NodesAround {
+ public:
+  NodesAround(const GridBlock& grid, const GridBlock& refined, const NodeBox& box, uint32_t parts)
+      : parts_(parts) {
+    std::tie(box_.i0, box_.i1) = planesAround(box.i0, box.endOfRow(refined.ni), grid.ni, parts);
+    std::tie(box_.j0, box_.j1) = planesAround(box.j0, box.j1, grid.nj, parts);
+    std::tie(box_.k0, box_.k1) = planesAround(box.k0, box.k1, grid.nk, parts);
+    first_ = {box_.i0, box_.j0, box_.k0};
+    counts_ = {box_.i1 - box_.i0, box_.j1 - box_.j0, box_.k1 - box_.k0};
+    strides_ = {1, counts_[0], counts_[0] * counts_[1]};
+  }
+
+  const NodeBox& box() const { return box_; }
+
+  PlaceBetween placeOf(const std::array<uint64_t, 3>& node) const {
+    PlaceBetween place;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      place.at += (node[axis] / parts_ - first_[axis]) * strides_[axis];
+      const auto part = static_cast<uint32_t>(node[axis] % parts_);
+      if (part == 0) continue;
+      place.steps[place.axes] = strides_[axis];
+      place.parts[place.axes++] = part;
+    }
+    return place;
+  }
+
+  /// [lowest node] whether a node of the cell is missing; a flat block's cells have no thickness.
+  std::vector<uint8_t> brokenCells(std::vector<uint8_t> missing) const {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (counts_[axis] < 2) continue;
+      for (size_t n = 0; n < missing.size(); ++n) {
+        const bool is_last = n / strides_[axis] % counts_[axis] + 1 == counts_[axis];
+        missing[n] |= is_last ? 1 : missing[n + strides_[axis]];
+      }
+    }
+    return missing;
+  }
+
+  /// Whether one of the cells that a refined node lies in, or on the border of, is whole.
+  bool isInWhole(const std::array<uint64_t, 3>& node, const std::vector<uint8_t>& broken) const {
+    size_t at = 0;
+    std::array<size_t, 3> back{};  // to the cell before, along axes where the node is on its border
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const uint64_t plane = node[axis] / parts_ - first_[axis];
+      at += plane * strides_[axis];
+      if (node[axis] % parts_ == 0 && plane > 0) back[axis] = strides_[axis];
+    }
+    for (const size_t i : {size_t{0}, back[0]})
+      for (const size_t j : {size_t{0}, back[1]})
+        for (const size_t k : {size_t{0}, back[2]})
+          if (!broken[at - i - j - k]) return true;
+    return false;
+  }
+
+ private:
+  uint64_t parts_;
+  NodeBox box_;
+  std::array<uint64_t, 3> first_{}, counts_{}, strides_{};
+};
+
+/// Calls `take` with the indices of each node of the box.
+template <typename Take>
+void forEachNode(const NodeBox& box, uint64_t ni, const Take& take) {
+  for (uint64_t k = box.k0; k < box.k1; ++k)
+    for (uint64_t j = box.j0; j < box.j1; ++j)
+      for (uint64_t i = box.i0; i < box.endOfRow(ni); ++i) take(std::array{i, j, k});
+}
+
+class RefinedSource final : public GridSource {
+ public:
+  RefinedSource(std::unique_ptr<GridSource> source, uint32_t parts, std::optional<double> blank_value)
+      : source_(std::move(source)), parts_(parts), between_(parts), description_(source_->description()) {
+    if (blank_value) blank_value_ = static_cast<float>(*blank_value);
+    for (GridBlock& block : description_.blocks) block = refinedBlock(block, parts);
+    for (GridBoundary& boundary : description_.boundaries)
+      for (size_t axis = 0; axis < 3; ++axis) {
+        boundary.first[axis] *= parts;
+        boundary.last[axis] *= parts;
+      }
+    description_.refined *= parts;
+    description_.format += fmt::format(", refined {0} x {0} x {0}", parts);
+  }
+
+  const GridDescription& description() const override { return description_; }
+
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    const NodesAround around = aroundOf(block, box);
+    NodeArrays grid;
+    readBox(*source_, block, around.box(), scalars, grid);
+    const uint64_t ni = description_.blocks[block].ni;
+    const size_t count = box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0);
+    for (auto* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
+    out.scalars.resize(scalars.size());
+    for (std::vector<float>& values : out.scalars) values.resize(count);
+    size_t at = 0;
+    forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
+      const PlaceBetween place = around.placeOf(node);
+      out.x[at] = valueAt(grid.x, place);
+      out.y[at] = valueAt(grid.y, place);
+      out.z[at] = valueAt(grid.z, place);
+      for (size_t n = 0; n < scalars.size(); ++n)
+        out.scalars[n][at] =
+            isOfCells(scalars[n]) ? grid.scalars[n][place.at] : valueAt(grid.scalars[n], place);
+      ++at;
+    });
+    fillBlanks(around, box, ni, missingOf(scalars, grid), grid.blank, out.blank);
+  }
+
+  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                      NodeArrays& out) const override {
+    read(block, box, scalars, out);
+  }
+
+  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
+    return (source_->rowsInMemory(scalars) + parts_ - 1) / parts_;  // the grid's rows are shorter
+  }
+
+  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
+    const NodesAround around = aroundOf(block, box);
+    std::vector<uint8_t> grid;
+    if (!source_->readFringePart(block, around.box(), grid)) return false;
+    out.clear();
+    forEachNode(box, description_.blocks[block].ni, [&](const std::array<uint64_t, 3>& node) {
+      const PlaceBetween place = around.placeOf(node);
+      bool all = true;
+      for (size_t corner = 0; corner < place.corners(); ++corner)
+        all = all && grid[place.corner(corner)] != 0;
+      out.push_back(all);
+    });
+    return true;
+  }
+
+ private:
+  NodesAround aroundOf(uint32_t block, const NodeBox& box) const {
+    return {source_->description().blocks.at(block), description_.blocks.at(block), box, parts_};
+  }
+
+  bool isOfCells(uint32_t scalar) const {
+    return description_.scalars.at(scalar).centring == Centring::kCell;
+  }
+
+  /// The grid's own nodes keep their bits.
+  template <typename Value>
+  Value valueAt(const std::vector<Value>& values, const PlaceBetween& place) const {
+    if (place.axes == 0) return values[place.at];
+    return static_cast<Value>(valueBetween(values.data(), place, between_));
+  }
+
+  /// [node of the grid]: whether it is not there.
+  std::vector<uint8_t> missingOf(std::span<const uint32_t> scalars, const NodeArrays& grid) const {
+    std::vector<uint8_t> missing(grid.blank.size());
+    for (size_t n = 0; n < missing.size(); ++n)
+      missing[n] = grid.blank[n] != 0 ||
+                   !(std::isfinite(grid.x[n]) && std::isfinite(grid.y[n]) && std::isfinite(grid.z[n]));
+    for (size_t scalar = 0; scalar < scalars.size(); ++scalar) {
+      if (isOfCells(scalars[scalar])) continue;
+      const std::vector<float>& values = grid.scalars[scalar];
+      for (size_t n = 0; n < missing.size(); ++n)
+        missing[n] |= !std::isfinite(values[n]) || values[n] == blank_value_;
+    }
+    return missing;
+  }
+
+  static void fillBlanks(const NodesAround& around, const NodeBox& box, uint64_t ni,
+                         const std::vector<uint8_t>& missing, const std::vector<uint8_t>& blank,
+                         std::vector<uint8_t>& out) {
+    if (std::find(missing.begin(), missing.end(), 1) == missing.end()) {
+      out.assign(box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0), 0);
+      return;
+    }
+    const std::vector<uint8_t> broken = around.brokenCells(missing);
+    out.clear();
+    forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
+      const PlaceBetween place = around.placeOf(node);
+      out.push_back(place.axes == 0 ? blank[place.at] : !around.isInWhole(node, broken));
+    });
+  }
+
+  const std::unique_ptr<const GridSource> source_;
+  const uint32_t parts_;
+  const PartsBetween between_;
+  std::optional<float> blank_value_;
+  GridDescription description_;
+};
+
+}  // namespace
+
+std::unique_ptr<GridSource> refined(std::unique_ptr<GridSource> source, uint32_t parts,
+                                    std::optional<double> blank_value) {
+  CURVISPLAT_CHECK(parts > 0);
+  if (parts == 1) return source;
+  return std::make_unique<RefinedSource>(std::move(source), parts, blank_value);
+}
+
+}  // namespace curvisplat
