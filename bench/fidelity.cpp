@@ -12,6 +12,7 @@
 
 #include "bench/picture_sheet.h"
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/refined_source.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
@@ -35,7 +36,7 @@ struct View {
 /// A grid, and the field that its picture is compared with.
 struct Case {
   std::string name;
-  std::unique_ptr<GridSource> corners;  // cell-centred cases: the grid whose cells `source` offers
+  std::unique_ptr<GridSource> corners;  // what `source` or `field` is made from, where that is another grid
   std::unique_ptr<GridSource> source;
   uint32_t scalar = 0;
   std::shared_ptr<const Scene> scene;  // the scene behind `field`, if it is analytic
@@ -81,16 +82,21 @@ Case trilinearCase(const std::string& name, const std::string& scene, std::optio
   return out;
 }
 
-Case realCase(const std::string& name, const std::filesystem::path& grid,
-              const std::filesystem::path& solution, const std::string& scalar) {
+struct RealGrid {
+  std::filesystem::path grid, solution;
+  std::string scalar;
+};
+
+Case realCase(const std::string& name, const RealGrid& real, uint32_t refine) {
   Case out;
-  out.name = name;
+  out.name = refine == 1 ? name : fmt::format("{} /{}", name, refine);
   OpenGridOptions options;
-  options.grid = grid;
-  options.solutions = {solution};
-  out.source = openGrid(options);
-  out.scalar = scalarsNamed(out.source->description(), {scalar}).front();
-  auto field = std::make_unique<GridField>(*out.source, out.scalar);
+  options.grid = real.grid;
+  options.solutions = {real.solution};
+  out.corners = openGrid(options);
+  out.source = refined(openGrid(options), refine);
+  out.scalar = scalarsNamed(out.corners->description(), {real.scalar}).front();
+  auto field = std::make_unique<GridField>(*out.corners, out.scalar);
   const auto [lower, upper] = field->bounds();
   out.range = field->range();
   out.length = glm::length(upper - lower) / 3;  // as for half-annulus, whose diagonal is 2.6
@@ -108,7 +114,7 @@ struct NamedCase {
   std::function<Case()> make;
 };
 
-std::vector<NamedCase> allCases() {
+std::vector<NamedCase> allCases(uint32_t refine) {
   const View front{"front", halfAnnulusCamera()}, edge{"edge-on", edgeOnCamera()},
       perspective{"30 degrees", perspectiveCamera(30)}, wide{"90 degrees", perspectiveCamera(90)};
   Camera from_afar = halfAnnulusCamera();
@@ -144,7 +150,7 @@ std::vector<NamedCase> allCases() {
   const auto real = [&](const std::string& name, const std::string& grid, const std::string& solution,
                         const std::string& scalar) {
     if (std::filesystem::exists(data / grid))
-      cases.push_back({name, [=] { return realCase(name, data / grid, data / solution, scalar); }});
+      cases.push_back({name, [=] { return realCase(name, {data / grid, data / solution, scalar}, refine); }});
   };
   real("bluntfin density", "bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin", "density");
   real("combustor density", "combustor/combxyz.bin", "combustor/combq.bin", "density");
@@ -156,6 +162,7 @@ struct Settings {
   std::filesystem::path folder;
   std::string only = ".*", views = ".*";
   int pixels = kPixels, rays = 1;
+  uint32_t refine = 1;
   Backend backend = Backend::kCpu;
   double low_pass_px2 = FrameOptions().low_pass_px2;
   bool pictures = false, quick = false;
@@ -184,7 +191,7 @@ class Measurement {
  private:
   static std::string fileName(std::string name) {
     for (char& c : name)
-      if (c == ' ') c = '_';
+      if (c == ' ' || c == '/') c = '_';
     return name;
   }
 
@@ -285,6 +292,8 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(8, 4096));
   app.add_option("--rays", settings.rays, "Average the references over N x N rays a pixel (default 1)")
       ->check(CLI::Range(1, 16));
+  app.add_option("--refine", settings.refine, "Cut the cells of real grids into N x N x N, as convert does")
+      ->check(CLI::Range(1, 16));
   app.add_option("--json", json, "Write the table as JSON to this file");
   app.add_option("--backend", settings.backend, "Backend: cpu, osmesa, egl or auto")
       ->transform(CLI::CheckedTransformer(backends));
@@ -293,7 +302,7 @@ int run(int argc, char** argv) {
   app.add_flag("--quick", settings.quick, "Only the finest level, classified per pixel");
   CLI11_PARSE(app, argc, argv);
   Measurement measurement(settings);
-  for (const NamedCase& named : allCases())
+  for (const NamedCase& named : allCases(settings.refine))
     if (std::regex_search(named.name, std::regex(settings.only))) measurement.measure(named.make());
   if (!json.empty()) writeFileAtomically(json, measurement.rows().dump(1) + "\n");
   return 0;
