@@ -17,14 +17,13 @@ glm::dvec4 weighted(const TransferFunction::Value& value) {
 
 namespace {
 
-/// The part of a function's range that a table for data in [data_low, data_high] covers.
+/// The part of a function's range that data in [data_low, data_high] reaches.
 std::pair<double, double> coveredRange(const TransferFunction& transfer_function, double data_low,
                                        double data_high) {
-  const double margin = 0.25 * (data_high - data_low);
   const auto [from, to] = transfer_function.range();
-  double low = std::clamp(from, data_low - margin, data_high + margin);
-  double high = std::clamp(to, data_low - margin, data_high + margin);
-  if (transfer_function.logScale()) low = std::max(low, from);  // the margin may have reached below zero
+  double low = std::clamp(from, data_low, data_high);
+  if (transfer_function.logScale()) low = std::max(low, from);  // the data may end below zero
+  double high = std::clamp(to, data_low, data_high);
   // A constant field, or a transfer function that is constant over the data: any interval will do.
   if (!(high > low)) high = low + std::max(std::abs(low), 1.0) * 1e-3;
   return {low, high};

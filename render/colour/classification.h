@@ -26,9 +26,8 @@ class ClassificationTable {
   /// Smaller scalars are clamped to this before the logarithm is taken.
   static constexpr float kMinLogarithmic = 1e-37f;
 
-  /// A table for scalars in about [data_low, data_high]. It covers the part of the transfer function's range
-  /// that the data can reach, with a quarter of the data's range added on either side, since a splat's mean
-  /// at a pixel can lie beyond the samples' values.
+  /// A table for data in [data_low, data_high]. A splat's mean at a pixel can lie beyond: its tangent overshoots at a
+  /// step. There the function is what it is at the end of the data, so that no value is seen that the data does not have.
   static ClassificationTable of(const TransferFunction& transfer_function, double data_low, double data_high);
 
   /// The same of the colours alone, with extinction 1 everywhere: mean() is the mean colour.

@@ -104,5 +104,15 @@ TEST(Classification, OfAPresetFollowsItWhereDataCanBe) {
   EXPECT_NEAR(ClassificationTable::of(preset, 8, 9).mean(8.5, 0.1).w, preset.at(8.5).extinction, 1e-9);
 }
 
+TEST(Classification, ShowsNoValueThatTheDataDoesNotHave) {
+  const auto preset = TransferFunction::preset("grey", 0, 60, 1);
+  // A tangent reaches 45 beside a step from 0 to 35.
+  const ClassificationTable table = ClassificationTable::of(preset, 0, 35);
+  EXPECT_NEAR(table.mean(45, 0).w, preset.at(35).extinction, 1e-6);
+  EXPECT_NEAR(table.mean(40, 4).y, preset.at(35).colour.g * preset.at(35).extinction, 1e-6);
+  EXPECT_NEAR(table.mean(-9, 3).w, preset.at(0).extinction, 1e-6);
+  EXPECT_NEAR(table.mean(17, 0).w, preset.at(17).extinction, 1e-3);
+}
+
 }  // namespace
 }  // namespace curvisplat
