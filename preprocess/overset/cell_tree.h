@@ -16,7 +16,7 @@
 #include "preprocess/grid/hexahedron_location.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/overset/cell_size.h"
-#include "preprocess/survey/box_tree.h"
+#include "preprocess/survey/bounding_tree.h"
 
 namespace curvisplat {
 

@@ -11,7 +11,7 @@
 
 #include "preprocess/grid/slabs.h"
 #include "preprocess/overset/cell_size.h"
-#include "preprocess/survey/box_tree.h"
+#include "preprocess/survey/bounding_tree.h"
 
 namespace curvisplat {
 

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "preprocess/survey/box_tree.h"
+#include "preprocess/survey/bounding_tree.h"
 
 namespace curvisplat {
 
@@ -53,13 +53,10 @@ class PointTree {
  public:
   /// Of some of `points`, by number. Copies them.
   template <typename Point>
-  PointTree(std::span<const Point> points, std::span<const uint32_t> numbers) {
-    points_.reserve(numbers.size());
-    for (const uint32_t n : numbers) points_.push_back({points[n].position, n});
-    if (!points_.empty()) build(0, static_cast<uint32_t>(points_.size()));
-  }
+  PointTree(std::span<const Point> points, std::span<const uint32_t> numbers)
+      : tree_(numbered(points, numbers), kLeafPoints) {}
 
-  size_t size() const { return points_.size(); }
+  size_t size() const { return tree_.items().size(); }
 
   /// Calls each(number) for all points that the hexahedron's bounding box and its slanted box hold; where they are few,
   /// for all points of the bounding box.
@@ -69,53 +66,45 @@ class PointTree {
   /// Calls each(number) for all points.
   template <typename Each>
   void forEach(const Each& each) const {
-    for (const Numbered& point : points_) each(point.number);
+    for (const Numbered& point : tree_.items()) each(point.number);
   }
 
  private:
-  struct Node {
-    BoundingBox box;
-    uint32_t begin = 0, end = 0;  // of points_
-    uint32_t second = 0;          // the second child, the first being the next node; 0: a leaf
-  };
+  static constexpr uint32_t kLeafPoints = 8;
   struct Numbered {
     glm::dvec3 position;
     uint32_t number;
+    const glm::dvec3& box() const { return position; }
+    const glm::dvec3& place() const { return position; }
   };
+  template <typename Point>
+  static std::vector<Numbered> numbered(std::span<const Point> points, std::span<const uint32_t> numbers) {
+    std::vector<Numbered> out;
+    out.reserve(numbers.size());
+    for (const uint32_t n : numbers) out.push_back({points[n].position, n});
+    return out;
+  }
 
-  void build(uint32_t begin, uint32_t end);
-
-  std::vector<Numbered> points_;
-  std::vector<Node> nodes_;  // parents before their children
+  BoundingTree<Numbered> tree_;
 };
 
 template <typename Each>
 void PointTree::forEachNear(const std::array<glm::dvec3, 8>& corner, const Each& each) const {
-  if (nodes_.empty()) return;
   BoundingBox box;
   for (const glm::dvec3& node : corner) box.add(node);
-  if (!nodes_[0].box.touches(box)) return;
   constexpr size_t kManyNodes = 32;  // from there on the slanted box pays
   std::optional<SlantedBox> slanted;
   size_t visited = 0;
-  uint32_t stack[64];  // the tree is balanced: 32 levels at most
-  size_t depth = 0;
-  stack[depth++] = 0;
-  while (depth > 0) {
-    const uint32_t number = stack[--depth];
-    const Node& node = nodes_[number];
-    if (!node.box.touches(box)) continue;
-    if (++visited == kManyNodes) slanted.emplace(corner);
-    if (slanted && !slanted->mayTouch(node.box)) continue;
-    if (node.second != 0) {
-      stack[depth++] = node.second;
-      stack[depth++] = number + 1;
-      continue;
-    }
-    for (uint32_t n = node.begin; n < node.end; ++n)
-      if (box.holds(points_[n].position) && (!slanted || slanted->holds(points_[n].position)))
-        each(points_[n].number);
-  }
+  tree_.visit(
+      [&](const BoundingBox& node) {
+        if (!node.touches(box)) return false;
+        if (++visited == kManyNodes) slanted.emplace(corner);
+        return !slanted || slanted->mayTouch(node);
+      },
+      [&](const Numbered& point) {
+        if (box.holds(point.position) && (!slanted || slanted->holds(point.position))) each(point.number);
+        return false;
+      });
 }
 
 }  // namespace curvisplat

@@ -37,6 +37,17 @@ class RanksCommand : public testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
+  /// A script that draws never.png: the given rank from a cache of its own, the others from `cache`.
+  static std::string renderScript(unsigned rank, const std::string& its_cache, const std::string& cache) {
+    const std::string script = file(fmt::format("as_rank_{}.sh", rank));
+    writeFileAtomically(script, fmt::format("#!/bin/sh\n"
+                                            "cache=\"{}\"\n"
+                                            "[ \"$OMPI_COMM_WORLD_RANK\" = {} ] && cache=\"{}\"\n"
+                                            "exec \"{}\" render \"$cache\" -o \"{}\"\n",
+                                            cache, rank, its_cache, CURVISPLAT_PROGRAM, file("never.png")));
+    fs::permissions(script, fs::perms::owner_all);
+    return script;
+  }
   static void expectSameFile(const std::string& a, const std::string& b) {
     EXPECT_TRUE(readTextFile(file(a)) == readTextFile(file(b))) << a << " and " << b;
   }
@@ -171,14 +182,7 @@ TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
 
 TEST_F(RanksCommand, OfSeveralThatFailOfOneCauseTheLowestReports) {
   // All ranks but the first see no cache; rank 0 fails later than they do, as it hears of it.
-  const std::string script = file("first_sees.sh");
-  writeFileAtomically(
-      script, fmt::format("#!/bin/sh\n"
-                          "cache=\"{}\"\n"
-                          "[ \"$OMPI_COMM_WORLD_RANK\" = 0 ] && cache=\"{}\"\n"
-                          "exec \"{}\" render \"$cache\" -o \"{}\"\n",
-                          file("missing.splats"), file("g.splats"), CURVISPLAT_PROGRAM, file("never.png")));
-  fs::permissions(script, fs::perms::owner_all);
+  const std::string script = renderScript(0, file("g.splats"), file("missing.splats"));
   const ProgramResult result = runAsRanks(4, {}, script);
   EXPECT_EQ(result.status, 1);
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
@@ -189,14 +193,7 @@ TEST_F(RanksCommand, OfSeveralThatFailOfOneCauseTheLowestReports) {
 
 TEST_F(RanksCommand, AreEndedByTheOneThatFails) {
   // Rank 1 sees no cache, as on a machine where the file system is not mounted.
-  const std::string script = file("one_blind.sh");
-  writeFileAtomically(
-      script, fmt::format("#!/bin/sh\n"
-                          "cache=\"{}\"\n"
-                          "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && cache=\"{}\"\n"
-                          "exec \"{}\" render \"$cache\" -o \"{}\"\n",
-                          file("g.splats"), file("missing.splats"), CURVISPLAT_PROGRAM, file("never.png")));
-  fs::permissions(script, fs::perms::owner_all);
+  const std::string script = renderScript(1, file("missing.splats"), file("g.splats"));
   const ProgramResult result = runAsRanks(3, {}, script);
   EXPECT_EQ(result.status, 1);
   EXPECT_EQ(lineCount(result.err), 1) << result.err;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -68,6 +69,13 @@ AddScalarOptions adding(const fs::path& cache, std::vector<uint32_t> scalars) {
 AddScalarReport addQuietly(const GridSource& source, const AddScalarOptions& options) {
   Progress progress;
   return addScalars(source, options, progress);
+}
+
+void changeManifest(const fs::path& cache, const std::function<void(nlohmann::ordered_json&)>& change) {
+  auto manifest = nlohmann::ordered_json::parse(readTextFile(cache / "manifest.json"));
+  manifest.erase("checksum");
+  change(manifest);
+  writeFileAtomically(cache / "manifest.json", manifest.dump());
 }
 
 /// What adding throws, as text; empty if it does not.
@@ -233,11 +241,9 @@ TEST(AddScalar, CutsOctantsInCachesThatHaveThemOnly) {
 
   // Of a cache without the feature, whole pieces are expected: they lie elsewhere.
   convertTo(folder / "older.splats", source, {0});
-  const fs::path manifest = folder / "older.splats/manifest.json";
-  auto json = nlohmann::ordered_json::parse(readTextFile(manifest));
-  json.erase("checksum");
-  std::erase(json["requires"].get_ref<nlohmann::ordered_json::array_t&>(), kCellOctants);
-  writeFileAtomically(manifest, json.dump());
+  changeManifest(folder / "older.splats", [](nlohmann::ordered_json& json) {
+    std::erase(json["requires"].get_ref<nlohmann::ordered_json::array_t&>(), kCellOctants);
+  });
   EXPECT_NE(refusal(source, adding(folder / "older.splats", {1})).find("another position"),
             std::string::npos);
 }
@@ -263,11 +269,7 @@ TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
 
   // Of a cache from before, splats as they were then are expected.
   convertTo(folder / "older.splats", source, {0});
-  const fs::path manifest = folder / "older.splats/manifest.json";
-  auto json = nlohmann::ordered_json::parse(readTextFile(manifest));
-  json.erase("checksum");
-  json.erase("stretch");
-  writeFileAtomically(manifest, json.dump());
+  changeManifest(folder / "older.splats", [](nlohmann::ordered_json& json) { json.erase("stretch"); });
   EXPECT_NE(refusal(source, adding(folder / "older.splats", {1})).find("another position"),
             std::string::npos);
 }

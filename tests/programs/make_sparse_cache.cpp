@@ -1,5 +1,5 @@
-// make_sparse_cache OUT.splats BRICKS: a cache of so many bricks, with streams in the coarsest only (sparse_cache.h),
-// to be measured: `make_sparse_cache a.splats 1000000 && curvisplat render a.splats ...`
+// make_sparse_cache OUT.splats BRICKS: makes a cache of that many bricks, of which only the coarsest have data
+// (sparse_cache.h), to measure with: `make_sparse_cache a.splats 1000000 && curvisplat render a.splats ...`
 #include <fmt/format.h>
 
 #include <cstdio>
