@@ -144,6 +144,11 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
                    const TransferFunction& function, const Camera& camera, ImageSize size) {
   ProjectionSettings settings;
   std::vector<DirectSplat> splats = splatsOf(source, scalar, options);
+  double low = splats.front().value.mean, high = low;  // the data's, which merged splats do not reach
+  for (const DirectSplat& splat : splats) {
+    low = std::min(low, splat.value.mean);
+    high = std::max(high, splat.value.mean);
+  }
   if (options.voxel > 0) splats = mergedIntoVoxels(splats, options);
   if (options.cut_splats) {
     settings.clip_planes = options.clip_planes;
@@ -155,12 +160,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
     });
   }
   glm::dvec3 origin = splats.front().splat.position;
-  double low = splats.front().value.mean, high = low;
-  for (const auto& [splat, value, codes] : splats) {
-    origin = glm::min(origin, splat.position);
-    low = std::min(low, value.mean);
-    high = std::max(high, value.mean);
-  }
+  for (const DirectSplat& splat : splats) origin = glm::min(origin, splat.splat.position);
   const ProjectedArrays arrays = projectedArrays(splats, origin);
   const ClassificationTable table = ClassificationTable::of(function, low, high);
   settings.view = ScreenView::of(camera, size, glm::dvec3(1), options.low_pass_px2, options.near);
