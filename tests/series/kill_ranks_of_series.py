@@ -35,6 +35,19 @@ def ranks_of(pid, program):
     return found
 
 
+def living(pids):
+    """Those of `pids` that have not ended; one that its parent has not yet asked for (a zombie) has."""
+    found = []
+    for pid in pids:
+        try:
+            state = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            continue
+        if state not in "XZ":
+            found.append((pid, state))
+    return found
+
+
 class RanksOfSeries(Series):
     def by_ranks(self, count, command):
         return [str(word) for word in (*MPIRUN, count, self.program, *command, "--threads", "1", "--memory", "256M")]
@@ -45,11 +58,14 @@ class RanksOfSeries(Series):
         return time.monotonic() - start
 
     def killed(self, command, moment):
-        """Whether a rank was killed before the job was done."""
+        """Whether a rank was killed before the job was done, and what else is worth saying of its end.
+
+        Open MPI's launcher sleeps for ever, now and then, when a rank dies within MPI_Init: once all ranks have ended, it is killed.
+        """
         with subprocess.Popen(self.by_ranks(RANKS, command), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as job:
             try:
                 job.wait(timeout=moment)
-                return False
+                return False, ""
             except subprocess.TimeoutExpired:
                 pass
             ranks = ranks_of(job.pid, self.program)
@@ -59,10 +75,15 @@ class RanksOfSeries(Series):
                 except ProcessLookupError:
                     pass
             try:
-                return job.wait(timeout=60) != 0
+                return job.wait(timeout=60) != 0, ""
             except subprocess.TimeoutExpired:
+                left = living({*ranks, *ranks_of(job.pid, self.program)})
                 job.kill()
-                raise SystemExit("the other ranks did not end within a minute") from None
+                for pid, _ in left:
+                    os.kill(pid, signal.SIGKILL)
+                if left:
+                    raise SystemExit(f"ranks did not end within a minute: {left}") from None
+                return True, " (all ranks ended, their launcher did not)"
 
 
 def main(program, kills=20, size="28x24x12", steps=8):
@@ -87,7 +108,8 @@ def main(program, kills=20, size="28x24x12", steps=8):
                     series.prepare(job)
                     moment = duration * (n + random.random()) / kills
                     tried += 1
-                    killed += series.killed(command, moment)
+                    ended, remark = series.killed(command, moment)
+                    killed += ended
                     left = series.found_steps()
                     resuming = random.randint(1, 4)
                     # What was to be added may not have a cache of its own: the whole is resumed.
@@ -99,8 +121,8 @@ def main(program, kills=20, size="28x24x12", steps=8):
                         faults.append("resumed, it has other files")
                     if list(series.cache.parent.glob("a.splats?*")):
                         faults.append("something lies beside the cache")
-                    print(f"{'moving' if moving else 'fixed'} {job}: a rank killed after {moment:.3f} of {duration:.3f} s: {left} steps "
-                          f"left; by {resuming}: {'; '.join(faults).upper() or 'resumed to the same bytes'}", flush=True)
+                    print(f"{'moving' if moving else 'fixed'} {job}: a rank killed after {moment:.3f} of {duration:.3f} s{remark}: "
+                          f"{left} steps left; by {resuming}: {'; '.join(faults).upper() or 'resumed to the same bytes'}", flush=True)
                     failed |= bool(faults)
                     faults = []
     print(f"{killed} of {tried} were ended before they were done")
