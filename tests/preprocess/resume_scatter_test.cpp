@@ -176,7 +176,8 @@ TEST_F(ResumeScatter, AgainAndAgain) {
   uint64_t slabs = noted();
   // Each at the first write at which a further slab was noted.
   for (int further = 0, at = 0; further < 2; ++at) {
-    ASSERT_TRUE(interruptedInScatter(source, at, true)) << "at write " << at << " after " << slabs << " slabs";
+    ASSERT_TRUE(interruptedInScatter(source, at, true))
+        << "at write " << at << " after " << slabs << " slabs";
     ASSERT_GE(noted(), slabs);
     if (noted() == slabs) continue;
     slabs = noted();
