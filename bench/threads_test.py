@@ -73,7 +73,7 @@ class Threads(unittest.TestCase):
         scopes, _ = self.written(path)
         frames = [one for one in scopes if one.name == "frame"]
         self.assertEqual(len(frames), 3)
-        self.assertLessEqual({"plan", "project brick", "paint tile", "write picture"}, {one.name for one in scopes})
+        self.assertLessEqual({"plan", "project brick", "paint tiles", "write picture"}, {one.name for one in scopes})
 
     def test_trace_is_refused(self):
         found = run("render", FOLDER / "none.splats", "-o", FOLDER / "x.png", "--trace", FOLDER / "no" / "t.json", status=1)
