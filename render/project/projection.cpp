@@ -18,6 +18,7 @@
 #include "render/project/splat_ellipse.h"
 #include "render/project/splat_maps.h"
 #include "stream/base/check.h"
+#include "stream/base/vector_clones.h"
 #include "stream/model/border_code.h"
 #include "stream/model/border_pairs.h"
 #include "stream/model/growth_code.h"
@@ -56,8 +57,10 @@ ScreenSplat screenSplat(float x, float y, const Ellipse& e, float mean) {
   return {x, y, e.l11, e.l21, e.l22, e.amplitude, mean, e.slope0, e.slope1, e.half_width, 0};
 }
 
-void computeBlock(const OrthographicMap& map, const GeometryArrays<const float>& geometry,
-                  const VariableArrays<const float>& variable, size_t begin, size_t count, Block& block) {
+CURVISPLAT_VECTOR_CLONES void computeBlock(const OrthographicMap& map,
+                                           const GeometryArrays<const float>& geometry,
+                                           const VariableArrays<const float>& variable, size_t begin,
+                                           size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
@@ -71,8 +74,10 @@ void computeBlock(const OrthographicMap& map, const GeometryArrays<const float>&
   }
 }
 
-void computeBlock(const PerspectiveMap& map, const GeometryArrays<const float>& geometry,
-                  const VariableArrays<const float>& variable, size_t begin, size_t count, Block& block) {
+CURVISPLAT_VECTOR_CLONES void computeBlock(const PerspectiveMap& map,
+                                           const GeometryArrays<const float>& geometry,
+                                           const VariableArrays<const float>& variable, size_t begin,
+                                           size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
