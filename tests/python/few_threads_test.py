@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """few_threads_test.py
 
-The Python package for a user who may have few processes and threads (ulimit -u): whatever it is asked for works, or raises an
-exception of one line and leaves nothing; the interpreter goes on. The limit does not bind root, so that the test needs the right
-to become another user. The package is found by PYTHONPATH.
+The Python package for a user who may have few processes and threads (ulimit -u), or little address space (ulimit -v): whatever it
+is asked for works, or raises an exception of one line and leaves nothing; the interpreter goes on. The former limit does not bind
+root, so that its test needs the right to become another user. The package is found by PYTHONPATH.
 """
 
 import os
@@ -97,6 +97,19 @@ class FewThreadsTest(unittest.TestCase):
                     break
             # On machines of many cores more threads are needed.
             self.assertTrue(done or os.cpu_count() > 8, name)
+
+
+class LittleAddressSpaceTest(unittest.TestCase):
+    def test_it_works_or_raises(self):
+        """ulimit -v: also where the libraries fit, and their threads do not."""
+        work = "import curvisplat" + ARRAYS.format("'o.splats'")
+        script = (f"import os\ntry:\n{textwrap.indent(work, ' ')}\n"
+                  "except (ImportError, MemoryError, RuntimeError):\n assert not os.listdir()\n")
+        for mebibytes in range(100, 640, 10):
+            with self.subTest(mebibytes=mebibytes), tempfile.TemporaryDirectory() as folder:
+                run = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, timeout=MOST_SECONDS,
+                                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, 2 * (mebibytes << 20,)))
+                self.assertEqual(run.returncode, 0, run.stderr)
 
 
 if __name__ == "__main__":

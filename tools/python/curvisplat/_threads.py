@@ -1,13 +1,14 @@
 """Imported before _core: its libraries start threads as it is loaded, and end the interpreter where that fails (ulimit -u, ulimit -v)."""
 
+import ctypes
 import os
-import threading
 import time
 
 import numpy  # noqa: F401  Some of its builds start threads, too; those are counted by now.
 
 _OF_LIBRARIES = 4  # log4cplus, which OpenVDB needs
 _MOST_SECONDS = 0.2
+_SEMAPHORE_BYTES = 64  # 32 on Linux
 
 
 def _running() -> int:
@@ -19,26 +20,31 @@ def _running() -> int:
 
 
 def _require(count: int) -> None:
-    """Raises ImportError if this process cannot have `count` threads more."""
+    """Raises ImportError if this process cannot have `count` threads more.
+
+    They are not Python's: each of those would keep 64 MiB of address space (malloc's arenas), of which ulimit -v may leave little.
+    """
+    libc = ctypes.CDLL(None)
     before = _running()
-    end = threading.Event()
-    threads = [threading.Thread(target=end.wait, daemon=True) for _ in range(count)]
-    started = []
-    try:
-        for thread in threads:
-            thread.start()
-            started.append(thread)
-    except (RuntimeError, MemoryError):
+    semaphore = ctypes.create_string_buffer(_SEMAPHORE_BYTES)
+    libc.sem_init(semaphore, 0, 0)
+    threads = []
+    for _ in range(count):
+        thread = ctypes.c_void_p()
+        if libc.pthread_create(ctypes.byref(thread), None, libc.sem_wait, semaphore) != 0:
+            break
+        threads.append(thread)
+    for _ in threads:
+        libc.sem_post(semaphore)
+    for thread in threads:
+        libc.pthread_join(thread, None)
+    # pthread_join() returns a little before the system has counted a thread out.
+    until = time.monotonic() + _MOST_SECONDS
+    while _running() > before and time.monotonic() < until:
+        time.sleep(0)
+    if len(threads) < count:
         raise ImportError(f"curvisplat: cannot start {count} threads; "
-                          "raise the limits of processes and memory (ulimit -u, ulimit -v)") from None
-    finally:
-        end.set()
-        for thread in started:
-            thread.join()
-        # join() returns a little before the system has counted a thread out.
-        until = time.monotonic() + _MOST_SECONDS
-        while _running() > before and time.monotonic() < until:
-            time.sleep(0)
+                          "raise the limits of processes and memory (ulimit -u, ulimit -v)")
 
 
 _require(_OF_LIBRARIES)
