@@ -10,7 +10,6 @@
 #include <regex>
 #include <sstream>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -21,6 +20,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/shown_options.h"
 #include "tools/output/launched_ranks.h"
+#include "tools/output/required_threads.h"
 #include "tools/output/standard_streams.h"
 #include "tools/output/stop_signals.h"
 #include "tools/output/thread_failures.h"
@@ -33,16 +33,6 @@ std::string namesOf(const CLI::App& app) {
   for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   return fmt::format("{}", fmt::join(names, ", "));
 }
-
-/// Whether a thread could not be started, by the C++ library or by TBB.
-bool isForLackOfThreads(const std::exception& error) {
-  const auto* const system = dynamic_cast<const std::system_error*>(&error);
-  return (system && system->code() == std::errc::resource_unavailable_try_again) ||
-         std::string(error.what()).starts_with("pthread_create");
-}
-
-constexpr const char* kThreadAdvice =
-    "the system has none left; raise the limits of processes and memory (ulimit -u, ulimit -v)";
 
 /// What other programs call our options.
 constexpr std::pair<const char*, const char*> kForeignOptions[] = {
@@ -192,7 +182,7 @@ int run(int argc, char** argv) {
     const std::string path = error.path1().empty() ? "a directory cannot be read" : error.path1().string();
     return fail(path + ": " + error.code().message(), 1);
   } catch (const std::exception& error) {
-    if (isForLackOfThreads(error)) return fail(std::string("cannot start a thread: ") + kThreadAdvice, 1);
+    if (isForLackOfThreads(error)) return fail(kNoThread, 1);
     // Otherwise main() reports that standard output has failed.
     return std::ferror(stdout) == 0 ? fail(error.what(), 1) : 1;
   }

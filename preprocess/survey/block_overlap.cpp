@@ -249,19 +249,87 @@ class Holders {
         bins_(points, allOf(points)),
         tree_(treeOf(allOf(points))) {}
 
-  bool areAllFound() const { return tree_.size() == 0; }
+  bool areAllFound() const { return !is_pruned_ && tree_.size() == 0; }
 
-  /// Calls each(number) for points that may lie in the cell, among them all that do. Any thread.
-  template <typename Each>
-  void forEachNear(const std::array<glm::dvec3, 8>& corner, const Each& each) const {
-    BoundingBox box;
-    for (const glm::dvec3& node : corner) box.add(node);
-    const auto each_in_box = [&](uint32_t n) {
-      if (box.holds(points_[n].position)) each(n);
-    };
-    if (!bins_.forEachOfFew(box, each_in_box)) tree_.forEachNear(corner, each);
+  /// Locates the points in the cells of a slab. Throws Interrupted if a stop is asked for.
+  void locate(const GridBlock& block, const LoadedSlab& loaded, const Progress& progress) {
+    const Slab& slab = loaded.slab;
+    const uint64_t width = slab.box.j1 - slab.box.j0;
+    std::vector<uint64_t> next(rowsOf(slab.box), slab.box.i0);  // [row]: the first cell that is not searched
+    tbb::enumerable_thread_specific<std::vector<uint32_t>> found;
+    std::atomic<bool> complete = false;
+    while (!complete && tree_.size() > 0) {
+      complete = true;
+      forEachCell(
+          block, loaded,
+          [&](uint64_t, uint64_t) {
+            progress.throwIfStopped();
+            return true;
+          },
+          [&](size_t at, size_t row, size_t plane, uint64_t i, uint64_t j, uint64_t k) {
+            uint64_t& next_of_row = next[(k - slab.box.k0) * width + j - slab.box.j0];
+            if (i < next_of_row) return;
+            if (shouldPrune()) {
+              complete = false;
+              return;
+            }
+            next_of_row = i + 1;
+            locateInCell(slab.block, cornersIn(loaded, at, row, plane), found.local());
+          });
+      if (!complete) prune(slab.block);
+    }
+    for (const auto& of_thread : found)
+      for (const uint32_t point : of_thread) {
+        inside_.push_back({point, slab.block});
+        if (++counts_[point] == kMaxHolders) ++finished_;
+      }
   }
 
+  /// To be called after the last slab of each block.
+  void finishBlock() {
+    met_in_vain_ += in_vain_.exchange(0);
+    if (!is_pruned_ && 2 * finished_ <= tree_.size()) return;
+    std::vector<uint32_t> wanted;
+    for (uint32_t point = 0; point < points_.size(); ++point)
+      if (counts_[point] < kMaxHolders) wanted.push_back(point);
+    sort(wanted);
+    finished_ = 0;
+    is_pruned_ = false;
+  }
+
+  /// How often cells met points that were not to be located in them, in the blocks that are finished.
+  uint64_t metInVain() const { return met_in_vain_; }
+
+  /// (point, block), sorted.
+  std::vector<std::pair<uint32_t, uint32_t>> take() {
+    std::sort(inside_.begin(), inside_.end());
+    return std::move(inside_);
+  }
+
+ private:
+  // Where cells pass through one another, such as those of random coordinates, each of them meets a share of
+  // all points, nearly all of which are the block's own or were found in its first cells. So many meetings cost
+  // what sorting the points again does: for each of them, and in any case.
+  static constexpr size_t kInVainEach = 32, kInVainAnyway = 1 << 17;
+
+  /// Adds those to `found` that the cell holds. Any thread.
+  void locateInCell(uint32_t block, const std::array<glm::dvec3, 8>& corner, std::vector<uint32_t>& found) {
+    BoundingBox box;
+    for (const glm::dvec3& node : corner) box.add(node);
+    size_t in_vain = 0;
+    const auto locate = [&](uint32_t point) {
+      if (!isWanted(point, block)) {
+        ++in_vain;
+      } else if (holds(corner, points_[point].position) && note(point, block)) {
+        found.push_back(point);
+      }
+    };
+    const auto locate_in_box = [&](uint32_t point) {
+      if (box.holds(points_[point].position)) locate(point);
+    };
+    if (!bins_.forEachOfFew(box, locate_in_box)) tree_.forEachNear(corner, locate);
+    if (in_vain > 0) in_vain_.fetch_add(in_vain, std::memory_order_relaxed);
+  }
   /// Whether the point is to be located in the cells of `block`. Any thread.
   bool isWanted(uint32_t point, uint32_t block) const {
     return points_[point].block != block && counts_[point] < kMaxHolders &&
@@ -272,32 +340,25 @@ class Holders {
     return latest_[point].exchange(block + 1, std::memory_order_relaxed) != block + 1;
   }
 
-  /// Adds points that a part of `block` contains, as noted.
-  void add(uint32_t block, const std::vector<uint32_t>& points) {
-    for (const uint32_t point : points) {
-      inside_.push_back({point, block});
-      if (++counts_[point] == kMaxHolders) ++finished_;
-    }
+  /// Any thread.
+  bool shouldPrune() const {
+    return in_vain_.load(std::memory_order_relaxed) > kInVainEach * tree_.size() + kInVainAnyway;
   }
-  /// To be called after each block.
-  void finishBlock() {
-    if (2 * finished_ <= tree_.size()) return;
+  /// Sorts again the points that are still to be located in `block`. finishBlock() brings back the others.
+  void prune(uint32_t block) {
     std::vector<uint32_t> wanted;
     tree_.forEach([&](uint32_t point) {
-      if (counts_[point] < kMaxHolders) wanted.push_back(point);
+      if (isWanted(point, block)) wanted.push_back(point);
     });
+    sort(wanted);
+    met_in_vain_ += in_vain_.exchange(0);
+    is_pruned_ = true;
+  }
+  void sort(const std::vector<uint32_t>& wanted) {
     bins_ = Bins(points_, wanted);
     tree_ = treeOf(wanted);
-    finished_ = 0;
   }
 
-  /// (point, block), sorted.
-  std::vector<std::pair<uint32_t, uint32_t>> take() {
-    std::sort(inside_.begin(), inside_.end());
-    return std::move(inside_);
-  }
-
- private:
   static std::vector<uint32_t> allOf(const std::vector<BlockPoint>& points) {
     std::vector<uint32_t> numbers(points.size());
     std::iota(numbers.begin(), numbers.end(), 0u);
@@ -310,17 +371,21 @@ class Holders {
   const std::vector<BlockPoint>& points_;
   std::vector<uint8_t> counts_;  // [point]
   std::vector<std::atomic<uint32_t>>
-      latest_;           // [point]: 1 + the latest block that is known to contain it; 0: none
-  Bins bins_;            // the points still to be located, and few others
-  PointTree tree_;       // the same: for cells in whose bins many lie
-  size_t finished_ = 0;  // of the points in tree_
+      latest_;                      // [point]: 1 + the latest block that is known to contain it; 0: none
+  Bins bins_;                       // the points still to be located, and few others
+  PointTree tree_;                  // the same: for cells in whose bins many lie
+  size_t finished_ = 0;             // of the points in tree_
+  bool is_pruned_ = false;          // tree_ lacks points that blocks to come are searched for
+  std::atomic<size_t> in_vain_{0};  // how often cells met points that are not wanted, since tree_ was built
+  uint64_t met_in_vain_ = 0;        // before that
   std::vector<std::pair<uint32_t, uint32_t>> inside_;
 };
 
 /// The second pass: pairs (point, other block that contains it), sorted.
 std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, uint64_t slab_bytes,
                                                       const Progress& progress,
-                                                      const std::vector<BlockPoint>& points) {
+                                                      const std::vector<BlockPoint>& points,
+                                                      uint64_t* met_in_vain) {
   const std::vector<GridBlock>& blocks = reader.source().description().blocks;
   Holders holders(points);
   uint32_t block = 0;
@@ -330,29 +395,18 @@ std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, 
     const uint32_t number = loaded->slab.block;
     if (number != std::exchange(block, number)) holders.finishBlock();
     if (holders.areAllFound()) break;
-    tbb::enumerable_thread_specific<std::vector<uint32_t>> found;
-    forEachCell(
-        blocks[number], *loaded,
-        [&](uint64_t, uint64_t) {
-          progress.throwIfStopped();
-          return true;
-        },
-        [&](size_t at, size_t row, size_t plane, uint64_t, uint64_t, uint64_t) {
-          const std::array<glm::dvec3, 8> corner = cornersIn(*loaded, at, row, plane);
-          holders.forEachNear(corner, [&](uint32_t n) {
-            if (holders.isWanted(n, number) && holds(corner, points[n].position) && holders.note(n, number))
-              found.local().push_back(n);
-          });
-        });
-    for (const auto& of_thread : found) holders.add(number, of_thread);
+    holders.locate(blocks[number], *loaded, progress);
   }
+  holders.finishBlock();
+  if (met_in_vain) *met_in_vain = holders.metInVain();
   return holders.take();
 }
 
 }  // namespace
 
 std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
-                                       const Progress& progress) {
+                                       const Progress& progress, uint64_t* met_in_vain) {
+  if (met_in_vain) *met_in_vain = 0;
   const size_t blocks = source.description().blocks.size();
   std::vector<BlockOverlap> overlaps;
   if (blocks < 2 || blocks > kMaxBlocks) return overlaps;
@@ -371,7 +425,7 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
   if (points.empty()) return overlaps;
 
   std::map<std::pair<uint32_t, uint32_t>, double> shared;  // (block of points, block of cells) -> volume
-  for (const auto& [point, block] : findInside(reader, slab_bytes, progress, points))
+  for (const auto& [point, block] : findInside(reader, slab_bytes, progress, points, met_in_vain))
     shared[{points[point].block, block}] += points[point].volume;
   // The points of either block give an estimate for the pair; the larger one is used.
   std::map<std::pair<uint32_t, uint32_t>, double> of_pairs;

@@ -7,7 +7,9 @@
 // ignored. The coordinates are read twice, or once if the blocks' bounding boxes are disjoint. Memory: two
 // slabs, and 150 bytes for each point: about 100,000 points, and some more at each block's corners, edges and
 // faces. Time: n log n in the blocks, and for each cell what finding the points near it takes, however long and
-// slanted it is; a point is located in at most 16 other blocks. Grids of more than 100,000 blocks are not checked.
+// slanted it is; a point is located in at most 16 other blocks. Where cells pass through one another, such as those of random
+// coordinates, the points that are found, or are the block's own, are sorted out on the way. Grids of more than 100,000 blocks
+// are not checked.
 #pragma once
 
 #include <cstdint>
@@ -26,9 +28,11 @@ struct BlockOverlap {
 };
 
 /// All pairs of blocks with more than a negligible overlap, in order of their numbers. The result depends
-/// neither on the number of threads nor on the size of the slabs. Throws Error if the grid cannot be read.
+/// neither on the number of threads nor on the size of the slabs. `met_in_vain`: unless null, how often points were near a cell and
+/// had not to be located in it, which is most of the work where cells pass through one another; depends on the threads. Throws
+/// Error if the grid cannot be read.
 std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
-                                       const Progress& progress);
+                                       const Progress& progress, uint64_t* met_in_vain = nullptr);
 
 /// One line that says that there are too many blocks to search for overlaps; else empty.
 std::string unsearchedOverlaps(const GridDescription& description);

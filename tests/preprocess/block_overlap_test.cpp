@@ -6,7 +6,9 @@
 #include <cmath>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <random>
 #include <utility>
+#include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
 #include "tests/reference/function_grid.h"
@@ -110,6 +112,37 @@ TEST(BlockOverlap, IsFoundAmongSlenderCellsThatAreSlanted) {
     ASSERT_EQ(overlaps.size(), 1u) << name;
     EXPECT_NEAR(overlaps[0].share, 0.75, 0.01) << name;
   }
+}
+
+// Nearly every cell passes through nearly every other one, and meets most points of both blocks: 10,000 times each if those that are
+// found, and the block's own, are not sorted out.
+TEST(BlockOverlap, IsFoundAmongRandomCoordinatesByFewMeetings) {
+  constexpr uint64_t kNodes = 20;
+  constexpr uint64_t kPoints =
+      2 * 23 * 23 * 23;  // 17 cells inside along an axis, and 3 points in either last cell
+  std::vector<glm::dvec3> nodes(2 * kNodes * kNodes * kNodes);
+  std::mt19937 random(1);
+  for (glm::dvec3& node : nodes)
+    for (glm::length_t axis = 0; axis < 3; ++axis) node[axis] = static_cast<double>(random()) / 0x1p32;
+  const GridBlock block = gridBlock(kNodes, kNodes, kNodes);
+  const FunctionGridSource source({block, block}, 0, [&](const GridNode& node) {
+    return NodeValues{nodes[((node.block * kNodes + node.k) * kNodes + node.j) * kNodes + node.i], {}, false};
+  });
+  uint64_t met_in_vain = 0;
+  const auto overlaps = findOverlaps(source, 4 << 20, Progress(), &met_in_vain);
+  EXPECT_LT(met_in_vain, 500 * kPoints);
+  ASSERT_EQ(overlaps.size(), 1u);
+  EXPECT_EQ(overlaps[0].share, 1);
+  // However it is read.
+  EXPECT_EQ(overlapsIn(source, 20'000)[0].volume, overlaps[0].volume);
+}
+
+// Each point of such a block is near a few cells.
+TEST(BlockOverlap, OfOrdinaryBlocksMeetsFewPointsInVain) {
+  uint64_t met_in_vain = 0;
+  findOverlaps(boxes({{{0, 0, 0}, {2, 2, 2}, 24}, {{1.5, 0.5, 0}, {2, 2, 2}, 31}}), kSlabBytes, Progress(),
+               &met_in_vain);
+  EXPECT_LT(met_in_vain, 100'000u);
 }
 
 TEST(BlockOverlap, IsNoneOfBlocksThatAbut) {

@@ -13,9 +13,9 @@
 #include "stream/base/message.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/required_threads.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
-#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {

@@ -33,9 +33,9 @@
 #include "tools/output/output_paths.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/required_threads.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
-#include "tools/output/thread_failures.h"
 #include "tools/output/trace_of_run.h"
 
 namespace curvisplat {

@@ -21,9 +21,9 @@
 #include "stream/cache/faces_file.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/required_threads.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
-#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {

@@ -29,8 +29,8 @@
 #include "tools/output/output_paths.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/required_threads.h"
 #include "tools/output/stop_signals.h"
-#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {

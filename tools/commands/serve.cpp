@@ -17,8 +17,8 @@
 #include "stream/base/progress.h"
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
+#include "tools/output/required_threads.h"
 #include "tools/output/stop_signals.h"
-#include "tools/output/thread_failures.h"
 #include "tools/serve/access.h"
 #include "tools/serve/server.h"
 

@@ -25,8 +25,8 @@
 #include "tools/options/value_precision.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/required_threads.h"
 #include "tools/output/stop_signals.h"
-#include "tools/output/thread_failures.h"
 #include "tools/viewer/viewer.h"
 
 namespace curvisplat {

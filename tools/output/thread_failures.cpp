@@ -3,27 +3,18 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <new>
 #include <string_view>
-#include <system_error>
-#include <thread>
-#include <vector>
-
-#include "stream/base/error.h"
-#include "stream/base/mutex.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr size_t kLoadingStackBytes = 256 << 10;
-constexpr unsigned kOwnThreads = 4;  // reading ahead, writing, paging, OpenGL
-constexpr unsigned kMaxTried = 64;   // memory may allow fewer threads than --threads
-size_t stack_bytes = 0;              // the system's
+size_t stack_bytes = 0;  // the system's
 
 void print(std::string_view text) {
   // Nothing that allocates, and nothing of the C++ library, which may not be ready yet.
@@ -53,33 +44,6 @@ void print(std::string_view text) {
   std::abort();
 }
 
-void tryThreads(unsigned count, const char* hint) {
-  if (count == 0) count = std::max(1u, std::thread::hardware_concurrency());
-  count = std::min(count, kMaxTried) + kOwnThreads;
-  Mutex mutex;  // guards `ending`
-  bool ending = false;
-  ConditionVariable changed;
-  std::vector<std::thread> threads;
-  threads.reserve(count);
-  int error = 0;
-  try {
-    while (threads.size() < count)
-      threads.emplace_back([&] {
-        MutexLock lock(mutex);
-        while (!ending) changed.wait(lock);
-      });
-  } catch (const std::system_error& failure) {
-    error = failure.code().value();
-  }
-  {
-    const MutexLock lock(mutex);
-    ending = true;
-  }
-  changed.notify_all();
-  for (std::thread& thread : threads) thread.join();
-  if (error != 0) throw Error("cannot start {} threads: {}; {}", count, std::strerror(error), hint);
-}
-
 void prepare(int, char**, char**) {
   std::set_terminate(onTerminate);
   pthread_attr_t attributes;
@@ -101,14 +65,6 @@ void endLoadingOfLibraries() {
   pthread_attr_setstacksize(&attributes, stack_bytes);
   pthread_setattr_default_np(&attributes);
   pthread_attr_destroy(&attributes);
-}
-
-void requireThreads(unsigned count) {
-  tryThreads(count, "lower --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)");
-}
-
-void requireThreads() {
-  tryThreads(0, "raise the limits of processes and memory (ulimit -u, ulimit -v)");
 }
 
 }  // namespace curvisplat

@@ -4,12 +4,6 @@
 
 namespace curvisplat {
 
-/// Throws Error if this process cannot have the threads of a command with `--threads count` (0: one per core)
-/// now. To be called before anything is written.
-void requireThreads(unsigned count);
-/// The same for a command without --threads.
-void requireThreads();
-
 /// Gives threads the system's stack size again. Until main() calls this, stacks are small, so that libraries
 /// that start threads when they are loaded (log4cplus, which OpenVDB needs) take little of a small limit.
 void endLoadingOfLibraries();

@@ -13,6 +13,7 @@
 
 #include "render/export/field_sampler.h"
 #include "stream/base/error.h"
+#include "tools/output/required_threads.h"
 #include "tools/python/interruptible.h"
 
 namespace py = pybind11;
@@ -118,6 +119,7 @@ py::tuple sampledArrays(const CacheReader& cache, const DataChoice& choice,
                         const std::array<uint32_t, 3>& size, const py::object& progress) {
   const SampleLattice lattice = latticeOf(choice, size);
   FieldSamples all;
+  requireThreads();
   runInterruptibly(progress, [&](Progress& of_work) {
     const CacheReader at_step = openedAt(cache, choice.step);
     const double widest = std::max({lattice.spacing.x, lattice.spacing.y, lattice.spacing.z});

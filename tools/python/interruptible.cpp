@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <exception>
 #include <future>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
+#include "tools/output/required_threads.h"
 
 namespace py = pybind11;
 
@@ -85,25 +87,7 @@ void visitPython(const py::object& report, LatestState& latest) {
     report(state->phase, state->done + state->skipped, state->total, state->unit);
 }
 
-}  // namespace
-
-CountedWork::CountedWork(Progress* progress) : progress_(progress) {
-  allWork().add(progress);
-}
-
-CountedWork::~CountedWork() {
-  allWork().remove(progress_);
-}
-
-void endAllWork() {
-  const py::gil_scoped_release unlocked;
-  allWork().end();
-}
-
-void runInterruptibly(const py::object& report, const std::function<void(Progress&)>& work) {
-  if (!report.is_none() && PyCallable_Check(report.ptr()) == 0)
-    throw UsageError("progress: {} is not callable",
-                     std::string(py::str(report.get_type().attr("__name__"))));
+void run(const py::object& report, const std::function<void(Progress&)>& work) {
   LatestState latest;
   Progress progress([&](const Progress::State* state) { latest.set(state); });
   const CountedWork counted(&progress);
@@ -130,6 +114,34 @@ void runInterruptibly(const py::object& report, const std::function<void(Progres
     if (!raised) throw;
   }
   if (raised) throw *raised;
+}
+
+}  // namespace
+
+CountedWork::CountedWork(Progress* progress) : progress_(progress) {
+  allWork().add(progress);
+}
+
+CountedWork::~CountedWork() {
+  allWork().remove(progress_);
+}
+
+void endAllWork() {
+  const py::gil_scoped_release unlocked;
+  allWork().end();
+}
+
+void runInterruptibly(const py::object& report, const std::function<void(Progress&)>& work) {
+  if (!report.is_none() && PyCallable_Check(report.ptr()) == 0)
+    throw UsageError("progress: {} is not callable",
+                     std::string(py::str(report.get_type().attr("__name__"))));
+  try {
+    run(report, work);
+  } catch (const std::exception& error) {
+    // Others may have taken the threads that there were.
+    if (isForLackOfThreads(error)) throw Error(kNoThread);
+    throw;
+  }
 }
 
 }  // namespace curvisplat::python

@@ -11,8 +11,8 @@ namespace curvisplat::python {
 
 /// Runs `work` in a thread of its own while this one, which must hold the interpreter's lock, waits without it and
 /// looks for signals every 50 ms. `report`: None, or a callable that gets (phase, done, total, unit), at most twenty times a
-/// second, in this thread. Throws what `work` throws; after Ctrl-C, or if `report` raises, stops the work and throws
-/// that Python exception.
+/// second, in this thread. Throws what `work` throws, and Error where no thread can be started; after Ctrl-C, or if `report`
+/// raises, stops the work and throws that Python exception.
 /// Where the interpreter ends, the work is stopped first, and the end waits for it.
 void runInterruptibly(const pybind11::object& report, const std::function<void(Progress&)>& work);
 

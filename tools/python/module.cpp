@@ -27,6 +27,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/series_input.h"
 #include "tools/options/value_precision.h"
+#include "tools/output/required_threads.h"
 #include "tools/python/array_source.h"
 #include "tools/python/cache_arrays.h"
 #include "tools/python/interruptible.h"
@@ -37,6 +38,8 @@ namespace py = pybind11;
 
 namespace curvisplat::python {
 namespace {
+
+constexpr const char* kThreads = "threads";  // the argument
 
 glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
@@ -193,6 +196,7 @@ py::dict reportOf(const ConvertReport& report) {
 
 py::dict convertSource(const DataSource& source, ConvertOptions options, const py::object& progress) {
   ConvertReport report;
+  requireThreads(options.threads, kThreads);
   runInterruptibly(progress, [&](Progress& of_work) { report = convert(source, options, of_work); });
   return reportOf(report);
 }
@@ -242,6 +246,7 @@ uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks
   input.open = [&](uint64_t) { return std::move(source); };
   input.scalars = [&](const GridDescription&) { return allScalars(names); };
   SeriesReport report;
+  requireThreads(options.convert.threads, kThreads);
   runInterruptibly(progress, [&](Progress& of_work) {
     report = convertSeries(input, options, of_work, [](const SeriesEvent&) {});
   });
@@ -279,6 +284,7 @@ py::dict convertSteps(const ConvertArguments& arguments, const std::vector<StepF
   SeriesReport series;
   ConvertReport first;
   std::vector<std::string> warnings;
+  requireThreads(options.convert.threads, kThreads);
   runInterruptibly(progress, [&](Progress& of_work) {
     series = convertSeries(input, options, of_work, [&](const SeriesEvent& event) {
       if (!event.reason.empty()) warnings.push_back(event.name + " was left out: " + event.reason);
@@ -324,6 +330,7 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   if (options.title.empty()) options.title = arguments.grid.grid.stem().string();
   if (!steps.empty()) return convertSteps(arguments, steps, std::move(options), progress);
   ConvertReport report;
+  requireThreads(options.threads, kThreads);
   runInterruptibly(progress, [&](Progress& of_work) {
     const auto source = openSource(arguments, options.output);
     options.scalars = chooseScalars(arguments, scalars, source->description());

@@ -10,6 +10,7 @@
 #include "stream/base/error.h"
 #include "tools/options/picture_choice.h"
 #include "tools/output/empty_picture.h"
+#include "tools/output/required_threads.h"
 #include "tools/python/interruptible.h"
 #include "tools/viewer/histogram.h"
 
@@ -107,6 +108,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
   Image image;
   PixelValues values;
   const ImageSize size = arguments.frame.size;
+  requireThreads(arguments.frame.threads, "threads");
   runInterruptibly(progress, [&](Progress& of_work) {
     goTo(chosenSteps(arguments.steps, reader_).front());
     const Manifest manifest = reader_.manifest();

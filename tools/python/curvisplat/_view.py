@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import html
 import os
 import pathlib
@@ -53,7 +54,8 @@ class View:
                 # A session of its own: Ctrl-C in the interpreter is not meant for it.
                 process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=messages, text=True, start_new_session=True)
             except OSError as error:
-                raise _core.Error(f"{command[0]}: cannot be run: {error.strerror}") from error
+                advice = "; raise the limits of processes and threads (ulimit -u)" if error.errno == errno.EAGAIN else ""
+                raise _core.Error(f"{command[0]}: cannot be run: {error.strerror}{advice}") from error
             assert process.stdout is not None
             self.url = process.stdout.readline().strip()
             if not self.url:
