@@ -199,7 +199,7 @@ class Addition {
         std::make_unique<ValuePasses>(cache_, options_.scalars.size(), plan_, workspace_.own(), progress_);
     if (ranks_) passes_->shareWith(*ranks_, workspace_.shared());
     if (mesh_) return passes_->scatter(*origin_);
-    passes_->setOverlaps(overlapsFor(manifest(), *grid_, plan_.slab_bytes, progress_, ranks_));
+    passes_->setOverlaps(overlapsFor(manifest(), *grid_, plan_.forOverlaps(), progress_, ranks_));
     passes_->scatter(*reader_);
   }
 

@@ -167,7 +167,7 @@ class StepAddition {
     const uint64_t expected = cache_.series().steps[cache_.step()].grid_checksum;
     makeScratch();
     ValuePasses passes(cache_, scalars_.size(), plan_, scratch_->path(), progress_);
-    passes.setOverlaps(overlapsFor(cache_.manifest(), *grid_, plan_.slab_bytes, progress_));
+    passes.setOverlaps(overlapsFor(cache_.manifest(), *grid_, plan_.forOverlaps(), progress_));
     SlabSurvey survey;
     survey.ranges.resize(scalars_.size());
     try {
@@ -202,7 +202,7 @@ class StepAddition {
     const CacheReader cache = cache_.atStep(cache_.series().first_steps[*geometry]);
     if (grid_) makeScratch();
     ValuePasses passes(cache, scalars_.size(), plan_, scratch_->path(), progress_);
-    if (grid_) passes.setOverlaps(overlapsFor(cache.manifest(), *grid_, plan_.slab_bytes, progress_));
+    if (grid_) passes.setOverlaps(overlapsFor(cache.manifest(), *grid_, plan_.forOverlaps(), progress_));
     pass("scatter", report_.nodes, "nodes",
          [&] { grid_ ? passes.scatter(*reader_) : passes.scatter(*origin_); });
     finishValues(passes, cache);

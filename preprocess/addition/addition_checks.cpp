@@ -78,12 +78,12 @@ void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache) {
   }
 }
 
-std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid, uint64_t slab_bytes,
-                                      const Progress& progress, Ranks* ranks) {
+std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid,
+                                      const OverlapMemory& memory, const Progress& progress, Ranks* ranks) {
   if (cache.overlap != kOverlapOwner) return {};
-  if (!ranks) return findOverlaps(grid, slab_bytes, progress);
+  if (!ranks) return findOverlaps(grid, memory, progress);
   std::vector<BlockOverlap> overlaps;
-  if (ranks->isFirst()) overlaps = findOverlaps(grid, slab_bytes, progress);
+  if (ranks->isFirst()) overlaps = findOverlaps(grid, memory, progress);
   return fromBytes<BlockOverlap>(ranks->broadcast(toBytes(overlaps)));
 }
 

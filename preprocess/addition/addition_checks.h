@@ -18,8 +18,9 @@ void checkBlocksOfStep(const std::vector<GridBlock>& grid, const Manifest& serie
 
 /// The overlaps of the grid's blocks where `cache` draws each point once; else none. With `ranks` rank 0 looks for them, and
 /// all get them. Throws Error if the grid cannot be read.
-std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid, uint64_t slab_bytes,
-                                      const Progress& progress, Ranks* ranks = nullptr);
+std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid,
+                                      const OverlapMemory& memory, const Progress& progress,
+                                      Ranks* ranks = nullptr);
 
 /// A new name in `folder` for the temporary files of an addition to `cache`, which is locked. Removes those of
 /// additions that were killed.

@@ -84,7 +84,7 @@ GridSurvey GridOrigin::survey(Progress& progress) {
                                  progress, ranks_);
   if (faces_) faces_->match(progress);
   has_values_everywhere_ = survey.blanked.by_value == 0 && survey.blanked.not_finite == 0;
-  if (!ranks_ || ranks_->isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.slab_bytes, progress);
+  if (!ranks_ || ranks_->isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.forOverlaps(), progress);
   if (ranks_) overlaps_ = fromBytes<BlockOverlap>(ranks_->broadcast(toBytes(overlaps_)));
   return survey;
 }

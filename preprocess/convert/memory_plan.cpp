@@ -22,7 +22,7 @@ constexpr uint64_t kMiB = uint64_t{1} << 20;
 // libraries (RssFile of a conversion of NetCDF tiles); the rest has room for what HDF5 keeps of its files.
 constexpr uint64_t kProgramBytes = 80 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
-constexpr uint64_t kSeamShare = 8, kSlabShare = 8, kMeshShare = 2;  // of the rest
+constexpr uint64_t kSeamShare = 8, kSlabShare = 8, kMeshShare = 2, kOverlapShare = 4;  // of the rest
 // The fewest splats of a bucket: some bricks for each thread to work on.
 constexpr uint64_t kMinBucketSplats = 4 * kMaxBrickSplats;
 constexpr uint64_t kMinChunkBytes = kMiB / 8, kMaxChunkBytes = kMiB;
@@ -86,6 +86,7 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   plan.slab_bytes = std::min(bytes / kSlabShare, 256 * kMiB);
   plan.counting_bytes = bytes / 8;
   plan.seam_bytes = bytes / kSeamShare;
+  plan.overlap_bytes = bytes / kOverlapShare;
   plan.owner_bytes = bytes / 8;
   plan.mesh_bytes = bytes / kMeshShare;
 
@@ -112,6 +113,10 @@ MemoryPlan MemoryPlan::ofOptions(uint64_t cap_bytes, size_t variables, unsigned 
 
 uint64_t MemoryPlan::capForSeams(uint64_t seam_bytes) {
   return capFor(seam_bytes * kSeamShare);
+}
+
+uint64_t MemoryPlan::capForOverlaps(uint64_t overlap_bytes) {
+  return capFor(overlap_bytes * kOverlapShare);
 }
 
 uint64_t MemoryPlan::capForMesh(uint64_t mesh_bytes) {

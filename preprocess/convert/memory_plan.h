@@ -2,6 +2,7 @@
 // all of it, less what the program itself needs throughout.
 //
 //    scan          2 slabs | seams: faces of cells
+//    overlaps      2 slabs | points of blocks
 //    count         2 slabs | counting grid
 //    scatter       2 slabs | a row that is read as a whole | chunk buffers | seams | cells of overlapping blocks
 //                  a task's splats a thread
@@ -15,6 +16,8 @@
 #include <cstdint>
 #include <string>
 
+#include "preprocess/survey/block_overlap.h"
+
 namespace curvisplat {
 
 struct MemoryPlan {
@@ -22,6 +25,7 @@ struct MemoryPlan {
   uint64_t slab_bytes = 0;      // each of two; and a row of a source that reads rows as a whole
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
+  uint64_t overlap_bytes = 0;       // the points by which overlaps of blocks are found
   uint64_t owner_bytes = 0;         // the cells of overlapping blocks, while splats are made
   uint64_t mesh_bytes = 0;          // of an unstructured grid, instead of slabs and seams
   uint64_t chunk_buffer_bytes = 0;  // the write buffers of all buckets
@@ -38,8 +42,13 @@ struct MemoryPlan {
 
   /// The limit at which seams get this much.
   static uint64_t capForSeams(uint64_t seam_bytes);
+  /// The limit at which the search for overlaps gets this much.
+  static uint64_t capForOverlaps(uint64_t overlap_bytes);
   /// The limit at which a mesh gets this much.
   static uint64_t capForMesh(uint64_t mesh_bytes);
+
+  /// What the search for overlaps may take.
+  OverlapMemory forOverlaps() const { return {slab_bytes, overlap_bytes, capForOverlaps}; }
 
   /// Throws Error that names a sufficient limit if a row of `bytes` does not fit beside the slabs. `block`: the name of
   /// its block; `nodes`: its nodes along i.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "preprocess/faces/face_patches.h"
+#include "preprocess/faces/face_regions.h"
 #include "preprocess/faces/face_spool.h"
 #include "preprocess/splats/abutting_faces.h"
 #include "stream/base/error.h"
@@ -73,13 +74,11 @@ class FacesPass {
     spool_.fill(slabs, abutting_, progress_);
     abutting_.keepFolds();
     abutting_.match(progress_);
-    const std::vector<FaceRegion> all_regions = regionsOf(grid_, spool_.faces());
+    const FaceRegions regions(regionsOf(grid_, spool_.faces()));
     FacesWriter writer(job_.output, spool_.box(), job_.variables);
     Written written;
     for (uint32_t n = 0; n < spool_.faces().size(); ++n) {
-      std::vector<FaceRegion> own;
-      for (const FaceRegion& region : all_regions)
-        if (region.face == n) own.push_back(region);
+      const std::span<const FaceRegion> own = regions.of(n);
       Quads quads = quadsOf(n, own);
       add(n, spool_.faces()[n].side, quads.drawn, own, writer, written);
       // A body without thickness is a side that abuts on itself.
@@ -107,7 +106,7 @@ class FacesPass {
     uint32_t patch_count = 0;
   };
 
-  void add(uint32_t spooled, FaceSide side, const QuadMask& quads, std::vector<FaceRegion> regions,
+  void add(uint32_t spooled, FaceSide side, const QuadMask& quads, std::span<const FaceRegion> regions,
            FacesWriter& writer, Written& written) const {
     std::vector<FacePatch> patches =
         writePatches(spool_, spooled, quads, written.patch_count, writer, progress_);
@@ -119,10 +118,7 @@ class FacesPass {
     for (FacePatch& patch : patches) patch.face = number;
     written.patch_count += static_cast<uint32_t>(patches.size());
     written.patches.push_back(std::move(patches));
-    for (FaceRegion& region : regions) {
-      region.face = number;
-      written.regions.push_back(std::move(region));
-    }
+    for (const FaceRegion& region : regions) written.regions.emplace_back(region).face = number;
   }
 
   /// Whether the face was asked for as an index plane, too.
@@ -155,9 +151,11 @@ class FacesPass {
     const GridFace& face = spool_.faces()[number];
     const RowRange nodes{part.begin, part.end + 1};
     LatticeRow before = spool_.row(number, 0, nodes);
+    RegionRows region_rows(regions, part);
     for (uint64_t v = 0; v < quads.drawn.rows(); ++v) {
       progress_.throwIfStopped();
       LatticeRow next = spool_.row(number, v + 1, nodes);
+      const std::span<const uint8_t> in_region = region_rows.row(v);
       std::vector<uint8_t> there(part.end - part.begin, 1);
       if (spool_.ofCells()) there = spool_.cellsOfRow(number, v, part);
       for (uint64_t u = part.begin; u < part.end; ++u) {
@@ -165,14 +163,11 @@ class FacesPass {
         for (const LatticeRow* row : {&before, &next})
           for (const uint64_t node : {u, u + 1})
             is_there = is_there && row->codes[node - part.begin][0] != LatticeRow::kNone;
-        const auto in_region = [&](const FaceRegion& r) {
-          return u >= r.first[0] && u < r.last[0] && v >= r.first[1] && v < r.last[1];
-        };
         if (!is_there) continue;
         const bool is_outer = face.side == FaceSide::kPlane || !abutting_.abuts(cellOf(face, u, v));
         const bool folds = face.side != FaceSide::kPlane && abutting_.folds(cellOf(face, u, v));
         quads.folds |= folds;
-        if (is_outer || std::any_of(regions.begin(), regions.end(), in_region)) quads.drawn.draw(u, v);
+        if (is_outer || in_region[u - part.begin]) quads.drawn.draw(u, v);
         if (is_outer || folds) quads.with_folds.draw(u, v);
       }
       before = std::move(next);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stream/base/error.h"
 #include "stream/base/huge_pages.h"
@@ -65,6 +66,23 @@ void makeRoom(size_t count, size_t scalars, NodeArrays& nodes) {
   for (auto& values : nodes.scalars) make(values);
 }
 
+/// Of its window.
+uint64_t nodesOf(const Slab& slab, uint64_t ni) {
+  return rowsOf(slab.window) * slab.window.rowNodes(ni);
+}
+
+std::vector<Slab> shareOf(std::vector<Slab> slabs, const SlabShare& share) {
+  const auto begin_of = [&](unsigned index) {
+    size_t begin = slabs.size() * index / share.count;
+    while (share.whole_rows && begin < slabs.size() && slabs[begin].box.i0 > 0) ++begin;
+    return begin;
+  };
+  const size_t begin = begin_of(share.index), end = begin_of(share.index + 1);
+  slabs.resize(end);
+  slabs.erase(slabs.begin(), slabs.begin() + static_cast<ptrdiff_t>(begin));
+  return slabs;
+}
+
 }  // namespace
 
 uint64_t leastSlabBytes(const std::vector<GridBlock>& blocks, size_t scalars, Halo halo) {
@@ -111,26 +129,56 @@ std::vector<NodeBox> cutForTasks(uint64_t row_nodes, const NodeBox& box, uint64_
 
 SlabStream::SlabStream(const NodeReader& reader, const SlabBuffers& buffers, Halo halo,
                        const SlabShare& share)
-    : slabs_(cutIntoSlabs(reader.source().description().blocks,
-                          buffers.slab_bytes / slabBytesPerNode(reader.scalars()), halo)),
-      begin_(beginOf(share.index, share)),
-      end_(beginOf(share.index + 1, share)),
+    : SlabStream(reader, buffers,
+                 shareOf(cutIntoSlabs(reader.source().description().blocks,
+                                      buffers.slab_bytes / slabBytesPerNode(reader.scalars()), halo),
+                         share)) {}
+
+SlabStream::SlabStream(const NodeReader& reader, const SlabBuffers& buffers, std::vector<Slab> slabs)
+    : slabs_(std::move(slabs)),
+      ends_(endsOfGroups(slabs_, reader.source().description().blocks)),
       ahead_(
-          [this, &reader](LoadedSlab& loaded, uint64_t number) {
-            if (number >= end_ - begin_) return false;
-            loaded.slab = slabs_[begin_ + number];
-            const NodeBox& window = loaded.slab.window;
-            const uint64_t ni = reader.source().description().blocks[loaded.slab.block].ni;
-            makeRoom(rowsOf(window) * window.rowNodes(ni), reader.scalars(), loaded.nodes);
-            loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
+          [this, &reader](Group& group, uint64_t number) {
+            if (number >= ends_.size()) return false;
+            const size_t begin = number == 0 ? 0 : ends_[number - 1];
+            group.count = ends_[number] - begin;
+            if (group.slabs.size() < group.count) group.slabs.resize(group.count);
+            for (size_t n = 0; n < group.count; ++n) {
+              LoadedSlab& loaded = group.slabs[n];
+              loaded.slab = slabs_[begin + n];
+              const uint64_t ni = reader.source().description().blocks[loaded.slab.block].ni;
+              makeRoom(nodesOf(loaded.slab, ni), reader.scalars(), loaded.nodes);
+              loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
+            }
             return true;
           },
           buffers.readers) {}
 
-size_t SlabStream::beginOf(unsigned index, const SlabShare& share) const {
-  size_t begin = slabs_.size() * index / share.count;
-  while (share.whole_rows && begin < slabs_.size() && slabs_[begin].box.i0 > 0) ++begin;
-  return begin;
+std::vector<size_t> SlabStream::endsOfGroups(std::span<const Slab> slabs, std::span<const GridBlock> blocks) {
+  // A group's arrays are kept for the next: these few take little, whatever the limit of slabs is.
+  constexpr size_t kMaxSlabs = 64;
+  constexpr uint64_t kSmallNodes = 1024;
+  std::vector<size_t> ends;
+  size_t begin = 0;
+  bool is_small = false;
+  for (size_t n = 0; n < slabs.size(); ++n) {
+    const bool was_small =
+        std::exchange(is_small, nodesOf(slabs[n], blocks[slabs[n].block].ni) <= kSmallNodes);
+    if (n == begin || (was_small && is_small && n - begin < kMaxSlabs)) continue;
+    ends.push_back(n);
+    begin = n;
+  }
+  if (begin < slabs.size()) ends.push_back(slabs.size());
+  return ends;
+}
+
+const LoadedSlab* SlabStream::next() {
+  if (!group_ || next_ == group_->count) {
+    group_ = ahead_.next();
+    next_ = 0;
+    if (!group_) return nullptr;
+  }
+  return &group_->slabs[next_++];
 }
 
 }  // namespace curvisplat

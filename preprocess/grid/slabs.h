@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -92,17 +93,26 @@ struct SlabBuffers {
 class SlabStream {
  public:
   SlabStream(const NodeReader& reader, const SlabBuffers& buffers, Halo halo, const SlabShare& share = {});
+  /// Some slabs of cutIntoSlabs().
+  SlabStream(const NodeReader& reader, const SlabBuffers& buffers, std::vector<Slab> slabs);
 
   /// The next slab, valid until the next call; null at the end. Throws Error if a slab cannot be read.
-  const LoadedSlab* next() { return ahead_.next(); }
+  const LoadedSlab* next();
 
  private:
-  /// Number of the first slab of share `index`.
-  size_t beginOf(unsigned index, const SlabShare& share) const;
+  /// Slabs that are read at a time: one, or several small ones, since handing one from thread to thread takes longer than
+  /// reading a block of some hundred nodes.
+  struct Group {
+    std::vector<LoadedSlab> slabs;
+    size_t count = 0;
+  };
+  static std::vector<size_t> endsOfGroups(std::span<const Slab> slabs, std::span<const GridBlock> blocks);
 
-  std::vector<Slab> slabs_;
-  const size_t begin_, end_;
-  ReadAhead<LoadedSlab> ahead_;
+  const std::vector<Slab> slabs_;
+  const std::vector<size_t> ends_;  // [group], of slabs_
+  ReadAhead<Group> ahead_;
+  const Group* group_ = nullptr;  // of the latest slab
+  size_t next_ = 0;               // of its slabs
 };
 
 }  // namespace curvisplat

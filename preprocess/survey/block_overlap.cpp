@@ -1,444 +1,295 @@
 #include "preprocess/survey/block_overlap.h"
 
 #include <fmt/format.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
-#include <atomic>
-#include <cmath>
-#include <glm/common.hpp>
 #include <iterator>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <utility>
 
-#include "preprocess/grid/hexahedron.h"
-#include "preprocess/grid/hexahedron_location.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/box_tree.h"
-#include "preprocess/survey/point_tree.h"
-#include "stream/base/check.h"
+#include "preprocess/survey/overlap_points.h"
+#include "preprocess/survey/point_holders.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr double kPoints = 100'000;  // approximate number of points inside all blocks; more at their faces
 constexpr size_t kMaxBlocks = 100'000;
-constexpr uint64_t kBinsAlongAxis = 64;
 // A smaller share of the smaller block is attributed to rounding, or to curved faces that two blocks
 // approximate by different chords.
 constexpr double kNegligibleShare = 2e-3;
 constexpr size_t kPairsNamed = 4;
-constexpr uint8_t kMaxHolders = 16;  // of a point: other blocks that are found to hold it
+constexpr uint64_t kBytesOfPair = 96;  // in a map, and in the result
+constexpr uint64_t kMinPoints = 4 * BlockSampling::kMaxPointsOfCell;
 
-/// A sample point of a block, and the volume that it represents.
-struct BlockPoint {
-  glm::dvec3 position{0.0};
-  double volume = 0;
-  uint32_t block = 0;
-};
-
-/// A sample point in a cell along one axis: its position (0 to 1), and the number of cells it represents.
-struct AxisPoint {
-  double t, cells;
-};
-
-/// The sample points along an axis of `cells` cells, by cell: several in the first and the last cell, close
-/// to the ends of the block, to find overlaps of less than a cell; `wanted` at the centres of other cells,
-/// evenly spread.
-std::map<uint64_t, std::vector<AxisPoint>> pointsAlong(uint64_t cells, uint64_t wanted, bool few) {
-  const std::vector<AxisPoint> end = few ? std::vector<AxisPoint>{{0.1, 0.2}, {0.6, 0.8}}
-                                         : std::vector<AxisPoint>{{0.05, 0.1}, {0.2, 0.2}, {0.65, 0.7}};
-  std::map<uint64_t, std::vector<AxisPoint>> points;
-  if (cells == 1) {
-    for (const AxisPoint& point : end) {
-      points[0].push_back({point.t / 2, point.cells / 2});
-      points[0].push_back({1 - point.t / 2, point.cells / 2});
-    }
-    return points;
-  }
-  points[0] = end;
-  for (const AxisPoint& point : end) points[cells - 1].push_back({1 - point.t, point.cells});
-  const uint64_t inner = cells - 2, count = std::min(inner, std::max<uint64_t>(1, wanted));
-  for (uint64_t n = 0; n < count; ++n)
-    points[1 + (2 * n + 1) * inner / (2 * count)] = {
-        {0.5, static_cast<double>(inner) / static_cast<double>(count)}};
-  return points;
+bool hasCells(const GridBlock& block) {
+  return block.ni > 1 && block.nj > 1 && block.nk > 1;
 }
 
-/// The sample points of a block, as a product of those along each axis.
-struct Sampling {
-  std::map<uint64_t, std::vector<AxisPoint>> i, j, k;
-
-  Sampling(const GridBlock& block, double cells_in_all, size_t blocks) {
-    const auto cells = static_cast<double>((block.ni - 1) * (block.nj - 1) * (block.nk - 1));
-    // One of every `step` cells along each axis.
-    const double step = std::max(1.0, std::cbrt(cells_in_all / kPoints));
-    const auto wanted = [&](uint64_t nodes) {
-      return static_cast<uint64_t>(static_cast<double>(nodes - 1) / step);
-    };
-    const bool few = blocks > 200;
-    CURVISPLAT_CHECK(cells > 0);
-    i = pointsAlong(block.ni - 1, wanted(block.ni), few);
-    j = pointsAlong(block.nj - 1, wanted(block.nj), few);
-    k = pointsAlong(block.nk - 1, wanted(block.nk), few);
-  }
-};
-
-glm::dvec3 pointIn(const std::array<glm::dvec3, 8>& corner, double u, double v, double w) {
-  const auto along_i = [&](size_t c) { return glm::mix(corner[c], corner[c + 1], u); };
-  return glm::mix(glm::mix(along_i(0), along_i(2), v), glm::mix(along_i(4), along_i(6), v), w);
-}
-
-/// Whether the trilinear hexahedron contains the point. Its faces belong to none.
-bool holds(const std::array<glm::dvec3, 8>& corner, const glm::dvec3& point) {
-  const std::optional<glm::dvec3> u = locateInHexahedron(corner, point);
-  return u && std::abs(u->x) < 1 && std::abs(u->y) < 1 && std::abs(u->z) < 1;
-}
-
-/// Some of `points`, given by number, sorted into the cells of a uniform lattice. Borrows the points.
-class Bins {
+/// The volumes that blocks share, as seen by the points of either: a pair's estimate is the larger of the two.
+class SharedVolumes {
  public:
-  Bins(const std::vector<BlockPoint>& points, const std::vector<uint32_t>& numbers) {
-    for (const uint32_t n : numbers) box_.add(points[n].position);
-    for (int axis = 0; axis < 3; ++axis) {
-      const double extent = box_.upper[axis] - box_.lower[axis];
-      scale_[axis] = extent > 0 ? static_cast<double>(kBinsAlongAxis) / extent : 0.0;
+  SharedVolumes(std::span<const double> volumes, uint64_t max_pairs)
+      : volumes_(volumes), max_pairs_(max_pairs) {}
+
+  /// `other` holds a point of `block`. For each pair in the order of the points.
+  void add(uint32_t block, uint32_t other, double volume) { shared_[{block, other}] += volume; }
+
+  /// All points of the blocks before `end` are located: forgets their pairs that share too little. Counts the pairs only
+  /// from the moment on when there are too many.
+  void finishBlocks(uint32_t end) {
+    if (shared_.size() > checked_) {
+      std::erase_if(shared_, [&](const auto& entry) {
+        const auto [block, other] = entry.first;
+        return block < end && other < end && !(entry.second > negligible(block, other));
+      });
+      checked_ = 2 * shared_.size() + 1000;
     }
-    first_.assign(kBinsAlongAxis * kBinsAlongAxis * kBinsAlongAxis + 1, 0);
-    for (const uint32_t n : numbers) ++first_[binOf(points[n].position) + 1];
-    for (size_t bin = 1; bin < first_.size(); ++bin) first_[bin] += first_[bin - 1];
-    std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-    sorted_.resize(numbers.size());
-    for (const uint32_t n : numbers) sorted_[next[binOf(points[n].position)]++] = n;
+    if (too_many_ == 0 && shared_.size() <= max_pairs_) return;
+    too_many_ += shared_.size();
+    shared_.clear();
   }
 
-  /// Calls each(number) for the points of the bins that the box touches. False, and calls nothing, if there are many bins or points.
-  template <typename Each>
-  bool forEachOfFew(const BoundingBox& box, const Each& each) const {
-    constexpr uint64_t kFewBins = 64, kFewPoints = 64;
-    if (!box_.meets(box)) return true;
-    const auto low = place(box.lower), high = place(box.upper);
-    if ((high[0] - low[0] + 1) * (high[1] - low[1] + 1) * (high[2] - low[2] + 1) > kFewBins) return false;
-    const auto for_each_row = [&](const auto& visit) {
-      for (uint64_t z = low[2]; z <= high[2]; ++z)
-        for (uint64_t y = low[1]; y <= high[1]; ++y) {
-          const uint64_t row = (z * kBinsAlongAxis + y) * kBinsAlongAxis;
-          visit(first_[row + low[0]], first_[row + high[0] + 1]);
-        }
-    };
-    uint64_t count = 0;
-    for_each_row([&](uint32_t begin, uint32_t end) { count += end - begin; });
-    if (count > kFewPoints) return false;
-    if (count == 0) return true;
-    for_each_row([&](uint32_t begin, uint32_t end) {
-      for (uint32_t n = begin; n < end; ++n) each(sorted_[n]);
+  uint64_t bytes() const { return shared_.size() * kBytesOfPair; }
+  /// More than all pairs, where they are too many to be held; else 0.
+  uint64_t tooMany() const { return too_many_; }
+
+  std::vector<BlockOverlap> overlaps() const {
+    std::vector<BlockOverlap> overlaps;
+    overlaps.reserve(shared_.size());
+    for (const auto& [pair, own] : shared_) {
+      const auto [block, other] = pair;
+      const auto reverse = shared_.find({other, block});
+      if (block > other && reverse != shared_.end()) continue;  // has been looked at
+      const double volume = reverse == shared_.end() ? own : std::max(own, reverse->second);
+      if (!(volume > negligible(block, other))) continue;
+      const double smaller = std::min(volumes_[block], volumes_[other]);
+      overlaps.push_back({std::min(block, other), std::max(block, other), std::min(volume, smaller),
+                          std::min(1.0, volume / smaller)});
+    }
+    std::sort(overlaps.begin(), overlaps.end(), [](const BlockOverlap& a, const BlockOverlap& b) {
+      return std::pair(a.first, a.second) < std::pair(b.first, b.second);
     });
-    return true;
+    return overlaps;
   }
 
  private:
-  std::array<uint64_t, 3> place(const glm::dvec3& position) const {
-    std::array<uint64_t, 3> place;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double at = (position[axis] - box_.lower[axis]) * scale_[axis];
-      place[axis] = static_cast<uint64_t>(std::clamp(at, 0.0, static_cast<double>(kBinsAlongAxis - 1)));
-    }
-    return place;
-  }
-  uint64_t binOf(const glm::dvec3& position) const {
-    const auto at = place(position);
-    return (at[2] * kBinsAlongAxis + at[1]) * kBinsAlongAxis + at[0];
+  double negligible(uint32_t block, uint32_t other) const {
+    return kNegligibleShare * std::min(volumes_[block], volumes_[other]);
   }
 
-  BoundingBox box_;
-  glm::dvec3 scale_{0.0};
-  std::vector<uint32_t> first_, sorted_;
+  const std::span<const double> volumes_;  // [block], as far as they are measured
+  const uint64_t max_pairs_;
+  std::map<std::pair<uint32_t, uint32_t>, double> shared_;  // (block of points, block of cells)
+  size_t checked_ = 1000;
+  uint64_t too_many_ = 0;
 };
 
-/// Calls each(element of the lowest node, strides, i, j, k) for the cells of a slab that are not blanked, in
-/// parallel by rows; skips rows for which `keep` is false.
-template <typename Keep, typename Each>
-void forEachCell(const GridBlock& block, const LoadedSlab& loaded, const Keep& keep, const Each& each) {
-  const Slab& slab = loaded.slab;
-  const WindowStrides strides(slab.window, block.ni);
-  const uint64_t width = slab.box.j1 - slab.box.j0;
-  tbb::parallel_for(uint64_t{0}, rowsOf(slab.box), [&](uint64_t n) {
-    const uint64_t j = slab.box.j0 + n % width, k = slab.box.k0 + n / width;
-    if (j + 1 >= block.nj || k + 1 >= block.nk || !keep(j, k)) return;
-    size_t at = strides.at(slab.box.i0, j, k);
-    for (uint64_t i = slab.box.i0; i < slab.box.i1 && i + 1 < block.ni; ++i, ++at)
-      if (!cornerMarks(loaded.nodes.blank.data(), at, strides.row, strides.plane))
-        each(at, strides.row, strides.plane, i, j, k);
-  });
-}
-
-std::array<glm::dvec3, 8> cornersIn(const LoadedSlab& loaded, size_t at, size_t row, size_t plane) {
-  return cornersAt(loaded.nodes.x.data(), loaded.nodes.y.data(), loaded.nodes.z.data(), at, row, plane);
-}
-
-struct BlockMeasure {
-  BoundingBox box;
-  double volume = 0;
-};
-
-/// The first pass: bounding boxes and volumes of the blocks, and their sample points.
-std::vector<BlockPoint> pickPoints(const NodeReader& reader, uint64_t slab_bytes, const Progress& progress,
-                                   std::vector<BlockMeasure>& measures) {
-  const std::vector<GridBlock>& blocks = reader.source().description().blocks;
-  double cells = 0;
-  for (const GridBlock& block : blocks)
-    cells += static_cast<double>((block.ni - 1) * (block.nj - 1) * (block.nk - 1));
-  using Numbered = std::pair<std::pair<uint32_t, uint64_t>, std::vector<BlockPoint>>;  // of (block, cell)
-  std::vector<Numbered> of_cells;
-  SlabStream slabs(reader, slab_bytes, kCornerHalo);
-  while (const LoadedSlab* loaded = slabs.next()) {
-    progress.throwIfStopped();
-    const uint32_t number = loaded->slab.block;
-    const GridBlock& block = blocks[number];
-    for (size_t n = 0; n < loaded->nodes.x.size(); ++n)
-      if (!loaded->nodes.blank[n])
-        measures[number].box.add({loaded->nodes.x[n], loaded->nodes.y[n], loaded->nodes.z[n]});
-    if (block.ni < 2 || block.nj < 2 || block.nk < 2) continue;
-    const Sampling sampling(block, cells, blocks.size());
-    tbb::enumerable_thread_specific<std::vector<Numbered>> found;
-    forEachCell(
-        block, *loaded,
-        [&](uint64_t j, uint64_t k) { return sampling.j.contains(j) && sampling.k.contains(k); },
-        [&](size_t at, size_t row, size_t plane, uint64_t i, uint64_t j, uint64_t k) {
-          const auto along_i = sampling.i.find(i);
-          if (along_i == sampling.i.end()) return;
-          const std::array<glm::dvec3, 8> corner = cornersIn(*loaded, at, row, plane);
-          const double volume = std::abs(Hexahedron(corner).volume());
-          std::vector<BlockPoint> points;
-          for (const AxisPoint& w : sampling.k.at(k))
-            for (const AxisPoint& v : sampling.j.at(j))
-              for (const AxisPoint& u : along_i->second)
-                points.push_back(
-                    {pointIn(corner, u.t, v.t, w.t), volume * u.cells * v.cells * w.cells, number});
-          found.local().push_back({{number, (k * block.nj + j) * block.ni + i}, std::move(points)});
-        });
-    for (const auto& of_thread : found) of_cells.insert(of_cells.end(), of_thread.begin(), of_thread.end());
-  }
-  std::sort(of_cells.begin(), of_cells.end(),
-            [](const Numbered& a, const Numbered& b) { return a.first < b.first; });
-  std::vector<BlockPoint> points;
-  for (const auto& [cell, of_cell] : of_cells)
-    for (const BlockPoint& point : of_cell) {
-      points.push_back(point);
-      measures[point.block].volume += point.volume;
-    }
-  return points;
-}
-
-/// Which points (by number) other blocks contain, as the blocks come one after another. A point that lies in
-/// kMaxHolders blocks is located no further: otherwise a set that names one file a thousand times would take
-/// the square of that.
-class Holders {
+class OverlapSearch {
  public:
-  explicit Holders(const std::vector<BlockPoint>& points)
-      : points_(points),
-        counts_(points.size(), 0),
-        latest_(points.size()),
-        bins_(points, allOf(points)),
-        tree_(treeOf(allOf(points))) {}
+  OverlapSearch(const GridSource& source, const OverlapMemory& memory, const Progress& progress)
+      : blocks_(source.description().blocks),
+        reader_(source, {}, std::nullopt),
+        memory_(memory),
+        progress_(progress),
+        boxes_(blocks_.size()),
+        volumes_(blocks_.size()),
+        shared_(volumes_, memory.cap_for ? memory.point_bytes / 2 / kBytesOfPair
+                                         : std::numeric_limits<uint64_t>::max()) {
+    for (const GridBlock& block : blocks_)
+      cells_ += static_cast<double>((block.ni - 1) * (block.nj - 1) * (block.nk - 1));
+  }
 
-  bool areAllFound() const { return !is_pruned_ && tree_.size() == 0; }
-
-  /// Locates the points in the cells of a slab. Throws Interrupted if a stop is asked for.
-  void locate(const GridBlock& block, const LoadedSlab& loaded, const Progress& progress) {
-    const Slab& slab = loaded.slab;
-    const uint64_t width = slab.box.j1 - slab.box.j0;
-    std::vector<uint64_t> next(rowsOf(slab.box), slab.box.i0);  // [row]: the first cell that is not searched
-    tbb::enumerable_thread_specific<std::vector<uint32_t>> found;
-    std::atomic<bool> complete = false;
-    while (!complete && tree_.size() > 0) {
-      complete = true;
-      forEachCell(
-          block, loaded,
-          [&](uint64_t, uint64_t) {
-            progress.throwIfStopped();
-            return true;
-          },
-          [&](size_t at, size_t row, size_t plane, uint64_t i, uint64_t j, uint64_t k) {
-            uint64_t& next_of_row = next[(k - slab.box.k0) * width + j - slab.box.j0];
-            if (i < next_of_row) return;
-            if (shouldPrune()) {
-              complete = false;
-              return;
-            }
-            next_of_row = i + 1;
-            locateInCell(slab.block, cornersIn(loaded, at, row, plane), found.local());
-          });
-      if (!complete) prune(slab.block);
-    }
-    for (const auto& of_thread : found)
-      for (const uint32_t point : of_thread) {
-        inside_.push_back({point, slab.block});
-        if (++counts_[point] == kMaxHolders) ++finished_;
+  std::vector<BlockOverlap> find() {
+    uint64_t all = 0;
+    for (const GridBlock& block : blocks_)
+      if (hasCells(block)) all += samplingOf(block).points();
+    const bool at_once = all <= memory_.point_bytes / 2 / sizeof(BlockPoint);
+    std::vector<BlockPoint> points;
+    measure(at_once ? &points : nullptr);
+    tree_.emplace(boxes_);
+    for (uint32_t block = 0; block < blocks_.size(); ++block)
+      meets_.push_back(tree_->anotherTouches(boxes_[block], block));
+    if (at_once) {
+      keepPointsInOthers(points, 0, *tree_);
+      points.shrink_to_fit();
+      locateInParts(points);
+    } else {
+      for (Place next; next.block < blocks_.size();) {
+        points.clear();
+        next = pick(next, points);
+        locateInParts(points);
+        shared_.finishBlocks(next.block);
       }
+    }
+    if (shared_.tooMany() > 0)
+      throw Error("--memory: the blocks of this grid overlap in up to {} pairs; give at least {} MiB",
+                  shared_.tooMany(), (memory_.cap_for(2 * shared_.tooMany() * kBytesOfPair) >> 20) + 1);
+    return shared_.overlaps();
   }
-
-  /// To be called after the last slab of each block.
-  void finishBlock() {
-    met_in_vain_ += in_vain_.exchange(0);
-    if (!is_pruned_ && 2 * finished_ <= tree_.size()) return;
-    std::vector<uint32_t> wanted;
-    for (uint32_t point = 0; point < points_.size(); ++point)
-      if (counts_[point] < kMaxHolders) wanted.push_back(point);
-    sort(wanted);
-    finished_ = 0;
-    is_pruned_ = false;
-  }
-
-  /// How often cells met points that were not to be located in them, in the blocks that are finished.
+  /// As findOverlaps() has it, after find().
   uint64_t metInVain() const { return met_in_vain_; }
 
-  /// (point, block), sorted.
-  std::vector<std::pair<uint32_t, uint32_t>> take() {
-    std::sort(inside_.begin(), inside_.end());
-    return std::move(inside_);
-  }
-
  private:
-  // Where cells pass through one another, such as those of random coordinates, each of them meets a share of
-  // all points, nearly all of which are the block's own or were found in its first cells. So many meetings cost
-  // what sorting the points again does: for each of them, and in any case.
-  static constexpr size_t kInVainEach = 32, kInVainAnyway = 1 << 17;
+  /// A cell, and the plane of cells that it is in.
+  struct Place {
+    uint32_t block = 0;
+    uint64_t cell = 0, plane = 0;
+  };
 
-  /// Adds those to `found` that the cell holds. Any thread.
-  void locateInCell(uint32_t block, const std::array<glm::dvec3, 8>& corner, std::vector<uint32_t>& found) {
-    BoundingBox box;
-    for (const glm::dvec3& node : corner) box.add(node);
-    size_t in_vain = 0;
-    const auto locate = [&](uint32_t point) {
-      if (!isWanted(point, block)) {
-        ++in_vain;
-      } else if (holds(corner, points_[point].position) && note(point, block)) {
-        found.push_back(point);
+  BlockSampling samplingOf(const GridBlock& block) const { return {block, cells_, blocks_.size()}; }
+
+  /// The first pass: the blocks' boxes and, with `points`, all of their sample points and volumes.
+  void measure(std::vector<BlockPoint>* points) {
+    SlabStream slabs(reader_, memory_.slab_bytes, points ? kCornerHalo : kNoHalo);
+    std::optional<BlockSampling> sampling;
+    std::optional<PointPicker> picker;
+    uint32_t picked = 0;
+    const auto finish = [&] {
+      if (picker) picker->finish(volumes_[picked], nullptr);
+      picker.reset();
+    };
+    while (const LoadedSlab* loaded = slabs.next()) {
+      progress_.throwIfStopped();
+      const uint32_t number = loaded->slab.block;
+      for (size_t n = 0; n < loaded->nodes.x.size(); ++n)
+        if (!loaded->nodes.blank[n])
+          boxes_[number].add({loaded->nodes.x[n], loaded->nodes.y[n], loaded->nodes.z[n]});
+      if (!points || !hasCells(blocks_[number])) continue;
+      if (!picker || picked != number) {
+        finish();
+        picked = number;
+        sampling.emplace(samplingOf(blocks_[number]));
+        picker.emplace(blocks_[number], *sampling, CellPart{number, 0, sampling->endOfCells()}, *points);
       }
+      picker->add(*loaded);
+    }
+    finish();
+  }
+
+  /// The slabs of the blocks that `wanted` is true for.
+  template <typename Wanted>
+  std::vector<Slab> slabsOf(const Wanted& wanted) const {
+    std::vector<Slab> slabs = cutIntoSlabs(blocks_, memory_.slab_bytes / slabBytesPerNode(0), kCornerHalo);
+    std::erase_if(slabs, [&](const Slab& slab) { return !hasCells(blocks_[slab.block]) || !wanted(slab); });
+    return slabs;
+  }
+
+  /// What points may take: the pairs get a quarter, or what they have and an eighth.
+  uint64_t bytesForPoints() const {
+    const uint64_t all = memory_.point_bytes;
+    return all - std::min(all, std::max(all / 4, shared_.bytes() + all / 8));
+  }
+  /// How many points may be located at a time, beside those in memory.
+  uint64_t mostLocated(uint64_t points) const {
+    const uint64_t bytes = bytesForPoints(), held = points * sizeof(BlockPoint);
+    return std::max<uint64_t>((bytes - std::min(bytes, held)) / PointHolders::kBytesEach, kMinPoints);
+  }
+  /// How many may be picked and located.
+  uint64_t mostPicked() const {
+    return std::max<uint64_t>(bytesForPoints() / (sizeof(BlockPoint) + PointHolders::kBytesEach), kMinPoints);
+  }
+
+  /// Picks the points that may lie in other blocks, from a cell on, as many as fit. Returns where to go on.
+  Place pick(const Place& from, std::vector<BlockPoint>& points) {
+    const uint64_t most = mostPicked();
+    CellPart part;  // of a block, that is being picked
+    std::optional<BlockSampling> sampling;
+    std::optional<PointPicker> picker;
+    const auto finish = [&] {
+      if (picker) picker->finish(volumes_[part.block], &*tree_);
+      picker.reset();
+      return sampling && part.end < sampling->endOfCells();
     };
-    const auto locate_in_box = [&](uint32_t point) {
-      if (box.holds(points_[point].position)) locate(point);
+    const auto goOn = [&](uint64_t cell) { return Place{part.block, cell, sampling->planeOf(cell)}; };
+    points.reserve(most);
+    SlabStream slabs(reader_, memory_.slab_bytes, slabsOf([&](const Slab& slab) {
+                       return slab.block >= from.block && meets_[slab.block] &&
+                              (slab.block > from.block || slab.box.k1 > from.plane);
+                     }));
+    while (const LoadedSlab* loaded = slabs.next()) {
+      progress_.throwIfStopped();
+      const uint32_t number = loaded->slab.block;
+      if (!picker || part.block != number) {
+        if (finish()) return goOn(part.end);
+        sampling.emplace(samplingOf(blocks_[number]));
+        const uint64_t begin = number == from.block ? from.cell : 0;
+        part = {number, begin, sampling->endOfPart(begin, most)};
+        const uint64_t count = sampling->pointsBefore(part.end) - sampling->pointsBefore(begin);
+        if (points.size() + count > most) return goOn(begin);
+        picker.emplace(blocks_[number], *sampling, part, points);
+      }
+      picker->add(*loaded);
+    }
+    return finish() ? goOn(part.end) : Place{static_cast<uint32_t>(blocks_.size())};
+  }
+
+  void locateInParts(std::span<const BlockPoint> points) {
+    const uint64_t most = mostLocated(points.size());
+    while (!points.empty()) {
+      const size_t count = std::min<size_t>(points.size(), most);
+      locate(points.first(count));
+      points = points.subspan(count);
+    }
+  }
+
+  /// Adds the volumes of the points that lie in other blocks.
+  void locate(std::span<const BlockPoint> points) {
+    PointHolders holders(points);
+    std::vector<bool> wanted(blocks_.size());
+    for (uint32_t block = 0; block < blocks_.size(); ++block)
+      wanted[block] = !boxes_[block].isEmpty() && holders.mayHold(block, boxes_[block]);
+    const auto finish = [&](uint32_t block) {
+      for (const uint32_t point : holders.finishBlock())
+        shared_.add(points[point].block, block, points[point].volume);
     };
-    if (!bins_.forEachOfFew(box, locate_in_box)) tree_.forEachNear(corner, locate);
-    if (in_vain > 0) in_vain_.fetch_add(in_vain, std::memory_order_relaxed);
-  }
-  /// Whether the point is to be located in the cells of `block`. Any thread.
-  bool isWanted(uint32_t point, uint32_t block) const {
-    return points_[point].block != block && counts_[point] < kMaxHolders &&
-           latest_[point].load(std::memory_order_relaxed) != block + 1;
-  }
-  /// `block` contains the point. Returns whether that is new: two cells may both contain a point of their common face. Any thread.
-  bool note(uint32_t point, uint32_t block) {
-    return latest_[point].exchange(block + 1, std::memory_order_relaxed) != block + 1;
-  }
-
-  /// Any thread.
-  bool shouldPrune() const {
-    return in_vain_.load(std::memory_order_relaxed) > kInVainEach * tree_.size() + kInVainAnyway;
-  }
-  /// Sorts again the points that are still to be located in `block`. finishBlock() brings back the others.
-  void prune(uint32_t block) {
-    std::vector<uint32_t> wanted;
-    tree_.forEach([&](uint32_t point) {
-      if (isWanted(point, block)) wanted.push_back(point);
-    });
-    sort(wanted);
-    met_in_vain_ += in_vain_.exchange(0);
-    is_pruned_ = true;
-  }
-  void sort(const std::vector<uint32_t>& wanted) {
-    bins_ = Bins(points_, wanted);
-    tree_ = treeOf(wanted);
+    SlabStream slabs(reader_, memory_.slab_bytes,
+                     slabsOf([&](const Slab& slab) { return wanted[slab.block]; }));
+    std::optional<uint32_t> block;
+    while (const LoadedSlab* loaded = slabs.next()) {
+      progress_.throwIfStopped();
+      const uint32_t number = loaded->slab.block;
+      if (block && *block != number) {
+        finish(*block);
+        block.reset();
+        if (holders.areAllFound()) break;
+      }
+      block = number;
+      holders.locate(blocks_[number], *loaded, progress_);
+    }
+    if (block) finish(*block);
+    met_in_vain_ += holders.metInVain();
   }
 
-  static std::vector<uint32_t> allOf(const std::vector<BlockPoint>& points) {
-    std::vector<uint32_t> numbers(points.size());
-    std::iota(numbers.begin(), numbers.end(), 0u);
-    return numbers;
-  }
-  PointTree treeOf(const std::vector<uint32_t>& numbers) const {
-    return PointTree(std::span<const BlockPoint>(points_), numbers);
-  }
-
-  const std::vector<BlockPoint>& points_;
-  std::vector<uint8_t> counts_;  // [point]
-  std::vector<std::atomic<uint32_t>>
-      latest_;                      // [point]: 1 + the latest block that is known to contain it; 0: none
-  Bins bins_;                       // the points still to be located, and few others
-  PointTree tree_;                  // the same: for cells in whose bins many lie
-  size_t finished_ = 0;             // of the points in tree_
-  bool is_pruned_ = false;          // tree_ lacks points that blocks to come are searched for
-  std::atomic<size_t> in_vain_{0};  // how often cells met points that are not wanted, since tree_ was built
-  uint64_t met_in_vain_ = 0;        // before that
-  std::vector<std::pair<uint32_t, uint32_t>> inside_;
+  const std::vector<GridBlock>& blocks_;
+  const NodeReader reader_;
+  const OverlapMemory memory_;
+  const Progress& progress_;
+  double cells_ = 0;
+  uint64_t met_in_vain_ = 0;
+  std::vector<BoundingBox> boxes_;  // [block]
+  std::vector<double> volumes_;     // [block], of those whose points have been picked
+  std::optional<BoxTree> tree_;     // of the boxes
+  std::vector<bool> meets_;         // [block], whether its box touches another
+  SharedVolumes shared_;
 };
-
-/// The second pass: pairs (point, other block that contains it), sorted.
-std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, uint64_t slab_bytes,
-                                                      const Progress& progress,
-                                                      const std::vector<BlockPoint>& points,
-                                                      uint64_t* met_in_vain) {
-  const std::vector<GridBlock>& blocks = reader.source().description().blocks;
-  Holders holders(points);
-  uint32_t block = 0;
-  SlabStream slabs(reader, slab_bytes, kCornerHalo);
-  while (const LoadedSlab* loaded = slabs.next()) {
-    progress.throwIfStopped();
-    const uint32_t number = loaded->slab.block;
-    if (number != std::exchange(block, number)) holders.finishBlock();
-    if (holders.areAllFound()) break;
-    holders.locate(blocks[number], *loaded, progress);
-  }
-  holders.finishBlock();
-  if (met_in_vain) *met_in_vain = holders.metInVain();
-  return holders.take();
-}
 
 }  // namespace
 
-std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
+std::vector<BlockOverlap> findOverlaps(const GridSource& source, const OverlapMemory& memory,
                                        const Progress& progress, uint64_t* met_in_vain) {
   if (met_in_vain) *met_in_vain = 0;
   const size_t blocks = source.description().blocks.size();
-  std::vector<BlockOverlap> overlaps;
-  if (blocks < 2 || blocks > kMaxBlocks) return overlaps;
-  const NodeReader reader(source, {}, std::nullopt);
-  std::vector<BlockMeasure> measures(blocks);
-  std::vector<BlockPoint> points = pickPoints(reader, slab_bytes, progress, measures);
-
-  // Points outside all other blocks' bounding boxes need no search.
-  std::vector<BoundingBox> boxes;
-  for (const BlockMeasure& measure : measures) boxes.push_back(measure.box);
-  const BoxTree tree(boxes);
-  std::erase_if(points, [&](const BlockPoint& point) {
-    progress.throwIfStopped();
-    return !tree.anotherHolds(point.position, point.block);
-  });
-  if (points.empty()) return overlaps;
-
-  std::map<std::pair<uint32_t, uint32_t>, double> shared;  // (block of points, block of cells) -> volume
-  for (const auto& [point, block] : findInside(reader, slab_bytes, progress, points, met_in_vain))
-    shared[{points[point].block, block}] += points[point].volume;
-  // The points of either block give an estimate for the pair; the larger one is used.
-  std::map<std::pair<uint32_t, uint32_t>, double> of_pairs;
-  for (const auto& [pair, volume] : shared) {
-    double& largest = of_pairs[std::minmax(pair.first, pair.second)];
-    largest = std::max(largest, volume);
-  }
-  for (const auto& [pair, volume] : of_pairs) {
-    const double smaller = std::min(measures[pair.first].volume, measures[pair.second].volume);
-    if (volume > kNegligibleShare * smaller)
-      overlaps.push_back(
-          {pair.first, pair.second, std::min(volume, smaller), std::min(1.0, volume / smaller)});
-  }
+  if (blocks < 2 || blocks > kMaxBlocks) return {};
+  OverlapSearch search(source, memory, progress);
+  std::vector<BlockOverlap> overlaps = search.find();
+  if (met_in_vain) *met_in_vain = search.metInVain();
   return overlaps;
 }
 

@@ -4,12 +4,15 @@
 // Sample points of every block, most of them close to its faces, are located in the cells of all other
 // blocks. Abutting blocks share no volume, whether or not their nodes match on the common face; overlaps of
 // up to a five-hundredth of a block, where two blocks approximate a curved face by different chords, are
-// ignored. The coordinates are read twice, or once if the blocks' bounding boxes are disjoint. Memory: two
-// slabs, and 150 bytes for each point: about 100,000 points, and some more at each block's corners, edges and
-// faces. Time: n log n in the blocks, and for each cell what finding the points near it takes, however long and
-// slanted it is; a point is located in at most 16 other blocks. Where cells pass through one another, such as those of random
-// coordinates, the points that are found, or are the block's own, are sorted out on the way. Grids of more than 100,000 blocks
-// are not checked.
+// ignored. There are about 100,000 points, and some more at each block's corners, edges and faces. Where all of them fit
+// in memory, the coordinates are read twice, or once if the blocks' bounding boxes are disjoint. Otherwise the first pass
+// finds the boxes alone, and the points of blocks whose boxes touch are picked and located in parts:
+//
+//    blocks --boxes--> BoxTree --PointPicker--> points in others' boxes --PointHolders--> shared volumes of pairs
+//                                 as many as fit, and again
+//
+// Time: n log n in the blocks, and for each cell what finding the points near it takes, however long and
+// slanted it is; a point is located in at most 16 other blocks. Grids of more than 100,000 blocks are not checked.
 #pragma once
 
 #include <cstdint>
@@ -27,11 +30,19 @@ struct BlockOverlap {
   double share = 0;                // volume / volume of the smaller block
 };
 
+/// What the search may take, beside some hundred bytes a block.
+struct OverlapMemory {
+  uint64_t slab_bytes = 0;   // each of two
+  uint64_t point_bytes = 0;  // the points that are located at a time, and pairs of blocks
+  /// The limit of memory to name where `point_bytes` should be this; null: there is no limit for pairs.
+  uint64_t (*cap_for)(uint64_t point_bytes) = nullptr;
+};
+
 /// All pairs of blocks with more than a negligible overlap, in order of their numbers. The result depends
-/// neither on the number of threads nor on the size of the slabs. `met_in_vain`: unless null, how often points were near a cell and
-/// had not to be located in it, which is most of the work where cells pass through one another; depends on the threads. Throws
-/// Error if the grid cannot be read.
-std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
+/// neither on the number of threads nor on the memory. `met_in_vain`: unless null, how often points were near a cell and had not
+/// to be located in it, which is most of the work where cells pass through one another; depends on the threads. Throws Error
+/// if the grid cannot be read, or the pairs do not fit.
+std::vector<BlockOverlap> findOverlaps(const GridSource& source, const OverlapMemory& memory,
                                        const Progress& progress, uint64_t* met_in_vain = nullptr);
 
 /// One line that says that there are too many blocks to search for overlaps; else empty.

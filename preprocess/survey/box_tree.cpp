@@ -21,4 +21,11 @@ bool BoxTree::anotherHolds(const glm::dvec3& point, uint32_t except) const {
                      [&](const Numbered& box) { return box.number != except && box.bounds.holds(point); });
 }
 
+bool BoxTree::anotherTouches(const BoundingBox& box, uint32_t except) const {
+  if (box.isEmpty()) return false;
+  return tree_.visit(
+      [&](const BoundingBox& node) { return node.touches(box); },
+      [&](const Numbered& other) { return other.number != except && other.bounds.touches(box); });
+}
+
 }  // namespace curvisplat

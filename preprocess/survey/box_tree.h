@@ -1,4 +1,4 @@
-// A tree of axis-parallel boxes, which finds those that hold a point.
+// A tree of axis-parallel boxes, which finds those that hold a point or touch a box.
 //
 // Building takes n log n, a query log n where few boxes overlap; both take less than 150 bytes a box.
 #pragma once
@@ -20,6 +20,8 @@ class BoxTree {
 
   /// Whether a box other than number `except` holds the point.
   bool anotherHolds(const glm::dvec3& point, uint32_t except) const;
+  /// Whether a box other than number `except` has a point in common with this one.
+  bool anotherTouches(const BoundingBox& box, uint32_t except) const;
 
  private:
   struct Numbered {

@@ -63,6 +63,13 @@ class PointTree {
   template <typename Each>
   void forEachNear(const std::array<glm::dvec3, 8>& corner, const Each& each) const;
 
+  /// Whether is(number) is true for a point that the box holds.
+  template <typename Is>
+  bool anyIn(const BoundingBox& box, const Is& is) const {
+    return tree_.visit([&](const BoundingBox& node) { return node.touches(box); },
+                       [&](const Numbered& point) { return box.holds(point.position) && is(point.number); });
+  }
+
   /// Calls each(number) for all points.
   template <typename Each>
   void forEach(const Each& each) const {

@@ -107,6 +107,40 @@ TEST_F(LimitsTest, LongRowsAreConvertedWithinTheMemory) {
   EXPECT_EQ(added.status, 0) << added.err;
 }
 
+// Whose boxes overlap, so that the check for overlaps picks the points of all of them.
+TEST_F(LimitsTest, ManySmallBlocksAreConvertedWithinTheMemory) {
+  constexpr uint64_t kMebibytes = 160;
+  constexpr int32_t kBlocks = 10'000, kSide = 4;
+  std::vector<int32_t> grid_header{kBlocks}, function_header{kBlocks};
+  std::vector<float> coordinates, values;
+  for (int32_t n = 0; n < kBlocks; ++n) {
+    grid_header.insert(grid_header.end(), {kSide, kSide, kSide});
+    function_header.insert(function_header.end(), {kSide, kSide, kSide, 1});
+    for (int axis = 0; axis < 3; ++axis)
+      for (int32_t node = 0; node < kSide * kSide * kSide; ++node) {
+        const double x = n % 20 + node % kSide / 3.0, y = n / 20 % 20 + node / kSide % kSide / 3.0;
+        const double z = n / 400 + node / (kSide * kSide) / 3.0;
+        const double at[] = {0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y, z + 0.1 * x};
+        coordinates.push_back(static_cast<float>(at[axis]));
+        if (axis == 0) values.push_back(static_cast<float>(z));
+      }
+  }
+  const auto write = [](const std::string& path, const std::vector<int32_t>& header,
+                        const std::vector<float>& numbers) {
+    std::string bytes(reinterpret_cast<const char*>(header.data()), header.size() * sizeof(int32_t));
+    bytes.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float));
+    writeFileAtomically(path, bytes);
+  };
+  write(file("blocks.xyz"), grid_header, coordinates);
+  write(file("blocks.fun"), function_header, values);
+  const ProgramResult result =
+      runProgram({"convert", file("blocks.xyz"), file("blocks.fun"), "-o", file("blocks.splats"), "--memory",
+                  mebibytes(kMebibytes), "--stats", file("blocks.json")});
+  EXPECT_EQ(result.status, 0) << result.err;
+  const auto stats = nlohmann::json::parse(readTextFile(file("blocks.json")));
+  EXPECT_LE(stats["peak_memory_bytes"].get<uint64_t>(), kMebibytes << 20);
+}
+
 TEST_F(LimitsTest, TheLayoutOfAFileWithLongRowsIsFoundWithinTheMemory) {
   constexpr uint64_t kMebibytes = 160;
   const std::array<int32_t, 3> size{500000, 8, 8};

@@ -7,19 +7,22 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kSlabBytes = 200'000;
+constexpr uint64_t kSlabBytes = 200'000, kPointBytes = uint64_t{1} << 30;
 
-std::vector<BlockOverlap> overlapsIn(const GridSource& source, uint64_t slab_bytes = kSlabBytes) {
-  return findOverlaps(source, slab_bytes, Progress());
+std::vector<BlockOverlap> overlapsIn(const GridSource& source, uint64_t slab_bytes = kSlabBytes,
+                                     uint64_t point_bytes = kPointBytes) {
+  return findOverlaps(source, {slab_bytes, point_bytes}, Progress());
 }
 
 /// Boxes of even nodes: from `lower`, `size` long along each axis.
@@ -56,6 +59,60 @@ TEST(BlockOverlap, IsFoundWithItsVolume) {
   EXPECT_EQ(warning.find("box 3"), std::string::npos) << warning;
   // However it is read.
   EXPECT_EQ(overlapsIn(source, 20'000)[0].volume, overlaps[0].volume);
+}
+
+void expectSame(const std::vector<BlockOverlap>& a, const std::vector<BlockOverlap>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t n = 0; n < a.size(); ++n) {
+    EXPECT_EQ(a[n].first, b[n].first);
+    EXPECT_EQ(a[n].second, b[n].second);
+    EXPECT_EQ(a[n].volume, b[n].volume);
+    EXPECT_EQ(a[n].share, b[n].share);
+  }
+}
+
+// Points are located as many at a time as fit, and those of a block may not fit at once.
+TEST(BlockOverlap, IsTheSameWithLittleMemory) {
+  const glm::dmat3 turn(0.8, 0.6, 0, -0.6, 0.8, 0, 0, 0, 1);
+  std::vector<TestBox> many{{{0.3, 0.3, 0.3}, {3.1, 3.2, 3.3}, 40}};
+  for (int n = 0; n < 60; ++n)
+    many.push_back(
+        {{0.9 * (n % 4), 0.8 * (n / 4 % 4), 0.95 * (n / 16)}, {1, 1, 1}, 3 + static_cast<uint64_t>(n % 9)});
+  many.push_back(many[7]);
+  const auto source = boxes(many, turn);
+  const auto all = overlapsIn(source);
+  EXPECT_GT(all.size(), 100u);
+  for (const uint64_t point_bytes : {0, 500'000, 2'000'000, 8'000'000}) {
+    SCOPED_TRACE(point_bytes);
+    expectSame(overlapsIn(source, kSlabBytes, point_bytes), all);
+    expectSame(overlapsIn(source, 30'000, point_bytes), all);
+  }
+  // Rows of which not all points fit.
+  const FunctionGridSource rows({gridBlock(20'001, 2, 2), gridBlock(3, 3, 3)}, 0, [](const GridNode& node) {
+    const double size = node.block == 0 ? 1e-3 : 0.5, shift = node.block == 0 ? 0 : 19.5;
+    return NodeValues{{shift + size * node.i, 0.7 * node.j, 0.6 * node.k}, {}, false};
+  });
+  const auto of_rows = overlapsIn(rows);
+  ASSERT_EQ(of_rows.size(), 1u);
+  EXPECT_NEAR(of_rows[0].volume, 0.5 * 0.7 * 0.6, 0.02);
+  expectSame(overlapsIn(rows, kSlabBytes, 0), of_rows);
+}
+
+TEST(BlockOverlap, InMorePairsThanFitIsRefusedWithASufficientSize) {
+  const auto source = boxes(std::vector<TestBox>(1000, {{0, 0, 0}, {1, 1, 1}, 3}));
+  const auto find = [&](uint64_t point_bytes) {
+    return findOverlaps(source, {kSlabBytes, point_bytes, [](uint64_t bytes) { return bytes; }}, Progress());
+  };
+  const auto all = overlapsIn(source);
+  try {
+    find(1 << 20);
+    FAIL() << "more pairs than fit were kept";
+  } catch (const Error& error) {
+    const std::string line = error.what(), before = "give at least ";
+    const size_t at = line.find(before);
+    ASSERT_NE(at, std::string::npos) << line;
+    expectSame(find(std::stoull(line.substr(at + before.size())) << 20), all);
+  }
 }
 
 TEST(BlockOverlap, OfASmallBlockWithinACellIsItsOwnVolume) {
@@ -129,7 +186,7 @@ TEST(BlockOverlap, IsFoundAmongRandomCoordinatesByFewMeetings) {
     return NodeValues{nodes[((node.block * kNodes + node.k) * kNodes + node.j) * kNodes + node.i], {}, false};
   });
   uint64_t met_in_vain = 0;
-  const auto overlaps = findOverlaps(source, 4 << 20, Progress(), &met_in_vain);
+  const auto overlaps = findOverlaps(source, {4 << 20, kPointBytes}, Progress(), &met_in_vain);
   EXPECT_LT(met_in_vain, 500 * kPoints);
   ASSERT_EQ(overlaps.size(), 1u);
   EXPECT_EQ(overlaps[0].share, 1);
@@ -140,8 +197,8 @@ TEST(BlockOverlap, IsFoundAmongRandomCoordinatesByFewMeetings) {
 // Each point of such a block is near a few cells.
 TEST(BlockOverlap, OfOrdinaryBlocksMeetsFewPointsInVain) {
   uint64_t met_in_vain = 0;
-  findOverlaps(boxes({{{0, 0, 0}, {2, 2, 2}, 24}, {{1.5, 0.5, 0}, {2, 2, 2}, 31}}), kSlabBytes, Progress(),
-               &met_in_vain);
+  findOverlaps(boxes({{{0, 0, 0}, {2, 2, 2}, 24}, {{1.5, 0.5, 0}, {2, 2, 2}, 31}}), {kSlabBytes, kPointBytes},
+               Progress(), &met_in_vain);
   EXPECT_LT(met_in_vain, 100'000u);
 }
 

@@ -41,6 +41,30 @@ TEST(BoxTree, FindsWhatASearchOfAllBoxesFinds) {
   }
 }
 
+TEST(BoxTree, FindsWhetherAnotherBoxTouches) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> place(0, 10), size(0, 1);
+  std::vector<BoundingBox> boxes;
+  for (int n = 0; n < 200; ++n) {
+    const glm::dvec3 at(place(random), place(random), place(random));
+    boxes.push_back({at, at + glm::dvec3(size(random), size(random), size(random))});
+  }
+  boxes.push_back({boxes[3].upper, boxes[3].upper + 0.1});  // a corner in common
+  boxes.emplace_back();
+  const BoxTree tree(boxes);
+  uint32_t touching = 0;
+  for (uint32_t n = 0; n < boxes.size(); ++n) {
+    bool expected = false;
+    for (uint32_t other = 0; other < boxes.size(); ++other)
+      expected |= other != n && boxes[other].touches(boxes[n]);
+    EXPECT_EQ(tree.anotherTouches(boxes[n], n), expected) << n;
+    touching += expected;
+  }
+  EXPECT_GT(touching, 10u);
+  EXPECT_LT(touching, 190u);
+  EXPECT_TRUE(tree.anotherTouches(boxes[3], 3));
+}
+
 TEST(BoxTree, KnowsABoxFromItself) {
   const BoundingBox unit = boxOf({0, 0, 0}, {1, 1, 1});
   const std::vector<BoundingBox> same(100, unit);

@@ -184,6 +184,54 @@ TEST(GridFacesOfBlock, AreFoundByItsNumber) {
   }
 }
 
+/// A grid with boundary conditions.
+class BoundedGrid : public GridSource {
+ public:
+  BoundedGrid(const GridSource& grid, std::vector<GridBoundary> boundaries)
+      : grid_(grid), description_(grid.description()) {
+    description_.boundaries = std::move(boundaries);
+  }
+  const GridDescription& description() const override { return description_; }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    grid_.read(block, box, scalars, out);
+  }
+
+ private:
+  const GridSource& grid_;
+  GridDescription description_;
+};
+
+// Every second quad of a face that another block closes.
+TEST_F(GridFacesTest, QuadsOfVeryManyBoundariesAreDrawn) {
+  constexpr uint64_t kSide = 200;
+  std::vector<GridBoundary> boundaries;
+  for (uint64_t k = 0; k < kSide; ++k)
+    for (uint64_t j = k % 2; j < kSide; j += 2)
+      boundaries.push_back({std::to_string(boundaries.size()), "BCWall", 1, {0, j, k}, {0, j + 1, k + 1}});
+  boundaries.push_back({"whole", "BCWall", 0, {0, 0, 0}, {0, kSide, kSide}});
+  boundaries.push_back({"inside", "BCWall", 0, {1, 0, 0}, {1, kSide, kSide}});
+  const FunctionGridSource grid = twoBlocks(3, kSide + 1, kSide + 1);
+  const auto faces = convertAndOpen(BoundedGrid(grid, boundaries));
+  ASSERT_TRUE(faces);
+  std::map<std::pair<uint32_t, FaceSide>, uint64_t> quads;
+  for (const GridFace& face : faces->faces())
+    if (face.axis == 0) quads[{face.block, face.side}] = quadsOf(*faces, face);
+  const uint64_t all = kSide * kSide;
+  EXPECT_EQ(quads,
+            (decltype(quads){
+                {{0, FaceSide::kMin}, all}, {{1, FaceSide::kMin}, all / 2}, {{1, FaceSide::kMax}, all}}));
+  ASSERT_EQ(faces->regions().size(), all / 2 + 1);
+  EXPECT_EQ(faces->regions()[0].name, "whole");
+  for (size_t n = 0; n < all / 2; ++n) {
+    const FaceRegion& region = faces->regions()[n + 1];
+    const GridFace& face = faces->faces()[region.face];
+    ASSERT_EQ(region.name, std::to_string(n));
+    ASSERT_TRUE(face.block == 1 && face.axis == 0 && face.side == FaceSide::kMin);
+    ASSERT_EQ(region.first, (std::array{boundaries[n].first[1], boundaries[n].first[2]}));
+  }
+}
+
 TEST_F(GridFacesTest, ADamagedFileIsRefused) {
   convertAndOpen(twoBlocks(20, 30, 10));
   const std::string whole = bytes();

@@ -22,7 +22,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kSlabBytes = uint64_t{32} << 20;
+constexpr uint64_t kSlabBytes = uint64_t{32} << 20, kPointBytes = uint64_t{128} << 20;
 constexpr size_t kBlocksListed = 16;
 
 /// The grid's description and what was measured.
@@ -47,7 +47,7 @@ GridInfo inspect(const GridSource& source) {
   Progress progress{progressBar()};
   progress.begin("reading", 2 * info.nodes, "nodes");
   info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
-  info.overlaps = findOverlaps(source, kSlabBytes, progress);
+  info.overlaps = findOverlaps(source, {kSlabBytes, kPointBytes}, progress);
   const bool by_cell = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
   info.estimate = InfoEstimate(
       by_cell ? info.statistics.cells() : info.nodes - info.statistics.blank().total(), SplatsOf::kGrid);
