@@ -12,6 +12,7 @@
 
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
+#include "tests/reference/function_grid.h"
 
 namespace curvisplat {
 namespace {
@@ -209,6 +210,41 @@ TEST(ReadAhead, HandsOnTheFirstThatWentWrongByManyThreads) {
       EXPECT_STREQ(error.what(), "5");
     }
   }
+}
+
+// Small ones are read several at a time.
+TEST(Slabs, OfBlocksSmallAndLargeComeInOrder) {
+  std::vector<GridBlock> blocks;
+  for (uint64_t n = 0; n < 300; ++n)
+    blocks.push_back(n % 97 == 5 ? gridBlock(20, 20, 20 + n % 7) : gridBlock(2 + n % 3, 2 + n % 5, 4));
+  const FunctionGridSource source(blocks, 0, [](const GridNode& node) {
+    return NodeValues{{1.0 * node.block, 1.0 * node.j, 1.0 * node.k}, {}, false};
+  });
+  const NodeReader reader(source, {}, std::nullopt);
+  for (const unsigned readers : {1u, 3u})
+    for (const uint64_t nodes : {uint64_t{500}, uint64_t{100'000}}) {
+      const std::vector<Slab> all = cutIntoSlabs(blocks, nodes, kCornerHalo);
+      SlabStream slabs(reader, {nodes * slabBytesPerNode(0), readers}, kCornerHalo);
+      size_t count = 0;
+      while (const LoadedSlab* loaded = slabs.next()) {
+        ASSERT_LT(count, all.size());
+        const Slab& expected = all[count++];
+        ASSERT_EQ(loaded->slab.block, expected.block);
+        ASSERT_EQ(loaded->slab.box.k0, expected.box.k0);
+        ASSERT_EQ(loaded->slab.box.j0, expected.box.j0);
+        ASSERT_EQ(loaded->nodes.x.size(),
+                  rowsOf(expected.window) * expected.window.rowNodes(blocks[expected.block].ni));
+        ASSERT_EQ(loaded->nodes.x.back(), expected.block);
+        ASSERT_EQ(loaded->nodes.z.back(), static_cast<double>(expected.window.k1 - 1));
+      }
+      EXPECT_EQ(count, all.size());
+    }
+  // And some of them.
+  std::vector<Slab> some = cutIntoSlabs(blocks, 100'000, kNoHalo);
+  std::erase_if(some, [](const Slab& slab) { return slab.block % 3 != 1; });
+  SlabStream slabs(reader, 1 << 20, some);
+  for (const Slab& expected : some) ASSERT_EQ(slabs.next()->slab.block, expected.block);
+  EXPECT_EQ(slabs.next(), nullptr);
 }
 
 }  // namespace
