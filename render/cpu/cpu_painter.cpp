@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <numeric>
 #include <optional>
 #include <thread>
 #include <vector>
@@ -71,7 +70,7 @@ struct CpuPainter::State {
   size_t batch_splats = 0;
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
-  std::vector<uint32_t> all, touched;              // tiles; those of a batch
+  std::vector<uint32_t> touched;                   // tiles of a batch
   WindowTiles windows;
   std::optional<SplatBins> bins;
   std::optional<ShadingTable> table, colours;
@@ -82,7 +81,7 @@ struct CpuPainter::State {
 
   float* tile(size_t number) { return tiles.get() + number * kTileFloats; }
   template <typename Job>
-  void forTiles(const char* name, std::span<const uint32_t> numbers, const Job& job);
+  void forRanges(const char* name, size_t count, const Job& job);
   BlockMask inImage(size_t number) const;
   BlockMask blocksIn(const TileSet& wanted, size_t number) const;
   void clear(size_t number);
@@ -113,7 +112,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   state.bins->clear();  // of a frame that was not ended
   state.bins->open();
   state.arena->execute([&] { state.windows.begin(shading.layers); });
-  state.forTiles("clear tiles", state.all, [&](size_t number) { state.clear(number); });
+  state.forRanges("clear tiles", tileCount(size), [&](size_t number) { state.clear(number); });
 }
 
 void CpuPainter::drawOnly(const TileSet& tiles) {
@@ -172,8 +171,6 @@ void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t bat
   tiles = hwy::AllocateAligned<float>(tileCount(wanted) * kTileFloats);
   if (!tiles) throw std::bad_alloc();
   open = std::make_unique<std::atomic<BlockMask>[]>(tileCount(wanted));
-  all.resize(tileCount(wanted));
-  std::iota(all.begin(), all.end(), 0u);
   bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads_);
   // TBB warns of more than there are cores.
   arena.emplace(std::min(static_cast<int>(threads_), tbb::info::default_concurrency()));
@@ -197,17 +194,18 @@ void CpuPainter::State::paintBorrowed(std::span<const ScreenSplat>& splats) {
   paintTiles();
 }
 
-/// By all threads, a few neighbours at a time: of 2,040 tiles a batch may touch 400, with some microseconds of work each.
+/// job(n), for n below `count`. By all threads, a few neighbours at a time: of 2,040 tiles a batch may touch 400, with some
+/// microseconds of work each.
 template <typename Job>
-void CpuPainter::State::forTiles(const char* name, std::span<const uint32_t> numbers, const Job& job) {
+void CpuPainter::State::forRanges(const char* name, size_t count, const Job& job) {
   constexpr size_t kRangesAThread = 32;
-  const size_t most = std::max<size_t>(1, numbers.size() / (kRangesAThread * threads));
+  const size_t most = std::max<size_t>(1, count / (kRangesAThread * threads));
   arena->execute([&] {
     tbb::parallel_for(
-        tbb::blocked_range<size_t>(0, numbers.size(), most),
+        tbb::blocked_range<size_t>(0, count, most),
         [&](const tbb::blocked_range<size_t>& range) {
           const TraceScope trace(name);
-          for (size_t n = range.begin(); n < range.end(); ++n) job(numbers[n]);
+          for (size_t n = range.begin(); n < range.end(); ++n) job(n);
         },
         tbb::simple_partitioner());
   });
@@ -215,10 +213,11 @@ void CpuPainter::State::forTiles(const char* name, std::span<const uint32_t> num
 
 void CpuPainter::State::paintTiles() {
   touched.clear();
-  for (const uint32_t number : all)
-    if (!bins->tile(static_cast<int>(number)).empty()) touched.push_back(number);
-  forTiles("paint tiles", touched, [this](size_t number) {
+  for (size_t number = 0; number < tileCount(size); ++number)
+    if (!bins->tile(static_cast<int>(number)).empty()) touched.push_back(static_cast<uint32_t>(number));
+  forRanges("paint tiles", touched.size(), [this](size_t n) {
     if (stop.stop_requested()) return;
+    const size_t number = touched[n];
     const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
     const auto columns = static_cast<size_t>(bins->columns());
     const BlockMask left = paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
@@ -269,7 +268,7 @@ Image CpuPainter::end() {
   const StageTimer timer(state.draw_s, "finish picture", TraceKind::kStage);
   Image image(state.size);
   const auto columns = static_cast<size_t>(state.bins->columns());
-  state.forTiles("finish tiles", state.all, [&](size_t number) {
+  state.forRanges("finish tiles", tileCount(state.size), [&](size_t number) {
     const float* tile = state.tile(number);
     const TileWindows* const windows = state.windows.tile(number);
     const int x0 = static_cast<int>(number % columns) * kTileSide;
@@ -311,8 +310,7 @@ uint64_t CpuPainter::hiddenSplats() const {
 }
 
 uint64_t CpuPainter::frameBytes(ImageSize size) {
-  return tileCount(size) *
-         (kTileFloats * sizeof(float) + sizeof(std::atomic<BlockMask>) + 2 * sizeof(uint32_t));
+  return tileCount(size) * (kTileFloats * sizeof(float) + sizeof(std::atomic<BlockMask>) + sizeof(uint32_t));
 }
 
 uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {

@@ -6,28 +6,23 @@ leaves nothing. The limit does not bind root, so that the test needs the right t
 """
 import os
 import pathlib
-import resource
 import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+from limited_user import USER, LimitedUserTest, become_limited  # noqa: E402
+
 PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
-USER = 0x5EED0000 | os.getpid() & 0xFFFF  # has no other process
 MOST_SECONDS = 120  # until the program counts as stuck
 
 
-class FewThreads(unittest.TestCase):
+class FewThreads(LimitedUserTest):
     @classmethod
     def setUpClass(cls):
-        if os.geteuid() != 0:
-            raise unittest.SkipTest("needs the right to become another user")
-        cls.temporary = tempfile.TemporaryDirectory(prefix="curvisplat_threads_")
-        cls.addClassCleanup(cls.temporary.cleanup)
-        cls.folder = pathlib.Path(cls.temporary.name)
-        cls.folder.chmod(0o755)
+        super().setUpClass()
         (cls.folder / "work").mkdir()
         os.chown(cls.folder / "work", USER, USER)
         for words in (["generate", "o-grid", "--size", "20x15x10", "-o", "o"], ["convert", "o.xyz", "o.fun", "-o", "o.splats"]):
@@ -35,16 +30,11 @@ class FewThreads(unittest.TestCase):
 
     def limited(self, words, processes):
         """The program with so many processes and threads; stopped once it has printed, if it does not end by itself."""
-        def limit():
-            resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
-            os.setgroups([])
-            os.setgid(USER)
-            os.setuid(USER)
         work = self.folder / "work"
         environment = {"PATH": os.environ["PATH"], "HOME": str(work), "TMPDIR": str(work)}
         try:
             program = subprocess.Popen([PROGRAM, *words], cwd=work, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                       text=True, preexec_fn=limit)
+                                       text=True, preexec_fn=lambda: become_limited(processes))
         except (PermissionError, subprocess.SubprocessError) as error:
             self.skipTest(f"another user cannot run the program here: {error}")
         self.addCleanup(program.kill)

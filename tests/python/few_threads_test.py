@@ -16,7 +16,9 @@ import tempfile
 import textwrap
 import unittest
 
-USER = 0x5EED0000 | os.getpid() & 0xFFFF  # has no other process
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+from limited_user import USER, LimitedUserTest, become_limited  # noqa: E402
+
 MOST_SECONDS = 120  # until the interpreter counts as stuck
 MOST_PROCESSES = 24
 
@@ -46,24 +48,14 @@ print("refused" if refused else "done")
 """
 
 
-class FewThreadsTest(unittest.TestCase):
+class FewThreadsTest(LimitedUserTest):
     @classmethod
     def setUpClass(cls):
-        if os.geteuid() != 0:
-            raise unittest.SkipTest("needs the right to become another user")
-        cls.temporary = tempfile.TemporaryDirectory(prefix="curvisplat_threads_")
-        cls.addClassCleanup(cls.temporary.cleanup)
-        cls.folder = pathlib.Path(cls.temporary.name)
-        cls.folder.chmod(0o755)
+        super().setUpClass()
         subprocess.run([sys.executable, "-c", "import curvisplat\n" + ARRAYS.format("'o.splats'")], cwd=cls.folder, check=True)
 
     def limited(self, work, processes):
         """The interpreter with so many processes and threads, in a folder of its own."""
-        def limit():
-            resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
-            os.setgroups([])
-            os.setgid(USER)
-            os.setuid(USER)
         folder = self.folder / "work"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(self.folder / "o.splats", folder / "a.splats")
@@ -74,7 +66,7 @@ class FewThreadsTest(unittest.TestCase):
         script = RUN.format(work=textwrap.indent(work, 8 * " "))
         try:
             return subprocess.run([sys.executable, "-c", script], cwd=folder, env=environment, capture_output=True, text=True,
-                                  timeout=MOST_SECONDS, preexec_fn=limit)
+                                  timeout=MOST_SECONDS, preexec_fn=lambda: become_limited(processes))
         except (PermissionError, subprocess.SubprocessError) as error:
             self.skipTest(f"another user cannot run the interpreter here: {error}")
 
