@@ -75,6 +75,32 @@ class Threads(unittest.TestCase):
         self.assertEqual(len(frames), 3)
         self.assertLessEqual({"plan", "project brick", "paint tiles", "write picture"}, {one.name for one in scopes})
 
+    def at_once(self, path, *names_left_out):
+        """The most threads that work at a time, without those of the names that are left out."""
+        scopes, names = self.written(path)
+        changes = []
+        for thread in names.keys() - {thread for thread, name in names.items() if name in names_left_out}:
+            for begin, end in threads.intervals_at_work([one for one in scopes if one.thread == thread]):
+                if end - begin > 4e-6:  # the trace has whole microseconds
+                    changes += [(begin + 2e-6, 1), (end - 2e-6, -1)]
+        now = most = 0
+        for _, change in sorted(changes):
+            now += change
+            most = max(most, now)
+        return most
+
+    def test_no_more_threads_compute_than_asked_for(self):
+        run("generate", "o-grid", "--size", "80x60x50", "-o", FOLDER / "m")
+        for count in 1, 2:
+            path = FOLDER / f"bound_{count}.json"
+            shutil.rmtree(FOLDER / "m.splats", ignore_errors=True)
+            # Reading and writing have threads of their own.
+            run("convert", FOLDER / "m.xyz", FOLDER / "m.fun", "-o", FOLDER / "m.splats", "--threads", count, "--trace", path)
+            self.assertLessEqual(self.at_once(path, "read-ahead", "bucket-writer"), count)
+            run("render", FOLDER / "m.splats", "-o", FOLDER / "m_%d.png", "--orbit", 30, "--frames", 3, "--backend", "cpu",
+                "--lod-pixels", 0, "--size", "600x600", "--threads", count, "--trace", path)
+            self.assertLessEqual(self.at_once(path), count)
+
     def test_trace_is_refused(self):
         found = run("render", FOLDER / "none.splats", "-o", FOLDER / "x.png", "--trace", FOLDER / "no" / "t.json", status=1)
         self.assertRegex(found.stderr, r"^curvisplat: --trace .*no/t.json: .*\n$")

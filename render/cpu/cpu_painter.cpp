@@ -2,22 +2,17 @@
 
 #include <hwy/aligned_allocator.h>
 #include <hwy/highway.h>
-#include <tbb/info.h>
-#include <tbb/parallel_for.h>
-#include <tbb/partitioner.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
 #include "render/cpu/tile_windows.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/stage_timer.h"
-#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -57,16 +52,11 @@ BlockMask blocksOf(BlockMask columns, BlockMask rows) {
   return blocks;
 }
 
-unsigned threadsOf(const PaintResources& resources) {
-  return resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
-}
-
 }  // namespace
 
 struct CpuPainter::State {
   ImageSize size{0, 0};
   glm::vec4 background{0};
-  unsigned threads = 0;
   size_t batch_splats = 0;
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
@@ -74,7 +64,7 @@ struct CpuPainter::State {
   WindowTiles windows;
   std::optional<SplatBins> bins;
   std::optional<ShadingTable> table, colours;
-  std::optional<tbb::task_arena> arena;
+  std::optional<PaintLoop> loop;
   PixelShading shading;
   std::stop_token stop;
   double upload_s = 0, draw_s = 0;
@@ -85,7 +75,7 @@ struct CpuPainter::State {
   BlockMask inImage(size_t number) const;
   BlockMask blocksIn(const TileSet& wanted, size_t number) const;
   void clear(size_t number);
-  void allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_);
+  void allocate(ImageSize wanted, unsigned threads, size_t batch_splats_);
   void paintBatch();
   void paintBorrowed(std::span<const ScreenSplat>& splats);
   void paintTiles();
@@ -98,20 +88,24 @@ CpuPainter::~CpuPainter() = default;
 void CpuPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                        PixelShading shading, const PaintResources& resources) {
   State& state = *state_;
-  const unsigned threads = threadsOf(resources);
+  const Computing computing(resources.permits);
+  const unsigned threads = PaintLoop::threadsOf(resources),
+                 threads_before = state.loop ? state.loop->threads() : 0;
   state.upload_s = state.draw_s = 0;
   state.shading = shading;
   state.stop = resources.stop;
   state.table.emplace(table);
   state.colours.reset();
   if (shading.colours) state.colours.emplace(*shading.colours);
-  if (size.width != state.size.width || size.height != state.size.height || threads != state.threads ||
+  if (size.width != state.size.width || size.height != state.size.height || threads != threads_before ||
       resources.batch_splats != state.batch_splats)
     state.allocate(size, threads, resources.batch_splats);
+  if (threads != threads_before || resources.permits != state.loop->permits())
+    state.loop.emplace(threads, resources.permits);
   state.background = background;
   state.bins->clear();  // of a frame that was not ended
   state.bins->open();
-  state.arena->execute([&] { state.windows.begin(shading.layers); });
+  state.windows.begin(shading.layers, *state.loop);
   state.forRanges("clear tiles", tileCount(size), [&](size_t number) { state.clear(number); });
 }
 
@@ -164,51 +158,37 @@ void CpuPainter::State::clear(size_t number) {
   open[number].store(inImage(number), std::memory_order_relaxed);
 }
 
-void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_) {
+void CpuPainter::State::allocate(ImageSize wanted, unsigned threads, size_t batch_splats_) {
   size = {0, 0};
   bins.reset();
   tiles.reset();
   tiles = hwy::AllocateAligned<float>(tileCount(wanted) * kTileFloats);
   if (!tiles) throw std::bad_alloc();
   open = std::make_unique<std::atomic<BlockMask>[]>(tileCount(wanted));
-  bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads_);
-  // TBB warns of more than there are cores.
-  arena.emplace(std::min(static_cast<int>(threads_), tbb::info::default_concurrency()));
+  bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads);
   size = wanted;
-  threads = threads_;
   batch_splats = batch_splats_;
 }
 
 void CpuPainter::State::paintBatch() {
   const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
-  arena->execute([this] { bins->sort(); });
+  bins->sort(*loop);
   paintTiles();
 }
 
 /// As many as fit into a batch of their own, which are taken off the span's beginning.
 void CpuPainter::State::paintBorrowed(std::span<const ScreenSplat>& splats) {
   const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
-  size_t taken = 0;
-  arena->execute([&] { taken = bins->sortBorrowed(splats); });
-  splats = splats.subspan(taken);
+  splats = splats.subspan(bins->sortBorrowed(splats, *loop));
   paintTiles();
 }
 
-/// job(n), for n below `count`. By all threads, a few neighbours at a time: of 2,040 tiles a batch may touch 400, with some
-/// microseconds of work each.
+/// job(n), for n below `count`. A few neighbours at a time: of 2,040 tiles a batch may touch 400, with some microseconds of
+/// work each.
 template <typename Job>
 void CpuPainter::State::forRanges(const char* name, size_t count, const Job& job) {
   constexpr size_t kRangesAThread = 32;
-  const size_t most = std::max<size_t>(1, count / (kRangesAThread * threads));
-  arena->execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<size_t>(0, count, most),
-        [&](const tbb::blocked_range<size_t>& range) {
-          const TraceScope trace(name);
-          for (size_t n = range.begin(); n < range.end(); ++n) job(n);
-        },
-        tbb::simple_partitioner());
-  });
+  loop->forAll(name, count, std::max<size_t>(1, count / (kRangesAThread * loop->threads())), job);
 }
 
 void CpuPainter::State::paintTiles() {
@@ -232,6 +212,7 @@ void CpuPainter::State::paintTiles() {
 
 void CpuPainter::draw(std::span<const ScreenSplat> splats) {
   State& state = *state_;
+  const Computing computing(state.loop->permits());
   while (!splats.empty() && !state.stop.stop_requested()) {
     if (2 * splats.size() >= state.batch_splats && !state.bins->awaitsSplat()) {
       if (!state.bins->empty()) state.paintBatch();
@@ -264,6 +245,7 @@ bool CpuPainter::hides(const ScreenBox& box) const {
 
 Image CpuPainter::end() {
   State& state = *state_;
+  const Computing computing(state.loop->permits());
   if (!state.bins->empty()) state.paintBatch();
   const StageTimer timer(state.draw_s, "finish picture", TraceKind::kStage);
   Image image(state.size);
@@ -315,7 +297,7 @@ uint64_t CpuPainter::frameBytes(ImageSize size) {
 
 uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {
   return SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
-                          threadsOf(resources));
+                          PaintLoop::threadsOf(resources));
 }
 
 uint64_t CpuPainter::layerBytes(const PixelLayers& layers) {

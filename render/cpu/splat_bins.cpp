@@ -1,14 +1,11 @@
 #include "render/cpu/splat_bins.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "render/cpu/tile.h"
 #include "render/project/kernel.h"
 #include "stream/base/check.h"
-#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -102,9 +99,8 @@ void SplatBins::push(const ScreenSplat& splat, const Tiles& tiles) {
 
 /// visit(piece, its first splat, its end)
 template <typename Visit>
-void SplatBins::forPieces(const Visit& visit) const {
-  tbb::parallel_for(size_t{0}, size_t{pieces_}, [&](size_t piece) {
-    const TraceScope trace("sort bins");
+void SplatBins::forPieces(PaintLoop& loop, const Visit& visit) const {
+  loop.forAll("sort bins", pieces_, 1, [&](size_t piece) {
     visit(piece, batch_.size() * piece / pieces_, batch_.size() * (piece + 1) / pieces_);
   });
 }
@@ -124,7 +120,7 @@ size_t SplatBins::forOpenTiles(size_t n, const Visit& visit) const {
   return open;
 }
 
-size_t SplatBins::sortBorrowed(std::span<const ScreenSplat> splats) {
+size_t SplatBins::sortBorrowed(std::span<const ScreenSplat> splats, PaintLoop& loop) {
   CURVISPLAT_CHECK(empty() && !awaitsSplat());
   const auto withoutLastRecords = [](std::span<const ScreenSplat> of) {
     while (!of.empty() && isRecord(of.back())) of = of.first(of.size() - 1);
@@ -134,7 +130,7 @@ size_t SplatBins::sortBorrowed(std::span<const ScreenSplat> splats) {
   while (most < splats.size() && isRecord(splats[most - 1])) ++most;
   batch_ = withoutLastRecords(splats.first(most));
   std::atomic<uint64_t> entries = 0;
-  forPieces([&](size_t, size_t begin, size_t end) {
+  forPieces(loop, [&](size_t, size_t begin, size_t end) {
     uint64_t of_piece = 0;
     for (size_t n = begin; n < end; ++n) {
       tiles_[n] = isRecord(batch_[n]) ? kNoTiles : tilesOf(batch_[n]);
@@ -143,7 +139,7 @@ size_t SplatBins::sortBorrowed(std::span<const ScreenSplat> splats) {
     entries += of_piece;
   });
   if (entries > most_entries_) batch_ = withoutLastRecords(batch_.first(fitting()));
-  sort();
+  sort(loop);
   return batch_.size();
 }
 
@@ -154,10 +150,10 @@ size_t SplatBins::fitting() const {
   return n;
 }
 
-void SplatBins::sort() {
+void SplatBins::sort(PaintLoop& loop) {
   const size_t tiles = begins_.size() - 1;
   std::fill(piece_ends_.begin(), piece_ends_.end(), 0);
-  forPieces([&](size_t piece, size_t begin, size_t end) {
+  forPieces(loop, [&](size_t piece, size_t begin, size_t end) {
     uint32_t* const counts = &piece_ends_[piece * tiles];
     uint64_t hidden = 0;
     for (size_t n = begin; n < end; ++n)
@@ -174,7 +170,7 @@ void SplatBins::sort() {
     }
   }
   begins_[tiles] = sum;
-  forPieces([&](size_t piece, size_t begin, size_t end) {
+  forPieces(loop, [&](size_t piece, size_t begin, size_t end) {
     uint32_t* const ends = &piece_ends_[piece * tiles];
     for (size_t n = begin; n < end; ++n)
       forOpenTiles(n, [&](size_t tile) { entries_[ends[tile]++] = static_cast<uint32_t>(n); });

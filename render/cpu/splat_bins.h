@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "render/camera/camera.h"
+#include "render/project/paint_loop.h"
 #include "render/project/screen_splat.h"
 
 namespace curvisplat {
@@ -37,13 +38,13 @@ class SplatBins {
   size_t add(std::span<const ScreenSplat> splats);
   /// Whether records were added whose splat was not.
   bool awaitsSplat() const { return record_count_ > 0; }
-  /// Fills the lists with what was added. Uses the calling thread's TBB arena.
-  void sort();
+  /// Fills the lists with what was added.
+  void sort(PaintLoop& loop);
 
   /// Fills the lists with what fits of `splats`, which stay where they are until clear(), and says how much that was: all
   /// but records at the end, unless they are too many. Something always fits, but not of records alone. While empty()
-  /// and not awaitsSplat(). Uses the calling thread's TBB arena.
-  size_t sortBorrowed(std::span<const ScreenSplat> splats);
+  /// and not awaitsSplat().
+  size_t sortBorrowed(std::span<const ScreenSplat> splats, PaintLoop& loop);
 
   bool empty() const { return batch_.empty(); }
   std::span<const ScreenSplat> splats() const { return batch_; }
@@ -73,7 +74,7 @@ class SplatBins {
   void push(const ScreenSplat& splat, const Tiles& tiles);
   size_t fitting() const;
   template <typename Visit>
-  void forPieces(const Visit& visit) const;
+  void forPieces(PaintLoop& loop, const Visit& visit) const;
   template <typename Visit>
   size_t forOpenTiles(size_t n, const Visit& visit) const;
 

@@ -1,7 +1,5 @@
 #include "render/cpu/tile_windows.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <new>
 
@@ -41,7 +39,7 @@ uint64_t WindowTiles::bytes(const PixelLayers& layers) {
   return sizeof(float) * floats;
 }
 
-void WindowTiles::begin(const PixelLayers* layers) {
+void WindowTiles::begin(const PixelLayers* layers, PaintLoop& loop) {
   offsets_.clear();
   tiles_.clear();
   if (!layers || layers->empty()) return;
@@ -66,8 +64,8 @@ void WindowTiles::begin(const PixelLayers* layers) {
     at += needs[number].floats();
   }
   tiles_.resize(numbers.size());
-  tbb::parallel_for(size_t{0}, numbers.size(),
-                    [&](size_t n) { fill(*layers, numbers[n], needs[numbers[n]], places[n], tiles_[n]); });
+  loop.forAll("fill windows", numbers.size(), 1,
+              [&](size_t n) { fill(*layers, numbers[n], needs[numbers[n]], places[n], tiles_[n]); });
 }
 
 void WindowTiles::fill(const PixelLayers& layers, size_t number, const Needs& needs, float* at,

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "render/cpu/tile.h"
+#include "render/project/paint_loop.h"
 #include "render/project/pixel_layers.h"
 
 namespace curvisplat {
@@ -24,7 +25,7 @@ namespace curvisplat {
 class WindowTiles {
  public:
   /// Begins a frame with layers of the picture's size, which outlive it; null: without.
-  void begin(const PixelLayers* layers);
+  void begin(const PixelLayers* layers, PaintLoop& loop);
   static uint64_t bytes(const PixelLayers& layers);
 
   /// Null where the tile has no layers. One thread at a time for each tile.

@@ -121,6 +121,10 @@ FrameRenderer::FrameRenderer(const CacheReader& cache, const DrawnScalars& scala
 
 FrameRenderer::~FrameRenderer() = default;
 
+ComputePermits* FrameRenderer::permits() const {
+  return state_->pipeline.permits();
+}
+
 const std::string& FrameRenderer::backendName() const {
   return state_->pipeline.backend().name();
 }

@@ -31,6 +31,7 @@
 #include "render/frame/pixel_values.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 
@@ -94,6 +95,10 @@ class FrameRenderer {
 
   /// The projection that render() uses for these arguments. Throws UsageError as render() does.
   ScreenView screenView(const Camera& camera, const FrameOptions& options) const;
+
+  /// A thread that computes between frames, while bricks are fetched ahead, holds one of these: no more threads than
+  /// the last frame's options.threads compute then. Null before the first frame. Valid until the next.
+  ComputePermits* permits() const;
 
   /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;

@@ -32,7 +32,7 @@ struct FrameOptions {
   std::shared_ptr<const SurfaceScene> scene;  // surfaces and slices; null: none
   glm::vec4 background{1, 1, 1, 1};           // premultiplied
   double low_pass_px2 = kLowPass;             // added to the diagonal of S2, pixels squared
-  unsigned threads = 0;                       // workers; 0: one per core
+  unsigned threads = 0;                       // that compute at a time; 0: one per core
   uint64_t memory_bytes = 512 << 20;
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them

@@ -30,10 +30,6 @@ constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
 // Splats that are exchanged lie in blocks of other sizes at each step. What malloc kept of them was 27 MiB of 256.
 constexpr size_t kLargeBlock = size_t{1} << 20;
 
-PaintResources resourcesOf(const FrameOptions& options) {
-  return {.threads = options.threads, .stop = options.stop};
-}
-
 unsigned threadsOf(const FrameOptions& options) {
   return options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
 }
@@ -109,13 +105,13 @@ class DrawsFinished {
 /// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
   Pools(const CacheReader& cache, const BrickSource::Variables& variables, const FrameBudget& budget_,
-        const PagerOptions& pager_, std::span<ScreenSplat> splats)
+        const PagerOptions& pager_, std::span<ScreenSplat> splats, ComputePermits& permits)
       : budget(budget_),
         pager(pager_),
         ring(splats),
         sweep(budget.sweep_splats, budget.ring_splats / 2),
         source(cache, variables, pager, budget.cache_bytes, budget.kept_bytes),
-        workers(source, sweep, ring, budget.workers) {}
+        workers(source, sweep, ring, permits, budget.workers) {}
 
   const FrameBudget budget;
   const PagerOptions pager;
@@ -146,8 +142,8 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
   const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
   const FrameBudget::Fixed fixed{planner_.bytes(),
                                  least_pager_bytes_,
-                                 backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options) +
-                                     exchange_bytes + aside_bytes_,
+                                 backend_->bytes(options.size, {.threads = options.threads}) +
+                                     sceneBytes(options) + exchange_bytes + aside_bytes_,
                                  options.output_bytes,
                                  planner_.mostSplats(),
                                  options.size,
@@ -167,11 +163,12 @@ void FramePipeline::makePools(const FrameOptions& options) {
   pager.way = options.read_by;
   pager.direct = options.direct_reads;
   if (pools_ && pools_->budget == budget && pools_->pager.way == pager.way &&
-      pools_->pager.direct == pager.direct)
+      pools_->pager.direct == pager.direct && permits_->count() == threadsOf(options))
     return;
   dropPools();  // before the new ones take their memory
+  permits_ = std::make_unique<ComputePermits>(threadsOf(options));
   auto fresh = std::make_unique<Pools>(cache_, BrickSource::Variables(variable_, coloured_by_), budget, pager,
-                                       backend_->splatMemory(budget.ring_splats));
+                                       backend_->splatMemory(budget.ring_splats), *permits_);
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
 }
@@ -474,7 +471,7 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     painter.begin(
         plan.settings.view.size, options.background, planner_.table(),
         {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers, planner_.colourClasses()},
-        resourcesOf(options));
+        {.threads = options.threads, .stop = options.stop, .permits = permits_.get()});
     if (regions.front().tiles) painter.drawOnly(*regions.front().tiles);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);

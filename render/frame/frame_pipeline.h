@@ -32,6 +32,7 @@
 #include "render/surface/iso_layers.h"
 #include "render/surface/scene_triangles.h"
 #include "render/surface/slice_sampler.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
@@ -79,6 +80,8 @@ class FramePipeline {
   /// The order in which plans must list their parts.
   DrawingOrder order() const { return painting_->order(); }
   const PaintingBackend& backend() const { return *backend_; }
+  /// See FrameRenderer::permits().
+  ComputePermits* permits() const { return permits_.get(); }
 
  private:
   struct Pools;
@@ -117,6 +120,7 @@ class FramePipeline {
   std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn
+  std::unique_ptr<ComputePermits> permits_;  // as many as the options said that threads were to be used
   uint64_t least_pager_bytes_ = 0;           // that the largest brick of any step so far needs
 
   Mutex mutex_;  // a stop comes from another thread

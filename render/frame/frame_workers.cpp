@@ -18,8 +18,9 @@ struct FrameWorkers::Worker {
   PrepareStatistics statistics;
 };
 
-FrameWorkers::FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring, unsigned count)
-    : source_(source), sweep_(sweep), ring_(ring), team_(count, "prepare") {
+FrameWorkers::FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring,
+                           ComputePermits& permits, unsigned count)
+    : source_(source), sweep_(sweep), ring_(ring), permits_(permits), team_(count, "prepare") {
   for (unsigned n = 0; n < count; ++n) workers_.push_back(std::make_unique<Worker>());
 }
 
@@ -44,7 +45,7 @@ void FrameWorkers::beginFrame(const FrameWork& work) {
 void FrameWorkers::start(const TileSet* tiles) {
   begin();
   tiles_ = tiles;
-  team_.start([this](unsigned number) { loop(*workers_[number]); });
+  run(Urgency::kUrgent, [this](Worker& worker) { loop(worker); });
 }
 
 void FrameWorkers::startExchange() {
@@ -55,7 +56,16 @@ void FrameWorkers::startExchange() {
 
 void FrameWorkers::startSampling(const SamplingWork& work) {
   begin();
-  team_.start([this, work](unsigned number) { sample(*workers_[number], work); });
+  run(Urgency::kUrgent, [this, work](Worker& worker) { sample(worker, work); });
+}
+
+/// Starts `job` on all threads; each holds a permit except where it waits.
+template <typename Job>
+void FrameWorkers::run(Urgency urgency, const Job& job) {
+  team_.start([this, urgency, job](unsigned number) {
+    const Computing computing(&permits_, urgency);
+    job(*workers_[number]);
+  });
 }
 
 void FrameWorkers::begin() {
@@ -85,10 +95,9 @@ void FrameWorkers::finish(FrameStatistics& statistics) {
 }
 
 void FrameWorkers::startPrefetch() {
-  team_.start([this](unsigned number) {
+  run(Urgency::kNormal, [this](Worker& worker) {
     try {
-      while (source_.prefetchNext(workers_[number]->scratch)) {
-      }
+      while (source_.prefetchNext(worker.scratch)) Computing::giveWay();
     } catch (...) {
       // The frame will report a damaged brick. The other bricks can wait for the frame too.
       source_.stop();
@@ -122,7 +131,7 @@ void FrameWorkers::endSlab(Worker& worker) {
   while (true) {
     std::optional<SweepBuffer::Batch> batch;
     {
-      const StageTimer timer(worker.statistics.workers_waited_s, "wait for a batch", TraceKind::kWait);
+      const WaitTimer timer(worker.statistics.workers_waited_s, "wait for a batch");
       batch = sweep_.awaitNext();
     }
     if (!batch) break;
@@ -139,13 +148,13 @@ void FrameWorkers::exchangeLoop() {
       return work_->exchange->step([this](uint64_t sequence) { return isUnneeded(sequence); });
     };
     while (step()) {
-      team_.start([this](unsigned number) { sharedLoop(*workers_[number]); });
+      run(Urgency::kUrgent, [this](Worker& worker) { sharedLoop(worker); });
       team_.wait();
       if (ring_.isClosed()) return;
     }
-    team_.start([this](unsigned number) {
+    run(Urgency::kUrgent, [this](Worker& worker) {
       try {
-        endSlab(*workers_[number]);
+        endSlab(worker);
       } catch (...) {
         fail();
       }
@@ -330,7 +339,7 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank, const
     sorted = worker.sorter.sort(projected.keys, work_->keys.order());
   }
   {
-    const StageTimer timer(statistics.workers_waited_s, "wait for its turn", TraceKind::kWait);
+    const WaitTimer timer(statistics.workers_waited_s, "wait for its turn");
     if (!sweep_.awaitTurn(sequence)) return false;
   }
   std::shared_ptr<SweepBuffer::Run> run;
@@ -339,7 +348,7 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank, const
       if (!hand(worker, *batch)) return false;
       continue;
     }
-    const StageTimer timer(statistics.workers_waited_s, "wait for space", TraceKind::kWait);
+    const WaitTimer timer(statistics.workers_waited_s, "wait for space");
     if (!sweep_.awaitSpace(rank, sorted)) return false;
   }
   const StageTimer timer(statistics.sort_s, "fill sweep");
@@ -357,7 +366,7 @@ bool FrameWorkers::hand(Worker& worker, const SweepBuffer::Batch& batch) {
     sorted = worker.batch_sorter.sort();
   }
   {
-    const StageTimer timer(worker.statistics.workers_waited_s, "wait for the ring", TraceKind::kWait);
+    const WaitTimer timer(worker.statistics.workers_waited_s, "wait for the ring");
     if (!sweep_.awaitFilled(batch)) return false;
     segment = ring_.acquire(batch.sequence, batch.count);
   }

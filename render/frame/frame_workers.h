@@ -22,6 +22,7 @@
 #include "render/project/depth_keys.h"
 #include "render/project/projection.h"
 #include "render/surface/slice_sampler.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
 #include "stream/base/worker_team.h"
 #include "stream/paging/brick_source.h"
@@ -51,8 +52,9 @@ struct SamplingWork {
 
 class FrameWorkers {
  public:
-  /// Starts `count` threads, named "prepare". The other arguments must outlive them.
-  FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring, unsigned count);
+  /// Starts `count` threads, named "prepare", which hold a permit while they compute. The other arguments must outlive them.
+  FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring, ComputePermits& permits,
+               unsigned count);
   ~FrameWorkers();
   FrameWorkers(const FrameWorkers&) = delete;
   FrameWorkers& operator=(const FrameWorkers&) = delete;
@@ -98,6 +100,8 @@ class FrameWorkers {
   bool enterReceived(Worker& worker, uint64_t sequence);
   bool isUnneeded(uint64_t sequence);
   void begin();
+  template <typename Job>
+  void run(Urgency urgency, const Job& job);
   void fail();
   // Return false if the sweep, the ring or the source was stopped.
   bool prepare(Worker& worker, uint64_t sequence);
@@ -117,6 +121,7 @@ class FrameWorkers {
   BrickSource& source_;
   SweepBuffer& sweep_;
   SegmentRing& ring_;
+  ComputePermits& permits_;
   const FrameWork* work_ = nullptr;
   const TileSet* tiles_ = nullptr;
   std::vector<Seen> seen_;         // [part of the frame]; each is one worker's at a time

@@ -12,7 +12,7 @@ bool SegmentDrawer::drawNext() {
   if (!segment) {
     painter_.finishDraws();
     release();
-    const StageTimer timer(waited_s_, "wait for splats", TraceKind::kWait);
+    const WaitTimer timer(waited_s_, "wait for splats");
     segment = ring_.next();
   }
   if (!segment) return false;

@@ -1,9 +1,5 @@
 #include "render/frame/value_painter.h"
 
-#include <tbb/info.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,7 +11,6 @@
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "render/cpu/half_depths.h"
@@ -24,6 +19,8 @@
 #include "render/project/footprint_skew.h"
 #include "render/project/kernel.h"
 #include "render/project/light.h"
+#include "render/project/paint_loop.h"
+#include "stream/base/compute_permits.h"
 
 namespace curvisplat {
 namespace {
@@ -88,11 +85,10 @@ class ValuePainter final : public Painter {
     size_ = size;
     extinction_.emplace(table);
     shading_ = shading;
-    const unsigned threads =
-        resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
-    bins_.emplace(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, threads);
+    const Computing computing(resources.permits);
+    loop_.emplace(PaintLoop::threadsOf(resources), resources.permits);
+    bins_.emplace(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, loop_->threads());
     bins_->open();
-    arena_.emplace(std::min(static_cast<int>(threads), tbb::info::default_concurrency()));
     constexpr float kNone = std::numeric_limits<float>::infinity(),
                     kUnknown = std::numeric_limits<float>::quiet_NaN();
     halves_.assign(TileSet::tilesOf(size), {});
@@ -121,6 +117,7 @@ class ValuePainter final : public Painter {
   }
 
   void draw(std::span<const ScreenSplat> splats) override {
+    const Computing computing(loop_->permits());
     while (!splats.empty()) {
       splats = splats.subspan(bins_->add(splats));
       if (!splats.empty()) paintBatch();
@@ -128,6 +125,7 @@ class ValuePainter final : public Painter {
   }
 
   Image end() override {
+    const Computing computing(loop_->permits());
     if (!bins_->empty()) paintBatch();
     Image image(size_);
     for (size_t tile = 0; tile < halves_.size(); ++tile)
@@ -157,10 +155,8 @@ class ValuePainter final : public Painter {
   }
 
   void paintBatch() {
-    arena_->execute([this] {
-      bins_->sort();
-      tbb::parallel_for(size_t{0}, TileSet::tilesOf(size_), [this](size_t number) { paintTile(number); });
-    });
+    bins_->sort(*loop_);
+    loop_->forAll("find depths", TileSet::tilesOf(size_), 1, [this](size_t number) { paintTile(number); });
     bins_->clear();
   }
 
@@ -307,7 +303,7 @@ class ValuePainter final : public Painter {
   std::optional<MeanExtinction> extinction_;
   PixelShading shading_;
   std::optional<SplatBins> bins_;
-  std::optional<tbb::task_arena> arena_;
+  std::optional<PaintLoop> loop_;
   std::vector<HalfTile> halves_;  // [tiles]
   std::vector<FoundTile> found_;  // [tiles]
 };
@@ -342,11 +338,10 @@ PixelLayers everywhere(ImageSize size, double depth_origin) {
 }
 
 uint64_t valueBytes(ImageSize size, const PaintResources& resources) {
-  const unsigned threads =
-      resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
   constexpr uint64_t kLayer = sizeof(PixelLayer) + sizeof(uint32_t);  // everywhere()'s
   return TileSet::tilesOf(size) * (sizeof(HalfTile) + sizeof(FoundTile)) + size.pixels() * kLayer +
-         SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, threads);
+         SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
+                          PaintLoop::threadsOf(resources));
 }
 
 std::unique_ptr<PaintingBackend> makeValueBackend(const ValueInputs& inputs) {

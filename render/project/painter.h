@@ -16,6 +16,7 @@
 #include "render/project/screen_box.h"
 #include "render/project/screen_splat.h"
 #include "render/project/tile_set.h"
+#include "stream/base/compute_permits.h"
 #include "stream/paging/cut.h"
 
 namespace curvisplat {
@@ -26,6 +27,8 @@ struct PaintResources {
   size_t batch_splats = 65536;  // the most splats that may be collected and drawn together
   std::stop_token stop =
       {};  // once it is requested, the rest may be left out: nobody wants the picture any more
+  ComputePermits* permits =
+      nullptr;  // that those who compute hold; outlive the frame. Null: there is no further bound
 };
 
 /// How the pixels of a splat get their colours.

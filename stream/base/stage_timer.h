@@ -4,6 +4,7 @@
 
 #include <chrono>
 
+#include "stream/base/compute_permits.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -23,6 +24,17 @@ class StageTimer {
   const TraceScope trace_;
   double& seconds_;
   const std::chrono::steady_clock::time_point start_;
+};
+
+/// The same for a scope in which this thread waits for another one, or for the disk: its permit to compute, if it has one, is
+/// another's meanwhile.
+class WaitTimer {
+ public:
+  WaitTimer(double& seconds, const char* name) : timer_(seconds, name, TraceKind::kWait) {}
+
+ private:
+  const StageTimer timer_;
+  const GivenBackPermit given_back_;
 };
 
 }  // namespace curvisplat

@@ -160,7 +160,7 @@ BrickSource::Splats BrickSource::splatsOf(const Scratch& scratch, const BrickPar
 }
 
 std::optional<PagedBrick> BrickSource::await(uint64_t miss, Scratch& scratch) {
-  const StageTimer timer(scratch.waited_s, "wait for a brick", TraceKind::kWait);
+  const WaitTimer timer(scratch.waited_s, "wait for a brick");
   return pager_.take(miss);
 }
 

@@ -139,7 +139,8 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
     std::vector<ScreenSplat> memory(3 * BrickProjector::kMaxSplats);
     SegmentRing ring(memory);
     SweepBuffer sweep(1'000'000, 50'000);
-    FrameWorkers workers(source, sweep, ring, 2);
+    ComputePermits permits(2);
+    FrameWorkers workers(source, sweep, ring, permits, 2);
     BrickPager::Unneeded unneeded;
     if (before_reading) unneeded = [&](uint32_t brick) { return hidden.hides(brick); };
     source.start(parts, unneeded);

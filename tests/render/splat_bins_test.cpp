@@ -36,8 +36,9 @@ void appendLists(const SplatBins& bins, Lists& lists) {
 }
 
 Lists listsByAdding(SplatBins& bins, std::span<const ScreenSplat> splats) {
+  PaintLoop loop(2, nullptr);
   EXPECT_EQ(bins.add(splats), splats.size());
-  bins.sort();
+  bins.sort(loop);
   Lists lists;
   appendLists(bins, lists);
   bins.clear();
@@ -45,12 +46,13 @@ Lists listsByAdding(SplatBins& bins, std::span<const ScreenSplat> splats) {
 }
 
 TEST(SplatBins, ListsBorrowedSplatsAsThoseThatWereAdded) {
+  PaintLoop loop(3, nullptr);
   const auto splats = someSplats(3000);
   SplatBins one(kSize, splats.size(), kManyEntries, 1);
   const Lists expected = listsByAdding(one, splats);
   for (const unsigned pieces : {1u, 2u, 7u}) {
     SplatBins bins(kSize, splats.size(), kManyEntries, pieces);
-    EXPECT_EQ(bins.sortBorrowed(splats), splats.size());
+    EXPECT_EQ(bins.sortBorrowed(splats, loop), splats.size());
     EXPECT_EQ(bins.splats().data(), splats.data()) << "a copy";
     Lists lists;
     appendLists(bins, lists);
@@ -63,6 +65,7 @@ TEST(SplatBins, ListsBorrowedSplatsAsThoseThatWereAdded) {
 }
 
 TEST(SplatBins, BorrowsNoMoreThanThereIsSpaceFor) {
+  PaintLoop loop(3, nullptr);
   const auto splats = someSplats(3000);
   SplatBins all(kSize, splats.size(), kManyEntries, 1);
   const Lists expected = listsByAdding(all, splats);
@@ -72,7 +75,7 @@ TEST(SplatBins, BorrowsNoMoreThanThereIsSpaceFor) {
     Lists lists;
     int batches = 0;
     for (std::span<const ScreenSplat> left = splats; !left.empty(); ++batches) {
-      const size_t taken = bins.sortBorrowed(left);
+      const size_t taken = bins.sortBorrowed(left, loop);
       ASSERT_GT(taken, 0u);
       EXPECT_LE(taken, most_splats + 3);
       EXPECT_FALSE(isRecord(left[taken - 1])) << "records without their splat";
@@ -89,12 +92,13 @@ TEST(SplatBins, BorrowsNoMoreThanThereIsSpaceFor) {
 }
 
 TEST(SplatBins, LeavesRecordsAtTheEndToBeAddedWithTheirSplat) {
+  PaintLoop loop(3, nullptr);
   const auto splats = someSplats(300);
   const auto last = std::find_if(splats.rbegin(), splats.rend(), isRecord);
   ASSERT_NE(last, splats.rend());
   const auto end = static_cast<size_t>(splats.rend() - last);  // behind that record
   SplatBins bins(kSize, splats.size(), kManyEntries, 2);
-  const size_t taken = bins.sortBorrowed(std::span(splats).first(end));
+  const size_t taken = bins.sortBorrowed(std::span(splats).first(end), loop);
   EXPECT_LT(taken, end);
   bins.clear();
   EXPECT_EQ(bins.add(std::span(splats).first(end).subspan(taken)), end - taken);
@@ -106,18 +110,19 @@ TEST(SplatBins, LeavesRecordsAtTheEndToBeAddedWithTheirSplat) {
 }
 
 TEST(SplatBins, CountsSplatsOfClosedTilesAsHidden) {
+  PaintLoop loop(3, nullptr);
   std::vector<ScreenSplat> splats(50, {16, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0});  // in the first tile
   splats.resize(80, {3 * kTileSide + 5, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0});
   SplatBins bins(kSize, splats.size(), kManyEntries, 2);
   bins.close(0);
-  EXPECT_EQ(bins.sortBorrowed(splats), splats.size());
+  EXPECT_EQ(bins.sortBorrowed(splats, loop), splats.size());
   EXPECT_EQ(bins.hidden(), 50u);
   EXPECT_TRUE(bins.tile(0).empty());
   EXPECT_EQ(bins.tile(3).size(), 30u);
   bins.clear();
   bins.open();
   EXPECT_EQ(bins.hidden(), 0u);
-  EXPECT_EQ(bins.sortBorrowed(splats), splats.size());
+  EXPECT_EQ(bins.sortBorrowed(splats, loop), splats.size());
   EXPECT_EQ(bins.tile(0).size(), 50u);
 }
 

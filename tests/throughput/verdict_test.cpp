@@ -135,18 +135,17 @@ TEST(Verdict, CoarserErrorsAreAdvisedByWhatTheyGave) {
 TEST(Verdict, CoresAreAdvisedByWhatTheyGave) {
   JudgedFrame four = frame();
   four.threads = 4;
-  OtherFrame others[] = {{0.2, 2, 4, 512 * kMiB, 250'000}, {0.38, 2, 1, 512 * kMiB, 250'000}};
+  OtherFrame others[] = {{0.2, 2, 4, 512 * kMiB, 250'000}, {0.6, 2, 1, 512 * kMiB, 250'000}};
   EXPECT_TRUE(
       says(judge(four, speeds(), others),
-           "--threads 4 draws --lod-pixels 2 1.9 times as fast as --threads 1: more cores would help"));
-  others[1].seconds = 0.25;
+           "--threads 4 draws --lod-pixels 2 3.0 times as fast as --threads 1: more cores would help"));
+  others[1].seconds = 0.5;
   EXPECT_TRUE(
-      says(judge(four, speeds(), others), "1.2 times as fast as --threads 1: more cores would help little"));
+      says(judge(four, speeds(), others), "2.5 times as fast as --threads 1: more cores would help little"));
   others[1].memory_bytes = 128 * kMiB;  // no longer the same but for threads
   EXPECT_FALSE(says(judge(four, speeds(), others), "more cores"));
-  // A worker and the painter have two cores already.
-  const OtherFrame two[] = {{0.2, 2, 2, 512 * kMiB, 250'000}, {0.2, 2, 1, 512 * kMiB, 250'000}};
-  EXPECT_FALSE(says(judge(frame(), speeds(), two), "more cores"));
+  const OtherFrame two[] = {{0.2, 2, 2, 512 * kMiB, 250'000}, {0.38, 2, 1, 512 * kMiB, 250'000}};
+  EXPECT_TRUE(says(judge(frame(), speeds(), two), "1.9 times as fast as --threads 1: more cores would help"));
 }
 
 TEST(Verdict, MemoryIsAdvisedByWhatItGave) {

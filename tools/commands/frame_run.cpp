@@ -7,6 +7,7 @@
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "tools/options/channel_arguments.h"
@@ -155,6 +156,8 @@ class FrameRun {
       if (!ranks_.isFirst()) return;
       frame.statistics = combined(frame.of_ranks);
     }
+    // Bricks of the next picture are prepared meanwhile.
+    const Computing computing(player_.renderer().permits(), Urgency::kUrgent);
     const uint64_t number = frame.number;
     const Camera& camera = frame.camera;
     const FrameStatistics& statistics = frame.statistics;

@@ -382,7 +382,9 @@ void addRender(CLI::App& app) {
   command->add_option("--memory", arguments->frame.memory, "Memory limit for drawing, such as 512M or 2G")
       ->capture_default_str()
       ->group(how);
-  command->add_option("--threads", arguments->frame.threads, "Number of worker threads; 0: one per core")
+  command
+      ->add_option("--threads", arguments->frame.threads,
+                   "Number of threads that compute at a time; 0: one per core")
       ->check(CLI::Range(0u, kMaxThreads))
       ->capture_default_str()
       ->group(how);

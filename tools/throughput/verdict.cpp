@@ -130,15 +130,14 @@ class Judge {
                     secondsText(cores_s_ - draw_s_)));
   }
 
-  /// Compares frames that differ only in their threads. --threads 1 already uses two cores, one for the
-  /// worker and one for the painter, so frames with 2 threads show nothing.
+  /// Compares frames that differ only in their threads.
   void adviseCores() {
     const OtherFrame* one = nullptr;
     const OtherFrame* all = nullptr;
     for (const OtherFrame& other : others_) {
       if (other.threads != 1) continue;
       for (const OtherFrame& same : others_)
-        if (same.threads == frame_.threads && same.threads > 2 && same.lod_pixels == other.lod_pixels &&
+        if (same.threads == frame_.threads && same.threads > 1 && same.lod_pixels == other.lod_pixels &&
             same.memory_bytes == other.memory_bytes) {
           one = &other;
           all = &same;
@@ -151,7 +150,7 @@ class Judge {
       return;
     }
     const double gain = one->seconds / all->seconds;
-    const bool good = gain >= kGoodScaling * all->threads / 2;
+    const bool good = gain >= kGoodScaling * all->threads;
     if (good) buys_.emplace_back("a processor with more cores");
     verdict_.lines.push_back(
         fmt::format("--threads {} draws --lod-pixels {:g} {:.1f} times as fast as --threads 1: more cores "

@@ -1,0 +1,116 @@
+#include "stream/base/compute_permits.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <semaphore>
+#include <thread>
+#include <vector>
+
+#include "stream/base/stage_timer.h"
+
+namespace curvisplat {
+namespace {
+
+TEST(ComputePermits, AreHeldByNoMoreThreadsThanThereAre) {
+  constexpr int kPermits = 3, kThreads = 8, kTimes = 2000;
+  ComputePermits permits(kPermits);
+  std::atomic<int> now = 0, most = 0, done = 0;
+  const auto compute = [&] {
+    const int those = ++now;
+    int before = most;
+    while (before < those && !most.compare_exchange_weak(before, those)) {
+    }
+    std::this_thread::yield();
+    --now;
+  };
+  std::vector<std::thread> threads;
+  for (int n = 0; n < kThreads; ++n)
+    threads.emplace_back([&, n] {
+      for (int time = 0; time < kTimes; ++time) {
+        const Computing computing(&permits, n % 2 == 0 ? Urgency::kUrgent : Urgency::kNormal);
+        compute();
+        Computing::giveWay();
+        compute();
+        double waited_s = 0;
+        { const WaitTimer waiting(waited_s, "wait for nothing"); }
+        compute();
+        ++done;
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(done, kThreads * kTimes);
+  EXPECT_LE(most, kPermits);
+  EXPECT_EQ(now, 0);
+}
+
+TEST(ComputePermits, AreLeftToAnUrgentThreadFirst) {
+  for (int time = 0; time < 200; ++time) {
+    ComputePermits permits(1);
+    std::atomic<int> order = 0, normal = 0, urgent = 0;
+    std::thread of_normal, of_urgent;
+    {
+      const Computing computing(&permits);
+      of_normal = std::thread([&] {
+        const Computing waited(&permits);
+        normal = ++order;
+      });
+      of_urgent = std::thread([&] {
+        const Computing waited(&permits, Urgency::kUrgent);
+        urgent = ++order;
+      });
+      while (urgent == 0) Computing::giveWay();  // this thread waits, and is as urgent as `normal`
+    }
+    of_normal.join();
+    of_urgent.join();
+    EXPECT_EQ(urgent, 1);
+    EXPECT_EQ(normal, 2);
+  }
+}
+
+TEST(ComputePermits, AreAnothersWhileTheirThreadWaits) {
+  ComputePermits permits(1);
+  std::binary_semaphore computed(0);
+  const Computing computing(&permits);
+  std::thread other([&] {
+    const Computing of_other(&permits);
+    computed.release();
+  });
+  double waited_s = 0;
+  {
+    const WaitTimer waiting(waited_s, "wait for the other");
+    computed.acquire();
+  }
+  other.join();
+}
+
+TEST(ComputePermits, AreNotWaitedForByAThreadThatNeedsNoneAnyMore) {
+  ComputePermits permits(1);
+  const Computing computing(&permits);
+  std::atomic<bool> asked = false, unneeded = false;
+  std::thread other([&] {
+    const Computing in_vain(&permits, Urgency::kUrgent, [&] {
+      asked = true;
+      return unneeded.load();
+    });
+    EXPECT_FALSE(in_vain.granted());
+  });
+  while (!asked) std::this_thread::yield();
+  unneeded = true;
+  permits.recheck();
+  other.join();
+}
+
+TEST(ComputePermits, OfAThreadThatHoldsOneAreEnough) {
+  ComputePermits permits(1), of_others(1);
+  const Computing computing(&permits);
+  {
+    const Computing again(&permits, Urgency::kUrgent), another(&of_others);
+    EXPECT_TRUE(again.granted());
+  }
+  const Computing without(nullptr);
+  EXPECT_TRUE(without.granted());
+}
+
+}  // namespace
+}  // namespace curvisplat
