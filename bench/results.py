@@ -7,6 +7,7 @@
 A name is a path that does not change from version to version, with parameters last: "frames/wake/backend:cpu". Units have no
 prefix: s, B, B/s, nodes/s, dB, 1 (a count).
 """
+import decimal
 import json
 import os
 import platform
@@ -31,6 +32,11 @@ def spread(samples):
         return 0.5 * (max(samples) - min(samples))
     middle = statistics.median(samples)
     return 1.4826 * statistics.median(abs(sample - middle) for sample in samples)
+
+
+def three_digits(number):
+    """As text without an exponent: 0.0712, 8.71, 5060."""
+    return f"{decimal.Decimal(f'{number:.2e}'):f}"
 
 
 def machine():

@@ -7,7 +7,8 @@ Each step writes FOLDER/STEP.json, its output to FOLDER/STEP.log, and plots; FOL
 bench/compare.py. Caches, grids and reference pictures stay in FOLDER and are reused. A step's JSON lists what could not be
 measured, with the reason. The smoke test uses tiny sizes: it shows that the benchmarks work, its figures mean nothing.
 
-Exit status 1 if a step fails or writes no valid measurements; the other steps are still run.
+Exit status 1 if a step fails or writes no valid measurements; the other steps are still run. The whole should end within ten minutes
+on two idle cores: a line at the end warns if it took longer.
 """
 import argparse
 import json
@@ -20,6 +21,7 @@ import time
 import results
 
 HERE = pathlib.Path(__file__).resolve().parent
+MOST_SECONDS = 600
 
 
 class Form:
@@ -181,10 +183,13 @@ def main():
         if problem:
             failed.append(name)
     everything.write(paths.folder / "all.json", "bench/run.py", version, form="smoke" if arguments.smoke else "short")
-    print(f"{len(everything.measurements)} measurements in {paths.folder / 'all.json'}, "
-          f"{time.monotonic() - begin:.0f} s")
     for left in everything.left_out:
         print(f"left out: {left['name']}: {left['reason']}")
+    took = time.monotonic() - begin
+    print(f"{len(everything.measurements)} measurements in {paths.folder / 'all.json'}, {took:.0f} s")
+    if took > MOST_SECONDS:
+        print(f"warning: took longer than {MOST_SECONDS} s: other programs have the cores or the disk, or a step has become too slow",
+              flush=True)
     sys.exit(1 if failed else 0)
 
 

@@ -4,6 +4,7 @@
 Runs the scripts that nothing else runs, in their short forms: whether they work and print what they promise. No figure
 is judged.
 """
+import json
 import pathlib
 import shutil
 import subprocess
@@ -79,6 +80,25 @@ class ShortForms(unittest.TestCase):
         for line, function in zip(lines[2:], ["default", "step"], strict=True):
             self.assertRegex(line, rf"^\| levels \| {function} \| \d+ splats, \S+ s \| the same "
                                    r"\| (the same|\d+\.\d dB, \d+ splats, \S+ s) \|$")
+
+    def test_card_frames(self):
+        form = [FOLDER / "card", "--sizes", "4K", "--pictures", "64x48", "--frames", 2]
+        software = {one["name"] for one in json.loads(output([PROGRAM, "info", "--system", "--json"]))["backends"]
+                    if one["works"] and "llvmpipe" in one["found"]}
+        lines = run("card_frames.py", *form, "--backends", "osmesa,cpu").splitlines()
+        if "osmesa" in software:
+            self.assertRegex(lines[0], r"^osmesa: left out: draws in software \(OSMesa .*\); give --software to measure it all the same$")
+        row = r"^\| 4096 \| 64x48 \| {} \| \S+ ms \| \S+ ms \| {} \| \S+ ms \| {} \| \S+ \| \S+ \| {} \|$"
+        self.assertRegex(lines[-1], row.format("cpu", "", "", ""))
+        if "osmesa" not in software:
+            self.skipTest("there is no OSMesa")
+        told = FOLDER / "card.json"
+        lines = run("card_frames.py", *form, "--backends", "osmesa,cpu", "--software", "--json", told).splitlines()
+        self.assertRegex(lines[-2], row.format("cpu", "", "", ""))
+        self.assertRegex(lines[-1], row.format("osmesa", r"\S+ ms", r"\S+ ms", r"\S+"))
+        names = {one["name"]: len(one["samples"]) for one in json.loads(told.read_text())["measurements"]}
+        self.assertEqual(names["card_frames/gl_draw/splats:4K/picture:64x48/backend:osmesa"], 2)
+        self.assertNotIn("card_frames/gl_draw/splats:4K/picture:64x48/backend:cpu", names)
 
     def test_many_steps(self):
         lines = output([SCRIPTS / "many_steps.py", FOLDER / "many", "--steps", 20, "--program", PROGRAM]).splitlines()

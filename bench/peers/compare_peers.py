@@ -15,6 +15,8 @@ tests/data/half_annulus_*.json over white, an orthographic camera and one sample
 "build" is what precedes the first picture and is kept: reading and cutting into tetrahedra, or resampling; for curvisplat the
 conversion, which is done once, to a file. "frame" is the median of further frames, between which the camera moves a little. "peak"
 is the peak memory of the process; for curvisplat that of its picture, with that of the conversion beside it in the JSON.
+"draws" is the number of primitives in a frame: splats, tetrahedra, or the voxels of the resampled grid. They and the picture's pixels
+are divided by "frame": "M a second" is millions of primitives.
 """
 import argparse
 import contextlib
@@ -41,6 +43,9 @@ OWN_TECHNIQUES = {"curvisplat": "0", "curvisplat-1px": "1"}  # and their --lod-p
 NAMES = {"projected-tetrahedra": "VTK, projected tetrahedra", "ray-cast": "VTK, ray cast of tetrahedra",
          "zsweep": "VTK, ZSweep", "resampled": "VTK, resampled and ray cast",
          "curvisplat": "curvisplat, finest level", "curvisplat-1px": "curvisplat, 1 pixel of error"}
+# What each technique draws; its number is in the answer under this name.
+PRIMITIVES = {"projected-tetrahedra": "tetrahedra", "ray-cast": "tetrahedra", "zsweep": "tetrahedra", "resampled": "voxels",
+              "curvisplat": "splats", "curvisplat-1px": "splats"}
 CLUSTERING = 2.5
 MIB = 2**20
 
@@ -173,7 +178,9 @@ def drawn_by_us(arguments, case, made, function, technique, picture):
         file.unlink()
     answer = json.loads(told.read_text())
     seconds = [frame["seconds"]["total"] for frame in answer["frames"]]
-    return {"build_s": conversion["seconds"], "first_frame_s": seconds[0], "frames_s": seconds[1:],
+    splats = [frame["splats_drawn"] for frame in answer["frames"]]
+    return {"splats": round(statistics.median(splats[1:] or splats)), "build_s": conversion["seconds"],
+            "first_frame_s": seconds[0], "frames_s": seconds[1:],
             "peak_memory_bytes": answer["peak_memory_bytes"], "drawn_by": answer["backend"],
             "conversion_peak_memory_bytes": conversion["peak_memory_bytes"], "cache_bytes": conversion["cache_bytes"]}
 
@@ -199,6 +206,12 @@ def psnr_of(arguments, picture, truth):
     return float(found[1])
 
 
+def rates_of(primitives, picture, seconds):
+    """Primitives and pixels a second, of a picture such as "256x256"."""
+    width, height = picture.split("x")
+    return {"primitives_per_s": primitives / seconds, "pixels_per_s": int(width) * int(height) / seconds}
+
+
 def measure(arguments, case, out):
     """Returns a row for every technique and function."""
     told = json.loads(results.run([arguments.program, "info", *case.files(), "--json"]))
@@ -215,7 +228,8 @@ def measure(arguments, case, out):
                 row = drawn_by_vtk(arguments, case, function, technique, picture)
             row |= {"case": case.name, "nodes": case.nodes, "function": function, "technique": technique,
                     "frame_s": statistics.median(row["frames_s"] or [row["first_frame_s"]]),
-                    "psnr_db": psnr_of(arguments, picture, truth)}
+                    "psnr_db": psnr_of(arguments, picture, truth), "primitives": row[PRIMITIVES[technique]]}
+            row |= rates_of(row["primitives"], arguments.picture, row["frame_s"])
             rows.append(row)
             print(line_of(row), flush=True)
             name = f"peers/{technique}/{case.name}/{function}"
@@ -227,14 +241,16 @@ def measure(arguments, case, out):
     return rows
 
 
-HEADING = ("| grid | function | drawn by | build | first frame | frame | peak | PSNR |\n"
-           "|---|---|---|---|---|---|---|---|")
+HEADING = ("| grid | function | drawn by | draws | build | first frame | frame | M a second | megapixels/s | peak | PSNR |\n"
+           "|---|---|---|---|---|---|---|---|---|---|---|")
 
 
 def line_of(row):
-    return (f"| {row['case']} | {row['function']} | {NAMES[row['technique']]} | {row['build_s']:.2f} s "
-            f"| {row['first_frame_s']:.3f} s | {row['frame_s']:.3f} s | {row['peak_memory_bytes'] / MIB:.0f} MiB "
-            f"| {row['psnr_db']:.1f} dB |")
+    primitives, primitives_per_s, pixels_per_s = (results.three_digits(1e-6 * row[name])
+                                                  for name in ("primitives", "primitives_per_s", "pixels_per_s"))
+    return (f"| {row['case']} | {row['function']} | {NAMES[row['technique']]} | {primitives} M {PRIMITIVES[row['technique']]} "
+            f"| {row['build_s']:.2f} s | {row['first_frame_s']:.3f} s | {row['frame_s']:.3f} s | {primitives_per_s} "
+            f"| {pixels_per_s} | {row['peak_memory_bytes'] / MIB:.0f} MiB | {row['psnr_db']:.1f} dB |")
 
 
 def plots_of(rows, function):

@@ -66,7 +66,7 @@ def resampled(grid, samples):
     sampler.Update()
     image = sampler.GetOutput()
     image.GetPointData().SetActiveScalars("scalar")
-    return image, {"samples": samples**3}
+    return image, {"voxels": samples**3}
 
 
 def build(job, grid):
