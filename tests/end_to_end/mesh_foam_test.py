@@ -140,6 +140,9 @@ class MeshFoam(MeshCase):
         result = self.run_program("info", case, "--json", "--time-step", "1")
         scalars = {scalar["name"]: scalar for scalar in json.loads(result.stdout)["scalars"]}
         self.assertAlmostEqual(scalars["p"]["max"], p.max() + 0.5, places=5)
+        for name in ("nan", "inf"):
+            (case / name).mkdir()
+        self.assertEqual(self.info(case)["times"], [0, 0.5])
         FoamCase(case).write(case / "0.5" / "polyMesh" / "points", "vectorField",
                              FoamCase(case).numbers(2 * lattice(4)))
         result = self.run_program("info", case, "--json", "--time-step", "1")

@@ -179,6 +179,20 @@ class SeveralFiles(unittest.TestCase):
             self.assertEqual(self.info(f"parts.{suffix}")["scalars"], self.info("three.nc")["scalars"])
         self.assertEqual([path.name for path in self.folder.iterdir() if "unpacked" in path.name], [])
 
+    def test_files_that_fill_the_buffer_to_its_end(self):
+        """Files are decompressed by the MiB. What ends with one is complete, whatever the buffer of the compressed bytes holds."""
+        mib, nodes = 1 << 20, 64**3
+        head = (f"# vtk DataFile Version 2.0\na\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS 64 64 64\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+                f"POINT_DATA {nodes}\nSCALARS p double\nLOOKUP_TABLE default\n").encode()
+        data = head + RANDOM.random(nodes).astype(">f8").tobytes()
+        (self.folder / "grid.vtk").write_bytes(data)
+        plain = self.info("grid.vtk")["scalars"]
+        for suffix, compress in COMPRESSIONS.items():
+            for name, packed in (("whole", compress(data.ljust(3 * mib, b"\n"))), ("parts", compress(data) + compress(b"\n" * mib))):
+                with self.subTest(name, suffix=suffix):
+                    (self.folder / f"{name}.vtk.{suffix}").write_bytes(packed)
+                    self.assertEqual(self.info(f"{name}.vtk.{suffix}")["scalars"], plain)
+
     def test_damaged_compressed_files_are_refused(self):
         data = (self.folder / self.files()[0]).read_bytes()[:3000]
         before = list(pathlib.Path(tempfile.gettempdir()).glob("curvisplat.*.unpacked"))

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <zstd.h>
 
+#include <array>
 #include <random>
 #include <tuple>
+#include <utility>
 
 #include "preprocess/convert/conversion_journal.h"
 #include "stream/cache/brick_log.h"
@@ -66,6 +68,45 @@ void writeStreams(const Seeds& seeds) {
     seeds.write("values_stream", kind.name,
                 Seed().add(splats).text(unpacked(encoded.values.front(), sizeof(ValuesHeader))).whole());
   }
+}
+
+/// Of a scalar that grows from step to step, as the second and third of a group are coded.
+void writeValuesInTime(const Seeds& seeds) {
+  constexpr uint16_t kSplats = 20;
+  const auto valuesAt = [](double time) {
+    std::vector<SplatScalar> values(kSplats);
+    for (size_t n = 0; n < values.size(); ++n) {
+      const auto at = static_cast<double>(n * n % 11);
+      values[n] = {at + 0.1 * time, {at, 2 * at, 3 - time}, at * time};
+    }
+    return values;
+  };
+  std::array<std::string, 2> streams;
+  std::array<SplatVariable, 2> decoded;
+  TimeReferences references;
+  Brick brick;
+  brick.splats = kSplats;
+  for (size_t n = 0; n < 2; ++n) {
+    auto values = valuesAt(static_cast<double>(2 - n));
+    const EncodedValues encoded = encodeValues({}, {}, values);
+    streams[n] = unpacked(encoded.bytes, sizeof(ValuesHeader));
+    decodeVariable(brick, encoded.variable, encoded.bytes, decoded[n]);
+    references.values[n] = arraysOf(std::as_const(decoded[n]));
+  }
+  const auto length = [&](size_t n) { return static_cast<uint16_t>(streams[n].size()); };
+  for (const ValuePrecision precision : {ValuePrecision::kNormal, ValuePrecision::kFine})
+    for (const bool two : {false, true}) {
+      references.steps_back = {1, static_cast<uint8_t>(two ? 2 : 0)};
+      auto values = valuesAt(3);
+      const EncodedValues encoded = encodeValues({}, {}, values, references, precision);
+      Seed seed;
+      seed.add(static_cast<uint16_t>(kSplats - 1)).add(length(0)).add(two ? length(1) : uint16_t{0});
+      seed.text(streams[0]).text(two ? streams[1] : "").text(unpacked(encoded.bytes, sizeof(ValuesHeader)));
+      seeds.write(
+          "values_in_time",
+          fmt::format("{}_{}", two ? "two" : "one", precision == ValuePrecision::kFine ? "fine" : "normal"),
+          seed.whole());
+    }
 }
 
 void writeTables(const Seeds& seeds) {
@@ -210,6 +251,7 @@ void writeSplats(const Seeds& seeds) {
 
 void writeCacheSeeds(const Seeds& seeds) {
   writeStreams(seeds);
+  writeValuesInTime(seeds);
   writeTables(seeds);
   writeFaces(seeds);
   writeBrickLog(seeds);

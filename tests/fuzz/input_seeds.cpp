@@ -1,6 +1,7 @@
 #include "tests/fuzz/seeds.h"
 
 #include <fmt/format.h>
+#include <zstd.h>
 
 #include <fstream>
 
@@ -9,6 +10,7 @@
 #include "render/image/image_file.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/stream/test_bricks.h"
+#include "tests/support/earth_files.h"
 #include "tests/support/netcdf_writer.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/vts_writer.h"
@@ -231,6 +233,41 @@ void writeNetcdf(const Seeds& seeds) {
   }
 }
 
+/// As models of the ocean and the atmosphere write them.
+void writeModels(const Seeds& seeds) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.nc";
+  const auto write = [&](const std::string& name, uint8_t flags) {
+    const std::string file = bytesOfFile(path);
+    seeds.write("cf_grid", name,
+                Seed().add(flags).add(static_cast<uint16_t>(file.size())).text(file).whole());
+  };
+  for (const char* coordinate : {"ocean_s_coordinate_g2", "ocean_s_coordinate", "ocean_sigma_coordinate"}) {
+    roms::write(path, NetcdfFileType::kClassic, coordinate);
+    write(fmt::format("roms_{}", coordinate), 2);
+  }
+  for (const bool partial_cells : {false, true}) {
+    nemo::write(path, NetcdfFileType::kClassic, partial_cells);
+    write(partial_cells ? "nemo_partial_cells" : "nemo", 0);
+  }
+  wrf::write(path, NetcdfFileType::kClassic);
+  write("wrf", 2);
+}
+
+/// A grid, and one followed by empty lines, as long as the buffer into which they are decompressed.
+void writeCompressed(const Seeds& seeds) {
+  const std::string text = std::string("# vtk DataFile Version 2.0\na\nASCII\nDATASET STRUCTURED_POINTS\n") +
+                           "DIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 8\nSCALARS p float\n" +
+                           "LOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n";
+  for (const bool full : {false, true}) {
+    std::string file = text;
+    if (full) file.resize(1 << 20, '\n');
+    std::string packed(ZSTD_compressBound(file.size()), '\0');
+    packed.resize(ZSTD_compress(packed.data(), packed.size(), file.data(), file.size(), 3));
+    seeds.write("unpacked_file", full ? "full.zst" : "grid.zst", packed);
+  }
+}
+
 void writeMeshes(const Seeds& seeds) {
   Seed stl;
   stl.add(uint8_t{0}).text(std::string(80, ' ')).add(uint32_t{1});
@@ -266,6 +303,8 @@ void writeInputSeeds(const Seeds& seeds) {
   writePlot3d(seeds);
   writeVtk(seeds);
   writeNetcdf(seeds);
+  writeModels(seeds);
+  writeCompressed(seeds);
   writeMeshes(seeds);
 }
 

@@ -1,10 +1,12 @@
 #!/usr/bin/python3
-"""make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of Tecplot's and XDMF's structured ones, of lists of time steps
-and of steps.bin: FOLDER/<target>/<seed>.
+"""make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of Tecplot's, XDMF's and NetCDF's structured ones, of surfaces
+of VTK, of grids that are compressed, of lists of time steps, of steps.bin and of records of parts: FOLDER/<target>/<seed>.
 
 What others wrote: VTK (python3-vtk9), libnetcdf (python3-netcdf4) and libcgns. The other seeds are make_seeds's.
 """
+import gzip
 import json
+import lzma
 import pathlib
 import struct
 import sys
@@ -88,6 +90,53 @@ def vtk_seeds(folder):
             writer.SetFileTypeToBinary() if binary else writer.SetFileTypeToASCII()
             of = with_values(polyhedra() if version == 42 else grid(), ghosts=True)
             put("vtk_legacy", f"mesh_{version}_{'binary' if binary else 'ascii'}", written(writer, of, "a.vtk"))
+
+
+def surface_seeds(folder):
+    points, polygons, strips = vtk.vtkPoints(), vtk.vtkCellArray(), vtk.vtkCellArray()
+    points.SetData(numpy_to_vtk(POINTS.astype("f4"), deep=True))
+    for cells, all_corners in ((polygons, [*FACES[:2], (0, 1, 8)]), (strips, [(4, 5, 6, 7, 8)])):
+        for corners in all_corners:
+            cells.InsertNextCell(len(corners), corners)
+    of = vtk.vtkPolyData()
+    of.SetPoints(points)
+    of.SetPolys(polygons)
+    of.SetStrips(strips)
+    for mode, packed in (("Ascii", "None"), ("Binary", "None"), ("Appended", "ZLib"), ("Appended", "LZ4")):
+        writer = vtk.vtkXMLPolyDataWriter()
+        getattr(writer, f"SetDataModeTo{mode}")()
+        getattr(writer, f"SetCompressorTypeTo{packed}")()
+        writer.SetEncodeAppendedData(packed == "ZLib")
+        writer.SetFileName(str(folder / "a.vtp"))
+        writer.SetInputData(of)
+        writer.Write()
+        put("vtk_surface", f"{mode}_{packed}".lower(), (folder / "a.vtp").read_bytes())
+
+
+def set_seeds():
+    """.pvtu and AMR sets, of the pieces that the target vtk_set has."""
+    head = '<VTKFile type="{}" version="{}" byte_order="LittleEndian">'
+    put("vtk_set", "pieces.pvtu", (head.format("PUnstructuredGrid", "0.1") +
+        '<PUnstructuredGrid GhostLevel="0"><PPointData><PDataArray type="Float32" Name="p"/></PPointData><PPoints>'
+        '<PDataArray type="Float32" NumberOfComponents="3"/></PPoints><Piece Source="tetrahedron.vtu"/>'
+        '<Piece Source="tetrahedron.vtu"/></PUnstructuredGrid></VTKFile>').encode())
+    patches = ('<DataSet index="0" amr_box="0 4 0 3 0 5" file="ghosts_0.vti"/>', '<DataSet index="0" amr_box="2 6 2 6 2 7" file="ghosts_1.vti"/>')
+    blocks = "".join(f'<Block level="{n}" spacing="{1 / 2**n} {1 / 2**n} {1 / 2**n}">{patch}</Block>' for n, patch in enumerate(patches))
+    put("vtk_set", "patches.vthb", (head.format("vtkOverlappingAMR", "1.1") +
+        f'<vtkOverlappingAMR origin="0 0 0" grid_description="XYZ">{blocks}</vtkOverlappingAMR></VTKFile>').encode())
+    blocks = "".join(f'<Block level="{n}" refinement_ratio="2">{patch}</Block>' for n, patch in enumerate(patches))
+    put("vtk_set", "patches.vth", (head.format("vtkHierarchicalBoxDataSet", "1.0") +
+        f"<vtkHierarchicalBoxDataSet>{blocks}</vtkHierarchicalBoxDataSet></VTKFile>").encode())
+
+
+def compressed_seeds():
+    grid_text = b"# vtk DataFile Version 2.0\na\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+    grid_text += b"POINT_DATA 8\nSCALARS p float\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n"
+    full = grid_text.ljust(1 << 20, b"\n")  # exactly as long as the buffer
+    for name, text in (("grid", grid_text), ("full", full)):
+        put("unpacked_file", f"{name}.gz", gzip.compress(text, mtime=0))
+        put("unpacked_file", f"{name}.xz", lzma.compress(text))
+    put("unpacked_file", "members.gz", gzip.compress(grid_text[:40], mtime=0) + gzip.compress(grid_text[40:], mtime=0) + bytes(9))
 
 
 def foam_seeds():
@@ -263,6 +312,80 @@ def ensight_seeds():
                           bytes([kind]) + struct.pack("<H", len(geometry)) + geometry + file)
 
 
+def ensight_case_seeds():
+    head = "FORMAT\ntype: ensight gold\n"
+    put("ensight_case", "one_step", (head + "GEOMETRY\nmodel: t.geo\nVARIABLE\nscalar per node: p t.p\n"
+                                     "vector per node: 1 u t.u # words\nscalar per element: c t.c\n").encode())
+    put("ensight_case", "steps", (head + "GEOMETRY\nmodel: 1 t.geo*\nVARIABLE\nscalar per node: 2 p \"t.p**\"\nconstant per case: k 3\n"
+                                  "TIME\ntime set: 1\nnumber of steps: 2\nfilename start number: 0\nfilename increment: 1\n"
+                                  "time values: 0.0 0.5\ntime set: 2\nnumber of steps: 2\nfilename numbers: 0\n1\ntime values:\n0\n0.5\n").encode())
+
+
+def cf_seeds(folder):
+    def write(name, dimensions, variables, **attributes):
+        """variables: name, dimensions, values, attributes."""
+        with netCDF4.Dataset(folder / name, "w", format="NETCDF3_CLASSIC") as f:
+            f.setncatts(attributes)
+            for dimension, length in dimensions.items():
+                f.createDimension(dimension, length)
+            for variable, along, values, words in variables:
+                values = np.asarray(values)
+                added = f.createVariable(variable, values.dtype, tuple(along.split()), fill_value=words.pop("_FillValue", None))
+                added.setncatts(words)
+                added.set_auto_maskandscale(False)
+                added[...] = values
+        return (folder / name).read_bytes().rstrip(b"\0") + bytes(8)  # the library pads files whose header has grown
+
+    def put_grid(name, flags, first, second=b""):
+        put("cf_grid", name, bytes([flags]) + struct.pack("<H", len(first)) + first + second)
+
+    east, north = {"units": "degrees_east"}, {"units": "degrees_north"}
+    height = ("z", "z", np.array([0, 100.0]), {"units": "m", "positive": "up"})
+
+    def values(*shape):
+        return np.arange(np.prod(shape), dtype="f4").reshape(shape)
+
+    around = [("lon", "lon", np.arange(0, 360, 45.0), east), ("lat", "lat", np.linspace(-60, 60, 4), north)]
+    put_grid("around", 0, write("a.nc", {"z": 2, "lat": 4, "lon": 8}, [*around, height, ("t", "z lat lon", values(2, 4, 8), {})]))
+    packed = (values(2, 2, 4, 8).astype("i2"), {"scale_factor": 0.5, "add_offset": 3.0, "_FillValue": np.int16(5), "valid_range": np.array([1, 90], "i2")})
+    mask = ("mask", "lat lon", np.tile([0, 1], (4, 4)).astype("i1"), {"flag_values": np.array([0, 1], "i1"), "flag_meanings": "land sea"})
+    time = ("time", "time", np.array([0, 1.0]), {"units": "days since 2000-01-01"})
+    put_grid("packed_and_masked", 2, write("a.nc", {"time": None, "z": 2, "lat": 4, "lon": 8}, [*around, height, time, mask, ("t", "time z lat lon", *packed)]))
+    levels = [("lev", "lev", np.array([0.5, 1.0]), {"standard_name": "atmosphere_hybrid_sigma_pressure_coordinate", "formula_terms": "ap: a b: b ps: ps"}),
+              ("a", "lev", np.array([1e4, 0.0]), {"units": "Pa"}), ("b", "lev", np.array([0.5, 1.0]), {}),
+              ("ps", "lat lon", np.full((4, 8), 1e5, "f4"), {"units": "Pa"})]
+    hybrid = write("a.nc", {"lev": 2, "lat": 4, "lon": 8}, [*around, *levels, ("t", "lev lat lon", values(2, 4, 8), {})])
+    put_grid("hybrid_pressure", 0, hybrid)
+    axes = [("x", "x", np.arange(3.0), {"units": "km", "standard_name": "projection_x_coordinate"}),
+            ("y", "y", np.arange(3.0), {"units": "km", "standard_name": "projection_y_coordinate"})]
+    lambert = {"grid_mapping_name": "lambert_conformal_conic", "standard_parallel": np.array([30.0, 60]), "longitude_of_central_meridian": 10.0,
+               "latitude_of_projection_origin": 45.0}
+    put_grid("projected", 0, write("a.nc", {"z": 2, "y": 3, "x": 3}, [*axes, height, ("crs", "", np.int32(0), lambert),
+                                                                      ("t", "z y x", values(2, 3, 3), {"grid_mapping": "crs"})]))
+    rotated = {"grid_mapping_name": "rotated_latitude_longitude", "grid_north_pole_latitude": 40.0, "grid_north_pole_longitude": 170.0}
+    axes = [("rlon", "rlon", np.arange(3.0), {"units": "degrees", "standard_name": "grid_longitude"}),
+            ("rlat", "rlat", np.arange(3.0), {"units": "degrees", "standard_name": "grid_latitude"})]
+    put_grid("rotated_flat", 4, write("a.nc", {"z": 2, "rlat": 3, "rlon": 3}, [*axes, height, ("pole", "", np.int32(0), rotated),
+                                                                             ("t", "z rlat rlon", values(2, 3, 3), {"grid_mapping": "pole"})]))
+    # Faces of a cube: what lies beside them is 1 degree away.
+    rows, columns = np.meshgrid(np.arange(3.0), np.arange(3.0), indexing="ij")
+    faces = [("lons", "nf y x", np.stack([columns + 3 * n for n in (0, 1)]), east), ("lats", "nf y x", np.stack([rows] * 2), north)]
+    put_grid("faces", 0, write("a.nc", {"z": 2, "nf": 2, "y": 3, "x": 3},
+                               [*faces, height, ("t", "z nf y x", values(2, 2, 3, 3), {"coordinates": "lons lats"})]))
+    tiles = [write("a.nc", {"z": 2, "grid_yt": 3, "grid_xt": 3},
+                   [("grid_lont", "grid_yt grid_xt", columns + 3 * n, east), ("grid_latt", "grid_yt grid_xt", rows, north), height,
+                    ("t", "z grid_yt grid_xt", values(2, 3, 3), {})]) for n in (0, 1)]
+    put_grid("tiles", 1, *tiles)
+    fine = np.meshgrid(np.arange(7.0), np.arange(7.0), indexing="ij")
+    words = np.zeros((1, 8), "S1")
+    words[0, :4] = list("b.nc")
+    supergrid = write("b.nc", {"nyp": 7, "nxp": 7}, [("x", "nyp nxp", fine[1], {"units": "degrees"}), ("y", "nyp nxp", fine[0], {"units": "degrees"})])
+    for named in (False, True):
+        data = [height, ("t", "z yh xh", values(2, 3, 3), {})] + named * [("gridfiles", "ntiles string", words, {})]
+        put_grid("mosaic" if named else "supergrid", 0 if named else 8,
+                 write("a.nc", {"z": 2, "yh": 3, "xh": 3, "ntiles": 1, "string": 8}, data), supergrid)
+
+
 def columns_seeds(folder):
     nodes = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1.0]])
     faces = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
@@ -319,14 +442,30 @@ def lists_of_steps():
         put("steps", f"{steps}_of_{variables}", bytes([variables - 1]) + data)
 
 
+def part_records():
+    step = {"states_time": True, "sources": ["a.xyz", "a.fun"]}
+
+    def record(steps, count):
+        return json.dumps({"steps_of_series": steps, "steps": [step] * count}).encode()
+
+    for name, first, second in (("one", record(6, 6), b""), ("nothing_to_do", record(6, 6), record(6, 0)), ("two", record(11, 6), record(11, 6))):
+        put("part_record", name, struct.pack("<H", len(first)) + first + second)
+
+
 with tempfile.TemporaryDirectory() as name:
     vtk_seeds(pathlib.Path(name))
+    surface_seeds(pathlib.Path(name))
+    cf_seeds(pathlib.Path(name))
     exodus_seeds(pathlib.Path(name))
     columns_seeds(pathlib.Path(name))
     adf_seeds(pathlib.Path(name))
+set_seeds()
+compressed_seeds()
 foam_seeds()
 su2_seeds()
 ensight_seeds()
+ensight_case_seeds()
 tecplot_seeds()
 xdmf_seeds()
 lists_of_steps()
+part_records()

@@ -81,7 +81,8 @@ void unpackGzip(Input& input, const Sink& sink) {
         input.fail("gzip", gzip.stream.msg ? gzip.stream.msg : "its data is wrong");
       complete = status == Z_STREAM_END;
       sink({out.data(), out.size() - gzip.stream.avail_out});
-    } while (gzip.stream.avail_in > 0 || gzip.stream.avail_out == 0);
+      // Past the end of a member there is nothing to come, though the buffer is full.
+    } while (gzip.stream.avail_in > 0 || (gzip.stream.avail_out == 0 && !complete));
   }
   if (!complete) input.fail("gzip", "it ends early");
 }
@@ -132,7 +133,8 @@ void unpackZstd(Input& input, const Sink& sink) {
       left = ZSTD_decompressStream(zstd.get(), &to, &from);
       if (ZSTD_isError(left)) input.fail("zstd", ZSTD_getErrorName(left));
       sink({out.data(), to.pos});
-      full = to.pos == to.size;
+      full = to.pos == to.size &&
+             left != 0;  // 0: the frame is complete; a call without input would begin another
     }
   }
   if (left != 0) input.fail("zstd", "it ends early");

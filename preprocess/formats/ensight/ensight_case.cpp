@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <sstream>
 #include <string_view>
@@ -111,7 +112,8 @@ void CaseReader::takeLine(const std::string& key, const std::string& value) {
   key_ = key;
   if (section_ == "format" && key == "type") type_ = lower(value);
   if (section_ == "geometry" && key == "model") model_ = entryOf(value, 1);
-  if (section_ == "geometry" && key != "model") skipped_.push_back(fmt::format("{} geometry", key));
+  if (section_ == "geometry" && key != "model")
+    skipped_.push_back(fmt::format("{} geometry", printable(key)));
   if (section_ == "variable") takeVariable(key, value);
   if (section_ == "time") takeTime(key, value);
 }
@@ -149,7 +151,7 @@ void CaseReader::takeVariable(const std::string& key, const std::string& value) 
   variable.entry = entryOf(value, 2);
   if (variable.entry.words.size() < 2)
     throw Error("{}: '{}: {}' does not name a variable and its file; the file is damaged", path_.string(),
-                key, printable(value));
+                printable(key), printable(value));
   variable.variable.name = variable.entry.words[0];
   variable.variable.components = vector ? 3 : 1;
   variable.variable.centring = key.ends_with("element") ? Centring::kCell : Centring::kNode;
@@ -194,10 +196,13 @@ EnsightCase CaseReader::run(std::optional<uint32_t> step) {
   if (!model_ || model_->words.empty()) throw Error("{}: names no geometry (model:)", path_.string());
   EnsightCase result;
   for (const auto& [number, set] : sets_) {
-    if (set.steps != static_cast<double>(set.times.size()) || !(set.steps <= kMaxSteps) ||
+    const bool finite =
+        std::all_of(set.times.begin(), set.times.end(), [](double time) { return std::isfinite(time); });
+    if (set.steps != static_cast<double>(set.times.size()) || !(set.steps <= kMaxSteps) || !finite ||
         !std::is_sorted(set.times.begin(), set.times.end()))
       throw Error(
-          "{}: time set {} has {} times for {:g} steps, or times that do not rise; the file is damaged",
+          "{}: time set {} has {} times for {:g} steps, or times that are not finite or do not rise; the "
+          "file is damaged",
           path_.string(), number, set.times.size(), set.steps);
     result.times.insert(result.times.end(), set.times.begin(), set.times.end());
   }

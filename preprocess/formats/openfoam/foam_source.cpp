@@ -94,7 +94,8 @@ void FoamSource::findTimes(std::optional<uint32_t> asked, const fs::path& shown)
   std::vector<std::pair<double, std::string>> times;
   for (const auto& entry : fs::directory_iterator(pieces_.front().folder)) {
     double time = 0;
-    if (entry.is_directory() && parseNumber(entry.path().filename().string(), time))
+    // A run that diverges may leave a folder "nan", which has no place among times.
+    if (entry.is_directory() && parseNumber(entry.path().filename().string(), time) && std::isfinite(time))
       times.emplace_back(time, entry.path().filename().string());
   }
   std::sort(times.begin(), times.end());
