@@ -1,6 +1,5 @@
 // Temporary files without a name: each is removed from its folder as soon as it is open, and the system frees its space
-// when it is closed, however the process ends. For data that does not fit in memory and that nobody else reads. Errors name
-// the folder.
+// when it is closed, however the process ends. For data that does not fit in memory and that nobody else reads.
 #pragma once
 
 #include <cstdint>
