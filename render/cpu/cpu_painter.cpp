@@ -11,8 +11,10 @@
 #include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
 #include "render/cpu/tile_windows.h"
+#include "render/project/paint_loop.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/stage_timer.h"
+#include "stream/base/thread_count.h"
 
 namespace curvisplat {
 namespace {
@@ -89,7 +91,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
                        PixelShading shading, const PaintResources& resources) {
   State& state = *state_;
   const Computing computing(resources.permits);
-  const unsigned threads = PaintLoop::threadsOf(resources),
+  const unsigned threads = threadsOrCores(resources.threads),
                  threads_before = state.loop ? state.loop->threads() : 0;
   state.upload_s = state.draw_s = 0;
   state.shading = shading;
@@ -297,7 +299,7 @@ uint64_t CpuPainter::frameBytes(ImageSize size) {
 
 uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {
   return SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
-                          PaintLoop::threadsOf(resources));
+                          threadsOrCores(resources.threads));
 }
 
 uint64_t CpuPainter::layerBytes(const PixelLayers& layers) {

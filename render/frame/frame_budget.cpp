@@ -1,12 +1,12 @@
 #include "render/frame/frame_budget.h"
 
 #include <algorithm>
-#include <thread>
 
 #include "render/frame/sweep_buffer.h"
 #include "render/project/projection.h"
 #include "stream/base/byte_text.h"
 #include "stream/base/error.h"
+#include "stream/base/thread_count.h"
 #include "stream/model/brick.h"
 #include "stream/model/splats.h"
 
@@ -46,7 +46,7 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
                      byteText(memory_bytes), fixed.size.width, fixed.size.height, (least >> 20) + 1);
   const uint64_t part = memory_bytes / kParts;
   const uint64_t rounded = (exact + part - 1) / part * part;
-  const unsigned wanted = threads ? threads : std::max(1u, std::thread::hardware_concurrency());
+  const unsigned wanted = threadsOrCores(threads);
   FrameBudget budget;
   const uint64_t taken = rounded + pools + wanted * worker_bytes <= memory_bytes ? rounded : exact;
   budget.workers =

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <limits>
 #include <span>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -20,6 +19,7 @@
 #include "stream/base/freed_memory.h"
 #include "stream/base/interrupted.h"
 #include "stream/base/stage_timer.h"
+#include "stream/base/thread_count.h"
 #include "stream/paging/brick_source.h"
 #include "stream/paging/pager.h"
 
@@ -31,7 +31,7 @@ constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
 constexpr size_t kLargeBlock = size_t{1} << 20;
 
 unsigned threadsOf(const FrameOptions& options) {
-  return options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+  return threadsOrCores(options.threads);
 }
 
 /// What the splats of isosurfaces may take; where it is too little they are found in several parts of the picture.

@@ -21,6 +21,7 @@
 #include "render/project/light.h"
 #include "render/project/paint_loop.h"
 #include "stream/base/compute_permits.h"
+#include "stream/base/thread_count.h"
 
 namespace curvisplat {
 namespace {
@@ -86,7 +87,7 @@ class ValuePainter final : public Painter {
     extinction_.emplace(table);
     shading_ = shading;
     const Computing computing(resources.permits);
-    loop_.emplace(PaintLoop::threadsOf(resources), resources.permits);
+    loop_.emplace(threadsOrCores(resources.threads), resources.permits);
     bins_.emplace(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, loop_->threads());
     bins_->open();
     constexpr float kNone = std::numeric_limits<float>::infinity(),
@@ -341,7 +342,7 @@ uint64_t valueBytes(ImageSize size, const PaintResources& resources) {
   constexpr uint64_t kLayer = sizeof(PixelLayer) + sizeof(uint32_t);  // everywhere()'s
   return TileSet::tilesOf(size) * (sizeof(HalfTile) + sizeof(FoundTile)) + size.pixels() * kLayer +
          SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
-                          PaintLoop::threadsOf(resources));
+                          threadsOrCores(resources.threads));
 }
 
 std::unique_ptr<PaintingBackend> makeValueBackend(const ValueInputs& inputs) {

@@ -12,9 +12,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
-#include <thread>
 
-#include "render/project/painter.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/trace.h"
 
@@ -22,11 +20,6 @@ namespace curvisplat {
 
 class PaintLoop {
  public:
-  /// The threads that a painter with these resources may use: as many as there are cores, unless it is said.
-  static unsigned threadsOf(const PaintResources& resources) {
-    return resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
-  }
-
   /// `permits` outlives the loop; null: there is no bound but `threads`.
   PaintLoop(unsigned threads, ComputePermits* permits)
       : threads_(threads),

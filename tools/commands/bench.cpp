@@ -12,11 +12,11 @@
 #include <optional>
 #include <string>
 #include <system_error>
-#include <thread>
 
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
+#include "stream/base/thread_count.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/options/camera_motion.h"
@@ -87,7 +87,7 @@ void checkArguments(const BenchArguments& arguments) {
 }
 
 unsigned threadsOf(const BenchArguments& arguments) {
-  return arguments.threads ? arguments.threads : std::max(1u, std::thread::hardware_concurrency());
+  return threadsOrCores(arguments.threads);
 }
 
 void printMachine(const Machine& machine) {

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
@@ -21,6 +20,7 @@
 #include "stream/base/message.h"
 #include "stream/base/process_usage.h"
 #include "stream/base/progress.h"
+#include "stream/base/thread_count.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/frame_run.h"
@@ -137,7 +137,7 @@ void render(const RenderArguments& given) {
   Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
   checkRenderArguments(arguments, options.size);
-  if (options.threads == 0) options.threads = std::max(1u, std::thread::hardware_concurrency());
+  options.threads = threadsOrCores(options.threads);
   const double frames_per_s =
       arguments.frame_rate ? parsePositive("--frame-rate", *arguments.frame_rate) : 25;
 

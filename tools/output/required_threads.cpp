@@ -11,6 +11,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
+#include "stream/base/thread_count.h"
 
 namespace curvisplat {
 namespace {
@@ -20,8 +21,7 @@ constexpr unsigned kMaxTried = 64;   // memory may allow fewer threads than --th
 constexpr const char* kAdvice = "raise the limits of processes and memory (ulimit -u, ulimit -v)";
 
 void tryThreads(unsigned count, const std::string& hint) {
-  if (count == 0) count = std::max(1u, std::thread::hardware_concurrency());
-  count = std::min(count, kMaxTried) + kOwnThreads;
+  count = std::min(threadsOrCores(count), kMaxTried) + kOwnThreads;
   Mutex mutex;  // guards `ending`
   bool ending = false;
   ConditionVariable changed;
