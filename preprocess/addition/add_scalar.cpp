@@ -20,6 +20,7 @@
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/shared_passes.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/error.h"
 #include "stream/base/freed_memory.h"
 #include "stream/base/paths.h"
@@ -280,7 +281,10 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& giv
   }
 
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
-  AddScalarReport report = Addition(source, options, plan, progress).run();
+  const RoomNeeded room{{options.cache, temporaryFolder(options)},
+                        "the added scalars and their temporary files",
+                        kFullDiskHint};
+  AddScalarReport report = room.during([&] { return Addition(source, options, plan, progress).run(); });
   report.threads = plan.threads;
   report.memory_bytes = plan.cap_bytes;
   return report;

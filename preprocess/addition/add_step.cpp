@@ -24,6 +24,7 @@
 #include "preprocess/grid/reordered_source.h"
 #include "preprocess/grid/time_steps.h"
 #include "preprocess/survey/grid_checksum.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/freed_memory.h"
@@ -65,6 +66,10 @@ std::unique_ptr<GridSource> inOrderOf(const Manifest& series, const DataSource& 
   for (const BlockInfo& block : series.blocks) names.push_back(block.name);
   std::vector<uint32_t> order = orderByName(grid->description().blocks, names);
   return order.empty() ? nullptr : reordered(*grid, std::move(order));
+}
+
+std::filesystem::path temporaryFolder(const AddStepOptions& options) {
+  return options.temporary_folder.empty() ? folderOf(options.cache) : options.temporary_folder;
 }
 
 /// What the scatter pass learns about a grid of node-centred scalars on its way.
@@ -212,8 +217,8 @@ class StepAddition {
     if (options_.check_disk_space)
       checkDiskSpace(
           diskNeedsOfAdding(cache_.manifest().splats, scalars_.size(), minValueRecordBytes(scalars_.size())),
-          options_.cache, temporaryFolder());
-    scratch_ = std::make_unique<ScratchFolder>(newScratch(options_.cache, temporaryFolder()),
+          options_.cache, temporaryFolder(options_));
+    scratch_ = std::make_unique<ScratchFolder>(newScratch(options_.cache, temporaryFolder(options_)),
                                                ScratchFolder::Folder::kMake);
   }
 
@@ -255,7 +260,8 @@ class StepAddition {
     if (cache_.manifest().hasFeature(kFineValues)) options.precision = ValuePrecision::kFine;
     options.memory_bytes = options_.memory_bytes;
     options.threads = options_.threads;
-    options.temporary_folder = temporaryFolder();
+    options.temporary_folder = temporaryFolder(options_);
+    options.given_folders = options_.given_folders;
     options.title = cache_.seriesManifest().title;
     options.time = report_.time;
     options.time_unit = unit();
@@ -271,10 +277,6 @@ class StepAddition {
     NewStep step{report_.time, {}, source_.description().files};
     for (const ScalarRange& range : ranges_) step.ranges.push_back({range.min, range.max});
     return step;
-  }
-
-  std::filesystem::path temporaryFolder() const {
-    return options_.temporary_folder.empty() ? folderOf(options_.cache) : options_.temporary_folder;
   }
 
   const AddStepOptions& options_;
@@ -313,7 +315,9 @@ std::optional<double> timeOf(const GridDescription& description, const TimeUnit&
 
 AddStepReport addStep(const DataSource& source, const AddStepOptions& options, Progress& progress) {
   checkWritable(options.cache, "; name a splat cache that you may change");
-  return StepAddition(source, options, progress).run();
+  RoomNeeded room{options.given_folders, "the step and its temporary files", kFullDiskHint};
+  if (room.folders.empty()) room.folders = {options.cache, temporaryFolder(options)};
+  return room.during([&] { return StepAddition(source, options, progress).run(); });
 }
 
 }  // namespace curvisplat

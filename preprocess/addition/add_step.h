@@ -25,6 +25,7 @@ struct AddStepOptions {
   bool expect_new_geometry = false;        // for speed only: the previous step had a new geometry
   bool to_part = false;                    // the cache is a part of a series (series_part.h)
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
+  std::vector<std::filesystem::path> given_folders;  // that the user gave, where these two are temporary
 
   /// Smaller buckets than memory would allow, and smaller slabs, in which even the rows of a small grid are cut: for tests.
   std::optional<uint64_t> bucket_splats, slab_bytes;

@@ -17,7 +17,7 @@ namespace {
 /// What an addition's temporary folder is called, up to its process: for this cache alone, wherever it is.
 std::string scratchName(const std::filesystem::path& cache) {
   const std::string place = std::filesystem::canonical(cache).string();
-  return fmt::format("{}.add-{:016x}", cache.filename().string(),
+  return fmt::format("{}.add-{:016x}", ScratchFolder::beginOfName(cache),
                      checksumOf(std::as_bytes(std::span(place))));
 }
 

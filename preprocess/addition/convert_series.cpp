@@ -10,10 +10,14 @@
 
 #include "preprocess/addition/shared_series.h"
 #include "preprocess/addition/step_references.h"
+#include "preprocess/convert/conversion.h"
 #include "preprocess/convert/conversion_workspace.h"
+#include "preprocess/convert/preflight.h"
 #include "stream/base/count_text.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
+#include "stream/base/paths.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/partial_folder.h"
 
@@ -288,6 +292,7 @@ class SeriesConversion {
     options.resume = all.resume;
     options.expect_new_geometry = expect_new_geometry_;
     options.temporary_folder = all.temporary_folder;
+    options.given_folders = all.given_folders;
     options.bucket_splats = all.bucket_splats;
     options.to_part = options_.to_part;
     return options;
@@ -389,7 +394,10 @@ class SeriesConversion {
 
 SeriesReport convertSeries(const SeriesInput& input, const SeriesOptions& options, Progress& progress,
                            const std::function<void(const SeriesEvent&)>& report) {
-  return SeriesConversion(input, options, progress, report).run();
+  const ConvertOptions& first = options.convert;
+  RoomNeeded room{first.given_folders, "the cache and its temporary files", kFullDiskHint};
+  if (room.folders.empty()) room.folders = {folderOf(first.output), temporaryFolder(first)};
+  return room.during([&] { return SeriesConversion(input, options, progress, report).run(); });
 }
 
 }  // namespace curvisplat

@@ -10,10 +10,12 @@
 
 #include "preprocess/addition/series_part.h"
 #include "preprocess/addition/step_references.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/json_document.h"
+#include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/partial_folder.h"
@@ -260,7 +262,8 @@ void writePartRecord(const fs::path& folder, const SeriesPart& part, uint64_t st
 
 JoinReport joinParts(const JoinOptions& options, Progress& progress) {
   checkReplaceable(options.output, options.overwrite);
-  return Joining(options, progress).run();
+  const RoomNeeded room{{folderOf(options.output)}, "the joined cache", "make room there"};
+  return room.during([&] { return Joining(options, progress).run(); });
 }
 
 }  // namespace curvisplat

@@ -13,9 +13,12 @@
 
 #include "preprocess/addition/series_part.h"
 #include "preprocess/addition/step_references.h"
+#include "preprocess/convert/preflight.h"
 #include "stream/base/checksum.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
 
@@ -58,7 +61,8 @@ std::string scratchNameOfRanks(const fs::path& cache) {
   struct stat parent {};
   ::stat(path.parent_path().c_str(), &parent);
   const std::string key = fmt::format("{}\n{}", path.string(), parent.st_ino);
-  return fmt::format("{}.{:016x}.rank", path.filename().string(), checksumOf(std::as_bytes(std::span(key))));
+  return fmt::format("{}.{:016x}.rank", ScratchFolder::beginOfName(path),
+                     checksumOf(std::as_bytes(std::span(key))));
 }
 
 void removeLeftOfRanks(const fs::path& cache, const fs::path& temporary_folder) {
@@ -83,7 +87,7 @@ SharedSteps::SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ra
       add_(std::move(add)),
       ranks_(ranks),
       progress_(progress),
-      folder_(besideCache(add_.cache, ".ranks.partial")) {
+      folder_(besideCache(add_.cache, kRanksSuffix)) {
   if (ranks_.isFirst()) locked_ = std::make_unique<PartialFolder>(besideCache(add_.cache, ".ranks"), false);
   ranks_.barrier();
   if (!fs::is_directory(folder_))
@@ -93,6 +97,8 @@ SharedSteps::SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ra
   if (!add_.temporary_folder.empty()) removeAbandonedScratch(add_.temporary_folder, add_.cache);
   ranks_.barrier();
   if (ranks_.isFirst()) return;
+  add_.given_folders = {folderOf(fs::absolute(add_.cache))};
+  if (!add_.temporary_folder.empty()) add_.given_folders.push_back(add_.temporary_folder);
   const fs::path parent = add_.temporary_folder.empty() ? folder_ : add_.temporary_folder;
   scratch_ = std::make_unique<ScratchFolder>(
       ScratchFolder::newPath(parent, scratchNameOfRanks(add_.cache) + std::to_string(ranks_.rank())),
@@ -147,6 +153,9 @@ ConvertedSteps SharedSteps::convertPart(const Start& start) const {
     }
   } catch (const Interrupted&) {
     throw;
+  } catch (const DiskFull& full) {
+    const RoomNeeded room{add_.given_folders, "steps and their temporary files", kFullDiskHint};
+    converted.error = room.error(full).what();
   } catch (const Error& error) {
     converted.error = error.what();
   }

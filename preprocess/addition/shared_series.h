@@ -49,6 +49,9 @@ std::vector<StepSpan> dealSteps(uint64_t next, uint64_t count, uint64_t in_group
 /// otherwise. The rank's number follows.
 std::string scratchNameOfRanks(const std::filesystem::path& cache);
 
+/// What is appended to the cache's name for a folder beside it; it ends with kPartialSuffix.
+inline constexpr const char* kRanksSuffix = ".ranks.partial";
+
 /// Parts of a series in a folder beside it, removed in the end.
 class SharedSteps {
  public:

@@ -82,8 +82,12 @@ std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOpt
 class Conversion {
  public:
   Conversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
-             std::vector<ConversionFact> facts, Progress& progress)
-      : options_(options), plan_(plan), progress_(progress), ranks_(options.ranks) {
+             std::vector<ConversionFact> facts, EstimateNeeds estimate, Progress& progress)
+      : estimate_(std::move(estimate)),
+        options_(options),
+        plan_(plan),
+        progress_(progress),
+        ranks_(options.ranks) {
     if (isFirst())
       workspace_.emplace(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
                          std::move(facts));
@@ -126,13 +130,6 @@ class Conversion {
   bool leaveForResuming() {
     if (file_) file_->leave();
     return workspace_ && workspace_->leaveForResuming();
-  }
-
-  /// The folder that has the cache or the temporary files, whichever `file` belongs to.
-  std::filesystem::path folderOf(const std::filesystem::path& file) const {
-    if (partial_.empty()) return file.parent_path();
-    const auto [differs, ignored] = std::mismatch(scratch_.begin(), scratch_.end(), file.begin(), file.end());
-    return differs == scratch_.end() ? scratch_.parent_path() : partial_.parent_path();
   }
 
  private:
@@ -390,17 +387,26 @@ class Conversion {
 
   void checkRoom() const {
     if (!options_.check_disk_space) return;
-    const TemporaryNeeds most = workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
+    const DiskNeeds most = diskNeeds(nodes_, options_.scalars.size());
+    const TemporaryNeeds most_temporary =
+        workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
     const std::filesystem::path folder = temporaryFolder(options_);
-    if (hasDiskSpace(needsWith(most), options_.output, folder)) return;
+    if (hasDiskSpace(needsWith(most, most_temporary), options_.output, folder)) return;
     const TemporaryNeeds forecast =
         workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->temporaryNeeds(progress_);
-    checkDiskSpace(needsWith(forecast), options_.output, folder,
+    checkDiskSpace(needsWith(likelyNeeds(most), forecast), options_.output, folder,
                    options_.full_disk_hint.empty() ? kSmallDiskHint : options_.full_disk_hint);
   }
 
-  DiskNeeds needsWith(const TemporaryNeeds& temporary) const {
-    DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
+  DiskNeeds likelyNeeds(const DiskNeeds& most) const {
+    const std::optional<DiskNeeds> likely =
+        estimate_ ? estimate_(workspace_->scratch() / "sample") : std::nullopt;
+    if (!likely) return most;
+    return {std::min(likely->temporary_bytes, most.temporary_bytes),
+            std::min(likely->cache_bytes, most.cache_bytes), 0};
+  }
+
+  DiskNeeds needsWith(DiskNeeds needs, const TemporaryNeeds& temporary) const {
     if (workspace_->splats())
       needs.temporary_bytes -= std::min(needs.temporary_bytes, workspace_->splats()->buckets.size);
     if (workspace_->hasAllSplats()) needs.temporary_bytes = 0;
@@ -436,6 +442,7 @@ class Conversion {
     return manifest;
   }
 
+  const EstimateNeeds estimate_;
   const ConvertOptions& options_;
   const MemoryPlan plan_;
   Progress& progress_;
@@ -459,31 +466,38 @@ class Conversion {
 
 constexpr const char* kKept = "; finished work is kept: continue with --resume";
 
+RoomNeeded roomNeeded(const ConvertOptions& options) {
+  RoomNeeded room{options.given_folders, "the cache and its temporary files", options.full_disk_hint};
+  if (room.folders.empty()) room.folders = {folderOf(options.output), temporaryFolder(options)};
+  if (room.advice.empty()) room.advice = kFullDiskHint;
+  return room;
+}
+
 }  // namespace
 
 ConvertReport runConversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
-                            std::vector<ConversionFact> facts, Progress& progress) {
-  Conversion conversion(source, options, plan, std::move(facts), progress);
+                            std::vector<ConversionFact> facts, const EstimateNeeds& estimate,
+                            Progress& progress) {
+  const RoomNeeded room = roomNeeded(options);
+  std::optional<Conversion> conversion;
+  room.during([&] { conversion.emplace(source, options, plan, std::move(facts), estimate, progress); });
   try {
-    return conversion.run();
+    return conversion->run();
   } catch (const Interrupted& interrupted) {
     const char* what = "interrupted; its temporary files were removed";
     if (options.keep_interrupted)
-      what = conversion.leaveForResuming()
+      what = conversion->leaveForResuming()
                  ? "interrupted; continue with the same command and --resume"
                  : "interrupted before there was anything to resume; its temporary files were removed";
     throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
   } catch (const DiskFull& full) {
-    const std::string text =
-        fmt::format("{}: no room for the cache and its temporary files: {}; {}",
-                    conversion.folderOf(full.file()).string(), full.reason(),
-                    options.full_disk_hint.empty() ? kFullDiskHint : options.full_disk_hint);
-    throw OutputError("{}{}", text, options.resume && conversion.leaveForResuming() ? kKept : "");
+    throw OutputError("{}{}", room.error(full).what(),
+                      options.resume && conversion->leaveForResuming() ? kKept : "");
   } catch (const OutputError& error) {
-    if (options.resume && conversion.leaveForResuming()) throw OutputError("{}{}", error.what(), kKept);
+    if (options.resume && conversion->leaveForResuming()) throw OutputError("{}{}", error.what(), kKept);
     throw;
   } catch (const Error& error) {
-    if (options.resume && conversion.leaveForResuming()) throw Error("{}{}", error.what(), kKept);
+    if (options.resume && conversion->leaveForResuming()) throw Error("{}{}", error.what(), kKept);
     throw;
   }
 }

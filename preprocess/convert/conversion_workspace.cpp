@@ -12,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string scratchName(const fs::path& output) {
-  return output.filename().string() + ".tmp";
+  return ScratchFolder::beginOfName(output) + ".tmp";
 }
 
 /// Whether what the journal names can be the folder of temporary files of a conversion to `output`, in which

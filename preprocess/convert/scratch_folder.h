@@ -9,6 +9,8 @@ namespace curvisplat {
 
 class ScratchFolder {
  public:
+  /// How names of temporary folders for a cache begin: so much of its name that what follows fits, too.
+  static std::string beginOfName(const std::filesystem::path& cache);
   /// A name that no other process uses: `parent`/`name`.<process number>.<n>
   static std::filesystem::path newPath(const std::filesystem::path& parent, const std::string& name);
 

@@ -10,10 +10,14 @@
 
 namespace curvisplat {
 
+/// What samples are that BlankCounts::not_finite counts, for messages: coordinates are read in double precision, values in single.
+inline constexpr const char* kNotFinite =
+    "not finite in single precision (NaN, infinite, or a value beyond 3.4e+38 in magnitude)";
+
 struct BlankCounts {
   uint64_t by_grid = 0;     // iblank 0
   uint64_t by_value = 0;    // --blank
-  uint64_t not_finite = 0;  // NaN or infinite coordinate or scalar, not counted above
+  uint64_t not_finite = 0;  // NaN or infinite coordinate, or scalar in single precision; not counted above
   uint64_t total() const { return by_grid + by_value + not_finite; }
   BlankCounts& operator+=(const BlankCounts& other);
 };

@@ -76,7 +76,7 @@ std::vector<SampledBox> boxesOf(const std::vector<GridBlock>& blocks, uint64_t n
 
 class SampleSource final : public GridSource {
  public:
-  SampleSource(std::unique_ptr<GridSource> source, uint64_t nodes)
+  SampleSource(std::shared_ptr<const GridSource> source, uint64_t nodes)
       : source_(std::move(source)),
         boxes_(boxesOf(source_->description().blocks, nodes)),
         description_(source_->description()) {
@@ -129,14 +129,14 @@ class SampleSource final : public GridSource {
           std::fill_n(row, row_nodes, std::numeric_limits<float>::quiet_NaN());
   }
 
-  const std::unique_ptr<GridSource> source_;
+  const std::shared_ptr<const GridSource> source_;
   const std::vector<SampledBox> boxes_;
   GridDescription description_;
 };
 
 }  // namespace
 
-std::unique_ptr<GridSource> sampleOf(std::unique_ptr<GridSource> source, uint64_t nodes) {
+std::unique_ptr<GridSource> sampleOf(std::shared_ptr<const GridSource> source, uint64_t nodes) {
   return std::make_unique<SampleSource>(std::move(source), nodes);
 }
 

@@ -11,6 +11,6 @@ namespace curvisplat {
 
 /// Boxes of `source` with about `nodes` nodes together, rows whole; all of its blocks, each as it is, if it has no more
 /// nodes than that. Boxes do not overlap. Boundaries and flow conditions are left out of the description.
-std::unique_ptr<GridSource> sampleOf(std::unique_ptr<GridSource> source, uint64_t nodes);
+std::unique_ptr<GridSource> sampleOf(std::shared_ptr<const GridSource> source, uint64_t nodes);
 
 }  // namespace curvisplat

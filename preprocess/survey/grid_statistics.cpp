@@ -161,6 +161,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
   if (!in_cells.empty()) {
     const GridSurvey survey =
         surveyCells(NodeReader(source, in_cells, std::nullopt), slab_bytes, {}, progress);
+    statistics.cell_values_not_finite = survey.blanked.not_finite;
     for (size_t n = 0; n < in_cells.size(); ++n) statistics.scalars[of_cells[n]] = survey.ranges[n];
   }
   return statistics;

@@ -24,8 +24,9 @@ struct BlockStatistics {
 
 struct GridStatistics {
   std::vector<BlockStatistics> blocks;
-  std::array<ScalarRange, 3> bounds;  // of the nodes that are not blanked, along x, y, z
-  std::vector<ScalarRange> scalars;   // [requested scalar]; of the samples that are not blanked
+  std::array<ScalarRange, 3> bounds;    // of the nodes that are not blanked, along x, y, z
+  std::vector<ScalarRange> scalars;     // [requested scalar]; of the samples that are not blanked
+  uint64_t cell_values_not_finite = 0;  // cells with an infinite value of a cell-centred scalar
 
   BlankCounts blank() const;
   uint64_t cells() const;

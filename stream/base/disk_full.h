@@ -1,9 +1,12 @@
-// The error of a write for which there is no room: whoever knows what the file is for can say so.
+// The error of a file for which there is no room: the disk is full, a quota is used up, or a limit of file sizes is reached.
+// It names temporary files that the user has never heard of. Whoever knows which folders the user gave reports it under
+// one of these (RoomNeeded).
 #pragma once
 
 #include <filesystem>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "stream/base/error.h"
 
@@ -11,16 +14,42 @@ namespace curvisplat {
 
 class DiskFull : public OutputError {
  public:
-  /// `reason`: the system's words. `text`: the whole message, of this file.
-  DiskFull(std::filesystem::path file, std::string reason, const std::string& text)
-      : OutputError(text), file_(std::move(file)), reason_(std::move(reason)) {}
+  /// Whether `error`, a value of errno, says that there is no room.
+  static bool is(int error);
+
+  /// `file`: where there is no room. `shown`: what the message names instead of it. `what`: needs the room.
+  DiskFull(std::filesystem::path file, const std::filesystem::path& shown, const std::string& what,
+           int error);
 
   const std::filesystem::path& file() const { return file_; }
-  const std::string& reason() const { return reason_; }
+  /// The system's words.
+  std::string reason() const;
+  /// What helps: `of_full_disk`, unless it was the limit of file sizes.
+  std::string advice(const std::string& of_full_disk) const;
 
  private:
   std::filesystem::path file_;
-  std::string reason_;
+  int error_;
+};
+
+/// What some work writes, and the folders that the user gave for it.
+struct RoomNeeded {
+  std::vector<std::filesystem::path> folders;
+  std::string what;    // "the cache and its temporary files"
+  std::string advice;  // what helps where a disk is full
+
+  /// The error for the user. It names the longest of the folders that the file is in; if it is in none, the message stays.
+  OutputError error(const DiskFull& full) const;
+
+  /// Calls `work()` and throws error() instead of DiskFull.
+  template <typename Work>
+  auto during(const Work& work) const {
+    try {
+      return work();
+    } catch (const DiskFull& full) {
+      throw error(full);
+    }
+  }
 };
 
 }  // namespace curvisplat

@@ -92,11 +92,8 @@ void TemporaryFile::putIntoPlace() {
 
 void writeFileDurably(const fs::path& path, std::span<const std::byte> bytes) {
   TemporaryFile temporary(writableTarget(path));
-  try {
-    OutputFile(temporary.path()).append(bytes);
-  } catch (const Error& error) {
-    throw Error(temporary.aboutTarget(error.what()));
-  }
+  OutputFile(temporary.path(), Caching::kPages, OutputFile::Existing::kEmpty, temporary.target())
+      .append(bytes);
   temporary.putIntoPlace();
 }
 

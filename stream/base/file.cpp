@@ -14,6 +14,7 @@
 #include "stream/base/check.h"
 #include "stream/base/disk_full.h"
 #include "stream/base/open_retrying.h"
+#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -45,14 +46,22 @@ bool stoppedBeingDirect(int fd) {
   return flags >= 0 && (flags & O_DIRECT) != 0 && ::fcntl(fd, F_SETFL, flags & ~O_DIRECT) == 0;
 }
 
-void syncRetrying(int fd, const std::filesystem::path& path) {
+/// Throws the error of `file` for a value of errno: DiskFull if there is no room for `what`, else one that says what
+/// `cannot` be done. Messages name `shown`.
+[[noreturn]] void fail(int error, const std::filesystem::path& file, const std::filesystem::path& shown,
+                       const std::string& what, const std::string& cannot) {
+  if (DiskFull::is(error)) throw DiskFull(file, shown, what, error);
+  throw OutputError("{}: {}: {}", shown.string(), cannot, std::strerror(error));
+}
+
+void syncRetrying(int fd, const std::filesystem::path& path, const std::filesystem::path& shown) {
   int result;
   do {
     result = SystemCalls::current().fsync(fd);
   } while (result < 0 && errno == EINTR);
   // EINVAL and ENOTSUP: the file system cannot sync a directory or a pipe. The disk has not failed.
   if (result < 0 && errno != EINVAL && errno != ENOTSUP)
-    throw OutputError("{}: cannot be synced to the disk: {}", path.string(), reason());
+    fail(errno, path, shown, "what was written", "cannot be synced to the disk");
 }
 
 }  // namespace
@@ -155,25 +164,30 @@ void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
   }
 }
 
-OutputFile::OutputFile(std::filesystem::path path, Caching caching, Existing existing)
-    : path_(std::move(path)) {
+OutputFile::OutputFile(std::filesystem::path path, Caching caching, Existing existing,
+                       std::filesystem::path shown)
+    : path_(std::move(path)), shown_(shown.empty() ? path_ : std::move(shown)) {
   const int empty = existing == Existing::kEmpty ? O_TRUNC : 0;
   fd_ = openWith(caching, path_, O_RDWR | O_CREAT | empty, 0666);
-  if (fd_ < 0) throw OutputError("{}: cannot be opened for writing: {}", path_.string(), reason());
+  if (fd_ < 0) fail(errno, path_, shown_, "a new file", "cannot be opened for writing");
   struct stat status {};
   if (::fstat(fd_, &status) < 0) {
     const std::string why = reason();
     SystemCalls::current().close(std::exchange(fd_, -1));
-    throw OutputError("{}: cannot determine the file size: {}", path_.string(), why);
+    throw OutputError("{}: cannot determine the file size: {}", shown_.string(), why);
   }
   size_ = static_cast<uint64_t>(status.st_size);
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_.load()) {}
+    : path_(std::move(other.path_)),
+      shown_(std::move(other.shown_)),
+      fd_(std::exchange(other.fd_, -1)),
+      size_(other.size_.load()) {}
 
 OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   std::swap(path_, other.path_);
+  std::swap(shown_, other.shown_);
   std::swap(fd_, other.fd_);
   size_ = other.size_.exchange(size_.load());
   return *this;
@@ -195,12 +209,9 @@ void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
         SystemCalls::current().pwrite(fd_, from.data() + done, count, static_cast<int64_t>(offset + done));
     if (put < 0) {
       if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
-      const bool full = errno == ENOSPC || errno == EDQUOT;
-      const std::string why = reason();
-      const std::string text = fmt::format("{}: cannot write {} bytes at offset {}: {}", path_.string(),
-                                           count, offset + done, why);
-      if (full) throw DiskFull(path_, why, text);
-      throw OutputError(text);
+      const int error = errno;
+      fail(error, path_, shown_, fmt::format("{} more bytes", count),
+           fmt::format("cannot write {} bytes at offset {}", count, offset + done));
     }
     done += static_cast<size_t>(put);
   }
@@ -217,19 +228,19 @@ void OutputFile::truncate(uint64_t size) {
     result = SystemCalls::current().truncate(fd_, static_cast<int64_t>(size));
   } while (result < 0 && errno == EINTR);
   if (result < 0)
-    throw OutputError("{}: cannot be truncated to {} bytes: {}", path_.string(), size, reason());
+    throw OutputError("{}: cannot be truncated to {} bytes: {}", shown_.string(), size, reason());
   size_ = size;
 }
 
 void OutputFile::sync() {
   CURVISPLAT_CHECK(fd_ >= 0);
-  syncRetrying(fd_, path_);
+  syncRetrying(fd_, path_, shown_);
 }
 
 void OutputFile::close() {
   sync();
   if (SystemCalls::current().close(std::exchange(fd_, -1)) < 0 && errno != EINTR)
-    throw OutputError("{}: cannot be closed: {}", path_.string(), reason());
+    fail(errno, path_, shown_, "what was written", "cannot be closed");
 }
 
 std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
@@ -247,7 +258,7 @@ void writeFileAtomically(const std::filesystem::path& path, std::span<const std:
   // What is there may be a link that leads anywhere: it would be followed.
   SystemCalls::current().remove(temporary.c_str());
   try {
-    OutputFile file(temporary);
+    OutputFile file(temporary, Caching::kPages, OutputFile::Existing::kEmpty, path);
     file.append(bytes);
     file.close();
     if (SystemCalls::current().rename(temporary.c_str(), path.c_str()) < 0)
@@ -266,7 +277,7 @@ void syncDirectory(const std::filesystem::path& path) {
   const int fd = openRetrying(path, O_RDONLY | O_DIRECTORY, 0);
   if (fd < 0) throw OutputError("{}: cannot be opened: {}", path.string(), reason());
   try {
-    syncRetrying(fd, path);
+    syncRetrying(fd, path, path);
   } catch (...) {
     SystemCalls::current().close(fd);
     throw;
@@ -275,8 +286,10 @@ void syncDirectory(const std::filesystem::path& path) {
 }
 
 void makeFolder(const std::filesystem::path& path) {
-  if (SystemCalls::current().mkdir(path.c_str(), 0777) < 0)
-    throw OutputError("{}: the directory cannot be created: {}", path.string(), reason());
+  if (SystemCalls::current().mkdir(path.c_str(), 0777) == 0) return;
+  const int error = errno;
+  if (DiskFull::is(error)) throw DiskFull(path, folderOf(path), "a new directory", error);
+  throw OutputError("{}: the directory cannot be created: {}", path.string(), std::strerror(error));
 }
 
 void removeFile(const std::filesystem::path& path) {

@@ -1,8 +1,8 @@
 // Positional file access. All I/O of the program's own code goes through these classes and functions, and
 // they go through one table of system calls, so that a test can substitute a failing disk. (Reads by io_uring
 // bypass the table: async_reads.h. So do libraries that read or write files themselves: CGNS, HDF5, NetCDF.)
-// Every failure is an Error that names the path, the byte offset and the system's reason. Short transfers and
-// EINTR are retried; they are not failures.
+// Every failure is an Error that names the path, the byte offset and the system's reason, and DiskFull
+// (disk_full.h) where there is no room. Short transfers and EINTR are retried; they are not failures.
 #pragma once
 
 #include <sys/types.h>
@@ -103,9 +103,10 @@ class OutputFile {
  public:
   enum class Existing { kEmpty, kKeep };
 
-  /// Creates `path`. If it exists, empties it or keeps its bytes. Throws Error if that fails.
+  /// Creates `path`. If it exists, empties it or keeps its bytes. Throws Error if that fails. Messages name `shown`, unless
+  /// it is empty: of a temporary file, the file or folder that the user knows.
   explicit OutputFile(std::filesystem::path path, Caching caching = Caching::kPages,
-                      Existing existing = Existing::kEmpty);
+                      Existing existing = Existing::kEmpty, std::filesystem::path shown = {});
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&& other) noexcept;
   ~OutputFile();
@@ -129,7 +130,7 @@ class OutputFile {
   }
 
  private:
-  std::filesystem::path path_;
+  std::filesystem::path path_, shown_;
   int fd_ = -1;
   std::atomic<uint64_t> size_ = 0;
 };

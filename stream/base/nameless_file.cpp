@@ -8,8 +8,10 @@
 #include <list>
 #include <utility>
 
+#include "stream/base/disk_full.h"
 #include "stream/base/mutex.h"
 #include "stream/base/new_file.h"
+#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -18,10 +20,13 @@ namespace {
 OutputFile create(const std::filesystem::path& folder) {
   const NewFile file = createNewFile(
       [&](uint32_t random) { return folder / fmt::format("curvisplat.{:08x}.tmp", random); }, 0600);
-  if (file.fd < 0)
-    throw Error("{}: no temporary file can be made there: {}", folder.string(), std::strerror(errno));
+  if (file.fd < 0) {
+    const int error = errno;
+    if (DiskFull::is(error)) throw DiskFull(folder, folder, "a temporary file", error);
+    throw Error("{}: no temporary file can be made there: {}", folder.string(), std::strerror(error));
+  }
   try {
-    OutputFile out(file.path, Caching::kPages, OutputFile::Existing::kKeep);
+    OutputFile out(file.path, Caching::kPages, OutputFile::Existing::kKeep, folderOf(file.path));
     SystemCalls::current().close(file.fd);
     return out;
   } catch (...) {

@@ -1,5 +1,6 @@
 // Temporary files without a name: each is removed from its folder as soon as it is open, and the system frees its space
-// when it is closed, however the process ends. For data that does not fit in memory and that nobody else reads.
+// when it is closed, however the process ends. For data that does not fit in memory and that nobody else reads. Errors name
+// the folder.
 #pragma once
 
 #include <cstdint>

@@ -39,7 +39,7 @@ fs::path withoutSlash(fs::path path) {
 }
 
 fs::path partialOf(const fs::path& target) {
-  return withSuffix(withoutSlash(target), ".partial");
+  return withSuffix(withoutSlash(target), kPartialSuffix);
 }
 
 /// removeAll() of a folder, its mark last: killed meanwhile, it leaves a folder that the next conversion removes.

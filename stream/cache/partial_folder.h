@@ -17,6 +17,7 @@
 
 namespace curvisplat {
 
+inline constexpr const char* kPartialSuffix = ".partial";  // of the folder's name
 inline constexpr const char* kPartialLock = "lock";
 inline constexpr std::string_view kPartialMark = "curvisplat: unfinished cache\n";
 

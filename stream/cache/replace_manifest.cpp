@@ -27,7 +27,7 @@ void replaceManifest(const std::filesystem::path& cache, const Manifest& manifes
   const std::filesystem::path part = partOf(path);
   SystemCalls::current().remove(part.c_str());  // which may be a link
   try {
-    OutputFile file(part);
+    OutputFile file(part, Caching::kPages, OutputFile::Existing::kEmpty, path);
     const std::string text = manifest.toJson();
     file.append(std::as_bytes(std::span(text)));
     file.close();

@@ -76,7 +76,8 @@ StepWriter::StepWriter(const CacheLock& lock, const CacheReader& cache, NewStep 
       fs::path part = path;
       part += ".part";
       SystemCalls::current().remove(part.c_str());  // a killed program's; which may be a link
-      files_.push_back({path, part, OutputFile(part), {}, false});
+      files_.push_back(
+          {path, part, OutputFile(part, Caching::kPages, OutputFile::Existing::kEmpty, path), {}, false});
       beginVariableFile(files_.back().file);
       files_.back().table.resize(cache.bricks().size());
     }

@@ -34,7 +34,8 @@ VariableWriter::VariableWriter(const CacheLock& lock, Manifest manifest, std::ve
       const fs::path path = lock.cache() / variableFileName(variable);
       fs::path part = path;
       part += kPartSuffix;
-      files_.push_back({std::move(variable), path, part, OutputFile(part), {}, false});
+      OutputFile file(part, Caching::kPages, OutputFile::Existing::kEmpty, path);
+      files_.push_back({std::move(variable), path, part, std::move(file), {}, false});
       beginVariableFile(files_.back().file);
       files_.back().table.resize(manifest_.bricks);
     }

@@ -5,7 +5,9 @@
 #include <csignal>
 #include <fstream>
 
+#include "stream/base/file.h"
 #include "tests/end_to_end/kept_caches_fixture.h"
+#include "tests/support/vts_writer.h"
 
 namespace curvisplat {
 namespace {
@@ -105,16 +107,27 @@ TEST_F(KeptCaches, OfAGridThatIsStoppedNothingStays) {
         << entry.path();
 }
 
+void writeSet(const std::string& set, const std::string& file, int times) {
+  std::ofstream out(set);
+  out << R"(<VTKFile type="vtkMultiBlockDataSet" version="1.0"><vtkMultiBlockDataSet>)";
+  for (int n = 0; n < times; ++n) out << fmt::format("<DataSet index=\"{}\" file=\"{}\"/>", n, file);
+  out << "</vtkMultiBlockDataSet></VTKFile>";
+}
+
+// It ends: each block was compared with every other one, which took more than a minute.
+TEST_F(KeptCaches, InfoOfASetThatNamesOneFileThousandsOfTimesEnds) {
+  writeFileAtomically("one.vts", vtsFile(annulusVtsGrid(2, 2, 2), {}));
+  writeSet("many.vtm", "one.vts", 5000);
+  const ProgramResult result = runProgram({"info", "many.vtm"});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("nodes     40000 in 5000 blocks"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("cells     5000; 0 degenerate"), std::string::npos) << result.out;
+}
+
 TEST_F(KeptCaches, SetsThatNameFilesThousandsOfTimesAreSearchedOnce) {
-  const auto naming = [](const std::string& set, const std::string& file, int times) {
-    std::ofstream out(set);
-    out << R"(<VTKFile type="vtkMultiBlockDataSet" version="1.0"><vtkMultiBlockDataSet>)";
-    for (int n = 0; n < times; ++n) out << fmt::format("<DataSet index=\"{}\" file=\"{}\"/>", n, file);
-    out << "</vtkMultiBlockDataSet></VTKFile>";
-  };
-  naming("outer.vtm", "middle.vtm", 3000);
-  naming("middle.vtm", "inner.vtm", 3000);
-  naming("inner.vtm", "none.vts", 3000);
+  writeSet("outer.vtm", "middle.vtm", 3000);
+  writeSet("middle.vtm", "inner.vtm", 3000);
+  writeSet("inner.vtm", "none.vts", 3000);
   const ProgramResult result = runProgram({"render", "outer.vtm", "-o", "grid.png", "--size", "20x20"});
   EXPECT_EQ(result.status, 1);  // 27 thousand million files
   EXPECT_EQ(lineCount(result.err), 1) << result.err;

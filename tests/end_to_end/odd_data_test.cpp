@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -89,7 +90,7 @@ TEST_F(OddDataTest, ASingleRemainingNodeHasNoVolumeWhichIsReported) {
     values.blank = node.i + node.j + node.k > 0;
   });
   EXPECT_TRUE(said("7 samples are blanked by the grid")) << said_;
-  expectEmpty({}, "the data has no volume");
+  expectEmpty({}, "are flat and have no volume");
   EXPECT_TRUE(said("7 of 8")) << said_;
 }
 
@@ -98,7 +99,34 @@ TEST_F(OddDataTest, NodesInOnePointHaveNoVolumeWhichIsReported) {
     values.position = {1, 2, 3};
     along(node, values);
   });
-  expectEmpty({}, "the data has no volume");
+  expectEmpty({}, "are flat and have no volume");
+}
+
+// What `convert` says of flat samples is what `render` says of a picture of nothing else, and what is seen of some of them
+// beside others. From the front the flat ones would cover the right half.
+TEST_F(OddDataTest, FlatSamplesAreInvisibleAndBothCommandsSaySo) {
+  for (const bool all : {true, false}) {
+    SCOPED_TRACE(all);
+    std::filesystem::remove_all(file("cube.splats"));
+    expectConverted(16, [&](const GridNode& node, NodeValues& values) {
+      along(node, values);
+      if (all || node.i >= 8) values.position.z = 3;
+    });
+    EXPECT_TRUE(
+        said("samples are flat: they have no volume, or nearly none, and are as faint in volume "
+             "rendering"))
+        << said_;
+    EXPECT_FALSE(said("drawn with")) << said_;
+    const std::vector<std::string> front{"--view", "+z", "--range", "0,15"};
+    if (all) {
+      expectEmpty(front, "are flat and have no volume, so they are invisible in volume rendering");
+      continue;
+    }
+    const Image image = render(front);
+    EXPECT_FALSE(said("empty")) << said_;
+    EXPECT_LT(image.pixel(20, 32)[0], 0.9f);
+    EXPECT_EQ(image.pixel(44, 32)[0], 1);
+  }
 }
 
 TEST_F(OddDataTest, AGridWithoutNodesIsNotConverted) {
@@ -179,7 +207,8 @@ TEST_F(OddDataTest, NonFiniteSamplesAreCountedSkippedAndReported) {
   writeCube(folder_ / "cube", 8, node);
   const ProgramResult result = runProgram(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("note: 208 samples are not finite in single precision and are blanked"),
+  EXPECT_NE(result.err.find("note: 208 samples are not finite in single precision (NaN, infinite, or a value "
+                            "beyond 3.4e+38 in magnitude) and are blanked"),
             std::string::npos)
       << result.err;
   const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
@@ -194,6 +223,58 @@ TEST_F(OddDataTest, NonFiniteSamplesAreCountedSkippedAndReported) {
   const Image image = render();
   EXPECT_TRUE(isFinite(image));
   EXPECT_FALSE(isWhite(image));
+}
+
+/// A VTK file of 4 x 4 x 4 nodes, a hexahedron between each eight if it is a mesh, with a scalar of doubles.
+std::string vtkOfDoubles(bool mesh, bool in_cells, const std::function<double(int)>& value) {
+  constexpr int kSide = 4;
+  std::string points, cells;
+  int count = 0;
+  for (int k = 0; k < kSide; ++k)
+    for (int j = 0; j < kSide; ++j)
+      for (int i = 0; i < kSide; ++i) {
+        points += fmt::format("{} {} {}\n", i, j, k);
+        if (i + 1 == kSide || j + 1 == kSide || k + 1 == kSide) continue;
+        const int at = i + kSide * (j + kSide * k);
+        cells += fmt::format("8 {} {} {} {} {} {} {} {}\n", at, at + 1, at + 5, at + 4, at + 16, at + 17,
+                             at + 21, at + 20);
+        ++count;
+      }
+  std::string text = "# vtk DataFile Version 3.0\ndoubles\nASCII\n";
+  text += mesh ? "DATASET UNSTRUCTURED_GRID\n" : "DATASET STRUCTURED_GRID\nDIMENSIONS 4 4 4\n";
+  text += "POINTS 64 double\n" + points;
+  if (mesh) {
+    text += fmt::format("CELLS {} {}\n{}CELL_TYPES {}\n", count, 9 * count, cells, count);
+    for (int n = 0; n < count; ++n) text += "12\n";
+  }
+  const int values = in_cells ? count : 64;
+  text += fmt::format("{} {}\nSCALARS p double 1\nLOOKUP_TABLE default\n",
+                      in_cells ? "CELL_DATA" : "POINT_DATA", values);
+  for (int n = 0; n < values; ++n) text += fmt::format("{}\n", value(n));
+  return text;
+}
+
+// A double is finite, and infinite as the float that splats store.
+TEST_F(OddDataTest, ValuesBeyondSinglePrecisionAreCountedAndTheLimitIsNamed) {
+  const std::string named =
+      "not finite in single precision (NaN, infinite, or a value beyond 3.4e+38 in magnitude)";
+  for (const bool mesh : {false, true})
+    for (const bool in_cells : {false, true}) {
+      SCOPED_TRACE(fmt::format("mesh {}, in cells {}", mesh, in_cells));
+      writeFileAtomically(folder_ / "huge.vtk", vtkOfDoubles(mesh, in_cells, [](int n) {
+                            return n == 5 ? 1e300 : n == 6 ? -1e39 : n == 7 ? 3.4e38 : n;
+                          }));
+      const ProgramResult info = runProgram({"info", file("huge.vtk")});
+      EXPECT_EQ(info.status, 0) << info.err;
+      const std::string counted = mesh ? "2 of its values are " : in_cells ? "2 with values " : "grid, 2 ";
+      EXPECT_NE(info.out.find(counted + named), std::string::npos) << info.out;
+      EXPECT_NE(info.out.find("0 .. 3.4e+38"), std::string::npos) << info.out;
+      const ProgramResult converted = runProgram(
+          {"convert", file("huge.vtk"), "-o", file("huge.splats"), "--overwrite", "--blank", "3.4e38"});
+      EXPECT_EQ(converted.status, 0) << converted.err;
+      EXPECT_NE(converted.err.find("note: 2 samples are " + named + " and are blanked"), std::string::npos)
+          << converted.err;
+    }
 }
 
 TEST_F(OddDataTest, ValuesTooFarApartAreRefusedUnlessTheyAreBlank) {

@@ -16,6 +16,7 @@
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
 #include "tests/support/cube_files.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -176,8 +177,9 @@ TEST_F(OddFiles, AFileSizeLimitIsAnErrorLikeAFullDisk) {
     const ProgramResult result = limited(command);
     EXPECT_EQ(result.status, 1) << command;
     EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find("File too large"), std::string::npos) << result.err;
-    EXPECT_EQ(result.err.find(".curvisplat"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("File too large; raise the limit of file sizes (ulimit -f)"), std::string::npos)
+        << result.err;
+    EXPECT_FALSE(faults::namesTemporaryFile(result.err)) << result.err;
     EXPECT_EQ(names(), before) << command;
   }
 }
@@ -254,6 +256,31 @@ TEST_F(OddFiles, ASmallDiskIsRefusedWithBothSizesOrTried) {
       << tried.err;
 }
 
+// The cache takes 1.0 MiB; 16 bytes a node, the most that caches take, would be 3.3.
+TEST_F(OddFiles, ADiskForTheCacheAloneIsRefusedOnlyIfTheCacheDoesNotFit) {
+  ASSERT_EQ(shell("generate o-grid --size 60x60x60 -o more").status, 0);
+  ASSERT_EQ(shell("convert more.xyz more.fun -o real.splats").status, 0);
+  uint64_t cache_bytes = 0;
+  for (const auto& entry : fs::directory_iterator(folder_ / "real.splats")) cache_bytes += entry.file_size();
+  fs::create_directory(folder_ / "disk");
+  const auto converted = [&](uint64_t bytes) {
+    const std::string command =
+        "cd '" + folder_.path().string() + "' && mount -t tmpfs -o size=" + std::to_string(bytes) +
+        " none disk && exec " CURVISPLAT_PROGRAM " convert more.xyz more.fun -o disk/a.splats --tmp .";
+    return RunningProgram({"unshare", "--mount", "sh", "-c", command}, "/usr/bin/env").wait();
+  };
+  const ProgramResult refused = converted(cache_bytes / 3 * 2);
+  if (refused.err.find("curvisplat: ") != 0) GTEST_SKIP() << "no file system can be mounted here";
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
+  EXPECT_NE(refused.err.find("disk: the cache's files need about "), std::string::npos) << refused.err;
+  EXPECT_LT(3 * cache_bytes / 2, uint64_t{60 * 60 * 60} * 16);
+  const ProgramResult fits = converted(3 * cache_bytes / 2);
+  EXPECT_EQ(fits.status, 0) << fits.err;
+  for (const auto& entry : fs::directory_iterator(folder_.path()))
+    EXPECT_EQ(entry.path().filename().string().find(".tmp."), std::string::npos) << entry.path();
+}
+
 TEST_F(OddFiles, NamesThatAreTooLongAreRefusedBeforeTheWork) {
   const std::string longest(251, 'x');  // with its ending
   for (const std::string& name :
@@ -267,6 +294,50 @@ TEST_F(OddFiles, NamesThatAreTooLongAreRefusedBeforeTheWork) {
   }
   expectRefused({"convert", file("cube.xyz"), file("cube.fun"), "-o", file(longest + "xxxxxxxx")},
                 "the name is too long");
+}
+
+std::string nameOf(size_t bytes) {
+  return std::string(bytes, 'x');
+}
+
+// Folders and files have longer names while they are written. What has no name then is refused before anything is read; every
+// shorter name works, also for what is added later.
+TEST_F(OddFiles, NamesThatAreTooLongWhileTheFilesAreWrittenAreRefusedBeforeTheWork) {
+  const auto entries = [&] { return std::distance(fs::directory_iterator(folder_.path()), {}); };
+  ASSERT_EQ(shell("generate wake --size 12x10x8 --steps 3 -o w").status, 0);
+  std::ofstream(file("damaged.xyz")) << "read only if the name is accepted";
+  const auto before = entries();
+  const std::string frames = file("w_*.fun");
+  for (size_t bytes = 248; bytes <= 255; ++bytes) {
+    SCOPED_TRACE(bytes);
+    const std::string too_long =
+        "the name is too long; choose one that is " + std::to_string(bytes - 247) + " bytes shorter";
+    const std::string output = file(nameOf(bytes));
+    expectRefused({"convert", file("damaged.xyz"), "-o", output}, too_long);
+    expectRefused({"convert", file("damaged.xyz"), frames, "-o", output}, too_long);
+    expectRefused({"convert", "--join", file("nowhere"), "-o", output}, too_long);
+    // .xyz.part is one byte longer than .partial, and _0002.xyz.part is six.
+    expectRefused({"generate", "wake", "--size", "8x8x8", "-o", output}, "the name is too long");
+    expectRefused({"generate", "wake", "--size", "8x8x8", "--steps", "3", "-o", file(nameOf(bytes - 6))},
+                  "the name is too long");
+    EXPECT_EQ(entries(), before);
+    // The temporary file of a picture has a short name.
+    const std::string picture = file(nameOf(bytes - 4) + ".png");
+    EXPECT_EQ(runProgram({"render", cache(), "-o", picture, "--size", "16x16"}).status, 0);
+    fs::remove(picture);
+  }
+  for (const size_t bytes : {240u, 247u}) {
+    SCOPED_TRACE(bytes);
+    const std::string output = file(nameOf(bytes));
+    const ProgramResult one = runProgram({"convert", file("w.xyz"), file("w_0000.fun"), "-o", output});
+    EXPECT_EQ(one.status, 0) << one.err;
+    const ProgramResult added = runProgram({"convert", file("w.xyz"), "--add-scalar", "i", "--to", output});
+    EXPECT_EQ(added.status, 0) << added.err;
+    const ProgramResult series = runProgram({"convert", file("w.xyz"), frames, "-o", output, "--overwrite"});
+    EXPECT_EQ(series.status, 0) << series.err;
+    fs::remove_all(output);
+  }
+  EXPECT_EQ(runProgram({"generate", "wake", "--size", "8x8x8", "-o", file(nameOf(246))}).status, 0);
 }
 
 TEST_F(OddFiles, ACacheIsReplacedThroughALink) {

@@ -15,14 +15,17 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
 
 # CLOCK_REALTIME as of a machine whose clock is set back by a day again and again.
-CLOCK = """
+CLOCK = r"""
 #define _GNU_SOURCE
 #include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <sys/syscall.h>
 #include <sys/time.h>
 #include <time.h>
@@ -47,11 +50,19 @@ int gettimeofday(struct timeval* to, void* zone) {
   to->tv_usec = now.tv_nsec / 1000;
   return 0;
 }
+
+__attribute__((destructor)) static void report(void) {
+  const char* name = getenv("CLOCK_REPORT");
+  FILE* to = name ? fopen(name, "a") : NULL;
+  if (!to) return;
+  fprintf(to, "%ld\n", (long)calls);
+  fclose(to);
+}
 """
 
 # The calls of a network file system, as libraries see them: reads and writes of half of what is asked for, no O_DIRECT, no
 # O_TMPFILE, no fallocate, no io_uring, with NO_FLOCK no flock; stat() by name answers from a cache of attributes until the file is opened.
-# With ESTALE_AT=n the n-th read or write of a regular file below ESTALE_FOLDER, and all that follow of that descriptor, fail.
+# The file SEEN_MARK is made when the size of SEEN_FILE is remembered. With ESTALE_AT=n the n-th read or write of a regular file below ESTALE_FOLDER, and all that follow of that descriptor, fail.
 NETWORK = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -124,6 +135,8 @@ static int answer(const char* path, struct stat* to, int (*ask)(const char*, str
   if (result == 0 && S_ISREG(to->st_mode) && strlen(path) < sizeof cached[0].path && places < 256) {
     strcpy(cached[places].path, path);
     cached[places++].status = *to;
+    const char* file = getenv("SEEN_FILE");
+    if (file && strcmp(path, file) == 0) close(NEXT(open)(getenv("SEEN_MARK"), O_CREAT | O_WRONLY, 0600));
   }
   pthread_mutex_unlock(&mutex);
   errno = error;
@@ -359,9 +372,12 @@ class OddHosts(unittest.TestCase):
         source, library = self.folder / "clock.c", self.folder / "clock.so"
         source.write_text(CLOCK)
         subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, source], check=True)
-        folder = self.folder / "clock"
+        folder, report = self.folder / "clock", self.folder / "clock.txt"
         folder.mkdir()
-        self.expect_same(folder, {"LD_PRELOAD": str(library)})
+        self.expect_same(folder, {"LD_PRELOAD": str(library), "CLOCK_REPORT": str(report)})
+        calls = sum(map(int, report.read_text().split()))
+        print(f"clock: {calls} calls got an earlier time")
+        self.assertGreater(calls, 0, "the library is not in use")
 
     def test_inodes_beyond_32_bits(self):
         compiler = shutil.which("cc") or shutil.which("gcc")
@@ -410,10 +426,45 @@ class OddHosts(unittest.TestCase):
         folder, report = self.folder / "network", self.folder / "network.txt"
         folder.mkdir()
         self.expect_same(folder, {**environment, "NETWORK_REPORT": str(report)})
-        cut, refused, _ = (sum(int(line.split()[n]) for line in report.read_text().splitlines()) for n in range(3))
+        cut, refused, _ = self.counted(report)
         print(f"network: {cut} short transfers, {refused} opens refused")
         self.assertGreater(cut, 100)
         self.assertGreater(refused, 0)
+
+    @staticmethod
+    def counted(report):
+        """Short transfers, refused opens, and sizes by name that were late, of all processes."""
+        return [sum(int(line.split()[n]) for line in report.read_text().splitlines()) for n in range(3)]
+
+    def test_sizes_that_are_late(self):
+        """Of a file that a simulation goes on writing after `convert --follow` has looked at it by name. No other command
+        looks at a file by name that grows and stays closed."""
+        folder, report, seen = self.folder / "late", self.folder / "late.txt", self.folder / "late.seen"
+        folder.mkdir()
+        run = lambda *words: subprocess.run([PROGRAM, *words], cwd=folder, capture_output=True, check=True)
+        run("generate", "wake", "--size", "12x10x8", "--steps", "2", "-o", "w")
+        files = [str(folder / name) for name in ("w.xyz", "w_*.fun")]
+        run("convert", *files, "-o", "whole.splats")
+        growing = folder / "w_0001.fun"
+        content = growing.read_bytes()
+        for path in folder.glob("w*.*"):
+            if path.is_file():
+                os.utime(path, (1e9, 1e9))
+        growing.write_bytes(content[:len(content) // 2])
+        environment = {**os.environ, **self.network(), "NETWORK_REPORT": str(report), "SEEN_FILE": str(growing), "SEEN_MARK": str(seen)}
+        with subprocess.Popen([PROGRAM, "convert", *files, "-o", "followed.splats", "--follow", "--until", "2"], cwd=folder,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment) as following:
+            while not seen.exists() and following.poll() is None:
+                time.sleep(0.01)
+            with open(growing, "ab") as file:
+                file.write(content[len(content) // 2:])
+            said = following.communicate(timeout=60)[0]
+        self.assertEqual(following.returncode, 0, said)
+        late = self.counted(report)[2]
+        print(f"network: {late} late sizes")
+        self.assertGreater(late, 0)
+        caches = [{path.name: path.read_bytes() for path in (folder / name).iterdir()} for name in ("whole.splats", "followed.splats")]
+        self.assertEqual(*caches)
 
     def test_without_flock_a_conversion_is_refused_and_leaves_nothing(self):
         folder = self.folder / "unlocked"

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <random>
 
+#include "stream/base/disk_full.h"
 #include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
+#include "tests/support/fault_sweep.h"
 
 namespace curvisplat {
 namespace {
@@ -121,7 +123,14 @@ TEST(AsciiSpool, AFullDiskIsAnErrorAndLeavesNothing) {
   const auto path = folder.write("text", std::string("400000*1.5"));
   FullDisk disk(1'000'000);
   const ScopedSystemCalls scope(disk);
-  EXPECT_THROW(spoolAscii(InputFile(path), folder.path()), Error);
+  try {
+    spoolAscii(InputFile(path), folder.path());
+    ADD_FAILURE() << "it had room";
+  } catch (const DiskFull& full) {
+    const std::string message = full.what();
+    EXPECT_TRUE(message.starts_with(folder.path().string() + ": no room for ")) << message;
+    EXPECT_FALSE(faults::namesTemporaryFile(message)) << message;
+  }
   EXPECT_EQ(files(folder), 1u);
 }
 

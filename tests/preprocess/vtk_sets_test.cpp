@@ -8,9 +8,14 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/vtk/vtk_extent.h"
 #include "preprocess/grid/time_steps.h"
+#include "preprocess/survey/block_overlap.h"
+#include "preprocess/survey/grid_statistics.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/progress.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/all_nodes.h"
+#include "tests/support/faulty_system_calls.h"
 #include "tests/support/vts_writer.h"
 
 namespace curvisplat {
@@ -220,6 +225,30 @@ TEST(VtkSets, FilesThatNameOthersOverAndOverAreRefused) {
   }
   folder.write("10.vtm", setOf("vtkMultiBlockDataSet", ""));
   EXPECT_NE(errorOf(folder.path() / "0.vtm").find("refers to more than 100000 files"), std::string::npos);
+}
+
+/// What `info` reads of a set that names one file `times` times: opened files, and reads.
+std::pair<int64_t, int64_t> readForInfo(const TestFolder& folder, int times) {
+  std::string members;
+  for (int n = 0; n < times; ++n) members += "<DataSet file='one.vts'/>";
+  const auto path = folder.write("set.vtm", setOf("vtkMultiBlockDataSet", members));
+  faults::FaultySystemCalls counting;
+  const ScopedSystemCalls scope(counting);
+  const auto source = open(path);
+  Progress progress;
+  EXPECT_EQ(measureGrid(*source, {0}, 32 << 20, progress).cells(), static_cast<uint64_t>(times));
+  EXPECT_FALSE(findOverlaps(*source, {32 << 20, 128 << 20}, progress).empty());
+  return {counting.calls - counting.reads, counting.reads};
+}
+
+TEST(VtkSets, OfOneFileThousandsOfTimesAreMeasuredInReadsThatGrowAsTheSet) {
+  const TestFolder folder("vtm-one");
+  folder.write("one.vts", vtsFile(annulusVtsGrid(2, 2, 2), {}));
+  const auto [few_others, few_reads] = readForInfo(folder, 500);
+  const auto [others, reads] = readForInfo(folder, 5000);
+  EXPECT_LE(few_reads, 20 * 500);
+  EXPECT_LE(reads, 11 * few_reads);
+  EXPECT_LE(others, few_others + 10);  // the file is opened once, not once a block
 }
 
 // More pieces than files can be open at once.

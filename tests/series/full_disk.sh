@@ -31,6 +31,8 @@ for preflight in '' --no-preflight; do
   cat "$folder/err"
   [ $status = 1 ] || fail "status $status"
   [ "$(wc -l < "$folder/err")" = 1 ] || fail "more than one line"
+  grep -q "$folder/disk[^ ]*: .*make room" "$folder/err" || fail "the folder of the cache, or what helps, is not named"
+  ! grep -qE '\.part\b|\.partial|\.tmp|\.add-' "$folder/err" || fail "a temporary file is named"
   steps=$(grep -c '^step' "$folder/out")
   [ "$steps" -ge 2 ] && [ "$steps" -lt 12 ] || fail "$steps steps"
   grep -q "step $steps .*$(printf 'w_%04d.fun' "$steps")" "$folder/err" || fail "the step is not named"

@@ -20,6 +20,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "tests/series/step_series.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
@@ -195,6 +196,41 @@ TEST(SharedSeries, CanBeInterruptedInAnyRound) {
     EXPECT_TRUE(allFilesOf(cache) == wanted);
     fs::remove_all(cache);
   }
+}
+
+/// What `work` throws on a disk that is full from each `stride`-th write on; until it is not full any more.
+void expectGivenFoldersOnFullDisks(const fs::path& given, int64_t stride, const std::function<void()>& work) {
+  int64_t failures = 0;
+  for (int64_t at = 0;; at += stride) {
+    SCOPED_TRACE(at);
+    ASSERT_LT(at, 100'000);
+    faults::FaultySystemCalls full;
+    full.is_unsynced = true;
+    full.fail_write_at = at;
+    try {
+      const ScopedSystemCalls faulty(full);
+      work();
+    } catch (const Error& error) {
+      // A rank may also find the common folder removed before it hears that another one has failed.
+      const std::string message = error.what();
+      if (message.find("No space left on device") == std::string::npos) continue;
+      ++failures;
+      EXPECT_FALSE(faults::namesTemporaryFile(message)) << message;
+      EXPECT_NE(message.find(given.string()), std::string::npos) << message;
+      EXPECT_NE(message.find(": no room for "), std::string::npos) << message;
+      continue;
+    }
+    break;
+  }
+  EXPECT_GE(failures, 3);
+}
+
+TEST(SharedSeries, NamesTheFolderOfTheOutputIfTheDiskIsFull) {
+  const TemporaryFolder folder;
+  SeriesOptions options = optionsFor(folder / "a.splats");
+  options.convert.overwrite = true;
+  for (const unsigned ranks : {1u, 3u})
+    expectGivenFoldersOnFullDisks(folder.path(), 29, [&] { convertBy(ranks, inputOf(kMoving), options); });
 }
 
 TEST(SharedSeries, RemovesOnlyItsOwnTemporaryFiles) {
@@ -379,6 +415,16 @@ TEST(SeriesParts, AreWholeInTheCacheWhicheverSyncFails) {
     }
     EXPECT_TRUE(not_synced);
   }
+}
+
+TEST(SeriesParts, NameTheFolderOfTheOutputIfTheDiskIsFull) {
+  const TemporaryFolder folder;
+  const fs::path output = folder / "a.splats";
+  for (const uint64_t index : {0u, 1u}) convertPart(output, kSteady, {index, 2});
+  expectGivenFoldersOnFullDisks(folder.path(), 1, [&] {
+    Progress progress;
+    joinParts({partsFolder(output), output, true}, progress);
+  });
 }
 
 TEST(SeriesParts, CopiesOfFilesCanBeInterrupted) {

@@ -83,7 +83,7 @@ TEST_F(FileTest, DirectTransfersThatAreCutShortGoOnThroughThePageCache) {
   }
 }
 
-TEST_F(FileTest, FailuresNameThePathTheOffsetAndTheReason) {
+TEST_F(FileTest, FailuresNameThePathThePlaceAndTheReason) {
   const std::vector<std::byte> bytes = someBytes(100);
   FaultySystemCalls faulty;
   faulty.largest_transfer = 40;
@@ -92,11 +92,13 @@ TEST_F(FileTest, FailuresNameThePathTheOffsetAndTheReason) {
   OutputFile out(folder / "full");
   const std::string full = messageOf([&] { out.append(std::span(bytes)); });
   EXPECT_NE(full.find((folder / "full").string()), std::string::npos) << full;
-  EXPECT_NE(full.find("offset 80"), std::string::npos) << full;
+  EXPECT_NE(full.find("no room for 20 more bytes"), std::string::npos) << full;
   EXPECT_NE(full.find("No space left"), std::string::npos) << full;
 
   faulty.fail_sync_at = 0;
   faulty.error = EIO;
+  const std::string broken = messageOf([&] { out.append(std::span(bytes)); });
+  EXPECT_NE(broken.find("offset 0: Input/output error"), std::string::npos) << broken;
   EXPECT_NE(messageOf([&] { out.close(); }).find("Input/output error"), std::string::npos);
 }
 

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
+#include <regex>
 
 #include "stream/base/error.h"
 #include "tests/support/sweep.h"
@@ -18,6 +20,12 @@ bool tellsWhy(const std::string& line, const Fault& fault) {
 }
 
 }  // namespace
+
+bool namesTemporaryFile(const std::string& message) {
+  static const std::regex temporary(
+      R"(\.(part|partial|tmp|unpacked)\b|\.add-[0-9a-f]{16}|\.rank\d|dry-run\.)");
+  return std::regex_search(message, temporary);
+}
 
 int64_t FaultSweep::run(const Fault& fault) const {
   int64_t tried = 0;
@@ -39,6 +47,7 @@ int64_t FaultSweep::run(const Fault& fault) const {
       EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 0) << outcome.error;
       EXPECT_NE(outcome.error.find(in_message), std::string::npos) << outcome.error;
       EXPECT_TRUE(tellsWhy(outcome.error, fault)) << outcome.error;
+      EXPECT_FALSE(fault.error == ENOSPC && namesTemporaryFile(outcome.error)) << outcome.error;
     }
     EXPECT_EQ(openDescriptors(), descriptors) << outcome.error;
     outcome.has_refused_removal = faulty.has_refused_removal;

@@ -25,6 +25,10 @@ inline constexpr Fault kIsCutOff{"cut to half", &FaultySystemCalls::cut_at, 0};
 inline constexpr Fault kFaults[] = {kFailsOnce,   kFailsFromThenOn, kIsFull,
                                     kFailsToSync, kFailsToRename,   kIsCutOff};
 
+/// Whether a message names a file or folder that only exists while the program works, such as "a.splats.partial",
+/// "a.splats.tmp.17.0" and "curvisplat.0123abcd.tmp".
+bool namesTemporaryFile(const std::string& message);
+
 /// What came of a job.
 struct FaultOutcome {
   std::string error;                 // what it threw; empty: it says that it has done its work
@@ -41,7 +45,8 @@ struct FaultSweep {
 
   /// Calls prepare(), job() with the fault at the n-th call, and check(outcome), for n from 0 on as
   /// nextInSweep() says, until the fault is not reached any more. Expects that a failing job throws an Error of one line that
-  /// names a path and the reason, and that no descriptor is lost. Returns how many faults were tried.
+  /// names a path and the reason, and no temporary file where the disk is full, and that no descriptor is lost. Returns how
+  /// many faults were tried.
   int64_t run(const Fault& fault) const;
 };
 

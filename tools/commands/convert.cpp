@@ -9,10 +9,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
@@ -20,6 +22,7 @@
 #include "stream/base/paths.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/partial_folder.h"
 #include "stream/cache/stored_precision.h"
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
@@ -61,16 +64,17 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
   for (const std::string& warning : report.warnings) printMessage("warning: {}", warning);
   for (const std::string& note : report.notes) printMessage("note: {}", note);
   if (const auto note = timeStepNote(description, time_step)) printMessage("note: {}", *note);
-  const auto note = [](uint64_t count, const char* what) {
+  const auto note = [](uint64_t count, std::string_view what) {
     if (count > 0) printMessage("note: {} {}", count, what);
   };
   if (report.resumed)
     printMessage("note: resumed; {} of {} bricks were already written", report.resumed_bricks, report.bricks);
   note(report.blanked.by_grid, "samples are blanked by the grid");
   note(report.blanked.by_value, "samples have the blank value");
-  note(report.blanked.not_finite, "samples are not finite in single precision and are blanked");
+  note(report.blanked.not_finite, fmt::format("samples are {} and are blanked", kNotFinite));
   // For samples at nodes these two differ from what `info` prints: it counts the cells between nodes.
-  note(report.degenerate, "samples have no volume; they are drawn with a minimum thickness");
+  note(report.degenerate,
+       "samples are flat: they have no volume, or nearly none, and are as faint in volume rendering");
   note(report.inverted, "samples are inverted: their handedness differs from most of their block");
   note(report.merged_nodes, "nodes on block faces coincide with others and were merged");
 }
@@ -97,11 +101,11 @@ void runConvert(ConvertArguments arguments) {
   Ranks& ranks = launchedRanks();
   if (arguments.output.empty()) throw UsageError("--output is required, or --add-scalar with --to");
   if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
-  checkOutputFolder("-o", arguments.output);
-  ConvertOptions options;
   // A link stays, as it does where pictures are written through one.
+  ConvertOptions options;
   options.output = linkTarget(arguments.output);
-  if (options.output != arguments.output) checkOutputFolder("-o", options.output);
+  if (options.output != arguments.output) checkOutputFolder("-o", arguments.output);
+  checkOutputFolder("-o", options.output, kPartialSuffix);
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
   options.ranks = &ranks;
@@ -238,7 +242,9 @@ void addConvert(CLI::App& app) {
   command->add_option(
       "--memory", arguments->memory,
       "Memory limit of this process, such as 512M (default: 2G, at most 1/4 of the machine's)");
-  command->add_option("--threads", arguments->threads, "Number of threads (default 0: one per core)")
+  command
+      ->add_option("--threads", arguments->threads,
+                   "Number of threads that compute at a time (default 0: one per core)")
       ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");

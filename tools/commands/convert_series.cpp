@@ -10,12 +10,14 @@
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/addition/join_series.h"
+#include "preprocess/addition/shared_series.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/partial_folder.h"
 #include "tools/commands/dry_run.h"
 #include "tools/commands/folder_events.h"
 #include "tools/commands/written_files.h"
@@ -66,6 +68,12 @@ void checkArguments(const ConvertArguments& arguments) {
   refuse(!arguments.scalars.empty(), "--scalar");
   refuse(!arguments.added_scalars.empty(), "--add-scalar");
   refuse(arguments.overwrite, "--overwrite");
+}
+
+/// For a new cache. A link stays: the folders for unfinished files are beside its target.
+void checkCacheFolder(const std::filesystem::path& output) {
+  checkOutputFolder("-o", output);
+  checkOutputFolder("-o", linkTarget(output), launchedRanks().alone() ? kPartialSuffix : kRanksSuffix);
 }
 
 std::string titleOf(const OpenGridOptions& files) {
@@ -218,7 +226,7 @@ void runJoinSeries(ConvertArguments arguments) {
     throw UsageError("--join: one process joins the parts; start curvisplat without mpirun");
   if (arguments.output.empty()) throw UsageError("--output is required");
   if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
-  checkOutputFolder("-o", arguments.output);
+  checkCacheFolder(arguments.output);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const JoinReport report =
@@ -239,7 +247,7 @@ void runConvertSeries(ConvertArguments arguments) {
   if (!arguments.adds_steps && arguments.output.empty()) throw UsageError("--output is required");
   for (auto* path : {&arguments.output, &arguments.to})
     if (!path->empty() && !path->has_filename()) *path = path->parent_path();  // "NAME.splats/"
-  if (!arguments.adds_steps) checkOutputFolder("-o", arguments.output);
+  if (!arguments.adds_steps) checkCacheFolder(arguments.output);
   if (arguments.follows) {
     if (arguments.steps || arguments.every)
       throw UsageError("--follow takes all steps; leave out --steps and --every");

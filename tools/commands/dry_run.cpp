@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -11,14 +10,13 @@
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
+#include "preprocess/convert/sampled_conversion.h"
 #include "preprocess/convert/scratch_folder.h"
-#include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/sample_source.h"
 #include "stream/base/byte_text.h"
 #include "stream/base/count_text.h"
 #include "stream/base/free_space.h"
 #include "stream/base/process_usage.h"
-#include "stream/cache/faces_file.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/required_threads.h"
@@ -42,43 +40,9 @@ uint64_t nodesOf(const GridDescription& description) {
   return nodes;
 }
 
-uint64_t times(uint64_t count, double factor) {
-  return static_cast<uint64_t>(std::llround(static_cast<double>(count) * factor));
-}
-
-/// How much larger the whole is than its sample.
-struct Scale {
-  double volume = 1, faces = 1;
-
-  uint64_t bytesOf(const std::vector<FileReport>& files) const {
-    uint64_t bytes = 0;
-    for (const FileReport& file : files) bytes += times(file.bytes, isFacesFile(file.name) ? faces : volume);
-    return bytes;
-  }
-};
-
-Scale scaleOf(const GridDescription& whole, const GridDescription& sample, const ConvertOptions& options) {
-  const auto of_faces = [&](const GridDescription& grid, std::span<const IndexPlane> planes) {
-    return static_cast<double>(temporaryBytesOfFaces(grid.blocks, planes, options.scalars.size()));
-  };
-  return {static_cast<double>(nodesOf(whole)) / static_cast<double>(nodesOf(sample)),
-          of_faces(whole, options.planes) / of_faces(sample, {})};
-}
-
 std::filesystem::path temporaryFolderOf(const ConvertOptions& options) {
   const std::filesystem::path output = std::filesystem::absolute(options.output);
   return options.temporary_folder.empty() ? output.parent_path() : options.temporary_folder;
-}
-
-/// The options for a sample, which is converted within `folder`.
-ConvertOptions ofSample(const ConvertOptions& options, const std::filesystem::path& folder) {
-  ConvertOptions of_sample = options;
-  of_sample.output = folder / "sample.splats";
-  of_sample.temporary_folder = folder;
-  of_sample.overwrite = of_sample.resume = false;
-  of_sample.planes.clear();  // the sample may not have them
-  of_sample.ranks = nullptr;
-  return of_sample;
 }
 
 std::string timeText(double seconds) {
@@ -129,7 +93,7 @@ void finish(const Forecast& forecast, const ConvertOptions& options, const Conve
 }
 
 /// What the conversion of one step takes, from `report` of its sample.
-Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, const Scale& scale,
+Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, const SampleScale& scale,
                     const ConvertOptions& options) {
   Forecast forecast;
   forecast.samples = nodesOf(whole);
@@ -188,8 +152,8 @@ void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
   const StopOnSignals stopping(progress);
   const ScratchFolder folder(ScratchFolder::newPath(temporaryFolderOf(options), "dry-run"),
                              ScratchFolder::Folder::kMake);
-  const ConvertReport report = convert(*sample, ofSample(options, folder.path()), progress);
-  const Scale scale = scaleOf(whole, sample->description(), options);
+  const ConvertReport report = convert(*sample, optionsOfSample(options, folder.path()), progress);
+  const SampleScale scale = SampleScale::of(whole, sample->description(), options);
   Forecast forecast = forecastOf(report, whole, scale, options);
   forecast.sampling_seconds = secondsOf(progress);
   forecast.seconds = scale.volume * forecast.sampling_seconds;
@@ -207,7 +171,7 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   const ScratchFolder folder(ScratchFolder::newPath(temporaryFolderOf(options.convert), "dry-run"),
                              ScratchFolder::Folder::kMake);
   SeriesOptions of_sample = options;
-  of_sample.convert = ofSample(options.convert, folder.path());
+  of_sample.convert = optionsOfSample(options.convert, folder.path());
   GridDescription whole, part;
   SeriesInput sample = input;
   sample.count = std::min<uint64_t>(2, input.count);
@@ -229,7 +193,7 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   uint64_t further_bytes = 0;
   convertSeries(sample, of_sample, progress, [&](const SeriesEvent& event) {
     if (!event.added && !event.converted) return;
-    const Scale scale = scaleOf(whole, part, with_scalars);
+    const SampleScale scale = SampleScale::of(whole, part, with_scalars);
     if (event.converted) {
       forecast = forecastOf(*event.converted, whole, scale, with_scalars);
       first_s = secondsOf(progress) * scale.volume;

@@ -9,9 +9,6 @@
 
 namespace curvisplat {
 
-/// How many nodes a sample has: they take some seconds on two cores. A smaller grid is converted whole.
-inline constexpr uint64_t kSampledNodes = 8'000'000;
-
 /// Prints bytes, memory and time that convert() of `source` with these options will take, and writes them to --stats. Of
 /// unstructured grids by experience, since they are not sampled. Throws what convert() would at its beginning, and
 /// Interrupted.

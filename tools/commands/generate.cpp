@@ -13,6 +13,7 @@
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
 #include "tools/commands/commands.h"
+#include "tools/output/output_paths.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
@@ -46,6 +47,16 @@ SceneGridSize parseSize(const std::string& text) {
   return size;
 }
 
+std::string stepPrefix(const std::string& prefix, uint64_t step) {
+  return fmt::format("{}_{:04}", prefix, step);
+}
+
+/// That is appended to the prefix while the files are written.
+std::string longestEnding(const GenerateOptions& options) {
+  const std::string ending = fmt::format(".xyz{}", kPlot3dPartSuffix);
+  return options.steps ? stepPrefix("", options.first_step + *options.steps - 1) + ending : ending;
+}
+
 /// The files of each time step: PREFIX_0000.fun, ... and, unless the grid moves, one PREFIX.xyz.
 void generateSteps(const GenerateOptions& options) {
   const SceneGridSize size = parseSize(options.size);
@@ -56,7 +67,7 @@ void generateSteps(const GenerateOptions& options) {
   for (uint64_t step = options.first_step; step < options.first_step + *options.steps; ++step) {
     const SceneTime time{static_cast<double>(step) / kStepsPerUnitOfTime, options.moving};
     const SceneGridSource source(makeScenesAt(options.scene, options.clustering, time), size);
-    const auto paths = writePlot3d(source, fmt::format("{}_{:04}", options.prefix, step), progress);
+    const auto paths = writePlot3d(source, stepPrefix(options.prefix, step), progress);
     if (!options.moving) {
       if (step == options.first_step)
         std::filesystem::rename(paths[0], options.prefix + ".xyz");
@@ -74,6 +85,7 @@ void generateSteps(const GenerateOptions& options) {
 void generate(const GenerateOptions& options) {
   makeScenes(options.scene, options.clustering);  // the scene's name first
   if (options.size.empty()) throw UsageError("--size NIxNJxNK is required, such as --size 128x64x64");
+  checkOutputFolder("-o", options.prefix, longestEnding(options));
   if (options.steps) return generateSteps(options);
   if (options.moving) throw UsageError("--moving needs --steps");
   if (options.first_step > 0) throw UsageError("--first-step needs --steps");

@@ -218,12 +218,15 @@ void printAsText(const GridInfo& info) {
   for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
   if (!info.overlaps.empty()) printLine("note: {}", overlapNote(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
-  printLine("nodes     {} in {}; {} blanked by the grid, {} not finite", info.nodes,
-            countText(description.blocks.size(), "block"), blank.by_grid, blank.not_finite);
+  printLine("nodes     {} in {}; {} blanked by the grid, {} {}", info.nodes,
+            countText(description.blocks.size(), "block"), blank.by_grid, blank.not_finite,
+            blank.not_finite > 0 ? kNotFinite : "not finite");
   if (const std::string rule = blankingRule(description); !rule.empty()) printLine("blanking  {}", rule);
   printBlocks(info);
-  printLine("cells     {}; {} degenerate, {} inverted", info.statistics.cells(), info.statistics.degenerate(),
-            info.statistics.inverted());
+  const uint64_t cell_values = info.statistics.cell_values_not_finite;
+  printLine("cells     {}; {} degenerate, {} inverted{}", info.statistics.cells(),
+            info.statistics.degenerate(), info.statistics.inverted(),
+            cell_values > 0 ? fmt::format(", {} with values {}", cell_values, kNotFinite) : "");
   for (size_t axis = 0; axis < 3; ++axis)
     printLine("{}         {}", "xyz"[axis],
               isEmpty(info.statistics.bounds[axis])

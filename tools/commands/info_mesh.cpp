@@ -12,6 +12,7 @@
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/mesh_survey.h"
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/grid/node_reader.h"
 #include "stream/base/count_text.h"
 #include "tools/commands/info_estimate.h"
 #include "tools/output/print_line.h"
@@ -29,16 +30,23 @@ struct MeshInfo {
   const GridDescription* description = nullptr;
   uint64_t points = 0, cells = 0;
   MeshSurvey survey;
-  std::vector<ScalarRange> ranges;  // [scalar]
+  std::vector<ScalarRange> ranges;   // [scalar]
+  std::vector<uint64_t> not_finite;  // [scalar], values
   InfoEstimate estimate;
 };
 
-void widen(ScalarRange& range, const std::vector<float>& values) {
+/// Returns how many of the values are not finite.
+uint64_t widen(ScalarRange& range, const std::vector<float>& values) {
+  uint64_t not_finite = 0;
   for (const float value : values) {
-    if (!std::isfinite(value)) continue;
+    if (!std::isfinite(value)) {
+      ++not_finite;
+      continue;
+    }
     range.min = std::min<double>(range.min, value);
     range.max = std::max<double>(range.max, value);
   }
+  return not_finite;
 }
 
 /// Ranges of the scalars of one centring.
@@ -60,7 +68,8 @@ void measure(const MeshSource& source, Centring centring, MeshInfo& info) {
       nodes ? source.readPoints(piece, first, count, scalars, points)
             : source.readCells(piece, first, count, scalars, cells);
       for (size_t n = 0; n < scalars.size(); ++n)
-        widen(info.ranges[scalars[n]], nodes ? points.scalars[n] : cells.scalars[n]);
+        info.not_finite[scalars[n]] +=
+            widen(info.ranges[scalars[n]], nodes ? points.scalars[n] : cells.scalars[n]);
     }
   }
 }
@@ -69,6 +78,7 @@ MeshInfo inspect(const MeshSource& source) {
   MeshInfo info;
   info.description = &source.description();
   info.ranges.resize(info.description->scalars.size());
+  info.not_finite.resize(info.description->scalars.size());
   const MeshReader reader(source, {}, std::nullopt);
   info.points = reader.points();
   info.cells = reader.cells();
@@ -129,8 +139,8 @@ void printAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
-  printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} not finite", info.points,
-            countText(description.pieces.size(), "piece"), info.survey.unused_points,
+  printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} NaN or infinite",
+            info.points, countText(description.pieces.size(), "piece"), info.survey.unused_points,
             info.survey.grid.blanked.by_grid, info.survey.grid.blanked.not_finite);
   std::string kinds;
   for (size_t kind = 1; kind < kKinds.size(); ++kind)
@@ -159,6 +169,8 @@ void printAsText(const MeshInfo& info) {
               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
               scalar.centring == Centring::kCell ? ", cell-centred" : "",
               isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
+    if (info.not_finite[n] > 0)
+      printLine("          {} of its values are {}", info.not_finite[n], kNotFinite);
   }
   const size_t steps = description.times.size();
   if (steps > 1)

@@ -47,8 +47,9 @@ std::string whyNothingIsVisible(const RenderedScene& scene) {
   const FrameStatistics& s = scene.statistics;
   if (manifest.volume == 0)
     return fmt::format(
-        "the data has no volume: all {} splats are flat, because the samples lie in one plane or line or "
-        "their neighbours are blanked ({} of {} samples are blanked)",
+        "all {} splats are flat and have no volume, so they are invisible in volume rendering: the samples "
+        "lie "
+        "in one plane or line, or their neighbours are blanked ({} of {} samples are blanked)",
         manifest.splats, manifest.blanked_nodes, manifest.nodes);
   if (s.splats_transparent + s.bricks_transparent > 0 && s.splats_drawn == 0)
     return fmt::format(

@@ -13,7 +13,7 @@
 
 namespace curvisplat {
 
-void checkOutputFolder(std::string_view option, const std::filesystem::path& path) {
+void checkOutputFolder(std::string_view option, const std::filesystem::path& path, std::string_view suffix) {
   const std::filesystem::path folder = folderOf(path);
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored))
@@ -23,9 +23,14 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
     throw Error("{} {}: the directory {} is not writable: {}; choose another", option, path.string(),
                 folder.string(), std::strerror(errno));
   std::error_code error;
-  static_cast<void>(std::filesystem::symlink_status(path, error));
-  if (error == std::errc::filename_too_long)
-    throw Error("{} {}: the name is too long; choose a shorter one", option, path.string());
+  static_cast<void>(std::filesystem::symlink_status(path.string().append(suffix), error));
+  if (error != std::errc::filename_too_long) return;
+  const long most = ::pathconf(folder.c_str(), _PC_NAME_MAX);
+  const size_t bytes = path.filename().string().size() + suffix.size();
+  if (most > 0 && bytes > static_cast<size_t>(most))
+    throw Error("{} {}: the name is too long; choose one that is {} bytes shorter", option, path.string(),
+                bytes - static_cast<size_t>(most));
+  throw Error("{} {}: the name is too long; choose a shorter one", option, path.string());
 }
 
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,

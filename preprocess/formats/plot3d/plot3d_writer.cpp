@@ -27,7 +27,9 @@ constexpr uint64_t kTaskNodes = 32 << 10;  // what one worker reads from the sou
 class PendingFile {
  public:
   explicit PendingFile(const std::filesystem::path& path)
-      : path_(path), file_(std::filesystem::path(path) += ".part") {}
+      : path_(path),
+        file_(std::filesystem::path(path) += kPlot3dPartSuffix, Caching::kPages, OutputFile::Existing::kEmpty,
+              path) {}
   ~PendingFile() {
     if (!in_place_) removeAll(file_.path());
   }

@@ -17,6 +17,8 @@
 
 namespace curvisplat {
 
+inline constexpr const char* kPlot3dPartSuffix = ".part";  // of the files' names until they are complete
+
 /// Writes all blocks and scalars of `source`, and returns the paths of the files. TBB workers read the
 /// source, the calling thread writes. Needs about 100 MB of memory and a few rows, whatever the grid's size.
 ///
