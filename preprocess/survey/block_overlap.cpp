@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -27,6 +28,23 @@ constexpr double kNegligibleShare = 2e-3;
 constexpr size_t kPairsNamed = 4;
 constexpr uint64_t kBytesOfPair = 96;  // in a map, and in the result
 constexpr uint64_t kMinPoints = 4 * BlockSampling::kMaxPointsOfCell;
+
+/// Of a block that was read as a whole: how it is slanted; nullopt if one of its corners is blanked.
+std::optional<SlantedBox> slantedBoxOf(const GridBlock& block, const NodeArrays& nodes) {
+  const auto position = [&](size_t n) { return glm::dvec3(nodes.x[n], nodes.y[n], nodes.z[n]); };
+  std::array<glm::dvec3, 8> corner;
+  for (size_t c = 0; c < corner.size(); ++c) {
+    const size_t n = ((c & 4 ? block.nk - 1 : 0) * block.nj + (c & 2 ? block.nj - 1 : 0)) * block.ni +
+                     (c & 1 ? block.ni - 1 : 0);
+    if (nodes.blank[n]) return std::nullopt;
+    corner[c] = position(n);
+  }
+  std::vector<glm::dvec3> positions;
+  positions.reserve(nodes.x.size());
+  for (size_t n = 0; n < nodes.x.size(); ++n)
+    if (!nodes.blank[n]) positions.push_back(position(n));
+  return SlantedBox(corner, positions);
+}
 
 bool hasCells(const GridBlock& block) {
   return block.ni > 1 && block.nj > 1 && block.nk > 1;
@@ -98,7 +116,7 @@ class OverlapSearch {
         reader_(source, {}, std::nullopt),
         memory_(memory),
         progress_(progress),
-        boxes_(blocks_.size()),
+        bounds_(blocks_.size()),
         volumes_(blocks_.size()),
         shared_(volumes_, memory.cap_for ? memory.point_bytes / 2 / kBytesOfPair
                                          : std::numeric_limits<uint64_t>::max()) {
@@ -113,9 +131,9 @@ class OverlapSearch {
     const bool at_once = all <= memory_.point_bytes / 2 / sizeof(BlockPoint);
     std::vector<BlockPoint> points;
     measure(at_once ? &points : nullptr);
-    tree_.emplace(boxes_);
+    tree_.emplace(bounds_);
     for (uint32_t block = 0; block < blocks_.size(); ++block)
-      meets_.push_back(tree_->anotherTouches(boxes_[block], block));
+      meets_.push_back(tree_->anotherTouches(bounds_[block].box, block));
     if (at_once) {
       keepPointsInOthers(points, 0, *tree_);
       points.shrink_to_fit();
@@ -145,7 +163,7 @@ class OverlapSearch {
 
   BlockSampling samplingOf(const GridBlock& block) const { return {block, cells_, blocks_.size()}; }
 
-  /// The first pass: the blocks' boxes and, with `points`, all of their sample points and volumes.
+  /// The first pass: the blocks' bounds and, with `points`, all of their sample points and volumes.
   void measure(std::vector<BlockPoint>* points) {
     SlabStream slabs(reader_, memory_.slab_bytes, points ? kCornerHalo : kNoHalo);
     std::optional<BlockSampling> sampling;
@@ -160,7 +178,9 @@ class OverlapSearch {
       const uint32_t number = loaded->slab.block;
       for (size_t n = 0; n < loaded->nodes.x.size(); ++n)
         if (!loaded->nodes.blank[n])
-          boxes_[number].add({loaded->nodes.x[n], loaded->nodes.y[n], loaded->nodes.z[n]});
+          bounds_[number].box.add({loaded->nodes.x[n], loaded->nodes.y[n], loaded->nodes.z[n]});
+      if (hasCells(blocks_[number]) && loaded->nodes.x.size() == blocks_[number].nodes())
+        bounds_[number].slanted = slantedBoxOf(blocks_[number], loaded->nodes);
       if (!points || !hasCells(blocks_[number])) continue;
       if (!picker || picked != number) {
         finish();
@@ -244,7 +264,7 @@ class OverlapSearch {
     PointHolders holders(points);
     std::vector<bool> wanted(blocks_.size());
     for (uint32_t block = 0; block < blocks_.size(); ++block)
-      wanted[block] = !boxes_[block].isEmpty() && holders.mayHold(block, boxes_[block]);
+      wanted[block] = !bounds_[block].box.isEmpty() && holders.mayHold(block, bounds_[block].box);
     const auto finish = [&](uint32_t block) {
       for (const uint32_t point : holders.finishBlock())
         shared_.add(points[point].block, block, points[point].volume);
@@ -273,10 +293,10 @@ class OverlapSearch {
   const Progress& progress_;
   double cells_ = 0;
   uint64_t met_in_vain_ = 0;
-  std::vector<BoundingBox> boxes_;  // [block]
-  std::vector<double> volumes_;     // [block], of those whose points have been picked
-  std::optional<BoxTree> tree_;     // of the boxes
-  std::vector<bool> meets_;         // [block], whether its box touches another
+  std::vector<Bounds> bounds_;   // [block]; slanted where the block is one slab
+  std::vector<double> volumes_;  // [block], of those whose points have been picked
+  std::optional<BoxTree> tree_;  // of the bounds
+  std::vector<bool> meets_;      // [block], whether its box touches another
   SharedVolumes shared_;
 };
 

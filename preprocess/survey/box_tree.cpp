@@ -7,12 +7,12 @@ constexpr uint32_t kLeafBoxes = 4;
 
 }  // namespace
 
-BoxTree::BoxTree(std::span<const BoundingBox> boxes) : tree_(numbered(boxes), kLeafBoxes) {}
+BoxTree::BoxTree(std::span<const Bounds> boxes) : tree_(numbered(boxes), kLeafBoxes) {}
 
-std::vector<BoxTree::Numbered> BoxTree::numbered(std::span<const BoundingBox> boxes) {
+std::vector<BoxTree::Numbered> BoxTree::numbered(std::span<const Bounds> boxes) {
   std::vector<Numbered> out;
   for (uint32_t n = 0; n < boxes.size(); ++n)
-    if (!boxes[n].isEmpty()) out.push_back({boxes[n], n});
+    if (!boxes[n].box.isEmpty()) out.push_back({boxes[n], n});
   return out;
 }
 
@@ -25,7 +25,7 @@ bool BoxTree::anotherTouches(const BoundingBox& box, uint32_t except) const {
   if (box.isEmpty()) return false;
   return tree_.visit(
       [&](const BoundingBox& node) { return node.touches(box); },
-      [&](const Numbered& other) { return other.number != except && other.bounds.touches(box); });
+      [&](const Numbered& other) { return other.number != except && other.box().touches(box); });
 }
 
 }  // namespace curvisplat

@@ -90,7 +90,7 @@ class PointPicker {
   /// A slab of the block with kCornerHalo. In any order.
   void add(const LoadedSlab& loaded);
   /// After the last slab: adds the points' volumes to `volume`, and removes those in no cell and, with `others`, those in no
-  /// other block's box.
+  /// other block's bounds.
   void finish(double& volume, const BoxTree* others);
 
  private:
@@ -102,7 +102,7 @@ class PointPicker {
   const uint64_t skipped_;  // points of the block before those of the part
 };
 
-/// Removes the points, from number `first` on, that lie in no box but their own block's.
+/// Removes the points, from number `first` on, that lie in no bounds but their own block's.
 void keepPointsInOthers(std::vector<BlockPoint>& points, size_t first, const BoxTree& boxes);
 
 }  // namespace curvisplat

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -146,6 +147,22 @@ TEST(BlockOverlap, IsFoundAmongAHundredThousandBlocks) {
   EXPECT_EQ(overlaps[0].first, 1234u);
   EXPECT_EQ(overlaps[0].second, 99'999u);
   EXPECT_NEAR(overlaps[0].share, 1, 1e-9);
+}
+
+// The axis-parallel boxes of blocks that are turned overlap, also where the blocks abut. No point lies in another block's slanted
+// box, so no cell is read again for points in it.
+TEST(BlockOverlap, OfTurnedBlocksThatAbutReadsThemOnce) {
+  const glm::dmat3 turn(glm::dvec3(1, 1, 1) / std::sqrt(3.0), glm::dvec3(1, -1, 0) / std::sqrt(2.0),
+                        glm::dvec3(1, 1, -2) / std::sqrt(6.0));
+  std::vector<GridBlock> blocks(1000, gridBlock(4, 4, 4));
+  std::atomic<uint64_t> nodes_read = 0;
+  const FunctionGridSource source(blocks, 0, [&](const GridNode& node) {
+    ++nodes_read;
+    const glm::dvec3 lower(node.block % 10, node.block / 10 % 10, node.block / 100);
+    return NodeValues{turn * (lower + glm::dvec3(node.i, node.j, node.k) / 3.0), {}, false};
+  });
+  EXPECT_TRUE(overlapsIn(source).empty());
+  EXPECT_EQ(nodes_read, 1000u * 64);
 }
 
 // Needles and plates across all of the grid, slanted to all axes: their boxes hold nearly every point, and locating each point in
