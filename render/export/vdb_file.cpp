@@ -12,6 +12,7 @@
 #include <string>
 
 #include "render/export/field_sampler.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
@@ -96,7 +97,9 @@ void writeGrids(const Grids& grids, const std::filesystem::path& path) {
     stream.write(openvdb::GridPtrVec{grids.density, grids.value});
     file.close();
   } catch (const std::ios::failure&) {  // its words are "basic_ios::clear: iostream error"
-    throw Error("{}: cannot be written: {}", path.string(), std::strerror(errno ? errno : EIO));
+    const int error = errno ? errno : EIO;
+    if (DiskFull::is(error)) throw DiskFull(temporary.path(), path, "the voxels", error);
+    throw Error("{}: cannot be written: {}", path.string(), std::strerror(error));
   } catch (const std::exception& error) {  // OpenVDB's
     throw Error("{}: cannot be written: {}", path.string(), temporary.aboutTarget(error.what()));
   }

@@ -48,6 +48,11 @@ std::string DiskFull::advice(const std::string& of_full_disk) const {
   return adviceFor(error_, of_full_disk);
 }
 
+void failToRename(int error, const fs::path& from, const fs::path& to) {
+  if (DiskFull::is(error)) throw DiskFull(to, to, "a new name", error);
+  throw OutputError("{}: cannot be renamed to {}: {}", from.string(), to.string(), std::strerror(error));
+}
+
 OutputError RoomNeeded::error(const DiskFull& full) const {
   const fs::path file = wholePath(full.file());
   fs::path holds;

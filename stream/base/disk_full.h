@@ -32,6 +32,10 @@ class DiskFull : public OutputError {
   int error_;
 };
 
+/// Throws the error, a value of errno, of a complete file or folder `from` that could not be renamed to `to`: DiskFull if
+/// there is no room for the name.
+[[noreturn]] void failToRename(int error, const std::filesystem::path& from, const std::filesystem::path& to);
+
 /// What some work writes, and the folders that the user gave for it.
 struct RoomNeeded {
   std::vector<std::filesystem::path> folders;

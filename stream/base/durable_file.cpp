@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "stream/base/disk_full.h"
 #include "stream/base/file.h"
 #include "stream/base/new_file.h"
 #include "stream/base/open_retrying.h"
@@ -34,8 +35,7 @@ void renameDurably(const fs::path& from, const fs::path& to) {
   const bool replaces = fs::exists(fs::symlink_status(to, none_there));
   // Where names can be exchanged, the old file stays under the new one's until the folder is synced.
   const bool exchanged = replaces && calls.exchange(from.c_str(), to.c_str()) == 0;
-  if (!exchanged && calls.rename(from.c_str(), to.c_str()) < 0)
-    throw Error("{}: cannot be renamed to {}: {}", from.string(), to.string(), reason());
+  if (!exchanged && calls.rename(from.c_str(), to.c_str()) < 0) failToRename(errno, from, to);
   try {
     syncDirectory(folderOf(to));
   } catch (const Error& error) {
@@ -54,6 +54,7 @@ TemporaryFile::TemporaryFile(fs::path target) : target_(std::move(target)) {
     NewFile file = createNewFile(name, 0666);
     path_ = std::move(file.path);
     fd_ = file.fd;
+    if (fd_ < 0 && DiskFull::is(errno)) throw DiskFull(path_, target_, "a new file", errno);
     if (fd_ < 0) throw Error("{}: no file can be made beside it: {}", target_.string(), reason());
     if (lockNew(fd_)) return;
     SystemCalls::current().close(fd_);
@@ -77,6 +78,7 @@ void TemporaryFile::putIntoPlace() {
   do {
     result = SystemCalls::current().fsync(fd_);
   } while (result < 0 && errno == EINTR);
+  if (result < 0 && DiskFull::is(errno)) throw DiskFull(path_, target_, "what was written", errno);
   if (result < 0 && errno != EINVAL && errno != ENOTSUP)
     throw Error("{}: cannot be synced to the disk: {}", target_.string(), reason());
   try {

@@ -262,7 +262,7 @@ void writeFileAtomically(const std::filesystem::path& path, std::span<const std:
     file.append(bytes);
     file.close();
     if (SystemCalls::current().rename(temporary.c_str(), path.c_str()) < 0)
-      throw OutputError("{}: cannot be renamed to {}: {}", temporary.string(), path.string(), reason());
+      failToRename(errno, temporary, path);
   } catch (...) {
     removeAll(temporary);
     throw;

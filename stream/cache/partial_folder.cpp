@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/open_retrying.h"
@@ -119,6 +120,7 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
     : target_(withoutSlash(std::move(target))), path_(partialOf(target_)) {
   checkReplaceable(target_, overwrite);
   const bool is_new = SystemCalls::current().mkdir(path_.c_str(), 0777) == 0;
+  if (!is_new && DiskFull::is(errno)) throw DiskFull(path_, target_, "a new directory", errno);
   if (!is_new && errno != EEXIST)
     throw OutputError("{}: the directory cannot be created: {}; choose another output", path_.string(),
                       reason());
@@ -162,6 +164,7 @@ PartialFolder::~PartialFolder() {
 void PartialFolder::lock(bool is_new) {
   const fs::path name = path_ / kPartialLock;
   const int fd = openRetrying(name, O_RDWR | O_CREAT | O_NOFOLLOW, 0666);
+  if (fd < 0 && DiskFull::is(errno)) throw DiskFull(name, target_, "a new file", errno);
   if (fd < 0) throw OutputError("{}: cannot be opened: {}", name.string(), reason());
   bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
   std::string why = reason();
@@ -204,21 +207,19 @@ void PartialFolder::putIntoPlace() {
   syncDirectory(path_);
   const fs::path aside = withSuffix(target_, ".replaced");
   if (!fs::exists(fs::symlink_status(target_))) {
-    if (calls.rename(path_.c_str(), target_.c_str()) < 0)
-      throw OutputError("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), reason());
+    if (calls.rename(path_.c_str(), target_.c_str()) < 0) failToRename(errno, path_, target_);
   } else if (calls.exchange(path_.c_str(), target_.c_str()) == 0) {
     replaced_ = path_;
   } else if (errno == EINVAL || errno == ENOSYS || errno == ENOTSUP) {
-    if (calls.rename(target_.c_str(), aside.c_str()) < 0)
-      throw OutputError("{}: cannot be moved aside to {}: {}", target_.string(), aside.string(), reason());
+    if (calls.rename(target_.c_str(), aside.c_str()) < 0) failToRename(errno, target_, aside);
     if (calls.rename(path_.c_str(), target_.c_str()) < 0) {
-      const std::string why = reason();
+      const int error = errno;
       calls.rename(aside.c_str(), target_.c_str());
-      throw OutputError("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), why);
+      failToRename(error, path_, target_);
     }
     replaced_ = aside;
   } else {
-    throw OutputError("{}: cannot replace {}: {}", path_.string(), target_.string(), reason());
+    failToRename(errno, path_, target_);
   }
   try {
     // Synced before the old cache is removed: a power loss must not lose both caches.

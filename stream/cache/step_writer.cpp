@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <span>
 #include <utility>
 
 #include "stream/base/check.h"
 #include "stream/base/checksum.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_file.h"
@@ -116,8 +116,7 @@ std::vector<FileInfo> StepWriter::finish() {
   lock_->requireStillThere();
   for (NewFile& file : files_) {
     if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
-      throw OutputError("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
-                        std::strerror(errno));
+      failToRename(errno, file.part, file.path);
     file.is_renamed = true;
   }
   syncDirectory(folder_);

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <system_error>
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/base/disk_full.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_index.h"
@@ -88,8 +88,7 @@ std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sou
         lock_->cache().string());
   for (NewFile& file : files_) {
     if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
-      throw Error("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
-                  std::strerror(errno));
+      failToRename(errno, file.part, file.path);
     file.is_renamed = true;
   }
   // The names of the payload files must be on the disk before a manifest that lists them.

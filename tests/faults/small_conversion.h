@@ -1,5 +1,5 @@
-// A conversion of a small grid, and the addition of a scalar to its cache, from files to files: what the
-// disk's failures are tried on.
+// A conversion of a small grid, structured or not, and the addition of a scalar to its cache, from files to files: what
+// the disk's failures are tried on.
 #pragma once
 
 #include <fmt/format.h>
@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "preprocess/gather/gradient_mesh.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/folder_files.h"
@@ -52,10 +54,10 @@ class SmallConversion : public ::testing::Test {
     faults::FaultySystemCalls unsynced;
     unsynced.is_unsynced = true;
     const ScopedSystemCalls scope(unsynced);
-    convertNow({0}, {});
+    convertNow({first_}, {});
     one_ = filesOf(output_);
     std::filesystem::remove_all(output_);
-    convertNow({0, 1}, {});
+    convertNow({first_, first_ + 1}, {});
     both_ = filesOf(output_);
     startWithOne();
     addNow();
@@ -87,6 +89,7 @@ class SmallConversion : public ::testing::Test {
     options.title = "small";
     options.threads = 1;
     options.bucket_splats = 9000;
+    options.mesh_bytes = mesh_bytes_;
     options.memory_bytes = leastMemory(2);
     Progress progress;
     convert(*source, options, progress);
@@ -96,7 +99,7 @@ class SmallConversion : public ::testing::Test {
     const auto source = open();
     AddScalarOptions options;
     options.cache = output_;
-    options.scalars = {1};
+    options.scalars = {first_ + 1};
     options.threads = 1;
     options.bucket_splats = 9000;
     options.memory_bytes = leastMemory(2);
@@ -115,18 +118,25 @@ class SmallConversion : public ::testing::Test {
     addStep(*source, options, progress);
   }
 
-  std::unique_ptr<GridSource> open() const {
+  std::unique_ptr<DataSource> open() const {
     OpenGridOptions options;
     options.grid = grid_;
-    options.solutions = {input_ / "in.fun"};
+    if (const auto solution = input_ / "in.fun"; std::filesystem::exists(solution))
+      options.solutions = {solution};
     options.temporary_folder = work_;
-    return openGrid(options);
+    std::unique_ptr<DataSource> source = openData(options);
+    if (!with_gradients_) return source;
+    return std::make_unique<GradientMesh>(
+        std::unique_ptr<MeshSource>(dynamic_cast<MeshSource*>(source.release())), DerivedOptions{}, work_);
   }
 
   const TemporaryFolder input_, folder_;
   std::filesystem::path grid_ = input_ / "in.xyz";
   const std::filesystem::path work_ = folder_ / "work";
   const std::filesystem::path output_ = work_ / "a.splats";
+  uint32_t first_ = 0;                  // of the two scalars
+  bool with_gradients_ = false;         // scalars derived from them; of an unstructured grid
+  std::optional<uint64_t> mesh_bytes_;  // of an unstructured grid; nullopt: all fits in memory
   Files inputs_;
   Files one_, both_;  // the cache of the first scalar, and of both
   Files added_;       // of both, one after the other: its manifest lists the files in another order

@@ -14,7 +14,7 @@ import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from serving import serving, wait_for, websocket  # noqa: E402
+from serving import Viewer, serving, wait_for, websocket  # noqa: E402
 
 program = sys.argv[1]
 failures = []
@@ -53,61 +53,6 @@ def get(server, target, host=None, method="GET", headers=()):
 def upgrade(origin):
     return ["Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
             *([f"Origin: {origin}"] if origin else [])]
-
-
-class Viewer:
-    """A page without a browser. Waits for a place: viewers that have gone keep theirs until their pictures have been stopped."""
-
-    def __init__(self, server, size=(64, 48)):
-        self.size = list(size)
-        self.number = 0
-        wait_for(lambda: self.gets_in(server), "a place among the viewers")
-
-    def gets_in(self, server):
-        self.socket = server.socket()
-        try:
-            self.hello = self.text("hello")
-            return True
-        except (ValueError, websocket.WebSocketException):  # it was told to try again later
-            self.socket.close()
-            return False
-
-    def send(self, **message):
-        self.socket.send(json.dumps(message))
-
-    def receive(self):
-        data = self.socket.recv()
-        return json.loads(data) if isinstance(data, str) else data
-
-    def text(self, kind):
-        while True:
-            message = self.receive()
-            if isinstance(message, dict) and message["type"] == kind:
-                return message
-
-    def open(self):
-        self.send(type="open", cache=0, size=self.size)
-        self.facts = self.text("cache")
-        return self.facts
-
-    def view(self, state=None, moving=False, **more):
-        self.number += 1
-        self.send(**{"type": "view", "number": self.number, "cache": 0, "size": self.size, "moving": moving, "step": 0,
-                     "state": state or self.facts["state"], **more})
-
-    def picture(self):
-        """Waits for a picture that is final, or an error's text."""
-        while True:
-            message = self.receive()
-            if isinstance(message, dict):
-                if message["type"] == "error":
-                    return message["text"]
-                continue
-            number, = struct.unpack_from("<I", message, 4)
-            self.send(type="shown", picture=number)
-            request, = struct.unpack_from("<d", message, 8)
-            if request == self.number and message[25]:
-                return message
 
 
 def draws(server, what):

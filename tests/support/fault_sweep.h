@@ -19,10 +19,11 @@ struct Fault {
 inline constexpr Fault kFailsOnce{"EIO once", &FaultySystemCalls::fail_only_call_at, EIO};
 inline constexpr Fault kFailsFromThenOn{"EIO from then on", &FaultySystemCalls::fail_call_at, EIO};
 inline constexpr Fault kIsFull{"ENOSPC", &FaultySystemCalls::fail_write_at, ENOSPC};
+inline constexpr Fault kHasNoNames{"ENOSPC at a new name", &FaultySystemCalls::fail_name_at, ENOSPC};
 inline constexpr Fault kFailsToSync{"EIO at syncing", &FaultySystemCalls::fail_sync_at, EIO};
 inline constexpr Fault kFailsToRename{"EIO at renaming", &FaultySystemCalls::fail_rename_at, EIO};
 inline constexpr Fault kIsCutOff{"cut to half", &FaultySystemCalls::cut_at, 0};
-inline constexpr Fault kFaults[] = {kFailsOnce,   kFailsFromThenOn, kIsFull,
+inline constexpr Fault kFaults[] = {kFailsOnce,   kFailsFromThenOn, kIsFull,  kHasNoNames,
                                     kFailsToSync, kFailsToRename,   kIsCutOff};
 
 /// Whether a message names a file or folder that only exists while the program works, such as "a.splats.partial",

@@ -16,6 +16,11 @@ bool FaultySystemCalls::callFails() {
   return (fail_call_at >= 0 && number >= fail_call_at) || number == fail_only_call_at;
 }
 
+bool FaultySystemCalls::nameFails() {
+  const int64_t number = names_++;
+  return fail_name_at >= 0 && number >= fail_name_at;
+}
+
 bool FaultySystemCalls::interrupted() {
   if (interrupt_every == 0 || ++transfers_ % interrupt_every != 0) return false;
   errno = EINTR;
@@ -45,6 +50,7 @@ void FaultySystemCalls::cut(int fd) {
 int FaultySystemCalls::open(const char* path, int flags, unsigned mode) {
   if (interrupted()) return -1;
   if (callFails()) return fail();
+  if ((flags & O_CREAT) != 0 && ::access(path, F_OK) != 0 && nameFails()) return fail();
   if (refuse_direct_open && (flags & O_DIRECT)) {
     errno = EINVAL;
     return -1;
@@ -101,19 +107,19 @@ int FaultySystemCalls::fsync(int fd) {
 int FaultySystemCalls::rename(const char* from, const char* to) {
   const int64_t number = renames++;
   if (callFails()) return fail();
-  if (fail_rename_at >= 0 && number >= fail_rename_at) return fail();
+  if ((fail_rename_at >= 0 && number >= fail_rename_at) || nameFails()) return fail();
   return SystemCalls::rename(from, to);
 }
 
 int FaultySystemCalls::exchange(const char* a, const char* b) {
   const int64_t number = renames++;
   if (callFails()) return fail();
-  if (fail_rename_at >= 0 && number >= fail_rename_at) return fail();
+  if ((fail_rename_at >= 0 && number >= fail_rename_at) || nameFails()) return fail();
   return SystemCalls::exchange(a, b);
 }
 
 int FaultySystemCalls::mkdir(const char* path, unsigned mode) {
-  return callFails() ? fail() : SystemCalls::mkdir(path, mode);
+  return callFails() || nameFails() ? fail() : SystemCalls::mkdir(path, mode);
 }
 
 int FaultySystemCalls::remove(const char* path) {

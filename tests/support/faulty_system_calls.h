@@ -22,6 +22,8 @@ class FaultySystemCalls : public SystemCalls {
   int64_t wrong_only_read_at = -1;     // this read gives other bytes than the file has
   int64_t fail_sync_at = -1;
   int64_t fail_rename_at = -1;
+  int64_t fail_name_at =
+      -1;  // this call that makes a name: of a new file or folder, or a rename; and all after it
   int64_t fail_call_at = -1;       // this call, of whatever kind, and all after it
   int64_t fail_only_call_at = -1;  // this call, of whatever kind, and none after it
   int64_t cut_at = -1;  // at this read of a file whose path begins with `to_be_cut`, it is halved first
@@ -49,12 +51,13 @@ class FaultySystemCalls : public SystemCalls {
 
  private:
   bool callFails();
+  bool nameFails();
   bool interrupted();
   int fail();
   void dawdle();
   void cut(int fd);
 
-  std::atomic<int64_t> transfers_ = 0, cuttable_ = 0;
+  std::atomic<int64_t> transfers_ = 0, cuttable_ = 0, names_ = 0;
   std::set<int> direct_;  // descriptors
 };
 

@@ -105,6 +105,7 @@ MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, doub
                                        "-nostdin",
                                        "-loglevel",
                                        "error",
+                                       "-xerror",  // else its status is 0 where the file's end is not written
                                        "-y",
                                        "-f",
                                        "rawvideo",

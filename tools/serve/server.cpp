@@ -1,5 +1,7 @@
 #include "tools/serve/server.h"
 
+#include <malloc.h>
+
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -62,6 +64,7 @@ class ViewerCloser {
       viewers_.pop_front();
       lock.unlock();
       viewer.reset();
+      malloc_trim(0);  // what it has freed is the system's again
       ended_();
       lock.lock();
     }
@@ -189,6 +192,9 @@ class Server : public ConnectionHost {
 
 void runServer(const ServedCaches& caches, const ServerOptions& options, const Progress& stopped,
                const std::function<void(const std::string& address)>& listening) {
+  // malloc_trim() does not return the ends of other heaps than the first: with a heap for each thread, as malloc makes them, a
+  // server whose three viewers of 96 MiB had left kept up to 480 MiB. A picture takes the same time with one (on two cores).
+  mallopt(M_ARENA_MAX, 1);
   Server server(caches, options, stopped);
   listening(server.address());
   server.run();
