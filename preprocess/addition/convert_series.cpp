@@ -10,7 +10,6 @@
 
 #include "preprocess/addition/shared_series.h"
 #include "preprocess/addition/step_references.h"
-#include "preprocess/convert/conversion.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/preflight.h"
 #include "stream/base/count_text.h"

@@ -12,6 +12,7 @@
 #include "preprocess/convert/build_octree.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/disk_check.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/interrupted_scatter.h"
 #include "preprocess/convert/mesh_origin.h"
@@ -39,10 +40,6 @@
 #include "stream/cache/partial_folder.h"
 
 namespace curvisplat {
-
-std::filesystem::path temporaryFolder(const ConvertOptions& options) {
-  return options.temporary_folder.empty() ? folderOf(options.output) : options.temporary_folder;
-}
 
 void reportCache(const Manifest& written, ConvertReport& report) {
   report.centring = written.cells ? Centring::kCell : Centring::kNode;
@@ -109,7 +106,7 @@ class Conversion {
     const Pass build_cache[] = {
         {"build", "nodes", nodes_, &Conversion::build},
     };
-    if (isFirst()) checkRoom();
+    if (isFirst()) checkDiskOf({options_, *origin_, nodes_, *workspace_, estimate_}, progress_);
     if (hasSplats()) {
       try {
         runPasses(take_up_splats);
@@ -383,39 +380,6 @@ class Conversion {
     report_.merged_nodes = splats_.merged_nodes;
     report_.temporary_bytes = std::max(splats_.temporaryBytes(), origin_->temporaryBytes());
     report_.resumed = workspace_->resumed();
-  }
-
-  void checkRoom() const {
-    if (!options_.check_disk_space) return;
-    const DiskNeeds most = diskNeeds(nodes_, options_.scalars.size());
-    const TemporaryNeeds most_temporary =
-        workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->mostTemporaryNeeds();
-    const std::filesystem::path folder = temporaryFolder(options_);
-    if (hasDiskSpace(needsWith(most, most_temporary), options_.output, folder)) return;
-    const TemporaryNeeds forecast =
-        workspace_->hasAllSplats() ? TemporaryNeeds{} : origin_->temporaryNeeds(progress_);
-    checkDiskSpace(needsWith(likelyNeeds(most), forecast), options_.output, folder,
-                   options_.full_disk_hint.empty() ? kSmallDiskHint : options_.full_disk_hint);
-  }
-
-  DiskNeeds likelyNeeds(const DiskNeeds& most) const {
-    const std::optional<DiskNeeds> likely =
-        estimate_ ? estimate_(workspace_->scratch() / "sample") : std::nullopt;
-    if (!likely) return most;
-    return {std::min(likely->temporary_bytes, most.temporary_bytes),
-            std::min(likely->cache_bytes, most.cache_bytes), 0};
-  }
-
-  DiskNeeds needsWith(DiskNeeds needs, const TemporaryNeeds& temporary) const {
-    if (workspace_->splats())
-      needs.temporary_bytes -= std::min(needs.temporary_bytes, workspace_->splats()->buckets.size);
-    if (workspace_->hasAllSplats()) needs.temporary_bytes = 0;
-    if (ranks_) needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
-    if (options_.surfaces)
-      needs.temporary_bytes +=
-          temporaryBytesOfFaces(origin_->blocks(), options_.planes, options_.scalars.size());
-    needs.cache_bytes -= std::min(needs.cache_bytes, workspace_->bytesInPartial());
-    return with(temporary, needs);
   }
 
   /// Needs the survey.

@@ -3,29 +3,20 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <optional>
 #include <vector>
 
 #include "preprocess/convert/conversion_journal.h"
 #include "preprocess/convert/convert_options.h"
+#include "preprocess/convert/disk_check.h"
 #include "preprocess/convert/memory_plan.h"
-#include "preprocess/convert/preflight.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/progress.h"
 #include "stream/cache/manifest.h"
 
 namespace curvisplat {
 
-/// Where temporary files go.
-std::filesystem::path temporaryFolder(const ConvertOptions& options);
-
 /// Copies what the manifest of a cache says into the report.
 void reportCache(const Manifest& written, ConvertReport& report);
-
-/// What the conversion will need on disk, from a sample that is converted within `folder`, a new one in the conversion's own.
-/// nullopt: that is not known. Throws Interrupted.
-using EstimateNeeds = std::function<std::optional<DiskNeeds>(const std::filesystem::path& folder)>;
 
 /// Runs all passes that are not done yet. Where the disk may be too small, `estimate` is called first, unless it is empty.
 /// What is to be resumed stays when it is stopped, and on an Error if options.resume is set. Throws Error and Interrupted.

@@ -13,6 +13,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/overset/block_owners.h"
 #include "stream/base/calendar.h"
+#include "stream/base/paths.h"
 #include "stream/base/ranks.h"
 #include "stream/codec/values_codec.h"
 
@@ -53,6 +54,11 @@ struct ConvertOptions {
   /// For tests: how often scatter notes what is on disk.
   std::chrono::milliseconds note_interval{10'000};
 };
+
+/// Where temporary files go.
+inline std::filesystem::path temporaryFolder(const ConvertOptions& options) {
+  return options.temporary_folder.empty() ? folderOf(options.output) : options.temporary_folder;
+}
 
 /// A file of the cache, and its size.
 struct FileReport {

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <span>
 
-#include "preprocess/convert/conversion.h"
 #include "preprocess/faces/grid_faces_pass.h"
 #include "stream/cache/faces_file.h"
 
