@@ -25,6 +25,7 @@ class Scope:
         self.begin = 1e-6 * event["ts"]
         self.end = self.begin + 1e-6 * event["dur"]
         self.processor = 1e-6 * event["tdur"]
+        self.numbers = event.get("args", {})
 
 
 def read(path):

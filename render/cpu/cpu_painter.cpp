@@ -15,6 +15,7 @@
 #include "stream/base/compute_permits.h"
 #include "stream/base/stage_timer.h"
 #include "stream/base/thread_count.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -54,6 +55,11 @@ BlockMask blocksOf(BlockMask columns, BlockMask rows) {
   return blocks;
 }
 
+Image blackImage(ImageSize size) {
+  const TraceScope trace("make image");
+  return Image(size);
+}
+
 }  // namespace
 
 struct CpuPainter::State {
@@ -91,6 +97,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
                        PixelShading shading, const PaintResources& resources) {
   State& state = *state_;
   const Computing computing(resources.permits);
+  const TraceScope trace("begin picture", TraceKind::kStage);
   const unsigned threads = threadsOrCores(resources.threads),
                  threads_before = state.loop ? state.loop->threads() : 0;
   state.upload_s = state.draw_s = 0;
@@ -194,9 +201,12 @@ void CpuPainter::State::forRanges(const char* name, size_t count, const Job& job
 }
 
 void CpuPainter::State::paintTiles() {
-  touched.clear();
-  for (size_t number = 0; number < tileCount(size); ++number)
-    if (!bins->tile(static_cast<int>(number)).empty()) touched.push_back(static_cast<uint32_t>(number));
+  {
+    const TraceScope trace("list tiles");
+    touched.clear();
+    for (size_t number = 0; number < tileCount(size); ++number)
+      if (!bins->tile(static_cast<int>(number)).empty()) touched.push_back(static_cast<uint32_t>(number));
+  }
   forRanges("paint tiles", touched.size(), [this](size_t n) {
     if (stop.stop_requested()) return;
     const size_t number = touched[n];
@@ -250,7 +260,7 @@ Image CpuPainter::end() {
   const Computing computing(state.loop->permits());
   if (!state.bins->empty()) state.paintBatch();
   const StageTimer timer(state.draw_s, "finish picture", TraceKind::kStage);
-  Image image(state.size);
+  Image image = blackImage(state.size);
   const auto columns = static_cast<size_t>(state.bins->columns());
   state.forRanges("finish tiles", tileCount(state.size), [&](size_t number) {
     const float* tile = state.tile(number);

@@ -6,6 +6,7 @@
 #include "render/cpu/tile.h"
 #include "render/project/kernel.h"
 #include "stream/base/check.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -129,17 +130,23 @@ size_t SplatBins::sortBorrowed(std::span<const ScreenSplat> splats, PaintLoop& l
   size_t most = std::min(splats.size(), most_splats_);
   while (most < splats.size() && isRecord(splats[most - 1])) ++most;
   batch_ = withoutLastRecords(splats.first(most));
-  std::atomic<uint64_t> entries = 0;
-  forPieces(loop, [&](size_t, size_t begin, size_t end) {
+  std::atomic<uint64_t> entries = 0, hidden = 0;
+  forPieces(loop, [&](size_t piece, size_t begin, size_t end) {
     uint64_t of_piece = 0;
     for (size_t n = begin; n < end; ++n) {
       tiles_[n] = isRecord(batch_[n]) ? kNoTiles : tilesOf(batch_[n]);
       of_piece += tiles_[n].count();
     }
     entries += of_piece;
+    hidden += countPiece(piece, begin, end);
   });
-  if (entries > most_entries_) batch_ = withoutLastRecords(batch_.first(fitting()));
-  sort(loop);
+  if (entries > most_entries_) {
+    batch_ = withoutLastRecords(batch_.first(fitting()));
+    sort(loop);
+  } else {
+    hidden_ += hidden;
+    writeEntries(loop);
+  }
   return batch_.size();
 }
 
@@ -151,15 +158,35 @@ size_t SplatBins::fitting() const {
 }
 
 void SplatBins::sort(PaintLoop& loop) {
+  forPieces(loop, [&](size_t piece, size_t begin, size_t end) { hidden_ += countPiece(piece, begin, end); });
+  writeEntries(loop);
+}
+
+/// Counts the entries of each tile in a piece. Returns how many of its splats touch no open tile.
+uint64_t SplatBins::countPiece(size_t piece, size_t begin, size_t end) {
   const size_t tiles = begins_.size() - 1;
-  std::fill(piece_ends_.begin(), piece_ends_.end(), 0);
+  uint32_t* const counts = &piece_ends_[piece * tiles];
+  std::fill_n(counts, tiles, 0);
+  uint64_t hidden = 0;
+  for (size_t n = begin; n < end; ++n)
+    if (forOpenTiles(n, [&](size_t tile) { ++counts[tile]; }) == 0 && !isRecord(batch_[n])) ++hidden;
+  return hidden;
+}
+
+void SplatBins::writeEntries(PaintLoop& loop) {
+  sumCounts();
+  const size_t tiles = begins_.size() - 1;
   forPieces(loop, [&](size_t piece, size_t begin, size_t end) {
-    uint32_t* const counts = &piece_ends_[piece * tiles];
-    uint64_t hidden = 0;
+    uint32_t* const ends = &piece_ends_[piece * tiles];
     for (size_t n = begin; n < end; ++n)
-      if (forOpenTiles(n, [&](size_t tile) { ++counts[tile]; }) == 0 && !isRecord(batch_[n])) ++hidden;
-    hidden_ += hidden;
+      forOpenTiles(n, [&](size_t tile) { entries_[ends[tile]++] = static_cast<uint32_t>(n); });
   });
+}
+
+/// From how many entries a piece has for each tile to where it writes them.
+void SplatBins::sumCounts() {
+  const TraceScope trace("sum bins");
+  const size_t tiles = begins_.size() - 1;
   uint32_t sum = 0;
   for (size_t tile = 0; tile < tiles; ++tile) {
     begins_[tile] = sum;
@@ -170,11 +197,6 @@ void SplatBins::sort(PaintLoop& loop) {
     }
   }
   begins_[tiles] = sum;
-  forPieces(loop, [&](size_t piece, size_t begin, size_t end) {
-    uint32_t* const ends = &piece_ends_[piece * tiles];
-    for (size_t n = begin; n < end; ++n)
-      forOpenTiles(n, [&](size_t tile) { entries_[ends[tile]++] = static_cast<uint32_t>(n); });
-  });
 }
 
 void SplatBins::open() {

@@ -73,6 +73,9 @@ class SplatBins {
   bool allClosed(const Tiles& tiles) const;
   void push(const ScreenSplat& splat, const Tiles& tiles);
   size_t fitting() const;
+  uint64_t countPiece(size_t piece, size_t begin, size_t end);
+  void sumCounts();
+  void writeEntries(PaintLoop& loop);
   template <typename Visit>
   void forPieces(PaintLoop& loop, const Visit& visit) const;
   template <typename Visit>

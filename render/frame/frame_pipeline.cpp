@@ -20,6 +20,7 @@
 #include "stream/base/interrupted.h"
 #include "stream/base/stage_timer.h"
 #include "stream/base/thread_count.h"
+#include "stream/base/trace.h"
 #include "stream/paging/brick_source.h"
 #include "stream/paging/pager.h"
 
@@ -224,6 +225,9 @@ bool FramePipeline::sweepNext(const FramePlan& plan, const FrameOptions& options
 /// Starts the stages on the sweep's slab, of `region`; null: there is none. False if no rank has one.
 bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, const FrameOptions& options) {
   if (exchange_ ? !beginExchangedSlab(region) : region == nullptr) return false;
+  const TraceScope trace(
+      "start slab", TraceKind::kStage,
+      {static_cast<int64_t>(pools_->sweep.slabs()), static_cast<int64_t>(pools_->budget.ring_splats)});
   const MutexLock lock(mutex_);
   throwIfStopped(options.stop);
   pools_->ring.resume();
@@ -404,6 +408,7 @@ void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
+  std::optional<TraceScope> starting(std::in_place, "start frame");
   makePools(options);
   exchange_.reset();
   if (plan.shared) beginExchange(plan, options);
@@ -427,7 +432,9 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   try {
     region_ = 0;
     pools_->sweep.beginRegion(regions.front().left_out);
-    startSlab(plan, sweepNext(plan, options) ? &regions.front() : nullptr, options);
+    const bool is_any = sweepNext(plan, options);
+    starting.reset();
+    startSlab(plan, is_any ? &regions.front() : nullptr, options);
     image = paint(plan, regions, options, statistics, progress);
   } catch (...) {
     pools_->workers.stop();

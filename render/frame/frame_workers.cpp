@@ -335,7 +335,8 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank, const
   PrepareStatistics& statistics = worker.statistics;
   std::span<const DepthItem> sorted;
   {
-    const StageTimer timer(statistics.sort_s, "sort brick");
+    const TraceNumbers numbers{static_cast<int64_t>(sequence), static_cast<int64_t>(projected.keys.size())};
+    const StageTimer timer(statistics.sort_s, "sort brick", TraceKind::kWork, numbers);
     sorted = worker.sorter.sort(projected.keys, work_->keys.order());
   }
   {
@@ -361,7 +362,8 @@ bool FrameWorkers::hand(Worker& worker, const SweepBuffer::Batch& batch) {
   std::span<const DepthItem> sorted;
   std::optional<std::span<ScreenSplat>> segment;
   {
-    const StageTimer timer(worker.statistics.sort_s, "sort batch");
+    const TraceNumbers numbers{static_cast<int64_t>(batch.turn), static_cast<int64_t>(batch.count)};
+    const StageTimer timer(worker.statistics.sort_s, "sort batch", TraceKind::kWork, numbers);
     sweep_.itemsOf(batch, worker.batch_sorter.items(batch.count));
     sorted = worker.batch_sorter.sort();
   }
@@ -372,7 +374,8 @@ bool FrameWorkers::hand(Worker& worker, const SweepBuffer::Batch& batch) {
   }
   if (!segment) return false;
   {
-    const StageTimer timer(worker.statistics.sort_s, "copy batch");
+    const TraceNumbers numbers{static_cast<int64_t>(batch.sequence), static_cast<int64_t>(batch.count)};
+    const StageTimer timer(worker.statistics.sort_s, "copy batch", TraceKind::kWork, numbers);
     sweep_.copy(sorted, *segment);
     sweep_.giveBack(batch);
   }

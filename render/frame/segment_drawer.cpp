@@ -16,7 +16,10 @@ bool SegmentDrawer::drawNext() {
     segment = ring_.next();
   }
   if (!segment) return false;
-  painter_.draw(*segment);
+  {
+    const TraceScope trace("draw batch", TraceKind::kStage);
+    painter_.draw(*segment);
+  }
   ++kept_;
   release();
   return true;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -13,6 +14,8 @@ namespace {
 constexpr size_t kFirstEighths = 6, kNextEighths = 7;
 // Space is made for the part that needs it, and for one page in kSpareShare of the buffer in addition.
 constexpr size_t kSpareShare = 16;
+// Of every run, for the ends of batches.
+constexpr size_t kSamplesABatch = 16;
 
 size_t pagesFor(size_t splats) {
   return (splats + SweepBuffer::kPageSplats - 1) / SweepBuffer::kPageSplats;
@@ -119,6 +122,7 @@ void SweepBuffer::endTurn() {
 std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<const DepthItem> sorted) {
   const MutexLock lock(mutex_);
   if (closed_) return {};
+  const TraceScope trace("enter sweep");
   const size_t before = countBefore(begin_, rank, sorted);
   const size_t before_end = std::max(before, countBefore(end_, rank, sorted));
   size_t after = sorted.size();
@@ -176,14 +180,15 @@ void SweepBuffer::fill(Run& run, std::span<const DepthItem> sorted, std::span<co
 
 std::optional<SweepBuffer::Batch> SweepBuffer::next() {
   const MutexLock lock(mutex_);
-  return cut(batch_splats_ / 2);
+  const TraceScope trace("cut batch");
+  return cut(batch_splats_);
 }
 
 std::optional<SweepBuffer::Batch> SweepBuffer::awaitNext() {
   MutexLock lock(mutex_);
   while (!closed_) {
     const bool all_in = turn_ == parts_.size();
-    if (auto batch = cut(all_in ? 1 : batch_splats_ / 2)) return batch;
+    if (auto batch = cut(all_in ? 1 : batch_splats_)) return batch;
     if (all_in) break;
     changed_.wait(lock);
   }
@@ -239,13 +244,14 @@ std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
       entered_ = 0;
       return {};
     }
-    splitFinals(finals);
+    splitFinals(finals, at_least > 1);
+    split_turn_ = turn_;
   }
   const SweepPosition end = splits_.front();
   splits_.pop_front();
   Batch batch;
   for (const auto& run : live_) {
-    const size_t to = splits_.empty() ? run->final_to : firstNotBefore(*run, end);
+    const size_t to = firstNotBefore(*run, end);
     if (to == run->first) continue;
     batch.pieces.push_back({run, run->first, to});
     batch.count += to - run->first;
@@ -254,6 +260,7 @@ std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
   std::erase_if(live_, [](const auto& run) { return run->first == run->count; });
   CURVISPLAT_CHECK_OP(batch.count, <=, batch_splats_);
   batch.sequence = batches_++;
+  batch.turn = split_turn_;
   ++under_way_;
   changed_.notify_all();  // the last one may be out
   return batch;
@@ -261,10 +268,10 @@ std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
 
 /// Sets the ends of batches of at most batch_splats_ splats; the last end is the mark. They are chosen from a
 /// sorted sample of every stride-th splat of every run: between two neighbours in the sample lie at most
-/// `stride` splats of each run.
-void SweepBuffer::splitFinals(size_t finals) {
+/// `stride` splats of each run. So all batches but the last have most of that; the last may stay, to grow.
+void SweepBuffer::splitFinals(size_t finals, bool last_may_stay) {
   if (finals > batch_splats_) {
-    const size_t stride = std::max<size_t>(1, batch_splats_ / (4 * live_.size()));
+    const size_t stride = std::max<size_t>(1, batch_splats_ / (kSamplesABatch * live_.size()));
     const size_t samples = stride == 1 ? batch_splats_ : batch_splats_ / stride - live_.size();
     std::vector<SweepPosition> sample;
     for (const auto& run : live_)
@@ -272,7 +279,7 @@ void SweepBuffer::splitFinals(size_t finals) {
     std::sort(sample.begin(), sample.end());
     for (size_t n = samples; n < sample.size(); n += samples) splits_.push_back(sample[n]);
   }
-  splits_.push_back(mark_);
+  if (splits_.empty() || !last_may_stay) splits_.push_back(mark_);
 }
 
 /// Makes space for those splats of the part to be entered that lie before the slab's end. Requires that

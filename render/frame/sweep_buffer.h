@@ -92,6 +92,7 @@ class SweepBuffer {
   /// Splats that come next in the drawing order, in pieces by rank, each sorted.
   struct Batch {
     uint64_t sequence = 0;  // in the frame
+    uint64_t turn = 0;      // its splats were final before this part entered; for the trace
     size_t count = 0;
     std::vector<Piece> pieces;
   };
@@ -123,7 +124,7 @@ class SweepBuffer {
   /// has.
   void fill(Run& run, std::span<const DepthItem> sorted, std::span<const ScreenSplat> splats);
 
-  /// A batch of final splats, if there are enough of them. The caller sorts it and calls giveBack().
+  /// A batch of final splats, if there are enough for a full one. The caller sorts it and calls giveBack().
   std::optional<Batch> next();
   /// As next(), but waits for a batch as long as one can still come in this slab.
   std::optional<Batch> awaitNext();
@@ -153,7 +154,7 @@ class SweepBuffer {
   size_t firstNotBefore(const Run& run, const SweepPosition& mark) const REQUIRES(mutex_);
   size_t countFinals() REQUIRES(mutex_);
   std::optional<Batch> cut(size_t at_least) REQUIRES(mutex_);
-  void splitFinals(size_t finals) REQUIRES(mutex_);
+  void splitFinals(size_t finals, bool last_may_stay) REQUIRES(mutex_);
   void endTurn() REQUIRES(mutex_);
   void makeSpace(uint32_t rank, std::span<const DepthItem> sorted) REQUIRES(mutex_);
   size_t pagesNeeded(uint32_t rank, std::span<const DepthItem> sorted) const REQUIRES(mutex_);
@@ -180,6 +181,7 @@ class SweepBuffer {
   SweepPosition mark_ GUARDED_BY(mutex_);                            // all before it is final
   std::vector<std::shared_ptr<Run>> live_ GUARDED_BY(mutex_);  // with splats that are in no batch; by rank
   std::deque<SweepPosition> splits_ GUARDED_BY(mutex_);        // between batches of what is known to be final
+  uint64_t split_turn_ GUARDED_BY(mutex_) = 0;                 // when that was found
   size_t entered_ GUARDED_BY(mutex_) = 0;                      // splats since finals were counted
   bool worth_counting_ GUARDED_BY(mutex_) = false;
   uint64_t batches_ GUARDED_BY(mutex_) = 0;    // handed out in this frame

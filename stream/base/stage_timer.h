@@ -11,9 +11,9 @@ namespace curvisplat {
 
 class StageTimer {
  public:
-  /// `name`, `kind`: in the trace, see TraceScope.
-  StageTimer(double& seconds, const char* name, TraceKind kind = TraceKind::kWork)
-      : trace_(name, kind), seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
+  /// `name`, `kind`, `numbers`: in the trace, see TraceScope.
+  StageTimer(double& seconds, const char* name, TraceKind kind = TraceKind::kWork, TraceNumbers numbers = {})
+      : trace_(name, kind, numbers), seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
   ~StageTimer() {
     seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }

@@ -28,6 +28,7 @@ constexpr std::array kKindNames = {"stage", "work", "wait"};
 struct Event {
   const char* name;
   TraceKind kind;
+  TraceNumbers numbers;
   int64_t start_ns, wall_ns, processor_ns;
 };
 
@@ -44,6 +45,12 @@ std::string nameOfThisThread() {
   pthread_getname_np(pthread_self(), name.data(), name.size());
   const std::string found = name.data();
   return found == "curvisplat" ? "tbb" : found;
+}
+
+std::string argumentsOf(const TraceNumbers& numbers) {
+  if (numbers.number < 0) return {};
+  if (numbers.splats < 0) return fmt::format(R"(,"args":{{"number":{}}})", numbers.number);
+  return fmt::format(R"(,"args":{{"number":{},"splats":{}}})", numbers.number, numbers.splats);
 }
 
 /// The file of the trace that is written.
@@ -68,10 +75,10 @@ class TraceFile {
       fmt::format_to(
           std::back_inserter(text),
           ",\n"
-          R"({{"name":"{}","cat":"{}","ph":"X","pid":{},"tid":{},"ts":{:.3f},"dur":{:.3f},"tdur":{:.3f}}})",
+          R"({{"name":"{}","cat":"{}","ph":"X","pid":{},"tid":{},"ts":{:.3f},"dur":{:.3f},"tdur":{:.3f}{}}})",
           event.name, kKindNames[static_cast<size_t>(event.kind)], process_, thread,
           1e-3 * static_cast<double>(event.start_ns - begun_ns_), 1e-3 * static_cast<double>(event.wall_ns),
-          1e-3 * static_cast<double>(event.processor_ns));
+          1e-3 * static_cast<double>(event.processor_ns), argumentsOf(event.numbers));
     append(text);
   }
 
@@ -193,7 +200,7 @@ void TraceScope::start() {
 
 void TraceScope::record() const {
   thread_local ThreadEvents own;
-  own.add({name_, kind_, wall_ns_, now(CLOCK_MONOTONIC) - wall_ns_,
+  own.add({name_, kind_, numbers_, wall_ns_, now(CLOCK_MONOTONIC) - wall_ns_,
            now(CLOCK_THREAD_CPUTIME_ID) - processor_ns_});
 }
 

@@ -7,7 +7,7 @@
 //   wait    this thread waits for another one
 //
 // While no trace is written a scope costs one relaxed load. While one is, two clocks are read at both ends (0.5 us),
-// so scopes are bricks, slabs and tiles, never splats. A thread keeps 1024 events (40 KiB), then writes them.
+// so scopes are bricks, slabs and tiles, never splats. A thread keeps 1024 events (56 KiB), then writes them.
 #pragma once
 
 #include <atomic>
@@ -17,6 +17,12 @@
 namespace curvisplat {
 
 enum class TraceKind { kStage, kWork, kWait };
+
+/// What a scope works on; bench/replay_frame.py needs it. Negative: not written.
+struct TraceNumbers {
+  int64_t number = -1;  // of a brick or a batch
+  int64_t splats = -1;
+};
 
 /// The process's one trace.
 class Trace {
@@ -36,8 +42,8 @@ class Trace {
 /// Traces the time from here to the end of the scope. `name` has to live as long as the program.
 class TraceScope {
  public:
-  explicit TraceScope(const char* name, TraceKind kind = TraceKind::kWork)
-      : name_(Trace::isOn() ? name : nullptr), kind_(kind) {
+  explicit TraceScope(const char* name, TraceKind kind = TraceKind::kWork, TraceNumbers numbers = {})
+      : name_(Trace::isOn() ? name : nullptr), kind_(kind), numbers_(numbers) {
     if (name_) start();
   }
   ~TraceScope() {
@@ -52,6 +58,7 @@ class TraceScope {
 
   const char* const name_;  // null: not traced
   const TraceKind kind_;
+  const TraceNumbers numbers_;
   int64_t wall_ns_ = 0, processor_ns_ = 0;  // when it began, by the clocks of the system and of the thread
 };
 

@@ -171,6 +171,18 @@ TEST(SweepBuffer, HoldsALayerOnly) {
   EXPECT_LE(sweeper.buffer().peakSplats(), 14 * kPage);
 }
 
+// Painting threads wait for one another at the end of each.
+TEST(SweepBuffer, FillsBatches) {
+  const Scene scene(11, 200, 2000, 1u << 30);
+  const auto order = scene.inOrder();
+  constexpr size_t kBatch = 10'000;
+  Sweeper sweeper(scene, 2 * order.size(), kBatch);
+  for (const int workers : {1, 3}) {
+    EXPECT_EQ(sweeper.sweep(workers), order);
+    EXPECT_LE(sweeper.buffer().batches(), order.size() / (kBatch * 9 / 10) + 2);
+  }
+}
+
 TEST(SweepBuffer, ClosingWakesAllWhoWait) {
   const Scene scene(3, 10, 1000, 100);
   SweepBuffer buffer(8 * kPage, 100);
