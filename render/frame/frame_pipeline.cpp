@@ -1,8 +1,5 @@
 #include "render/frame/frame_pipeline.h"
 
-#include <tbb/info.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <limits>
 #include <span>
@@ -14,7 +11,6 @@
 #include "render/frame/segment_drawer.h"
 #include "render/frame/segment_ring.h"
 #include "render/frame/sweep_buffer.h"
-#include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
 #include "stream/base/freed_memory.h"
 #include "stream/base/interrupted.h"
@@ -27,59 +23,11 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
 // Splats that are exchanged lie in blocks of other sizes at each step. What malloc kept of them was 27 MiB of 256.
 constexpr size_t kLargeBlock = size_t{1} << 20;
 
 unsigned threadsOf(const FrameOptions& options) {
   return threadsOrCores(options.threads);
-}
-
-/// What the splats of isosurfaces may take; where it is too little they are found in several parts of the picture.
-uint64_t isoSplatBytes(const FrameOptions& options) {
-  constexpr uint64_t kMinBytes = 4 << 20;
-  return std::max(kMinBytes, options.memory_bytes / 8);
-}
-
-/// What finding where rays meet them may take; where it is too little fewer threads do.
-uint64_t isoTracerBytes(const FrameOptions& options) {
-  constexpr uint64_t kTracerBytes = 2 << 20;
-  return std::max(kTracerBytes * threadsOf(options), options.memory_bytes / 16);
-}
-
-tbb::task_arena arenaOf(const FrameOptions& options) {
-  return tbb::task_arena(std::min(static_cast<int>(threadsOf(options)), tbb::info::default_concurrency()));
-}
-
-/// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles, samples of slices
-/// and of surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
-uint64_t sceneBytes(const FrameOptions& options) {
-  if (!options.scene || options.scene->empty()) return 0;
-  const uint64_t slice_bytes = options.scene->slices_by_function ? 144 : 72;  // of two scalars
-  const auto is_translucent = [](const auto& surface) { return !surface.opacity.opaque(); };
-  const bool peels =
-      std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
-      std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
-  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8;
-  uint64_t bytes = kSampleTileBytes * (peels ? PixelLayers::kMaxLayers : 1) * threadsOf(options) +
-                   options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
-  for (const Surface& surface : options.scene->surfaces)
-    bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
-             kTriangleBytes * surface.mesh->triangles.size();
-  if (!options.scene->isovalues.empty())
-    bytes += isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels();
-  if (!options.scene->grid_surfaces.empty())
-    bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
-  return bytes;
-}
-
-/// The bricks of a slice that this rank samples.
-SlicePlan shareOf(const SlicePlan& slice, const FrameOptions& options) {
-  if (!options.ranks) return slice;
-  SlicePlan share{slice.plane, {}, slice.complete};
-  for (size_t n = options.ranks->rank(); n < slice.parts.size(); n += options.ranks->count())
-    share.parts.push_back(slice.parts[n]);
-  return share;
 }
 
 /// Waits for the painter's draws when a frame ends, however it ends: the next frame uses the same ring
@@ -133,7 +81,8 @@ FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scala
       coloured_by_(scalars.colour ? std::optional(scalars.colour->variable) : std::nullopt),
       planner_(planner),
       backend_(std::move(backend)),
-      painting_(backend_.get()) {}
+      painting_(backend_.get()),
+      layers_(cache, scalars, planner) {}
 
 FramePipeline::~FramePipeline() {
   endPrefetch();
@@ -144,7 +93,7 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
   const FrameBudget::Fixed fixed{planner_.bytes(),
                                  least_pager_bytes_,
                                  backend_->bytes(options.size, {.threads = options.threads}) +
-                                     sceneBytes(options) + exchange_bytes + aside_bytes_,
+                                     LayerDrawer::bytes(options) + exchange_bytes + aside_bytes_,
                                  options.output_bytes,
                                  planner_.mostSplats(),
                                  options.size,
@@ -200,7 +149,7 @@ Image FramePipeline::drawBy(PaintingBackend& painter, const FramePlan& plan, con
 
 void FramePipeline::release() {
   endPrefetch();
-  surface_memory_ = {};
+  layers_.release();
   dropPools();
 }
 
@@ -292,98 +241,8 @@ uint64_t FramePipeline::exchangeBytes(const FrameOptions& options) const {
 }
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
-  if (!options.scene || (options.scene->empty() && options.scene->volume)) {
-    surface_memory_ = {};
-    return;
-  }
-  const ScreenView& view = plan.settings.view;
-  const auto samplerOf = [&](const SlicePlan& slice, size_t variable) {
-    const VariableInfo& info = cache_.manifest().variables[variable];
-    return std::make_unique<SliceSampler>(view, slice.plane, info.min, info.max, plan.settings.borders);
-  };
-  std::vector<std::unique_ptr<SliceSampler>> samplers, of_opacity;
-  for (const SlicePlan& slice : plan.slices) {
-    samplers.push_back(samplerOf(slice, coloured_by_.value_or(variable_)));
-    if (coloured_by_ && options.scene->slices_by_function) of_opacity.push_back(samplerOf(slice, variable_));
-    if (!samplers.back()->isSeen()) continue;
-    SliceSampler* const opacities = of_opacity.empty() ? nullptr : of_opacity.back().get();
-    const SlicePlan share = shareOf(slice, options);
-    const auto take = [&](size_t, const glm::dvec3& cell_min, const BrickSource::Splats& splats) {
-      samplers.back()->add(cell_min, splats.geometry, splats.second.value_or(splats.values), splats.ranges);
-      if (opacities) opacities->add(cell_min, splats.geometry, splats.values, splats.ranges);
-    };
-    sample({cache_, share.parts, take, options.keep_going}, options, statistics);
-    if (!options.ranks) continue;
-    samplers.back()->addOthers(*options.ranks);
-    if (opacities) opacities->addOthers(*options.ranks);
-  }
-  const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
-  const double depth_origin = view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
-  std::optional<ColourTable> opacities;
-  if (options.scene->usesOpacities()) opacities.emplace(planner_.transferFunction());
-  const auto isosurfaces =
-      this->isosurfaces(plan, options, {depth_origin, opacities ? &*opacities : nullptr}, statistics);
-  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
-  const SceneLook look{planner_.colours(),
-                       options.light,
-                       plan.settings.clip_planes,
-                       depth_origin,
-                       opacities ? &*opacities : nullptr,
-                       of_opacity,
-                       isosurfaces ? &*isosurfaces : nullptr};
-  std::shared_ptr<const PixelLayers> layers;
-  arenaOf(options).execute([&] {
-    const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
-    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, &surface_memory_));
-  });
-  planner_.addLayers(plan, std::move(layers), options);
-}
-
-/// A part of the picture after the other, each as large as its splats fit into the memory. A tile of 32x32 pixels is
-/// the smallest.
-std::optional<IsoLayers> FramePipeline::isosurfaces(const FramePlan& plan, const FrameOptions& options,
-                                                    const IsoInput& input, FrameStatistics& statistics) {
-  if (options.scene->isovalues.empty()) return std::nullopt;
-  const ProjectionSettings& settings = plan.settings;
-  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
-  const SheetOpacity& opacity = options.scene->iso_opacity;
-  const IsoLayers::Look look{planner_.colours(),
-                             options.light,
-                             {opacity.factor, opacity.by_function ? input.opacities : nullptr, of_colours},
-                             coloured_by_ && !of_colours};
-  IsoLayers layers(settings.view.size);
-  std::vector<TileRange> left{{0, layers.tiles()}};
-  while (!left.empty()) {
-    const TileRange tiles = left.back();
-    left.pop_back();
-    IsoSplats splats({settings.view, options.scene->isovalues, settings.borders, settings.clip_planes,
-                      input.depth_origin, tiles, isoSplatBytes(options)},
-                     plan.iso_parts.size());
-    const auto take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& of_part) {
-      const auto& values = of_colours ? *of_part.second : of_part.values;
-      const auto* const second = of_part.second ? &*of_part.second : nullptr;
-      splats.add(part, cell_min, of_part.geometry, values, of_colours ? &of_part.values : second,
-                 of_part.ranges);
-    };
-    sample({cache_, plan.iso_parts, take, options.keep_going}, options, statistics);
-    if (splats.overflowed()) {
-      if (tiles.count() == 1)
-        throw UsageError(
-            "isosurfaces: too many splats in {0}x{0} pixels (they need more than their {1} KiB of --memory); "
-            "increase --memory or --lod-pixels",
-            kTileSide, isoSplatBytes(options) >> 10);
-      const size_t middle = (tiles.begin + tiles.end) / 2;
-      left.push_back({middle, tiles.end});
-      left.push_back({tiles.begin, middle});
-      continue;
-    }
-    const StageTimer timer(statistics.surfaces_s, "draw isosurfaces");
-    arenaOf(options).execute([&] {
-      splats.sort();
-      layers.draw(splats, look, isoTracerBytes(options));
-    });
-  }
-  return layers;
+  layers_.draw(
+      plan, options, [&](const SamplingWork& work) { sample(work, options, statistics); }, statistics);
 }
 
 void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options,

@@ -27,11 +27,8 @@
 #include "render/frame/frame_regions.h"
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
+#include "render/frame/layer_drawer.h"
 #include "render/frame/splat_exchange.h"
-#include "render/surface/face_meshes.h"
-#include "render/surface/iso_layers.h"
-#include "render/surface/scene_triangles.h"
-#include "render/surface/slice_sampler.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
 #include "stream/base/progress.h"
@@ -87,12 +84,6 @@ class FramePipeline {
   struct Pools;
 
   void sample(const SamplingWork& work, const FrameOptions& options, FrameStatistics& statistics);
-  struct IsoInput {
-    double depth_origin;
-    const ColourTable* opacities;  // of the picture's function; null: not needed
-  };
-  std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
-                                       const IsoInput& input, FrameStatistics& statistics);
   bool sweepNext(const FramePlan& plan, const FrameOptions& options);
   bool startSlab(const FramePlan& plan, const FrameRegion* region, const FrameOptions& options);
   bool nextSlab(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
@@ -115,8 +106,7 @@ class FramePipeline {
   PaintingBackend* painting_;  // backend_, except in drawBy()
   uint64_t aside_bytes_ = 0;
   HiddenBricks hidden_;
-  FaceMeshes face_meshes_;
-  ScreenVertices surface_memory_;            // of the last picture's surfaces, for the next one's
+  LayerDrawer layers_;
   std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn

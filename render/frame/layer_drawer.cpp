@@ -1,0 +1,167 @@
+#include "render/frame/layer_drawer.h"
+
+#include <tbb/info.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "render/frame/frame_workers.h"
+#include "render/surface/scene_layers.h"
+#include "render/surface/slice_sampler.h"
+#include "stream/base/error.h"
+#include "stream/base/stage_timer.h"
+#include "stream/base/thread_count.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
+
+/// What the splats of isosurfaces may take; where it is too little they are found in several parts of the picture.
+uint64_t isoSplatBytes(const FrameOptions& options) {
+  constexpr uint64_t kMinBytes = 4 << 20;
+  return std::max(kMinBytes, options.memory_bytes / 8);
+}
+
+/// What finding where rays meet them may take; where it is too little fewer threads do.
+uint64_t isoTracerBytes(const FrameOptions& options) {
+  constexpr uint64_t kTracerBytes = 2 << 20;
+  return std::max(kTracerBytes * threadsOrCores(options.threads), options.memory_bytes / 16);
+}
+
+tbb::task_arena arenaOf(const FrameOptions& options) {
+  return tbb::task_arena(
+      std::min(static_cast<int>(threadsOrCores(options.threads)), tbb::info::default_concurrency()));
+}
+
+/// The bricks of a slice that this rank samples.
+SlicePlan shareOf(const SlicePlan& slice, const FrameOptions& options) {
+  if (!options.ranks) return slice;
+  SlicePlan share{slice.plane, {}, slice.complete};
+  for (size_t n = options.ranks->rank(); n < slice.parts.size(); n += options.ranks->count())
+    share.parts.push_back(slice.parts[n]);
+  return share;
+}
+
+}  // namespace
+
+uint64_t LayerDrawer::bytes(const FrameOptions& options) {
+  if (!options.scene || options.scene->empty()) return 0;
+  const uint64_t slice_bytes = options.scene->slices_by_function ? 144 : 72;  // of two scalars
+  const auto is_translucent = [](const auto& surface) { return !surface.opacity.opaque(); };
+  const bool peels =
+      std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
+      std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
+  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8;
+  uint64_t bytes =
+      kSampleTileBytes * (peels ? PixelLayers::kMaxLayers : 1) * threadsOrCores(options.threads) +
+      options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
+  for (const Surface& surface : options.scene->surfaces)
+    bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
+             kTriangleBytes * surface.mesh->triangles.size();
+  if (!options.scene->isovalues.empty())
+    bytes += isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels();
+  if (!options.scene->grid_surfaces.empty())
+    bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
+  return bytes;
+}
+
+void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sample& sample,
+                       FrameStatistics& statistics) {
+  if (!options.scene || (options.scene->empty() && options.scene->volume)) {
+    surface_memory_ = {};
+    return;
+  }
+  const ScreenView& view = plan.settings.view;
+  const auto samplerOf = [&](const SlicePlan& slice, size_t variable) {
+    const VariableInfo& info = cache_.manifest().variables[variable];
+    return std::make_unique<SliceSampler>(view, slice.plane, info.min, info.max, plan.settings.borders);
+  };
+  std::vector<std::unique_ptr<SliceSampler>> samplers, of_opacity;
+  for (const SlicePlan& slice : plan.slices) {
+    samplers.push_back(samplerOf(slice, coloured_by_.value_or(variable_)));
+    if (coloured_by_ && options.scene->slices_by_function) of_opacity.push_back(samplerOf(slice, variable_));
+    if (!samplers.back()->isSeen()) continue;
+    SliceSampler* const opacities = of_opacity.empty() ? nullptr : of_opacity.back().get();
+    const SlicePlan share = shareOf(slice, options);
+    const auto take = [&](size_t, const glm::dvec3& cell_min, const BrickSource::Splats& splats) {
+      samplers.back()->add(cell_min, splats.geometry, splats.second.value_or(splats.values), splats.ranges);
+      if (opacities) opacities->add(cell_min, splats.geometry, splats.values, splats.ranges);
+    };
+    sample({cache_, share.parts, take, options.keep_going});
+    if (!options.ranks) continue;
+    samplers.back()->addOthers(*options.ranks);
+    if (opacities) opacities->addOthers(*options.ranks);
+  }
+  const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
+  const double depth_origin = view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
+  std::optional<ColourTable> opacities;
+  if (options.scene->usesOpacities()) opacities.emplace(planner_.transferFunction());
+  const auto isosurfaces =
+      this->isosurfaces(plan, options, {sample, depth_origin, opacities ? &*opacities : nullptr}, statistics);
+  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
+  const SceneLook look{planner_.colours(),
+                       options.light,
+                       plan.settings.clip_planes,
+                       depth_origin,
+                       opacities ? &*opacities : nullptr,
+                       of_opacity,
+                       isosurfaces ? &*isosurfaces : nullptr};
+  std::shared_ptr<const PixelLayers> layers;
+  arenaOf(options).execute([&] {
+    const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
+    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, &surface_memory_));
+  });
+  planner_.addLayers(plan, std::move(layers), options);
+}
+
+/// A part of the picture after the other, each as large as its splats fit into the memory. A tile of 32x32 pixels is
+/// the smallest.
+std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const FrameOptions& options,
+                                                  const IsoInput& input, FrameStatistics& statistics) const {
+  if (options.scene->isovalues.empty()) return std::nullopt;
+  const ProjectionSettings& settings = plan.settings;
+  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
+  const SheetOpacity& opacity = options.scene->iso_opacity;
+  const IsoLayers::Look look{planner_.colours(),
+                             options.light,
+                             {opacity.factor, opacity.by_function ? input.opacities : nullptr, of_colours},
+                             coloured_by_ && !of_colours};
+  IsoLayers layers(settings.view.size);
+  std::vector<TileRange> left{{0, layers.tiles()}};
+  while (!left.empty()) {
+    const TileRange tiles = left.back();
+    left.pop_back();
+    IsoSplats splats({settings.view, options.scene->isovalues, settings.borders, settings.clip_planes,
+                      input.depth_origin, tiles, isoSplatBytes(options)},
+                     plan.iso_parts.size());
+    const auto take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& of_part) {
+      const auto& values = of_colours ? *of_part.second : of_part.values;
+      const auto* const second = of_part.second ? &*of_part.second : nullptr;
+      splats.add(part, cell_min, of_part.geometry, values, of_colours ? &of_part.values : second,
+                 of_part.ranges);
+    };
+    input.sample({cache_, plan.iso_parts, take, options.keep_going});
+    if (splats.overflowed()) {
+      if (tiles.count() == 1)
+        throw UsageError(
+            "isosurfaces: too many splats in {0}x{0} pixels (they need more than their {1} KiB of --memory); "
+            "increase --memory or --lod-pixels",
+            kTileSide, isoSplatBytes(options) >> 10);
+      const size_t middle = (tiles.begin + tiles.end) / 2;
+      left.push_back({middle, tiles.end});
+      left.push_back({tiles.begin, middle});
+      continue;
+    }
+    const StageTimer timer(statistics.surfaces_s, "draw isosurfaces");
+    arenaOf(options).execute([&] {
+      splats.sort();
+      layers.draw(splats, look, isoTracerBytes(options));
+    });
+  }
+  return layers;
+}
+
+}  // namespace curvisplat
