@@ -39,11 +39,10 @@ std::optional<SlantedBox> slantedBoxOf(const GridBlock& block, const NodeArrays&
     if (nodes.blank[n]) return std::nullopt;
     corner[c] = position(n);
   }
-  std::vector<glm::dvec3> positions;
-  positions.reserve(nodes.x.size());
-  for (size_t n = 0; n < nodes.x.size(); ++n)
-    if (!nodes.blank[n]) positions.push_back(position(n));
-  return SlantedBox(corner, positions);
+  return SlantedBox(corner, [&](const auto& visit) {
+    for (size_t n = 0; n < nodes.x.size(); ++n)
+      if (!nodes.blank[n]) visit(position(n));
+  });
 }
 
 bool hasCells(const GridBlock& block) {

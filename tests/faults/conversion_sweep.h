@@ -1,5 +1,5 @@
-// Conversion, and the addition of a scalar and of time steps, as jobs of a FaultSweep: what is there afterwards is whole or no cache, and
-// nothing else is left.
+// Jobs of a FaultSweep: conversion, and the addition of a scalar and of time steps. Each must leave a complete cache or none, and
+// no other file.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -94,9 +94,10 @@ TEST(BoxTree, HoldsWhatBothOfItsBoxesHold) {
   EXPECT_FALSE(holds({0.5, 0.1, 0.5}));  // in the axis-parallel box
   EXPECT_FALSE(holds({0, 0.1, 1.5}));
   // Of more nodes than the corners.
-  std::vector<glm::dvec3> nodes(corner.begin(), corner.end());
-  nodes.emplace_back(0.5, 0.05, 0.5);
-  turned.slanted = SlantedBox(corner, nodes);
+  turned.slanted = SlantedBox(corner, [&](const auto& visit) {
+    for (const glm::dvec3& node : corner) visit(node);
+    visit({0.5, 0.05, 0.5});
+  });
   EXPECT_TRUE(holds({0.5, 0.1, 0.5}));
   EXPECT_FALSE(holds({-0.5, 0.1, 0.5}));
 }

@@ -6,8 +6,8 @@ import shutil
 import subprocess
 
 # Counts calls that write, sync, rename, make or open for writing what is below a folder, from 1 on; the one at `at`, or all from
-# there on, fail. A full disk (ENOSPC) opens what is there already. Syncing does nothing: nobody pulls the plug, and it takes its time. A process is told by faults_begin(), or by its
-# environment: FAULTS_FOLDER, FAULTS_AT, FAULTS_ON (1: from there on), FAULTS_ERROR; it appends to FAULTS_REPORT how many failed.
+# there on, fail. A full disk (ENOSPC) opens what is there already. Syncing does nothing, to save time. A process is told by
+# faults_begin(), or by its environment: FAULTS_FOLDER, FAULTS_AT, FAULTS_ON (1: from there on), FAULTS_ERROR; it appends to FAULTS_REPORT how many failed.
 SOURCE = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
