@@ -14,6 +14,7 @@
 #include "stream/base/error.h"
 #include "stream/base/freed_memory.h"
 #include "stream/base/interrupted.h"
+#include "stream/base/spare_memory.h"
 #include "stream/base/stage_timer.h"
 #include "stream/base/thread_count.h"
 #include "stream/base/trace.h"
@@ -119,6 +120,7 @@ void FramePipeline::makePools(const FrameOptions& options) {
   permits_ = std::make_unique<ComputePermits>(threadsOf(options));
   auto fresh = std::make_unique<Pools>(cache_, BrickSource::Variables(variable_, coloured_by_), budget, pager,
                                        backend_->splatMemory(budget.ring_splats), *permits_);
+  requireSpareMemory();
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
 }

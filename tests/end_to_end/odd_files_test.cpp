@@ -18,6 +18,7 @@
 #include "tests/support/cube_files.h"
 #include "tests/support/fault_sweep.h"
 #include "tests/support/run_program.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -204,20 +205,23 @@ TEST_F(OddFiles, WithoutProcItWorksAndStatisticsLackMemory) {
   EXPECT_EQ(drawn["frames"].size(), 1u);
 }
 
+/// Runs the program in `folder` with so much address space.
+ProgramResult runWithin(const TemporaryFolder& folder, const std::string& command, int kibibytes) {
+  const std::string limited = "cd '" + folder.path().string() + "' && ulimit -v " +
+                              std::to_string(kibibytes) + " && exec " CURVISPLAT_PROGRAM " ";
+  return RunningProgram({"bash", "-c", limited + command}, "/usr/bin/env").wait();
+}
+
 // Address space for the libraries but not for threads' stacks, whatever of both this system needs.
 TEST_F(OddFiles, WithoutThreadsItEndsWithOneLine) {
-  const auto within = [&](const std::string& command, int mebibytes) {
-    const std::string limited = "cd '" + folder_.path().string() + "' && ulimit -v " +
-                                std::to_string(1024 * mebibytes) + " && exec " CURVISPLAT_PROGRAM " ";
-    return RunningProgram({"bash", "-c", limited + command}, "/usr/bin/env").wait();
-  };
+  if (kIsSanitized) GTEST_SKIP() << "sanitizers take more address space than there is";
   constexpr int kNotLoaded = 127;
   for (const char* command :
        {"--version", "info cube.splats", "info cube.xyz cube.fun", "convert cube.xyz cube.fun -o b.splats",
         "render cube.splats -o b.png --size 64x64 --memory 256M"}) {
     bool succeeded = false;
     for (int mebibytes = 100; mebibytes < 700 && !succeeded; mebibytes += 20) {
-      const ProgramResult result = within(command, mebibytes);
+      const ProgramResult result = runWithin(folder_, command, 1024 * mebibytes);
       if (result.status == kNotLoaded) continue;
       succeeded = result.status == 0;
       EXPECT_TRUE(result.status <= 1)
@@ -229,6 +233,23 @@ TEST_F(OddFiles, WithoutThreadsItEndsWithOneLine) {
     }
     fs::remove_all(file("b.splats"));
     EXPECT_TRUE(succeeded || std::string(command) != "--version");
+  }
+}
+
+// Just below what suffices, the buffers of a frame fit and leave nothing for what glibc allocates when a thread begins.
+TEST_F(OddFiles, AFrameWhoseBuffersJustFitEndsWithOneLine) {
+  if (kIsSanitized) GTEST_SKIP() << "sanitizers take more address space than there is";
+  const std::string command = "render cube.splats -o b.png --size 64x64 --memory 256M";
+  int refused = 100 << 10, sufficient = 2 << 20;  // KiB
+  while (sufficient - refused > 1024) {
+    const int middle = (refused + sufficient) / 2;
+    (runWithin(folder_, command, middle).status == 0 ? sufficient : refused) = middle;
+  }
+  for (int n = 0; n < 16; ++n) {
+    const int limit = sufficient - 347 * n;
+    const ProgramResult result = runWithin(folder_, command, limit);
+    EXPECT_LE(result.status, 1) << limit << " KiB: " << result.err;
+    EXPECT_TRUE(result.status == 0 || lineCount(result.err) == 1) << limit << " KiB: " << result.err;
   }
 }
 

@@ -13,6 +13,7 @@
 #include "stream/base/file.h"
 #include "tests/support/lattice_cache.h"
 #include "tests/support/run_program.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/sparse_cache.h"
 #include "tests/support/temporary_folder.h"
 
@@ -71,9 +72,7 @@ TEST_F(SparseCache, IsDrawnAsTheLatticeWithinItsMemory) {
     ASSERT_FALSE(sparse.picture.empty());
     EXPECT_EQ(sparse.statistics["frames"][0]["bricks_drawn"], bricks);
     EXPECT_TRUE(sparse.picture == draw(file("lattice.splats"), {"--lod-pixels", lod_pixels}).picture);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-    EXPECT_LE(sparse.statistics["peak_memory_bytes"], kMaxMemoryBytes);
-#endif
+    if (!kIsSanitized) EXPECT_LE(sparse.statistics["peak_memory_bytes"], kMaxMemoryBytes);
   }
 }
 

@@ -23,6 +23,7 @@
 #include "tests/stream/test_bricks.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/run_program.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -37,13 +38,10 @@ constexpr uint64_t kMax64 = std::numeric_limits<uint64_t>::max();
 /// most are libraries and threads' stacks, and less than the caches here ask for. Sanitizers need more than
 /// there are.
 ProgramResult runWithLittleMemory(std::vector<std::string> arguments) {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  if (kIsSanitized) return runProgram(arguments);
   std::vector<std::string> words{"-c", "ulimit -v 2097152; exec \"$0\" \"$@\"", CURVISPLAT_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
   return RunningProgram(words, "/bin/sh").wait();
-#else
-  return runProgram(arguments);
-#endif
 }
 
 /// A small cache, taken apart: a root, eight cells below it, leaves below them. One scalar.

@@ -29,13 +29,13 @@ signals=handle_segv=2:handle_abort=2:handle_sigbus=2:handle_sigfpe=2:handle_sigi
 export ASAN_OPTIONS=allocator_may_return_null=0:max_allocation_size_mb=512:detect_leaks=1:$signals:${ASAN_OPTIONS:-}
 export LSAN_OPTIONS=print_suppressions=0:${LSAN_OPTIONS:-}
 
-# Ends process $1 in order once it has used $2 seconds of processor time: by the clock, a run is cut short by whoever else has the
-# machine, and by a pause.
+# Ends process $1 in order once it has used $2 seconds of processor time, with the processes that it has waited for: by the clock, a
+# run is cut short by whoever else has the machine, and by a pause.
 end_after() {
   local ticks stat
   ticks=$(getconf CLK_TCK)
   while stat=$(cat "/proc/$1/stat" 2>/dev/null); do
-    if awk -v ticks="$ticks" -v all="$2" '{ exit !($14 + $15 >= all * ticks) }' <<<"$stat"; then
+    if awk -v ticks="$ticks" -v all="$2" '{ exit !($14 + $15 + $16 + $17 >= all * ticks) }' <<<"$stat"; then
       kill -USR1 "$1"
       return
     fi

@@ -17,6 +17,7 @@
 #include "stream/base/file.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/all_nodes.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/vts_writer.h"
 
 namespace curvisplat {
@@ -32,20 +33,15 @@ constexpr uint64_t kMaxRows = 4096;
 class MemoryLimit {
  public:
   MemoryLimit() {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
     ::getrlimit(RLIMIT_AS, &before_);
+    if (kIsSanitized) return;
     uint64_t pages = 0;
     std::ifstream("/proc/self/statm") >> pages;
     rlimit limit = before_;
     limit.rlim_cur = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMoreMemory;
     ::setrlimit(RLIMIT_AS, &limit);
-#endif
   }
-  ~MemoryLimit() {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-    ::setrlimit(RLIMIT_AS, &before_);
-#endif
-  }
+  ~MemoryLimit() { ::setrlimit(RLIMIT_AS, &before_); }
   MemoryLimit(const MemoryLimit&) = delete;
   MemoryLimit& operator=(const MemoryLimit&) = delete;
 

@@ -19,6 +19,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -130,13 +131,13 @@ Content contentOf(const GridSource& source) {
   for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGILL}) std::signal(number, onCrash);
   std::signal(SIGALRM, SIG_DFL);
   ::alarm(kHangSeconds);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  uint64_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  const rlim_t limit = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMoreMemory;
-  const rlimit memory{limit, limit};
-  ::setrlimit(RLIMIT_AS, &memory);
-#endif
+  if (!kIsSanitized) {
+    uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const rlim_t limit = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMoreMemory;
+    const rlimit memory{limit, limit};
+    ::setrlimit(RLIMIT_AS, &memory);
+  }
   int ending = kOtherException;
   try {
     ending = contentOf(*open(file)) == whole ? kSame : kChanged;

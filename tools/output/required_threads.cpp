@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
+#include <new>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -11,6 +13,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
+#include "stream/base/spare_memory.h"
 #include "stream/base/thread_count.h"
 
 namespace curvisplat {
@@ -34,8 +37,11 @@ void tryThreads(unsigned count, const std::string& hint) {
         MutexLock lock(mutex);
         while (!ending) changed.wait(lock);
       });
+    requireSpareMemory();
   } catch (const std::system_error& failure) {
     error = failure.code().value();
+  } catch (const std::bad_alloc&) {
+    error = ENOMEM;
   }
   {
     const MutexLock lock(mutex);

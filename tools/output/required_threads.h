@@ -7,9 +7,9 @@
 
 namespace curvisplat {
 
-/// Throws Error if this process cannot have the threads of a command with `--threads count` (0: one per core) now. To be called
-/// before anything is written. `option`: what the user calls it. Starts and ends each of them, at most 68: some 20 microseconds
-/// a thread. Any thread.
+/// Throws Error if this process cannot have the threads of a command with `--threads count` (0: one per core) now, or if there is
+/// too little memory for them to begin. To be called before anything is written. `option`: what the user calls it. Starts and ends
+/// each of them, at most 68: some 20 microseconds a thread. Any thread.
 void requireThreads(unsigned count, std::string_view option = "--threads");
 /// The same for a command without such an option.
 void requireThreads();
