@@ -20,7 +20,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kNoChunk = UINT64_MAX;
+constexpr uint64_t kNoChunk = BucketChains::kNoChunk;
 
 struct ChunkHeader {
   uint64_t checksum;
@@ -143,8 +143,8 @@ class ChunkWriter {
 struct Bucket {
   mutable Mutex mutex;
   ChunkBuffer buffer GUARDED_BY(mutex);  // a chunk in the making, header first; empty: none
-  uint64_t last_chunk GUARDED_BY(mutex) = kNoChunk;
-  uint64_t bytes GUARDED_BY(mutex) = 0;
+  BucketChains::OfBucket chains GUARDED_BY(mutex);
+  size_t next_chain GUARDED_BY(mutex) = 0;
 };
 
 }  // namespace
@@ -164,10 +164,7 @@ struct BucketFile::State {
         buckets(chains.chains.size()),
         end(chains.size),
         is_foreign(true) {
-    for (size_t n = 0; n < buckets.size(); ++n) {
-      buckets[n].last_chunk = chains.chains[n].last_chunk;
-      buckets[n].bytes = chains.chains[n].bytes;
-    }
+    for (size_t n = 0; n < buckets.size(); ++n) buckets[n].chains = chains.chains[n];
   }
 
   const std::filesystem::path path;
@@ -182,28 +179,30 @@ struct BucketFile::State {
   bool leave = false;
 
   void flush(Bucket& bucket) REQUIRES(bucket.mutex) {
-    const ChunkHeader header{0, bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
+    uint64_t& last_chunk = bucket.chains.last_chunks[bucket.next_chain++ % BucketChains::kCount];
+    const ChunkHeader header{0, last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
     std::memcpy(bucket.buffer.data(), &header, sizeof header);
     const size_t pages = (bucket.buffer.size() + kDirectAlignment - 1) / kDirectAlignment;
     bucket.buffer.resize(pages * kDirectAlignment);
-    bucket.last_chunk = end.fetch_add(bucket.buffer.size());
-    bucket.bytes += header.bytes;
-    writer->write({bucket.last_chunk, std::move(bucket.buffer)});
+    last_chunk = end.fetch_add(bucket.buffer.size());
+    bucket.chains.bytes += header.bytes;
+    writer->write({last_chunk, std::move(bucket.buffer)});
     bucket.buffer = {};
   }
 
-  uint64_t lastChunk(uint32_t number) const {
+  BucketChains::OfBucket chainsOf(uint32_t number) const {
     const Bucket& bucket = buckets[number];
     const MutexLock lock(bucket.mutex);
-    return bucket.last_chunk;
+    return bucket.chains;
   }
 
-  /// Calls use(records) for each chunk.
+  /// Calls use(records) for each chunk of a chain.
   template <typename Use>
-  void forEachChunk(uint32_t number, Use use) const {
+  void forEachChunk(uint32_t number, size_t chain, Use use) const {
     CURVISPLAT_CHECK(input.has_value());
+    uint64_t at = chainsOf(number).last_chunks[chain];
+    if (at == kNoChunk) return;
     ChunkBuffer chunk(chunk_bytes);
-    uint64_t at = lastChunk(number);
     while (at != kNoChunk) {
       // The next chunk's beginning comes along with a short one.
       const std::span<std::byte> whole = std::span(chunk).first(std::min<uint64_t>(chunk_bytes, end - at));
@@ -263,10 +262,7 @@ void BucketFile::leave() {
 
 BucketChains BucketFile::chains() const {
   BucketChains chains{state_->chunk_bytes, state_->end, {}};
-  for (const Bucket& bucket : state_->buckets) {
-    const MutexLock lock(bucket.mutex);
-    chains.chains.push_back({bucket.last_chunk, bucket.bytes});
-  }
+  for (uint32_t n = 0; n < buckets(); ++n) chains.chains.push_back(state_->chainsOf(n));
   return chains;
 }
 
@@ -310,11 +306,9 @@ void BucketFile::close(bool sync) {
 }
 
 uint64_t BucketFile::bytes(uint32_t bucket) const {
-  const Bucket& of_number = state_->buckets[bucket];
-  uint64_t bytes = 0;
+  uint64_t bytes = state_->chainsOf(bucket).bytes;
   for (const auto& other : state_->joined) bytes += other->bytes(bucket);
-  const MutexLock lock(of_number.mutex);
-  return bytes + of_number.bytes;
+  return bytes;
 }
 
 uint64_t BucketFile::size() const {
@@ -337,8 +331,13 @@ void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
 
 void BucketFile::forEachChunk(uint32_t bucket,
                               const std::function<void(std::span<const std::byte>)>& use) const {
-  state_->forEachChunk(bucket, use);
-  for (const auto& other : state_->joined) other->forEachChunk(bucket, use);
+  for (size_t chain = 0; chain < BucketChains::kCount; ++chain) forEachChunk(bucket, chain, use);
+}
+
+void BucketFile::forEachChunk(uint32_t bucket, size_t chain,
+                              const std::function<void(std::span<const std::byte>)>& use) const {
+  state_->forEachChunk(bucket, chain, use);
+  for (const auto& other : state_->joined) other->forEachChunk(bucket, chain, use);
 }
 
 }  // namespace curvisplat

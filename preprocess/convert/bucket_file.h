@@ -1,9 +1,9 @@
-// The temporary data of conversion: one file, in which each bucket's records form a chain of chunks. A chunk
+// The temporary data of conversion: one file, in which each bucket's records form four chains of chunks. A chunk
 // is what one bucket's buffer held when it was full, so writes are large whatever order the splats come in,
-// and the memory of a bucket is its buffer and one offset.
+// and the memory of a bucket is its buffer and four offsets. Chains are equally long, so that as many threads can read a bucket.
 //
 //    chunk:  checksum of what follows                           uint64
-//            offset of the bucket's chunk before, or kNoChunk   uint64
+//            offset of its chain's chunk before, or kNoChunk    uint64
 //            bytes of records that follow                       uint64
 //            whole records
 //            zeros up to a multiple of kDirectAlignment
@@ -13,6 +13,7 @@
 // lost a part.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -33,12 +34,15 @@ class LostBuckets : public Error {
 
 /// What reading a file again takes, beside the file.
 struct BucketChains {
-  struct Chain {
-    uint64_t last_chunk = 0, bytes = 0;
+  static constexpr size_t kCount = 4;  // of a bucket
+  static constexpr uint64_t kNoChunk = UINT64_MAX;
+  struct OfBucket {
+    std::array<uint64_t, kCount> last_chunks{kNoChunk, kNoChunk, kNoChunk, kNoChunk};  // offsets
+    uint64_t bytes = 0;                                                                // of records
   };
   uint64_t chunk_bytes = 0;
-  uint64_t size = 0;          // of the file
-  std::vector<Chain> chains;  // [bucket]
+  uint64_t size = 0;             // of the file
+  std::vector<OfBucket> chains;  // [bucket]
 };
 
 class BucketFile {
@@ -77,8 +81,11 @@ class BucketFile {
   uint64_t bytes(uint32_t bucket) const;
   /// All records of a bucket; the order is not to be relied on. Overwrites `out` and keeps its capacity.
   void read(uint32_t bucket, std::vector<std::byte>& out) const;
-  /// The same, a chunk at a time.
+  /// The same, a chunk at a time, which is whole records.
   void forEachChunk(uint32_t bucket, const std::function<void(std::span<const std::byte>)>& use) const;
+  /// The same of one of its chains, 0 to BucketChains::kCount - 1.
+  void forEachChunk(uint32_t bucket, size_t chain,
+                    const std::function<void(std::span<const std::byte>)>& use) const;
 
   /// Bytes of the whole file.
   uint64_t size() const;

@@ -1,15 +1,19 @@
 // Loads the buckets of a temporary file, one ahead of the work, and groups each one's records by the cells
-// that are to be built.
+// that are to be built. Where many threads build, several load a bucket together: with 16, one alone would take longer than they do.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_tree.h"
 #include "preprocess/convert/build_cell.h"
 #include "preprocess/grid/read_ahead.h"
+#include "stream/base/unfilled_array.h"
+#include "stream/base/worker_team.h"
 
 namespace curvisplat {
 
@@ -26,12 +30,12 @@ struct LoadedBucket {
 
   uint32_t bucket = 0;
   bool too_large = false;  // has more records than allowed: nothing is loaded
-  std::vector<std::byte> bytes;
-  std::vector<uint32_t> places;  // of the records: RecordSpan's
-  std::vector<Part> parts;       // of `places`, in Morton order
+  UnfilledArray<std::byte> bytes;
+  UnfilledArray<uint32_t> places;  // of the records: RecordSpan's
+  std::vector<Part> parts;         // of `places`, in Morton order
 
   RecordSpan records(const Part& part) {
-    return {bytes.data(), std::span(places).subspan(part.begin, part.count)};
+    return {bytes.data(), places.span().subspan(part.begin, part.count)};
   }
 };
 
@@ -41,20 +45,27 @@ struct BucketRange {
 };
 
 /// Loads the buckets of a range that are not empty, in order. Ends after one that is too large, so that
-/// its division has the memory for itself. Two buckets of `most_bytes`, and 4 bytes a record
-/// of three, are in memory.
+/// its division has the memory for itself. In memory are two buckets of `most_bytes`, 4 bytes a record
+/// of three, and a chunk for each reader.
 /// Tree and file must not change meanwhile.
 class BucketLoader {
  public:
+  /// `readers`: threads that load a bucket, BucketChains::kCount at most. Fewer do if the system has no more.
   BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables, const BucketRange& range,
-               uint64_t most_bytes);
+               uint64_t most_bytes, unsigned readers);
+  ~BucketLoader();
 
   /// The next bucket, until the next call; null at the end. Throws Error if the disk fails.
   LoadedBucket* next() { return ahead_.next(); }
 
  private:
+  struct Reader;
+
   bool fill(LoadedBucket& loaded);
-  void group(LoadedBucket& loaded);
+  void read(LoadedBucket& loaded);
+  void sortParts(LoadedBucket& loaded);
+  void place(LoadedBucket& loaded);
+  void forEachReader(const std::function<void(Reader&, size_t)>& job);
 
   const BucketTree* tree_;
   const BucketFile* file_;
@@ -63,8 +74,12 @@ class BucketLoader {
   const uint32_t end_;
   const uint64_t most_bytes_;
   bool ended_ = false;
-  std::vector<uint32_t> tags_;  // [record]: 2 x its part, and 1 if it is irregular
-  ReadAhead<LoadedBucket> ahead_;
+  std::unique_ptr<WorkerTeam> team_;  // of all readers but the first, which is the thread that reads ahead
+  std::vector<Reader> readers_;
+  // By the record's place in the bucket over the least bytes of a record, which no two share: 2 x its part among its reader's, and 1
+  // if it is irregular.
+  UnfilledArray<uint32_t> tags_;
+  ReadAhead<LoadedBucket> ahead_;  // last: its thread uses the others
 };
 
 }  // namespace curvisplat

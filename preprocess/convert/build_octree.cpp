@@ -104,7 +104,7 @@ void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint3
   while (next < end) {
     bool too_large = false;
     {
-      BucketLoader loader(*tree_, file, variables_, {next, end}, plan_.bucket_bytes);
+      BucketLoader loader(*tree_, file, variables_, {next, end}, plan_.bucket_bytes, plan_.bucketReaders());
       next = end;
       while (LoadedBucket* loaded = loader.next()) {
         too_large = loaded->too_large;

@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 // To be raised when the journal, temporary files or the bricks of a grid change.
-constexpr int kJournalVersion = 5;
+constexpr int kJournalVersion = 6;
 constexpr uint64_t kLargestJournal = uint64_t{1} << 30;
 
 std::string checksumLine(const std::string& text) {
@@ -158,14 +158,20 @@ BucketTree treeOf(const JsonField& nodes, size_t buckets) {
 
 json jsonOf(const BucketChains& buckets) {
   json chains = json::array();
-  for (const BucketChains::Chain& chain : buckets.chains) chains.push_back({chain.last_chunk, chain.bytes});
+  for (const BucketChains::OfBucket& bucket : buckets.chains) {
+    json& row = chains.emplace_back(bucket.last_chunks);
+    row.push_back(bucket.bytes);
+  }
   return {{"chunk_bytes", buckets.chunk_bytes}, {"size", buckets.size}, {"chains", chains}};
 }
 
 BucketChains bucketsOf(const JsonField& from) {
   BucketChains buckets{from.at("chunk_bytes").count(), from.at("size").count(), {}};
-  for (const JsonField& chain : from.at("chains").elements())
-    buckets.chains.push_back({chain[0].count(), chain[1].count()});
+  for (const JsonField& row : from.at("chains").elements()) {
+    BucketChains::OfBucket& bucket = buckets.chains.emplace_back();
+    for (size_t n = 0; n < BucketChains::kCount; ++n) bucket.last_chunks[n] = row[n].count();
+    bucket.bytes = row[BucketChains::kCount].count();
+  }
   return buckets;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
 #include "stream/base/byte_text.h"
@@ -40,6 +41,15 @@ uint64_t brickScratchBytes(size_t variables) {
 /// Bytes for a splat of a bucket: its record, its place in two orders, and its encoded form.
 uint64_t bucketBytesPerSplat(size_t variables) {
   return regularRecordBytes(variables) + 2 * sizeof(uint32_t) + 12 + 10 * variables;
+}
+
+unsigned bucketReadersFor(unsigned threads) {
+  return std::min(threads, static_cast<unsigned>(BucketChains::kCount));
+}
+
+/// What the threads of build need beside the buckets. The first reader's chunk is the program's.
+uint64_t threadBytes(unsigned threads, size_t variables) {
+  return threads * brickScratchBytes(variables) + (bucketReadersFor(threads) - 1) * kMaxChunkBytes;
 }
 
 /// The index records that the writer of the cache holds, beyond the usual ones. They grow while bricks are appended: a vector
@@ -98,7 +108,7 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   const uint64_t least_buckets = 2 * kMinBucketSplats * bucketBytesPerSplat(variables);
   const uint64_t affordable = std::max<uint64_t>(1, (bytes - least_buckets) / (2 * scratch));
   plan.threads = static_cast<unsigned>(std::min<uint64_t>(std::max(1u, threads), affordable));
-  plan.bucket_splats = (bytes - plan.threads * scratch) / (2 * bucketBytesPerSplat(variables));
+  plan.bucket_splats = (bytes - threadBytes(plan.threads, variables)) / (2 * bucketBytesPerSplat(variables));
   // More makes nothing faster; and places in a bucket are of 32 bits.
   plan.bucket_splats = std::min<uint64_t>(
       {plan.bucket_splats, uint64_t{1} << 24, UINT32_MAX / irregularRecordBytes(variables)});
@@ -142,8 +152,8 @@ void MemoryPlan::requireFaces(uint64_t bytes) const {
 uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
   // Cells fill a bucket to three quarters, mostly; two are in memory.
   const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);
-  const uint64_t build = in_buckets * bucketBytesPerSplat(variables) +
-                         threads * brickScratchBytes(variables) + indexBytes(splats, variables);
+  const uint64_t build = in_buckets * bucketBytesPerSplat(variables) + threadBytes(threads, variables) +
+                         indexBytes(splats, variables);
   const uint64_t slabs = 2 * std::min(slab_bytes, splats * slabBytesPerNode(variables));
   const uint64_t buckets = 3 * splats / (2 * plannedBucketSplats()) + 1;
   const uint64_t scatter = slabs + std::min({chunk_buffer_bytes, splats * regularRecordBytes(variables),
@@ -172,12 +182,16 @@ void MemoryPlan::leaveIndex(uint64_t samples, size_t variables) {
         byteText(cap_bytes), samples, byteText(index), (capFor(least) >> 20) + 1);
   const uint64_t affordable = std::max<uint64_t>(1, (bytes - index - least_buckets) / (2 * scratch));
   threads = static_cast<unsigned>(std::min<uint64_t>(threads, affordable));
-  limitBuckets((bytes - index - threads * scratch) / a_splat, variables);
+  limitBuckets((bytes - index - threadBytes(threads, variables)) / a_splat, variables);
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
   bucket_splats = std::min(bucket_splats, splats);
   bucket_bytes = bucket_splats * regularRecordBytes(variables);
+}
+
+unsigned MemoryPlan::bucketReaders() const {
+  return bucketReadersFor(threads);
 }
 
 size_t MemoryPlan::chunkBytes(uint32_t buckets) const {

@@ -105,8 +105,10 @@ void sumContents(std::vector<CellContents>& contents, Ranks& ranks) {
 
 std::vector<BucketChains> gatherChains(const BucketChains& chains, Ranks& ranks) {
   std::vector<uint64_t> words{chains.chunk_bytes, chains.size};
-  for (const BucketChains::Chain& chain : chains.chains)
-    words.insert(words.end(), {chain.last_chunk, chain.bytes});
+  for (const BucketChains::OfBucket& bucket : chains.chains) {
+    words.insert(words.end(), bucket.last_chunks.begin(), bucket.last_chunks.end());
+    words.push_back(bucket.bytes);
+  }
   const std::vector<Ranks::Bytes> sent = ranks.gather(toBytes(words));
   std::vector<BucketChains> of_ranks;
   for (size_t n = 1; n < sent.size(); ++n) {
@@ -114,7 +116,11 @@ std::vector<BucketChains> gatherChains(const BucketChains& chains, Ranks& ranks)
     BucketChains& one = of_ranks.emplace_back();
     one.chunk_bytes = from[0];
     one.size = from[1];
-    for (size_t at = 2; at < from.size(); at += 2) one.chains.push_back({from[at], from[at + 1]});
+    for (size_t at = 2; at < from.size(); at += BucketChains::kCount + 1) {
+      BucketChains::OfBucket& bucket = one.chains.emplace_back();
+      std::copy_n(&from[at], BucketChains::kCount, bucket.last_chunks.begin());
+      bucket.bytes = from[at + BucketChains::kCount];
+    }
   }
   return of_ranks;
 }

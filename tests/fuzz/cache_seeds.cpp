@@ -219,7 +219,7 @@ void writeJournals(const Seeds& seeds) {
   std::vector<CellContents> contents(splats.tree.size());
   contents[leaves.front()].add({{1, 2, 3}});
   splats.tree.setContents(leaves, contents);
-  splats.buckets = {4096, 8192, {{0, 100}, {4096, 200}}};
+  splats.buckets = {4096, 8192, {{{0, 4096, UINT64_MAX, UINT64_MAX}, 100}, {{8192}, 200}}};
   splats.buckets.chains.resize(buckets);
   journal.splats = splats;
   write("scattered");

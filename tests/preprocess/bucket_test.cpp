@@ -3,12 +3,16 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <map>
+#include <memory>
 #include <random>
 #include <set>
 #include <string>
 
 #include "preprocess/convert/bucket_file.h"
+#include "preprocess/convert/bucket_loader.h"
 #include "preprocess/convert/bucket_tree.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_record.h"
@@ -117,6 +121,119 @@ TEST(BucketFile, GivesBackEachBucketsRecordsWhoeverWroteThem) {
     for (uint32_t n = bucket; n < kRecords && bucket != 3; n += kBuckets) expected.insert(n);
     EXPECT_EQ(found, expected);
     EXPECT_EQ(in_chunks, expected);
+  }
+}
+
+TEST(BucketFile, HasAllRecordsInChainsOfEqualLength) {
+  const TemporaryFolder folder;
+  BucketFile file(folder / "buckets.bin", 2, 4096);
+  std::vector<std::byte> record(4000);
+  for (int n = 0; n < 4 * 5; ++n) {
+    record[0] = static_cast<std::byte>(n);
+    file.append(1, record);
+  }
+  file.close();
+  std::set<int> found;
+  for (size_t chain = 0; chain < BucketChains::kCount; ++chain) {
+    int chunks = 0;
+    file.forEachChunk(1, chain, [&](std::span<const std::byte> chunk) {
+      found.insert(static_cast<int>(chunk[0]));
+      ++chunks;
+    });
+    EXPECT_EQ(chunks, 5);
+  }
+  EXPECT_EQ(found.size(), 20u);
+  file.forEachChunk(0, [](std::span<const std::byte>) { FAIL(); });
+}
+
+/// A tree of 64 leaves in buckets, and a file with random records of its cells.
+struct BucketsOfTree {
+  explicit BucketsOfTree(const TemporaryFolder& folder) : path(folder / "buckets.bin") {
+    tree.split(
+        0, [](const Cell& cell) { return cell.level < 2 ? 1000u : 10u; }, 100, 24);
+    const std::vector<uint32_t> leaves = tree.leavesBelow(0);
+    const uint32_t buckets = tree.assignBuckets(
+        leaves, [](uint32_t) { return 10u; }, 300);
+    file = std::make_unique<BucketFile>(path, buckets, 4096);
+    std::mt19937_64 random(7);
+    std::vector<CellContents> contents(tree.size());
+    std::vector<std::byte> record;
+    for (int n = 0; n < 20'000; ++n) {
+      NodeSplat splat = someSplat(random);
+      splat.regular = n % 3 != 0;
+      const RootPosition position{{random() >> 16, random() >> 16, random() >> 16}};
+      record.clear();
+      packRecord(splat, kValues, position, record);
+      const uint32_t leaf = tree.leafOf(position);
+      // More than a brick each, so that no leaves are built together.
+      contents[leaf].add(position);
+      contents[leaf].splats += kMaxBrickSplats;
+      file->append(tree[leaf].bucket, record);
+      expected[leaf].insert(splat.node);
+    }
+    file->close();
+    tree.setContents(leaves, contents);
+  }
+
+  static const inline std::vector<SplatScalar> kValues{{0.25, {1, 2, 3}, 0}};
+  const std::filesystem::path path;
+  BucketTree tree;
+  std::unique_ptr<BucketFile> file;
+  std::map<uint32_t, std::multiset<uint64_t>> expected;  // nodes by leaf
+};
+
+TEST(BucketLoader, GroupsAllRecordsByCellsForAnyNumberOfReaders) {
+  const TemporaryFolder folder;
+  BucketsOfTree buckets(folder);
+  ASSERT_GT(buckets.file->buckets(), 1u);
+  for (const unsigned readers : {1u, 2u, 3u, 4u}) {
+    SCOPED_TRACE(readers);
+    BucketLoader loader(buckets.tree, *buckets.file, 1, {0, buckets.file->buckets()}, 1 << 30, readers);
+    std::map<uint32_t, std::multiset<uint64_t>> found;
+    while (LoadedBucket* const loaded = loader.next()) {
+      size_t placed = 0;
+      for (size_t n = 0; n < loaded->parts.size(); ++n) {
+        const LoadedBucket::Part& part = loaded->parts[n];
+        EXPECT_EQ(part.begin, placed);
+        placed += part.count;
+        const RecordSpan records = loaded->records(part);
+        for (size_t r = 0; r < records.size(); ++r) {
+          EXPECT_EQ(buckets.tree.leafOf(recordPosition(records[r])), part.unit);
+          found[part.unit].insert(recordNode(records[r]));
+        }
+        if (n > 0) {
+          const auto first = [&](uint32_t unit) {
+            const Cell& cell = buckets.tree[unit].cell;
+            return Cell{2, cell.at};
+          };
+          EXPECT_TRUE(mortonLess(first(loaded->parts[n - 1].unit), first(part.unit)));
+        }
+      }
+      EXPECT_EQ(placed, loaded->places.size());
+    }
+    EXPECT_EQ(found, buckets.expected);
+  }
+}
+
+TEST(BucketLoader, ReportsDamageWhicheverReaderFindsIt) {
+  const TemporaryFolder folder;
+  const BucketsOfTree buckets(folder);
+  const BucketChains chains = buckets.file->chains();
+  for (const uint64_t chunk : chains.chains.front().last_chunks) {
+    ASSERT_NE(chunk, BucketChains::kNoChunk);
+    const auto change = [&] {
+      std::fstream file(buckets.path, std::ios::binary | std::ios::in | std::ios::out);
+      file.seekg(static_cast<std::streamoff>(chunk + 100));
+      const char changed = static_cast<char>(file.get() ^ 1);
+      file.seekp(static_cast<std::streamoff>(chunk + 100));
+      file.put(changed);
+    };
+    BucketFile foreign(buckets.path, chains);
+    foreign.leave();
+    change();
+    BucketLoader loader(buckets.tree, foreign, 1, {0, foreign.buckets()}, 1 << 30, 4);
+    EXPECT_THROW(while (loader.next()){}, LostBuckets);
+    change();
   }
 }
 
