@@ -27,7 +27,7 @@ esac
 [[ $form == plain ]] || export CURVISPLAT_SANITIZED=1
 export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
 export LSAN_OPTIONS=suppressions=$root/tests/lsan.supp:print_suppressions=0
-export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
+export UBSAN_OPTIONS=suppressions=$root/tests/ubsan.supp:halt_on_error=1:print_stacktrace=1
 export TSAN_OPTIONS=suppressions=$root/tests/tsan.supp:halt_on_error=1
 
 case $form in
