@@ -182,7 +182,8 @@ void dualMoments(const CellView& cell, size_t fields, DualScratch& scratch, std:
         of_middle[field] = 0.5 * (scratch.values[a * fields + field] + scratch.values[b * fields + field]);
       const Vertex m{0.5 * (scratch.at[a] + scratch.at[b]), of_middle};
       for (const size_t end : {a, b})
-        addPiece(volume, {scratch.at[end], &scratch.values[end * fields]}, m, f, fields, &out[end * stride]);
+        addPiece(volume, {scratch.at[end], scratch.values.data() + end * fields}, m, f, fields,
+                 &out[end * stride]);
     }
   }
 
