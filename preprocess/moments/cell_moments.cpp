@@ -214,15 +214,15 @@ CellBody bodyOf(const CellView& cell) {
   return bodyFrom(middle, sums);
 }
 
-CellBody bodyFrom(const glm::dvec3& middle, std::span<const double, 10> sums) {
+CellBody bodyFrom(const glm::dvec3& middle, std::span<const double, 10> moments) {
   CellBody body;
-  body.volume = sums[0];
+  body.volume = moments[0];
   body.centre = middle;
   if (!(body.volume > 0)) return body;
-  const glm::dvec3 mean(sums[1] / sums[0], sums[2] / sums[0], sums[3] / sums[0]);
+  const glm::dvec3 mean(moments[1] / moments[0], moments[2] / moments[0], moments[3] / moments[0]);
   body.centre += mean;
-  const auto covariance = [&](size_t sum, int i, int j) {
-    return 12 * (sums[sum] / sums[0] - mean[i] * mean[j]);
+  const auto covariance = [&](size_t number, int i, int j) {
+    return 12 * (moments[number] / moments[0] - mean[i] * mean[j]);
   };
   body.xx = covariance(4, 0, 0);
   body.xy = covariance(5, 0, 1);
