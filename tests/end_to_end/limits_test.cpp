@@ -74,7 +74,9 @@ std::unique_ptr<TemporaryFolder> LimitsTest::folder_;
 
 /// Sanitizers need memory of their own.
 void expectAtMost(uint64_t mebibytes, uint64_t peak_bytes) {
-  if (!kIsSanitized) EXPECT_LE(peak_bytes, mebibytes << 20);
+  if (!kIsSanitized) {
+    EXPECT_LE(peak_bytes, mebibytes << 20);
+  }
 }
 
 std::string mebibytes(uint64_t count) {
@@ -158,7 +160,9 @@ TEST_F(LimitsTest, TheLayoutOfAFileWithLongRowsIsFoundWithinTheMemory) {
   const ProgramResult result = runProgram(
       {"convert", grid, "--scalar", "none", "-o", file("none.splats"), "--memory", mebibytes(kMebibytes)});
   EXPECT_NE(result.err.find("no scalar 'none'"), std::string::npos) << result.err;
-  if (!kIsSanitized) EXPECT_LE(largestProgram(), std::max(before, kMebibytes));
+  if (!kIsSanitized) {
+    EXPECT_LE(largestProgram(), std::max(before, kMebibytes));
+  }
 }
 
 TEST_F(LimitsTest, AddingAScalarNamesTheLeastMemoryThatItTakes) {

@@ -72,7 +72,9 @@ TEST_F(SparseCache, IsDrawnAsTheLatticeWithinItsMemory) {
     ASSERT_FALSE(sparse.picture.empty());
     EXPECT_EQ(sparse.statistics["frames"][0]["bricks_drawn"], bricks);
     EXPECT_TRUE(sparse.picture == draw(file("lattice.splats"), {"--lod-pixels", lod_pixels}).picture);
-    if (!kIsSanitized) EXPECT_LE(sparse.statistics["peak_memory_bytes"], kMaxMemoryBytes);
+    if (!kIsSanitized) {
+      EXPECT_LE(sparse.statistics["peak_memory_bytes"], kMaxMemoryBytes);
+    }
   }
 }
 
