@@ -22,7 +22,6 @@ class UnitFinder {
       unit_ = buildUnitOf(*tree_, tree_->leafOf(position));
     return unit_;
   }
-  uint32_t unit() const { return unit_; }
 
  private:
   const BucketTree* tree_;
@@ -36,7 +35,7 @@ Cell firstDeepest(const Cell& cell) {
   return deepest;
 }
 
-/// Threads to read with, or none if the system has not so many.
+/// A team of `count` threads, or an empty one if the system cannot start them.
 std::unique_ptr<WorkerTeam> teamOf(unsigned count) {
   try {
     return std::make_unique<WorkerTeam>(count, "bucket-reader");

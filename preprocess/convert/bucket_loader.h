@@ -1,5 +1,5 @@
 // Loads the buckets of a temporary file, one ahead of the work, and groups each one's records by the cells
-// that are to be built. Where many threads build, several load a bucket together: with 16, one alone would take longer than they do.
+// that are to be built. Several threads load a bucket together: one alone would take longer than 16 take to build it.
 #pragma once
 
 #include <cstddef>
@@ -50,7 +50,7 @@ struct BucketRange {
 /// Tree and file must not change meanwhile.
 class BucketLoader {
  public:
-  /// `readers`: threads that load a bucket, BucketChains::kCount at most. Fewer do if the system has no more.
+  /// `readers`: threads that load a bucket, 1 to BucketChains::kCount. One does if the system cannot start the others.
   BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables, const BucketRange& range,
                uint64_t most_bytes, unsigned readers);
   ~BucketLoader();
