@@ -9,4 +9,8 @@ void returnFreedMemory(size_t large) {
   malloc_trim(0);
 }
 
+void allocateFromOneHeap() {
+  mallopt(M_ARENA_MAX, 1);
+}
+
 }  // namespace curvisplat

@@ -12,6 +12,11 @@ namespace curvisplat {
 /// For the whole process. `large`: bytes of a large block; the last call's holds. Any thread.
 void returnFreedMemory(size_t large = size_t{4} << 20);
 
+/// From now on all threads allocate from the first heap, for the whole process. To be called before other threads begin: those
+/// that have allocated keep the heaps that malloc has made for them, whose ends malloc_trim() does not return. A server whose three
+/// viewers of 96 MiB had left kept up to 480 MiB in such heaps. A picture takes the same time with one (on two cores).
+void allocateFromOneHeap();
+
 /// Empties a vector and frees its memory. `values = {}` does not: that assigns no elements, and the capacity stays.
 template <typename Vector>
 void freeMemory(Vector& values) {

@@ -85,6 +85,16 @@ def visit(server, seed):
     return cache, first
 
 
+def settled_kilobytes(server):
+    """The server's memory once it stops falling: it gives back what a viewer had after that viewer's threads have ended."""
+    least, fell = server.kilobytes(), time.time()
+    while time.time() < fell + 0.5:
+        time.sleep(0.05)
+        if (now := server.kilobytes()) < least:
+            least, fell = now, time.time()
+    return least
+
+
 def files_of(server):
     return len(list(pathlib.Path(f"/proc/{server.process.pid}/fd").iterdir()))
 
@@ -106,8 +116,7 @@ with serving(program, caches, "--viewer-memory", "96M", "--memory", "288M", "--b
             wait_for(lambda: all(now <= before[what] for what, now in state().items()), "viewers to be gone", 20)
         except AssertionError:
             sys.exit(f"round {rounds}: when all viewers had left, the server had {state()}; expected at most {before}")
-        now = state()
-        log.write(f"{time.time()} {begin} {now['KiB']} {now['files']} {now['threads']}\n")
+        log.write(f"{time.time()} {begin} {settled_kilobytes(server)} {files_of(server)} {server.threads()}\n")
     assert server.is_alive() and server.messages().count("\n") <= 1, server.messages()
     status = server.stop()
     assert status == 130, f"Ctrl-C ends it with status {status}"

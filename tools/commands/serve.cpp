@@ -13,6 +13,7 @@
 
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
 #include "tools/commands/commands.h"
@@ -64,6 +65,7 @@ void warnOfNetwork(const ServerOptions& options) {
 }
 
 void serve(const ServeArguments& arguments) {
+  allocateFromOneHeap();  // so that what viewers had goes back to the system once they have left
   const ServerOptions options = optionsFrom(arguments);
   warnOfNetwork(options);
   const ServedCaches caches(arguments.caches);

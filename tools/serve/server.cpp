@@ -192,9 +192,6 @@ class Server : public ConnectionHost {
 
 void runServer(const ServedCaches& caches, const ServerOptions& options, const Progress& stopped,
                const std::function<void(const std::string& address)>& listening) {
-  // malloc_trim() does not return the ends of other heaps than the first: with a heap for each thread, as malloc makes them, a
-  // server whose three viewers of 96 MiB had left kept up to 480 MiB. A picture takes the same time with one (on two cores).
-  mallopt(M_ARENA_MAX, 1);
   Server server(caches, options, stopped);
   listening(server.address());
   server.run();
