@@ -1,4 +1,4 @@
-// Loads the buckets of a temporary file, one ahead of the work, and groups each one's records by the cells
+// Loads the buckets of a temporary file, ahead of the work, and groups each one's records by the cells
 // that are to be built. Several threads load a bucket together: one alone would take longer than 16 take to build it.
 #pragma once
 
@@ -55,8 +55,10 @@ class BucketLoader {
                uint64_t most_bytes, unsigned readers);
   ~BucketLoader();
 
-  /// The next bucket, until the next call; null at the end. Throws Error if the disk fails.
-  LoadedBucket* next() { return ahead_.next(); }
+  /// The next bucket, until it is given back; null at the end. Throws Error if the disk fails. Two may be taken. One thread at a time.
+  LoadedBucket* take() { return ahead_.take(); }
+  /// Of those taken, the one that was taken first. Any thread.
+  void giveBack() { ahead_.giveBack(); }
 
  private:
   struct Reader;

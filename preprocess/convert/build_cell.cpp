@@ -7,6 +7,7 @@
 #include <array>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include "preprocess/convert/merge_levels.h"
 #include "preprocess/convert/splat_record.h"
@@ -30,19 +31,39 @@ bool coincide(const RecordSpan& records) {
   return true;
 }
 
-/// Reorders the records by octant of `cell`. Returns where each octant begins, and the end.
+/// Reorders the records by octant of `cell`, many by several threads. Returns where each octant begins, and the end.
 std::array<size_t, 9> divide(const Cell& cell, RecordSpan records) {
+  constexpr size_t kRecordsPerTask = 32768;
+  struct Part {
+    std::array<size_t, 8> next{};  // record of each octant: first their number, then where it goes
+  };
+  std::vector<Part> parts((records.size() + kRecordsPerTask - 1) / kRecordsPerTask);
   std::vector<uint8_t> octants(records.size());
+  const auto forEachPart = [&](const auto& work) {
+    tbb::parallel_for(size_t{0}, parts.size(), [&](size_t n) {
+      const TraceScope trace("divide cell");
+      const size_t begin = n * kRecordsPerTask;
+      work(parts[n], begin, std::min(begin + kRecordsPerTask, records.size()));
+    });
+  };
+  forEachPart([&](Part& part, size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) {
+      records.prefetchAfter(n);
+      octants[n] = static_cast<uint8_t>(octantOf(recordPosition(records[n]), cell));
+      ++part.next[octants[n]];
+    }
+  });
   std::array<size_t, 9> begins{};
-  for (size_t n = 0; n < records.size(); ++n) {
-    records.prefetchAfter(n);
-    octants[n] = static_cast<uint8_t>(octantOf(recordPosition(records[n]), cell));
-    ++begins[octants[n] + size_t{1}];
+  size_t placed = 0;
+  for (size_t octant = 0; octant < 8; ++octant) {
+    begins[octant] = placed;
+    for (Part& part : parts) placed += std::exchange(part.next[octant], placed);
   }
-  for (size_t octant = 0; octant < 8; ++octant) begins[octant + 1] += begins[octant];
+  begins[8] = placed;
   std::vector<uint32_t> divided(records.size());
-  std::array<size_t, 9> ends = begins;
-  for (size_t n = 0; n < records.size(); ++n) divided[ends[octants[n]]++] = records.places[n];
+  forEachPart([&](Part& part, size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) divided[part.next[octants[n]]++] = records.places[n];
+  });
   std::copy(divided.begin(), divided.end(), records.places.begin());
   return begins;
 }
@@ -146,11 +167,7 @@ Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool
 }
 
 Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, bool is_top) {
-  std::array<size_t, 9> begins;
-  {
-    const TraceScope trace("divide cell");
-    begins = divide(cell, records);
-  }
+  const std::array<size_t, 9> begins = divide(cell, records);
   std::array<Subtree, 8> children;
   tbb::parallel_for(size_t{0}, size_t{8}, [&](size_t octant) {
     const size_t count = begins[octant + 1] - begins[octant];

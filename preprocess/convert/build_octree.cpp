@@ -1,7 +1,6 @@
 #include "preprocess/convert/build_octree.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -38,7 +37,6 @@ void OctreeBuilder::build(const BucketFile& file, uint32_t first) {
 }
 
 void OctreeBuilder::buildShare(const BucketFile& file, uint32_t first, uint32_t end) {
-  built_.resize(tree_->size());
   buildBuckets(file, tree_->leavesBelow(0), first, end);
   CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
 }
@@ -100,41 +98,36 @@ void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint3
   std::vector<std::vector<uint32_t>> leaves_of(file.buckets());
   for (const uint32_t leaf : leaves)
     if ((*tree_)[leaf].contents.splats > 0) leaves_of[(*tree_)[leaf].bucket].push_back(leaf);
-  uint32_t next = first;
-  while (next < end) {
-    bool too_large = false;
-    {
-      BucketLoader loader(*tree_, file, variables_, {next, end}, plan_.bucket_bytes, plan_.bucketReaders());
-      next = end;
-      while (LoadedBucket* loaded = loader.next()) {
-        too_large = loaded->too_large;
-        if (too_large) next = loaded->bucket;
-        if (!too_large) buildLoaded(*loaded);
-      }
-    }
-    appendBuilt();
-    if (!too_large) continue;
+  for (uint32_t next = first; next < end; ++next) {
+    const std::optional<uint32_t> too_large = buildLoaded(file, {next, end});
+    if (!too_large) return;
+    next = *too_large;
     buildTooLarge(file, next, leaves_of[next]);
-    ++next;
   }
 }
 
-void OctreeBuilder::buildLoaded(LoadedBucket& loaded) {
-  struct Job {
-    uint32_t unit;
-    RecordSpan records;
-  };
-  std::vector<Job> jobs;
-  std::vector<std::vector<std::byte>> completed;  // that were carried, and are built now
-  std::vector<std::vector<uint32_t>> completed_places;
-  completed.reserve(loaded.parts.size());
-  completed_places.reserve(loaded.parts.size());
+/// Builds buckets up to the first that is too large, and returns that.
+std::optional<uint32_t> OctreeBuilder::buildLoaded(const BucketFile& file, const BucketRange& buckets) {
+  built_.resize(tree_->size());  // now, since what asks it runs beside what appends
+  BucketLoader loader(*tree_, file, variables_, buckets, plan_.bucket_bytes, plan_.bucketReaders());
+  BucketBuilds builds({[&] { return loader.take(); }, [&] { loader.giveBack(); },
+                       [&](LoadedBucket& loaded) { return jobsOf(loaded); },
+                       [&](const CellJob& job) { return cells_.build((*tree_)[job.unit].cell, job.records); },
+                       [&](uint32_t unit, BuiltCell&& cell) {
+                         append(unit, std::move(cell));
+                         completeParents(unit);
+                       }});
+  return builds.run();
+}
+
+BucketJobs OctreeBuilder::jobsOf(LoadedBucket& loaded) {
+  BucketJobs jobs;
   for (const LoadedBucket::Part& part : loaded.parts) {
     if (isBuilt(part.unit)) continue;
     const RecordSpan records = loaded.records(part);
     const uint64_t expected = (*tree_)[part.unit].contents.splats;
     if (records.size() == expected) {
-      jobs.push_back({part.unit, records});
+      jobs.cells.push_back({part.unit, records});
       continue;
     }
     std::vector<std::byte>& carried = carried_[part.unit];
@@ -142,27 +135,12 @@ void OctreeBuilder::buildLoaded(LoadedBucket& loaded) {
       carried.insert(carried.end(), records[n], records[n] + recordBytes(records[n], variables_));
     std::vector<uint32_t> places = placesOfRecords(carried, variables_);
     if (places.size() < expected) continue;
-    completed.push_back(std::move(carried));
-    completed_places.push_back(std::move(places));
+    jobs.carried.push_back(std::move(carried));
+    jobs.carried_places.push_back(std::move(places));
     carried_.erase(part.unit);
-    jobs.push_back({part.unit, {completed.back().data(), completed_places.back()}});
+    jobs.cells.push_back({part.unit, {jobs.carried.back().data(), jobs.carried_places.back()}});
   }
-
-  std::vector<BuiltCell> cells(jobs.size());
-  tbb::parallel_invoke([this] { appendBuilt(); },
-                       [&] {
-                         tbb::parallel_for(size_t{0}, jobs.size(), [&](size_t n) {
-                           cells[n] = cells_.build((*tree_)[jobs[n].unit].cell, jobs[n].records);
-                         });
-                       });
-  for (size_t n = 0; n < jobs.size(); ++n) to_append_.emplace_back(jobs[n].unit, std::move(cells[n]));
-}
-
-void OctreeBuilder::appendBuilt() {
-  for (auto& [unit, cell] : std::exchange(to_append_, {})) {
-    append(unit, std::move(cell));
-    completeParents(unit);
-  }
+  return jobs;
 }
 
 void OctreeBuilder::buildTooLarge(const BucketFile& file, uint32_t bucket,
@@ -201,7 +179,6 @@ void OctreeBuilder::buildCoincident(const BucketFile& file, uint32_t bucket, uin
 
 void OctreeBuilder::append(uint32_t node, BuiltCell&& cell) {
   const TraceScope trace("append bricks");
-  built_.resize(std::max(built_.size(), tree_->size()));
   Built& built = built_[node];
   for (size_t n = 0; n < cell.bricks.size(); ++n) {
     const uint32_t splats = cell.bricks[n].encoded.brick.splats;

@@ -1,9 +1,9 @@
 // The pass that makes the cache's bricks: bucket after bucket in Morton order, and the levels above as soon
 // as the last of their children is there.
 //
-//    BucketFile --loader--> records of a bucket --CellBuilder, parallel--> bricks --in order--> CacheWriter
-//                  |                                                                               |
-//                  +-- too large: divided into a temporary file of its own            readBack, merge, append
+//    BucketFile --loader--> records of a bucket --BucketBuilds, CellBuilder--> bricks --in order--> CacheWriter
+//                  |                                                                                   |
+//                  +-- too large: divided into a temporary file of its own                readBack, merge, append
 //
 // Bricks come out in post-order of the octree whatever the buckets are. So the bricks that an interrupted
 // conversion has appended are the first ones of any other's, and only the rest is built: from the first
@@ -14,9 +14,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <utility>
+#include <optional>
 #include <vector>
 
+#include "preprocess/convert/bucket_builds.h"
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_loader.h"
 #include "preprocess/convert/bucket_tree.h"
@@ -65,8 +66,8 @@ class OctreeBuilder {
   bool isBuilt(uint32_t node) const { return node < built_.size() && built_[node].bricks > 0; }
   void buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves, uint32_t first,
                     uint32_t end);
-  void buildLoaded(LoadedBucket& loaded);
-  void appendBuilt();
+  std::optional<uint32_t> buildLoaded(const BucketFile& file, const BucketRange& buckets);
+  BucketJobs jobsOf(LoadedBucket& loaded);
   void buildTooLarge(const BucketFile& file, uint32_t bucket, const std::vector<uint32_t>& leaves);
   void buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf);
   void append(uint32_t node, BuiltCell&& cell);
@@ -85,8 +86,6 @@ class OctreeBuilder {
   std::vector<Built> built_;  // [node of the tree]
   // Cells that fit a brick but whose records lie in several buckets: what was seen of them so far.
   std::map<uint32_t, std::vector<std::byte>> carried_;
-  // Cells of the bucket built last, by node: appended while the next one's are built.
-  std::vector<std::pair<uint32_t, BuiltCell>> to_append_;
   unsigned files_made_ = 0;
 };
 

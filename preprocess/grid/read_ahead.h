@@ -52,6 +52,24 @@ class ReadAhead {
     MutexLock lock(mutex_);
     given_back_ = taken_;
     changed_.notify_all();
+    return take(lock);
+  }
+
+  /// In the place of next(), for callers that process several values at a time: the value is valid until it is given back. Waits
+  /// for ever where all values are taken. One thread at a time.
+  T* take() {
+    MutexLock lock(mutex_);
+    return take(lock);
+  }
+  /// Of the values taken, the one that was taken first. Any thread.
+  void giveBack() {
+    const MutexLock lock(mutex_);
+    ++given_back_;
+    changed_.notify_all();
+  }
+
+ private:
+  T* take(MutexLock& lock) REQUIRES(mutex_) {
     const size_t place = taken_ % values_.size();
     {
       const TraceScope trace("wait for reading", TraceKind::kWait);
@@ -66,7 +84,6 @@ class ReadAhead {
     return nullptr;
   }
 
- private:
   void fillAll() {
     nameThisThread("read-ahead");
     for (;;) {
