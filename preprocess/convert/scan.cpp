@@ -21,7 +21,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kNodesPerTask = 16384;
-constexpr size_t kNodesAtOnce = size_t{1} << 18;  // 4 MiB of runs at most
+constexpr size_t kPositionsAtOnce = size_t{1} << 18;  // 4 MiB of runs at most
 
 // Splats are stored in single precision, their weights in units cubed.
 constexpr double kSmallestExtent = 1e-9, kLargestExtent = 1e12;
@@ -46,46 +46,40 @@ void widen(GridSurvey& bounds, const NodeArrays& nodes, size_t begin, size_t end
   }
 }
 
-/// Counts slabs a part at a time: while the threads gather one part's voxels, one of them adds those of the part before
-/// to the counts, in the order of the nodes.
+/// Counts positions a part at a time: while the threads gather one part's voxels, one of them adds those of the part before
+/// to the counts, in the order of the positions.
 class PartCounter {
  public:
-  PartCounter(const RootCube& root, CountingGrid& counts) : root_(root), counts_(counts) {}
+  explicit PartCounter(CountingGrid& counts) : counts_(counts) {}
 
-  void add(const NodeArrays& nodes) {
-    for (size_t begin = 0; begin < nodes.x.size(); begin += kNodesAtOnce)
-      addPart(nodes, begin, std::min(nodes.x.size(), begin + kNodesAtOnce));
+  /// `gather(runs, begin, end)` adds the positions begin .. end - 1 of `positions` to runs, in any thread.
+  template <typename Gather>
+  void add(size_t positions, const Gather& gather) {
+    for (size_t begin = 0; begin < positions; begin += kPositionsAtOnce) {
+      const size_t end = std::min(positions, begin + kPositionsAtOnce);
+      std::vector<VoxelRuns> gathered((end - begin + kNodesPerTask - 1) / kNodesPerTask,
+                                      VoxelRuns(counts_.level()));
+      tbb::parallel_invoke([&] { addGathered(); },
+                           [&] {
+                             tbb::parallel_for(size_t{0}, gathered.size(), [&](size_t task) {
+                               const TraceScope trace("count nodes");
+                               const size_t first = begin + task * kNodesPerTask;
+                               gather(gathered[task], first, std::min(end, first + kNodesPerTask));
+                             });
+                           });
+      gathered_ = std::move(gathered);
+    }
   }
   /// To be called at the end.
   void finish() { addGathered(); }
 
  private:
-  void addPart(const NodeArrays& nodes, size_t begin, size_t end) {
-    std::vector<VoxelRuns> gathered((end - begin + kNodesPerTask - 1) / kNodesPerTask,
-                                    VoxelRuns(counts_.level()));
-    tbb::parallel_invoke([&] { addGathered(); },
-                         [&] {
-                           tbb::parallel_for(size_t{0}, gathered.size(), [&](size_t task) {
-                             const size_t first = begin + task * kNodesPerTask;
-                             gather(nodes, first, std::min(end, first + kNodesPerTask), gathered[task]);
-                           });
-                         });
-    gathered_ = std::move(gathered);
-  }
-
-  void gather(const NodeArrays& nodes, size_t begin, size_t end, VoxelRuns& runs) const {
-    const TraceScope trace("count nodes");
-    for (size_t n = begin; n < end; ++n)
-      if (!nodes.blank[n]) runs.add(root_.fromWorld({nodes.x[n], nodes.y[n], nodes.z[n]}));
-  }
-
   void addGathered() {
     const TraceScope trace("add counts");
     for (const VoxelRuns& runs : gathered_) counts_.add(runs.level(), runs.runs());
     gathered_.clear();
   }
 
-  const RootCube& root_;
   CountingGrid& counts_;
   std::vector<VoxelRuns> gathered_;  // not yet added
 };
@@ -162,25 +156,27 @@ void countNodes(const GridSource& source, const RootCube& root, const SlabBuffer
                 CountingGrid& counts, Progress& progress, const SlabShare& share) {
   const NodeReader coordinates(source, {}, std::nullopt);
   SlabStream stream(coordinates, slabs, kNoHalo, share);
-  PartCounter counter(root, counts);
+  PartCounter counter(counts);
   while (const LoadedSlab* loaded = stream.next()) {
-    counter.add(loaded->nodes);
-    progress.advance(loaded->nodes.x.size());
+    const NodeArrays& nodes = loaded->nodes;
+    counter.add(nodes.x.size(), [&](VoxelRuns& runs, size_t begin, size_t end) {
+      for (size_t n = begin; n < end; ++n)
+        if (!nodes.blank[n]) runs.add(root.fromWorld({nodes.x[n], nodes.y[n], nodes.z[n]}));
+    });
+    progress.advance(nodes.x.size());
   }
   counter.finish();
 }
 
 void countSample(const PositionSample& sample, const RootCube& root, CountingGrid& counts) {
-  const TraceScope trace("count sample");
-  constexpr size_t kAtOnce = 4096;
   const std::span<const glm::dvec3> positions = sample.positions();
-  for (size_t begin = 0; begin < positions.size(); begin += kAtOnce) {
-    VoxelRuns runs(counts.level());
-    for (const glm::dvec3& position : positions.subspan(begin, std::min(kAtOnce, positions.size() - begin)))
+  PartCounter counter(counts);
+  counter.add(positions.size(), [&](VoxelRuns& runs, size_t begin, size_t end) {
+    for (const glm::dvec3& position : positions.subspan(begin, end - begin))
       runs.add(root.fromWorld(position));
     runs.multiply(sample.nodesEach());
-    counts.add(runs.level(), runs.runs());
-  }
+  });
+  counter.finish();
 }
 
 uint32_t countingLevel(uint64_t nodes, const glm::dvec3& extent) {

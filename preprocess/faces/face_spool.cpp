@@ -1,5 +1,6 @@
 #include "preprocess/faces/face_spool.h"
 
+#include <tbb/blocked_range2d.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
@@ -9,6 +10,7 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "stream/base/check.h"
+#include "stream/base/mutex.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -160,13 +162,35 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
 
 /// Of the cells whose lowest nodes are in the slab's box, and which have their corners at the end.
 void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const {
-  const TraceScope trace("take ends of blocks");
+  const Slab& slab = loaded.slab;
+  const Node size = sizeOf(reader_.source().description().blocks[slab.block]);
+  const uint64_t j1 = std::min(slab.box.j1, size[1] - 1), k1 = std::min(slab.box.k1, size[2] - 1);
+  constexpr uint64_t kRowsPerTask = 32;
+  Mutex adding;
+  tbb::parallel_for(tbb::blocked_range2d<uint64_t>(slab.box.k0, std::max(slab.box.k0, k1), 1, slab.box.j0,
+                                                   std::max(slab.box.j0, j1), kRowsPerTask),
+                    [&](const tbb::blocked_range2d<uint64_t>& rows) {
+                      const TraceScope trace("take ends of blocks");
+                      const NodeBox box{rows.cols().begin(), rows.cols().end(), rows.rows().begin(),
+                                        rows.rows().end(),   slab.box.i0,       slab.box.i1};
+                      addEndsIn(loaded, box, abutting, adding);
+                    });
+}
+
+/// Of the cells whose lowest nodes are in `box`. Several threads, each with a box.
+void FaceSpool::addEndsIn(const LoadedSlab& loaded, const NodeBox& box, AbuttingFaces& abutting,
+                          Mutex& adding) const {
   const Slab& slab = loaded.slab;
   const NodeArrays& nodes = loaded.nodes;
   const Node size = sizeOf(reader_.source().description().blocks[slab.block]);
   const WindowStrides strides(slab.window, size[0]);
   constexpr size_t kCentresAtOnce = 4096;
   std::vector<AbuttingFaces::Centre> centres;
+  const auto add = [&] {
+    const MutexLock lock(adding);
+    abutting.add(centres);
+    centres.clear();
+  };
   const auto isThereAt = [&](const CellFace& face, size_t at) {
     if (ofCells()) return cellIsThere(nodes, at, strides.row, strides.plane);
     const size_t bit = size_t{1} << face.axis;
@@ -186,23 +210,20 @@ void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const
         if (abutting.isAtEnd(face) && isThereAt(face, at))
           centres.push_back(abutting.centreOf(face, corners));
       }
-    if (centres.size() < kCentresAtOnce) return;
-    abutting.add(centres);
-    centres.clear();
+    if (centres.size() >= kCentresAtOnce) add();
   };
-  for (uint64_t k = slab.box.k0; k < std::min(slab.box.k1, size[2] - 1); ++k)
-    for (uint64_t j = slab.box.j0; j < std::min(slab.box.j1, size[1] - 1); ++j) {
+  for (uint64_t k = box.k0; k < box.k1; ++k)
+    for (uint64_t j = box.j0; j < box.j1; ++j) {
       const bool row_at_end = j == 0 || j + 2 == size[1] || k == 0 || k + 2 == size[2];
       // In other rows only the first and the last cell are at an end.
       const auto next = [&](uint64_t i) {
         return row_at_end || i + 2 >= size[0] ? i + 1 : std::max(i + 1, size[0] - 2);
       };
-      const uint64_t first =
-          row_at_end || slab.box.i0 == 0 ? slab.box.i0 : std::max(slab.box.i0, size[0] - 2);
-      for (uint64_t i = first; i < slab.box.i1 && i + 1 < size[0]; i = next(i))
+      const uint64_t first = row_at_end || box.i0 == 0 ? box.i0 : std::max(box.i0, size[0] - 2);
+      for (uint64_t i = first; i < box.i1 && i + 1 < size[0]; i = next(i))
         addCell({slab.block, {i, j, k}, 0, false});
     }
-  abutting.add(centres);
+  add();
 }
 
 std::vector<float> FaceSpool::storedScalars(size_t face, uint64_t v, const RowRange& range) const {

@@ -15,6 +15,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/abutting_faces.h"
+#include "stream/base/mutex.h"
 #include "stream/base/nameless_file.h"
 #include "stream/base/progress.h"
 #include "stream/model/grid_faces.h"
@@ -73,6 +74,7 @@ class FaceSpool {
   };
   void take(const LoadedSlab& loaded, size_t face);
   void addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const;
+  void addEndsIn(const LoadedSlab& loaded, const NodeBox& box, AbuttingFaces& abutting, Mutex& adding) const;
   std::vector<float> storedScalars(size_t face, uint64_t v, const RowRange& range) const;
 
   const NodeReader& reader_;
