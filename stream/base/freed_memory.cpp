@@ -9,8 +9,8 @@ void returnFreedMemory(size_t large) {
   malloc_trim(0);
 }
 
-void allocateFromOneHeap() {
-  mallopt(M_ARENA_MAX, 1);
+void limitHeaps(int most) {
+  mallopt(M_ARENA_MAX, most);
 }
 
 }  // namespace curvisplat

@@ -18,6 +18,7 @@
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
 #include "stream/base/progress.h"
@@ -277,6 +278,7 @@ void addConvert(CLI::App& app) {
   addGasOptions(*command, arguments->gas);
   command->callback([arguments, command] {
     refuseWithoutEffect(*command, *arguments);
+    limitHeaps(kHeapsOfConversion);
     if (arguments->joins) return runJoinSeries(*arguments);
     takeScalarsFromSolutions(*arguments);
     const bool series = isSeries(*arguments);

@@ -21,6 +21,7 @@
 #include "render/colour/published_maps.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
+#include "stream/base/freed_memory.h"
 #include "stream/cache/geometry_folder.h"
 #include "stream/cache/probe.h"
 #include "tools/options/convert_arguments.h"
@@ -194,9 +195,15 @@ py::dict reportOf(const ConvertReport& report) {
   return out;
 }
 
+/// To be called before a conversion. Those heaps stay that the interpreter's threads have.
+void beginThreads(unsigned count) {
+  limitHeaps(kHeapsOfConversion);
+  requireThreads(count, kThreads);
+}
+
 py::dict convertSource(const DataSource& source, ConvertOptions options, const py::object& progress) {
   ConvertReport report;
-  requireThreads(options.threads, kThreads);
+  beginThreads(options.threads);
   runInterruptibly(progress, [&](Progress& of_work) { report = convert(source, options, of_work); });
   return reportOf(report);
 }
@@ -246,7 +253,7 @@ uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks
   input.open = [&](uint64_t) { return std::move(source); };
   input.scalars = [&](const GridDescription&) { return allScalars(names); };
   SeriesReport report;
-  requireThreads(options.convert.threads, kThreads);
+  beginThreads(options.convert.threads);
   runInterruptibly(progress, [&](Progress& of_work) {
     report = convertSeries(input, options, of_work, [](const SeriesEvent&) {});
   });
@@ -284,7 +291,7 @@ py::dict convertSteps(const ConvertArguments& arguments, const std::vector<StepF
   SeriesReport series;
   ConvertReport first;
   std::vector<std::string> warnings;
-  requireThreads(options.convert.threads, kThreads);
+  beginThreads(options.convert.threads);
   runInterruptibly(progress, [&](Progress& of_work) {
     series = convertSeries(input, options, of_work, [&](const SeriesEvent& event) {
       if (!event.reason.empty()) warnings.push_back(event.name + " was left out: " + event.reason);
@@ -330,7 +337,7 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   if (options.title.empty()) options.title = arguments.grid.grid.stem().string();
   if (!steps.empty()) return convertSteps(arguments, steps, std::move(options), progress);
   ConvertReport report;
-  requireThreads(options.threads, kThreads);
+  beginThreads(options.threads);
   runInterruptibly(progress, [&](Progress& of_work) {
     const auto source = openSource(arguments, options.output);
     options.scalars = chooseScalars(arguments, scalars, source->description());
