@@ -56,13 +56,15 @@ SlabBuffers GridOrigin::smallSlabs(Halo halo) const {
                      std::min<uint64_t>({2 * plan_.slab_bytes / bytes - 1, plan_.threads, kMaxReaders}))};
 }
 
-/// Fits in half of what counting may take, which it needs only after the slabs of the survey are gone.
+/// Fits in half of what counting may take, which it needs only after the slabs of the survey are gone. One thread counts it, so it is
+/// no larger than it has to be: 8192 in a bucket tell its size within some percent, where 20 are planned for.
 PositionSample GridOrigin::newSample() const {
-  constexpr uint64_t kMaxPositions = uint64_t{1} << 21;
+  constexpr uint64_t kInBucket = 8192, kMaxPositions = uint64_t{1} << 21;
   uint64_t nodes = 0;
   for (const GridBlock& block : blocks()) nodes += block.nodes();
-  return {nodes,
-          std::clamp<uint64_t>(plan_.counting_bytes / 2 / PositionSample::kBytesEach, 1024, kMaxPositions)};
+  const uint64_t wanted = (nodes / plan_.plannedBucketSplats() + 1) * kInBucket;
+  const uint64_t affordable = plan_.counting_bytes / 2 / PositionSample::kBytesEach;
+  return {nodes, std::clamp<uint64_t>(std::min(wanted, affordable), 1024, kMaxPositions)};
 }
 
 bool GridOrigin::shareWith(Ranks& ranks) {

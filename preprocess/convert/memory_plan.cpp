@@ -169,7 +169,7 @@ uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
 
 void MemoryPlan::suit(uint64_t samples, size_t variables) {
   // A slab's halo is read twice, so they are fewer and larger; a cell above buckets is merged from bricks that are read back.
-  constexpr uint64_t kSlabs = 8, kMinSlabBytes = 48 * kMiB;
+  constexpr uint64_t kSlabs = 24, kMinSlabBytes = 48 * kMiB;
   constexpr uint64_t kBuckets = 4, kBricksOfThread = 10;
   slab_bytes = std::min(slab_bytes, std::max(kMinSlabBytes, samples * slabBytesPerNode(variables) / kSlabs));
   limitBuckets(std::max(samples / kBuckets, threads * kBricksOfThread * kMaxBrickSplats), variables);
