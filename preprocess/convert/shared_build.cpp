@@ -253,7 +253,7 @@ void joinBricks(const SharedBuild& build, CacheWriter& own, CacheWriter* whole, 
     }
     for (size_t rank = 0; rank < places.size(); ++rank) offsets[rank] = toBytes(places[rank]);
   }
-  const std::vector<Ranks::Bytes> sent = ranks.exchange(offsets);
+  const std::vector<Ranks::Bytes> sent = ranks.exchange(std::move(offsets));
   std::vector<AppendedBrick> bricks;
   for (uint64_t id = 0; id < own.bricks().size(); ++id) bricks.push_back(own.appended(id));
   copyStreams(build, bricks, fromBytes<uint64_t>(sent[0]), ranks.rank());

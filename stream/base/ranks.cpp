@@ -59,45 +59,45 @@ bool Ranks::waitForFailures(std::chrono::milliseconds longest) {
   return true;
 }
 
-std::vector<uint64_t> Ranks::sizesFor(const std::vector<std::span<const std::byte>>& out) {
-  std::vector<uint64_t> out_bytes, in_bytes(count());
-  for (const auto& bytes : out) out_bytes.push_back(bytes.size());
-  transport_->beginSizes(out_bytes.data(), in_bytes.data());
+/// How many bytes come from each rank, where those of call_.out go to each.
+void Ranks::exchangeSizes() {
+  for (const auto& bytes : call_.out) call_.out_bytes.push_back(bytes.size());
+  call_.in_bytes.resize(count());
+  transport_->beginSizes(call_.out_bytes.data(), call_.in_bytes.data());
   wait();
-  return in_bytes;
 }
 
-std::vector<Ranks::Bytes> Ranks::exchange(const std::vector<Bytes>& to) {
+std::vector<Ranks::Bytes> Ranks::exchange(std::vector<Bytes> to) {
   CURVISPLAT_CHECK_OP(to.size(), ==, count());
   if (alone()) return to;
-  const std::vector<std::span<const std::byte>> out(to.begin(), to.end());
-  const std::vector<uint64_t> in_bytes = sizesFor(out);
-  std::vector<Bytes> from(count());
-  std::vector<std::span<std::byte>> in;
-  for (unsigned n = 0; n < count(); ++n) {
-    from[n].resize(in_bytes[n]);
-    in.emplace_back(from[n]);
-  }
-  transport_->beginExchange(out.data(), in.data());
+  call_.to = std::move(to);
+  call_.out.assign(call_.to.begin(), call_.to.end());
+  exchangeSizes();
+  for (const uint64_t bytes : call_.in_bytes) call_.from.emplace_back(bytes);
+  call_.in.assign(call_.from.begin(), call_.from.end());
+  transport_->beginExchange(call_.out.data(), call_.in.data());
   wait();
-  return from;
+  return std::move(std::exchange(call_, {}).from);
 }
 
 void Ranks::exchange(const Messages& to, Messages& from) {
-  std::vector<std::span<const std::byte>> out;
-  for (unsigned n = 0; n < count(); ++n) out.push_back(n == rank() ? std::span<const std::byte>() : to.of(n));
-  from.begin(alone() ? std::vector<uint64_t>(1) : sizesFor(out));
-  if (alone()) return;
-  std::vector<std::span<std::byte>> in;
-  for (unsigned n = 0; n < count(); ++n) in.push_back(from.of(n));
-  transport_->beginExchange(out.data(), in.data());
+  if (alone()) return from.begin(std::vector<uint64_t>(1));
+  call_.to_block = to.block();
+  for (unsigned n = 0; n < count(); ++n)
+    call_.out.push_back(n == rank() ? std::span<const std::byte>() : to.of(n));
+  exchangeSizes();
+  from.begin(call_.in_bytes);
+  call_.from_block = from.block();
+  for (unsigned n = 0; n < count(); ++n) call_.in.push_back(from.of(n));
+  transport_->beginExchange(call_.out.data(), call_.in.data());
   wait();
+  call_ = {};
 }
 
 std::vector<Ranks::Bytes> Ranks::gather(Bytes bytes) {
   std::vector<Bytes> to(count());
   to[0] = std::move(bytes);
-  std::vector<Bytes> from = exchange(to);
+  std::vector<Bytes> from = exchange(std::move(to));
   if (!isFirst()) from.clear();
   return from;
 }
@@ -105,7 +105,7 @@ std::vector<Ranks::Bytes> Ranks::gather(Bytes bytes) {
 Ranks::Bytes Ranks::broadcast(Bytes bytes) {
   std::vector<Bytes> to(count());
   if (isFirst()) std::fill(to.begin(), to.end(), bytes);
-  return std::move(exchange(to).front());
+  return std::move(exchange(std::move(to)).front());
 }
 
 void Ranks::barrier() {
@@ -115,8 +115,11 @@ void Ranks::barrier() {
 
 void Ranks::sum(std::span<int64_t> values) {
   if (alone()) return;
-  transport_->beginSum(values);
+  call_.sums.assign(values.begin(), values.end());
+  transport_->beginSum(call_.sums);
   wait();
+  std::copy(call_.sums.begin(), call_.sums.end(), values.begin());
+  call_ = {};
 }
 
 void Ranks::sum(std::span<uint64_t> values) {

@@ -28,7 +28,8 @@ class RankTransport {
   virtual unsigned rank() const = 0;
   virtual unsigned count() const = 0;
 
-  /// Each of the three begins a call, which ends when isDone() returns true; until then the memory must stay.
+  /// Each of the three begins a call, which ends when isDone() returns true; until then the memory must stay. If the caller does not
+  /// wait for that, until this object has ended.
   ///   out, in  [rank]  a number for each rank, and from each
   virtual void beginSizes(const uint64_t* out, uint64_t* in) = 0;
   ///   out, in  [rank]  bytes for each rank, and from each
@@ -60,10 +61,12 @@ class Messages {
   std::span<std::byte> of(unsigned rank) const {
     return {block_.get() + begins_[rank], begins_[rank + 1] - begins_[rank]};
   }
+  /// The memory of all, for those who have to keep it.
+  std::shared_ptr<std::byte[]> block() const { return block_; }
 
  private:
   uint64_t expected_, capacity_ = 0;
-  std::unique_ptr<std::byte[]> block_;
+  std::shared_ptr<std::byte[]> block_;
   std::vector<uint64_t> begins_;  // [rank], then the end
 };
 
@@ -87,7 +90,7 @@ class Ranks {
   void whileWaiting(std::function<void()> check) { check_ = std::move(check); }
 
   /// Sends to[n] to each rank n. Returns what came from each.
-  std::vector<Bytes> exchange(const std::vector<Bytes>& to);
+  std::vector<Bytes> exchange(std::vector<Bytes> to);
   /// The same, for messages that are large and many. What a rank has for itself stays where it is, in `to`.
   void exchange(const Messages& to, Messages& from);
   /// At rank 0: what each rank has given; elsewhere nothing.
@@ -110,11 +113,22 @@ class Ranks {
   RankTransport* transport() { return transport_.get(); }
 
  private:
-  /// How many bytes come from each rank, if out[n] go to each rank n.
-  std::vector<uint64_t> sizesFor(const std::vector<std::span<const std::byte>>& out);
+  /// What the transport reads and writes during a call. Stays there if the call is left by an exception, until this object ends: MPI
+  /// works on what was begun whenever it is called, also to announce the failure.
+  struct Call {
+    std::vector<uint64_t> out_bytes, in_bytes;  // [rank]
+    std::vector<Bytes> to, from;                // [rank]
+    std::shared_ptr<std::byte[]> to_block, from_block;
+    std::vector<std::span<const std::byte>> out;  // [rank], of `to` or `to_block`
+    std::vector<std::span<std::byte>> in;
+    std::vector<int64_t> sums;
+  };
+
+  void exchangeSizes();
   void wait();
   void throwIfOneFailed();
 
+  Call call_;  // the one under way
   std::unique_ptr<RankTransport> transport_;
   std::function<void()> check_;
   bool failed_first_ = false;
