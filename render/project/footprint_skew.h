@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -72,11 +73,12 @@ class GrowthBlock {
 // Inline, for the loop over a brick's splats.
 
 inline uint32_t FootprintSkew::pack() const {
-  constexpr float kShift = 0x1.8p23f;  // rounds as std::nearbyint(), which is a call
+  // Rounds as std::nearbyint(), which is a call; the lowest bits of the sum are then those of the integer, and 0 of NaN.
+  constexpr float kShift = 0x1.8p23f;
   uint32_t skew = 0;
   for (size_t n = 0; n < 4; ++n) {
-    const float steps = (std::clamp(t[n] * (1 / kSkewStep), -127.0f, 127.0f) + kShift) - kShift;
-    skew |= static_cast<uint32_t>(static_cast<uint8_t>(static_cast<int>(steps))) << 8 * n;
+    const float shifted = std::clamp(t[n] * (1 / kSkewStep), -127.0f, 127.0f) + kShift;
+    skew |= (std::bit_cast<uint32_t>(shifted) & 0xff) << 8 * n;
   }
   return skew;
 }

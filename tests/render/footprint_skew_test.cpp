@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
+#include <limits>
 #include <memory>
 #include <random>
 #include <vector>
@@ -22,6 +23,10 @@ TEST(FootprintSkew, KeepsItsNumbers) {
   for (size_t n = 0; n < 4; ++n) EXPECT_NEAR(kept.t[n], skew.t[n], 0.005) << n;
   EXPECT_EQ(FootprintSkew{}.pack(), 0u);
   EXPECT_NEAR(FootprintSkew::unpack(FootprintSkew{{99, -99, 0, 0}}.pack()).t[1], -1.27, 1e-6);
+  // Of cameras that are beyond single precision. The undefined-behaviour sanitizer looks, too.
+  EXPECT_EQ((FootprintSkew{{NAN, -NAN, NAN, 0.5f}}.pack()), (FootprintSkew{{0, 0, 0, 0.5f}}.pack()));
+  const float infinite = std::numeric_limits<float>::infinity();
+  EXPECT_EQ((FootprintSkew{{infinite, -infinite, 0, 0}}.pack()), (FootprintSkew{{99, -99, 0, 0}}.pack()));
 }
 
 TEST(FootprintSkew, NeitherWeighsNorMoves) {
