@@ -31,6 +31,12 @@ bool coincide(const RecordSpan& records) {
   return true;
 }
 
+/// If another task of an enclosing loop has thrown, TBB cancels the loops within a cell, too, which then return normally with work
+/// left undone. The cell must not be built from the rest; of the two exceptions the first one is reported.
+[[noreturn]] void throwNotAllBuilt() {
+  throw Error("the bricks of a cell were not all built");
+}
+
 /// Reorders the records by octant of `cell`, many by several threads. Returns where each octant begins, and the end.
 std::array<size_t, 9> divide(const Cell& cell, RecordSpan records) {
   constexpr size_t kRecordsPerTask = 32768;
@@ -60,6 +66,7 @@ std::array<size_t, 9> divide(const Cell& cell, RecordSpan records) {
     for (Part& part : parts) placed += std::exchange(part.next[octant], placed);
   }
   begins[8] = placed;
+  if (placed != records.size()) throwNotAllBuilt();
   std::vector<uint32_t> divided(records.size());
   forEachPart([&](Part& part, size_t begin, size_t end) {
     for (size_t n = begin; n < end; ++n) divided[part.next[octants[n]]++] = records.places[n];
@@ -175,11 +182,8 @@ Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, boo
     children[octant] =
         build(cell.child(static_cast<int>(octant)), records.subspan(begins[octant], count), false);
   });
-  // If another task of the enclosing loop has thrown, TBB cancels this loop, too, which then returns normally with children
-  // missing. The cell must not be built from the rest; of the two exceptions the first one is reported.
   for (size_t octant = 0; octant < 8; ++octant)
-    if (begins[octant] != begins[octant + 1] && !children[octant].octant)
-      throw Error("the bricks of a cell were not all built");
+    if (begins[octant] != begins[octant + 1] && !children[octant].octant) throwNotAllBuilt();
 
   const TraceScope trace("build inner brick");
   Subtree inner;
