@@ -27,47 +27,37 @@ BucketBuilds::~BucketBuilds() = default;
 
 std::optional<uint32_t> BucketBuilds::run() {
   tasks_.run([this] { startNext(); });
-  tasks_.wait();
+  tasks_.wait();  // a task that throws ends the others: none begins any more
   return too_large_;
 }
 
 /// One at a time: called again once all cells of this bucket have begun.
 void BucketBuilds::startNext() {
-  try {
-    LoadedBucket* const loaded = stages_.take();
-    if (!loaded) return;
-    if (loaded->too_large) {
-      too_large_ = loaded->bucket;
-      return;
-    }
-    auto next = std::make_unique<Bucket>(stages_.jobs_of(*loaded));
-    Bucket& bucket = *next;
-    {
-      const MutexLock lock(mutex_);
-      buckets_.push_back(std::move(next));
-    }
-    const size_t cells = bucket.jobs.cells.size();
-    if (cells == 0) {
-      noteBegun();
-      noteBuilt(bucket);
-      return;
-    }
-    for (size_t n = 0; n < cells; ++n) tasks_.run([this, &bucket, n] { build(bucket, n); });
-  } catch (...) {
-    fail();
-    throw;
+  LoadedBucket* const loaded = stages_.take();
+  if (!loaded) return;
+  if (loaded->too_large) {
+    too_large_ = loaded->bucket;
+    return;
   }
+  auto next = std::make_unique<Bucket>(stages_.jobs_of(*loaded));
+  Bucket& bucket = *next;
+  {
+    const MutexLock lock(mutex_);
+    buckets_.push_back(std::move(next));
+  }
+  const size_t cells = bucket.jobs.cells.size();
+  if (cells == 0) {
+    noteBegun();
+    noteBuilt(bucket);
+    return;
+  }
+  for (size_t n = 0; n < cells; ++n) tasks_.run([this, &bucket, n] { build(bucket, n); });
 }
 
 void BucketBuilds::build(Bucket& bucket, size_t cell) {
   if (--bucket.not_begun == 0) noteBegun();
-  try {
-    // While this thread waits for parts of the cell, it may not begin another, which would keep it from this one.
-    tbb::this_task_arena::isolate([&] { bucket.cells[cell] = stages_.build(bucket.jobs.cells[cell]); });
-  } catch (...) {
-    fail();
-    throw;
-  }
+  // While this thread waits for parts of the cell, it may not begin another, which would keep it from this one.
+  tbb::this_task_arena::isolate([&] { bucket.cells[cell] = stages_.build(bucket.jobs.cells[cell]); });
   if (--bucket.not_ended == 0) noteBuilt(bucket);
 }
 
@@ -79,7 +69,7 @@ void BucketBuilds::noteBegun() {
 
 /// If no more than one other is on its way: a third would take more memory.
 void BucketBuilds::startNextIfDue() {
-  if (!latest_has_begun_ || buckets_.size() > 1 || has_failed_) return;
+  if (!latest_has_begun_ || buckets_.size() > 1) return;
   latest_has_begun_ = false;
   tasks_.run([this] { startNext(); });
 }
@@ -96,12 +86,12 @@ void BucketBuilds::noteBuilt(Bucket& bucket) {
   appendBuilt();
 }
 
-/// Appends the first buckets as far as they are built, unless another thread does.
+/// Appends the first buckets as far as they are built, unless another thread does, or has failed to.
 void BucketBuilds::appendBuilt() {
   MutexLock lock(mutex_);
   if (is_appending_) return;
   is_appending_ = true;
-  while (!buckets_.empty() && buckets_.front()->is_built && !has_failed_) {
+  while (!buckets_.empty() && buckets_.front()->is_built) {
     Bucket& bucket = *buckets_.front();
     lock.unlock();
     append(bucket);
@@ -114,20 +104,10 @@ void BucketBuilds::appendBuilt() {
 }
 
 void BucketBuilds::append(Bucket& bucket) {
-  try {
-    tbb::this_task_arena::isolate([&] {  // as in build()
-      for (size_t n = 0; n < bucket.cells.size(); ++n)
-        stages_.append(bucket.jobs.cells[n].unit, std::move(bucket.cells[n]));
-    });
-  } catch (...) {
-    fail();
-    throw;
-  }
-}
-
-void BucketBuilds::fail() {
-  const MutexLock lock(mutex_);
-  has_failed_ = true;
+  tbb::this_task_arena::isolate([&] {  // as in build()
+    for (size_t n = 0; n < bucket.cells.size(); ++n)
+      stages_.append(bucket.jobs.cells[n].unit, std::move(bucket.cells[n]));
+  });
 }
 
 }  // namespace curvisplat

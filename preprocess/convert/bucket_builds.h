@@ -73,7 +73,6 @@ class BucketBuilds {
   void noteBuilt(Bucket& bucket);
   void appendBuilt();
   void append(Bucket& bucket);
-  void fail();
 
   const Stages stages_;
   tbb::task_group tasks_;
@@ -84,7 +83,6 @@ class BucketBuilds {
   size_t given_back_ GUARDED_BY(mutex_) = 0;                        // the first of them that are
   bool latest_has_begun_ GUARDED_BY(mutex_) = false;  // all of its cells are being built, or are built
   bool is_appending_ GUARDED_BY(mutex_) = false;      // one thread does
-  bool has_failed_ GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace curvisplat

@@ -32,8 +32,7 @@ uint32_t OctreeBuilder::takeUpBricks(uint32_t buckets) {
 }
 
 void OctreeBuilder::build(const BucketFile& file, uint32_t first) {
-  buildBuckets(file, tree_->leavesBelow(0), first, file.buckets());
-  CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
+  buildShare(file, first, file.buckets());
 }
 
 void OctreeBuilder::buildShare(const BucketFile& file, uint32_t first, uint32_t end) {
