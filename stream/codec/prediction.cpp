@@ -34,7 +34,8 @@ struct KnownRow {
 };
 
 /// out: [count]
-CURVISPLAT_VECTOR_CLONES void residualsOfRow(Predictor predictor, const KnownRow& row, uint32_t* out) {
+[[gnu::always_inline]] inline void residualsOfRow(Predictor predictor, const KnownRow& row,
+                                                  uint32_t* __restrict out) {
   const uint32_t *const v = row.values, *const up = row.above, count = row.count;
   const auto put = [v, out](uint32_t n, uint32_t predicted) { out[n] = zigzag(v[n] - predicted); };
   if (predictor == Predictor::kNone) {
@@ -55,27 +56,15 @@ CURVISPLAT_VECTOR_CLONES void residualsOfRow(Predictor predictor, const KnownRow
   }
 }
 
-/// Calls use(row, first) for each row: its values, and the number of its first.
-template <typename Use>
-void forEachKnownRow(std::span<const Row> rows, const uint32_t* values, Use use) {
-  uint32_t before = 0;
-  for (const Row& row : rows) {
-    if (row.count == 0) continue;
-    use(KnownRow{values + row.first, row.above == kNoRow ? nullptr : values + row.above, before, row.count},
-        row.first);
-    before = values[row.first + row.count - 1];
-  }
-}
-
 /// The sum of std::bit_width(). From the exponents of floats, as which numbers of 31 bits are converted in vectors: without the
 /// bit below the highest none is rounded up to the next power of two.
-CURVISPLAT_VECTOR_CLONES uint64_t bitsOf(const uint32_t* numbers, uint32_t count) {
-  constexpr uint32_t kAtOnce = 1u << 20;  // whose sum has 32 bits
+CURVISPLAT_VECTOR_CLONES uint64_t bitsOf(const uint32_t* numbers, size_t count) {
+  constexpr size_t kAtOnce = 1u << 20;  // whose sum has 32 bits
   uint64_t bits = 0;
-  for (uint32_t begin = 0; begin < count; begin += kAtOnce) {
+  for (size_t begin = 0; begin < count; begin += kAtOnce) {
     uint32_t sum = 0;
-    const uint32_t end = std::min(count, begin + kAtOnce);
-    for (uint32_t n = begin; n < end; ++n) {
+    const size_t end = std::min(count, begin + kAtOnce);
+    for (size_t n = begin; n < end; ++n) {
       const auto highest = static_cast<int32_t>(numbers[n] & ~(numbers[n] >> 1));
       const auto exponent = static_cast<int32_t>(std::bit_cast<uint32_t>(static_cast<float>(highest)) >> 23);
       const int32_t width = highest < 0 ? 32 : std::max(exponent - 126, 0);
@@ -179,23 +168,28 @@ std::vector<Row> sampleOf(std::span<const Row> rows) {
   return sample;
 }
 
-void residualsOf(Predictor predictor, std::span<const Row> rows, const uint32_t* values, uint32_t* out) {
-  forEachKnownRow(rows, values,
-                  [&](const KnownRow& row, uint32_t first) { residualsOfRow(predictor, row, out + first); });
+CURVISPLAT_VECTOR_CLONES void residualsOf(Predictor predictor, std::span<const Row> rows,
+                                          const uint32_t* values, uint32_t* out) {
+  uint32_t before = 0;
+  for (const Row& row : rows) {
+    if (row.count == 0) continue;
+    const uint32_t* const own = values + row.first;
+    residualsOfRow(predictor, {own, row.above == kNoRow ? nullptr : values + row.above, before, row.count},
+                   out);
+    before = own[row.count - 1];
+    out += row.count;
+  }
 }
 
 PredictorChoice bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values) {
   PredictorChoice best{Predictor::kNone, std::numeric_limits<uint64_t>::max()};
-  uint32_t longest = 0;
-  for (const Row& row : sample) longest = std::max(longest, row.count);
-  std::vector<uint32_t> residuals(longest);
+  size_t count = 0;
+  for (const Row& row : sample) count += row.count;
+  std::vector<uint32_t> residuals(count);
   for (int p = 0; p < kPredictors; ++p) {
     const auto predictor = static_cast<Predictor>(p);
-    uint64_t bits = 0;
-    forEachKnownRow(sample, values.data(), [&](const KnownRow& row, uint32_t) {
-      residualsOfRow(predictor, row, residuals.data());
-      bits += bitsOf(residuals.data(), row.count);
-    });
+    residualsOf(predictor, sample, values.data(), residuals.data());
+    const uint64_t bits = bitsOf(residuals.data(), count);
     if (bits < best.bits) best = {predictor, bits};
   }
   return best;
