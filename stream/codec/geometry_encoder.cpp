@@ -2,9 +2,11 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/geometry_steps.h"
+#include "stream/codec/log_codes.h"
 #include "stream/codec/planes.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
@@ -29,6 +31,15 @@ int positionBits(const RootCube& root, const Cell& cell, double smallest_axis) {
   const int lattice_bits = kPositionBits - static_cast<int>(cell.level);
   return static_cast<int>(
       std::clamp(bits, 1.0 * kMinPositionBits, 1.0 * std::min(kMaxPositionBits, lattice_bits)));
+}
+
+int positionBits(const RootCube& root, const Cell& cell, std::span<const Splat> splats) {
+  constexpr double kSlack = 0.01;
+  const double most = smallestSingularValue(splats, kSlack);
+  const int bits = positionBits(root, cell, most);
+  // Whatever it is within the slack, the number of bits is nearly always the same.
+  if (positionBits(root, cell, most / (1 + kSlack)) == bits) return bits;
+  return positionBits(root, cell, smallestSingularValue(splats));
 }
 
 class GeometryEncoder {
@@ -83,7 +94,7 @@ class GeometryEncoder {
   }
 
   void encodePositions() {
-    const int bits = positionBits(root_, brick_.cell, smallestSingularValue(brick_.splats));
+    const int bits = positionBits(root_, brick_.cell, brick_.splats);
     header_.position_bits = static_cast<uint8_t>(bits);
     decoded_.position_bits = bits;
     const int lattice_bits = kPositionBits - static_cast<int>(brick_.cell.level);
@@ -100,11 +111,11 @@ class GeometryEncoder {
   bool encodeShapes() {
     LogTable axis0, axis1, volume;
     const auto as_it_is = [] { return 0.0; };
-    if (!encodeLogs([](const Splat& s) { return std::log(s.axis[0]); }, kAxisStep,
+    if (!encodeLogs([](const Splat& s) { return s.axis[0]; }, kAxisStep,
                     {header_.log_axis0, axis0, decoded_.axis[0]}, as_it_is) ||
-        !encodeLogs([](const Splat& s) { return std::log(s.axis[1]); }, kAxisStep,
+        !encodeLogs([](const Splat& s) { return s.axis[1]; }, kAxisStep,
                     {header_.log_axis1, axis1, decoded_.axis[1]}, as_it_is) ||
-        !encodeLogs([](const Splat& s) { return std::log(s.axis[0] * s.axis[1] * s.axis[2]); }, kVolumeStep,
+        !encodeLogs([](const Splat& s) { return s.axis[0] * s.axis[1] * s.axis[2]; }, kVolumeStep,
                     {header_.log_volume, volume, decoded_.axis[2]}, [&] { return missingVolume(); }))
       return false;
     for (size_t n = 0; n < count_; ++n) decoded_.axis[2][n] /= decoded_.axis[0][n] * decoded_.axis[1][n];
@@ -132,25 +143,18 @@ class GeometryEncoder {
   };
 
   /// `shift()` is added to the base once all are decoded.
-  template <typename Log, typename Shift>
-  bool encodeLogs(Log log, double step, const DecodedLogs& decoded, const Shift& shift) {
-    double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
-    for (size_t n = 0; n < count_; ++n) {
-      targets_[n] = log(brick_.splats[n]);
-      lowest = std::min(lowest, targets_[n]);
-      highest = std::max(highest, targets_[n]);
-    }
-    if (!((highest - lowest) / step < kLargestLogCode)) return false;
-    const auto largest = static_cast<uint32_t>((highest - lowest) / step) + 1;
-    for (size_t n = 0; n < count_; ++n)
-      codes_[n] = static_cast<uint32_t>((targets_[n] - lowest) / step + 0.5);
+  template <typename Length, typename Shift>
+  bool encodeLogs(Length length, double step, const DecodedLogs& decoded, const Shift& shift) {
+    for (size_t n = 0; n < count_; ++n) targets_[n] = length(brick_.splats[n]);
+    const std::optional<LogCodes> logs = logCodes(targets_, step, kLargestLogCode, codes_.data());
+    if (!logs) return false;
     const auto decode = [&](double base) {
       decoded.base = base;
-      decoded.table = LogTable(base, step, largest);
+      decoded.table = LogTable(base, step, logs->largest);
       for (size_t n = 0; n < count_; ++n) decoded.out[n] = decoded.table[codes_[n]];
     };
-    decode(lowest);
-    if (const double more = shift(); more != 0) decode(lowest + more);
+    decode(logs->lowest);
+    if (const double more = shift(); more != 0) decode(logs->lowest + more);
     addPredicted(codes_);
     return true;
   }
