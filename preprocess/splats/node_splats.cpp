@@ -10,6 +10,7 @@
 
 #include "preprocess/splats/covered_part.h"
 #include "preprocess/splats/faces_behind.h"
+#include "preprocess/splats/inner_growth.h"
 #include "preprocess/splats/inner_nodes.h"
 #include "preprocess/splats/lq.h"
 #include "preprocess/splats/node_lattice.h"
@@ -47,7 +48,8 @@ class Window {
  private:
   uint64_t octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const;
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
-  void takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at);
+  void takeInnerNode(const InnerSplats& splats, const InnerGrowthCodes& growth, size_t n, uint64_t i,
+                     ptrdiff_t at);
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, const Layers& layers);
   void cutBehindOne(const NodeBehind& behind, NodeSplat& node) const;
   void cutBehindSeveral(const CutBehindFaces& cut);
@@ -172,6 +174,7 @@ void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighb
   }
   const size_t first = count_, scalars = scalars_.size();
   InnerSplats splats;
+  InnerGrowthCodes growth{};
   std::vector<SplatScalar> of_last;
   for (uint64_t done = 0; done < count;) {
     // The last ones come with some of those before, which stay as they are.
@@ -179,12 +182,16 @@ void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighb
     SplatScalar* values = out_.values.data() + (first + begin) * scalars;
     if (begin < done) of_last.resize(kInnerNodesAtOnce * scalars);
     computeInnerNodes(nodes, begin, splats, begin < done ? of_last.data() : values);
+    if (corrections_.growth_codes) {
+      const auto of = [&](size_t axis) { return scratch_.growth[axis].data() + in_part + begin; };
+      findInnerGrowth(splats, {of(0), of(1), of(2)}, growth);
+    }
     for (size_t n = done - begin; n < kInnerNodesAtOnce; ++n) {
       if (begin < done) std::copy_n(of_last.data() + n * scalars, scalars, values + n * scalars);
       count_ = first + begin + n;
       const uint64_t i = i0 + begin + n;
       if (splats.is_plain[n])
-        takeInnerNode(splats, n, i, at + static_cast<ptrdiff_t>(begin + n));
+        takeInnerNode(splats, growth, n, i, at + static_cast<ptrdiff_t>(begin + n));
       else
         addNode(i, at + static_cast<ptrdiff_t>(begin + n), neighbours, false, {});
     }
@@ -194,14 +201,11 @@ void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighb
 }
 
 /// Number `n` of `splats` as the splat of node `i` of the row.
-void Window::takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at) {
+void Window::takeInnerNode(const InnerSplats& splats, const InnerGrowthCodes& growth, size_t n, uint64_t i,
+                           ptrdiff_t at) {
   const auto of = [n](const InnerSplats::Row(&rows)[3]) {
     return glm::dvec3(rows[0][n], rows[1][n], rows[2][n]);
   };
-  const auto rotate = [&](const glm::dvec3& axis) {
-    return of(splats.rotated[axis.x != 0 ? 0 : axis.y != 0 ? 1 : 2]);
-  };
-  const uint64_t in_part = i - i0_;
   NodeSplat& node = out_.splats[count_];
   node.node = first_node_of_row_ + i;
   node.splat.position = of(splats.position);
@@ -212,10 +216,16 @@ void Window::takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrd
   node.splat.weight = splats.weight[n];
   node.regular = true;
   node.border_code = kNoBorder;
-  node.growth_code = kNoGrowth;
-  if (corrections_.growth_codes)
+  if (growth.of[n] != kGrowsAlongSeveral) {
+    node.growth_code = static_cast<uint32_t>(growth.of[n]);
+  } else {
+    const uint64_t in_part = i - i0_;
+    const auto rotate = [&](const glm::dvec3& axis) {
+      return of(splats.rotated[axis.x != 0 ? 0 : axis.y != 0 ? 1 : 2]);
+    };
     node.growth_code = growthCode(
         {scratch_.growth[0][in_part], scratch_.growth[1][in_part], scratch_.growth[2][in_part]}, rotate);
+  }
   node.on_block_face = node.behind_face = false;
   node.layers = 0;
   node.node_position = lattice_.position(at);

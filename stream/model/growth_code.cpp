@@ -12,11 +12,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kGrowthSteps = 32;
-constexpr int kLargestGrowth = 20;  // in steps
-constexpr double kRotationStep = 0.08;
-constexpr int kLargestRotation = 7;  // in steps
-constexpr int kRotationBits = 4, kRotationShift = kGrowthFrameShift;
 static_assert(3 * kRotationBits == kGrowthFrameBits);
 
 /// std::nearbyint() of a number far below 2^51, without a call.
@@ -112,8 +107,8 @@ uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> gr
   Steps steps{axis, {}};
   int count = 0, last = 0, none = 0;
   for (int n = 0; n < 3; ++n) {
-    steps.growth[n] =
-        nearestInteger(std::clamp(kGrowthSteps * growth[n], -1.0 * kLargestGrowth, 1.0 * kLargestGrowth));
+    steps.growth[n] = nearestInteger(
+        std::clamp(growth[n] / kGrowthStep, -1.0 * kLargestGrowthCode, 1.0 * kLargestGrowthCode));
     if (steps.growth[n] != 0) {
       ++count;
       last = n;
@@ -129,8 +124,8 @@ uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> gr
   const std::array<double, 3> numbers{rotation.x, rotation.y, rotation.z};
   for (int n = 0; n < 3; ++n) {
     const int number = nearestInteger(numbers[n] / kRotationStep);
-    code |= lowBits(std::clamp(number, -kLargestRotation, kLargestRotation), kRotationBits)
-            << (kRotationShift + n * kRotationBits);
+    code |= lowBits(std::clamp(number, -kLargestRotationCode, kLargestRotationCode), kRotationBits)
+            << (kGrowthFrameShift + n * kRotationBits);
   }
   return code;
 }
@@ -149,13 +144,13 @@ CellGrowth cellGrowth(uint32_t growth_code) {
 
 bool isPossibleGrowthCode(uint32_t growth_code) {
   if (growth_code == kNoGrowth) return true;
-  if (growth_code >> (kRotationShift + 3 * kRotationBits) != 0) return false;
+  if (growth_code >> (kGrowthFrameShift + 3 * kRotationBits) != 0) return false;
   bool any = false;
   for (int n = 0; n < 3; ++n) {
     const int growth = signedBits(growth_code, n * kGrowthBits, kGrowthBits);
-    if (std::abs(growth) > kLargestGrowth) return false;
+    if (std::abs(growth) > kLargestGrowthCode) return false;
     any |= growth != 0;
-    if (signedBits(growth_code, kRotationShift + n * kRotationBits, kRotationBits) < -kLargestRotation)
+    if (signedBits(growth_code, kGrowthFrameShift + n * kRotationBits, kRotationBits) < -kLargestRotationCode)
       return false;
   }
   return any;

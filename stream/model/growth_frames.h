@@ -14,6 +14,9 @@ using GrowthFrame = std::array<glm::vec3, 3>;
 
 inline constexpr int kGrowthBits = 6, kGrowthFrameShift = 3 * kGrowthBits, kGrowthFrameBits = 12;
 inline constexpr float kGrowthStep = 1.0f / 32;
+inline constexpr int kLargestGrowthCode = 20;                      // in steps
+inline constexpr int kRotationBits = 4, kLargestRotationCode = 7;  // in steps
+inline constexpr double kRotationStep = 0.08;
 
 /// Those of every rotation that codes have, by frameNumber().
 std::span<const GrowthFrame> growthFrames();
