@@ -173,7 +173,8 @@ TEST_F(Frames, PartsDrawTheFramesOfTheWhole) {
   for (const char* part : {"1/3", "2/3", "3/3"}) {
     const std::string json_name = fmt::format("part{}.json", part[0]);
     expectDrawn(with({"-o", file("part_%d.png"), "--part", part, "--stats", file(json_name)}));
-    for (const auto& frame : json(json_name)["frames"])
+    const nlohmann::json stats = json(json_name);
+    for (const auto& frame : stats["frames"])
       EXPECT_EQ(frame["frame"].get<int>() % 3, part[0] - '1');
   }
   for (int n = 0; n < 5; ++n)
