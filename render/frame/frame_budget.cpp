@@ -23,6 +23,9 @@ constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16
 // In pictures of two scalars: the second one's values, and a record for each splat.
 constexpr uint64_t kSecondScalarBytes =
     uint64_t{kMaxBrickSplats} * (5 * sizeof(float) + sizeof(ScreenSplat) + 8 + 2 * sizeof(DepthItem));
+// These have what they need first. More workers take half of the memory at most: where little is left for splats, the picture is
+// drawn in many regions, and bricks are prepared again for each.
+constexpr uint64_t kFirstWorkers = 2;
 constexpr uint64_t kMinRingBytes = 32768 * sizeof(ScreenSplat);
 constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // Larger buffers do not make a frame faster: they only even out bricks that take different times.
@@ -49,8 +52,9 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const unsigned wanted = threadsOrCores(threads);
   FrameBudget budget;
   const uint64_t taken = rounded + pools + wanted * worker_bytes <= memory_bytes ? rounded : exact;
+  const uint64_t fit = (memory_bytes - taken - pools) / worker_bytes;
   budget.workers =
-      static_cast<unsigned>(std::min<uint64_t>(wanted, (memory_bytes - taken - pools) / worker_bytes));
+      static_cast<unsigned>(std::min<uint64_t>(wanted, std::max(std::min(fit, kFirstWorkers), fit / 2)));
   const uint64_t free = memory_bytes - taken - pools - budget.workers * worker_bytes;
   const uint64_t share = free / 4;
   const uint64_t ring_bytes = std::min(kMinRingBytes + share, kMaxRingBytes);

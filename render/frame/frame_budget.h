@@ -28,9 +28,9 @@ struct FrameBudget {
     bool two_scalars = false;    // splats have ScreenColours
     bool several_ranks = false;  // draw the picture together
   };
-  /// Divides `memory_bytes` for at most `threads` workers (0: one per core). Workers come first, then the
-  /// ring, the pager and the sweep, each up to the size from which more does not help; the cache gets the
-  /// rest. Pictures of different sizes have the same shares as long as their needs lie in the same sixteenth
+  /// Divides `memory_bytes` for at most `threads` workers (0: one per core). Two workers come first, more take half
+  /// at most; then the ring, the pager and the sweep, each up to the size from which more does not help; the cache
+  /// gets the rest. Pictures of different sizes have the same shares as long as their needs lie in the same sixteenth
   /// of the memory. Throws UsageError if `memory_bytes` is too little; the message says how much is needed.
   static FrameBudget of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads);
 
