@@ -24,8 +24,11 @@ std::pair<double, double> coveredRange(const TransferFunction& transfer_function
   double low = std::clamp(from, data_low, data_high);
   if (transfer_function.logScale()) low = std::max(low, from);  // the data may end below zero
   double high = std::clamp(to, data_low, data_high);
-  // A constant field, or a transfer function that is constant over the data: any interval will do.
-  if (!(high > low)) high = low + std::max(std::abs(low), 1.0) * 1e-3;
+  // A constant field, or a transfer function that is constant over the data: any interval will do. Also of data that differ by
+  // so little that a table's scale would be infinite in single precision.
+  constexpr double kNarrowest = 1e-34;
+  const bool is_narrow = transfer_function.logScale() ? !(high > low) : !(high - low > kNarrowest);
+  if (is_narrow) high = low + std::max(std::abs(low), 1.0) * 1e-3;
   return {low, high};
 }
 

@@ -104,6 +104,14 @@ TEST(Classification, OfAPresetFollowsItWhereDataCanBe) {
   EXPECT_NEAR(ClassificationTable::of(preset, 8, 9).mean(8.5, 0.1).w, preset.at(8.5).extinction, 1e-9);
 }
 
+TEST(Classification, OfDataTooNarrowForSinglePrecisionIsFinite) {
+  const auto preset = TransferFunction::preset("viridis", -1, 1, 0.1);
+  const ClassificationTable table = ClassificationTable::of(preset, 0, 8e-44);
+  EXPECT_TRUE(std::isfinite(table.scale()) && std::isfinite(table.bias()));
+  EXPECT_FALSE(table.fullyTransparent(0, 8e-44f));
+  EXPECT_NEAR(table.mean(0, 0).z, preset.at(0).colour.b * preset.at(0).extinction, 1e-3);
+}
+
 TEST(Classification, ShowsNoValueThatTheDataDoesNotHave) {
   const auto preset = TransferFunction::preset("grey", 0, 60, 1);
   // A tangent reaches 45 beside a step from 0 to 35.
