@@ -3,13 +3,11 @@
 // small file implies.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <new>
+#include <optional>
 #include <random>
 
 #include "preprocess/formats/open/open_grid.h"
@@ -17,6 +15,7 @@
 #include "stream/base/file.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/all_nodes.h"
+#include "tests/support/memory_limit.h"
 #include "tests/support/sanitizers.h"
 #include "tests/support/vts_writer.h"
 
@@ -26,28 +25,8 @@ namespace {
 using test::TestFolder;
 
 // The files have some tens of KiB; readers have buffers.
-constexpr rlim_t kMoreMemory = rlim_t{64} << 20;
+constexpr uint64_t kMoreMemory = uint64_t{64} << 20;
 constexpr uint64_t kMaxRows = 4096;
-
-/// Until its end, this process may not take much more address space than it has.
-class MemoryLimit {
- public:
-  MemoryLimit() {
-    ::getrlimit(RLIMIT_AS, &before_);
-    if (kIsSanitized) return;
-    uint64_t pages = 0;
-    std::ifstream("/proc/self/statm") >> pages;
-    rlimit limit = before_;
-    limit.rlim_cur = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMoreMemory;
-    ::setrlimit(RLIMIT_AS, &limit);
-  }
-  ~MemoryLimit() { ::setrlimit(RLIMIT_AS, &before_); }
-  MemoryLimit(const MemoryLimit&) = delete;
-  MemoryLimit& operator=(const MemoryLimit&) = delete;
-
- private:
-  rlimit before_{};
-};
 
 /// All that a grid holds, in one row of numbers; of blocks that claim to be huge, the beginning.
 struct Content {
@@ -91,7 +70,8 @@ struct Ending {
 Ending endingOf(const std::filesystem::path& path, const Content& whole, const std::string& what) {
   Ending ending;
   try {
-    const MemoryLimit limit;
+    std::optional<test::MemoryLimit> limit;
+    if (!kIsSanitized) limit.emplace(kMoreMemory);
     const Content content = contentOf(path);
     if (content.names == whole.names && content.blocks == whole.blocks) {
       for (size_t n = 0; n < whole.numbers.size(); ++n) {

@@ -1,30 +1,24 @@
 #include "stream/base/spare_memory.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdint>
-#include <fstream>
 #include <new>
+
+#include "tests/support/memory_limit.h"
 
 namespace curvisplat {
 namespace {
 
-uint64_t mappedBytes() {
-  uint64_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  return pages * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
-}
+using test::mappedBytes;
 
 /// Whether requireSpareMemory() throws where the process may map `spare_bytes` more, tried in a process of its own.
 bool isRefusedWith(uint64_t spare_bytes) {
   const pid_t child = ::fork();
   if (child == 0) {
-    const rlim_t most = mappedBytes() + spare_bytes;
-    const rlimit limit{most, most};
-    ::setrlimit(RLIMIT_AS, &limit);
+    const test::MemoryLimit limit(spare_bytes);
     try {
       requireSpareMemory();
     } catch (const std::bad_alloc&) {

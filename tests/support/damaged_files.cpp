@@ -4,7 +4,6 @@
 #include <execinfo.h>
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,13 +11,14 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <new>
 #include <numeric>
+#include <optional>
 #include <random>
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "tests/support/memory_limit.h"
 #include "tests/support/sanitizers.h"
 #include "tests/support/temporary_folder.h"
 
@@ -26,7 +26,7 @@ namespace curvisplat {
 namespace {
 
 // Address space that a child may take beside what it has from its parent. The files are of some tens of KiB.
-constexpr rlim_t kMoreMemory = rlim_t{256} << 20;
+constexpr uint64_t kMoreMemory = uint64_t{256} << 20;
 constexpr unsigned kHangSeconds = 60;
 
 enum Ending : int {
@@ -131,13 +131,8 @@ Content contentOf(const GridSource& source) {
   for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGILL}) std::signal(number, onCrash);
   std::signal(SIGALRM, SIG_DFL);
   ::alarm(kHangSeconds);
-  if (!kIsSanitized) {
-    uint64_t pages = 0;
-    std::ifstream("/proc/self/statm") >> pages;
-    const rlim_t limit = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMoreMemory;
-    const rlimit memory{limit, limit};
-    ::setrlimit(RLIMIT_AS, &memory);
-  }
+  std::optional<test::MemoryLimit> limit;
+  if (!kIsSanitized) limit.emplace(kMoreMemory);
   int ending = kOtherException;
   try {
     ending = contentOf(*open(file)) == whole ? kSame : kChanged;
