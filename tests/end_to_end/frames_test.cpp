@@ -174,8 +174,7 @@ TEST_F(Frames, PartsDrawTheFramesOfTheWhole) {
     const std::string json_name = fmt::format("part{}.json", part[0]);
     expectDrawn(with({"-o", file("part_%d.png"), "--part", part, "--stats", file(json_name)}));
     const nlohmann::json stats = json(json_name);
-    for (const auto& frame : stats["frames"])
-      EXPECT_EQ(frame["frame"].get<int>() % 3, part[0] - '1');
+    for (const auto& frame : stats["frames"]) EXPECT_EQ(frame["frame"].get<int>() % 3, part[0] - '1');
   }
   for (int n = 0; n < 5; ++n)
     EXPECT_EQ(bytes(fmt::format("whole_{}.png", n)), bytes(fmt::format("part_{}.png", n))) << n;

@@ -30,7 +30,7 @@ CONSTANT = re.compile(r"k(?!(?:Most|Least)(?![a-z]))[A-Z0-9][A-Za-z0-9]*")
 
 
 NAMESPACE = re.compile(r"^namespace ([\w:]+) \{")
-DEFINED = re.compile(r"^(?:template <[^;{}]*> )?(?:class|struct|enum class|enum|union) (\w+)\b(?!::)(?!.*;$)")
+DEFINED = re.compile(r"^(?:template <[^;{}]*> )?(?:class|struct|enum class|enum|union) (?:alignas\(\w+\) )?(\w+)\b(?!::)(?!.*;$)")
 PRODUCT = ("stream", "preprocess", "render", "tools")
 
 

@@ -36,6 +36,9 @@ class Checks(unittest.TestCase):
         self.assertEqual(list(check_names.defined_twice([first, again])), [("b.h", 3, "n::Face", "a.h")])
         other = ("c.h", "namespace m {\nstruct Face {\n};\n}\nnamespace n {\nclass Face;\nstruct Face::Part {\n};\n}\n")
         self.assertEqual(list(check_names.defined_twice([first, other])), [])
+        aligned = [(name, f"namespace n {{\nstruct alignas(64) {type} {{\n}};\n}}\n")
+                   for name, type in (("d.h", "Row"), ("e.h", "Lane"), ("f.h", "Row"))]
+        self.assertEqual(list(check_names.defined_twice(aligned)), [("f.h", 2, "n::Row", "d.h")])
 
     def test_what_is_none(self):
         self.assertEqual(self.faults("  const int local = 3;\n  struct stat found {};\n  struct stat now;\n"), [])
