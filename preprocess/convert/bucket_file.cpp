@@ -112,11 +112,6 @@ class ChunkWriter {
       std::exception_ptr error;
       try {
         const TraceScope trace("write splats");
-        ChunkHeader header;
-        std::memcpy(&header, chunk.bytes.data(), sizeof header);
-        header.checksum = checksumOf(
-            std::span(chunk.bytes).first(sizeof header + header.bytes).subspan(sizeof header.checksum));
-        std::memcpy(chunk.bytes.data(), &header, sizeof header);
         file_->writeAt(chunk.offset, chunk.bytes);
       } catch (...) {
         error = std::current_exception();
@@ -180,7 +175,8 @@ struct BucketFile::State {
 
   void flush(Bucket& bucket) REQUIRES(bucket.mutex) {
     uint64_t& last_chunk = bucket.chains.last_chunks[bucket.next_chain++ % BucketChains::kCount];
-    const ChunkHeader header{0, last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
+    ChunkHeader header{0, last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
+    header.checksum = checksumOf(header, std::span(bucket.buffer).subspan(sizeof header));
     std::memcpy(bucket.buffer.data(), &header, sizeof header);
     const size_t pages = (bucket.buffer.size() + kDirectAlignment - 1) / kDirectAlignment;
     bucket.buffer.resize(pages * kDirectAlignment);
