@@ -10,7 +10,6 @@
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/cell_splats.h"
-#include "stream/base/mutex.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -19,6 +18,7 @@ namespace {
 constexpr uint64_t kNodesPerTask = 1024;        // their splats stay in a core's cache until they are sent
 constexpr uint64_t kNodesOfRowPerTask = 16384;  // longer rows are cut
 constexpr size_t kGatheredBytes = 32 << 10;
+constexpr size_t kGatheredForSeams = 16 << 10;  // doubles
 constexpr uint64_t kSeamReach =
     2;  // nodes of a row or column, from a face of the block on, that may be for seams
 
@@ -34,9 +34,7 @@ class SplatStream {
         faces_(faces),
         sink_of_thread_(&sink_of_thread),
         seams_(&seams),
-        workers_([this] {
-          return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size())};
-        }) {
+        workers_([this] { return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size()), {}}; }) {
     corrections_.steep = pass.steep;
     corrections_.octants = pass.octants;
     corrections_.growth_codes = !pass.values_alone;
@@ -70,8 +68,13 @@ class SplatStream {
         worker.handedness[slab.block].right += worker.splats.right_handed;
         worker.handedness[slab.block].left += worker.splats.left_handed;
       }
-      send(worker.splats, what);
+      send(worker, what);
     });
+  }
+
+  /// To be called at the end.
+  void finish() {
+    for (Worker& worker : workers_) seams_->addPacked(worker.for_seams);
   }
 
   /// Of all that was sent. Not while slabs are added.
@@ -109,6 +112,7 @@ class SplatStream {
     CellScratch cells;
     uint64_t degenerate = 0;
     std::vector<Handedness> handedness;  // [block]
+    std::vector<double> for_seams;       // packed, not yet added
   };
 
   /// The nodes i0 .. i1 - 1 of each row of a box.
@@ -143,7 +147,8 @@ class SplatStream {
     return std::span(splats.values).subspan(n * variables_, variables_);
   }
 
-  void send(const NodeSplats& splats, Send what) {
+  void send(Worker& worker, Send what) {
+    const NodeSplats& splats = worker.splats;
     SplatSink& sink = (*sink_of_thread_)();
     bool has_faces = false;
     for (size_t n = 0; n < splats.splats.size(); ++n) {
@@ -154,8 +159,10 @@ class SplatStream {
     }
     if (!has_faces) return;
     const TraceScope trace("add to seams");
-    const MutexLock lock(adding_to_seams_);
-    seams_->add(splats, variables_);
+    seams_->pack(splats, worker.for_seams);
+    if (worker.for_seams.size() < kGatheredForSeams) return;
+    seams_->addPacked(worker.for_seams);
+    worker.for_seams.clear();
   }
 
   const Progress* progress_;
@@ -166,8 +173,7 @@ class SplatStream {
   const SinkOfThread* sink_of_thread_;
   NodeSplatCorrections corrections_;
   ScatterState before_;  // of an interrupted run
-  Mutex adding_to_seams_;
-  SeamMerger* seams_ PT_GUARDED_BY(adding_to_seams_);
+  SeamMerger* seams_;
   tbb::enumerable_thread_specific<Worker> workers_;
 };
 
@@ -267,6 +273,7 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
     state.slabs = n + 1;
     pass.notes.note(state);
   }
+  splats.finish();
   return splats.counts(pass.ranks);
 }
 

@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -123,6 +124,8 @@ AbuttingFaces::Centre AbuttingFaces::centreOf(const CellFace& face,
 }
 
 void AbuttingFaces::add(std::span<const Centre> centres) {
+  std::vector<double> records;
+  records.reserve(centres.size() * kCentreSize);
   for (const Centre& centre : centres) {
     if (centre.collapsed) {
       abutting_[centre.face] = true;
@@ -130,12 +133,12 @@ void AbuttingFaces::add(std::span<const Centre> centres) {
     }
     reach_.add(centre.at, centre.spacing);
     const auto [along, across] = seamPosition(centre.at);
-    double* const rest = centres_.add(along, across, centre.face) + 3;
-    rest[0] = centre.at.x;
-    rest[1] = centre.at.y;
-    rest[2] = centre.at.z;
-    rest[3] = centre.spacing;
+    const std::array<double, kCentreSize> record{
+        along,       across,        std::bit_cast<double>(centre.face), centre.at.x, centre.at.y,
+        centre.at.z, centre.spacing};
+    records.insert(records.end(), record.begin(), record.end());
   }
+  centres_.add(records);
 }
 
 void AbuttingFaces::match(const Progress& progress) {

@@ -61,6 +61,11 @@ void LargestReach::add(const glm::dvec3& position, double spacing) {
   spacing_ = std::max(spacing_, spacing);
 }
 
+void LargestReach::add(const LargestReach& other) {
+  coordinate_ = std::max(coordinate_, other.coordinate_);
+  spacing_ = std::max(spacing_, other.spacing_);
+}
+
 double LargestReach::of(int coordinate_bytes) const {
   return reachOf({{}, glm::dvec3(coordinate_), spacing_}, coordinate_bytes);
 }

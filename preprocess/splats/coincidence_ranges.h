@@ -16,6 +16,7 @@ namespace curvisplat {
 class LargestReach {
  public:
   void add(const glm::dvec3& position, double spacing);
+  void add(const LargestReach& other);
   double of(int coordinate_bytes) const;
 
  private:

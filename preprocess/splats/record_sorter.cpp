@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <queue>
 #include <span>
 #include <utility>
 
 #include "stream/base/huge_pages.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -70,82 +72,124 @@ class RunReader {
 RecordSorter::RecordSorter(size_t record_size, uint64_t memory_bytes, std::filesystem::path temporary_folder)
     : record_size_(record_size),
       memory_bytes_(memory_bytes),
-      capacity_(std::max<uint64_t>(1, memory_bytes / (record_size * sizeof(double) + 2 * sizeof(Entry) + 1))),
+      half_(std::max<uint64_t>(1, memory_bytes / (record_size * sizeof(double) + 2 * sizeof(Entry) + 1) / 2)),
       folder_(std::move(temporary_folder)) {}
 
-double* RecordSorter::add(double along, double across, uint64_t number) {
-  if (entries_.size() == capacity_) spill();
-  if (!records_) {
-    // All at once: growing would hold the old and the new. Pages that are never touched cost nothing.
-    entries_.reserve(capacity_);
-    records_ = std::make_unique_for_overwrite<double[]>(capacity_ * record_size_);
-    preferHugePages(records_.get(), capacity_ * record_size_ * sizeof(double));
+void RecordSorter::takeMemory() {
+  if (records_) return;
+  // All at once: growing would hold the old and the new. Pages that are never touched cost nothing.
+  halves_[0].entries.reserve(2 * half_);  // all, if they stay in memory
+  halves_[1].entries.reserve(half_);
+  halves_[1].first = half_;
+  records_ = std::make_unique_for_overwrite<double[]>(2 * half_ * record_size_);
+  preferHugePages(records_.get(), 2 * half_ * record_size_ * sizeof(double));
+}
+
+/// As many as there is room for. Returns how many doubles these are.
+size_t RecordSorter::fill(Half& half, std::span<const double> records) {
+  const size_t room = (half_ - half.entries.size()) * record_size_;
+  records = records.first(std::min(room, records.size()));
+  size_t place = half.first + half.entries.size();
+  std::copy(records.begin(), records.end(), records_.get() + place * record_size_);
+  for (size_t n = 0; n < records.size(); n += record_size_)
+    half.entries.push_back({alongOf(&records[n]), place++});
+  return records.size();
+}
+
+void RecordSorter::add(std::span<const double> records) {
+  if (records.empty()) return;
+  MutexLock lock(mutex_);
+  takeMemory();
+  while (!records.empty()) {
+    Half &half = halves_[filling_], &other = halves_[1 - filling_];
+    if (half.entries.size() < half_) {
+      records = records.subspan(fill(half, records));
+    } else if (other.is_being_written) {
+      const TraceScope trace("wait for a run", TraceKind::kWait);
+      changed_.wait(lock);
+    } else if (runs_.empty() && other.entries.empty()) {
+      filling_ = 1 - filling_;  // nothing is written before all of the memory is full
+    } else {
+      Half& full = other.entries.empty() ? half : other;
+      if (&full == &half) filling_ = 1 - filling_;
+      full.is_being_written = true;
+      lock.unlock();
+      std::exception_ptr error;
+      Run run;
+      try {
+        run = write(full);
+      } catch (...) {
+        error = std::current_exception();
+      }
+      lock.lock();
+      full.is_being_written = false;
+      full.entries.clear();
+      changed_.notify_all();
+      if (error) std::rethrow_exception(error);
+      runs_.push_back(run);
+    }
   }
-  double* const record = records_.get() + entries_.size() * record_size_;
-  entries_.push_back({along, entries_.size()});
-  record[0] = along;
-  record[1] = across;
-  record[2] = std::bit_cast<double>(number);
-  return record;
 }
 
 /// Distributes entries over buckets of equal width, then sorts each bucket: quick where positions are spread more or less evenly.
-void RecordSorter::sortEntries() {
+void RecordSorter::sortEntries(Half& half) const {
+  std::vector<Entry>&entries = half.entries, &sorted = half.sorted;
   const auto is_before = [this](const Entry& a, const Entry& b) { return isBefore(a, b); };
-  if (entries_.size() < kFewEntries) return std::sort(entries_.begin(), entries_.end(), is_before);
+  if (entries.size() < kFewEntries) return std::sort(entries.begin(), entries.end(), is_before);
   const auto [least, most] = std::minmax_element(
-      entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.along < b.along; });
+      entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.along < b.along; });
   const double lower = least->along, width = most->along - lower;
-  const auto buckets = static_cast<uint32_t>(std::min<size_t>(entries_.size() / kEntriesOfBucket, 1u << 24));
+  const auto buckets = static_cast<uint32_t>(std::min<size_t>(entries.size() / kEntriesOfBucket, 1u << 24));
   const double scale = buckets / width;
-  if (!(std::isfinite(width) && scale < 1e300)) return std::sort(entries_.begin(), entries_.end(), is_before);
+  if (!(std::isfinite(width) && scale < 1e300)) return std::sort(entries.begin(), entries.end(), is_before);
   const auto bucketOf = [&](const Entry& entry) {
     return std::min(static_cast<uint32_t>((entry.along - lower) * scale), buckets - 1);
   };
   std::vector<size_t> begins(buckets + size_t{1});
-  for (const Entry& entry : entries_) ++begins[bucketOf(entry) + size_t{1}];
+  for (const Entry& entry : entries) ++begins[bucketOf(entry) + size_t{1}];
   for (size_t n = 1; n < begins.size(); ++n) begins[n] += begins[n - 1];
-  sorted_.reserve(entries_.capacity());
-  sorted_.resize(entries_.size());
-  for (const Entry& entry : entries_) sorted_[begins[bucketOf(entry)]++] = entry;
+  sorted.reserve(entries.capacity());
+  sorted.resize(entries.size());
+  for (const Entry& entry : entries) sorted[begins[bucketOf(entry)]++] = entry;
   size_t begin = 0;
   for (uint32_t bucket = 0; bucket < buckets; ++bucket) {
     const size_t end = begins[bucket];
-    std::sort(sorted_.begin() + static_cast<ptrdiff_t>(begin), sorted_.begin() + static_cast<ptrdiff_t>(end),
+    std::sort(sorted.begin() + static_cast<ptrdiff_t>(begin), sorted.begin() + static_cast<ptrdiff_t>(end),
               is_before);
     begin = end;
   }
-  entries_.swap(sorted_);
+  entries.swap(sorted);
 }
 
-void RecordSorter::visitInMemory(double from, double to, const VisitOrStop& visit) const {
+void RecordSorter::visitInMemory(const std::vector<Entry>& entries, double from, double to,
+                                 const VisitOrStop& visit) const {
   const auto placeOf = [&](double along) {
-    return static_cast<size_t>(std::ranges::lower_bound(entries_, along, {}, &Entry::along) -
-                               entries_.begin());
+    return static_cast<size_t>(std::ranges::lower_bound(entries, along, {}, &Entry::along) - entries.begin());
   };
-  const size_t end = to < kInfinity ? placeOf(to) : entries_.size();
+  const size_t end = to < kInfinity ? placeOf(to) : entries.size();
   for (size_t n = from > -kInfinity ? placeOf(from) : 0; n < end; ++n) {
-    if (n + kRecordsAhead < end) prefetch(record(entries_[n + kRecordsAhead]), record_size_);
-    if (!visit(record(entries_[n]))) return;
+    if (n + kRecordsAhead < end) prefetch(record(entries[n + kRecordsAhead]), record_size_);
+    if (!visit(record(entries[n]))) return;
   }
 }
 
-void RecordSorter::spill() {
+/// As a run that is sorted.
+RecordSorter::Run RecordSorter::write(Half& half) {
+  const TraceScope trace("write a run");
   if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
   OutputFile& out = file_->out();
   const uint64_t begin = out.size();
   std::vector<double> block;
-  sortEntries();
-  visitInMemory(-kInfinity, kInfinity, [&](const double* record) {
+  sortEntries(half);
+  visitInMemory(half.entries, -kInfinity, kInfinity, [&](const double* record) {
     block.insert(block.end(), record, record + record_size_);
     if (block.size() < kWriteSize) return true;
     out.append(std::span<const double>(block));
     block.clear();
     return true;
   });
-  entries_.clear();
   out.append(std::span<const double>(block));
-  runs_.push_back({begin, out.size()});
+  return {begin, out.size()};
 }
 
 void RecordSorter::drain(const Visit& visit_one) {
@@ -159,8 +203,14 @@ void RecordSorter::drain(const Visit& visit_one) {
 
 void RecordSorter::sort(unsigned visitors) {
   visitors_ = visitors;
-  if (runs_.empty()) return sortEntries();
-  if (!entries_.empty()) spill();
+  if (runs_.empty()) {
+    Half &all = halves_[0], &rest = halves_[1];
+    all.entries.insert(all.entries.end(), rest.entries.begin(), rest.entries.end());
+    rest.entries = std::vector<Entry>();
+    return sortEntries(all);
+  }
+  for (Half& half : halves_)
+    if (!half.entries.empty()) runs_.push_back(write(half));
   forgetMemory();
 }
 
@@ -171,14 +221,14 @@ void RecordSorter::forget() {
 }
 
 void RecordSorter::forgetMemory() {
-  entries_ = std::vector<Entry>();
-  sorted_ = std::vector<Entry>();
+  halves_ = {};
+  filling_ = 0;
   records_.reset();
 }
 
 void RecordSorter::visit(double from, double to, const VisitOrStop& visit) const {
   if (runs_.empty())
-    visitInMemory(from, to, visit);
+    visitInMemory(halves_[0].entries, from, to, visit);
   else
     visitRuns(from, to, visit);
 }
@@ -243,7 +293,8 @@ std::vector<double> RecordSorter::cutsInto(size_t parts) const {
     const uint64_t step = std::max<uint64_t>(1, records / kSamplesOfRun);
     for (uint64_t n = step / 2; n < records; n += step) sample.push_back(along_at(n));
   };
-  if (runs_.empty()) add(entries_.size(), [&](uint64_t n) { return entries_[n].along; });
+  const std::vector<Entry>& in_memory = halves_[0].entries;
+  if (runs_.empty()) add(in_memory.size(), [&](uint64_t n) { return in_memory[n].along; });
   for (const Run& run : runs_) add(recordsOf(run), [&](uint64_t n) { return alongAt(run, n); });
   std::sort(sample.begin(), sample.end());
   std::vector<double> cuts;

@@ -23,7 +23,7 @@ constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4, kProbe = 8, 
 constexpr int kLayersShift = 8, kBorderCodeShift = 32;
 
 /// `record`: behind its first three numbers.
-void pack(const NodeSplat& n, std::span<const SplatScalar> values, double* record) {
+void packRest(const NodeSplat& n, std::span<const SplatScalar> values, double* record) {
   const auto put = [&](auto... numbers) { ((*record++ = numbers), ...); };
   const Splat& s = n.splat;
   const uint64_t flags = (n.regular ? kRegular : 0) | (n.on_block_face ? kOnBlockFace : 0) |
@@ -89,10 +89,29 @@ size_t SeamSorter::recordBytes(size_t variables) {
   return (kNodeSize + variables * kScalarSize) * sizeof(double);
 }
 
-void SeamSorter::add(const SeamPosition& sweep, const NodeSplat& splat, std::span<const SplatScalar> values) {
+void SeamSorter::pack(const SeamPosition& sweep, const NodeSplat& splat, std::span<const SplatScalar> values,
+                      std::vector<double>& records) const {
   CURVISPLAT_CHECK_OP(values.size(), ==, variables_);
-  reach_.add(splat.node_position, splat.spacing);
-  pack(splat, values, records_.add(sweep.along, sweep.across, splat.node) + 3);
+  const size_t begin = records.size();
+  records.resize(begin + record_size_);
+  double* const record = records.data() + begin;
+  record[0] = sweep.along;
+  record[1] = sweep.across;
+  record[2] = std::bit_cast<double>(splat.node);
+  packRest(splat, values, record + 3);
+}
+
+void SeamSorter::add(std::span<const double> records) {
+  LargestReach reach;
+  for (size_t at = 0; at + record_size_ <= records.size(); at += record_size_) {
+    const SweptNode node = SeamRecord(&records[at]).swept();
+    reach.add(node.position, node.spacing);
+  }
+  {
+    const MutexLock lock(mutex_);
+    reach_.add(reach);
+  }
+  records_.add(records);
 }
 
 void SeamSorter::drain(const Visit& visit) {
@@ -116,17 +135,6 @@ void SeamSorter::visit(const SweepRange& range, const Visit& visit) const {
 
 void SeamSorter::drainPacked(const std::function<void(std::span<const double>)>& visit) {
   records_.drain([&](const double* record) { visit({record, record_size_}); });
-}
-
-void SeamSorter::addPacked(std::span<const double> records) {
-  for (size_t at = 0; at + record_size_ <= records.size(); at += record_size_) {
-    const double* record = &records[at];
-    double* added = records_.add(RecordSorter::alongOf(record), RecordSorter::acrossOf(record),
-                                 RecordSorter::numberOf(record));
-    std::copy(record + 3, record + record_size_, added + 3);
-    const SweptNode node = SeamRecord(record).swept();
-    reach_.add(node.position, node.spacing);
-  }
 }
 
 }  // namespace curvisplat

@@ -13,6 +13,7 @@
 #include "preprocess/splats/coincidence_sweep.h"
 #include "preprocess/splats/node_splats.h"
 #include "preprocess/splats/record_sorter.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -30,7 +31,7 @@ class SeamRecord {
   const double* record_;
 };
 
-/// Not for several threads at once. Throws Error if the disk fails.
+/// Throws Error if the disk fails.
 class SeamSorter {
  public:
   using Visit = std::function<void(const SeamRecord&)>;
@@ -42,7 +43,14 @@ class SeamSorter {
   /// What a node takes on disk.
   static size_t recordBytes(size_t variables);
 
-  void add(const SeamPosition& sweep, const NodeSplat& splat, std::span<const SplatScalar> values);
+  /// Appends a node to `records`, of recordBytes() each, in doubles. Any thread.
+  void pack(const SeamPosition& sweep, const NodeSplat& splat, std::span<const SplatScalar> values,
+            std::vector<double>& records) const;
+  /// Adds packed records, of this or of another process. Any thread.
+  void add(std::span<const double> records);
+
+  // What follows is not for several threads at once.
+
   /// Visits all that was added, by (along, node), and forgets it.
   void drain(const Visit& visit);
   /// In place of drain(): ends adding, for `visitors` threads to visit ranges at the same time. Coordinates are of
@@ -51,15 +59,15 @@ class SeamSorter {
   void visit(const SweepRange& range, const Visit& visit) const;
   void forget() { records_.forget(); }
 
-  /// The same as records of recordBytes(), in doubles, which the sorter of another process can take.
+  /// As drain(): the packed records.
   void drainPacked(const std::function<void(std::span<const double>)>& visit);
-  void addPacked(std::span<const double> records);
 
  private:
   size_t variables_;
   size_t record_size_;  // in doubles
   RecordSorter records_;
-  LargestReach reach_;
+  Mutex mutex_;
+  LargestReach reach_;  // while records are added, for the thread that holds the mutex
 };
 
 }  // namespace curvisplat

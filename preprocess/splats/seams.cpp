@@ -12,7 +12,6 @@
 #include "preprocess/splats/coincidence_sweep.h"
 #include "preprocess/splats/joint_sides.h"
 #include "preprocess/splats/seam_sorter.h"
-#include "stream/base/mutex.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -29,8 +28,9 @@ class WaitingSplats {
 
   /// Any thread.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) {
-    const MutexLock lock(mutex_);
-    sorter_.add({static_cast<double>(splat.node), 0}, splat, values);
+    std::vector<double> record;
+    sorter_.pack({static_cast<double>(splat.node), 0}, splat, values, record);
+    sorter_.add(record);
   }
 
   /// Gives out all splats, without the layers behind seams.
@@ -56,7 +56,6 @@ class WaitingSplats {
       any = false;
       seams = 0;
     };
-    const MutexLock lock(mutex_);
     sorter_.drain([&](const SeamRecord& next) {
       if (next.node() != node) release();
       node = next.node();
@@ -74,8 +73,7 @@ class WaitingSplats {
 
  private:
   const size_t variables_;
-  Mutex mutex_;
-  SeamSorter sorter_ GUARDED_BY(mutex_);
+  SeamSorter sorter_;
 };
 
 }  // namespace
@@ -164,13 +162,19 @@ SeamMerger::SeamMerger(SeamMerger&&) noexcept = default;
 SeamMerger& SeamMerger::operator=(SeamMerger&&) noexcept = default;
 
 void SeamMerger::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
-  state_->sorter.add(seamPosition(splat.node_position), splat, values);
+  std::vector<double> record;
+  state_->sorter.pack(seamPosition(splat.node_position), splat, values, record);
+  state_->sorter.add(record);
 }
 
-void SeamMerger::add(const NodeSplats& splats, size_t variables) {
-  const auto values_of = [&](size_t n) { return std::span(splats.values).subspan(n * variables, variables); };
+void SeamMerger::pack(const NodeSplats& splats, std::vector<double>& records) const {
+  const size_t variables = state_->variables;
+  const auto pack_one = [&](const NodeSplat& splat, size_t n) {
+    const auto values = std::span(splats.values).subspan(n * variables, variables);
+    state_->sorter.pack(seamPosition(splat.node_position), splat, values, records);
+  };
   for (size_t n = 0; n < splats.splats.size(); ++n)
-    if (splats.splats[n].isForSeams()) add(splats.splats[n], values_of(n));
+    if (splats.splats[n].isForSeams()) pack_one(splats.splats[n], n);
   for (const auto& [splat, probe] : splats.probes) {
     if (splats.splats[splat].layers == 0) continue;  // a part of the cell is left
     NodeSplat asks = splats.splats[splat];
@@ -180,8 +184,12 @@ void SeamMerger::add(const NodeSplats& splats, size_t variables) {
     asks.border_code = ~kNoBorder;  // kNoBorder once the face turns out to be a seam
     asks.node_position = probe.face_node;
     asks.spacing = probe.spacing;
-    add(asks, values_of(splat));
+    pack_one(asks, splat);
   }
+}
+
+void SeamMerger::addPacked(std::span<const double> records) {
+  state_->sorter.add(records);
 }
 
 void SeamMerger::sendToFirst(Ranks& ranks) {
@@ -192,7 +200,7 @@ void SeamMerger::sendToFirst(Ranks& ranks) {
   const auto round = [&](unsigned sender) {
     const bool sends = sender == ranks.rank();
     const std::vector<Ranks::Bytes> sent = ranks.gather(sends ? message : Ranks::Bytes{});
-    if (ranks.isFirst()) sorter.addPacked(fromBytes<double>(sent[sender]));
+    if (ranks.isFirst()) sorter.add(fromBytes<double>(sent[sender]));
     message.clear();
     std::vector<uint64_t> full{ranks.isFirst() && sent[sender].size() >= kMessageBytes};
     ranks.sum(std::span<uint64_t>(full));

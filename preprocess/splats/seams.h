@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "preprocess/splats/joint_nodes.h"
 #include "preprocess/splats/node_splats.h"
@@ -34,10 +35,14 @@ class SeamMerger {
   SeamMerger(SeamMerger&&) noexcept;
   SeamMerger& operator=(SeamMerger&&) noexcept;
 
-  /// One thread at a time. Every splat is one that isForSeams(). Throws Error if the disk fails.
+  /// Any thread. Every splat is one that isForSeams(). Throws Error if the disk fails.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
-  /// All splats that isForSeams(), and the probes.
-  void add(const NodeSplats& splats, size_t variables);
+  /// Appends all splats that isForSeams(), and the probes, to `records`. Any thread.
+  void pack(const NodeSplats& splats, std::vector<double>& records) const;
+  /// Adds packed splats. Any thread; one that has gathered many seldom waits for others.
+  void addPacked(std::span<const double> records);
+
+  // What follows is called by one thread, when all splats are added.
 
   /// Brings what the mergers of all ranks were given to rank 0's, a bounded amount at a time. All have to call it.
   void sendToFirst(Ranks& ranks);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -24,9 +26,10 @@ class CoincidenceRanges : public testing::Test {
     LargestReach reach;
     for (size_t n = 0; n < nodes.size(); ++n) {
       const auto& [sweep, position, spacing] = nodes[n];
-      double* const record = sorter.add(sweep.along, sweep.across, n);
-      for (int axis = 0; axis < 3; ++axis) record[3 + axis] = position[axis];
-      record[6] = spacing;
+      const std::array<double, kSize> record{sweep.along, sweep.across, std::bit_cast<double>(uint64_t{n}),
+                                             position.x,  position.y,   position.z,
+                                             spacing};
+      sorter.add(record);
       reach.add(position, spacing);
     }
     sorter.sort();

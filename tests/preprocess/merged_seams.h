@@ -49,7 +49,9 @@ class MergedSeams : public testing::Test {
     SeamMerger seams(1, memory_bytes_, folder_.path());
     for (const MappedBlock& block : blocks) {
       const NodeSplats splats = block.splats();
-      seams.add(splats, 1);
+      std::vector<double> records;
+      seams.pack(splats, records);
+      seams.addPacked(records);
       for (size_t n = 0; n < splats.splats.size(); ++n)
         if (splats.splats[n].isForSeams())
           ++faces;

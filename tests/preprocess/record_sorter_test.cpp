@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -12,6 +14,7 @@
 #include <numeric>
 #include <random>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -22,6 +25,11 @@ namespace {
 
 constexpr size_t kSize = 5;  // of a record: the last two are made of its number
 constexpr size_t kCount = 5000;
+
+std::array<double, kSize> recordOf(double along, uint64_t number) {
+  const auto n = static_cast<double>(number);
+  return {along, -along, std::bit_cast<double>(number), n + 0.5, n * 3};
+}
 
 class RecordSorterTest : public testing::Test {
  protected:
@@ -35,9 +43,7 @@ class RecordSorterTest : public testing::Test {
 
     RecordSorter sorter(kSize, memory_bytes, folder_.path());
     for (const auto& [position, number] : added) {
-      double* const record = sorter.add(position, -position, number);
-      record[3] = static_cast<double>(number) + 0.5;
-      record[4] = static_cast<double>(number) * 3;
+      sorter.add(recordOf(position, number));
     }
     size_t next = 0;
     sorter.drain([&](const double* record) {
@@ -94,7 +100,7 @@ TEST_F(RecordSorterTest, VisitsRangesThatAreAllTogether) {
     for (const uint64_t memory_bytes : {1 << 20, 3000}) {
       SCOPED_TRACE(fmt::format("{}, {} bytes", name, memory_bytes));
       RecordSorter sorter(kSize, memory_bytes, folder_.path());
-      for (size_t n = 0; n < along.size(); ++n) sorter.add(along[n], 0, n);
+      for (size_t n = 0; n < along.size(); ++n) sorter.add(recordOf(along[n], n));
       sorter.sort(3);
       std::vector<double> ends = sorter.cutsInto(7);
       EXPECT_EQ(ends.size(), 6u);
@@ -116,10 +122,43 @@ TEST_F(RecordSorterTest, VisitsRangesThatAreAllTogether) {
     }
 }
 
+TEST_F(RecordSorterTest, TakesRecordsFromSeveralThreads) {
+  constexpr size_t kThreads = 8, kOfThread = 4000;
+  // All stay in memory; some runs; two records a run.
+  for (const uint64_t memory_bytes : {4 << 20, 1'500'000, 100'000, 1}) {
+    RecordSorter sorter(kSize, memory_bytes, folder_.path());
+    const size_t of_thread = memory_bytes == 1 ? 20 : kOfThread;
+    std::vector<std::thread> threads;
+    for (size_t thread = 0; thread < kThreads; ++thread)
+      threads.emplace_back([&, thread] {
+        std::vector<double> records;
+        for (size_t n = 0; n < of_thread; ++n) {
+          const uint64_t number = n * kThreads + thread;
+          const std::array record = recordOf(static_cast<double>(number * 37 % 1000), number);
+          records.insert(records.end(), record.begin(), record.end());
+          if (n % 7 != 0 && n + 1 < of_thread) continue;
+          sorter.add(records);
+          records.clear();
+        }
+      });
+    for (std::thread& thread : threads) thread.join();
+    std::vector<std::pair<double, uint64_t>> expected, found;
+    for (uint64_t n = 0; n < kThreads * of_thread; ++n)
+      expected.emplace_back(static_cast<double>(n * 37 % 1000), n);
+    std::sort(expected.begin(), expected.end());
+    sorter.drain([&](const double* record) {
+      const uint64_t number = RecordSorter::numberOf(record);
+      found.emplace_back(RecordSorter::alongOf(record), number);
+      EXPECT_EQ(record[4], static_cast<double>(number) * 3);
+    });
+    EXPECT_EQ(found, expected) << memory_bytes;
+  }
+}
+
 TEST_F(RecordSorterTest, EndsAVisitWhenItIsToldTo) {
   for (const uint64_t memory_bytes : {1 << 20, 3000}) {
     RecordSorter sorter(kSize, memory_bytes, folder_.path());
-    for (size_t n = 0; n < kCount; ++n) sorter.add(static_cast<double>(n), 0, n);
+    for (size_t n = 0; n < kCount; ++n) sorter.add(recordOf(static_cast<double>(n), n));
     sorter.sort();
     uint64_t last = 0;
     sorter.visit(10.5, 4000,

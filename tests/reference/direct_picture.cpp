@@ -35,6 +35,7 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
         {node.splat, values[0], {options.border_parts ? node.border_code : kNoBorder, node.growth_code}});
   };
   SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path(), options.unlike);
+  std::vector<double> for_seams;
   uint64_t first_node = 0;
   const auto& blocks = source.description().blocks;
   for (uint32_t b = 0; b < blocks.size(); ++b) {
@@ -48,9 +49,10 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
       if (!splats.splats[n].isForSeams() || !options.merge_seams)
         take(splats.splats[n], {&splats.values[n], 1});
     }
-    if (options.merge_seams) seams.add(splats, 1);
+    if (options.merge_seams) seams.pack(splats, for_seams);
     first_node += blocks[b].nodes();
   }
+  seams.addPacked(for_seams);
   seams.finish(source.description().coordinate_bytes, take);
   return out;
 }
