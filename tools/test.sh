@@ -50,6 +50,6 @@ case $form in
     # TBB is not built with this sanitizer, so its loops get one thread (tests/support/one_tbb_thread.cpp). Of the
     # conversion, run only the tests of code with threads of its own.
     "$root/tools/build.sh" --preset tsan stream_tests preprocess_tests render_tests viewer_tests
-    run tsan -R '^(stream|render|viewer)\.|^preprocess\.(Convert|Slabs|AddScalar|Resume)' "$@"
+    run tsan -R '^(stream|render|viewer)\.|^preprocess\.(Convert|Slabs|AddScalar|Resume|RecordSorter)' "$@"
     ;;
 esac

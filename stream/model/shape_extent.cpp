@@ -33,6 +33,12 @@ class LargestEigenvalue {
     // The eigenvalues are q + 2 p cos(angle + 2/3 pi n): q + 2 p bounds them and rules out most, without p's root.
     const double room = needed_ - q;
     if (room > 0 && 4 * p2 < kBelowOne * room * room) return;
+    // None is above y + q if the characteristic polynomial of the matrix less q, and its derivative, are positive at y > 0. With
+    // room for what rounding does near a double root.
+    constexpr double kBelowRounding = 1 - 1e-7;
+    const double determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+    const double y = kBelowRounding * needed_ - q;
+    if (y > 0 && y * y > p2 && y * (y * y - 3 * p2) > determinant) return;
     const double p = std::sqrt(p2);
     if (q + 2 * p <= needed_) return;
     const std::array<double, 6> matrix{xx, xy, yy, xz, yz, zz};
