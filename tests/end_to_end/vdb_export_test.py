@@ -3,6 +3,7 @@
 
 `export -o out.vdb` against closed forms, read by OpenVDB's own Python module. Exit status 77 (skipped) without python3-openvdb.
 """
+import os
 import pathlib
 import re
 import resource
@@ -119,7 +120,8 @@ class VdbExport(unittest.TestCase):
         small = peak([*command[:-4], "--voxels", "8", "--memory", f"{limit}M"])
         large = peak(command)
         print(f"memory: {large:.0f} MiB for 256 voxels, {small:.0f} for 8; limit {limit}")
-        self.assertLess(large - small, limit)
+        if "CURVISPLAT_SANITIZED" not in os.environ:  # sanitizers keep freed memory
+            self.assertLess(large - small, limit)
         message = run("export", self.folder / "ring.splats", "-o", self.folder / "never.vdb", "--voxels", 2000, "--memory", "96M", fails=True)
         self.assertRegex(message, "give --memory .*M or fewer --voxels")
         self.assertFalse((self.folder / "never.vdb").exists())
