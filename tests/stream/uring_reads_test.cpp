@@ -17,6 +17,7 @@
 
 #include "stream/base/error.h"
 #include "stream/paging/async_reads.h"
+#include "tests/support/sanitizers.h"
 
 namespace curvisplat {
 namespace {
@@ -67,6 +68,7 @@ TEST_F(UringReads, AreNotUsedWhereReadsCannotBeSubmitted) {
 }
 
 TEST_F(UringReads, EndWithAnErrorIfTheirThreadCannotBeWoken) {
+  if (kHasThreadSanitizer) GTEST_SKIP() << "the forked process starts a thread";
   const auto run = []() -> int {
     const auto reads = makeUringReads(4);
     // Not write: sanitizers need it for themselves.

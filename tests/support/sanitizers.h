@@ -16,4 +16,17 @@ constexpr bool kIsSanitized = false;
 constexpr bool kIsSanitized = false;
 #endif
 
+// The thread sanitizer, which does not go on in a process that a process with threads has forked.
+#if defined(__SANITIZE_THREAD__)
+constexpr bool kHasThreadSanitizer = true;
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+constexpr bool kHasThreadSanitizer = true;
+#else
+constexpr bool kHasThreadSanitizer = false;
+#endif
+#else
+constexpr bool kHasThreadSanitizer = false;
+#endif
+
 }  // namespace curvisplat
