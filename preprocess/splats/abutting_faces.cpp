@@ -133,9 +133,8 @@ void AbuttingFaces::add(std::span<const Centre> centres) {
     }
     reach_.add(centre.at, centre.spacing);
     const auto [along, across] = seamPosition(centre.at);
-    const std::array<double, kCentreSize> record{
-        along,       across,        std::bit_cast<double>(centre.face), centre.at.x, centre.at.y,
-        centre.at.z, centre.spacing};
+    std::array<double, kCentreSize> record{0, 0, 0, centre.at.x, centre.at.y, centre.at.z, centre.spacing};
+    RecordSorter::setKey(record.data(), along, across, centre.face);
     records.insert(records.end(), record.begin(), record.end());
   }
   centres_.add(records);

@@ -51,6 +51,11 @@ class RecordSorter {
   std::vector<double> cutsInto(size_t parts) const;
   void forget();
 
+  static void setKey(double* record, double along, double across, uint64_t number) {
+    record[0] = along;
+    record[1] = across;
+    record[2] = std::bit_cast<double>(number);
+  }
   static double alongOf(const double* record) { return record[0]; }
   static double acrossOf(const double* record) { return record[1]; }
   static uint64_t numberOf(const double* record) { return std::bit_cast<uint64_t>(record[2]); }

@@ -95,9 +95,7 @@ void SeamSorter::pack(const SeamPosition& sweep, const NodeSplat& splat, std::sp
   const size_t begin = records.size();
   records.resize(begin + record_size_);
   double* const record = records.data() + begin;
-  record[0] = sweep.along;
-  record[1] = sweep.across;
-  record[2] = std::bit_cast<double>(splat.node);
+  RecordSorter::setKey(record, sweep.along, sweep.across, splat.node);
   packRest(splat, values, record + 3);
 }
 
@@ -121,6 +119,7 @@ void SeamSorter::drain(const Visit& visit) {
 std::vector<SweepRange> SeamSorter::sort(unsigned visitors, int coordinate_bytes) {
   constexpr unsigned kRangesOfVisitor = 4;  // they do not take equally long
   records_.sort(visitors);
+  const MutexLock lock(mutex_);
   return coincidenceRanges(
       records_, visitors * kRangesOfVisitor, [](const double* record) { return SeamRecord(record).swept(); },
       reach_, coordinate_bytes);

@@ -67,7 +67,7 @@ class SeamSorter {
   size_t record_size_;  // in doubles
   RecordSorter records_;
   Mutex mutex_;
-  LargestReach reach_;  // while records are added, for the thread that holds the mutex
+  LargestReach reach_ GUARDED_BY(mutex_);
 };
 
 }  // namespace curvisplat
