@@ -57,9 +57,9 @@ SlabBuffers GridOrigin::smallSlabs(Halo halo) const {
 }
 
 /// Fits in half of what counting may take, which it needs only after the slabs of the survey are gone. One thread counts it, so it is
-/// no larger than it has to be: 8192 in a bucket tell its size within some percent, where 20 are planned for.
+/// no larger than it has to be: 4096 in a bucket tell its size within some percent, where 20 are planned for.
 PositionSample GridOrigin::newSample() const {
-  constexpr uint64_t kInBucket = 8192, kMaxPositions = uint64_t{1} << 21;
+  constexpr uint64_t kInBucket = 4096, kMaxPositions = uint64_t{1} << 21;
   uint64_t nodes = 0;
   for (const GridBlock& block : blocks()) nodes += block.nodes();
   const uint64_t wanted = (nodes / plan_.plannedBucketSplats() + 1) * kInBucket;

@@ -74,7 +74,7 @@ class SplatStream {
 
   /// To be called at the end.
   void finish() {
-    for (Worker& worker : workers_) seams_->addPacked(worker.for_seams);
+    for (Worker& worker : workers_) seams_->add(worker.for_seams);
   }
 
   /// Of all that was sent. Not while slabs are added.
@@ -161,7 +161,7 @@ class SplatStream {
     const TraceScope trace("add to seams");
     seams_->pack(splats, worker.for_seams);
     if (worker.for_seams.size() < kGatheredForSeams) return;
-    seams_->addPacked(worker.for_seams);
+    seams_->add(worker.for_seams);
     worker.for_seams.clear();
   }
 

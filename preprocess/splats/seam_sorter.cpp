@@ -117,7 +117,7 @@ void SeamSorter::drain(const Visit& visit) {
 }
 
 std::vector<SweepRange> SeamSorter::sort(unsigned visitors, int coordinate_bytes) {
-  constexpr unsigned kRangesOfVisitor = 4;  // they do not take equally long
+  constexpr unsigned kRangesOfVisitor = 8;  // they do not take equally long
   records_.sort(visitors);
   const MutexLock lock(mutex_);
   return coincidenceRanges(

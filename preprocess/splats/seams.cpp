@@ -161,12 +161,6 @@ SeamMerger::~SeamMerger() = default;
 SeamMerger::SeamMerger(SeamMerger&&) noexcept = default;
 SeamMerger& SeamMerger::operator=(SeamMerger&&) noexcept = default;
 
-void SeamMerger::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
-  std::vector<double> record;
-  state_->sorter.pack(seamPosition(splat.node_position), splat, values, record);
-  state_->sorter.add(record);
-}
-
 void SeamMerger::pack(const NodeSplats& splats, std::vector<double>& records) const {
   const size_t variables = state_->variables;
   const auto pack_one = [&](const NodeSplat& splat, size_t n) {
@@ -188,7 +182,7 @@ void SeamMerger::pack(const NodeSplats& splats, std::vector<double>& records) co
   }
 }
 
-void SeamMerger::addPacked(std::span<const double> records) {
+void SeamMerger::add(std::span<const double> records) {
   state_->sorter.add(records);
 }
 

@@ -35,12 +35,10 @@ class SeamMerger {
   SeamMerger(SeamMerger&&) noexcept;
   SeamMerger& operator=(SeamMerger&&) noexcept;
 
-  /// Any thread. Every splat is one that isForSeams(). Throws Error if the disk fails.
-  void add(const NodeSplat& splat, std::span<const SplatScalar> values);
   /// Appends all splats that isForSeams(), and the probes, to `records`. Any thread.
   void pack(const NodeSplats& splats, std::vector<double>& records) const;
-  /// Adds packed splats. Any thread; one that has gathered many seldom waits for others.
-  void addPacked(std::span<const double> records);
+  /// Adds packed splats. Any thread; one that has gathered many seldom waits for others. Throws Error if the disk fails.
+  void add(std::span<const double> records);
 
   // What follows is called by one thread, when all splats are added.
 

@@ -23,12 +23,24 @@ struct Piece {
   SplatScalar value;
 };
 
+/// One at a time, as a thread with little to do adds them.
+inline void addEach(SeamMerger& seams, const std::vector<Piece>& faces) {
+  for (const Piece& face : faces) {
+    NodeSplats one;
+    one.splats = {face.node};
+    one.values = {face.value};
+    std::vector<double> records;
+    seams.pack(one, records);
+    seams.add(records);
+  }
+}
+
 class MergedSeams : public testing::Test {
  protected:
   std::vector<Piece> merge(const std::vector<Piece>& faces, uint64_t memory_bytes = 64 << 20,
                            int coordinate_bytes = 8, UnlikeHalves unlike = UnlikeHalves::kApart) {
     SeamMerger seams(1, memory_bytes, folder_.path(), unlike);
-    for (const Piece& face : faces) seams.add(face.node, {&face.value, 1});
+    addEach(seams, faces);
     return finish(seams, faces.size(), coordinate_bytes);
   }
 
@@ -51,7 +63,7 @@ class MergedSeams : public testing::Test {
       const NodeSplats splats = block.splats();
       std::vector<double> records;
       seams.pack(splats, records);
-      seams.addPacked(records);
+      seams.add(records);
       for (size_t n = 0; n < splats.splats.size(); ++n)
         if (splats.splats[n].isForSeams())
           ++faces;

@@ -285,7 +285,7 @@ TEST_F(Seams, AreTheSameByManyThreads) {
   const auto merged = merged_;
   for (const uint64_t memory_bytes : {uint64_t{100000}, uint64_t{64} << 20}) {
     SeamMerger seams(1, memory_bytes, folder_.path());
-    for (const Piece& face : faces) seams.add(face.node, {&face.value, 1});
+    addEach(seams, faces);
     Mutex mutex;
     std::vector<Piece> out;
     tbb::task_arena(8).execute([&] {
@@ -334,7 +334,7 @@ TEST_F(Seams, SayWhenTheDiskIsFull) {
   const ScopedSystemCalls scope(full);
   SeamMerger seams(1, 1000, folder_.path());
   try {
-    for (const Piece& face : faces) seams.add(face.node, {&face.value, 1});
+    addEach(seams, faces);
     FAIL() << "a full disk went unnoticed";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find(folder_.path().string()), std::string::npos) << error.what();

@@ -52,7 +52,7 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
     if (options.merge_seams) seams.pack(splats, for_seams);
     first_node += blocks[b].nodes();
   }
-  seams.addPacked(for_seams);
+  seams.add(for_seams);
   seams.finish(source.description().coordinate_bytes, take);
   return out;
 }

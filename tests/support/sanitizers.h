@@ -4,29 +4,25 @@
 
 namespace curvisplat {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kIsSanitized = true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-constexpr bool kIsSanitized = true;
+constexpr bool kHasAddressSanitizer =
+#if defined(__has_feature)
+    __has_feature(address_sanitizer);
+#elif defined(__SANITIZE_ADDRESS__)
+    true;
 #else
-constexpr bool kIsSanitized = false;
-#endif
-#else
-constexpr bool kIsSanitized = false;
+    false;
 #endif
 
-// The thread sanitizer, which does not go on in a process that a process with threads has forked.
-#if defined(__SANITIZE_THREAD__)
-constexpr bool kHasThreadSanitizer = true;
-#elif defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-constexpr bool kHasThreadSanitizer = true;
+// It does not go on in a process that a process with threads has forked.
+constexpr bool kHasThreadSanitizer =
+#if defined(__has_feature)
+    __has_feature(thread_sanitizer);
+#elif defined(__SANITIZE_THREAD__)
+    true;
 #else
-constexpr bool kHasThreadSanitizer = false;
+    false;
 #endif
-#else
-constexpr bool kHasThreadSanitizer = false;
-#endif
+
+constexpr bool kIsSanitized = kHasAddressSanitizer || kHasThreadSanitizer;
 
 }  // namespace curvisplat
