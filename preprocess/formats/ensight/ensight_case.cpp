@@ -19,8 +19,10 @@ namespace {
 constexpr uint64_t kLooked = 2048;
 constexpr double kMaxSteps = 1 << 20;
 
+/// Without what operator>> skips at either end.
 std::string trimmed(std::string_view text) {
-  const size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+  constexpr const char* kWhiteSpace = " \t\r\v\f";
+  const size_t first = text.find_first_not_of(kWhiteSpace), last = text.find_last_not_of(kWhiteSpace);
   return first == std::string_view::npos ? "" : std::string(text.substr(first, last - first + 1));
 }
 
