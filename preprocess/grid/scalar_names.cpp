@@ -2,14 +2,13 @@
 
 #include <algorithm>
 
+#include "stream/base/words.h"
+
 namespace curvisplat {
 
 std::string simplifiedName(const std::string& name) {
-  std::string simple;
-  for (const char c : name) {
-    if (c == ' ' || c == '_' || c == '-') continue;
-    simple += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  }
+  std::string simple = lowerCase(name);
+  std::erase_if(simple, [](char c) { return c == ' ' || c == '_' || c == '-'; });
   return simple;
 }
 

@@ -1,10 +1,9 @@
 // The built-in transfer functions; most are in published_maps.cpp. The colours of viridis, inferno and plasma are matplotlib's (CC0), those
 // of cool-warm are Moreland's, as in ParaView.
 #include <fmt/format.h>
-
 #include <algorithm>
+
 #include <array>
-#include <cctype>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -15,6 +14,7 @@
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
 #include "stream/base/suggestion.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -74,12 +74,6 @@ const std::vector<Preset>& presets() {
   return all;
 }
 
-bool sameLetters(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
-  });
-}
-
 std::optional<TransferFunctionDefinition> findPreset(std::string_view name) {
   TransferFunctionDefinition definition;
   const auto named = [&](std::string_view found) {
@@ -87,7 +81,7 @@ std::optional<TransferFunctionDefinition> findPreset(std::string_view name) {
     definition.origin = fmt::format("preset '{}'", found);
   };
   for (const Preset& preset : presets()) {
-    if (!sameLetters(preset.name, name)) continue;
+    if (!isSameIgnoringCase(preset.name, name)) continue;
     named(preset.name);
     definition.colour_space = preset.space;
     definition.colours = preset.colours;
@@ -95,7 +89,7 @@ std::optional<TransferFunctionDefinition> findPreset(std::string_view name) {
     return definition;
   }
   for (const PublishedMap& map : publishedMaps()) {
-    if (!sameLetters(map.name, name)) continue;
+    if (!isSameIgnoringCase(map.name, name)) continue;
     named(map.name);
     definition.colour_space = map.space;
     for (const PublishedMap::Point& point : map.points)

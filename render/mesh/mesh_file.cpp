@@ -1,11 +1,11 @@
 #include "render/mesh/mesh_file.h"
 
-#include <algorithm>
 #include <limits>
 #include <string>
 
 #include "render/mesh/mesh_formats.h"
 #include "stream/base/file.h"
+#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -13,13 +13,6 @@ namespace {
 constexpr const char* kFormats = "STL, PLY and OBJ files can be read";
 // A vertex or a triangle takes at least two bytes of a file.
 constexpr uint64_t kMaxBytes = uint64_t{1} << 36;
-
-std::string extensionOf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return extension;
-}
 
 RawMesh parse(std::string_view bytes, const std::filesystem::path& path) {
   const std::string extension = extensionOf(path);

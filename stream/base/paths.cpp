@@ -1,10 +1,9 @@
 #include "stream/base/paths.h"
 
-#include <algorithm>
-#include <cctype>
 #include <system_error>
 
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 
@@ -13,10 +12,7 @@ std::filesystem::path folderOf(const std::filesystem::path& path) {
 }
 
 std::string extensionOf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+  return lowerCase(path.extension().string());
 }
 
 bool isRegularFile(const std::filesystem::path& path) noexcept {

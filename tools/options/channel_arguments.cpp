@@ -1,34 +1,23 @@
 #include "tools/options/channel_arguments.h"
 
 #include <algorithm>
-#include <cctype>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/paths.h"
 #include "stream/base/suggestion.h"
 
 namespace curvisplat {
-namespace {
-
-bool isExr(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending == ".exr";
-}
-
-}  // namespace
-
 ValueChannels valueChannels(const std::optional<std::string>& text, const std::filesystem::path& output) {
   ValueChannels channels;
   if (!text) {
-    channels.depth = isExr(output);
+    channels.depth = extensionOf(output) == ".exr";
     return channels;
   }
   if (*text == "none") return channels;
-  if (!isExr(output))
+  if (extensionOf(output) != ".exr")
     throw UsageError("--channels {}: only .exr files have channels; name -o NAME.exr", *text);
   for (size_t begin = 0; begin <= text->size();) {
     const size_t end = std::min(text->find(',', begin), text->size());

@@ -11,16 +11,12 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr size_t kShortestToken = 16, kLongestToken = 256;
-
-bool isSameText(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
 
 bool isPort(std::string_view text) {
   return !text.empty() && text.size() <= 5 &&
@@ -94,17 +90,18 @@ RequestTarget targetOf(std::string_view target) {
 bool isKnownHost(std::string_view host, const std::vector<std::string>& names) {
   const std::string_view name = nameIn(host);
   if (name.empty()) return false;
-  if (isSameText(name, "localhost")) return true;
+  if (isSameIgnoringCase(name, "localhost")) return true;
   boost::system::error_code not_an_address;
   boost::asio::ip::make_address(std::string(name), not_an_address);
   if (!not_an_address) return true;
   return std::any_of(names.begin(), names.end(),
-                     [&](const std::string& known) { return isSameText(name, known); });
+                     [&](const std::string& known) { return isSameIgnoringCase(name, known); });
 }
 
 bool isOwnOrigin(std::string_view origin, std::string_view host) {
   for (const std::string_view scheme : {"http://", "https://"})
-    if (origin.starts_with(scheme) && isSameText(origin.substr(scheme.size()), host)) return !host.empty();
+    if (origin.starts_with(scheme) && isSameIgnoringCase(origin.substr(scheme.size()), host))
+      return !host.empty();
   return false;
 }
 

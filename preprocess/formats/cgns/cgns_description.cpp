@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "stream/base/words.h"
+
 namespace curvisplat {
 namespace {
 
@@ -67,10 +69,7 @@ void addVectors(const CgnsTree& tree, GridDescription& description, ArraysOfScal
     GridScalar length{key.first + ":mag", description.scalars[*components[0]].unit, {}, 0, key.second};
     std::vector<CgnsArrays> arrays(tree.zones.size());
     for (size_t axis = 0; axis < 3; ++axis) {
-      std::string alias = key.first + ":" + "xyz"[axis];
-      for (char& c : alias)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-      description.scalars[*components[axis]].aliases.push_back(alias);
+      description.scalars[*components[axis]].aliases.push_back(lowerCase(key.first + ":" + "xyz"[axis]));
       for (size_t z = 0; z < arrays.size(); ++z)
         for (const CgnsArray* array : arrays_of[*components[axis]][z]) arrays[z].push_back(array);
     }

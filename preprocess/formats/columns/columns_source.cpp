@@ -13,6 +13,7 @@
 #include "preprocess/grid/scalar_names.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {

@@ -12,32 +12,13 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr uint64_t kLooked = 2048;
 constexpr double kMaxSteps = 1 << 20;
-
-/// Without what operator>> skips at either end.
-std::string trimmed(std::string_view text) {
-  constexpr const char* kWhiteSpace = " \t\r\v\f";
-  const size_t first = text.find_first_not_of(kWhiteSpace), last = text.find_last_not_of(kWhiteSpace);
-  return first == std::string_view::npos ? "" : std::string(text.substr(first, last - first + 1));
-}
-
-std::string lower(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
-std::vector<std::string> wordsOf(const std::string& text) {
-  std::istringstream stream(text);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
 
 struct TimeSet {
   std::vector<double> times, numbers;  // numbers: in the names of files
@@ -51,17 +32,18 @@ struct Entry {
   std::vector<std::string> words;
 };
 
-Entry entryOf(const std::string& value, size_t least) {
+Entry entryOf(std::string_view value, size_t least) {
   Entry entry;
-  entry.words = wordsOf(value);
+  const std::vector<std::string_view> words = wordsOf(value);
   // Up to two whole numbers come first.
-  for (int n = 0; n < 2 && entry.words.size() > least; ++n) {
+  size_t numbers = 0;
+  for (; numbers < 2 && words.size() > least + numbers; ++numbers) {
     double number = 0;
-    if (!parseNumber(entry.words[0], number) || number < 1 || number > kMaxSteps) break;
-    if (n == 0) entry.time_set = static_cast<size_t>(number);
-    entry.file_set = n == 1;
-    entry.words.erase(entry.words.begin());
+    if (!parseNumber(words[numbers], number) || number < 1 || number > kMaxSteps) break;
+    if (numbers == 0) entry.time_set = static_cast<size_t>(number);
+    entry.file_set = numbers == 1;
   }
+  entry.words.assign(words.begin() + static_cast<ptrdiff_t>(numbers), words.end());
   return entry;
 }
 
@@ -72,9 +54,9 @@ class CaseReader {
 
  private:
   void readLines();
-  void takeLine(const std::string& key, const std::string& value);
-  void takeTime(const std::string& key, const std::string& value);
-  void takeVariable(const std::string& key, const std::string& value);
+  void takeLine(std::string_view key, std::string_view value);
+  void takeTime(std::string_view key, std::string_view value);
+  void takeVariable(std::string_view key, std::string_view value);
   std::filesystem::path fileOf(const Entry& entry, const std::string& name, double time) const;
 
   const std::filesystem::path& path_;
@@ -95,24 +77,24 @@ void CaseReader::readLines() {
   const auto file = std::make_shared<const PooledFile>(std::make_shared<OpenFiles>(), path_);
   TextReader text(file, 0, file->size());
   while (const auto line = text.line()) {
-    const std::string words = trimmed(line->substr(0, line->find('#')));
+    const std::string_view words = trimmed(line->substr(0, line->find('#')));
     if (words.empty()) continue;
     const size_t colon = words.find(':');
-    if (colon != std::string::npos) {
-      takeLine(lower(trimmed(words.substr(0, colon))), trimmed(words.substr(colon + 1)));
+    if (colon != std::string_view::npos) {
+      takeLine(lowerCase(trimmed(words.substr(0, colon))), trimmed(words.substr(colon + 1)));
       continue;
     }
     double number = 0;
     if (parseNumber(wordsOf(words)[0], number))
       takeTime(key_, words);  // more numbers of the line above
     else
-      section_ = lower(words);
+      section_ = lowerCase(words);
   }
 }
 
-void CaseReader::takeLine(const std::string& key, const std::string& value) {
+void CaseReader::takeLine(std::string_view key, std::string_view value) {
   key_ = key;
-  if (section_ == "format" && key == "type") type_ = lower(value);
+  if (section_ == "format" && key == "type") type_ = lowerCase(value);
   if (section_ == "geometry" && key == "model") model_ = entryOf(value, 1);
   if (section_ == "geometry" && key != "model")
     skipped_.push_back(fmt::format("{} geometry", printable(key)));
@@ -120,11 +102,10 @@ void CaseReader::takeLine(const std::string& key, const std::string& value) {
   if (section_ == "time") takeTime(key, value);
 }
 
-void CaseReader::takeTime(const std::string& key, const std::string& value) {
+void CaseReader::takeTime(std::string_view key, std::string_view value) {
   if (section_ != "time") return;
-  const std::vector<std::string> words = wordsOf(value);
   std::vector<double> numbers;
-  for (const std::string& word : words) {
+  for (const std::string_view word : wordsOf(value)) {
     double number = 0;
     if (!parseNumber(word, number)) break;
     numbers.push_back(number);
@@ -143,7 +124,7 @@ void CaseReader::takeTime(const std::string& key, const std::string& value) {
   if (key == "filename numbers") set_->numbers.insert(set_->numbers.end(), numbers.begin(), numbers.end());
 }
 
-void CaseReader::takeVariable(const std::string& key, const std::string& value) {
+void CaseReader::takeVariable(std::string_view key, std::string_view value) {
   Variable variable;
   const bool vector = key.starts_with("vector per ");
   if ((!vector && !key.starts_with("scalar per ")) || key.ends_with("measured node")) {
@@ -232,7 +213,7 @@ bool isEnsightCase(const InputFile& file) {
   std::istringstream lines(begin);
   bool format = false;
   for (std::string line; std::getline(lines, line);) {
-    const std::string words = lower(trimmed(line));
+    const std::string words = lowerCase(trimmed(line));
     if (words.empty() || words[0] == '#') continue;
     if (format) return words.starts_with("type:") && words.find("ensight") != std::string::npos;
     if (words != "format") return false;

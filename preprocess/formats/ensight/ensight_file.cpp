@@ -5,6 +5,7 @@
 
 #include "preprocess/formats/common/stored_values.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -13,10 +14,9 @@ constexpr size_t kTextBytes = 80;
 constexpr uint64_t kChunk = 65536;
 constexpr double kMaxCount = 0x1p40;
 
-std::string trimmed(std::string_view text) {
-  text = text.substr(0, text.find('\0'));
-  const size_t first = text.find_first_not_of(" \t\r\n"), last = text.find_last_not_of(" \t\r\n");
-  return first == std::string_view::npos ? "" : std::string(text.substr(first, last - first + 1));
+/// A line, or what it has before a 0.
+std::string textOf(std::string_view line) {
+  return std::string(trimmed(line.substr(0, line.find('\0'))));
 }
 
 template <typename Value>
@@ -62,7 +62,7 @@ EnsightFile::EnsightFile(std::shared_ptr<const PooledFile> file, std::optional<b
   std::array<char, kTextBytes> begin{};
   const size_t shown = std::min<uint64_t>(begin.size(), file_->size());
   file_->readAt(0, std::as_writable_bytes(std::span(begin).first(shown)));
-  const std::string first = trimmed(std::string_view(begin.data(), shown));
+  const std::string first = textOf(std::string_view(begin.data(), shown));
   if (first.find("ortran") != std::string::npos || begin[4] == 'F')
     throw Error("{}: is Fortran Binary, which is not read; write C Binary or ASCII", name());
   binary_ = binary.value_or(first.starts_with("C Binary") || first.starts_with("C binary"));
@@ -77,7 +77,7 @@ uint64_t EnsightFile::left() const {
 std::string EnsightFile::text() {
   if (!binary_) {
     const auto line = text_->line();
-    return line ? trimmed(*line) : "";
+    return line ? textOf(*line) : "";
   }
   std::array<char, kTextBytes> text{};
   if (left() < text.size()) {
@@ -86,7 +86,7 @@ std::string EnsightFile::text() {
   }
   file_->readAt(at_, std::as_writable_bytes(std::span(text)));
   at_ += text.size();
-  return trimmed(std::string_view(text.data(), text.size()));
+  return textOf(std::string_view(text.data(), text.size()));
 }
 
 std::string EnsightFile::keyword() {

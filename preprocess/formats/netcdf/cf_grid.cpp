@@ -14,6 +14,7 @@
 #include "preprocess/formats/netcdf/supergrid.h"
 #include "preprocess/formats/netcdf/tile_number.h"
 #include "stream/base/calendar.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {

@@ -4,6 +4,8 @@
 #include <initializer_list>
 #include <string_view>
 
+#include "stream/base/words.h"
+
 namespace curvisplat {
 namespace {
 
@@ -38,12 +40,6 @@ CfRole roleByName(const std::string& name, bool length) {
 }
 
 }  // namespace
-
-std::string lowerCase(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
 
 CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
   if (!variable.numeric) return CfRole::kNone;

@@ -24,9 +24,6 @@ enum class CfRole {
 /// Source: CF conventions 1.10, chapter 4.
 CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable);
 
-/// ASCII letters only.
-std::string lowerCase(std::string text);
-
 /// The length of a unit in kilometres; nullopt if it is not a unit of length.
 std::optional<double> kilometresOf(const std::string& unit);
 

@@ -9,6 +9,7 @@
 
 #include "preprocess/formats/netcdf/cf_roles.h"
 #include "preprocess/formats/netcdf/standard_atmosphere.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {

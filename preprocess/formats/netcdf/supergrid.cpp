@@ -10,6 +10,7 @@
 #include "preprocess/formats/netcdf/tile_number.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {

@@ -7,6 +7,8 @@
 #include <system_error>
 #include <vector>
 
+#include "stream/base/words.h"
+
 namespace curvisplat {
 namespace {
 
@@ -58,14 +60,12 @@ constexpr Magic kMagics[] = {
     {"PK\x03\x04"sv, "a zip archive (extract it first)"},
 };
 
-/// The next line of `text` that is not empty and does not begin with `comment`, without its blanks at both ends.
+/// The next line of `text` that is not empty and does not begin with `comment`, without the white space around it.
 std::string_view nextLine(std::string_view& text, char comment) {
   while (!text.empty()) {
     const size_t end = std::min(text.find('\n'), text.size());
-    std::string_view line = text.substr(0, end);
+    const std::string_view line = trimmed(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
-    line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
-    line = line.substr(0, line.find_last_not_of(" \t\r") + 1);
     if (!line.empty() && line.front() != comment) return line;
   }
   return {};
@@ -81,16 +81,6 @@ bool isNastran(std::string_view begin) {
   };
   return (line.starts_with("sol ") && begin.find("cend") != std::string_view::npos) || is_card("grid") ||
          is_card("ctetra") || is_card("chexa") || is_card("cpenta");
-}
-
-std::vector<std::string_view> wordsOf(std::string_view line) {
-  std::vector<std::string_view> words;
-  while (!line.empty()) {
-    const size_t end = std::min(line.find_first_of(" \t"), line.size());
-    words.push_back(line.substr(0, end));
-    line.remove_prefix(std::min(line.find_first_not_of(" \t", end), line.size()));
-  }
-  return words;
 }
 
 /// Nothing if the word has anything but digits, or too many.
@@ -130,8 +120,7 @@ bool isAvsUcd(std::string_view begin) {
 /// The formats that are text, by the words that they begin with. `begin`: the first bytes of the file.
 std::optional<std::string> foreignText(std::string begin) {
   if (std::any_of(begin.begin(), begin.end(), [](char c) { return c == '\0'; })) return std::nullopt;
-  std::transform(begin.begin(), begin.end(), begin.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  begin = lowerCase(begin);
   if (begin.starts_with("<?xml")) return "an XML file";
   if (begin.starts_with("*heading"))
     return "an Abaqus mesh, which is not read (meshio convert FILE mesh.vtu)";

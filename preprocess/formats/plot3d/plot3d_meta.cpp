@@ -12,6 +12,7 @@
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
 #include "stream/base/paths.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -25,8 +26,7 @@ struct MetaStep {
 
 /// The value of `field`, which must be one of `words`, ignoring case.
 std::string wordOf(const JsonField& field, std::initializer_list<const char*> words) {
-  std::string text = field.isText() ? field.text() : std::string();
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::string text = field.isText() ? lowerCase(field.text()) : std::string();
   std::string all;
   for (const char* one : words) {
     if (text == one) return text;

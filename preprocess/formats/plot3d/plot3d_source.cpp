@@ -8,6 +8,7 @@
 #include "preprocess/formats/plot3d/plot3d_detect.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -29,10 +30,9 @@ std::vector<std::string> variableNames(const std::filesystem::path& path) {
   const std::string text = readTextFile(path, 1 << 20);
   for (size_t begin = 0; begin < text.size();) {
     const size_t end = std::min(text.find('\n', begin), text.size());
-    std::string name = text.substr(begin, std::min(text.find(';', begin), end) - begin);
-    const auto first = name.find_first_not_of(" \t\r");
-    if (first != std::string::npos)
-      names.push_back(name.substr(first, name.find_last_not_of(" \t\r") + 1 - first));
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    const std::string_view name = trimmed(line.substr(0, line.find(';')));
+    if (!name.empty()) names.emplace_back(name);
     begin = end + 1;
   }
   return names;

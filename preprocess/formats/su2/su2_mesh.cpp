@@ -10,19 +10,13 @@
 #include "preprocess/formats/common/ascii_spool.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr double kMaxCount = 0x1p40;
 constexpr size_t kMaxWords = 16;  // of a line: a hexahedron has a type, 8 points and a number
-
-/// A line without comment and surrounding space.
-std::string_view trimmed(std::string_view line) {
-  line = line.substr(0, line.find('%'));
-  const size_t first = line.find_first_not_of(" \t\r"), last = line.find_last_not_of(" \t\r");
-  return first == std::string_view::npos ? std::string_view{} : line.substr(first, last - first + 1);
-}
 
 /// VTK's types that SU2 has. kPolyhedron: none of them.
 CellKind kindOf(double type) {
@@ -71,7 +65,7 @@ class MeshParser {
 bool MeshParser::nextLine() {
   while (const auto line = text_.line()) {
     ++line_number_;
-    line_ = trimmed(*line);
+    line_ = trimmed(line->substr(0, line->find('%')));
     if (!line_.empty()) return true;
   }
   return false;

@@ -8,6 +8,7 @@
 #include "preprocess/formats/common/stored_values.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -22,13 +23,13 @@ std::vector<std::string_view> fieldsOf(std::string_view line) {
   const std::string_view separators = commas ? "," : " \t";
   std::vector<std::string_view> fields;
   for (size_t at = 0; at < line.size();) {
-    const size_t quote = line.find_first_not_of(" \t\r", at);
+    const size_t quote = line.find_first_not_of(kWhiteSpace, at);
     const bool quoted = quote != std::string_view::npos && line[quote] == '"';
     const size_t closing = quoted ? std::min(line.find('"', quote + 1), line.size()) : at;
     const size_t end = std::min(line.find_first_of(separators, closing), line.size());
-    std::string_view field = quoted ? line.substr(quote + 1, closing - quote - 1) : line.substr(at, end - at);
-    const size_t first = field.find_first_not_of(" \t\r"), last = field.find_last_not_of(" \t\r");
-    if (first != std::string_view::npos) fields.push_back(field.substr(first, last - first + 1));
+    const std::string_view field =
+        trimmed(quoted ? line.substr(quote + 1, closing - quote - 1) : line.substr(at, end - at));
+    if (!field.empty()) fields.push_back(field);
     at = end + 1;
   }
   return fields;

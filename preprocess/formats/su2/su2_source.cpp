@@ -9,6 +9,7 @@
 
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -19,14 +20,13 @@ constexpr uint64_t kLooked = 4096;
 
 namespace {
 
-/// The first line that is neither empty nor a comment, without the spaces before it; empty if the beginning has none.
+/// The first line that is neither empty nor a comment, without the white space around it; empty if the beginning has none.
 std::string firstLineOf(const InputFile& file) {
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
   file.readAt(0, std::span(begin.data(), begin.size()));
   for (size_t at = 0; at < begin.size();) {
     const size_t end = std::min(begin.find('\n', at), begin.size());
-    std::string_view line = std::string_view(begin).substr(at, end - at);
-    line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
+    const std::string_view line = trimmed(std::string_view(begin).substr(at, end - at));
     at = end + 1;
     if (!line.empty() && line[0] != '%') return std::string(line);
   }
@@ -36,10 +36,9 @@ std::string firstLineOf(const InputFile& file) {
 /// What follows "KEY =" in the line; nullopt if it has another key.
 std::optional<std::string_view> valueOf(std::string_view line, std::string_view key) {
   if (!line.starts_with(key)) return std::nullopt;
-  const size_t next = line.find_first_not_of(" \t", key.size());
-  if (next == std::string_view::npos || line[next] != '=') return std::nullopt;
-  line.remove_prefix(std::min(line.find_first_not_of(" \t", next + 1), line.size()));
-  return line;
+  line = trimmed(line.substr(key.size()));
+  if (!line.starts_with('=')) return std::nullopt;
+  return trimmed(line.substr(1));
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <set>
 
+#include "preprocess/grid/scalar_names.h"
+
 namespace curvisplat {
 namespace {
 
@@ -12,15 +14,6 @@ constexpr int kMagnitude = WantedComponent<float>::kMagnitude;
 
 const std::vector<VtkArray>& dataOf(const VtkPiece& piece, Centring centring) {
   return centring == Centring::kNode ? piece.point_data : piece.cell_data;
-}
-
-/// The name in the form that scalarsNamed() compares.
-std::string asAlias(const std::string& name) {
-  std::string alias;
-  for (const char c : name)
-    if (c != ' ' && c != '_' && c != '-')
-      alias += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return alias;
 }
 
 }  // namespace
@@ -95,15 +88,15 @@ void VtkFields::addScalars(const std::vector<VtkPiece>& pieces, size_t number, G
   };
   const auto aliasesOf = [&](uint32_t component, bool has_letter) {
     std::vector<std::string> aliases;
-    const std::string begin = asAlias(field.name) + ":";
+    const std::string begin = simplifiedName(field.name) + ":";
     if (has_letter) aliases.push_back(begin + std::to_string(component));
     if (component < component_names.size() && !component_names[component].empty())
-      aliases.push_back(begin + asAlias(component_names[component]));
+      aliases.push_back(begin + simplifiedName(component_names[component]));
     return aliases;
   };
   if (field.components == 1) return add("", 0, {});
   const bool vector = field.components <= 3;
-  if (vector) add(":mag", kMagnitude, {asAlias(field.name)});
+  if (vector) add(":mag", kMagnitude, {simplifiedName(field.name)});
   for (uint32_t c = 0; c < field.components; ++c)
     add(vector ? fmt::format(":{}", "xyz"[c]) : fmt::format(":{}", c), static_cast<int>(c),
         aliasesOf(c, vector));

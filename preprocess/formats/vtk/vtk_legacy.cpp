@@ -11,6 +11,7 @@
 #include "preprocess/formats/vtk/vtk_mesh_source.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -330,7 +331,7 @@ class LegacyReader : VtkLegacyFile {
 
   void keepTime(const VtkArray& array) {
     if (owner_ != Owner::kGrid || array.tuples * array.components != 1) return;
-    if (lowered(array.name) != "time" && array.name != "TimeValue") return;
+    if (lowerCase(array.name) != "time" && array.name != "TimeValue") return;
     double time = 0;
     const WantedComponent<double> wanted{0, &time};
     readTuples<double>(array, 0, 1, std::span(&wanted, 1));
@@ -341,7 +342,7 @@ class LegacyReader : VtkLegacyFile {
   /// other types.
   bool skipIfNotDrawn(const std::string& name, const std::string& type, uint64_t components,
                       uint64_t tuples) {
-    const std::string type_word = lowered(type);
+    const std::string type_word = lowerCase(type);
     const bool bits = type_word == "bit";
     if (!bits && type_word != "string" && type_word != "utf8_string") return false;
     bits ? skipBits(name, components, tuples) : skipStrings(components, tuples);
@@ -381,7 +382,7 @@ bool isVtkLegacy(const InputFile& file) {
   constexpr std::string_view kMagic = "# vtk datafile";
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kMagic.size())), '\0');
   file.readAt(0, std::span(begin.data(), begin.size()));
-  return lowered(begin) == kMagic;
+  return lowerCase(begin) == kMagic;
 }
 
 std::unique_ptr<DataSource> openVtkLegacy(const OpenGridOptions& options) {

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "preprocess/formats/common/stored_values.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -42,13 +43,6 @@ std::string decodedName(std::string_view text) {
 
 }  // namespace
 
-std::string lowered(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return lower;
-}
-
 VtkLegacyFile::VtkLegacyFile(const VtkFiles& files, const std::filesystem::path& path)
     : files_(files),
       file_(std::make_shared<const PooledFile>(files_.pool, path)),
@@ -74,11 +68,11 @@ std::string VtkLegacyFile::lineOfType() {
 }
 
 bool VtkLegacyFile::wordFollows(std::string_view word) {
-  if (ascii_) return lowered(text_.peekWord()) == word;
+  if (ascii_) return lowerCase(text_.peekWord()) == word;
   std::string next(word.size(), '\0');
   if (file_->size() - text_.offset() < next.size()) return false;
   file_->readAt(text_.offset(), std::as_writable_bytes(std::span(next)));
-  return lowered(next) == word;
+  return lowerCase(next) == word;
 }
 
 uint64_t VtkLegacyFile::count(std::string_view word) const {
@@ -93,7 +87,7 @@ VtkArray VtkLegacyFile::readNumbers(const std::string& name, const std::string& 
                                     uint64_t tuples) {
   VtkArray array;
   array.name = name;
-  const std::string type_word = lowered(type);
+  const std::string type_word = lowerCase(type);
   const auto* const known = std::find_if(std::begin(kTypes), std::end(kTypes),
                                          [&](const auto& entry) { return type_word == entry.first; });
   if (known == std::end(kTypes))

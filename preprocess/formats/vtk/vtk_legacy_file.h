@@ -16,11 +16,9 @@
 #include "preprocess/formats/vtk/vtk_array.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
-
-/// `text` with small letters: keywords have either.
-std::string lowered(std::string_view text);
 
 class VtkLegacyFile {
  public:
@@ -35,7 +33,7 @@ class VtkLegacyFile {
                 printable(fmt::format(format, std::forward<Args>(args)...)));
   }
 
-  std::string nextWord() { return lowered(text_.word()); }
+  std::string nextWord() { return lowerCase(text_.word()); }
   /// As it was before it was written: special characters are coded.
   std::string nextName();
   /// The remaining words of the line.

@@ -10,24 +10,14 @@
 #include "preprocess/formats/xdmf/xml_entities.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 
-std::string xdmfLower(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
-std::string xdmfTrimmed(std::string_view text) {
-  const size_t first = text.find_first_not_of(" \t\r\n");
-  if (first == std::string_view::npos) return "";
-  return std::string(text.substr(first, text.find_last_not_of(" \t\r\n") + 1 - first));
-}
-
 std::string xdmfAttribute(const pugi::xml_node& node, std::initializer_list<const char*> names) {
   for (const char* const name : names)
-    if (const pugi::xml_attribute attribute = node.attribute(name)) return xdmfTrimmed(attribute.value());
+    if (const pugi::xml_attribute attribute = node.attribute(name))
+      return std::string(trimmed(attribute.value()));
   return "";
 }
 
@@ -51,7 +41,7 @@ pugi::xml_node XdmfDocument::resolved(pugi::xml_node node) const {
   for (int depth = 0; depth < kXdmfMaxDepth; ++depth) {
     std::string path = xdmfAttribute(node, {"Reference"});
     if (path.empty()) return node;
-    if (path == "XML") path = xdmfTrimmed(node.text().get());
+    if (path == "XML") path = trimmed(node.text().get());
     // Nothing that takes long to look up.
     const bool simple = path.size() < 1000 && path.starts_with('/') && path.find("//") == std::string::npos &&
                         path.find_first_of("(*|:") == std::string::npos;

@@ -16,10 +16,6 @@ inline constexpr int kXdmfMaxDepth = 32;
 /// Dimensions and counts are this at most.
 inline constexpr uint64_t kXdmfMaxCount = uint64_t{1} << 40;
 
-/// In ASCII lower case.
-std::string xdmfLower(std::string text);
-/// Without the blanks around it.
-std::string xdmfTrimmed(std::string_view text);
 /// The first of the attributes that there is, trimmed; empty if there is none.
 std::string xdmfAttribute(const pugi::xml_node& node, std::initializer_list<const char*> names);
 

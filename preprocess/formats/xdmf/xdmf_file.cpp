@@ -13,6 +13,7 @@
 #include "preprocess/formats/xdmf/xdmf_items.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
@@ -74,10 +75,10 @@ class Reader {
     const auto [found, is_new] = times_.try_emplace(collection);
     Times& times = found->second;
     const pugi::xml_node time = collection.child("Time"), given = time.child("DataItem");
-    const std::string type = xdmfLower(xdmfAttribute(time, {"TimeType", "Type"}));
+    const std::string type = lowerCase(xdmfAttribute(time, {"TimeType", "Type"}));
     if (!is_new || !given || (type != "list" && type != "hyperslab")) return times;
     const pugi::xml_node item = document_.resolved(given);
-    const std::string format = xdmfLower(xdmfAttribute(item, {"Format"}));
+    const std::string format = lowerCase(xdmfAttribute(item, {"Format"}));
     if (format.empty() || format == "xml") {
       times.numbers = document_.numbersIn(item, item.text().get());
     } else {
@@ -100,7 +101,7 @@ class Reader {
     if (depth > kXdmfMaxDepth) throw Error("{}: grids are nested more than {} deep", name(), kXdmfMaxDepth);
     if (++visited_ > kMaxGrids) throw Error("{}: has more than {} grids", name(), kMaxGrids);
     const pugi::xml_node grid = document_.resolved(given);
-    const std::string type = xdmfLower(xdmfAttribute(grid, {"GridType", "Type"}));
+    const std::string type = lowerCase(xdmfAttribute(grid, {"GridType", "Type"}));
     const std::string value = xdmfAttribute(grid.child("Time"), {"Value"});
     if (!value.empty()) time = document_.numberIn(grid.child("Time"), value);
     if (type == "subset") throw Error("{} is a SubSet, which is not read", document_.describe(grid));
@@ -108,7 +109,7 @@ class Reader {
       leaves_.push_back({grid, time});
       return;
     }
-    const bool temporal = xdmfLower(xdmfAttribute(grid, {"CollectionType"})) == "temporal";
+    const bool temporal = lowerCase(xdmfAttribute(grid, {"CollectionType"})) == "temporal";
     const Times none, &times = temporal ? timesOf(grid) : none;
     size_t number = 0;
     for (const pugi::xml_node child : grid.children("Grid")) {
@@ -138,7 +139,7 @@ class Reader {
     if (!topology)
       throw Error("{} has no Topology; expected 3DSMesh, 3DRectMesh or 3DCoRectMesh",
                   document_.describe(node));
-    const std::string type = xdmfAttribute(topology, {"TopologyType", "Type"}), small = xdmfLower(type);
+    const std::string type = xdmfAttribute(topology, {"TopologyType", "Type"}), small = lowerCase(type);
     if (!small.ends_with("smesh") && !small.ends_with("rectmesh"))
       throw Error(
           "{} has the topology {}, an unstructured grid, which is not read; expected 3DSMesh, 3DRectMesh or "
@@ -165,7 +166,7 @@ class Reader {
 
   void readGeometry(const pugi::xml_node& geometry, XdmfGrid& grid, const std::string& where) {
     if (!geometry) throw Error("{} has no Geometry", where);
-    const std::string type = xdmfLower(xdmfAttribute(geometry, {"GeometryType", "Type"}));
+    const std::string type = lowerCase(xdmfAttribute(geometry, {"GeometryType", "Type"}));
     std::vector<std::shared_ptr<const XdmfValues>> items;
     for (const pugi::xml_node item : geometry.children("DataItem")) {
       if (items.size() == 3) break;
@@ -214,7 +215,7 @@ class Reader {
     XdmfAttribute attribute;
     attribute.name = xdmfAttribute(node, {"Name"});
     if (attribute.name.empty()) attribute.name = fmt::format("attribute {}", grid.attributes.size() + 1);
-    const std::string centre = xdmfLower(xdmfAttribute(node, {"Center"}));
+    const std::string centre = lowerCase(xdmfAttribute(node, {"Center"}));
     if (!centre.empty() && centre != "node" && centre != "cell") {
       warn(fmt::format("attribute {} belongs to each {}; it is left out", attribute.name, centre));
       return;
@@ -266,7 +267,7 @@ bool isXdmf(const InputFile& file) {
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
   file.readAt(0, std::span(begin.data(), begin.size()));
   if (begin.find('\0') != std::string::npos) return false;
-  begin = xdmfLower(std::move(begin));
+  begin = lowerCase(begin);
   return begin.find("<xdmf") != std::string::npos || begin.find("<!doctype xdmf") != std::string::npos;
 }
 

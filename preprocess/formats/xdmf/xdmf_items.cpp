@@ -8,6 +8,7 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
+#include "stream/base/words.h"
 
 namespace curvisplat {
 
@@ -25,15 +26,15 @@ std::shared_ptr<const XdmfValues> XdmfItems::readItem(const pugi::xml_node& give
 }
 
 std::shared_ptr<const XdmfValues> XdmfItems::readNewItem(const pugi::xml_node& item, int depth) {
-  const std::string type = xdmfLower(xdmfAttribute(item, {"ItemType", "Type"}));
+  const std::string type = lowerCase(xdmfAttribute(item, {"ItemType", "Type"}));
   if (type == "hyperslab") return readSlab(item, depth);
   if (type == "function") return readFunction(item, depth);
   if (!type.empty() && type != "uniform")
     throw Error("{} is a {}, which is not computed; write its numbers", document_.describe(item),
                 printable(type.substr(0, 40)));
   std::vector<uint64_t> dims = document_.countsIn(item, xdmfAttribute(item, {"Dimensions"}));
-  const std::string format = xdmfLower(xdmfAttribute(item, {"Format"}));
-  const std::string text = xdmfTrimmed(item.text().get());
+  const std::string format = lowerCase(xdmfAttribute(item, {"Format"}));
+  const std::string text(trimmed(item.text().get()));
   if (format.empty() || format == "xml")
     return xdmfInline(document_.numbersIn(item, text), std::move(dims), document_.describe(item));
   if (format == "hdf") return readHdf5(item, text, std::move(dims));
@@ -44,7 +45,7 @@ std::shared_ptr<const XdmfValues> XdmfItems::readNewItem(const pugi::xml_node& i
 
 /// JOIN($0, $1, ...) of all its items in their order: how many programs write vectors.
 std::shared_ptr<const XdmfValues> XdmfItems::readFunction(const pugi::xml_node& item, int depth) {
-  std::string function = xdmfLower(xdmfAttribute(item, {"Function"})), expected;
+  std::string function = lowerCase(xdmfAttribute(item, {"Function"})), expected;
   std::erase_if(function, [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; });
   constexpr size_t kMaxParts = 64;
   std::vector<pugi::xml_node> parts;
@@ -103,7 +104,7 @@ std::shared_ptr<const XdmfValues> XdmfItems::readBinary(const pugi::xml_node& it
   const std::filesystem::path path = existing(item, text);
   addFile(path);
   binary.file = std::make_shared<const PooledFile>(pool_, path);
-  const std::string kind = xdmfLower(xdmfAttribute(item, {"NumberType", "DataType"}));
+  const std::string kind = lowerCase(xdmfAttribute(item, {"NumberType", "DataType"}));
   const std::string precision = xdmfAttribute(item, {"Precision"}), seek = xdmfAttribute(item, {"Seek"});
   binary.kind = kind == "int" ? 'i' : kind == "uint" || kind == "uchar" ? 'u' : kind == "char" ? 'i' : 'f';
   binary.bytes = kind == "uchar" || kind == "char" ? 1 : 4;
@@ -114,7 +115,7 @@ std::shared_ptr<const XdmfValues> XdmfItems::readBinary(const pugi::xml_node& it
   if (!known)
     throw Error("{} has numbers of {} bytes; expected 4 or 8", document_.describe(item), binary.bytes);
   if (!seek.empty()) binary.seek = document_.countsIn(item, seek).at(0);
-  const std::string order = xdmfLower(xdmfAttribute(item, {"Endian"}));
+  const std::string order = lowerCase(xdmfAttribute(item, {"Endian"}));
   if (order == "big") binary.swap = kMachineByteOrder == ByteOrder::kLittle;
   if (order == "little") binary.swap = kMachineByteOrder == ByteOrder::kBig;
   return openXdmfBinary(binary, std::move(dims));
