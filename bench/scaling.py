@@ -9,8 +9,9 @@ grid and 67 for temporary files. Then each cache is drawn --repeats times with e
 
 "cached" is the part of the grid's files that is in the page cache when a conversion starts, by mincore: they were just
 written. A cache's files are evicted from the page cache before it is drawn ("cold", checked with mincore), the program's own
-files are not. A conversion whose peak passes --convert-memory ends the script with status 1. "first" is the time from the start of the process until a first, coarse picture is in its file, "frame" the time
-of the whole picture once the cache is open. "peak" is the peak memory of the process, and "above" the part that a cache of
+files are not. A conversion whose peak passes --convert-memory ends the script with status 1. "first" is the time from the
+start of the process until a first, coarse picture is in its file, "frame" the time of the whole picture once the cache is
+open. With --against ERROR, "against" is the PSNR of the whole picture against one with this error, in pixels. "peak" is the peak memory of the process, and "above" the part that a cache of
 eight splats does not need: program, driver and image take the rest.
 """
 import argparse
@@ -71,8 +72,22 @@ def converted(arguments, edge, conversions):
     return cache, runs
 
 
-def drawn(arguments, cache, lod_pixels):
-    """Returns the --stats of one cold picture, with the PSNR of the first picture against it."""
+def psnr_text(arguments, picture, reference):
+    return results.run([arguments.program, "compare", picture, reference]).split(",")[0].strip()
+
+
+def finer_picture(arguments, cache):
+    """The picture that others are compared with, or None."""
+    if not arguments.against:
+        return None
+    picture = arguments.folder / "scaling_finer.png"
+    results.run([arguments.program, "render", cache, "-o", picture, "--size", arguments.size, "--memory", arguments.memory,
+                 "--lod-pixels", arguments.against])
+    return picture
+
+
+def drawn(arguments, cache, lod_pixels, finer):
+    """Returns the --stats of one cold picture, with the PSNR of the first picture against it, and its own against `finer`."""
     output = arguments.folder / "scaling.png"
     first = output.with_name("scaling_first.png")
     statistics_file = output.with_suffix(".json")
@@ -81,7 +96,8 @@ def drawn(arguments, cache, lod_pixels):
                  "--size", arguments.size, "--memory", arguments.memory, "--lod-pixels", lod_pixels])
     told = json.loads(statistics_file.read_text())
     told["cached"] = still_there
-    told["first_against_whole"] = results.run([arguments.program, "compare", first, output]).split(",")[0].strip()
+    told["first_against_whole"] = psnr_text(arguments, first, output)
+    told["against_finer"] = psnr_text(arguments, output, finer) if finer else "-"
     for file in (output, first, statistics_file):
         file.unlink(missing_ok=True)
     return told
@@ -99,8 +115,9 @@ def measure(arguments, edge, out):
     add("convert", "nodes/s", [nodes / run["seconds"] for run in conversions])
     add("convert_peak", "B", [run["peak_memory_bytes"] for run in conversions])
     add("cache", "B", [conversions[-1]["cache_bytes"]])
+    finer = finer_picture(arguments, cache)
     for lod_pixels in arguments.lod_pixels.split(","):
-        runs = [drawn(arguments, cache, lod_pixels) for _ in range(arguments.repeats)]
+        runs = [drawn(arguments, cache, lod_pixels, finer) for _ in range(arguments.repeats)]
         row["pictures"][lod_pixels] = runs
         still_there = max(run["cached"] for run in runs)
         for what, keys in (("first", ["time_to_first_image_s"]), ("frame", ["frames", 0, "seconds", "total"])):
@@ -110,6 +127,8 @@ def measure(arguments, edge, out):
                 out.leave_out(f"scaling/{what}/error:{lod_pixels}px/nodes:{nodes}",
                               f"not cold: {100 * still_there:.0f} % of a file stayed in memory; use a folder on a disk")
         add(f"peak/error:{lod_pixels}px", "B", [run["peak_memory_bytes"] for run in runs])
+    if finer:
+        finer.unlink()
     return row
 
 
@@ -147,8 +166,8 @@ def report_conversions(rows):
 
 
 def report_pictures(rows, base):
-    print("\n| error | nodes | cache | first | it, against the whole | frame | splats | bricks | read | peak | above | "
-          "the painter waited |\n|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("\n| error | nodes | cache | first | it, against the whole | frame | against | splats | bricks | read | peak | above | "
+          "the painter waited |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for lod_pixels in rows[0]["pictures"]:
         for row in rows:
             runs = row["pictures"][lod_pixels]
@@ -157,7 +176,7 @@ def report_pictures(rows, base):
             waited = middle(runs, "frames", 0, "seconds", "painter_waited")
             print(f"| {lod_pixels} px | {row['nodes'] / 1e6:.3g} M | {row['conversion']['cache_bytes'] / MIB:.1f} MiB "
                   f"| {middle(runs, 'time_to_first_image_s'):.2f} s | {runs[0]['first_against_whole']} "
-                  f"| {seconds:.2f} s | {frame['splats_drawn'] / 1e6:.2f} M | {frame['bricks_drawn']} "
+                  f"| {seconds:.2f} s | {runs[0]['against_finer']} | {frame['splats_drawn'] / 1e6:.2f} M | {frame['bricks_drawn']} "
                   f"| {frame['bytes_read'] / MIB:.1f} MiB | {peak / MIB:.0f} MiB "
                   f"| {(peak - middle(base['pictures'][lod_pixels], 'peak_memory_bytes')) / MIB:.0f} MiB "
                   f"| {100 * waited / seconds:.1f} % |")
@@ -199,6 +218,7 @@ def main():
     parser.add_argument("--scene", default="wake")
     parser.add_argument("--nodes", default="1M,8M,64M", type=counts_of)
     parser.add_argument("--lod-pixels", default="1,2,3")
+    parser.add_argument("--against", help="error of the picture that all are compared with, such as 0.4")
     parser.add_argument("--size", default="600x600")
     parser.add_argument("--memory", default="256M", help="--memory of pictures")
     parser.add_argument("--convert-memory", default="512M")

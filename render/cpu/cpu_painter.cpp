@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "render/cpu/splat_bins.h"
@@ -69,6 +70,7 @@ struct CpuPainter::State {
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
   std::vector<uint32_t> touched;                   // tiles of a batch
+  Image image;                                     // black until end()
   WindowTiles windows;
   std::optional<SplatBins> bins;
   std::optional<ShadingTable> table, colours;
@@ -86,6 +88,7 @@ struct CpuPainter::State {
   void allocate(ImageSize wanted, unsigned threads, size_t batch_splats_);
   void paintBatch();
   void paintBorrowed(std::span<const ScreenSplat>& splats);
+  void listTiles();
   void paintTiles();
 };
 
@@ -106,8 +109,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   state.table.emplace(table);
   state.colours.reset();
   if (shading.colours) state.colours.emplace(*shading.colours);
-  if (size.width != state.size.width || size.height != state.size.height || threads != threads_before ||
-      resources.batch_splats != state.batch_splats)
+  if (size != state.size || threads != threads_before || resources.batch_splats != state.batch_splats)
     state.allocate(size, threads, resources.batch_splats);
   if (threads != threads_before || resources.permits != state.loop->permits())
     state.loop.emplace(threads, resources.permits);
@@ -116,6 +118,8 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   state.bins->open();
   state.windows.begin(shading.layers, *state.loop);
   state.forRanges("clear tiles", tileCount(size), [&](size_t number) { state.clear(number); });
+  // One thread fills it. Now the others prepare the first splats; at the end they would wait.
+  if (state.image.size != size) state.image = blackImage(size);
 }
 
 void CpuPainter::drawOnly(const TileSet& tiles) {
@@ -200,13 +204,23 @@ void CpuPainter::State::forRanges(const char* name, size_t count, const Job& job
   loop->forAll(name, count, std::max<size_t>(1, count / (kRangesAThread * loop->threads())), job);
 }
 
-void CpuPainter::State::paintTiles() {
-  {
-    const TraceScope trace("list tiles");
-    touched.clear();
-    for (size_t number = 0; number < tileCount(size); ++number)
-      if (!bins->tile(static_cast<int>(number)).empty()) touched.push_back(static_cast<uint32_t>(number));
+/// The tiles that have splats. Those that have many come first: a thread that took one last would keep all others waiting.
+void CpuPainter::State::listTiles() {
+  const TraceScope trace("list tiles");
+  const auto splatsOf = [&](size_t number) { return bins->tile(static_cast<int>(number)).size(); };
+  touched.clear();
+  size_t entries = 0;
+  for (size_t number = 0; number < tileCount(size); ++number) {
+    if (splatsOf(number) == 0) continue;
+    touched.push_back(static_cast<uint32_t>(number));
+    entries += splatsOf(number);
   }
+  std::stable_partition(touched.begin(), touched.end(),
+                        [&](uint32_t number) { return splatsOf(number) * touched.size() > 2 * entries; });
+}
+
+void CpuPainter::State::paintTiles() {
+  listTiles();
   forRanges("paint tiles", touched.size(), [this](size_t n) {
     if (stop.stop_requested()) return;
     const size_t number = touched[n];
@@ -260,7 +274,7 @@ Image CpuPainter::end() {
   const Computing computing(state.loop->permits());
   if (!state.bins->empty()) state.paintBatch();
   const StageTimer timer(state.draw_s, "finish picture", TraceKind::kStage);
-  Image image = blackImage(state.size);
+  Image image = std::exchange(state.image, Image());
   const auto columns = static_cast<size_t>(state.bins->columns());
   state.forRanges("finish tiles", tileCount(state.size), [&](size_t number) {
     const float* tile = state.tile(number);

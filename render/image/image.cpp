@@ -18,7 +18,7 @@ double overWhite(const float* pixel, int channel) {
 Image::Image(ImageSize size_) : size(size_), rgba(4 * size_.pixels()) {}
 
 ImageDifference compareImages(const Image& a, const Image& b) {
-  if (a.size.width != b.size.width || a.size.height != b.size.height)
+  if (a.size != b.size)
     throw Error("the images have different sizes: {} x {} and {} x {} pixels", a.size.width, a.size.height,
                 b.size.width, b.size.height);
   ImageDifference difference;

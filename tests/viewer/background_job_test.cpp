@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "stream/base/interrupted.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/virtual_display.h"
 #include "tools/viewer/opening.h"
 
@@ -61,6 +62,9 @@ Threads threadsOfAJob() {
   return threads;
 }
 
+// The thread sanitizer cannot see how TBB hands a loop from one thread to another (support/one_tbb_thread.cpp).
+constexpr const char* kUnseenByThreadSanitizer = "a loop of several threads";
+
 class BackgroundJobTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -71,6 +75,7 @@ class BackgroundJobTest : public testing::Test {
 
 /// Whoever used TBB's threads first.
 TEST_F(BackgroundJobTest, AllOfItsThreadsHaveLowPriorityAndThoseThatDrawHaveNot) {
+  if (kHasThreadSanitizer) GTEST_SKIP() << kUnseenByThreadSanitizer;
   for (const bool draws_first : {false, true}) {
     if (draws_first) {
       EXPECT_EQ(threadsOfALoop().nices, std::set{nice_});
@@ -83,6 +88,7 @@ TEST_F(BackgroundJobTest, AllOfItsThreadsHaveLowPriorityAndThoseThatDrawHaveNot)
 }
 
 TEST_F(BackgroundJobTest, AllCoresWorkOnIt) {
+  if (kHasThreadSanitizer) GTEST_SKIP() << kUnseenByThreadSanitizer;
   const auto cores = static_cast<size_t>(tbb::info::default_concurrency());
   std::mutex mutex;
   std::set<std::thread::id> ids;
