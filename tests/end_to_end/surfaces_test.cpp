@@ -210,6 +210,12 @@ TEST_F(SurfaceOptions, WarningsOfSurfacesAloneDoNotMentionTheVolume) {
   EXPECT_EQ(nothing.err.find("transfer function"), std::string::npos) << nothing.err;
 }
 
+TEST_F(SurfaceOptions, SaysWhyNoIsosurfaceIsSeen) {
+  const ProgramResult nothing = render({"--volume", "off", "--iso", "0.5", "--focal-point", "900,0,0"});
+  EXPECT_NE(nothing.err.find("no isosurface of 0.5 is in sight"), std::string::npos) << nothing.err;
+  EXPECT_NE(nothing.err.find("f goes from 0 to 0.99859"), std::string::npos) << nothing.err;
+}
+
 TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
   const ProgramResult result = render({"--slice", "0,0,900,0,0,1"});
   EXPECT_EQ(result.status, 0);

@@ -132,11 +132,24 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
   return true;
 }
 
+/// Why nothing is seen of a scene without the volume.
+std::string whyNoSheetIsVisible(const SurfaceScene& sheets, const VariableInfo& variable) {
+  const bool is_only_iso = sheets.surfaces.empty() && sheets.grid_surfaces.empty() && sheets.slices.empty() &&
+                           !sheets.isovalues.empty();
+  if (!is_only_iso)
+    return "no surface, slice or isosurface is in sight, and --volume is off; try --view iso or another "
+           "camera";
+  return fmt::format(
+      "no isosurface of {:g} is in sight, and --volume is off; {} goes from {:g} to {:g}, of which a cache "
+      "has the means over cells, "
+      "which are less far apart: try a value between, --view iso, or convert again with --refine 2",
+      fmt::join(sheets.isovalues, ", "), variable.name, variable.min, variable.max);
+}
+
 std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   std::vector<std::string> reasons;
   if (scene.options.scene && !scene.options.scene->volume)
-    return {
-        "no surface, slice or isosurface is in sight, and --volume is off; try --view iso or another camera"};
+    return {whyNoSheetIsVisible(*scene.options.scene, scene.variable)};
   const double largest = largestExtinction(scene.transfer_function, scene.variable.min, scene.variable.max);
   if (largest == 0) reasons.push_back(whyTransparent(scene));
 
