@@ -80,7 +80,7 @@ def finer_picture(arguments, cache):
     """The picture that others are compared with, or None."""
     if not arguments.against:
         return None
-    picture = arguments.folder / "scaling_finer.png"
+    picture = arguments.folder / "scaling_finer.pfm"
     results.run([arguments.program, "render", cache, "-o", picture, "--size", arguments.size, "--memory", arguments.memory,
                  "--lod-pixels", arguments.against])
     return picture
@@ -88,8 +88,8 @@ def finer_picture(arguments, cache):
 
 def drawn(arguments, cache, lod_pixels, finer):
     """Returns the --stats of one cold picture, with the PSNR of the first picture against it, and its own against `finer`."""
-    output = arguments.folder / "scaling.png"
-    first = output.with_name("scaling_first.png")
+    output = arguments.folder / "scaling.pfm"  # 8 bits would bound the PSNR
+    first = output.with_name("scaling_first.pfm")
     statistics_file = output.with_suffix(".json")
     still_there = page_cache.forget(cache)
     results.run([arguments.program, "render", cache, "-o", output, "--first-image", first, "--stats", statistics_file,

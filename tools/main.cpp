@@ -83,6 +83,8 @@ std::string describe(const CLI::App& app, const CLI::App* command, const CLI::Pa
     return fmt::format("{} '{}': is not a {}, or is too large", found[1].str(), found[2].str(),
                        is_whole ? "whole number from 0 on" : "number");
   }
+  if (std::regex_match(text, found, std::regex("(\\S+): Failed parsing (.*) as a .*")))
+    return fmt::format("{} '{}': expected a number", found[1].str(), found[2].str());
   if (std::regex_match(text, found, std::regex("(\\S+): (.*) not in \\{(.*)\\}"))) {
     std::vector<std::string> choices;
     std::istringstream list(found[3].str());

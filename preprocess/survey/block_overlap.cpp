@@ -130,6 +130,7 @@ class OverlapSearch {
     const bool at_once = all <= memory_.point_bytes / 2 / sizeof(BlockPoint);
     std::vector<BlockPoint> points;
     measure(at_once ? &points : nullptr);
+    cutSlabs();
     tree_.emplace(bounds_);
     for (uint32_t block = 0; block < blocks_.size(); ++block)
       meets_.push_back(tree_->anotherTouches(bounds_[block].box, block));
@@ -192,12 +193,17 @@ class OverlapSearch {
     finish();
   }
 
-  /// The slabs of the blocks that `wanted` is true for.
-  template <typename Wanted>
-  std::vector<Slab> slabsOf(const Wanted& wanted) const {
-    std::vector<Slab> slabs = cutIntoSlabs(blocks_, memory_.slab_bytes / slabBytesPerNode(0), kCornerHalo);
-    std::erase_if(slabs, [&](const Slab& slab) { return !hasCells(blocks_[slab.block]) || !wanted(slab); });
-    return slabs;
+  void cutSlabs() {
+    slabs_ = cutIntoSlabs(blocks_, memory_.slab_bytes / slabBytesPerNode(0), kCornerHalo);
+    std::erase_if(slabs_, [&](const Slab& slab) { return !hasCells(blocks_[slab.block]); });
+    size_t at = 0;
+    for (uint32_t block = 0; block <= blocks_.size(); ++block) {
+      while (at < slabs_.size() && slabs_[at].block < block) ++at;
+      first_slab_.push_back(at);
+    }
+  }
+  std::span<const Slab> slabsOf(uint32_t block) const {
+    return std::span(slabs_).subspan(first_slab_[block], first_slab_[block + 1] - first_slab_[block]);
   }
 
   /// What points may take: the pairs get a quarter, or what they have and an eighth.
@@ -228,10 +234,17 @@ class OverlapSearch {
     };
     const auto goOn = [&](uint64_t cell) { return Place{part.block, cell, sampling->planeOf(cell)}; };
     points.reserve(most);
-    SlabStream slabs(reader_, memory_.slab_bytes, slabsOf([&](const Slab& slab) {
-                       return slab.block >= from.block && meets_[slab.block] &&
-                              (slab.block > from.block || slab.box.k1 > from.plane);
-                     }));
+    // Of as many blocks as have points enough.
+    std::vector<Slab> wanted;
+    uint32_t end = from.block;
+    for (uint64_t count = 0; end < blocks_.size() && count <= most; ++end) {
+      if (!meets_[end] || !hasCells(blocks_[end])) continue;
+      std::ranges::copy_if(slabsOf(end), std::back_inserter(wanted), [&](const Slab& slab) {
+        return slab.block > from.block || slab.box.k1 > from.plane;
+      });
+      count += samplingOf(blocks_[end]).points();
+    }
+    SlabStream slabs(reader_, memory_.slab_bytes, std::move(wanted));
     while (const LoadedSlab* loaded = slabs.next()) {
       progress_.throwIfStopped();
       const uint32_t number = loaded->slab.block;
@@ -246,7 +259,7 @@ class OverlapSearch {
       }
       picker->add(*loaded);
     }
-    return finish() ? goOn(part.end) : Place{static_cast<uint32_t>(blocks_.size())};
+    return finish() ? goOn(part.end) : Place{end};
   }
 
   void locateInParts(std::span<const BlockPoint> points) {
@@ -261,15 +274,15 @@ class OverlapSearch {
   /// Adds the volumes of the points that lie in other blocks.
   void locate(std::span<const BlockPoint> points) {
     PointHolders holders(points);
-    std::vector<bool> wanted(blocks_.size());
+    std::vector<Slab> wanted;
     for (uint32_t block = 0; block < blocks_.size(); ++block)
-      wanted[block] = !bounds_[block].box.isEmpty() && holders.mayHold(block, bounds_[block].box);
+      if (!bounds_[block].box.isEmpty() && holders.mayHold(block, bounds_[block].box))
+        std::ranges::copy(slabsOf(block), std::back_inserter(wanted));
     const auto finish = [&](uint32_t block) {
       for (const uint32_t point : holders.finishBlock())
         shared_.add(points[point].block, block, points[point].volume);
     };
-    SlabStream slabs(reader_, memory_.slab_bytes,
-                     slabsOf([&](const Slab& slab) { return wanted[slab.block]; }));
+    SlabStream slabs(reader_, memory_.slab_bytes, std::move(wanted));
     std::optional<uint32_t> block;
     while (const LoadedSlab* loaded = slabs.next()) {
       progress_.throwIfStopped();
@@ -292,10 +305,12 @@ class OverlapSearch {
   const Progress& progress_;
   double cells_ = 0;
   uint64_t met_in_vain_ = 0;
-  std::vector<Bounds> bounds_;   // [block]; slanted where the block is one slab
-  std::vector<double> volumes_;  // [block], of those whose points have been picked
-  std::optional<BoxTree> tree_;  // of the bounds
-  std::vector<bool> meets_;      // [block], whether its box touches another
+  std::vector<Bounds> bounds_;      // [block]; slanted where the block is one slab
+  std::vector<double> volumes_;     // [block], of those whose points have been picked
+  std::optional<BoxTree> tree_;     // of the bounds
+  std::vector<bool> meets_;         // [block], whether its box touches another
+  std::vector<Slab> slabs_;         // of blocks with cells, block by block
+  std::vector<size_t> first_slab_;  // [block], and their end
   SharedVolumes shared_;
 };
 

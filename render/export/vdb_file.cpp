@@ -1,5 +1,6 @@
 #include "render/export/vdb_file.h"
 
+#include <fmt/format.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
@@ -12,6 +13,7 @@
 #include <string>
 
 #include "render/export/field_sampler.h"
+#include "stream/base/byte_text.h"
 #include "stream/base/disk_full.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
@@ -33,22 +35,39 @@ SampleLattice latticeOf(const Manifest& manifest, uint32_t voxels) {
   return lattice;
 }
 
+/// What two grids take of which every voxel is filled: leaves of 8 voxels along each axis and the nodes above them, of 16 and 32.
+uint64_t filledBytes(const SampleLattice& lattice) {
+  constexpr uint64_t kLeaf = 2400, kNode = 48 << 10, kUpperNode = 384 << 10;
+  const auto count = [&](uint32_t side) {
+    uint64_t nodes = 1;
+    for (const uint32_t voxels : lattice.size) nodes *= (voxels + side - 1) / side;
+    return nodes;
+  };
+  return 2 * (count(8) * kLeaf + count(128) * kNode + count(4096) * kUpperNode);
+}
+
+/// --memory that suffices whatever the cache: half of it is for the grids, half for those who sample.
+std::string sufficientMemory(const SampleLattice& lattice) {
+  const uint64_t half = std::max(filledBytes(lattice), kSampleBytes * kSlab * lattice.planePoints());
+  return fmt::format("{}M", (2 * half >> 20) + 1);
+}
+
 /// How many threads may sample at a time, so that half of the memory is left for the grids.
 unsigned threadsFor(const SampleLattice& lattice, const VdbOptions& options) {
   const unsigned threads =
       FieldSampler::threadsWithin(options.memory_bytes / 2, lattice, kSlab, options.threads);
   if (threads == 0)
     throw UsageError(
-        "{} x {} x {} voxels: {} MiB are too few to sample them; give --memory {}M or fewer --voxels",
-        lattice.size[0], lattice.size[1], lattice.size[2], options.memory_bytes >> 20,
-        (2 * kSampleBytes * kSlab * lattice.planePoints() >> 20) + 1);
+        "--memory {}: is too little to sample {} x {} x {} voxels; give --memory {} or fewer --voxels",
+        byteText(options.memory_bytes), lattice.size[0], lattice.size[1], lattice.size[2],
+        sufficientMemory(lattice));
   return threads;
 }
 
 class Grids {
  public:
   Grids(const SampleLattice& lattice, uint64_t memory_bytes)
-      : size_(lattice.size), memory_bytes_(memory_bytes) {
+      : lattice_(lattice), memory_bytes_(memory_bytes) {
     value = openvdb::FloatGrid::create(0.0f);
     density = openvdb::FloatGrid::create(0.0f);
     value->setName("value");
@@ -65,22 +84,23 @@ class Grids {
     auto values = value->getAccessor(), densities = density->getAccessor();
     size_t n = 0;
     for (uint32_t k = k_begin; k < k_end; ++k)
-      for (uint32_t j = 0; j < size_[1]; ++j)
-        for (uint32_t i = 0; i < size_[0]; ++i, ++n) {
+      for (uint32_t j = 0; j < lattice_.size[1]; ++j)
+        for (uint32_t i = 0; i < lattice_.size[0]; ++i, ++n) {
           if (!(samples.density[n] > kMinDensity)) continue;
           const openvdb::Coord at(static_cast<int>(i), static_cast<int>(j), static_cast<int>(k));
           values.setValue(at, samples.value[n]);
           densities.setValue(at, samples.density[n]);
         }
     if (value->memUsage() + density->memUsage() > memory_bytes_ / 2)
-      throw UsageError("the voxels take more than half of {} MiB; give a larger --memory or fewer --voxels",
-                       memory_bytes_ >> 20);
+      throw UsageError(
+          "--memory {}: the voxels take more than half of it; give --memory {} or fewer --voxels",
+          byteText(memory_bytes_), sufficientMemory(lattice_));
   }
 
   openvdb::FloatGrid::Ptr value, density;
 
  private:
-  const std::array<uint32_t, 3> size_;
+  const SampleLattice lattice_;
   const uint64_t memory_bytes_;
 };
 

@@ -84,8 +84,9 @@ class TraceFile {
 
   void close() {
     append("\n]\n");
-    if (failure_) throw Error("{}", *failure_);
-    file_.close();
+    if (!failure_) return file_.close();
+    removeAll(file_.path());  // it has no end
+    throw Error("{}", *failure_);
   }
 
  private:

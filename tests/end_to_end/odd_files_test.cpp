@@ -337,9 +337,10 @@ TEST_F(OddFiles, NamesThatAreTooLongWhileTheFilesAreWrittenAreRefusedBeforeTheWo
     expectRefused({"convert", file("damaged.xyz"), "-o", output}, too_long);
     expectRefused({"convert", file("damaged.xyz"), frames, "-o", output}, too_long);
     expectRefused({"convert", "--join", file("nowhere"), "-o", output}, too_long);
-    // .xyz.part is one byte longer than .partial, and _0002.xyz.part is six.
-    expectRefused({"generate", "wake", "--size", "8x8x8", "-o", output}, "the name is too long");
-    expectRefused({"generate", "wake", "--size", "8x8x8", "--steps", "3", "-o", file(nameOf(bytes - 6))},
+    // .xyz is four bytes shorter than .partial, and _0002.xyz is one longer.
+    expectRefused({"generate", "wake", "--size", "8x8x8", "-o", file(nameOf(bytes + 4))},
+                  "the name is too long");
+    expectRefused({"generate", "wake", "--size", "8x8x8", "--steps", "3", "-o", file(nameOf(bytes - 1))},
                   "the name is too long");
     EXPECT_EQ(entries(), before);
     // The temporary file of a picture has a short name.

@@ -63,12 +63,14 @@ TEST(WritePlot3d, WritesASceneAsASingleBlock) {
   const TemporaryFolder folder;
   const SceneGridSource scene(makeScene("half-annulus"), {5, 4, 3});
   Progress progress;
-  const auto paths = writePlot3d(scene, folder / "scene", progress);
-  EXPECT_EQ(paths, (std::vector{folder / "scene.xyz", folder / "scene.fun", folder / "scene.nam"}));
+  const Plot3dOutputs outputs = writePlot3d(scene, folder / "scene", progress);
+  EXPECT_EQ(outputs.grid, folder / "scene.xyz");
+  EXPECT_EQ(outputs.function, folder / "scene.fun");
+  EXPECT_EQ(outputs.names, folder / "scene.nam");
 
   NodeArrays nodes;
   scene.read(0, {0, 4, 0, 3}, std::vector<uint32_t>{0}, nodes);
-  const auto grid = wordsOf(paths[0]), function = wordsOf(paths[1]);
+  const auto grid = wordsOf(outputs.grid), function = wordsOf(outputs.function);
   ASSERT_EQ(grid.size(), 3u + 3 * 60);
   ASSERT_EQ(function.size(), 4u + 60);
   EXPECT_EQ(std::vector(grid.begin(), grid.begin() + 3), (std::vector{5, 4, 3}));
@@ -79,7 +81,7 @@ TEST(WritePlot3d, WritesASceneAsASingleBlock) {
     EXPECT_EQ(asFloat(grid[3 + 120 + n]), static_cast<float>(nodes.z[n]));
     EXPECT_EQ(asFloat(function[4 + n]), nodes.scalars[0][n]);
   }
-  EXPECT_EQ(readTextFile(paths[2]), "f\n");
+  EXPECT_EQ(readTextFile(outputs.names), "f\n");
 }
 
 TEST(WritePlot3d, WritesBlocksWithBlanking) {
@@ -159,6 +161,39 @@ TEST(WritePlot3d, LeavesWhatWasThereWhenTheDiskIsFull) {
   }
   EXPECT_EQ(readTextFile(folder / "scene.xyz"), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(WritePlot3d, LeavesOthersFilesAndFollowsLinks) {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder;
+  std::ofstream(folder / "precious") << "mine";
+  fs::create_symlink("precious",
+                     folder / "scene.xyz.part");  // as files were called before they were complete
+  std::ofstream(folder / "scene.fun.part") << "mine";
+  fs::create_directory(folder / "disk");
+  fs::create_symlink("disk/names", folder / "scene.nam");
+  Progress progress;
+  const Plot3dOutputs outputs =
+      writePlot3d(SceneGridSource(makeScene("wake"), {5, 4, 3}), folder / "scene", progress);
+  EXPECT_EQ(readTextFile(folder / "precious"), "mine");
+  EXPECT_EQ(readTextFile(folder / "scene.fun.part"), "mine");
+  EXPECT_TRUE(fs::is_symlink(outputs.names));
+  EXPECT_EQ(readTextFile(folder / "disk/names"), "f\n");
+  EXPECT_FALSE(fs::is_symlink(outputs.grid));
+}
+
+/// Steps of a grid that does not move.
+TEST(WritePlot3d, LeavesOutCoordinates) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "a.xyz") << "old";
+  Progress progress;
+  Plot3dOutputs outputs = plot3dOutputs(folder / "a");
+  outputs.grid.clear();
+  const SceneGridSource source(makeScene("wake"), {5, 4, 3});
+  writePlot3d(source, outputs, progress);
+  const Plot3dOutputs all = writePlot3d(source, folder / "b", progress);
+  EXPECT_EQ(readTextFile(folder / "a.xyz"), "old");
+  EXPECT_EQ(wordsOf(outputs.function), wordsOf(all.function));
 }
 
 TEST(WritePlot3d, NamesAFolderThatIsMissing) {

@@ -134,6 +134,7 @@ TEST_F(BackgroundJobTest, SaysHowFarItIs) {
 }
 
 TEST_F(BackgroundJobTest, ThrowsWhatItsWorkThrows) {
+  if (kHasThreadSanitizer) GTEST_SKIP() << kUnseenByThreadSanitizer;
   BackgroundJob job(
       "job", "beginning",
       [](Progress&) -> std::filesystem::path {

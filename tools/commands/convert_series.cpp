@@ -244,6 +244,9 @@ bool isSeries(ConvertArguments& arguments) {
 
 void runConvertSeries(ConvertArguments arguments) {
   checkArguments(arguments);
+  if (!arguments.added_scalars.empty())
+    throw UsageError(
+        "--add-scalar adds to a cache of one time step; give the grid and the files of that step alone");
   if (!arguments.adds_steps && arguments.output.empty()) throw UsageError("--output is required");
   for (auto* path : {&arguments.output, &arguments.to})
     if (!path->empty() && !path->has_filename()) *path = path->parent_path();  // "NAME.splats/"

@@ -164,6 +164,9 @@ void exportCache(const ExportArguments& arguments) {
     } catch (const Interrupted& interrupted) {
       throw Interrupted(interrupted.signal(), fmt::format("{}: is complete; its comparison was interrupted",
                                                           arguments.output.string()));
+    } catch (const Error& error) {
+      throw Error("{}: is complete; it was not compared with curvisplat's pictures (--no-comparison): {}",
+                  arguments.output.string(), error.what());
     }
   }
   if (arguments.output.extension() == ".spz") {

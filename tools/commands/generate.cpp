@@ -51,9 +51,9 @@ std::string stepPrefix(const std::string& prefix, uint64_t step) {
   return fmt::format("{}_{:04}", prefix, step);
 }
 
-/// That is appended to the prefix while the files are written.
+/// Of the names of the files, after the prefix.
 std::string longestEnding(const GenerateOptions& options) {
-  const std::string ending = fmt::format(".xyz{}", kPlot3dPartSuffix);
+  const std::string ending = ".xyz";
   return options.steps ? stepPrefix("", options.first_step + *options.steps - 1) + ending : ending;
 }
 
@@ -67,13 +67,10 @@ void generateSteps(const GenerateOptions& options) {
   for (uint64_t step = options.first_step; step < options.first_step + *options.steps; ++step) {
     const SceneTime time{static_cast<double>(step) / kStepsPerUnitOfTime, options.moving};
     const SceneGridSource source(makeScenesAt(options.scene, options.clustering, time), size);
-    const auto paths = writePlot3d(source, stepPrefix(options.prefix, step), progress);
-    if (!options.moving) {
-      if (step == options.first_step)
-        std::filesystem::rename(paths[0], options.prefix + ".xyz");
-      else
-        std::filesystem::remove(paths[0]);
-    }
+    Plot3dOutputs outputs = plot3dOutputs(stepPrefix(options.prefix, step));
+    if (!options.moving)
+      outputs.grid = step == options.first_step ? options.prefix + ".xyz" : std::filesystem::path();
+    writePlot3d(source, outputs, progress);
     nodes += progress.phases().back().steps;
     seconds += progress.phases().back().seconds;
   }
@@ -92,9 +89,9 @@ void generate(const GenerateOptions& options) {
   const SceneGridSource source(makeScenes(options.scene, options.clustering), parseSize(options.size));
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
-  const auto paths = writePlot3d(source, options.prefix, progress);
+  const Plot3dOutputs outputs = writePlot3d(source, options.prefix, progress);
   const Progress::Phase& phase = progress.phases().back();
-  for (const auto& path : paths) printLine("{}", path.string());
+  for (const auto& path : {outputs.grid, outputs.function, outputs.names}) printLine("{}", path.string());
   fmt::print("{} nodes of {} in {:.1f} s\n", phase.steps, options.scene, phase.seconds);
 }
 

@@ -135,11 +135,12 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
   report.size = sizeOfGrid(effort.nodes);
   checkSpace(effort.temporary_folder, report.nodes());
   const WorkFolder folder(effort.temporary_folder);
-  const auto files = writePlot3d(SceneGridSource(makeScene("wake"), report.size), folder / "grid", progress);
+  const Plot3dOutputs files =
+      writePlot3d(SceneGridSource(makeScene("wake"), report.size), folder / "grid", progress);
 
   OpenGridOptions grid;
-  grid.grid = folder / "grid.xyz";
-  grid.solutions = {folder / "grid.fun"};
+  grid.grid = files.grid;
+  grid.solutions = {files.function};
   grid.temporary_folder = effort.temporary_folder;
   ConvertOptions options;
   options.output = folder / "grid.splats";
@@ -154,7 +155,7 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
   while (runs.empty() || (runs.size() < effort.max_runs && spent_s < effort.repeat_s)) {
     fs::remove_all(options.output);
     const auto source = openGrid(grid);
-    if (const auto reason = dropPages(files)) {
+    if (const auto reason = dropPages({files.grid, files.function, files.names})) {
       if (report.cold) to.leaveOut("conversion/cold", *reason);
       report.cold = false;
     }

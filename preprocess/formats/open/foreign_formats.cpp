@@ -44,7 +44,9 @@ constexpr Magic kMagics[] = {
     {"(1 \""sv, "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)"},
     {"GRIB"sv, "a GRIB file, which is not read"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
-    {"{"sv, "a JSON file (give a .p3d file alone, instead of the grid)"},
+    {"{"sv,
+     "a JSON file, but no .p3d file that can be read (one is given alone, instead of the grid; it has no "
+     "control characters)"},
     {"\x89PNG"sv, "a PNG image"},
     {"\xff\xd8\xff"sv, "a JPEG image"},
     {"%PDF"sv, "a PDF document"},

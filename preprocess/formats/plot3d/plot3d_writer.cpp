@@ -6,14 +6,16 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
-#include <cstring>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <string>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/free_space.h"
+#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -23,31 +25,23 @@ static_assert(std::endian::native == std::endian::little, "PLOT3D is written in 
 constexpr uint64_t kBatchNodes = 2 << 20;  // evaluated while the previous batch is written
 constexpr uint64_t kTaskNodes = 32 << 10;  // what one worker reads from the source at a time
 
-// A file under a temporary name. putIntoPlace() renames it; without that, the destructor removes it.
+/// A file that has its name once it is complete.
 class PendingFile {
  public:
   explicit PendingFile(const std::filesystem::path& path)
-      : path_(path),
-        file_(std::filesystem::path(path) += kPlot3dPartSuffix, Caching::kPages, OutputFile::Existing::kEmpty,
-              path) {}
-  ~PendingFile() {
-    if (!in_place_) removeAll(file_.path());
-  }
-  PendingFile(const PendingFile&) = delete;
-  PendingFile& operator=(const PendingFile&) = delete;
+      : temporary_(writableTarget(path)),
+        file_(temporary_.path(), Caching::kPages, OutputFile::Existing::kKeep, path) {}
 
   OutputFile& file() { return file_; }
 
   void putIntoPlace() {
-    if (SystemCalls::current().rename(file_.path().c_str(), path_.c_str()) < 0)
-      throw Error("{}: cannot rename the finished file: {}", path_.string(), std::strerror(errno));
-    in_place_ = true;
+    file_.close();
+    temporary_.putIntoPlace();
   }
 
  private:
-  std::filesystem::path path_;
+  TemporaryFile temporary_;
   OutputFile file_;
-  bool in_place_ = false;
 };
 
 // The rows [begin, end) of a block (numbered j fastest) as arrays to write: x, y, z, iblank, scalars.
@@ -65,7 +59,8 @@ struct BlockOffsets {
 
 class Writer {
  public:
-  Writer(const GridSource& source, OutputFile& grid, OutputFile& function, Progress& progress)
+  /// `grid`: null: coordinates are not written.
+  Writer(const GridSource& source, OutputFile* grid, OutputFile& function, Progress& progress)
       : source_(source),
         description_(source.description()),
         grid_(grid),
@@ -101,16 +96,16 @@ class Writer {
       for (const uint64_t nodes : {block.ni, block.nj, block.nk}) {
         if (nodes > std::numeric_limits<int32_t>::max())
           throw Error("{}: {} has {} nodes along an axis; PLOT3D allows at most 2^31 - 1",
-                      grid_.path().string(), block.name, nodes);
+                      function_.path().string(), block.name, nodes);
         grid.push_back(static_cast<int32_t>(nodes));
         function.push_back(static_cast<int32_t>(nodes));
       }
       function.push_back(static_cast<int32_t>(wanted_.size()));
     }
-    grid_.append(std::span<const int32_t>(grid));
+    if (grid_) grid_->append(std::span<const int32_t>(grid));
     function_.append(std::span<const int32_t>(function));
 
-    BlockOffsets next{grid_.size(), function_.size()};
+    BlockOffsets next{grid_ ? grid_->size() : 0, function_.size()};
     for (const GridBlock& block : description_.blocks) {
       offsets_.push_back(next);
       next.grid += block.nodes() * gridBytesPerNode();
@@ -120,8 +115,8 @@ class Writer {
   }
 
   void requireSpace(const BlockOffsets& sizes) const {
-    const std::filesystem::path folder = std::filesystem::absolute(grid_.path()).parent_path();
-    const uint64_t needed = sizes.grid + sizes.function;
+    const std::filesystem::path folder = std::filesystem::absolute(function_.path()).parent_path();
+    const uint64_t needed = (grid_ ? sizes.grid : 0) + sizes.function;
     const std::optional<uint64_t> available = freeBytes(folder);
     if (available && *available < needed)
       throw Error("{}: needs {} bytes, but only {} are free; free some space or write elsewhere",
@@ -196,15 +191,17 @@ class Writer {
     const auto put = [&](OutputFile& file, uint64_t block_offset, size_t array, const auto& values) {
       file.writeAt(block_offset + array * array_bytes + begin, std::as_bytes(std::span(values)));
     };
-    for (size_t axis = 0; axis < 3; ++axis) put(grid_, offsets_[b].grid, axis, batch.coordinates[axis]);
-    if (has_blanking_) put(grid_, offsets_[b].grid, 3, batch.iblank);
+    if (grid_) {
+      for (size_t axis = 0; axis < 3; ++axis) put(*grid_, offsets_[b].grid, axis, batch.coordinates[axis]);
+      if (has_blanking_) put(*grid_, offsets_[b].grid, 3, batch.iblank);
+    }
     for (size_t n = 0; n < batch.scalars.size(); ++n)
       put(function_, offsets_[b].function, n, batch.scalars[n]);
   }
 
   const GridSource& source_;
   const GridDescription& description_;
-  OutputFile& grid_;
+  OutputFile* const grid_;
   OutputFile& function_;
   Progress& progress_;
   std::vector<uint32_t> wanted_;
@@ -219,20 +216,28 @@ std::filesystem::path withEnding(const std::filesystem::path& prefix, const char
 
 }  // namespace
 
-std::vector<std::filesystem::path> writePlot3d(const GridSource& source, const std::filesystem::path& prefix,
-                                               Progress& progress) {
-  const std::vector<std::filesystem::path> paths{withEnding(prefix, ".xyz"), withEnding(prefix, ".fun"),
-                                                 withEnding(prefix, ".nam")};
-  PendingFile grid(paths[0]), function(paths[1]), names(paths[2]);
-  Writer(source, grid.file(), function.file(), progress).write();
+Plot3dOutputs plot3dOutputs(const std::filesystem::path& prefix) {
+  return {withEnding(prefix, ".xyz"), withEnding(prefix, ".fun"), withEnding(prefix, ".nam")};
+}
+
+void writePlot3d(const GridSource& source, const Plot3dOutputs& outputs, Progress& progress) {
+  std::optional<PendingFile> grid;
+  if (!outputs.grid.empty()) grid.emplace(outputs.grid);
+  PendingFile function(outputs.function), names(outputs.names);
+  Writer(source, grid ? &grid->file() : nullptr, function.file(), progress).write();
   std::string text;
   for (const GridScalar& scalar : source.description().scalars) text += scalar.name + "\n";
   names.file().append(std::as_bytes(std::span(text)));
 
-  for (PendingFile* pending : {&grid, &function, &names}) pending->file().close();
-  for (PendingFile* pending : {&grid, &function, &names}) pending->putIntoPlace();
-  syncDirectory(std::filesystem::absolute(prefix).parent_path());
-  return paths;
+  if (grid) grid->putIntoPlace();
+  function.putIntoPlace();
+  names.putIntoPlace();
+}
+
+Plot3dOutputs writePlot3d(const GridSource& source, const std::filesystem::path& prefix, Progress& progress) {
+  Plot3dOutputs outputs = plot3dOutputs(prefix);
+  writePlot3d(source, outputs, progress);
+  return outputs;
 }
 
 }  // namespace curvisplat

@@ -10,21 +10,27 @@
 #pragma once
 
 #include <filesystem>
-#include <vector>
 
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
 
-inline constexpr const char* kPlot3dPartSuffix = ".part";  // of the files' names until they are complete
+struct Plot3dOutputs {
+  std::filesystem::path grid;  // empty: coordinates are not written
+  std::filesystem::path function, names;
+};
 
-/// Writes all blocks and scalars of `source`, and returns the paths of the files. TBB workers read the
-/// source, the calling thread writes. Needs about 100 MB of memory and a few rows, whatever the grid's size.
+/// PREFIX.xyz, PREFIX.fun and PREFIX.nam.
+Plot3dOutputs plot3dOutputs(const std::filesystem::path& prefix);
+
+/// Writes all blocks and scalars of `source`. TBB workers read the source, the calling thread writes. Needs about 100 MB of
+/// memory and a few rows, whatever the grid's size. Links are followed.
 ///
-/// The files are renamed to their final names after all of them are complete; on failure, existing files stay
+/// The files get their names one after the other when all of them are complete; before that, existing files stay
 /// unchanged. Throws Error if a dimension exceeds 2^31 - 1, if there is too little space, or if I/O fails.
-std::vector<std::filesystem::path> writePlot3d(const GridSource& source, const std::filesystem::path& prefix,
-                                               Progress& progress);
+void writePlot3d(const GridSource& source, const Plot3dOutputs& outputs, Progress& progress);
+/// Returns the three outputs.
+Plot3dOutputs writePlot3d(const GridSource& source, const std::filesystem::path& prefix, Progress& progress);
 
 }  // namespace curvisplat
