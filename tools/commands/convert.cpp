@@ -64,7 +64,8 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
   for (const std::string& warning : description.warnings) printMessage("warning: {}", warning);
   for (const std::string& warning : report.warnings) printMessage("warning: {}", warning);
   for (const std::string& note : report.notes) printMessage("note: {}", note);
-  if (const auto note = timeStepNote(description, time_step)) printMessage("note: {}", *note);
+  if (const auto note = timeStepNote(description, time_step))
+    printMessage("note: {}, or all of them with --steps all", *note);
   const auto note = [](uint64_t count, std::string_view what) {
     if (count > 0) printMessage("note: {} {}", count, what);
   };
