@@ -99,6 +99,7 @@ std::shared_ptr<const XdmfValues> XdmfItems::readHdf5(const pugi::xml_node& item
 std::shared_ptr<const XdmfValues> XdmfItems::readBinary(const pugi::xml_node& item, const std::string& text,
                                                         std::vector<uint64_t> dims) {
   XdmfBinary binary;
+  binary.where = document_.describe(item);
   const std::filesystem::path path = existing(item, text);
   addFile(path);
   binary.file = std::make_shared<const PooledFile>(pool_, path);
