@@ -73,7 +73,7 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
     printMessage("note: resumed; {} of {} bricks were already written", report.resumed_bricks, report.bricks);
   note(report.blanked.by_grid, "samples are blanked by the grid");
   note(report.blanked.by_value, "samples have the blank value");
-  note(report.blanked.not_finite, fmt::format("samples are {} and are blanked", kNotFinite));
+  note(report.blanked.not_finite, fmt::format("samples are {} and are blanked", notFiniteText(description)));
   // For samples at nodes these two differ from what `info` prints: it counts the cells between nodes.
   note(report.degenerate,
        "samples are flat: they have no volume, or nearly none, and are as faint in volume rendering");

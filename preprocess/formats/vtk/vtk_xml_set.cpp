@@ -42,8 +42,9 @@ class Gatherer {
  private:
   VtkMesh finishMesh() {
     if (!left_out_.empty())
-      grid_.warnings.push_back(
-          fmt::format("{} files without unstructured grids are left out: {}", left_out_files_, left_out_));
+      grid_.warnings.push_back(fmt::format("{} without unstructured grids {} left out: {}",
+                                           countText(left_out_files_, "file"), isOrAre(left_out_files_),
+                                           left_out_));
     mesh_.format =
         fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == mesh_type_ ? "" : " of " + mesh_type_,
                     mesh_encoding_, countText(mesh_.pieces.size(), "piece"));
@@ -58,8 +59,9 @@ class Gatherer {
     for (const MeshPiece& piece : mesh_.names)
       if (left_out_files_++ == 0) left_out_ = fmt::format("{} is of type {}", piece.file, mesh_type_);
     if (!left_out_.empty())
-      grid_.warnings.push_back(
-          fmt::format("{} files without structured grids are left out: {}", left_out_files_, left_out_));
+      grid_.warnings.push_back(fmt::format("{} without structured grids {} left out: {}",
+                                           countText(left_out_files_, "file"), isOrAre(left_out_files_),
+                                           left_out_));
     grid_.format =
         fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == leaf_type_ ? "" : " of " + leaf_type_,
                     encoding_, countText(grid_.blocks.size(), "block"));
