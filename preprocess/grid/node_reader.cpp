@@ -1,5 +1,7 @@
 #include "preprocess/grid/node_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -79,6 +81,13 @@ void markCells(std::optional<double> blank_value, NodeArrays& out) {
 }
 
 }  // namespace
+
+std::string notFiniteText(const GridDescription& description) {
+  const std::string undefined =
+      description.undefined.empty() ? "" : fmt::format(", or undefined: {}", description.undefined);
+  return fmt::format(
+      "not finite in single precision (NaN, infinite, or a value beyond 3.4e+38 in magnitude{})", undefined);
+}
 
 BlankCounts& BlankCounts::operator+=(const BlankCounts& other) {
   by_grid += other.by_grid;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -11,8 +12,7 @@
 namespace curvisplat {
 
 /// What samples are that BlankCounts::not_finite counts, for messages: coordinates are read in double precision, values in single.
-inline constexpr const char* kNotFinite =
-    "not finite in single precision (NaN, infinite, or a value beyond 3.4e+38 in magnitude)";
+std::string notFiniteText(const GridDescription& description);
 
 struct BlankCounts {
   uint64_t by_grid = 0;     // iblank 0

@@ -14,4 +14,9 @@ inline std::string countText(uint64_t count, std::string_view one) {
   return fmt::format("{} {}{}", count, one, count == 1 ? "" : "s");
 }
 
+/// The verb behind it: "1 brick is", "2 bricks are".
+inline const char* isOrAre(uint64_t count) {
+  return count == 1 ? "is" : "are";
+}
+
 }  // namespace curvisplat

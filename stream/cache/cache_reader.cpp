@@ -1,5 +1,7 @@
 #include "stream/cache/cache_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -335,6 +337,9 @@ size_t CacheReader::variableNamed(std::string_view name) const {
     listed += (n ? ", " : "") + variables[n].name;
     names.push_back(variables[n].name);
   }
+  for (size_t n = 0; n < variables.size(); ++n)  // as `info` prints it
+    if (!variables[n].unit.empty() && name == fmt::format("{} [{}]", variables[n].name, variables[n].unit))
+      return n;
   if (variables.empty()) throw UsageError("{}: the cache has no scalars", path().string());
   throw UsageError("{}: the cache has no scalar '{}'{}; it has {}", path().string(), name,
                    didYouMean(name, names), listed);

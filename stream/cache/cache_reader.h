@@ -69,8 +69,8 @@ class CacheReader {
   /// [brick]: the table of manifest().variables[variable].
   std::span<const BrickVariable> brickVariables(size_t variable) const;
 
-  /// The index in manifest().variables of the variable `name`; 0 for the empty name. Throws a UsageError that
-  /// lists the names if there is none.
+  /// The index in manifest().variables of the variable `name`, which its unit may follow ("T [K]"); 0 for the empty name.
+  /// Throws a UsageError that lists the names if there is none.
   size_t variableNamed(std::string_view name) const;
 
   /// Reads, verifies and decodes a brick. Throws DamagedBrick if the checksum does not match, the file ends

@@ -66,7 +66,7 @@ class Su2Meshes(MeshFormats):
 
     def test_a_mesh_alone_asks_for_its_restart(self):
         self.write(Mesh(2))
-        self.expect_line(self.path, scalar="p", words="there are none; give a restart file")
+        self.expect_line(self.path, scalar="p", words="the files contain no scalar; give a restart file as well")
 
     def test_derived_scalars(self):
         mesh = Mesh(2)

@@ -31,7 +31,7 @@ class ModelDialects(ModelFileTest):
         self.expect(info, sphere(lon, lat, -1e-5 * depths[:, None, None]), values)
         self.assertEqual(info["blanking"], "TEMP is missing where it is equal to 9.96921e+36, or where KMT counts fewer levels")
         self.assertEqual([s["name"] for s in info["scalars"]], ["TEMP", "SALT"])
-        self.assertIn("left out: UVEL, on another grid (nlon x nlat x z_t at ULONG, ULAT); select that grid with --scalar NAME",
+        self.assertIn("left out: UVEL, on another grid (nlon, nlat, z_t at ULONG, ULAT); select that grid with --scalar NAME",
                       info["warnings"])
 
     def test_cosmo_has_the_heights_of_half_levels(self):

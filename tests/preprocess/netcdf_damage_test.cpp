@@ -1,5 +1,6 @@
 // Damaged NetCDF files: an Error of one line or changed values, never a crash, a hang or an allocation of
 // what the file has no room for.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -75,6 +76,24 @@ TEST(ClassicNetcdfDamage, RecordsThatTheHeaderDoesNotCountAreCountedByTheFilesSi
   EXPECT_EQ(records(), counted);
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 8);
   EXPECT_EQ(records(), counted - 1);
+}
+
+TEST(Netcdf4Damage, HalfAFileIsCalledTruncated) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "file.nc";
+  roms::write(path, NetcdfFileType::kNetcdf4, "ocean_s_coordinate_g2");
+  const uint64_t bytes = std::filesystem::file_size(path);
+  std::filesystem::resize_file(path, bytes / 2);
+  try {
+    OpenGridOptions options;
+    options.grid = path;
+    openGrid(options);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              fmt::format("{}: is truncated (found {} bytes, expected {}); copy it again", path.string(),
+                          bytes / 2, bytes));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, NetcdfDamage,

@@ -102,7 +102,7 @@ TEST_P(NetcdfModels, TheGridIsThatOfTheScalarWanted) {
   ASSERT_EQ(description.scalars.size(), 2u);
   EXPECT_EQ(description.scalars[0].unit, "unit");
   ASSERT_EQ(description.warnings.size(), 3u);
-  EXPECT_NE(description.warnings[0].find("u, on another grid (xi_u x eta_u x s_rho)"), std::string::npos)
+  EXPECT_NE(description.warnings[0].find("u, on another grid (xi_u, eta_u, s_rho)"), std::string::npos)
       << description.warnings[0];
   EXPECT_EQ(open({"U"})->description().blocks.at(0).ni, roms::kXi - 1);
   EXPECT_EQ(open({"jacobian"})->description().blocks.at(0).ni, roms::kXi);

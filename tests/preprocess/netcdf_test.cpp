@@ -40,6 +40,29 @@ void addAxes(NetcdfWriter& file, size_t ni, size_t nj, size_t nk) {
                 [](const Index& n) { return 1e-3 * metresUp(n[0]); });
 }
 
+TEST_P(Netcdf, WhyIndicesTakeThePlaceOfCoordinatesIsSaid) {
+  const auto write = [&](bool with_places) {
+    NetcdfWriter file(path_, GetParam());
+    for (const char* const name : {"x", "y", "z"}) file.dimension(name, 4);
+    const auto add = [&](const std::string& name, const NetcdfAttributes& attributes) {
+      file.variable(name, kDouble, {"z", "y", "x"}, attributes,
+                    [](const Index& n) { return static_cast<double>(n[2] + n[1] * n[0]); });
+    };
+    add("T", {{"coordinates", "X Y Z"}});
+    if (with_places)
+      for (const char* const name : {"X", "Y", "Z"}) add(name, {{"units", "m"}});
+  };
+  write(false);
+  EXPECT_EQ(open({"T"})->description().warnings,
+            (std::vector<std::string>{
+                "the dimensions x, y, z have no coordinates; the indices of the nodes take their place"}));
+  write(true);
+  EXPECT_EQ(
+      open({"T"})->description().warnings,
+      (std::vector<std::string>{"X and Y have three dimensions, expected one or two, and are not used; the "
+                                "indices of the nodes take their place"}));
+}
+
 TEST_P(Netcdf, AxesOfOneDimensionInAnyOrder) {
   {
     NetcdfWriter file(path_, GetParam());

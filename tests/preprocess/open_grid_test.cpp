@@ -62,6 +62,24 @@ TEST_F(OpenGrid, FindsScalarsByNameAliasAndNumber) {
   EXPECT_EQ(scalarsNamed(description, {"2", "velocity-U"}), (Positions{6, 5}));
 }
 
+TEST_F(OpenGrid, FindsScalarsAsListsPrintThem) {
+  GridDescription description;
+  description.scalars = {{"T", "K", {}, 3, Centring::kNode},
+                         {"T cell", "", {}, 0, Centring::kCell},
+                         {"p [Pa]", "K", {}, 0, Centring::kNode}};
+  EXPECT_EQ(scalarsNamed(description, {"T [K]"}), Positions{0});
+  EXPECT_EQ(scalarsNamed(description, {"T (3)"}), Positions{0});
+  EXPECT_EQ(scalarsNamed(description, {"T [K] (3)"}), Positions{0});
+  EXPECT_EQ(scalarsNamed(description, {"T (3) [K]"}), Positions{0});
+  EXPECT_EQ(scalarsNamed(description, {"p [Pa]"}), Positions{2});
+  EXPECT_EQ(scalarsNamed(description, {"p [Pa] [K]"}), Positions{2});
+  for (const char* wrong : {"T [m]", "T [K] ", "T (4)", "T cell []", "T cell (0)", "T [K] [K]"})
+    EXPECT_NE(usageErrorOf(description, {wrong}).find("there is no scalar"), std::string::npos) << wrong;
+  description.scalars.clear();
+  EXPECT_EQ(usageErrorOf(description, {"T"}),
+            "the files contain no scalar; give a Q or function file as well");
+}
+
 TEST_F(OpenGrid, ReadsPartsOfRows) {
   Plot3dLayout grid, q;
   grid.kind = Plot3dKind::kGrid;

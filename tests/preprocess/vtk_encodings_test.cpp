@@ -288,14 +288,15 @@ TEST(VtkEncodings, TextsMustHaveAsManyNumbersAsTheGrid) {
   grid.point_data = {{"a", "Int8", 1, std::vector<double>(27, 5)}};
   EXPECT_EQ(errorOf(folder, vtsFile(grid, ascii)), "");
   grid.point_data[0].values[9] = 300;
-  EXPECT_NE(errorOf(folder, vtsFile(grid, ascii)).find("300 is not an integer of 8 bits"), std::string::npos);
+  EXPECT_NE(errorOf(folder, vtsFile(grid, ascii)).find("array a: 300 is not an integer of 8 bits"),
+            std::string::npos);
   grid.point_data[0].values.assign(28, 5);
   EXPECT_NE(errorOf(folder, vtsFile(grid, ascii)).find("array a has more than 27 numbers"),
             std::string::npos);
   grid.point_data[0].values.assign(26, 5);
   EXPECT_NE(errorOf(folder, vtsFile(grid, ascii)).find("array a needs 27 numbers"), std::string::npos);
   grid.point_data[0].values.assign(26, 55);
-  EXPECT_NE(errorOf(folder, vtsFile(grid, ascii)).find("ends where a number was expected"),
+  EXPECT_NE(errorOf(folder, vtsFile(grid, ascii)).find("array a has 26 numbers; expected 27"),
             std::string::npos);
 }
 

@@ -151,9 +151,10 @@ TEST_F(VtkLegacy, PartsThatLieAreNamed) {
       {grid + "DIMENSIONS 2 2 2\n", "has no POINTS"},
       {grid + "DIMENSIONS 2 2 2\nPOINTS 7 float\n", "has 7 POINTS; expected 8"},
       {grid + "DIMENSIONS 2 2 2\nPOINTS 8 floot\n", "has type floot"},
-      {grid + "DIMENSIONS 2 2 2\nPOINTS 8 float\n1 2 3\n", "needs 24 numbers, but only 6 bytes are left"},
+      {grid + "DIMENSIONS 2 2 2\nPOINTS 8 float\n1 2 3\n",
+       "needs 24 numbers, 47 characters at least, but only 6 are left"},
       {grid + "DIMENSIONS 2 2 2\nPOINTS 8 float\n" + twelve_ + "1 2 3 four 5 6 7 8 9 10 11 12",
-       "\"four\"; expected a number"},
+       "array POINTS has 15 numbers, then \"four\"; expected a number"},
       {grid + "DIMENSIONS 1000 1000 1000\nPOINTS 1000000000 float\n1 2 3\n", "needs 3000000000 numbers"},
       {rectilinear + "Z_COORDINATES 3 float\n0 1 2\n", "has 3 z_coordinates; expected 2"},
       {rectilinear, "has no X_COORDINATES"},
@@ -162,7 +163,8 @@ TEST_F(VtkLegacy, PartsThatLieAreNamed) {
       {uniform_ + "POINT_DATA 12\nSCALARS p float 99999\n" + twelve_, "99999 components"},
       {uniform_ + "POINT_DATA 12\nSCALARS p\n" + twelve_, "without a type"},
       {uniform_ + "POINT_DATA 12\nSCALERS p float\n", "found \"scalers\"; expected SCALARS"},
-      {uniform_ + "POINT_DATA 12\nSCALARS p float\n0 1 2 3 4 5 6 7 8 9 10\n", "is truncated"},
+      {uniform_ + "POINT_DATA 12\nSCALARS p float\n0 1 2 3 4 5 6 7 8 9 10\n",
+       "array p has 11 numbers; expected 12; the file is truncated, or the count is wrong"},
       {uniform_ + "POINT_DATA 12\nSCALARS b bit 4000\n0 1\n", "b needs 12 x 4000 bits"},
       {"FIELD f 9999999\n", "ends where a name was expected"},
       {uniform_ + "SPACING 1 1 nan\n", "has spacing nan"},
@@ -174,9 +176,9 @@ TEST_F(VtkLegacy, PartsThatLieAreNamed) {
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
   }
   EXPECT_NE(errorOf(uniform_, "OCTAL").find("expected ASCII or BINARY"), std::string::npos);
-  EXPECT_NE(
-      errorOf(uniform_ + "POINT_DATA 12\nVECTORS v double\n12345678", "BINARY").find("needs 36 numbers"),
-      std::string::npos);
+  EXPECT_NE(errorOf(uniform_ + "POINT_DATA 12\nVECTORS v double\n12345678", "BINARY")
+                .find("needs 36 numbers, 288 bytes, but only 8 are left"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -43,7 +43,9 @@ TEST(Cache, GivesBackWhatWasAppended) {
   EXPECT_EQ(reader.manifest().title, "small");
   EXPECT_EQ(reader.variableNamed(""), 0u);
   EXPECT_EQ(reader.variableNamed("mach"), 1u);
-  EXPECT_THROW(reader.variableNamed("nothing"), UsageError);
+  EXPECT_EQ(reader.variableNamed("density [kg/m3]"), 0u);
+  for (const char* const wrong : {"nothing", "density [m]", "mach []"})
+    EXPECT_THROW(reader.variableNamed(wrong), UsageError) << wrong;
 
   const Brick& root = reader.bricks()[0];
   EXPECT_EQ(root.first_child, 1u);

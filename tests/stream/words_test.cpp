@@ -1,4 +1,4 @@
-// White space, words and letters of texts.
+// White space, words and letters of texts, and words of a shell.
 #include "stream/base/words.h"
 
 #include <gtest/gtest.h>
@@ -6,6 +6,8 @@
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "stream/base/shell_word.h"
 
 namespace curvisplat {
 namespace {
@@ -41,6 +43,16 @@ TEST(Words, HaveSmallLettersOfAsciiAlone) {
   EXPECT_FALSE(isSameIgnoringCase("localhost", "localhost."));
   EXPECT_FALSE(isSameIgnoringCase("@", "`"));
   EXPECT_TRUE(isSameIgnoringCase("", ""));
+}
+
+TEST(Words, OfAShellHaveQuotesWhereTheyNeedThem) {
+  EXPECT_EQ(shellWord("a_b-c./,:=+@%1"), "a_b-c./,:=+@%1");
+  EXPECT_EQ(shellWord("Temperature [K]"), "'Temperature [K]'");
+  EXPECT_EQ(shellWord("it's"), "'it'\\''s'");
+  EXPECT_EQ(shellWord(""), "''");
+  EXPECT_EQ(shellWord("a\nb'"), "$'a\\012b\\''");
+  EXPECT_EQ(shellOption("--scalar", "T (K)"), "--scalar 'T (K)'");
+  EXPECT_EQ(shellOption("--range", "-1,2"), "--range=-1,2");
 }
 
 }  // namespace

@@ -64,7 +64,8 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
   for (const std::string& warning : description.warnings) printMessage("warning: {}", warning);
   for (const std::string& warning : report.warnings) printMessage("warning: {}", warning);
   for (const std::string& note : report.notes) printMessage("note: {}", note);
-  if (const auto note = timeStepNote(description, time_step)) printMessage("note: {}", *note);
+  if (const auto note = timeStepNote(description, time_step))
+    printMessage("note: {}, or all of them with --steps all", *note);
   const auto note = [](uint64_t count, std::string_view what) {
     if (count > 0) printMessage("note: {} {}", count, what);
   };
@@ -72,7 +73,7 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
     printMessage("note: resumed; {} of {} bricks were already written", report.resumed_bricks, report.bricks);
   note(report.blanked.by_grid, "samples are blanked by the grid");
   note(report.blanked.by_value, "samples have the blank value");
-  note(report.blanked.not_finite, fmt::format("samples are {} and are blanked", kNotFinite));
+  note(report.blanked.not_finite, fmt::format("samples are {} and are blanked", notFiniteText(description)));
   // For samples at nodes these two differ from what `info` prints: it counts the cells between nodes.
   note(report.degenerate,
        "samples are flat: they have no volume, or nearly none, and are as faint in volume rendering");

@@ -29,6 +29,7 @@
 #include "tools/options/step_arguments.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/range_text.h"
 
 namespace curvisplat {
 namespace {
@@ -226,8 +227,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   printLine("written by {} from{}", m.program, sourcesText(m.sources));
   printLine("{}", m.reader);
   fmt::print("\n");
-  fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
-             m.lower.y, m.upper.y, m.lower.z, m.upper.z);
+  fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x + 0.0,
+             m.upper.x + 0.0, m.lower.y + 0.0, m.upper.y + 0.0, m.lower.z + 0.0, m.upper.z + 0.0);
   fmt::print("volume     {:.8g}\n", m.volume);
   fmt::print("samples    {} at {} in {}, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
              countText(m.blocks.size(), "block"), m.blanked_nodes);
@@ -236,9 +237,9 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {
-    printLine("scalar     {} {}: {:.6g} .. {:.6g}, rounded within {:.1e}", m.variables[v].name,
-              m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit), m.variables[v].min,
-              m.variables[v].max, storedWithin(reader, v));
+    printLine("scalar     {} {}: {}, rounded within {:.1e}", m.variables[v].name,
+              m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit),
+              rangeText(m.variables[v].min, m.variables[v].max, 6), storedWithin(reader, v));
     printSpread("", stepHistogram(reader, v));
     if (reader.series().steps.size() > 1) printSpread(", all steps", seriesHistogram(reader, v));
   }

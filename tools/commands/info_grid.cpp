@@ -18,6 +18,7 @@
 #include "tools/options/grid_options.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/range_text.h"
 
 namespace curvisplat {
 namespace {
@@ -200,7 +201,7 @@ void printScalars(const GridInfo& info) {
     printLine("scalar    {}{}{}{}: {}", scalar.name, named ? fmt::format(" ({})", number) : "",
               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
               scalar.centring == Centring::kCell ? ", cell-centred" : "",
-              isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
+              isEmpty(range) ? "no value" : rangeText(range.min, range.max, 6));
   }
   std::string names;
   for (const uint32_t position : info.derived) {
@@ -220,19 +221,19 @@ void printAsText(const GridInfo& info) {
   const BlankCounts blank = info.statistics.blank();
   printLine("nodes     {} in {}; {} blanked by the grid, {} {}", info.nodes,
             countText(description.blocks.size(), "block"), blank.by_grid, blank.not_finite,
-            blank.not_finite > 0 ? kNotFinite : "not finite");
+            blank.not_finite > 0 ? notFiniteText(description) : "not finite");
   if (const std::string rule = blankingRule(description); !rule.empty()) printLine("blanking  {}", rule);
   printBlocks(info);
   const uint64_t cell_values = info.statistics.cell_values_not_finite;
-  printLine("cells     {}; {} degenerate, {} inverted{}", info.statistics.cells(),
-            info.statistics.degenerate(), info.statistics.inverted(),
-            cell_values > 0 ? fmt::format(", {} with values {}", cell_values, kNotFinite) : "");
+  printLine(
+      "cells     {}; {} degenerate, {} inverted{}", info.statistics.cells(), info.statistics.degenerate(),
+      info.statistics.inverted(),
+      cell_values > 0 ? fmt::format(", {} with values {}", cell_values, notFiniteText(description)) : "");
   for (size_t axis = 0; axis < 3; ++axis)
     printLine("{}         {}", "xyz"[axis],
               isEmpty(info.statistics.bounds[axis])
                   ? "no node"
-                  : fmt::format("{:.9g} .. {:.9g}", info.statistics.bounds[axis].min,
-                                info.statistics.bounds[axis].max));
+                  : rangeText(info.statistics.bounds[axis].min, info.statistics.bounds[axis].max, 9));
   for (const std::string& note : description.notes) printLine("note      {}", note);
   printLine("stored    coordinates in {} precision", description.coordinate_bytes == 8 ? "double" : "single");
   printScalars(info);

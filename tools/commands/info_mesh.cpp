@@ -17,6 +17,7 @@
 #include "tools/commands/info_estimate.h"
 #include "tools/output/print_line.h"
 #include "tools/output/progress_bar.h"
+#include "tools/output/range_text.h"
 
 namespace curvisplat {
 namespace {
@@ -25,6 +26,8 @@ constexpr uint64_t kChunk = 65536;
 constexpr size_t kPiecesListed = 16;
 constexpr std::array<const char*, 6> kKinds{"other",  "tetrahedra", "pyramids",
                                             "wedges", "hexahedra",  "polyhedra"};
+constexpr std::array<const char*, 6> kKind{"other", "tetrahedron", "pyramid",
+                                           "wedge", "hexahedron",  "polyhedron"};
 
 struct MeshInfo {
   const GridDescription* description = nullptr;
@@ -139,13 +142,13 @@ void printAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
-  printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} NaN or infinite",
+  printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} at NaN or infinity",
             info.points, countText(description.pieces.size(), "piece"), info.survey.unused_points,
             info.survey.grid.blanked.by_grid, info.survey.grid.blanked.not_finite);
   std::string kinds;
   for (size_t kind = 1; kind < kKinds.size(); ++kind)
-    if (info.survey.cells_of[kind] > 0)
-      kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", info.survey.cells_of[kind], kKinds[kind]);
+    if (const uint64_t count = info.survey.cells_of[kind]; count > 0)
+      kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", count, (count == 1 ? kKind : kKinds)[kind]);
   printLine("cells     {}: {}", info.cells, kinds);
   if (description.pieces.size() > 1) {
     for (size_t n = 0; n < std::min(kPiecesListed, description.pieces.size()); ++n)
@@ -155,11 +158,10 @@ void printAsText(const MeshInfo& info) {
       printLine("  and {} more", description.pieces.size() - kPiecesListed);
   }
   for (int axis = 0; axis < 3; ++axis)
-    printLine(
-        "{}         {}", "xyz"[axis],
-        info.survey.grid.lower[axis] > info.survey.grid.upper[axis]
-            ? "no point"
-            : fmt::format("{:.9g} .. {:.9g}", info.survey.grid.lower[axis], info.survey.grid.upper[axis]));
+    printLine("{}         {}", "xyz"[axis],
+              info.survey.grid.lower[axis] > info.survey.grid.upper[axis]
+                  ? "no point"
+                  : rangeText(info.survey.grid.lower[axis], info.survey.grid.upper[axis], 9));
   for (const std::string& note : description.notes) printLine("note      {}", note);
   printLine("stored    coordinates in {} precision", description.coordinate_bytes == 8 ? "double" : "single");
   for (size_t n = 0; n < info.ranges.size(); ++n) {
@@ -168,9 +170,10 @@ void printAsText(const MeshInfo& info) {
     printLine("scalar    {}{}{}: {}", scalar.name,
               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
               scalar.centring == Centring::kCell ? ", cell-centred" : "",
-              isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
+              isEmpty(range) ? "no value" : rangeText(range.min, range.max, 6));
     if (info.not_finite[n] > 0)
-      printLine("          {} of its values are {}", info.not_finite[n], kNotFinite);
+      printLine("          {} of its values {} {}", info.not_finite[n],
+                info.not_finite[n] == 1 ? "is" : "are", notFiniteText(description));
   }
   const size_t steps = description.times.size();
   if (steps > 1)

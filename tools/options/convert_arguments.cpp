@@ -42,10 +42,28 @@ std::vector<std::string> splitAtCommas(const std::string& text) {
   return parts;
 }
 
+/// Scalars that are not converted unasked, by the reason.
+struct LeftOut {
+  std::vector<std::string> other_centring, others;
+
+  void printNotes(Centring centring) const {
+    const auto print = [](const std::vector<std::string>& names, const std::string& why) {
+      if (!names.empty())
+        printMessage("note: left out: {}{} --scalar NAME,NAME", fmt::join(names, ", "), why);
+    };
+    const bool cells = centring == Centring::kCell;
+    print(other_centring,
+          fmt::format(", {}-centred: this cache holds the {}-centred scalars; convert the others to a second "
+                      "cache with",
+                      cells ? "node" : "cell", cells ? "cell" : "node"));
+    print(others, "; choose scalars with");
+  }
+};
+
 /// The scalars that the files store, which can share a cache with the first: each name once.
 std::vector<uint32_t> storedScalars(const GridDescription& description) {
   std::vector<uint32_t> positions;
-  std::vector<std::string> left_out;
+  LeftOut left_out;
   std::set<std::string> names;
   for (uint32_t n = 0; n < description.scalars.size(); ++n) {
     const GridScalar& scalar = description.scalars[n];
@@ -54,10 +72,9 @@ std::vector<uint32_t> storedScalars(const GridDescription& description) {
     if (fits && positions.size() < kMaxDefaultScalars && names.insert(scalar.name).second)
       positions.push_back(n);
     else
-      left_out.push_back(scalar.name);
+      (fits ? left_out.others : left_out.other_centring).push_back(scalar.name);
   }
-  if (!left_out.empty())
-    printMessage("note: left out: {}; choose scalars with --scalar NAME,NAME", fmt::join(left_out, ", "));
+  if (!positions.empty()) left_out.printNotes(description.scalars[positions[0]].centring);
   return positions;
 }
 

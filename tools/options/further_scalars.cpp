@@ -1,5 +1,7 @@
 #include "tools/options/further_scalars.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -9,6 +11,7 @@
 
 #include "preprocess/addition/add_scalar.h"
 #include "stream/base/error.h"
+#include "stream/base/shell_word.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/series_scalar.h"
@@ -36,6 +39,45 @@ bool isSeries(const CacheReader& cache) {
   return cache.series().steps.size() > 1;
 }
 
+Centring centringOf(const CacheReader& cache) {
+  return cache.manifest().cells ? Centring::kCell : Centring::kNode;
+}
+
+/// What the files have; of a series, its first step.
+std::vector<GridScalar> scalarsIn(const std::vector<fs::path>& files, const CacheReader& cache) {
+  ConvertArguments arguments = argumentsFor(files, cache.path());
+  if (isSeries(cache)) arguments.grid = stepsOfFiles(files).front().options;
+  return openSource(arguments, cache.path())->description().scalars;
+}
+
+std::vector<FurtherScalar> furtherAmong(const std::vector<GridScalar>& scalars, const CacheReader& cache) {
+  std::set<std::string> names;
+  for (const VariableInfo& variable : cache.manifest().variables) names.insert(variable.name);
+  std::vector<FurtherScalar> further;
+  for (const GridScalar& scalar : scalars)
+    if (scalar.centring == centringOf(cache) && names.insert(scalar.name).second)
+      further.push_back({scalar.name, scalar.unit, scalar.derived});
+  std::stable_partition(further.begin(), further.end(),
+                        [](const FurtherScalar& one) { return !one.derived || !isOfGridAlone(one.name); });
+  return further;
+}
+
+/// Throws Error if the files have the scalar, but not at the samples of the cache.
+void requireSameCentring(const std::string& name, const std::vector<GridScalar>& scalars,
+                         const CacheReader& cache, const std::vector<fs::path>& files) {
+  for (const GridScalar& scalar : scalars) {
+    if (scalar.name != name || scalar.centring == centringOf(cache)) continue;
+    std::string words;
+    for (const fs::path& file : files) words += shellWord(file.string()) + ' ';
+    const bool cells = scalar.centring == Centring::kCell;
+    throw Error(
+        "{}: {} is {}-centred, and the cache that is kept of the grid holds its {}-centred scalars; "
+        "convert it to another one: curvisplat convert {}-o NAME.splats {}",
+        files.front().string(), name, cells ? "cell" : "node", cells ? "node" : "cell", words,
+        shellOption("--scalar", name));
+  }
+}
+
 }  // namespace
 
 std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache) {
@@ -52,19 +94,7 @@ std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache)
 
 std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::vector<fs::path>& files) {
   const CacheReader reader(cache);
-  ConvertArguments arguments = argumentsFor(files, cache);
-  if (isSeries(reader)) arguments.grid = stepsOfFiles(files).front().options;
-  const auto source = openSource(arguments, cache);
-  std::set<std::string> names;
-  for (const VariableInfo& variable : reader.manifest().variables) names.insert(variable.name);
-  const Centring centring = reader.manifest().cells ? Centring::kCell : Centring::kNode;
-  std::vector<FurtherScalar> further;
-  for (const GridScalar& scalar : source->description().scalars)
-    if (scalar.centring == centring && names.insert(scalar.name).second)
-      further.push_back({scalar.name, scalar.unit, scalar.derived});
-  std::stable_partition(further.begin(), further.end(),
-                        [](const FurtherScalar& one) { return !one.derived || !isOfGridAlone(one.name); });
-  return further;
+  return furtherAmong(scalarsIn(files, reader), reader);
 }
 
 void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files, const std::string& name,
@@ -90,8 +120,14 @@ void addMissingScalars(const fs::path& cache, const std::vector<fs::path>& files
   const CacheReader reader(cache);
   for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
   if (missing.empty()) return;
-  for (const FurtherScalar& one : furtherScalarsOf(cache, files))
-    if (missing.contains(one.name)) addFurtherScalar(cache, files, one.name, progress);
+  const std::vector<GridScalar> scalars = scalarsIn(files, reader);
+  for (const GridScalar& scalar : scalars)  // as `info` prints it
+    if (!scalar.unit.empty() && missing.erase(fmt::format("{} [{}]", scalar.name, scalar.unit)) > 0)
+      missing.insert(scalar.name);
+  for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
+  for (const FurtherScalar& one : furtherAmong(scalars, reader))
+    if (missing.erase(one.name) > 0) addFurtherScalar(cache, files, one.name, progress);
+  for (const std::string& name : missing) requireSameCentring(name, scalars, reader, files);
 }
 
 }  // namespace curvisplat

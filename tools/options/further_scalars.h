@@ -29,8 +29,8 @@ std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
 void addFurtherScalar(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
                       const std::string& name, Progress& progress);
 
-/// Adds those of `names` that the cache lacks and the files have; passes over empty names and others. Not while
-/// another process adds to the cache: keptCacheOf() has its lock.
+/// Adds those of `names` that the cache lacks and the files have; passes over empty names and others. Throws Error for one
+/// of the other centring. Not while another process adds to the cache: keptCacheOf() has its lock.
 void addMissingScalars(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
                        const std::vector<std::string>& names, Progress& progress);
 

@@ -185,6 +185,11 @@ std::string meantBy(const std::string& word, const Manifest& manifest, const Fac
   return didYouMean(word, names);
 }
 
+/// An unstructured grid is one block, a row of its samples (FORMAT.md).
+bool isUnstructured(const Manifest& manifest) {
+  return manifest.blocks.size() == 1 && manifest.blocks[0].nj == 1 && manifest.blocks[0].nk == 1;
+}
+
 size_t variableOf(const std::string& name, const CacheReader& cache) {
   try {
     return cache.variableNamed(name);
@@ -198,6 +203,11 @@ size_t variableOf(const std::string& name, const CacheReader& cache) {
 GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
                              const std::shared_ptr<const FacesReader>& faces) {
   const std::string path = cache.path().string();
+  if (!faces && isUnstructured(cache.manifest()))
+    throw Error(
+        "{}: --surface {}: the cache is of an unstructured grid, whose faces are not kept; "
+        "name an STL, PLY or OBJ file that exists",
+        path, text);
   if (!faces)
     throw Error(
         "{}: --surface {}: the cache has no surfaces: it was converted with --no-surfaces or by an earlier "

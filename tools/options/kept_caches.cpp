@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fnmatch.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -17,12 +18,15 @@
 #include <thread>
 #include <utility>
 
+#include "preprocess/formats/common/unpacked_file.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/checksum.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/paths.h"
+#include "stream/base/words.h"
 #include "tools/options/further_scalars.h"
 #include "tools/options/option_parsers.h"
 
@@ -33,6 +37,7 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kDefaultLimit = uint64_t{20} << 30;
 constexpr size_t kPiece = 4 << 20;
+constexpr size_t kMaxName = 4096;
 
 uint64_t checksumOfText(const std::string& text) {
   return checksumOf(std::as_bytes(std::span(text)));
@@ -145,13 +150,56 @@ uint64_t bytesIn(const fs::path& folder) {
   return bytes;
 }
 
-bool isSmallText(const fs::path& file, std::string& text) {
-  constexpr uint64_t kMaxText = 4 << 20;
+constexpr uint64_t kMaxText = 4 << 20;
+
+/// The text of a small file, which may be compressed; empty for others.
+std::string smallText(const fs::path& file) {
+  constexpr uint64_t kMaxPacked = 256 << 10;
   std::error_code error;
-  if (fs::file_size(file, error) > kMaxText || error) return false;
-  text = readTextFile(file);
-  const size_t first = text.find_first_not_of(" \t\r\n");
-  return first != std::string::npos && (text[first] == '<' || text[first] == '{');
+  const uint64_t bytes = fs::file_size(file, error);
+  if (error || bytes > kMaxText) return "";
+  if (!UnpackedFile::recognises(InputFile(file))) return readTextFile(file);
+  if (bytes > kMaxPacked) return "";
+  const UnpackedFile unpacked(file, fs::temp_directory_path());
+  return fs::file_size(unpacked.path(), error) > kMaxText || error ? "" : readTextFile(unpacked.path());
+}
+
+/// What may be names of files in a text: what stands between the quotes of XML (.pvd, .vtm) and JSON (.p3d), and the words
+/// of an EnSight case.
+std::set<std::string> namesIn(const std::string& text) {
+  std::set<std::string> names;
+  const std::string_view begin = trimmed(text).substr(0, 6);
+  if (isSameIgnoringCase(begin, "format"))
+    for (std::string_view word : wordsOf(text)) {
+      if (word.size() > 2 && word.starts_with('"') && word.ends_with('"'))
+        word = word.substr(1, word.size() - 2);
+      names.emplace(word.substr(0, kMaxName));
+    }
+  if (!begin.starts_with('<') && !begin.starts_with('{')) return names;
+  for (size_t from = text.find('"'); from != std::string::npos;) {
+    const size_t to = text.find('"', from + 1);
+    if (to == std::string::npos) break;
+    std::string word = text.substr(from + 1, std::min(to - from - 1, kMaxName));
+    if (word.find('.') != std::string::npos) names.insert(std::move(word));
+    from = text.find('"', to + 1);
+  }
+  return names;
+}
+
+/// The files beside `file` that it calls `name`; a star stands for the digits of a step's number.
+std::vector<fs::path> filesNamed(const std::string& name, const fs::path& file) {
+  std::vector<fs::path> found;
+  const fs::path path = file.parent_path() / name;
+  std::error_code error;
+  if (name.find('*') == std::string::npos) {
+    if (fs::is_regular_file(path, error)) found.push_back(path);
+    return found;
+  }
+  const std::string pattern = path.filename().string();
+  for (fs::directory_iterator at(folderOf(path), error), end; !error && at != end; at.increment(error))
+    if (::fnmatch(pattern.c_str(), at->path().filename().c_str(), 0) == 0) found.push_back(at->path());
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 /// A grid's files with those that they name, and when these were changed last.
@@ -167,8 +215,8 @@ class StampedFiles {
   const std::vector<std::string>& stamps() const { return stamps_; }  // [file]
 
  private:
-  /// Adds `file`: of a folder all files; and those that a small text (.pvd, .vtm, .p3d) names between quotes. At each
-  /// depth a file is looked at once: a text may name another one, which does the same, thousands of times.
+  /// Adds `file`: of a folder all files; and those that a small text names. At each depth a file is looked at once: a text
+  /// may name another one, which does the same, thousands of times.
   void add(const fs::path& file, int depth) {
     progress_.throwIfStopped();
     std::error_code error;
@@ -176,16 +224,13 @@ class StampedFiles {
     if (!seen_.emplace(depth, file.lexically_normal()).second) return;
     all_.push_back(file);
     constexpr int kMaxDepth = 3;  // a .pvd of .vtm of .vts
-    std::string text;
-    if (depth == kMaxDepth || !isSmallText(file, text)) return;
-    for (size_t begin = text.find('"'); begin != std::string::npos;) {
-      const size_t end = text.find('"', begin + 1);
-      if (end == std::string::npos) return;
-      const std::string word = text.substr(begin + 1, std::min<size_t>(end - begin - 1, 4096));
-      const fs::path named = file.parent_path() / word;
-      if (word.find('.') != std::string::npos && fs::is_regular_file(named, error) && named != file)
-        add(named, depth + 1);
-      begin = text.find('"', end + 1);
+    if (depth == kMaxDepth) return;
+    constexpr size_t kMaxPatterns = 1000;  // each lists a folder
+    size_t patterns = 0;
+    for (const std::string& name : namesIn(smallText(file))) {
+      if (name.find('*') != std::string::npos && ++patterns > kMaxPatterns) continue;
+      for (const fs::path& named : filesNamed(name, file))
+        if (named != file) add(named, depth + 1);
     }
   }
 

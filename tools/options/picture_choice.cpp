@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "stream/base/error.h"
+#include "stream/base/shell_word.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {
@@ -71,9 +72,7 @@ void PictureChoice::add(const std::string& option, const std::string& value) {
   if (!isSaid(option)) return;
   if (!chosen_.empty()) chosen_ += ' ';
   const bool has_own = part_ == Part::kOpacities && (option == "--range" || option == "--asinh");
-  // The parser would take a separate value with a minus sign for an option.
-  chosen_ +=
-      (has_own ? "--opacity" + option.substr(1) : option) + (value.starts_with('-') ? '=' : ' ') + value;
+  chosen_ += shellOption(has_own ? "--opacity" + option.substr(1) : option, value);
 }
 
 std::pair<double, double> PictureChoice::parseRange(const std::string& text) {

@@ -32,7 +32,7 @@ class PictureChoice {
   CameraArguments camera(CameraArguments arguments, const TransferFunction& function, ImageSize size,
                          bool whole = false);
 
-  /// What was filled in: "--tf viridis --range 0,1"; empty if nothing was.
+  /// What was filled in, for a shell: "--tf viridis --range 0,1"; empty if nothing was.
   const std::string& chosenOptions() const { return chosen_; }
 
  private:

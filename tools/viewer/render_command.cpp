@@ -3,47 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
-#include <string_view>
 #include <system_error>
 
 #include "render/automatic/rounded.h"
-#include "stream/base/error.h"
+#include "stream/base/shell_word.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr int kDigits = 6;  // of the picture's height, or of the number itself
-
-/// `word` with escapes in place of what a terminal obeys, as bash, zsh and POSIX of 2024 read it.
-std::string quotedWithEscapes(const std::string& word) {
-  std::string text = "$'";
-  for (const char c : word) {
-    if (c == '\'' || c == '\\')
-      text += {'\\', c};
-    else if (c >= ' ' && c <= '~')
-      text += c;
-    else
-      text += fmt::format("\\{:03o}", static_cast<unsigned char>(c));
-  }
-  return text + "'";
-}
-
-/// `word` quoted for a shell.
-std::string quoted(const std::string& word) {
-  if (oneLine(word) != word) return quotedWithEscapes(word);
-  const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
-    return std::isalnum(c) ||
-           std::string_view("_-./,:=+@%").find(static_cast<char>(c)) != std::string_view::npos;
-  });
-  if (plain) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
 
 std::string numbers(const glm::dvec3& point, double scale) {
   const auto part = [scale](double x) { return roundedTo(x, scale, kDigits); };
@@ -58,8 +29,8 @@ class Words {
  public:
   explicit Words(std::string begin) : text_(std::move(begin)) {}
   void add(const std::string& option, const std::string& value) {
-    // The parser would take a separate value with a minus sign for an option.
-    text_ += value.starts_with('-') ? " " + option + "=" + quoted(value) : " " + option + " " + quoted(value);
+    text_ += ' ';
+    text_ += shellOption(option, value);
   }
   void add(const std::string& flag) { text_ += " " + flag; }
   const std::string& text() const { return text_; }
@@ -168,9 +139,9 @@ std::filesystem::path shortPath(const std::filesystem::path& path) {
 }
 
 std::string renderCommand(const ViewState& state, const CommandOptions& options) {
-  std::string files = quoted(options.cache.string());
+  std::string files = shellWord(options.cache.string());
   for (const std::filesystem::path& file : options.solutions)
-    files += fmt::format(" {}", quoted(file.string()));
+    files += fmt::format(" {}", shellWord(file.string()));
   Words words(fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
   if (options.fine_values) words.add("--value-precision", "fine");
   const int multiple = options.turns ? 2 : 1;  // an .mp4 has an even width and height

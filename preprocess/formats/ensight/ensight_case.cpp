@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "preprocess/formats/common/ascii_spool.h"
+#include "preprocess/formats/common/named_file.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
@@ -49,7 +50,8 @@ Entry entryOf(std::string_view value, size_t least) {
 
 class CaseReader {
  public:
-  explicit CaseReader(const std::filesystem::path& path) : path_(path) {}
+  CaseReader(const std::filesystem::path& path, const std::filesystem::path& folder)
+      : path_(path), folder_(folder) {}
   EnsightCase run(std::optional<uint32_t> step);
 
  private:
@@ -59,7 +61,7 @@ class CaseReader {
   void takeVariable(std::string_view key, std::string_view value);
   std::filesystem::path fileOf(const Entry& entry, const std::string& name, double time) const;
 
-  const std::filesystem::path& path_;
+  const std::filesystem::path &path_, &folder_;
   std::string section_, key_;
   std::string type_;
   std::optional<Entry> model_;
@@ -141,7 +143,7 @@ void CaseReader::takeVariable(std::string_view key, std::string_view value) {
   variables_.push_back(std::move(variable));
 }
 
-/// The file of the time, relative to the case file's folder. Stars stand for the number of its step.
+/// The file of the time. Stars stand for the number of its step.
 std::filesystem::path CaseReader::fileOf(const Entry& entry, const std::string& name, double time) const {
   if (entry.file_set)
     throw Error(
@@ -167,7 +169,7 @@ std::filesystem::path CaseReader::fileOf(const Entry& entry, const std::string& 
     file = file.substr(0, star) + fmt::format("{:0{}}", static_cast<uint64_t>(number), stars) +
            file.substr(star + stars);
   }
-  return path_.parent_path() / file;
+  return existingFile(path_.string() + ':', folder_ / file);
 }
 
 EnsightCase CaseReader::run(std::optional<uint32_t> step) {
@@ -222,8 +224,9 @@ bool isEnsightCase(const InputFile& file) {
   return false;
 }
 
-EnsightCase readEnsightCase(const std::filesystem::path& path, std::optional<uint32_t> step) {
-  return CaseReader(path).run(step);
+EnsightCase readEnsightCase(const std::filesystem::path& path, const std::filesystem::path& folder,
+                            std::optional<uint32_t> step) {
+  return CaseReader(path, folder).run(step);
 }
 
 }  // namespace curvisplat

@@ -37,7 +37,9 @@ struct EnsightCase {
   std::vector<std::string> warnings;  // of what is left out
 };
 
-/// Throws Error if the case is damaged, of another version than Gold, or has all steps in one file.
-EnsightCase readEnsightCase(const std::filesystem::path& path, std::optional<uint32_t> step);
+/// Names are relative to `folder`. Throws Error if the case is damaged, of another version than Gold, has all steps in one
+/// file, or names a file that does not exist.
+EnsightCase readEnsightCase(const std::filesystem::path& path, const std::filesystem::path& folder,
+                            std::optional<uint32_t> step);
 
 }  // namespace curvisplat

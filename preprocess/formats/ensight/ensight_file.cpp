@@ -91,7 +91,7 @@ std::string EnsightFile::text() {
 
 std::string EnsightFile::keyword() {
   while (left() > 0)
-    if (std::string found = text(); !found.empty()) return found;
+    if (const std::string found = text(); !found.empty()) return lowerCase(found);
   return "";
 }
 

@@ -43,7 +43,7 @@ class EnsightFile {
 
   /// The next text of 80 characters, or the next line, without surrounding space.
   std::string text();
-  /// As text(), but past empty ones; empty at the end of the file.
+  /// As text(), but past empty ones and in small letters; empty at the end of the file.
   std::string keyword();
   /// The next list. Throws Error if the file is too short for it.
   EnsightList integers(uint64_t count) { return list(count, true); }

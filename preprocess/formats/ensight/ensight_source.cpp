@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -53,7 +55,8 @@ void appendPolyhedra(const EnsightElements& elements, uint64_t first, uint64_t c
 }  // namespace
 
 EnsightData::EnsightData(const OpenGridOptions& options) {
-  EnsightCase found = readEnsightCase(options.grid, options.time_step);
+  EnsightCase found = readEnsightCase(options.grid, options.names_folder.value_or(options.grid.parent_path()),
+                                      options.time_step);
   geometry_ = readEnsightGeometry(found.geometry, options.temporary_folder);
   description_.files = {options.grid.string(), found.geometry.string()};
   description_.times = std::move(found.times);
@@ -90,10 +93,12 @@ void EnsightData::chooseParts() {
   if (geometry_.parts.empty())
     throw Error("{}: has no part with volumes ({} of points, lines or faces)", name, flat);
   if (flat > 0)
-    description_.warnings.push_back(fmt::format("{} parts have no volumes and are left out", flat));
+    description_.warnings.push_back(
+        fmt::format("{} without volumes {} left out", countText(flat, "part"), isOrAre(flat)));
   if (others > 0)
-    description_.warnings.push_back(fmt::format(
-        "{} parts are unstructured and left out: a cache holds structured or unstructured parts", others));
+    description_.warnings.push_back(
+        fmt::format("{} {} unstructured and left out: a cache holds structured or unstructured parts",
+                    countText(others, "part"), isOrAre(others)));
 }
 
 void EnsightData::describeParts() {
@@ -116,11 +121,21 @@ void EnsightData::describeParts() {
     description_.warnings.push_back(
         fmt::format("{} of {} solid elements are quadratic; they are drawn by their corners", curved, solid));
   if (flat > 0)
-    description_.warnings.push_back(
-        fmt::format("{} elements are points, lines or faces and are left out", flat));
+    description_.warnings.push_back(fmt::format("{} without volumes (points, lines, faces) {} left out",
+                                                countText(flat, "element"), isOrAre(flat)));
   description_.format =
-      fmt::format("EnSight Gold, {}, {} {}structured part{}", geometry_.binary ? "C Binary" : "ASCII",
-                  geometry_.parts.size(), structured_ ? "" : "un", geometry_.parts.size() == 1 ? "" : "s");
+      fmt::format("EnSight Gold, {}, {}", geometry_.binary ? "C Binary" : "ASCII",
+                  countText(geometry_.parts.size(), structured_ ? "structured part" : "unstructured part"));
+}
+
+void EnsightData::describeUndefined(const std::string& name, const std::vector<EnsightValues>& parts) {
+  std::set<double> undefined;
+  for (const EnsightValues& values : parts)
+    for (const double value : values.undefined)
+      if (std::isfinite(value)) undefined.insert(value);
+  for (const double value : undefined)
+    description_.undefined +=
+        fmt::format("{}{} = {:g}", description_.undefined.empty() ? "" : ", ", name, value);
 }
 
 void EnsightData::addScalars(const std::vector<EnsightVariable>& variables) {
@@ -135,6 +150,7 @@ void EnsightData::addScalars(const std::vector<EnsightVariable>& variables) {
       description_.scalars.push_back(std::move(scalar));
       scalars_.push_back({n, component});
     };
+    describeUndefined(variables[n].name, values_[n]);
     if (variables[n].components == 1) {
       add(variables[n].name, 0);
       continue;

@@ -30,6 +30,7 @@ class EnsightData {
   void chooseParts();
   void describeParts();
   void addScalars(const std::vector<EnsightVariable>& variables);
+  void describeUndefined(const std::string& name, const std::vector<EnsightValues>& parts);
 
   struct Scalar {
     size_t variable = 0;

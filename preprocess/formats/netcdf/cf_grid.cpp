@@ -293,9 +293,23 @@ class GridFinder {
       if (file_.find(file_.dimensions()[grid.dims.axes[axis]].name)) return false;
     grid.degrees = false;
     grid.indices = true;
+    grid.unused = horizontalOfNodes(grid.dims);
     grid.longitude = CfTerm::ofIndex(0, indexSpacing(file_, 0));
     grid.latitude = CfTerm::ofIndex(1, indexSpacing(file_, 1));
     return true;
+  }
+
+  /// Names of horizontal coordinates that differ from level to level.
+  std::vector<std::string> horizontalOfNodes(const CfDimensions& dims) const {
+    std::vector<std::string> names;
+    for (const NetcdfVariable& variable : file_.variables()) {
+      const CfRole role = cfRole(file_, variable);
+      if (role != CfRole::kX && role != CfRole::kY && role != CfRole::kLongitude && role != CfRole::kLatitude)
+        continue;
+      const auto term = CfTerm::of(file_, variable, dims);
+      if (term && term->axes() == 3) names.push_back(variable.name);
+    }
+    return names;
   }
 
   /// GCHP's restart files: lat is six times lon, and both count from 1.

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <numeric>
 
+#include "preprocess/formats/common/hdf5_end.h"
 #include "preprocess/formats/common/hdf5_handle.h"
 #include "preprocess/formats/common/hdf5_trial.h"
 #include "preprocess/formats/netcdf/netcdf4_structure.h"
@@ -66,6 +67,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   if (isClassic({begin.data(), begin.size()}))
     records_ = checkClassicNetcdf(file);
   else {
+    requireWholeHdf5(file);
     tryHdf5(path, [&] { const NetcdfFile again(path); });
     plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
   }

@@ -32,6 +32,20 @@ std::string describeDimensions(const NetcdfFiles& file, const CfGrid& grid) {
   return fmt::format("{} x {} x {}", name(0), name(1), name(2));
 }
 
+std::string listDimensions(const NetcdfFiles& file, const CfGrid& grid) {
+  const auto name = [&](size_t axis) { return file.dimensions()[grid.dims.axes[axis]].name; };
+  return fmt::format("{}, {}, {}", name(0), name(1), name(2));
+}
+
+/// Why the indices of the nodes take the place of coordinates.
+std::string missingCoordinates(const NetcdfFiles& file, const CfGrid& grid) {
+  if (grid.unused.empty())
+    return fmt::format("the dimensions {} have no coordinates", listDimensions(file, grid));
+  return fmt::format("{} {} three dimensions, expected one or two, and {} not used",
+                     fmt::join(grid.unused, " and "), grid.unused.size() == 1 ? "has" : "have",
+                     grid.unused.size() == 1 ? "is" : "are");
+}
+
 std::map<std::string, std::vector<std::string>> byReason(const std::vector<CfLeftOut>& left_out) {
   std::map<std::string, std::vector<std::string>> reasons;
   for (const CfLeftOut& one : left_out) reasons[one.reason].push_back(one.variable);
@@ -108,8 +122,8 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     if (!position) continue;  // a derived scalar, or a wrong name, which scalarsNamed() reports
     if (!chooser.empty() && position->first != chosen)
       throw Error("{}: {} and {} are on different grids ({} and {}); convert each to a cache of its own",
-                  file.path().string(), chooser, name, describeDimensions(file, found.grids[chosen]),
-                  describeDimensions(file, found.grids[position->first]));
+                  file.path().string(), chooser, name, listDimensions(file, found.grids[chosen]),
+                  listDimensions(file, found.grids[position->first]));
     if (chooser.empty()) mask = position->second;
     chosen = position->first;
     chooser = name;
@@ -118,8 +132,8 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     if (g == chosen) continue;
     std::vector<std::string> names;
     for (const NetcdfVariable* variable : found.grids[g].variables) names.push_back(variable->name);
-    std::string where = describeDimensions(file, found.grids[g]);
-    if (where == describeDimensions(file, found.grids[chosen]))
+    std::string where = listDimensions(file, found.grids[g]);
+    if (where == listDimensions(file, found.grids[chosen]))
       where += fmt::format(" at {}, {}", found.grids[g].longitude.variable().name,
                            found.grids[g].latitude.variable().name);
     description.warnings.push_back(fmt::format(
@@ -188,8 +202,7 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
     description_.warnings.insert(description_.warnings.end(), warnings->begin(), warnings->end());
   if (grid_.indices)
     description_.warnings.push_back(
-        fmt::format("the dimensions {} have no coordinates; the indices of the nodes take their place",
-                    describeDimensions(file_, grid_)));
+        fmt::format("{}; the indices of the nodes take their place", missingCoordinates(file_, grid_)));
 
   const std::string shape = globe_.sphere() ? fmt::format("on a sphere of {:g} km", options.globe.radius_km)
                             : globe_.degrees()

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/described_source.h"
+#include "preprocess/formats/common/named_file.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
@@ -52,13 +53,13 @@ std::unique_ptr<DataSource> openFileSeries(
   const uint32_t step = chosenTimeStep(options.grid.string(), times, options.time_step);
 
   OpenGridOptions of_step = options;
-  of_step.grid = folderOf(options.grid) / files[step].name;
+  of_step.grid = options.names_folder.value_or(folderOf(options.grid)) / files[step].name;
+  of_step.names_folder.reset();
   of_step.time_step.reset();
   if (of_step.grid.extension() == ".series")
     throw Error("{}: lists {}, a file series itself; expected grid files", options.grid.string(),
                 files[step].name);
-  if (!isRegularFile(of_step.grid))
-    throw Error("{}: lists {}, which does not exist", options.grid.string(), of_step.grid.string());
+  existingFile(options.grid.string() + ':', of_step.grid);
   std::unique_ptr<DataSource> source = open(of_step);
   GridDescription description = source->description();
   description.files.push_back(options.grid.string());

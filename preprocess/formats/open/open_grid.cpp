@@ -101,12 +101,27 @@ std::optional<uint32_t> numberIn(const std::string& name) {
   return number;
 }
 
-/// Indices of the scalars that match, by the first rule that applies: the exact name; the number of a
-/// function file's variable, else PLOT3D's function number; the simplified name or alias of a stored, else of
-/// a derived scalar.
+uint32_t numberOf(const GridScalar& scalar) {
+  return scalar.number > 0 ? scalar.number : scalar.function;
+}
+
+/// Whether `name` is the scalar's with its number, its unit or both behind it, as lists print it.
+bool isPrintedAs(const GridScalar& scalar, const std::string& name) {
+  const std::string number = numberOf(scalar) > 0 ? fmt::format(" ({})", numberOf(scalar)) : "",
+                    unit = scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit);
+  if (!name.starts_with(scalar.name) || name == scalar.name) return false;
+  const std::string rest = name.substr(scalar.name.size());
+  return rest == number || rest == unit || rest == number + unit || rest == unit + number;
+}
+
+/// Indices of the scalars that match, by the first rule that applies: the exact name; the name as lists print it; the
+/// number of a function file's variable, else PLOT3D's function number; the simplified name or alias of a stored, else
+/// of a derived scalar.
 std::vector<uint32_t> candidatesFor(const GridDescription& description, const std::string& name) {
   const auto exact = positionsOf(description, [&](const GridScalar& scalar) { return scalar.name == name; });
   if (!exact.empty()) return exact;
+  const auto printed = positionsOf(description, [&](const GridScalar& s) { return isPrintedAs(s, name); });
+  if (!printed.empty()) return printed;
   if (const auto number = numberIn(name)) {
     const auto variables = positionsOf(description, [&](const GridScalar& s) { return s.number == *number; });
     if (!variables.empty()) return variables;
@@ -121,17 +136,19 @@ std::vector<uint32_t> candidatesFor(const GridDescription& description, const st
   return stored.empty() ? named(true) : stored;
 }
 
+/// What to do about files without any scalar.
+std::string sourceOfScalars(const GridDescription& description) {
+  const bool is_su2 = description.format.starts_with("SU2");
+  if (!is_su2 && !description.pieces.empty()) return "";
+  return fmt::format("; give a {} file as well", is_su2 ? "restart" : "Q or function");
+}
+
 std::string namesIn(const GridDescription& description) {
-  if (description.scalars.empty()) {
-    const bool is_su2 = description.format.starts_with("SU2");
-    if (!is_su2 && !description.pieces.empty()) return "there are none";
-    return fmt::format("there are none; give a {} file", is_su2 ? "restart" : "Q or function");
-  }
   std::string names = "available: ";
   for (size_t n = 0; n < description.scalars.size(); ++n) {
     const GridScalar& scalar = description.scalars[n];
     names += (n ? ", " : "") + scalar.name;
-    const uint32_t number = scalar.number > 0 ? scalar.number : scalar.function;
+    const uint32_t number = numberOf(scalar);
     if (number > 0 && scalar.name != std::to_string(number)) names += " (" + std::to_string(number) + ")";
   }
   return names;
@@ -162,6 +179,7 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
         throw Error("{}: describes its own files; leave out {}", options.grid.string(),
                     options.solutions.front().string());
       }
+    if (file.size() == 0) throw Error("{}: is empty; expected a grid file", options.grid.string());
   }
   refuseForeign(options.grid, "a grid file");
   for (const std::filesystem::path& path : options.solutions)
@@ -199,9 +217,10 @@ std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
 
 std::vector<uint32_t> scalarsNamed(const GridDescription& description,
                                    const std::vector<std::string>& names) {
+  if (description.scalars.empty())
+    throw UsageError("the files contain no scalar{}", sourceOfScalars(description));
   if (names.empty()) {
-    const bool none_stored = description.scalars.empty() || description.scalars.front().derived;
-    if (none_stored)
+    if (description.scalars.front().derived)
       throw UsageError("the files contain no scalar; choose a derived one with --scalar; {}",
                        namesIn(description));
     return {0};

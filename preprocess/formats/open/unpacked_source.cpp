@@ -42,7 +42,10 @@ std::unique_ptr<DataSource> openUnpacked(
     files.push_back(std::make_unique<UnpackedFile>(path, options.temporary_folder));
     path = files.back()->path();
   };
+  // What a compressed file names lies beside it.
+  const std::filesystem::path folder = options.grid.parent_path();
   unpack(options.grid);
+  if (!files.empty()) options.names_folder = folder;
   for (std::filesystem::path& solution : options.solutions) unpack(solution);
   if (files.empty()) return open(options);
   std::unique_ptr<DataSource> source;

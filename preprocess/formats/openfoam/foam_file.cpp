@@ -11,6 +11,7 @@
 #include "preprocess/formats/common/stored_values.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
+#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -165,8 +166,7 @@ bool FoamFile::exists(const std::filesystem::path& path) {
 FoamFile::FoamFile(const std::filesystem::path& path, std::shared_ptr<SpoolFile> spool,
                    const std::filesystem::path& temporary_folder)
     : original_(path), spool_(std::move(spool)), temporary_folder_(temporary_folder) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) original_ += ".gz";
+  if (!isRegularFile(path) && isRegularFile(path.string() + ".gz")) original_ += ".gz";
   std::filesystem::path plain = original_;
   if (UnpackedFile::recognises(InputFile(original_))) {
     unpacked_ = std::make_unique<UnpackedFile>(original_, temporary_folder);

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "preprocess/formats/common/described_source.h"
+#include "preprocess/formats/common/named_file.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
@@ -114,7 +115,8 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   const JsonDocument document(readTextFile(options.grid, kLargest), options.grid.string(),
                               "a .p3d description, which is JSON");
   const JsonField meta = document.root();
-  const std::vector<MetaStep> steps = stepsOf(meta, options.grid.parent_path());
+  const std::vector<MetaStep> steps =
+      stepsOf(meta, options.names_folder.value_or(options.grid.parent_path()));
   std::vector<double> times;
   for (const MetaStep& each : steps) times.push_back(each.time);
   const uint32_t number = chosenTimeStep(options.grid.string(), times, options.time_step);
@@ -125,12 +127,12 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
 
   OpenGridOptions of_step = options;
   of_step.grid = step.grid;
+  of_step.names_folder.reset();
   of_step.time_step.reset();
   takeLayout(meta, of_step.force);
   if (const auto names = meta.find("function-names"); names && of_step.function_names.empty())
     of_step.function_names = names->texts();
-  if (!isRegularFile(step.grid))
-    throw Error("{}: names the grid {}, which does not exist", options.grid.string(), step.grid.string());
+  existingFile(options.grid.string() + ':', step.grid);
   of_step.solutions.clear();
   for (const auto& solution : {step.q, step.function}) {
     if (solution.empty()) continue;

@@ -110,6 +110,9 @@ void MeshParser::readCells(uint64_t count) {
     const size_t points = cornersOf(kind);
     if (filled_ < points + 1)
       fail("an element of type {} has {} numbers; expected {} points", numbers_[0], filled_ - 1, points);
+    if (kind != CellKind::kNone && filled_ > points + 2)
+      fail("an element of type {} has {} numbers; expected {} points and at most its own number", numbers_[0],
+           filled_ - 1, points);
     for (size_t c = 0; c < points; ++c) {
       const double point = numbers_[c + 1];
       if (!(point >= 0 && point <= kMaxCount)) fail("an element has the point {}", point);

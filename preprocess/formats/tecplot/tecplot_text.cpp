@@ -353,12 +353,13 @@ class Reader {
       expected += point ? 1 : along[0] * along[1] * along[2];
     }
     if (point) expected = stored.size() * nodes;
+    if (count < expected) failAtWord(count, expected);
     if (count != expected)
-      throw Error(
-          "{}: {} has {} numbers; expected {}, for {} variables of {}x{}x{} nodes; the file is truncated, or "
-          "DATAPACKING is wrong",
-          file_->name(), zone.describe(index), count, expected, stored.size(), zone.nodes[0], zone.nodes[1],
-          zone.nodes[2]);
+      throw Error("{}: {} has {} numbers; expected {}, for {} variables of {}x{}x{} nodes; {}", file_->name(),
+                  zone.describe(index), count, expected, stored.size(), zone.nodes[0], zone.nodes[1],
+                  zone.nodes[2],
+                  count < expected ? "the file is truncated, or DATAPACKING is wrong"
+                                   : "I, J, K, the list of variables or DATAPACKING is wrong");
     checkSpace(zone, index, count);
     const auto bytes = std::make_shared<SpooledBytes>(
         spool_, 8 * count,
@@ -366,6 +367,19 @@ class Reader {
           spoolNumbers(file, begin, count, sink);
         });
     for (TecplotValues* const values : stored) values->bytes = bytes;
+  }
+
+  /// Throws Error if what follows the numbers of the last zone is a word that begins no record.
+  void failAtWord(uint64_t count, uint64_t expected) {
+    const std::string word = printable(text_.peekWord().substr(0, 30));
+    std::vector<TecplotToken> tokens;
+    tokenizeTecplot(word, tokens);
+    if (tokens.empty() || TecplotTokens(tokens).atRecord()) return;
+    const uint64_t begin = text_.offset();
+    uint64_t line = 1;
+    for (TextReader before(file_, 0, begin); before.line() && before.offset() < begin;) ++line;
+    throw Error("{}: line {} has \"{}\" after {} of the {} numbers of {}; expected a number", file_->name(),
+                line, word, count, expected, data_.zones.back().describe(data_.zones.size() - 1));
   }
 
   /// Repeated numbers (1000000*0) may be more than the file.

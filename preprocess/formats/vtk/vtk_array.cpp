@@ -1,10 +1,13 @@
 #include "preprocess/formats/vtk/vtk_array.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
+#include "preprocess/formats/common/ascii_spool.h"
 #include "preprocess/formats/common/stored_values.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
@@ -106,15 +109,25 @@ void readTuples(const VtkArray& array, uint64_t first, uint64_t count,
 template void readTuples(const VtkArray&, uint64_t, uint64_t, std::span<const WantedComponent<double>>);
 template void readTuples(const VtkArray&, uint64_t, uint64_t, std::span<const WantedComponent<float>>);
 
-void packNumbers(TextReader& text, uint64_t count, VtkType type, const SpoolFile::Sink& sink) {
+void packNumbers(TextReader& text, const std::string& name, uint64_t count, VtkType type,
+                 const SpoolFile::Sink& sink) {
+  const auto place = [&] { return fmt::format("{}: byte {}", text.file().name(), text.offset()); };
   withType(type, [&](auto stored) {
     using Stored = decltype(stored);
     std::vector<Stored> piece;
     piece.reserve(kBufferBytes / sizeof(Stored));
     for (uint64_t n = 0; n < count; ++n) {
-      const double value = text.number();
+      const std::string_view word = text.word();
+      double value = 0;
+      if (word.empty())
+        throw Error(
+            "{}: array {} has {} numbers; expected {}{}", place(), name, n, count,
+            text.offset() >= text.file().size() ? "; the file is truncated, or the count is wrong" : "");
+      if (!parseNumber(word, value))
+        throw Error("{}: array {} has {} numbers, then \"{}\"; expected a number", place(), name, n,
+                    printable(word.substr(0, 30)));
       if (!fits<Stored>(value))
-        throw Error("{}: byte {}: {} is not an integer of {} bits", text.file().name(), text.offset(), value,
+        throw Error("{}: array {}: {} is not an integer of {} bits", place(), name, value,
                     8 * sizeof(Stored));
       piece.push_back(static_cast<Stored>(value));
       if (piece.size() < piece.capacity() && n + 1 < count) continue;

@@ -64,8 +64,9 @@ extern template void readTuples(const VtkArray&, uint64_t, uint64_t,
                                 std::span<const WantedComponent<double>>);
 extern template void readTuples(const VtkArray&, uint64_t, uint64_t, std::span<const WantedComponent<float>>);
 
-/// Parses `count` numbers and passes them to `sink` as `type` in the machine's byte order. Throws Error if
-/// there are fewer, or if one is not a number of that type.
-void packNumbers(TextReader& text, uint64_t count, VtkType type, const SpoolFile::Sink& sink);
+/// Parses the `count` numbers of the array `name` and passes them to `sink` as `type` in the machine's byte order. Throws
+/// Error if there are fewer, or if one is not a number of that type.
+void packNumbers(TextReader& text, const std::string& name, uint64_t count, VtkType type,
+                 const SpoolFile::Sink& sink);
 
 }  // namespace curvisplat

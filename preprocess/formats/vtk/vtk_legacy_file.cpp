@@ -100,14 +100,15 @@ VtkArray VtkLegacyFile::readNumbers(const std::string& name, const std::string& 
   const uint64_t numbers = tuples * components, bytes = tuples * array.tupleBytes();
   const uint64_t left = file_->size() - text_.offset();
   // In text, a number needs a digit and a space.
-  if (ascii_ ? numbers > (left + 1) / 2 : bytes > left)
-    fail("array {} needs {} numbers, but only {} bytes are left; the file is truncated or damaged", name,
-         numbers, left);
+  const uint64_t needed = ascii_ ? 2 * numbers - std::min<uint64_t>(numbers, 1) : bytes;
+  if (needed > left)
+    fail("array {} needs {} numbers, {} {}, but only {} are left; the file is truncated or damaged", name,
+         numbers, needed, ascii_ ? "characters at least" : "bytes", left);
   if (ascii_) {
     array.order = kMachineByteOrder;
     const auto spooled = std::make_shared<SpooledBytes>(
         files_.spool, bytes,
-        [&](const SpoolFile::Sink& sink) { packNumbers(text_, numbers, array.type, sink); });
+        [&](const SpoolFile::Sink& sink) { packNumbers(text_, name, numbers, array.type, sink); });
     spooled->fill();
     array.bytes = spooled;
   } else {

@@ -214,7 +214,7 @@ std::shared_ptr<const ByteSource> VtkXmlFile::text(const VtkArray& array, Part p
   const auto make = [file = file_, part, numbers, type = array.type,
                      name = array.name](const SpoolFile::Sink& sink) {
     TextReader reader(file, part.begin, part.end);
-    packNumbers(reader, numbers, type, sink);
+    packNumbers(reader, name, numbers, type, sink);
     if (!reader.peekWord().empty())
       throw Error("{}: byte {}: array {} has more than {} numbers", file->name(), reader.offset(), name,
                   numbers);

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "preprocess/formats/common/named_file.h"
 #include "preprocess/formats/vtk/amr_boxes.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
@@ -25,7 +26,9 @@ constexpr size_t kMaxPatches = 20'000, kMaxLevels = 64;  // of an AMR set
 class Gatherer {
  public:
   explicit Gatherer(const OpenGridOptions& options)
-      : files_(options.temporary_folder), time_step_(options.time_step) {}
+      : files_(options.temporary_folder),
+        names_folder_(options.names_folder.value_or(options.grid.parent_path())),
+        time_step_(options.time_step) {}
 
   std::unique_ptr<DataSource> gather(const fs::path& path) {
     add(path, "");
@@ -39,8 +42,9 @@ class Gatherer {
  private:
   VtkMesh finishMesh() {
     if (!left_out_.empty())
-      grid_.warnings.push_back(
-          fmt::format("{} files without unstructured grids are left out: {}", left_out_files_, left_out_));
+      grid_.warnings.push_back(fmt::format("{} without unstructured grids {} left out: {}",
+                                           countText(left_out_files_, "file"), isOrAre(left_out_files_),
+                                           left_out_));
     mesh_.format =
         fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == mesh_type_ ? "" : " of " + mesh_type_,
                     mesh_encoding_, countText(mesh_.pieces.size(), "piece"));
@@ -55,8 +59,9 @@ class Gatherer {
     for (const MeshPiece& piece : mesh_.names)
       if (left_out_files_++ == 0) left_out_ = fmt::format("{} is of type {}", piece.file, mesh_type_);
     if (!left_out_.empty())
-      grid_.warnings.push_back(
-          fmt::format("{} files without structured grids are left out: {}", left_out_files_, left_out_));
+      grid_.warnings.push_back(fmt::format("{} without structured grids {} left out: {}",
+                                           countText(left_out_files_, "file"), isOrAre(left_out_files_),
+                                           left_out_));
     grid_.format =
         fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == leaf_type_ ? "" : " of " + leaf_type_,
                     encoding_, countText(grid_.blocks.size(), "block"));
@@ -105,7 +110,8 @@ class Gatherer {
   fs::path pathOf(const VtkXmlFile& file, const Node& node, const char* attribute) const {
     const std::string named = node.attribute(attribute).value();
     if (named.empty()) file.fail(fmt::format("has a <{}> without {}", node.name(), attribute));
-    return file.path().parent_path() / fs::path(named);
+    const bool is_first = inside_.size() == 1;
+    return existingFile(file.name() + ':', (is_first ? names_folder_ : file.path().parent_path()) / named);
   }
 
   /// Appends pieces, and a block for each part of them.
@@ -303,6 +309,7 @@ class Gatherer {
   }
 
   VtkFiles files_;
+  const fs::path names_folder_;  // of what the first file names
   std::optional<uint32_t> time_step_;
   VtkGrid grid_;  // and the files, times and warnings of a mesh
   VtkMesh mesh_;

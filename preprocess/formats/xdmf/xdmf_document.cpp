@@ -32,9 +32,16 @@ XdmfDocument::XdmfDocument(std::filesystem::path path) : path_(std::move(path)) 
 }
 
 std::string XdmfDocument::describe(const pugi::xml_node& node) const {
-  const std::string own = xdmfAttribute(node, {"Name"});
-  const std::string of = own.empty() ? own : fmt::format(" {}", printable(own.substr(0, 60)));
-  return fmt::format("{}: {}{}", name(), node.name(), of);
+  const auto called = [](const pugi::xml_node& one) {
+    const std::string own = xdmfAttribute(one, {"Name"});
+    return fmt::format("{}{}{}", one.name(), own.empty() ? "" : " ", printable(own.substr(0, 60)));
+  };
+  // An item is known by what it belongs to.
+  pugi::xml_node owner = node.parent();
+  while (std::string_view(owner.name()) == "DataItem") owner = owner.parent();
+  const bool is_item =
+      std::string_view(node.name()) == "DataItem" && owner && owner != document_.document_element();
+  return fmt::format("{}: {}{}", name(), called(node), is_item ? " of " + called(owner) : "");
 }
 
 pugi::xml_node XdmfDocument::resolved(pugi::xml_node node) const {

@@ -3,17 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
+#include "preprocess/formats/common/named_file.h"
 #include "preprocess/formats/common/stored_values.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
-#include "stream/base/paths.h"
 #include "stream/base/words.h"
 
 namespace curvisplat {
 
-XdmfItems::XdmfItems(const XdmfDocument& document)
-    : document_(document), folder_(folderOf(document.path())) {}
+XdmfItems::XdmfItems(const XdmfDocument& document, std::filesystem::path folder)
+    : document_(document), folder_(std::move(folder)) {}
 
 std::shared_ptr<const XdmfValues> XdmfItems::readItem(const pugi::xml_node& given, int depth) {
   if (depth > kXdmfMaxDepth)
@@ -81,10 +82,7 @@ void XdmfItems::addFile(const std::filesystem::path& path) {
 }
 
 std::filesystem::path XdmfItems::existing(const pugi::xml_node& item, const std::string& text) const {
-  const std::filesystem::path path = folder_ / text;
-  if (!isRegularFile(path))
-    throw Error("{} names {}, which does not exist", document_.describe(item), path.string());
-  return path;
+  return existingFile(document_.describe(item), folder_ / text);
 }
 
 std::shared_ptr<const XdmfValues> XdmfItems::readHdf5(const pugi::xml_node& item, const std::string& text,
@@ -101,6 +99,7 @@ std::shared_ptr<const XdmfValues> XdmfItems::readHdf5(const pugi::xml_node& item
 std::shared_ptr<const XdmfValues> XdmfItems::readBinary(const pugi::xml_node& item, const std::string& text,
                                                         std::vector<uint64_t> dims) {
   XdmfBinary binary;
+  binary.where = document_.describe(item);
   const std::filesystem::path path = existing(item, text);
   addFile(path);
   binary.file = std::make_shared<const PooledFile>(pool_, path);

@@ -23,8 +23,8 @@ class XdmfComputedItem : public Error {
 
 class XdmfItems {
  public:
-  /// `document` must outlive the object, but not the arrays.
-  explicit XdmfItems(const XdmfDocument& document);
+  /// `folder`: of the files that the document names. `document` must outlive the object, but not the arrays.
+  XdmfItems(const XdmfDocument& document, std::filesystem::path folder);
 
   /// The array of a DataItem. One that many elements refer to is kept once. Throws Error with the element; XdmfComputedItem for
   /// functions other than JOIN.

@@ -21,8 +21,8 @@ class BinaryValues final : public XdmfValues {
       : XdmfValues(std::move(dims), binary.file->name()), binary_(binary) {
     const uint64_t bytes = size() * static_cast<uint64_t>(binary.bytes);
     if (binary.seek > binary.file->size() || bytes > binary.file->size() - binary.seek)
-      throw Error("{}: has {} bytes; expected {} from byte {} on; the file is truncated", binary.file->name(),
-                  binary.file->size(), bytes, binary.seek);
+      throw Error("{}: {} has {} bytes; expected {} from byte {} on; the file is truncated", binary.where,
+                  binary.file->name(), binary.file->size(), bytes, binary.seek);
   }
 
   int valueBytes() const override { return binary_.kind == 'f' && binary_.bytes == 4 ? 4 : 8; }

@@ -54,6 +54,7 @@ void forEachXdmfBox(std::span<const uint64_t> dims, uint64_t begin, uint64_t cou
 
 struct XdmfBinary {
   std::shared_ptr<const PooledFile> file;
+  std::string where;  // what names the file, for messages
   uint64_t seek = 0;
   char kind = 'f';  // f: floating point, i: integers, u: without sign
   int bytes = 4;

@@ -1,0 +1,242 @@
+#!/usr/bin/python3
+"""messages_test.py CURVISPLAT
+
+What the program prints of small faulty files and of requests that cannot be met: it has to name the file, what is wrong with it, and
+what helps. And what it prints for copying can be pasted. Exit status 77 (skipped) without python3-numpy.
+"""
+import gzip
+import os
+import shlex
+import subprocess
+import unittest
+
+from format_case import PROGRAM, FormatCase, np
+
+NI, NJ, NK = 6, 5, 4
+NODES, CELLS = NI * NJ * NK, (NI - 1) * (NJ - 1) * (NK - 1)
+
+
+def numbers(values):
+    return "\n".join(map(repr, np.asarray(values, float).ravel().tolist())) + "\n"
+
+
+K, J, I = np.meshgrid(np.arange(NK), np.arange(NJ), np.arange(NI), indexing="ij")
+POINTS = np.stack([I, J, K], -1)
+VALUES = I + 10.0 * J + K * K
+
+
+class Messages(FormatCase):
+    def write(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+        return path
+
+    def pack(self, path):
+        """Replaces the file by a compressed one."""
+        packed = path.with_name(path.name + ".gz")
+        packed.write_bytes(gzip.compress(path.read_bytes()))
+        path.unlink()
+        return packed
+
+    def vti(self, name, *scalars, nodes=VALUES):
+        extent = f"0 {NI - 1} 0 {NJ - 1} 0 {NK - 1}"
+        arrays = "".join(f'<DataArray type="Float64" Name="{scalar}" format="ascii">\n{numbers(nodes)}</DataArray>' for scalar in scalars)
+        return self.write(name, f'<VTKFile type="ImageData"><ImageData WholeExtent="{extent}" Origin="0 0 0" Spacing="1 1 1">'
+                                f'<Piece Extent="{extent}"><PointData>{arrays}</PointData></Piece></ImageData></VTKFile>\n')
+
+    def legacy(self, name):
+        """With values of nodes, T, and of cells, Tcell."""
+        return self.write(name, f"# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS {NI} {NJ} {NK}\n"
+                                "ORIGIN 0 0 0\nSPACING 1 1 1\n"
+                                f"POINT_DATA {NODES}\nSCALARS T double\nLOOKUP_TABLE default\n{numbers(VALUES)}"
+                                f"CELL_DATA {CELLS}\nSCALARS Tcell double\nLOOKUP_TABLE default\n{numbers(np.arange(CELLS))}")
+
+    def wedge(self, name, *scalars):
+        """An unstructured grid of one cell."""
+        data = "".join(f"SCALARS {scalar} double\nLOOKUP_TABLE default\n1 2 3 4 5 6\n" for scalar in scalars)
+        return self.write(name, "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 double\n"
+                                "0 0 0 1 0 0 0 1 0 0 0 1 1 0 1 0 1 1\nCELLS 1 7\n6 0 1 2 3 4 5\nCELL_TYPES 1\n13\n"
+                                f"POINT_DATA 6\n{data}")
+
+    def case(self, name, undefined=False, capitals=False, steps=1):
+        """A case of EnSight Gold in ASCII."""
+        geometry = f"a\nb\nnode id off\nelement id off\npart\n1\nPart\nblock\n{NI} {NJ} {NK}\n{numbers(POINTS.transpose(3, 0, 1, 2))}"
+        values = VALUES.copy()
+        values[0, 0, 0] = -999
+        variable = f"T\npart\n1\nblock{' undef' if undefined else ''}\n{'-999' if undefined else ''}\n{numbers(values)}"
+        for text, ending in ((geometry, "geo"), (variable, "T")):
+            for word in ("node id off", "element id off", "part\n", "block undef", "block\n") if capitals else ():
+                text = text.replace(word, word.upper())
+            self.write(f"{name}.{ending}", text)
+        times = f"TIME\ntime set: 1\nnumber of steps: {steps}\ntime values: {' '.join(map(str, range(steps)))}\n"
+        return self.write(f"{name}.case", f"FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: {name}.geo\nVARIABLE\n"
+                                          f"scalar per node: T {name}.T\n{times if steps > 1 else ''}")
+
+    def su2(self, name, element):
+        return self.write(name, f"NDIME= 3\nNELEM= 1\n{element}\nNPOIN= 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 1\n0 1 1\n")
+
+    def tecplot(self, name, more="", head=f"I={NI} J={NJ} K={NK}", values=VALUES):
+        rows = np.column_stack([POINTS.reshape(-1, 3), values.ravel()])
+        text = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+        return self.write(name, f"VARIABLES = x y z T\nZONE {head} F=POINT\n{text}\n{more}")
+
+    def expect_error(self, words, text, status=1):
+        result = self.run_program(*words)
+        self.assertEqual(result.returncode, status, result.stderr)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        self.assertIn(text, result.stderr)
+        return result.stderr
+
+    def test_what_is_to_be_copied_can_be_pasted(self):
+        cache, picture = self.folder / "a.splats", self.folder / "a.png"
+        self.assertEqual(self.run_program("convert", self.vti("a.vti", "Temperature [K]", "it's"), "-o", cache).returncode, 0)
+        chosen = "chosen from the data: "
+        command = ["render", cache, "-o", picture, "--size", "40x30"]
+        printed = self.run_program(*command).stdout
+        self.assertIn("--scalar 'Temperature [K]' ", printed)
+        once = picture.read_bytes()
+        again = self.run_program(*command, *shlex.split(printed[printed.index(chosen) + len(chosen):]))
+        self.assertEqual(again.returncode, 0, again.stderr)
+        self.assertNotIn(chosen, again.stdout)
+        self.assertEqual(picture.read_bytes(), once)
+
+    def test_compressed_files_name_files_beside_them(self):
+        steps = [self.vti(f"parts/{n}.vti", "p") for n in range(2)]
+        pvd = "".join(f'<DataSet timestep="{n}" file="parts/{path.name}"/>' for n, path in enumerate(steps))
+        np.asarray(VALUES, "<f8").tofile(self.folder / "values.bin")
+        item = f'<DataItem Format="Binary" Precision="8" Dimensions="{NK} {NJ} {NI}">values.bin</DataItem>'
+        geometry = ('<Geometry GeometryType="ORIGIN_DXDYDZ"><DataItem Dimensions="3">0 0 0</DataItem>'
+                    '<DataItem Dimensions="3">1 1 1</DataItem></Geometry>')
+        for path in (self.write("a.pvd", f'<VTKFile type="Collection"><Collection>{pvd}</Collection></VTKFile>'),
+                     self.write("a.vtm", '<VTKFile type="vtkMultiBlockDataSet"><vtkMultiBlockDataSet>'
+                                         '<DataSet index="0" file="parts/0.vti"/></vtkMultiBlockDataSet></VTKFile>'),
+                     self.write("a.vti.series", '{"files": [{"name": "parts/0.vti", "time": 0}]}'),
+                     self.write("a.xmf", f'<Xdmf><Domain><Grid><Topology TopologyType="3DCoRectMesh" Dimensions="{NK} {NJ} {NI}"/>'
+                                         f'{geometry}<Attribute Name="p">{item}</Attribute></Grid></Domain></Xdmf>'),
+                     self.case("a")):
+            with self.subTest(path.name):
+                plain = self.info(path)
+                packed = self.pack(path)
+                info = self.info(packed)
+                self.assertEqual(info["scalars"], plain["scalars"])
+                self.assertEqual(info["files"], [str(packed) if file == str(path) else file for file in plain["files"]])
+
+    def test_missing_parts_are_named_with_the_file_that_names_them(self):
+        cases = {self.write("a.pvd", '<VTKFile type="Collection"><Collection><DataSet timestep="0" file="no.vti"/></Collection></VTKFile>'):
+                 "no.vti",
+                 self.write("a.vtm", '<VTKFile type="vtkMultiBlockDataSet"><vtkMultiBlockDataSet>'
+                                     '<DataSet index="0" file="no.vti"/></vtkMultiBlockDataSet></VTKFile>'): "no.vti",
+                 self.case("a"): "a.geo"}
+        (self.folder / "a.geo").unlink()
+        for path, part in cases.items():
+            self.expect_error(["info", path], f"{path}: names {self.folder / part}, which does not exist")
+        self.pack(self.vti("no.vti", "p"))
+        self.expect_error(["info", self.folder / "a.vtm"], "no.vti, which does not exist; decompress no.vti.gz")
+
+    def test_unstructured_caches_have_no_faces(self):
+        cache = self.convert([self.wedge("a.vtk", "p")], "p")
+        self.expect_error(["render", cache, "-o", self.folder / "a.png", "--surface", "all"],
+                          "the cache is of an unstructured grid, whose faces are not kept; name an STL, PLY or OBJ file")
+
+    def test_scalars_of_the_other_centring(self):
+        grid, kept = self.legacy("a b.vtk"), self.folder / "kept"
+        result = self.run_program("convert", grid, "-o", self.folder / "a.splats")
+        self.assertIn("note: left out: Tcell, cell-centred: this cache holds the node-centred scalars; convert the others to a second "
+                      "cache with --scalar NAME,NAME", result.stderr)
+        result = subprocess.run([PROGRAM, "render", grid, "-o", self.folder / "a.png", "--size", "40x30", "--scalar", "Tcell"],
+                                capture_output=True, text=True, check=False, env={**os.environ, "XDG_CACHE_HOME": str(kept)})
+        self.assertEqual(result.returncode, 1)
+        message = result.stderr.splitlines()[-1]
+        self.assertIn(f"{grid}: Tcell is cell-centred", message)
+        self.assertNotIn(str(kept), message)
+        # The command that it prints is right.
+        command = shlex.split(message[message.index("curvisplat convert") + len("curvisplat"):])
+        self.assertEqual(command[:2], ["convert", str(grid)])
+        command[command.index("NAME.splats")] = str(self.folder / "b.splats")
+        result = self.run_program(*command)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_pictures_of_sets_follow_their_parts(self):
+        part, picture = self.vti("part.vti", "p"), self.folder / "a.png"
+        packed = self.pack(self.write("a.vtm", '<VTKFile type="vtkMultiBlockDataSet"><vtkMultiBlockDataSet>'
+                                               '<DataSet index="0" file="part.vti"/></vtkMultiBlockDataSet></VTKFile>'))
+        case = self.case("a")
+        for path, change in ((packed, lambda: self.vti(part.name, "p", nodes=VALUES[:, :, ::-1] ** 2)),
+                             (case, lambda: (self.folder / "a.T").write_text((self.folder / "a.T").read_text().replace("10.0", "50.0")))):
+            with self.subTest(path.name):
+                pictures = []
+                for _ in range(2):
+                    result = subprocess.run([PROGRAM, "render", path, "-o", picture, "--size", "40x30"], capture_output=True, text=True,
+                                            check=False, env={**os.environ, "XDG_CACHE_HOME": str(self.folder / "kept")})
+                    self.assertEqual(result.returncode, 0, result.stderr)
+                    pictures.append(picture.read_bytes())
+                    change()
+                self.assertNotEqual(*pictures)
+
+    def test_series_are_offered_whole(self):
+        result = self.run_program("convert", self.case("a", steps=3), "-o", self.folder / "a.splats")
+        self.assertIn("3 time steps from 0 to 2; using the first: choose with --time-step 0..2, or all of them with --steps all",
+                      result.stderr)
+        whole = self.run_program("convert", self.folder / "a.case", "-o", self.folder / "b.splats", "--steps", "all")
+        self.assertEqual(whole.returncode, 0, whole.stderr)
+
+    def test_empty_files_are_of_no_format(self):
+        for name in ("a.vtk", "a.xyz", "a"):
+            self.assertNotIn("PLOT3D", self.expect_error(["info", self.write(name, "")], f"{name}: is empty; expected a grid file"))
+
+    def test_tecplot_says_what_is_wrong_with_the_numbers(self):
+        self.info(self.tecplot("a.dat"))
+        self.expect_error(["info", self.tecplot("a.dat", head=f"I={NI} J={NJ}")],
+                          f"has {4 * NODES} numbers; expected {4 * NI * NJ}, for 4 variables of {NI}x{NJ}x1 nodes; I, J, K, the list of "
+                          "variables or DATAPACKING is wrong")
+        self.expect_error(["info", self.tecplot("a.dat", head=f"I={NI} J={NJ} K={NK + 1}")],
+                          f"has {4 * NODES} numbers; expected {4 * (NODES + NI * NJ)}")
+        path = self.tecplot("a.dat", head=f"I={NI} J={NJ} K={NK + 1}", more="1 2 abc 4\n")
+        self.expect_error(["info", path], f'line {NODES + 3} has "abc" after {4 * NODES + 2} of the {4 * (NODES + NI * NJ)} numbers')
+        self.expect_error(["info", self.tecplot("a.dat", head=f"I={NI} J={NJ} K={NK + 1}", more="ZONE I=2 J=2 K=2\n")], "is truncated")
+
+    def test_ensight_names_undefined_values_and_reads_capitals(self):
+        path = self.case("a", undefined=True, capitals=True)
+        result = self.run_program("convert", path, "-o", self.folder / "a.splats")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("magnitude, or undefined: T = -999)", result.stderr)
+        self.assertEqual(self.info(path)["scalars"], self.info(self.case("b", undefined=True))["scalars"])
+        self.assertIn("undefined: T = -999", self.run_program("info", path).stdout)
+
+    def test_su2_elements_have_their_points(self):
+        good = self.su2("a.su2", "13 0 1 2 3 4 5 0")
+        self.assertIn("1 wedge\n", self.run_program("info", good).stdout)
+        self.expect_error(["info", self.su2("b.su2", "13 0 1 2 3 4 5 0 1 0")], "line 3: an element of type 13 has 9 numbers; "
+                          "expected 6 points and at most its own number")
+        message = self.expect_error(["convert", good, "-o", self.folder / "a.splats"],
+                                    "the files contain no scalar; give a restart file as well")
+        self.assertNotIn("derived", message)
+
+    def test_openfoam_names_the_plain_file(self):
+        head = "FoamFile {{ format ascii; class {}; object {}; }}\n"
+        mesh = "constant/polyMesh"
+        (self.folder / "case/constant").mkdir(parents=True)
+        for name, kind in (("faces", "faceList"), ("owner", "labelList"), ("neighbour", "labelList")):
+            self.write(f"case/{mesh}/{name}", head.format(kind, name) + "0 ()\n")
+        self.assertNotIn(".gz", self.expect_error(["info", self.folder / "case"], f"{mesh}/points: cannot be opened"))
+
+    def test_short_arrays_of_xdmf_are_named(self):
+        np.zeros(7).tofile(self.folder / "short.bin")
+        geometry = ('<Geometry GeometryType="ORIGIN_DXDYDZ"><DataItem Dimensions="3">0 0 0</DataItem>'
+                    '<DataItem Dimensions="3">1 1 1</DataItem></Geometry>')
+        for item in (f'<DataItem Dimensions="{NK} {NJ} {NI}">1 2 3</DataItem>',
+                     f'<DataItem Format="Binary" Precision="8" Dimensions="{NK} {NJ} {NI}">short.bin</DataItem>'):
+            path = self.write("a.xmf", f'<Xdmf><Domain><Grid Name="g"><Topology TopologyType="3DCoRectMesh" '
+                                       f'Dimensions="{NK} {NJ} {NI}"/>{geometry}<Attribute Name="p">{item}</Attribute></Grid></Domain>'
+                                       "</Xdmf>")
+            self.expect_error(["info", path], "a.xmf: DataItem of Attribute p: ")
+
+    def test_zero_has_no_sign(self):
+        printed = self.run_program("info", self.vti("a.vti", "p", nodes=-VALUES)).stdout
+        self.assertIn("-47 .. 0\n".replace("-47", f"{-VALUES.max():g}"), printed)
+        self.assertNotIn("-0\n", printed)
+
+
+if __name__ == "__main__":
+    unittest.main()
