@@ -68,8 +68,7 @@ void generateSteps(const GenerateOptions& options) {
     const SceneTime time{static_cast<double>(step) / kStepsPerUnitOfTime, options.moving};
     const SceneGridSource source(makeScenesAt(options.scene, options.clustering, time), size);
     Plot3dOutputs outputs = plot3dOutputs(stepPrefix(options.prefix, step));
-    if (!options.moving)
-      outputs.grid = step == options.first_step ? options.prefix + ".xyz" : std::filesystem::path();
+    if (!options.moving) outputs.grid = step == options.first_step ? options.prefix + ".xyz" : std::string();
     writePlot3d(source, outputs, progress);
     nodes += progress.phases().back().steps;
     seconds += progress.phases().back().seconds;

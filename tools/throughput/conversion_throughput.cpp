@@ -135,12 +135,13 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
   report.size = sizeOfGrid(effort.nodes);
   checkSpace(effort.temporary_folder, report.nodes());
   const WorkFolder folder(effort.temporary_folder);
-  const Plot3dOutputs files =
+  const Plot3dOutputs written =
       writePlot3d(SceneGridSource(makeScene("wake"), report.size), folder / "grid", progress);
 
   OpenGridOptions grid;
-  grid.grid = files.grid;
-  grid.solutions = {files.function};
+  grid.grid = written.grid;
+  grid.solutions = {written.function};
+  const std::vector<fs::path> files{written.grid, written.function, written.names};
   grid.temporary_folder = effort.temporary_folder;
   ConvertOptions options;
   options.output = folder / "grid.splats";
@@ -155,7 +156,7 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
   while (runs.empty() || (runs.size() < effort.max_runs && spent_s < effort.repeat_s)) {
     fs::remove_all(options.output);
     const auto source = openGrid(grid);
-    if (const auto reason = dropPages({files.grid, files.function, files.names})) {
+    if (const auto reason = dropPages(files)) {
       if (report.cold) to.leaveOut("conversion/cold", *reason);
       report.cold = false;
     }
