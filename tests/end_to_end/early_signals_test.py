@@ -100,8 +100,8 @@ class EarlySignals(unittest.TestCase):
         print(f"{ended_early} runs ended by a signal", flush=True)
         self.assertGreater(ended_early, 10)
 
-    def stopped(self, words, begun):
-        """Sends Ctrl-C once begun() is true. The status and the message."""
+    def stopped(self, words, begun, by=signal.SIGINT):
+        """Sends a signal once begun() is true. The status and the message."""
         program = subprocess.Popen([PROGRAM, *words], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
         self.addCleanup(program.kill)
@@ -109,17 +109,25 @@ class EarlySignals(unittest.TestCase):
         while not begun() and program.poll() is None:
             self.assertLess(time.monotonic(), deadline)
             time.sleep(0.001)
-        program.send_signal(signal.SIGINT)
+        program.send_signal(by)
         message = program.communicate(timeout=MOST_SECONDS)[1]
         return program.returncode, message
 
     def test_generate_that_is_stopped_leaves_nothing(self):
         for further in ([], ["--steps", "3"]):
             status, message = self.stopped(["generate", "wake", "--size", "400x300x100", "-o", "g", *further],
-                                           lambda: list(self.folder.glob("g*.part")))
+                                           lambda: list(self.folder.glob(".curvisplat.*.part")))
             self.assertEqual(status, 128 + signal.SIGINT, message)
             self.assertEqual(message.count("\n"), 1, message)
             self.assertEqual(self.files(), ["temporary"])
+
+    def test_generate_removes_what_a_killed_one_left(self):
+        unfinished = lambda: list(self.folder.glob(".curvisplat.*.part"))
+        self.stopped(["generate", "wake", "--size", "400x300x100", "-o", "g"], unfinished, signal.SIGKILL)
+        self.assertTrue(unfinished())
+        subprocess.run([PROGRAM, "generate", "wake", "--size", "4x4x4", "-o", "h"], cwd=self.folder, check=True,
+                       env=self.environment, stdout=subprocess.DEVNULL)
+        self.assertEqual(self.files(), ["h.fun", "h.nam", "h.xyz", "temporary"])
 
     def test_bench_that_is_stopped_does_not_offer_to_go_on(self):
         status, message = self.stopped(["bench", "--convert", "--nodes", "4M", "--tmp", "temporary"],

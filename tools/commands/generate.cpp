@@ -11,7 +11,9 @@
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
+#include "stream/base/paths.h"
 #include "tools/commands/commands.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/print_line.h"
@@ -82,6 +84,7 @@ void generate(const GenerateOptions& options) {
   makeScenes(options.scene, options.clustering);  // the scene's name first
   if (options.size.empty()) throw UsageError("--size NIxNJxNK is required, such as --size 128x64x64");
   checkOutputFolder("-o", options.prefix, longestEnding(options));
+  removeAbandonedFiles(folderOf(options.prefix));
   if (options.steps) return generateSteps(options);
   if (options.moving) throw UsageError("--moving needs --steps");
   if (options.first_step > 0) throw UsageError("--first-step needs --steps");
