@@ -3,15 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <vector>
+
+#include "stream/base/words.h"
 
 namespace curvisplat {
 namespace {
-
-char lower(char letter) {
-  return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
-}
 
 /// Damerau and Levenshtein's distance, in which two letters that are swapped count once.
 size_t distance(std::string_view a, std::string_view b) {
@@ -20,9 +17,9 @@ size_t distance(std::string_view a, std::string_view b) {
   for (size_t i = 1; i <= a.size(); ++i) {
     row[0] = i;
     for (size_t j = 1; j <= b.size(); ++j) {
-      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
+      const bool same = a[i - 1] == b[j - 1];
       row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
-      if (i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) && lower(a[i - 2]) == lower(b[j - 1]))
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
         row[j] = std::min(row[j], before[j - 2] + 1);
     }
     before.swap(last);
@@ -31,9 +28,9 @@ size_t distance(std::string_view a, std::string_view b) {
   return last[b.size()];
 }
 
+/// With capitals or small letters.
 bool beginsWith(std::string_view word, std::string_view begin) {
-  return word.size() >= begin.size() && std::equal(begin.begin(), begin.end(), word.begin(),
-                                                   [](char a, char b) { return lower(a) == lower(b); });
+  return word.size() >= begin.size() && isSameIgnoringCase(word.substr(0, begin.size()), begin);
 }
 
 /// The shortest candidate that the word begins, or that begins the word, of three letters at least.
@@ -55,11 +52,12 @@ std::string sharingTheBegin(std::string_view word, std::span<const std::string> 
 std::string closestTo(std::string_view word, std::span<const std::string> candidates) {
   constexpr size_t kMaxWord = 64;  // longer ones are no misspelled names
   if (word.empty() || word.size() > kMaxWord) return {};
+  const std::string letters_of_word = lowerCase(word);
   std::string best;
   size_t least = std::max<size_t>(1, word.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
     if (candidate.size() > 2 * kMaxWord) continue;
-    const size_t letters = distance(word, candidate);
+    const size_t letters = distance(letters_of_word, lowerCase(candidate));
     const bool is_closer_in_a_tie =
         letters == least && !best.empty() && beginsWith(candidate, word) && !beginsWith(best, word);
     if (letters >= least && !is_closer_in_a_tie) continue;

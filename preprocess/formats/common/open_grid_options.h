@@ -42,6 +42,9 @@ struct OpenGridOptions {
   GlobeOptions globe = {};                       // for grids in degrees
   std::vector<std::string> scalars = {};         // requested; select one of several grids in a file
   std::optional<std::filesystem::path> names_folder = {};  // of the files that `grid` names; nullopt: its own
+
+  /// What names in `grid` are relative to.
+  std::filesystem::path namesFolder() const { return names_folder.value_or(grid.parent_path()); }
 };
 
 }  // namespace curvisplat

@@ -55,8 +55,7 @@ void appendPolyhedra(const EnsightElements& elements, uint64_t first, uint64_t c
 }  // namespace
 
 EnsightData::EnsightData(const OpenGridOptions& options) {
-  EnsightCase found = readEnsightCase(options.grid, options.names_folder.value_or(options.grid.parent_path()),
-                                      options.time_step);
+  EnsightCase found = readEnsightCase(options.grid, options.namesFolder(), options.time_step);
   geometry_ = readEnsightGeometry(found.geometry, options.temporary_folder);
   description_.files = {options.grid.string(), found.geometry.string()};
   description_.times = std::move(found.times);

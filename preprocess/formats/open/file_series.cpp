@@ -13,7 +13,6 @@
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
-#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -53,7 +52,7 @@ std::unique_ptr<DataSource> openFileSeries(
   const uint32_t step = chosenTimeStep(options.grid.string(), times, options.time_step);
 
   OpenGridOptions of_step = options;
-  of_step.grid = options.names_folder.value_or(folderOf(options.grid)) / files[step].name;
+  of_step.grid = options.namesFolder() / files[step].name;
   of_step.names_folder.reset();
   of_step.time_step.reset();
   if (of_step.grid.extension() == ".series")

@@ -115,8 +115,7 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   const JsonDocument document(readTextFile(options.grid, kLargest), options.grid.string(),
                               "a .p3d description, which is JSON");
   const JsonField meta = document.root();
-  const std::vector<MetaStep> steps =
-      stepsOf(meta, options.names_folder.value_or(options.grid.parent_path()));
+  const std::vector<MetaStep> steps = stepsOf(meta, options.namesFolder());
   std::vector<double> times;
   for (const MetaStep& each : steps) times.push_back(each.time);
   const uint32_t number = chosenTimeStep(options.grid.string(), times, options.time_step);

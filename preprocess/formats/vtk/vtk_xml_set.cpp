@@ -27,7 +27,7 @@ class Gatherer {
  public:
   explicit Gatherer(const OpenGridOptions& options)
       : files_(options.temporary_folder),
-        names_folder_(options.names_folder.value_or(options.grid.parent_path())),
+        names_folder_(options.namesFolder()),
         time_step_(options.time_step) {}
 
   std::unique_ptr<DataSource> gather(const fs::path& path) {

@@ -13,7 +13,6 @@
 #include "preprocess/formats/xdmf/xdmf_items.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
-#include "stream/base/paths.h"
 #include "stream/base/words.h"
 
 namespace curvisplat {
@@ -24,7 +23,7 @@ constexpr uint64_t kLooked = 2048;
 class Reader {
  public:
   explicit Reader(const OpenGridOptions& options)
-      : document_(options.grid), items_(document_, options.names_folder.value_or(folderOf(options.grid))) {
+      : document_(options.grid), items_(document_, options.namesFolder()) {
     for (const pugi::xml_node grid : document_.domain().children("Grid")) findLeaves(grid, std::nullopt, 0);
     if (leaves_.empty()) throw Error("{}: has no Grid; expected a structured grid", name());
     chooseStep(options);
