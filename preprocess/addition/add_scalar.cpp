@@ -1,7 +1,5 @@
 #include "preprocess/addition/add_scalar.h"
 
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <glm/vector_relational.hpp>
 #include <memory>
@@ -13,6 +11,7 @@
 #include "preprocess/addition/further_faces.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
+#include "preprocess/convert/conversion_threads.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
@@ -280,7 +279,7 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& giv
     ConversionWorkspace::clearKilled(options.cache);
   }
 
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
+  const ConversionThreads threads(plan.threads);
   const RoomNeeded room{{options.cache, temporaryFolder(options)},
                         "the added scalars and their temporary files",
                         kFullDiskHint};

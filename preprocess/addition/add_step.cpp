@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +12,7 @@
 #include "preprocess/addition/step_references.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
+#include "preprocess/convert/conversion_threads.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
@@ -21,6 +20,7 @@
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scratch_folder.h"
+#include "preprocess/grid/parallel.h"
 #include "preprocess/grid/reordered_source.h"
 #include "preprocess/grid/time_steps.h"
 #include "preprocess/survey/grid_checksum.h"
@@ -83,7 +83,7 @@ struct SlabSurvey {
     const NodeArrays& nodes = loaded.nodes;
     for (size_t scalar = 0; scalar < ranges.size(); ++scalar) {
       const std::vector<float>& values = nodes.scalars[scalar];
-      ranges[scalar] = tbb::parallel_reduce(
+      ranges[scalar] = parallelReduce(
           tbb::blocked_range<size_t>(0, values.size(), kNodesPerTask), ranges[scalar],
           [&](const tbb::blocked_range<size_t>& part, ScalarRange range) {
             for (size_t n = part.begin(); n < part.end(); ++n) {
@@ -136,7 +136,7 @@ class StepAddition {
   }
 
   AddStepReport run() {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan_.threads);
+    const ConversionThreads threads(plan_.threads);
     const bool known = cache_.series().steps[cache_.step()].grid_checksum != 0;
     const bool try_first = grid_ && known && !options_.expect_new_geometry && centring() == Centring::kNode;
     if (!try_first || !addToLastGeometry()) addAfterScan();

@@ -1,13 +1,12 @@
 #include "preprocess/addition/build_values.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <utility>
 
 #include "preprocess/addition/value_record.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/codec/geometry_codec.h"
@@ -35,7 +34,7 @@ void ValueBuilder::build(LoadedValues& loaded) {
 
   const std::vector<Leaf> leaves = leavesOf(loaded);
   std::unique_ptr<OctantMerger> continued = std::move(open_);
-  tbb::parallel_for(size_t{0}, leaves.size(), [&](size_t n) {
+  parallelFor(size_t{0}, leaves.size(), [&](size_t n) {
     const Leaf& leaf = leaves[n];
     if (leaf.is_continued) return buildLeaf(leaf, loaded, *continued, built);
     if (!leaf.goes_on) return buildLeaf(leaf, loaded, scratch_.local().merger, built);
@@ -54,8 +53,8 @@ void ValueBuilder::build(LoadedValues& loaded) {
   }
   for (size_t level = inner.size(); level-- > 0;) {
     const std::vector<uint32_t>& positions = inner[level];
-    tbb::parallel_for(size_t{0}, positions.size(),
-                      [&](size_t n) { built[positions[n] - begin] = buildInner(positions[n], loaded); });
+    parallelFor(size_t{0}, positions.size(),
+                [&](size_t n) { built[positions[n] - begin] = buildInner(positions[n], loaded); });
     for (const uint32_t position : positions) {
       octants_.erase((*order_)[position]);
       giveToParent(position, std::move(built[position - begin].octant));

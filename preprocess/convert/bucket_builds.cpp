@@ -26,7 +26,7 @@ BucketBuilds::BucketBuilds(Stages stages) : stages_(std::move(stages)) {}
 BucketBuilds::~BucketBuilds() = default;
 
 std::optional<uint32_t> BucketBuilds::run() {
-  tasks_.run([this] { startNext(); });
+  run([this] { startNext(); });
   tasks_.wait();  // a task that throws ends the others: none begins any more
   return too_large_;
 }
@@ -51,7 +51,7 @@ void BucketBuilds::startNext() {
     noteBuilt(bucket);
     return;
   }
-  for (size_t n = 0; n < cells; ++n) tasks_.run([this, &bucket, n] { build(bucket, n); });
+  for (size_t n = 0; n < cells; ++n) run([this, &bucket, n] { build(bucket, n); });
 }
 
 void BucketBuilds::build(Bucket& bucket, size_t cell) {
@@ -71,7 +71,7 @@ void BucketBuilds::noteBegun() {
 void BucketBuilds::startNextIfDue() {
   if (!latest_has_begun_ || buckets_.size() > 1) return;
   latest_has_begun_ = false;
-  tasks_.run([this] { startNext(); });
+  run([this] { startNext(); });
 }
 
 void BucketBuilds::noteBuilt(Bucket& bucket) {

@@ -22,6 +22,7 @@
 
 #include "preprocess/convert/bucket_loader.h"
 #include "preprocess/convert/build_cell.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {
@@ -66,6 +67,10 @@ class BucketBuilds {
  private:
   struct Bucket;
 
+  template <typename Task>
+  void run(const Task& task) {
+    tasks_.run(withPermit(task));
+  }
   void startNext();
   void build(Bucket& bucket, size_t cell);
   void noteBegun();

@@ -11,6 +11,7 @@
 
 #include "stream/base/check.h"
 #include "stream/base/checksum.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/file.h"
 #include "stream/base/freed_memory.h"
 #include "stream/base/mutex.h"
@@ -202,7 +203,10 @@ struct BucketFile::State {
     while (at != kNoChunk) {
       // The next chunk's beginning comes along with a short one.
       const std::span<std::byte> whole = std::span(chunk).first(std::min<uint64_t>(chunk_bytes, end - at));
-      input->readAt(at, whole);
+      {
+        const GivenBackPermit given_back;
+        input->readAt(at, whole);
+      }
       ChunkHeader header;
       std::memcpy(&header, whole.data(), sizeof header);
       require(header.bytes <= whole.size() - sizeof header, at);

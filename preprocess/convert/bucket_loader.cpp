@@ -7,6 +7,7 @@
 
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/check.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/trace.h"
 #include "stream/model/brick.h"
 
@@ -124,9 +125,13 @@ void BucketLoader::forEachReader(const std::function<void(Reader&, size_t)>& job
       readers_[number].error = std::current_exception();
     }
   };
-  team_->start([&](unsigned number) { run(number + 1); });
+  team_->start([&, permits = Computing::ofThisThread()](unsigned number) {
+    const Computing computing(permits, Urgency::kUrgent);
+    run(number + 1);
+  });
   run(0);
   {
+    const GivenBackPermit given_back;
     const TraceScope trace("wait for readers", TraceKind::kWait);
     team_->wait();
   }

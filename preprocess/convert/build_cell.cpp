@@ -1,7 +1,6 @@
 #include "preprocess/convert/build_cell.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 
 #include "preprocess/convert/merge_levels.h"
 #include "preprocess/convert/splat_record.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 #include "stream/base/trace.h"
@@ -46,7 +46,7 @@ std::array<size_t, 9> divide(const Cell& cell, RecordSpan records) {
   std::vector<Part> parts((records.size() + kRecordsPerTask - 1) / kRecordsPerTask);
   std::vector<uint8_t> octants(records.size());
   const auto forEachPart = [&](const auto& work) {
-    tbb::parallel_for(size_t{0}, parts.size(), [&](size_t n) {
+    parallelFor(size_t{0}, parts.size(), [&](size_t n) {
       const TraceScope trace("divide cell");
       const size_t begin = n * kRecordsPerTask;
       work(parts[n], begin, std::min(begin + kRecordsPerTask, records.size()));
@@ -176,7 +176,7 @@ Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool
 Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, bool is_top) {
   const std::array<size_t, 9> begins = divide(cell, records);
   std::array<Subtree, 8> children;
-  tbb::parallel_for(size_t{0}, size_t{8}, [&](size_t octant) {
+  parallelFor(size_t{0}, size_t{8}, [&](size_t octant) {
     const size_t count = begins[octant + 1] - begins[octant];
     if (count == 0) return;
     children[octant] =

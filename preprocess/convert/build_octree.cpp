@@ -1,7 +1,5 @@
 #include "preprocess/convert/build_octree.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -10,6 +8,7 @@
 #include "preprocess/convert/counting_grid.h"
 #include "preprocess/convert/divide_bucket.h"
 #include "preprocess/convert/splat_record.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/check.h"
 #include "stream/base/trace.h"
 
@@ -67,7 +66,7 @@ void OctreeBuilder::matchBricks() {
     if (built.first_brick + built.bricks > complete) built = {};
   writer_->keep(complete);
   writer_->histograms().clear();
-  tbb::parallel_for(uint64_t{0}, complete, [&](uint64_t id) {
+  parallelFor(uint64_t{0}, complete, [&](uint64_t id) {
     const BrickSplats brick = writer_->readBack(id);
     const bool is_leaf = !brick.runs.empty();
     if (is_leaf) writer_->histograms().add(brick);

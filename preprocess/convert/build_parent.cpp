@@ -1,13 +1,13 @@
 #include "preprocess/convert/build_parent.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "preprocess/convert/merge_levels.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -18,7 +18,7 @@ BuiltCell buildFromChildren(const RootCube& root, size_t variables, const Cell& 
   tbb::enumerable_thread_specific<OctantMerger> mergers([&] { return OctantMerger(root, variables); });
   // Of its own: where a loop around this one is cancelled, this one would end early as well, with children missing.
   tbb::task_group_context own(tbb::task_group_context::isolated);
-  tbb::parallel_for(
+  parallelFor(
       size_t{0}, size_t{8},
       [&](size_t octant) {
         const ChildBricks& child = children[octant];

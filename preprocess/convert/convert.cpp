@@ -1,7 +1,5 @@
 #include "preprocess/convert/convert.h"
 
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "preprocess/convert/conversion.h"
+#include "preprocess/convert/conversion_threads.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
@@ -155,7 +154,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given_opti
     reportCache(Manifest::fromJson(readTextFile(manifest), manifest), report);
     report.resumed_bricks = report.bricks;
   } else {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
+    const ConversionThreads threads(plan.threads);
     EstimateNeeds estimate;
     if (grid)
       estimate = [&](const std::filesystem::path& folder) {

@@ -1,7 +1,6 @@
 #include "preprocess/convert/mesh_origin.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include "preprocess/gather/cell_slopes.h"
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/point_sums.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/error.h"
 #include "stream/base/freed_memory.h"
 #include "stream/base/trace.h"
@@ -93,7 +93,7 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
     const size_t tasks = (points.x.size() + kPointsPerTask - 1) / kPointsPerTask;
     const uint32_t level = counts.level();
     std::vector<VoxelRuns> runs(tasks, VoxelRuns(level));
-    tbb::parallel_for(size_t{0}, tasks, [&](size_t task) {
+    parallelFor(size_t{0}, tasks, [&](size_t task) {
       const TraceScope trace("splats of cells");
       const size_t end = std::min(points.x.size(), (task + 1) * kPointsPerTask);
       for (size_t n = task * kPointsPerTask; n < end; ++n)

@@ -1,9 +1,6 @@
 #include "preprocess/convert/scan.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <bit>
@@ -12,6 +9,7 @@
 #include <optional>
 
 #include "preprocess/convert/shared_passes.h"
+#include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
@@ -59,14 +57,14 @@ class PartCounter {
       const size_t end = std::min(positions, begin + kPositionsAtOnce);
       std::vector<VoxelRuns> gathered((end - begin + kNodesPerTask - 1) / kNodesPerTask,
                                       VoxelRuns(counts_.level()));
-      tbb::parallel_invoke([&] { addGathered(); },
-                           [&] {
-                             tbb::parallel_for(size_t{0}, gathered.size(), [&](size_t task) {
-                               const TraceScope trace("count nodes");
-                               const size_t first = begin + task * kNodesPerTask;
-                               gather(gathered[task], first, std::min(end, first + kNodesPerTask));
-                             });
-                           });
+      parallelInvoke([&] { addGathered(); },
+                     [&] {
+                       parallelFor(size_t{0}, gathered.size(), [&](size_t task) {
+                         const TraceScope trace("count nodes");
+                         const size_t first = begin + task * kNodesPerTask;
+                         gather(gathered[task], first, std::min(end, first + kNodesPerTask));
+                       });
+                     });
       gathered_ = std::move(gathered);
     }
   }
@@ -118,7 +116,7 @@ GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const 
   while (const LoadedSlab* loaded = stream.next()) {
     const size_t count = loaded->nodes.x.size();
     // The smallest and the largest do not depend on how the work is divided.
-    GridSurvey of_slab = tbb::parallel_reduce(
+    GridSurvey of_slab = parallelReduce(
         tbb::blocked_range<size_t>(0, count, kNodesPerTask), none,
         [&](const tbb::blocked_range<size_t>& range, GridSurvey bounds) {
           const TraceScope trace("scan nodes");

@@ -1,13 +1,13 @@
 #include "preprocess/convert/scatter.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_record.h"
+#include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/cell_splats.h"
 #include "stream/base/trace.h"
@@ -52,7 +52,7 @@ class SplatStream {
     const Slab& slab = loaded.slab;
     const GridBlock& block = (*blocks_)[slab.block];
     const std::vector<Task> tasks = tasksOf(slab.box, block, what);
-    tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t n) {
+    parallelFor(size_t{0}, tasks.size(), [&](size_t n) {
       progress_->throwIfStopped();
       const TraceScope trace("make splats");
       const Task& task = tasks[n];

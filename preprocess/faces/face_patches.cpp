@@ -1,7 +1,5 @@
 #include "preprocess/faces/face_patches.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -9,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "preprocess/grid/parallel.h"
 #include "stream/base/trace.h"
 #include "stream/codec/face_codec.h"
 
@@ -98,7 +97,7 @@ class PatchBuilder {
         for (Built& b : built) append(b, nodes, range.begin);
       }
     }
-    tbb::parallel_for(size_t{0}, built.size(), [&](size_t n) {
+    parallelFor(size_t{0}, built.size(), [&](size_t n) {
       const TraceScope trace("complete patch");
       complete(built[n]);
     });
@@ -271,7 +270,7 @@ std::vector<FacePatch> writePatches(const FaceSpool& spool, uint32_t face, const
       progress.throwIfStopped();
       std::vector<Built> part = builder.part(stride, first);
       std::vector<std::vector<std::byte>> streams(part.size());
-      tbb::parallel_for(size_t{0}, part.size(), [&](size_t n) {
+      parallelFor(size_t{0}, part.size(), [&](size_t n) {
         const TraceScope trace("encode patch");
         if (is_needed(part[n])) streams[n] = encodePatch(part[n].lattice);
       });

@@ -1,14 +1,13 @@
 #include "preprocess/faces/face_spool.h"
 
 #include <tbb/blocked_range2d.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/check.h"
 #include "stream/base/mutex.h"
 #include "stream/base/trace.h"
@@ -97,9 +96,8 @@ void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progre
       first_face = static_cast<size_t>(of_block.data() - faces_.data());
       end_face = first_face + of_block.size();
     }
-    tbb::parallel_invoke(
-        [&] { addEnds(*loaded, abutting); },
-        [&] { tbb::parallel_for(first_face, end_face, [&](size_t face) { take(*loaded, face); }); });
+    parallelInvoke([&] { addEnds(*loaded, abutting); },
+                   [&] { parallelFor(first_face, end_face, [&](size_t face) { take(*loaded, face); }); });
     progress.advance(rowsOf(loaded->slab.box) *
                      loaded->slab.box.rowNodes(reader_.source().description().blocks[block].ni));
   }
@@ -167,14 +165,14 @@ void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const
   const uint64_t j1 = std::min(slab.box.j1, size[1] - 1), k1 = std::min(slab.box.k1, size[2] - 1);
   constexpr uint64_t kRowsPerTask = 32;
   Mutex adding;
-  tbb::parallel_for(tbb::blocked_range2d<uint64_t>(slab.box.k0, std::max(slab.box.k0, k1), 1, slab.box.j0,
-                                                   std::max(slab.box.j0, j1), kRowsPerTask),
-                    [&](const tbb::blocked_range2d<uint64_t>& rows) {
-                      const TraceScope trace("take ends of blocks");
-                      const NodeBox box{rows.cols().begin(), rows.cols().end(), rows.rows().begin(),
-                                        rows.rows().end(),   slab.box.i0,       slab.box.i1};
-                      addEndsIn(loaded, box, abutting, adding);
-                    });
+  parallelFor(tbb::blocked_range2d<uint64_t>(slab.box.k0, std::max(slab.box.k0, k1), 1, slab.box.j0,
+                                             std::max(slab.box.j0, j1), kRowsPerTask),
+              [&](const tbb::blocked_range2d<uint64_t>& rows) {
+                const TraceScope trace("take ends of blocks");
+                const NodeBox box{rows.cols().begin(), rows.cols().end(), rows.rows().begin(),
+                                  rows.rows().end(),   slab.box.i0,       slab.box.i1};
+                addEndsIn(loaded, box, abutting, adding);
+              });
 }
 
 /// Of the cells whose lowest nodes are in `box`. Several threads, each with a box.

@@ -1,13 +1,14 @@
 #include "preprocess/gather/cell_faces.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <glm/geometric.hpp>
 #include <limits>
+
+#include "preprocess/grid/parallel.h"
 
 namespace curvisplat {
 namespace {
@@ -98,12 +99,12 @@ void FaceList::assign(const GatheredCells& cells) {
   corners.resize(begins_.back());
   places.resize(begins_.back());
   std::atomic<bool> any_collapsed = false;
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
-                    [&](const tbb::blocked_range<size_t>& part) {
-                      bool collapsed = false;
-                      for (size_t n = part.begin(); n < part.end(); ++n) collapsed |= assignCell(cells, n);
-                      if (collapsed) any_collapsed = true;
-                    });
+  parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+              [&](const tbb::blocked_range<size_t>& part) {
+                bool collapsed = false;
+                for (size_t n = part.begin(); n < part.end(); ++n) collapsed |= assignCell(cells, n);
+                if (collapsed) any_collapsed = true;
+              });
   if (any_collapsed) leaveOutCollapsed();
 }
 

@@ -1,8 +1,6 @@
 #include "preprocess/gather/cell_slopes.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +9,7 @@
 #include <limits>
 
 #include "preprocess/gather/streams_file.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/freed_memory.h"
 #include "stream/base/trace.h"
 
@@ -208,14 +207,14 @@ CellSlopes::~CellSlopes() = default;
 
 void CellSlopes::add(const GatheredCells& cells) {
   of_cells_.resize(cells.size());
-  tbb::parallel_invoke([&] { list_.assign(cells); },
-                       [&] {
-                         tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
-                                           [&](const tbb::blocked_range<size_t>& part) {
-                                             setBodies(cells, part.begin(), part.end(), of_cells_);
-                                           });
-                       });
-  tbb::parallel_invoke([&] { addFaces(cells); }, [&] { addBodies(cells); });
+  parallelInvoke([&] { list_.assign(cells); },
+                 [&] {
+                   parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+                               [&](const tbb::blocked_range<size_t>& part) {
+                                 setBodies(cells, part.begin(), part.end(), of_cells_);
+                               });
+                 });
+  parallelInvoke([&] { addFaces(cells); }, [&] { addBodies(cells); });
 }
 
 void CellSlopes::addBodies(const GatheredCells& cells) {
@@ -287,27 +286,26 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, PointSums::Coun
   }
   const OuterPlanes::OfRange planes = planes_->load(range);
   std::atomic<uint64_t> splats = 0, degenerate = 0;
-  tbb::parallel_for(
-      tbb::blocked_range<size_t>(0, cells.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
-        NodeSplat splat;
-        std::vector<SplatScalar> values(fields_);
-        std::vector<float> own(fields_), others;
-        std::vector<glm::dvec3> steps;
-        std::vector<OuterPlane> of_border;
-        uint64_t made = 0, flat = 0;
-        for (size_t n = part.begin(); n < part.end(); ++n) {
-          const BodyRecord body = cells.body(n);
-          cells.values(n, own);
-          cells.neighbours(n, steps, others);
-          if (!(body.body.volume > 0)) ++flat;
-          splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
-          splat.border_code = meshBorderCode(planes.of(body.cell, of_border), splat.splat, kNextOfCells);
-          take(splat, values);
-          ++made;
-        }
-        splats += made;
-        degenerate += flat;
-      });
+  parallelFor(tbb::blocked_range<size_t>(0, cells.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
+    NodeSplat splat;
+    std::vector<SplatScalar> values(fields_);
+    std::vector<float> own(fields_), others;
+    std::vector<glm::dvec3> steps;
+    std::vector<OuterPlane> of_border;
+    uint64_t made = 0, flat = 0;
+    for (size_t n = part.begin(); n < part.end(); ++n) {
+      const BodyRecord body = cells.body(n);
+      cells.values(n, own);
+      cells.neighbours(n, steps, others);
+      if (!(body.body.volume > 0)) ++flat;
+      splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
+      splat.border_code = meshBorderCode(planes.of(body.cell, of_border), splat.splat, kNextOfCells);
+      take(splat, values);
+      ++made;
+    }
+    splats += made;
+    degenerate += flat;
+  });
   counts.splats += splats;
   counts.degenerate += degenerate;
 }

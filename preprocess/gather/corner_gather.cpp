@@ -1,7 +1,6 @@
 #include "preprocess/gather/corner_gather.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
@@ -10,7 +9,9 @@
 
 #include "preprocess/gather/point_pages.h"
 #include "preprocess/gather/streams_file.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/check.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -50,10 +51,10 @@ class CornerGather::UsedBeside {
   /// next() is full. Waits until those before it have been used.
   void use() {
     task_.wait();
-    task_.run([this, full = next_] {
+    task_.run(withPermit([this, full = next_] {
       const TraceScope trace("use cells");
       (*use_)(cells_[full]);
-    });
+    }));
     next_ = 1 - next_;
   }
   /// Waits for the last ones. Throws what `use` threw.
@@ -171,17 +172,17 @@ void CornerGather::gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& use
         ranges[done].count -= begin;
         return false;
       }
-      tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
-                        [&](const tbb::blocked_range<size_t>& part) {
-                          for (size_t n = part.begin(); n < part.end(); ++n) {
-                            for (size_t at = cells.corner_begin[n]; at < cells.corner_begin[n + 1]; ++at) {
-                              cells.at[at] = pages.at(cells.corners[at]);
-                              std::copy_n(pages.values(cells.corners[at]), corner_fields_,
-                                          cells.corner_values.data() + at * corner_fields_);
-                            }
-                            dropIfBlanked(cells, n);
-                          }
-                        });
+      parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+                  [&](const tbb::blocked_range<size_t>& part) {
+                    for (size_t n = part.begin(); n < part.end(); ++n) {
+                      for (size_t at = cells.corner_begin[n]; at < cells.corner_begin[n + 1]; ++at) {
+                        cells.at[at] = pages.at(cells.corners[at]);
+                        std::copy_n(pages.values(cells.corners[at]), corner_fields_,
+                                    cells.corner_values.data() + at * corner_fields_);
+                      }
+                      dropIfBlanked(cells, n);
+                    }
+                  });
       used.use();
     }
     progress_->advance(loaded.range.count);

@@ -1,7 +1,6 @@
 #include "preprocess/gather/face_matcher.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <cstring>
 #include <utility>
 
+#include "preprocess/grid/parallel.h"
 #include "stream/base/freed_memory.h"
 
 namespace curvisplat {
@@ -123,14 +123,14 @@ void FaceMatcher::add(std::span<const FaceCorners> faces, const FaceCalls& calls
 /// Of the faces that were added and still wait.
 void FaceMatcher::makeRecords(const FaceCalls& calls) {
   std::erase_if(taken_, [&](const auto& taken) { return waiting_[taken.first].face != taken.second; });
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, taken_.size(), kRecordsPerTask),
-                    [&](const tbb::blocked_range<size_t>& part) {
-                      for (size_t n = part.begin(); n < part.end(); ++n) {
-                        const auto [entry, face] = taken_[n];
-                        calls.put(face, recordOf(entry));
-                        waiting_[entry].face = kHasRecord;
-                      }
-                    });
+  parallelFor(tbb::blocked_range<size_t>(0, taken_.size(), kRecordsPerTask),
+              [&](const tbb::blocked_range<size_t>& part) {
+                for (size_t n = part.begin(); n < part.end(); ++n) {
+                  const auto [entry, face] = taken_[n];
+                  calls.put(face, recordOf(entry));
+                  waiting_[entry].face = kHasRecord;
+                }
+              });
 }
 
 void FaceMatcher::matchStream(size_t stream, const TakePair& pair, const TakeSingle& single) const {

@@ -1,10 +1,10 @@
 #include "preprocess/gather/point_pages.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
+#include "preprocess/grid/parallel.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -44,16 +44,16 @@ bool PointPages::hold(std::span<const uint64_t> points) {
 
 void PointPages::take(const LoadedPoints& loaded) {
   const MeshPoints& points = loaded.points;
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, points.x.size(), kPointsPerTask),
-                    [&](const tbb::blocked_range<size_t>& part) {
-                      for (size_t n = part.begin(); n < part.end(); ++n) {
-                        const uint64_t point = loaded.range.number + n, in_page = point & (kPoints - 1);
-                        Page& page = pages_[slots_.slotOf(point >> kShift)];
-                        page.at[in_page] = {points.x[n], points.y[n], points.z[n]};
-                        for (size_t field = 0; field < fields_; ++field)
-                          page.values[in_page * fields_ + field] = points.scalars[field][n];
-                      }
-                    });
+  parallelFor(tbb::blocked_range<size_t>(0, points.x.size(), kPointsPerTask),
+              [&](const tbb::blocked_range<size_t>& part) {
+                for (size_t n = part.begin(); n < part.end(); ++n) {
+                  const uint64_t point = loaded.range.number + n, in_page = point & (kPoints - 1);
+                  Page& page = pages_[slots_.slotOf(point >> kShift)];
+                  page.at[in_page] = {points.x[n], points.y[n], points.z[n]};
+                  for (size_t field = 0; field < fields_; ++field)
+                    page.values[in_page * fields_ + field] = points.scalars[field][n];
+                }
+              });
 }
 
 }  // namespace curvisplat

@@ -2,8 +2,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include <cstring>
 
 #include "preprocess/gather/streams_file.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -98,7 +97,7 @@ uint64_t PointSums::bytesOfWaiting(uint64_t corners, uint64_t face_words, size_t
 PointSums::~PointSums() = default;
 
 void PointSums::add(const GatheredCells& cells) {
-  tbb::parallel_invoke([&] { borders_->add(cells); }, [&] { sum(cells); });
+  parallelInvoke([&] { borders_->add(cells); }, [&] { sum(cells); });
 }
 
 void PointSums::sum(const GatheredCells& cells) {
@@ -150,14 +149,14 @@ void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) 
     while (end < cells.size() && cells.corner_begin[end + 1] - first_corner <= most_corners) ++end;
     const size_t corners = cells.corner_begin[end] - first_corner;
     moments_.resize(std::max(moments_.size(), corners * stride));
-    tbb::parallel_for(tbb::blocked_range<size_t>(begin, end, kCellsPerTask),
-                      [&](const tbb::blocked_range<size_t>& part) {
-                        const size_t from = cells.corner_begin[part.begin()] - first_corner;
-                        momentsOf(cells, part.begin(), part.end(), fields_, scratch.local(),
-                                  std::span(moments_).subspan(from * stride));
-                      });
+    parallelFor(tbb::blocked_range<size_t>(begin, end, kCellsPerTask),
+                [&](const tbb::blocked_range<size_t>& part) {
+                  const size_t from = cells.corner_begin[part.begin()] - first_corner;
+                  momentsOf(cells, part.begin(), part.end(), fields_, scratch.local(),
+                            std::span(moments_).subspan(from * stride));
+                });
     // Each point's sum has the order of the cells, whoever adds them. A page is summed by one task.
-    tbb::parallel_for(size_t{0}, stripes, [&](size_t stripe) {
+    parallelFor(size_t{0}, stripes, [&](size_t stripe) {
       for (size_t n = begin; n < end; ++n) {
         if (cells.shapes[n] == CellKind::kNone) continue;
         for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner) {
@@ -183,28 +182,27 @@ void PointSums::flushRange(const PointRange& range, const OuterPlanes::OfRange& 
                            Counts& counts) {
   const size_t stride = momentCount(fields_);
   std::atomic<uint64_t> splats = 0, degenerate = 0;
-  tbb::parallel_for(
-      tbb::blocked_range<uint64_t>(range.first, range.end, 1024),
-      [&](const tbb::blocked_range<uint64_t>& part) {
-        const TraceScope trace("splats of points");
-        NodeSplat splat;
-        std::vector<SplatScalar> values(fields_);
-        std::vector<OuterPlane> of_point;
-        uint64_t made = 0, flat = 0;
-        for (uint64_t point = part.begin(); point < part.end(); ++point) {
-          const double* const sums = sums_->sums(point);
-          if (std::isnan(sums[0])) continue;
-          const std::span<const double> moments(sums + 3, stride);
-          if (!(moments[0] > 0)) ++flat;
-          splatOfPoint(point, {{sums[0], sums[1], sums[2]}, {sums_->values(point), fields_}, moments}, splat,
-                       values);
-          splat.border_code = meshBorderCode(planes.of(point, of_point), splat.splat, kNextOfPoints);
-          take(splat, values);
-          ++made;
-        }
-        splats += made;
-        degenerate += flat;
-      });
+  parallelFor(tbb::blocked_range<uint64_t>(range.first, range.end, 1024),
+              [&](const tbb::blocked_range<uint64_t>& part) {
+                const TraceScope trace("splats of points");
+                NodeSplat splat;
+                std::vector<SplatScalar> values(fields_);
+                std::vector<OuterPlane> of_point;
+                uint64_t made = 0, flat = 0;
+                for (uint64_t point = part.begin(); point < part.end(); ++point) {
+                  const double* const sums = sums_->sums(point);
+                  if (std::isnan(sums[0])) continue;
+                  const std::span<const double> moments(sums + 3, stride);
+                  if (!(moments[0] > 0)) ++flat;
+                  splatOfPoint(point, {{sums[0], sums[1], sums[2]}, {sums_->values(point), fields_}, moments},
+                               splat, values);
+                  splat.border_code = meshBorderCode(planes.of(point, of_point), splat.splat, kNextOfPoints);
+                  take(splat, values);
+                  ++made;
+                }
+                splats += made;
+                degenerate += flat;
+              });
   counts.splats += splats;
   counts.degenerate += degenerate;
 }

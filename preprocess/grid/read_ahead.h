@@ -1,5 +1,7 @@
 // Reads the next values in threads of its own while the caller processes the current one: blocking reads stay off the TBB
 // workers. Mostly one thread is enough. There is one value more than threads; values are reused and keep their capacity.
+//
+// Reading takes a permit, too, where the thread that makes it holds one (stream/base/compute_permits.h): much of it is decoding.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
 #include "stream/base/thread_name.h"
 #include "stream/base/trace.h"
@@ -20,13 +23,16 @@ namespace curvisplat {
 template <typename T>
 class ReadAhead {
  public:
-  /// `fill` overwrites a value and returns true, or returns false at the end.
+  /// `fill` overwrites a value and returns true, or returns false at the end. It gives its permit back where it waits for other threads.
   explicit ReadAhead(std::function<bool(T&)> fill)
       : ReadAhead([fill = std::move(fill)](T& value, uint64_t) { return fill(value); }, 1) {}
 
   /// The same by `readers` threads, which call `fill` at the same time, with the numbers of the values: 0, 1, ...
   ReadAhead(std::function<bool(T&, uint64_t)> fill, unsigned readers)
-      : fill_(std::move(fill)), values_(readers + 1), is_filled_(values_.size()) {
+      : fill_(std::move(fill)),
+        permits_(Computing::ofThisThread()),
+        values_(readers + 1),
+        is_filled_(values_.size()) {
     try {
       while (threads_.size() < readers) threads_.emplace_back([this] { fillAll(); });
     } catch (const std::system_error&) {
@@ -40,6 +46,7 @@ class ReadAhead {
       stopped_ = true;
     }
     changed_.notify_all();
+    const GivenBackPermit given_back;
     for (std::thread& thread : threads_) thread.join();
   }
 
@@ -49,17 +56,26 @@ class ReadAhead {
   /// Waits for the next value, valid until the next call; null at the end. Throws what `fill` threw. For one
   /// thread.
   T* next() {
-    MutexLock lock(mutex_);
-    given_back_ = taken_;
+    {
+      const MutexLock lock(mutex_);
+      given_back_ = taken_;
+    }
     changed_.notify_all();
-    return take(lock);
+    return take();
   }
 
   /// In the place of next(), for callers that process several values at a time: the value is valid until it is given back. Waits
   /// for ever where all values are taken. One thread at a time.
   T* take() {
-    MutexLock lock(mutex_);
-    return take(lock);
+    if (!isNextThere()) awaitNext();
+    const MutexLock lock(mutex_);
+    if (taken_ < end_) {
+      const size_t place = taken_++ % values_.size();
+      is_filled_[place] = false;
+      return &values_[place];
+    }
+    if (error_) std::rethrow_exception(error_);
+    return nullptr;
   }
   /// Of the values taken, the one that was taken first. Any thread.
   void giveBack() {
@@ -69,19 +85,17 @@ class ReadAhead {
   }
 
  private:
-  T* take(MutexLock& lock) REQUIRES(mutex_) {
-    const size_t place = taken_ % values_.size();
-    {
-      const TraceScope trace("wait for reading", TraceKind::kWait);
-      while (!is_filled_[place] && taken_ < end_) changed_.wait(lock);
-    }
-    if (taken_ < end_) {
-      is_filled_[place] = false;
-      ++taken_;
-      return &values_[place];
-    }
-    if (error_) std::rethrow_exception(error_);
-    return nullptr;
+  /// The value to be taken next, or the end.
+  bool isThere() const REQUIRES(mutex_) { return is_filled_[taken_ % values_.size()] || taken_ >= end_; }
+  bool isNextThere() {
+    const MutexLock lock(mutex_);
+    return isThere();
+  }
+  void awaitNext() {
+    const GivenBackPermit given_back;
+    const TraceScope trace("wait for reading", TraceKind::kWait);
+    MutexLock lock(mutex_);
+    while (!isThere()) changed_.wait(lock);
   }
 
   void fillAll() {
@@ -98,6 +112,7 @@ class ReadAhead {
       bool more = false;
       std::exception_ptr error;
       try {
+        const Computing computing(permits_, Urgency::kUrgent);
         const TraceScope trace("read ahead");
         more = fill_(values_[place], number);
       } catch (...) {
@@ -115,6 +130,7 @@ class ReadAhead {
   }
 
   const std::function<bool(T&, uint64_t)> fill_;
+  ComputePermits* const permits_;
   std::vector<T> values_;
   Mutex mutex_;
   ConditionVariable changed_;

@@ -1,12 +1,11 @@
 #include "preprocess/overset/block_owners.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <compare>
 #include <limits>
 #include <utility>
 
+#include "preprocess/grid/parallel.h"
 #include "preprocess/splats/covered_part.h"
 
 namespace curvisplat {
@@ -177,8 +176,7 @@ class BlockOwners::SlabCover {
   template <typename Each>
   void forRows(const NodeBox& box, const Each& each) const {
     const uint64_t width = box.j1 - box.j0;
-    tbb::parallel_for(uint64_t{0}, rowsOf(box),
-                      [&](uint64_t n) { each(box.j0 + n % width, box.k0 + n / width); });
+    parallelFor(uint64_t{0}, rowsOf(box), [&](uint64_t n) { each(box.j0 + n % width, box.k0 + n / width); });
   }
   /// Of a row of `box`.
   template <typename Each>

@@ -1,12 +1,11 @@
 #include "preprocess/overset/cell_tree.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 #include <utility>
 
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/freed_memory.h"
 
 namespace curvisplat {
@@ -38,7 +37,7 @@ CellTree::CellTree(const GridBlock& block, LoadedSlab loaded, std::vector<uint8_
   sizes_.assign(loaded_.nodes.x.size(), kNoCell);
   const std::vector<uint8_t>& blank = loaded_.nodes.blank;
   const uint8_t corner_marks = centring == Centring::kCell ? uint8_t{kNoNode} : uint8_t{0xff};
-  tbb::parallel_for(all_.begin[2], all_.end[2], [&](uint32_t k) {
+  parallelFor(all_.begin[2], all_.end[2], [&](uint32_t k) {
     for (uint32_t j = all_.begin[1]; j < all_.end[1]; ++j)
       for (uint32_t i = all_.begin[0]; i < all_.end[0]; ++i) {
         const size_t cell = elementOf(i, j, k);

@@ -1,12 +1,11 @@
 #include "preprocess/overset/sample_cells.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/parallel.h"
 
 namespace curvisplat {
 
@@ -22,7 +21,7 @@ SampleCells::SampleCells(const GridBlock& block, const LoadedSlab& loaded, std::
   const bool cells = centring == Centring::kCell;
   sizes_.assign(nodes.x.size(), kNoCell);
   there_.assign(nodes.x.size(), 0);
-  tbb::parallel_for(uint64_t{0}, planes, [&](uint64_t k) {
+  parallelFor(uint64_t{0}, planes, [&](uint64_t k) {
     for (uint64_t j = 0; j < rows; ++j)
       for (uint64_t i = 0; i < row; ++i) {
         const size_t at = k * strides_[2] + j * strides_[1] + i;

@@ -1,6 +1,5 @@
 #include "preprocess/splats/abutting_faces.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/grid/parallel.h"
 #include "preprocess/splats/coincidence_sweep.h"
 #include "stream/base/check.h"
 #include "stream/base/mutex.h"
@@ -147,7 +147,7 @@ void AbuttingFaces::match(const Progress& progress) {
   const std::vector<SweepRange> ranges =
       coincidenceRanges(centres_, threads * kRangesOfThread, sweptCentre, reach_, coordinate_bytes_);
   Mutex noting;
-  tbb::parallel_for(size_t{0}, ranges.size(), [&](size_t n) {
+  parallelFor(size_t{0}, ranges.size(), [&](size_t n) {
     const TraceScope trace("match faces");
     std::vector<std::vector<uint64_t>> sets;
     CoincidenceSweep sweep(coordinate_bytes_, [&](size_t set) {

@@ -1,6 +1,5 @@
 #include "preprocess/splats/seams.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/grid/parallel.h"
 #include "preprocess/splats/coincidence_sweep.h"
 #include "preprocess/splats/joint_sides.h"
 #include "preprocess/splats/seam_sorter.h"
@@ -130,7 +130,7 @@ struct SeamMerger::State {
   void sweepRanges(int coordinate_bytes, const JointNodes::Sink& sink) {
     const auto threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
     const std::vector<SweepRange> ranges = sortedRanges(threads, coordinate_bytes);
-    tbb::parallel_for(size_t{0}, ranges.size(), [&](size_t n) {
+    parallelFor(size_t{0}, ranges.size(), [&](size_t n) {
       const TraceScope trace("merge seams");
       sweep(
           coordinate_bytes, [&](const SeamSorter::Visit& visit) { sorter.visit(ranges[n], visit); }, sink);

@@ -1,13 +1,13 @@
 #include "preprocess/survey/cell_survey.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
 #include <glm/common.hpp>
 
 #include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/mutex.h"
@@ -86,7 +86,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, const Surv
     // Counts, minima and maxima do not depend on how the work is divided.
     survey = unitedSurvey(
         std::move(survey),
-        tbb::parallel_reduce(
+        parallelReduce(
             tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / row_nodes + 1), nothing,
             [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
               const TraceScope trace("scan cells");

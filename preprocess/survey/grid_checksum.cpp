@@ -1,12 +1,12 @@
 #include "preprocess/survey/grid_checksum.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
 
 #include <array>
 #include <functional>
 #include <span>
 
+#include "preprocess/grid/parallel.h"
 #include "stream/base/checksum.h"
 #include "stream/base/trace.h"
 
@@ -39,7 +39,7 @@ void GridChecksum::add(const LoadedSlab& loaded, const GridBlock& block) {
     };
     return checksumOfRow(slab.block, j, k, {of(nodes.x), of(nodes.y), of(nodes.z), of(nodes.blank)});
   };
-  sum_ += tbb::parallel_reduce(
+  sum_ += parallelReduce(
       tbb::blocked_range<uint64_t>(0, rowsOf(slab.box), kNodesPerTask / row_nodes + 1), uint64_t{0},
       [&](const tbb::blocked_range<uint64_t>& range, uint64_t sum) {
         const TraceScope trace("checksum");

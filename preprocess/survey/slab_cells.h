@@ -1,14 +1,13 @@
 // Visits the cells of a slab, for passes that locate things in them.
 #pragma once
 
-#include <tbb/parallel_for.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 
 #include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
 
 namespace curvisplat {
@@ -30,7 +29,7 @@ void forEachCell(const GridBlock& block, const LoadedSlab& loaded, const Keep& k
         each(at, strides.row, strides.plane, i, j, k);
   };
   if (loaded.nodes.x.size() > kFewNodes)
-    tbb::parallel_for(uint64_t{0}, rowsOf(slab.box), visit_row);
+    parallelFor(uint64_t{0}, rowsOf(slab.box), visit_row);
   else
     for (uint64_t n = 0; n < rowsOf(slab.box); ++n) visit_row(n);
 }

@@ -62,6 +62,10 @@ Computing::~Computing() {
   permits_->giveBack();
 }
 
+ComputePermits* Computing::ofThisThread() {
+  return this_thread ? this_thread->permits_ : nullptr;
+}
+
 void Computing::giveWay() {
   if (this_thread && this_thread->permits_->isWantedUrgently()) GivenBackPermit();
 }

@@ -1,20 +1,23 @@
 // Bounds how many threads compute at a time, whoever started them: the workers of a frame, the painter's threads, and the
-// thread that writes the last picture. There are as many permits as `--threads` says. A thread holds one while it
-// computes, and gives it back while it waits for another thread or for the disk:
+// thread that writes the last picture; or TBB's threads in a conversion, and those that read ahead of them. There are as many
+// permits as `--threads` says. A thread holds one while it computes, and gives it back while it waits for another thread or for
+// the disk:
 //
 //   Computing computing(permits);     // from here to the end of the scope, except
 //   { WaitTimer waiting(...); ... }   // in here (stage_timer.h)
 //   Computing::giveWay();             // and here, if a thread that is urgent waits for a permit
 //
 // No permit is idle while a thread waits for one. A thread with a permit waits for nothing that needs one, so there is no
-// deadlock. Urgent threads come first: those that prepare splats, until the ring between them and the painter is full.
-// The other way round the painter runs dry, and then waits while one worker waits for the turn of another.
+// deadlock. Urgent threads come first: those that prepare splats, until the ring between them and the painter is full, and
+// those that read, until all that they may read ahead is there. The other way round the painter runs dry, and then waits while
+// one worker waits for the turn of another.
 //
 // Taking and giving back cost a mutex each (20 ns), so they surround bricks and batches, never splats.
 #pragma once
 
 #include <atomic>
 #include <functional>
+#include <utility>
 
 #include "stream/base/mutex.h"
 
@@ -63,6 +66,8 @@ class Computing {
   Computing(const Computing&) = delete;
   Computing& operator=(const Computing&) = delete;
 
+  /// Those of which this thread holds one; null: it holds none.
+  static ComputePermits* ofThisThread();
   /// False if the permit was not needed any more.
   bool granted() const { return granted_; }
   /// Lets a thread that is urgent have this thread's permit, if it has one, and waits for another.
@@ -87,5 +92,17 @@ class GivenBackPermit {
  private:
   Computing* const of_;
 };
+
+/// `work` as a loop's threads are to call it: with a permit, where this thread, which begins the loop, holds one. Each call gives way
+/// to urgent threads first.
+template <typename Work>
+auto withPermit(Work work) {
+  return
+      [permits = Computing::ofThisThread(), work = std::move(work)](auto&&... arguments) -> decltype(auto) {
+        const Computing computing(permits);
+        Computing::giveWay();
+        return work(std::forward<decltype(arguments)>(arguments)...);
+      };
+}
 
 }  // namespace curvisplat

@@ -1,6 +1,7 @@
 #include "preprocess/grid/slabs.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,8 @@
 #include <thread>
 
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/grid/parallel.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
 
@@ -209,6 +212,47 @@ TEST(ReadAhead, HandsOnTheFirstThatWentWrongByManyThreads) {
     } catch (const std::runtime_error& error) {
       EXPECT_STREQ(error.what(), "5");
     }
+  }
+}
+
+// Readers and the threads of loops together, by the permits of the thread that makes both.
+TEST(ReadAhead, ComputesWithinTheBoundOfItsLoops) {
+  for (const int bound : {1, 2, 3}) {
+    ComputePermits permits(static_cast<unsigned>(bound));
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(bound));
+    std::atomic<int> computing_now = 0, most = 0, used = 0;
+    const auto compute = [&] {
+      const int now = ++computing_now;
+      for (int before = most; before < now && !most.compare_exchange_weak(before, now);) {
+      }
+      std::this_thread::yield();
+      --computing_now;
+    };
+    {
+      const Computing computing(&permits);
+      ReadAhead<uint64_t> ahead(
+          [&](uint64_t& value, uint64_t number) {
+            for (int n = 0; n < 10; ++n) compute();
+            value = number;
+            return number < 200;
+          },
+          3);
+      while (const uint64_t* value = ahead.next()) {
+        parallelFor(0, 20, [&](int) { parallelInvoke(compute, compute); });
+        used += *value < 200;
+      }
+    }
+    EXPECT_EQ(used, 200);
+    EXPECT_LE(most, bound);
+  }
+}
+
+TEST(ReadAhead, CanBeLeftWithTheOnlyPermit) {
+  ComputePermits permits(1);
+  const Computing computing(&permits);
+  for (int taken = 0; taken < 4; ++taken) {
+    ReadAhead<int> ahead([](int& value, uint64_t) { return ++value > 0; }, 3);
+    for (int n = 0; n < taken; ++n) ahead.next();
   }
 }
 

@@ -101,6 +101,35 @@ TEST(ComputePermits, AreNotWaitedForByAThreadThatNeedsNoneAnyMore) {
   other.join();
 }
 
+TEST(ComputePermits, AreHeldByThreadsThatTakePartInALoop) {
+  ComputePermits permits(1);
+  const auto ofThread = [] { return Computing::ofThisThread(); };
+  const auto inAnotherThread = [](const auto& work) {
+    ComputePermits* held = nullptr;
+    const GivenBackPermit given_back;
+    std::thread([&] { held = work(); }).join();
+    return held;
+  };
+  EXPECT_EQ(inAnotherThread(withPermit(ofThread)), nullptr);
+  const Computing computing(&permits);
+  EXPECT_EQ(withPermit(ofThread)(), &permits);
+  EXPECT_EQ(inAnotherThread(withPermit(ofThread)), &permits);
+  EXPECT_EQ(inAnotherThread(ofThread), nullptr);
+}
+
+TEST(ComputePermits, AreLeftToUrgentThreadsBetweenCallsOfALoop) {
+  ComputePermits permits(1);
+  const Computing computing(&permits);
+  std::atomic<bool> read = false;
+  std::thread reader([&] {
+    const Computing urgent(&permits, Urgency::kUrgent);
+    read = true;
+  });
+  while (!permits.isWantedUrgently()) std::this_thread::yield();
+  withPermit([&] { EXPECT_TRUE(read); })();
+  reader.join();
+}
+
 TEST(ComputePermits, OfAThreadThatHoldsOneAreEnough) {
   ComputePermits permits(1), of_others(1);
   const Computing computing(&permits);

@@ -246,9 +246,8 @@ void addConvert(CLI::App& app) {
       "Memory limit of this process, such as 512M (default: 2G, at most 1/4 of the machine's)");
   command
       ->add_option("--threads", arguments->threads,
-                   "Number of threads that make splats and build bricks (default 0: one per core). Up to "
-                   "four more read "
-                   "ahead, one writes")
+                   "Number of threads that compute at a time, those that read included (default 0: one per "
+                   "core)")
       ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");
