@@ -33,12 +33,15 @@ export TSAN_OPTIONS=suppressions=$root/tests/tsan.supp:halt_on_error=1
 
 case $form in
   plain)
-    # The smoke test of bench/ also draws with VTK; tests/end_to_end/fuse_test.py needs fusepy; tests/serve a browser and websocket; movies
-    # ffmpeg; tests/stream/read_cache.py, tests/python and the tests of files that others write need the others.
+    "$root/tools/setup.sh"
+    # While the program is built: the smoke test of bench/ also draws with VTK; tests/end_to_end/fuse_test.py needs fusepy; tests/serve a
+    # browser and websocket; movies ffmpeg; tests/stream/read_cache.py, tests/python and the tests of files that others write need the others.
     "$root/tools/setup.sh" python3-vtk9 python3-numpy python3-zstandard python3-xxhash python3-netcdf4 zstd \
       python3-xarray python3-pip python3-setuptools python3-wheel python3-openvdb python3-fusepy \
-      python3-websocket chromium ffmpeg python3-matplotlib python3-nbconvert python3-ipykernel python3-h5py python3-meshio
+      python3-websocket chromium ffmpeg python3-matplotlib python3-nbconvert python3-ipykernel python3-h5py python3-meshio &
+    trap 'wait' EXIT
     "$root/tools/build.sh"
+    wait $!
     run release "$@"
     ;;
   short)
