@@ -34,6 +34,7 @@ struct NodeScratch {
   std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
   std::array<std::vector<JointLine>, 3> lines;               // the same, of nodes at faces and one away
   std::vector<uint8_t> has_blank;                            // [row around the box]
+  std::vector<uint8_t> near_blank;                           // [node of a row's part]
 };
 
 }  // namespace curvisplat

@@ -53,6 +53,47 @@ PartMoments momentsOf(uint64_t left) {
   return part;
 }
 
+/// What is left of a cell, in its lattice's directions.
+struct Remainder {
+  PartMoments part;
+  double shift = 0;       // how far its middle is from the cell's
+  bool has_face = false;  // else it lies around what is covered
+  double to_face = 0;     // from its middle, away from it
+};
+
+Remainder remainderOf(uint64_t covered) {
+  Remainder rest{momentsOf(~covered)};
+  rest.shift = glm::length(rest.part.middle);
+  rest.has_face = rest.shift > kMinShift;
+  // The face between the blocks is about at right angles to where the rest's middle is.
+  if (rest.has_face) rest.to_face = rest.shift + planeDistance(covered, rest.part.middle / rest.shift);
+  return rest;
+}
+
+/// The same, from a table where whole octants are covered: beside blanked cells.
+Remainder knownRemainderOf(uint64_t covered) {
+  constexpr size_t kSets = size_t{1} << kCellOctantCount;  // of octants; not none, and not all of them
+  static const std::array<Remainder, kSets> of_octants = [] {
+    std::array<Remainder, kSets> all;
+    for (size_t set = 1; set < kSets - 1; ++set) {
+      uint64_t points = 0;
+      for (size_t octant = 0; octant < kCellOctantCount; ++octant)
+        if (set >> octant & 1) points |= octantPoints(octant);
+      all[set] = remainderOf(points);
+    }
+    return all;
+  }();
+  size_t set = 0;
+  for (size_t octant = 0; octant < kCellOctantCount; ++octant) {
+    const uint64_t points = covered & octantPoints(octant);
+    if (points == octantPoints(octant))
+      set |= size_t{1} << octant;
+    else if (points != 0)
+      return remainderOf(covered);
+  }
+  return of_octants[set];
+}
+
 /// L of M = L Lᵀ.
 glm::dmat3 choleskyOf(const glm::dmat3& m) {
   glm::dmat3 l(0.0);
@@ -134,11 +175,8 @@ const std::array<glm::dvec3, kCellPoints>& cellPoints() {
 std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std::span<SplatScalar> values) {
   if (cell.covered == 0) return cell.border_code;
   if (cell.covered == kAllCovered) return std::nullopt;
-  PartMoments part = momentsOf(~cell.covered);
-  // The face between the blocks is about at right angles to where the rest's middle is.
-  const double shift = glm::length(part.middle);
-  const bool has_face = shift > kMinShift;
-  const double to_face = has_face ? shift + planeDistance(cell.covered, part.middle / shift) : 0;
+  Remainder rest = knownRemainderOf(cell.covered);
+  PartMoments& part = rest.part;
   part.middle = cell.axes * part.middle;
   part.shape = cell.axes * part.shape * glm::transpose(cell.axes);
   const glm::dmat3 lower = choleskyOf(part.shape);
@@ -152,11 +190,11 @@ std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std
     value.slope = glm::transpose(lower) * value.slope;
   }
   PartFace face;
-  if (has_face) {
+  if (rest.has_face) {
     const glm::dvec3 inward =
-        glm::transpose(lower) * part.middle / shift;  // as long as the cell is to the part
+        glm::transpose(lower) * part.middle / rest.shift;  // as long as the cell is to the part
     const double length = glm::length(inward);
-    face = {inward / length, to_face / length, part.share >= kMinCut && part.share <= 1 - kMinCut};
+    face = {inward / length, rest.to_face / length, part.share >= kMinCut && part.share <= 1 - kMinCut};
   }
   return borderOf(lower, face, cell);
 }

@@ -107,12 +107,12 @@ void Window::addRow(uint64_t j, uint64_t k) {
   };
 
   if (corrections_.stretch) lines_.stretchRow(j, k);
+  // Those that are neither at a face nor behind one.
+  const uint64_t inner_begin = std::max<uint64_t>(2, i0_), inner_end = ni_ < 4 ? 0 : std::min(i1_, ni_ - 2);
+  const bool at_once = !on_face && !has_layer && !in_.covered && corrections_.all() &&
+                       inner_end >= inner_begin + kInnerNodesAtOnce;
   if (!lines_.anyBlankAround(j, k)) {
     if (i0_ == 0) addNode(0, row, at_i(0), true, layers_at(0));
-    // Those that are neither at a face nor behind one.
-    const uint64_t inner_begin = std::max<uint64_t>(2, i0_), inner_end = ni_ < 4 ? 0 : std::min(i1_, ni_ - 2);
-    const bool at_once = !on_face && !has_layer && !in_.covered && corrections_.all() &&
-                         inner_end >= inner_begin + kInnerNodesAtOnce;
     for (uint64_t i = std::max<uint64_t>(1, i0_); i < std::min(i1_, ni_ - 1); ++i) {
       if (at_once && i == inner_begin) {
         addInnerNodes(inner_begin, inner_end, row, inner);
@@ -125,18 +125,33 @@ void Window::addRow(uint64_t j, uint64_t k) {
       addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, layers_at(ni_ - 1));
     return;
   }
-  for (uint64_t i = i0_; i < i1_; ++i) {
-    const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
-    if (lattice_.blank[at]) continue;
-    Neighbours neighbours = at_i(i);
-    for (int axis = 0; axis < 3; ++axis) {
-      if (lattice_.blank[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
-      if (lattice_.blank[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
+  const auto one_by_one = [&](uint64_t begin, uint64_t end) {
+    for (uint64_t i = begin; i < end; ++i) {
+      const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
+      if (lattice_.blank[at]) continue;
+      Neighbours neighbours = at_i(i);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (lattice_.blank[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
+        if (lattice_.blank[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
+      }
+      if (corrections_.octants) octants_of_blanks_ = octantsOfBlanks(at, neighbours);
+      addNode(i, at, neighbours, on_face || isFace(i, ni_), layers_at(i));
     }
-    if (corrections_.octants) octants_of_blanks_ = octantsOfBlanks(at, neighbours);
-    addNode(i, at, neighbours, on_face || isFace(i, ni_), layers_at(i));
+    octants_of_blanks_ = 0;
+  };
+  if (!at_once) {
+    one_by_one(i0_, i1_);
+    return;
   }
-  octants_of_blanks_ = 0;
+  one_by_one(i0_, inner_begin);
+  lines_.forEachRunBetweenBlanks(j, k, inner_begin, inner_end,
+                                 [&](uint64_t begin, uint64_t end, bool is_clear) {
+                                   if (is_clear && end - begin >= kInnerNodesAtOnce)
+                                     addInnerNodes(begin, end, row, inner);
+                                   else
+                                     one_by_one(begin, end);
+                                 });
+  one_by_one(inner_end, i1_);
 }
 
 /// The points of the node's cell that lie in cells with a blanked node; none if all do. Along an axis with one

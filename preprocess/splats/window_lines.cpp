@@ -32,6 +32,7 @@ WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit f
   for (auto* rows : {&scratch.growth, &scratch.drift})
     for (auto& row : *rows) row.assign(i1_ - i0_, 0.0f);
   for (auto& row : scratch.lines) row.resize(i1_ - i0_);
+  scratch.near_blank.resize(i1_ - i0_);
   findBlanks();
 }
 
@@ -46,6 +47,17 @@ void WindowLines::findBlanks() {
       scratch_.has_blank.push_back(std::memchr(blank, 1, count) != nullptr);
     }
   }
+}
+
+void WindowLines::clearMarks(uint64_t first, uint64_t last) const {
+  std::fill_n(scratch_.near_blank.begin() + static_cast<ptrdiff_t>(first - i0_), last - first, uint8_t{0});
+}
+
+/// Marks the nodes of a row for which those of the row at `row` are blank.
+void WindowLines::markBlanks(ptrdiff_t row, uint64_t first, uint64_t last) const {
+  const uint8_t* const blank = lattice_.blank + row + static_cast<ptrdiff_t>(first);
+  uint8_t* const marks = scratch_.near_blank.data() + (first - i0_);
+  for (uint64_t n = 0; n < last - first; ++n) marks[n] |= static_cast<uint8_t>(blank[n] != 0);
 }
 
 bool WindowLines::anyBlankAround(uint64_t j, uint64_t k) const {
@@ -85,23 +97,31 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
       stretchNodes({lattice_.x, lattice_.y, lattice_.z}, row + static_cast<ptrdiff_t>(begin), strides[axis],
                    end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)}, fit_);
     };
-    bool whole = true;
+    // Of those with neighbours in the block, several at once as far as none of these is blank.
+    uint64_t first = i0_, last = i1_;
+    bool any_blank = false;
     if (axis == 0) {
-      whole = ni_ > 2 * kWhole && !hasBlank(j, k);
+      first = std::min(i1_, std::max(kWhole, i0_));
+      last = std::max(first, std::min(ni_ - std::min(ni_, kWhole), i1_));
+      any_blank = hasBlank(j, k);
+    } else if (index[axis] >= kWhole && index[axis] + kWhole < count[axis]) {
+      for (uint64_t n = 0; n <= 2 * kWhole; ++n)
+        any_blank |= axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole);
     } else {
-      whole = index[axis] >= kWhole && index[axis] + kWhole < count[axis];
-      for (uint64_t n = 0; n <= 2 * kWhole && whole; ++n)
-        whole = !(axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole));
+      first = last;
     }
-    if (!whole) {
-      one_by_one(i0_, i1_);
-    } else if (axis == 0) {
-      one_by_one(i0_, std::min(kWhole, i1_));
-      at_once(std::max(kWhole, i0_), std::min(ni_ - kWhole, i1_));
-      one_by_one(std::max(ni_ - kWhole, i0_), i1_);
+    one_by_one(i0_, first);
+    if (!any_blank) {
+      at_once(first, last);
     } else {
-      at_once(i0_, i1_);
+      clearMarks(first, last);
+      for (ptrdiff_t n = -static_cast<ptrdiff_t>(kWhole); n <= static_cast<ptrdiff_t>(kWhole); ++n)
+        markBlanks(row + n * strides[axis], first, last);
+      forEachRun(first, last, [&](uint64_t begin, uint64_t end, bool is_clear) {
+        is_clear ? at_once(begin, end) : one_by_one(begin, end);
+      });
     }
+    one_by_one(last, i1_);
   }
 }
 

@@ -1,6 +1,7 @@
 // The grid lines through the nodes of a box of a window: how long the cells on them are, and where blanked nodes end them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -32,6 +33,18 @@ class WindowLines {
   }
   /// Whether a node of the row's part, or one next to it, is blank; of the rows around it as well.
   bool anyBlankAround(uint64_t j, uint64_t k) const;
+  /// Calls each(begin, end, is_clear) for the nodes of a row one run after the other: those that have no blank node in the cells around
+  /// them, and the others. None of the nodes `first` to `last` - 1, of the row's part, is on a face of the block.
+  template <typename Each>
+  void forEachRunBetweenBlanks(uint64_t j, uint64_t k, uint64_t first, uint64_t last,
+                               const Each& each) const {
+    clearMarks(first, last);
+    const ptrdiff_t row = elementOfRow(j, k);
+    for (const ptrdiff_t plane : {-plane_stride_, ptrdiff_t{0}, plane_stride_})
+      for (const ptrdiff_t beside : {plane - row_stride_, plane, plane + row_stride_})
+        for (const ptrdiff_t step : {beside - 1, beside, beside + 1}) markBlanks(row + step, first, last);
+    forEachRun(first, last, each);
+  }
   /// Fills the scratch with the stretch of the nodes of a row's part, and with their lines.
   void stretchRow(uint64_t j, uint64_t k) const;
   /// After stretchRow(), of a node of the row: the lines across the faces of the block that it is on, or one away from.
@@ -48,6 +61,21 @@ class WindowLines {
     return scratch_.has_blank[(k - near_.k0) * (near_.j1 - near_.j0) + (j - near_.j0)] != 0;
   }
   void findBlanks();
+  void clearMarks(uint64_t first, uint64_t last) const;
+  void markBlanks(ptrdiff_t row, uint64_t first, uint64_t last) const;
+  template <typename Each>
+  void forEachRun(uint64_t first, uint64_t last, const Each& each) const {
+    const auto marks = [&](uint64_t i) {
+      return scratch_.near_blank.begin() + static_cast<ptrdiff_t>(i - i0_);
+    };
+    for (uint64_t begin = first; begin < last;) {
+      const uint8_t mark = *marks(begin);
+      const auto next = std::find(marks(begin), marks(last), static_cast<uint8_t>(1 - mark));
+      const uint64_t end = i0_ + static_cast<uint64_t>(next - scratch_.near_blank.begin());
+      each(begin, end, mark == 0);
+      begin = end;
+    }
+  }
   bool isAtJoint(uint64_t index, uint64_t count) const {
     return isFace(index, count) || layerOf(index, count) != 0;
   }

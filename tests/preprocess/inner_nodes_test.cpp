@@ -112,5 +112,37 @@ TEST(InnerNodes, OfPartsOfRowsAndBesideBlanksAreTheSame) {
   }
 }
 
+TEST(InnerNodes, BetweenBlanksAreTheSame) {
+  std::mt19937_64 random(5);
+  for (const uint64_t blanks : {1u, 3u, 20u, 200u}) {
+    MappedBlock grid = unevenBlock(90, 1, 0.02);
+    for (uint64_t n = 0; n < blanks; ++n) grid.nodes.blank[random() % grid.nodes.blank.size()] = 1;
+    EXPECT_TRUE(sameSplats(splatsOf(grid.window()), oneByOne(grid.window()))) << blanks << " blanks";
+  }
+}
+
+TEST(InnerNodes, FarFromBlanksDoNotKnowOfThem) {
+  constexpr uint64_t kNi = 60, kBlank = 31, kReach = kStretchReach + 1;
+  MappedBlock grid = unevenBlock(kNi, 1, 0.02);
+  const NodeSplats without = splatsOf(grid.window());
+  for (uint64_t k = 0; k < 8; ++k)
+    for (uint64_t j = 0; j < 7; ++j) grid.nodes.blank[grid.at(kBlank, j, k)] = 1;
+  const NodeSplats with = splatsOf(grid.window());
+  const auto farOnes = [&](const NodeSplats& all) {
+    NodeSplats some;
+    const size_t variables = all.values.size() / all.splats.size();
+    for (size_t n = 0; n < all.splats.size(); ++n) {
+      const uint64_t i = all.splats[n].node % kNi;
+      if (i + kReach > kBlank && i < kBlank + kReach) continue;
+      some.splats.push_back(all.splats[n]);
+      const auto values = all.values.begin() + static_cast<ptrdiff_t>(n * variables);
+      some.values.insert(some.values.end(), values, values + static_cast<ptrdiff_t>(variables));
+    }
+    return some;
+  };
+  EXPECT_GT(farOnes(with).splats.size(), 2000u);
+  EXPECT_TRUE(sameSplats(farOnes(with), farOnes(without)));
+}
+
 }  // namespace
 }  // namespace curvisplat
