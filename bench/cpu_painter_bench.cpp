@@ -10,8 +10,8 @@
 #include <random>
 #include <vector>
 
-#include "render/frame/backend.h"
-#include "render/project/kernel.h"
+#include "render/backend/backend.h"
+#include "render/project/footprint.h"
 
 namespace curvisplat {
 namespace {

@@ -12,15 +12,14 @@
 
 #include "bench/picture_sheet.h"
 #include "preprocess/formats/open/open_grid.h"
-#include "preprocess/grid/refined_source.h"
+#include "preprocess/grid/grid_views.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
-#include "tests/reference/cell_grid.h"
+#include "tests/reference/function_grid.h"
 #include "tests/reference/grid_field.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/reference/rearranged_grid.h"
 
 namespace curvisplat {
 namespace {

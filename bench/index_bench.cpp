@@ -1,5 +1,6 @@
-// Opens, plans and orders the index of a cache of a million bricks, as 10^10 nodes have (tests/support/sparse_cache.h). It is
-// made in CURVISPLAT_BENCH_FOLDER, or else in the folder of temporary files, and removed at the end: 190 MB.
+// Opens, plans and orders the index of a cache of a million bricks, as 10^10 nodes have
+// (tests/support/test_caches.h). It is made in CURVISPLAT_BENCH_FOLDER, or else in the folder of temporary
+// files, and removed at the end: 190 MB.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -8,10 +9,10 @@
 #include <string>
 
 #include "render/camera/camera.h"
+#include "render/frame/frame_memory.h"
 #include "render/frame/frame_plan.h"
-#include "render/frame/frame_regions.h"
 #include "stream/cache/cache_reader.h"
-#include "tests/support/sparse_cache.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {

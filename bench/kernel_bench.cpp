@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 
 namespace curvisplat {
 namespace {

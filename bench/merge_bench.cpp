@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "preprocess/splats/merge.h"
+#include "preprocess/shape/merge.h"
 
 namespace curvisplat {
 namespace {

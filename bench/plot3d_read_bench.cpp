@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/formats/common/ascii_spool.h"
-#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/grid/node_reader.h"
 #include "stream/base/file.h"

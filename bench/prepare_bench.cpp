@@ -15,7 +15,6 @@
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/colour/transfer_function.h"
-#include "render/project/depth_keys.h"
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "stream/base/checksum.h"

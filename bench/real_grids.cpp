@@ -30,7 +30,7 @@
 #include "bench/real_grids_cases.h"
 #include "bench/vtk_job.h"
 #include "preprocess/formats/open/open_grid.h"
-#include "preprocess/grid/refined_source.h"
+#include "preprocess/grid/grid_views.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"

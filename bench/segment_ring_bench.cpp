@@ -5,8 +5,8 @@
 #include <atomic>
 #include <vector>
 
-#include "render/frame/segment_ring.h"
-#include "stream/base/worker_team.h"
+#include "render/sweep/segment_ring.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {

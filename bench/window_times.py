@@ -93,7 +93,7 @@ def waited_for_a_core(process):
 
 
 def place_of(widget, places):
-    """x, y, width and height of a widget, from the file that the window writes (tools/viewer/widget_places.h)."""
+    """x, y, width and height of a widget, from the file that the window writes (tools/window/widgets.h)."""
     end = time.monotonic() + 120
     while time.monotonic() < end:
         for line in places.read_text().splitlines() if places.exists() else ():

@@ -1,32 +1,113 @@
-// The `curvisplat` program: parses the command line, runs one subcommand, and turns exceptions into messages
-// and exit statuses. No other file of the program catches errors to end it.
+// The `curvisplat` program: prepares the process, parses the command line, runs one subcommand, and turns
+// exceptions into messages and exit statuses. No other file of the program catches errors to end it.
+#include <fcntl.h>
 #include <fmt/format.h>
-
+#include <pthread.h>
+#include <unistd.h>
 #include <CLI/CLI.hpp>
+
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <regex>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "stream/base/error.h"
-#include "stream/base/message.h"
 #include "stream/base/progress.h"
-#include "stream/base/suggestion.h"
+#include "stream/base/text.h"
 #include "tools/commands/commands.h"
-#include "tools/options/shown_options.h"
+#include "tools/commands/manual.h"
+#include "tools/output/command_run.h"
 #include "tools/output/launched_ranks.h"
-#include "tools/output/required_threads.h"
-#include "tools/output/standard_streams.h"
-#include "tools/output/stop_signals.h"
-#include "tools/output/thread_failures.h"
+#include "tools/output/start_checks.h"
 
 namespace curvisplat {
 namespace {
+
+/// Opens /dev/null in place of each standard stream that is closed, so that no file the program opens gets
+/// number 0, 1 or 2. Reading from or printing to such a stream fails. Call before opening anything else.
+void openStandardStreams() {
+  // open() returns the lowest free number. Standard output is opened read-only, so that printing to it fails
+  // and is reported.
+  for (int number = 0; number <= 2; ++number)
+    if (::fcntl(number, F_GETFD) < 0) ::open("/dev/null", number == 2 ? O_WRONLY : O_RDONLY);
+}
+
+/// Flushes standard output. Prints a message and returns false if anything printed could not be written.
+bool finishStandardOutput() {
+  // An earlier failed write has set the error flag, but its errno is lost.
+  const bool failed = std::ferror(stdout) != 0;
+  if (std::fflush(stdout) == 0 && !failed) return true;
+  printMessage("cannot write to standard output{}{}", failed ? "" : ": ", failed ? "" : std::strerror(errno));
+  return false;
+}
+
+// Where the machine has no threads left (ulimit -u, ulimit -v), the program ends with one line and exit
+// status 1, wherever that shows: libraries start threads before main() and in places where no exception may
+// leave.
+constexpr size_t kLoadingStackBytes = 256 << 10;
+size_t stack_bytes = 0;  // the system's
+
+void print(std::string_view text) {
+  // Nothing that allocates, and nothing of the C++ library, which may not be ready yet.
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
+}
+
+/// Ends the program after an exception that nobody can catch: a library threw it before main(), or in a
+/// thread of its own.
+[[noreturn]] void onTerminate() {
+  try {
+    if (std::current_exception()) throw;
+  } catch (const std::bad_alloc&) {
+    print("curvisplat: out of memory; lower --memory or --size, or use a machine with more memory\n");
+    ::_exit(1);
+  } catch (const std::exception& error) {
+    // TBB throws a runtime_error with this text.
+    if (std::strstr(error.what(), std::strerror(EAGAIN))) {
+      print(
+          "curvisplat: cannot start a thread; raise the limits of processes and memory (ulimit -u, ulimit "
+          "-v)\n");
+      ::_exit(1);
+    }
+    print("curvisplat: internal error: ");
+    print(error.what());
+    print("\n");
+  } catch (...) {
+  }
+  std::abort();
+}
+
+void prepare(int, char**, char**) {
+  std::set_terminate(onTerminate);
+  pthread_attr_t attributes;
+  if (pthread_getattr_default_np(&attributes) != 0) return;
+  pthread_attr_getstacksize(&attributes, &stack_bytes);
+  pthread_attr_setstacksize(&attributes, kLoadingStackBytes);
+  pthread_setattr_default_np(&attributes);
+  pthread_attr_destroy(&attributes);
+}
+
+// Called before the initialisers of all libraries.
+__attribute__((section(".preinit_array"), used)) void (*const kPrepare)(int, char**, char**) = prepare;
+
+/// Gives threads the system's stack size again. Until main() calls this, stacks are small, so that libraries
+/// that start threads when they are loaded (log4cplus, which OpenVDB needs) take little of a small limit.
+void endLoadingOfLibraries() {
+  pthread_attr_t attributes;
+  if (stack_bytes == 0 || pthread_getattr_default_np(&attributes) != 0) return;
+  pthread_attr_setstacksize(&attributes, stack_bytes);
+  pthread_setattr_default_np(&attributes);
+  pthread_attr_destroy(&attributes);
+}
 
 std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;

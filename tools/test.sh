@@ -24,7 +24,7 @@ case ${1:-} in
   --sanitize=short) form=short && shift ;;
 esac
 
-# Tests in Python cannot tell how the program was built (tests/support/sanitizers.h).
+# Tests in Python cannot tell how the program was built (tests/support/memory_limit.h).
 [[ $form == plain ]] || export CURVISPLAT_SANITIZED=1
 export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
 export LSAN_OPTIONS=suppressions=$root/tests/lsan.supp:print_suppressions=0

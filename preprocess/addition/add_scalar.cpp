@@ -4,14 +4,10 @@
 #include <glm/vector_relational.hpp>
 #include <memory>
 
-#include "preprocess/addition/addition_checks.h"
 #include "preprocess/addition/addition_workspace.h"
-#include "preprocess/addition/cache_grid.h"
-#include "preprocess/addition/drawn_mesh.h"
-#include "preprocess/addition/further_faces.h"
+#include "preprocess/addition/drawn_samples.h"
+#include "preprocess/addition/value_buckets.h"
 #include "preprocess/addition/value_passes.h"
-#include "preprocess/addition/value_record.h"
-#include "preprocess/convert/conversion_threads.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
@@ -19,13 +15,14 @@
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/shared_passes.h"
-#include "stream/base/disk_full.h"
+#include "preprocess/grid/parallel.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
-#include "stream/base/freed_memory.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
+#include "stream/base/memory.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/faces_file.h"
-#include "stream/cache/variable_writer.h"
+#include "stream/cache/values_writer.h"
 
 namespace curvisplat {
 namespace {

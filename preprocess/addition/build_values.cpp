@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "preprocess/addition/value_record.h"
+#include "preprocess/addition/value_buckets.h"
 #include "preprocess/grid/parallel.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"

@@ -12,10 +12,9 @@
 #include <memory>
 #include <vector>
 
-#include "preprocess/addition/conversion_order.h"
-#include "preprocess/addition/step_references.h"
+#include "preprocess/addition/series_steps.h"
 #include "preprocess/addition/value_buckets.h"
-#include "preprocess/convert/merge_levels.h"
+#include "preprocess/convert/build_cell.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/values_writer.h"

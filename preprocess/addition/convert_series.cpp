@@ -8,15 +8,14 @@
 #include <span>
 #include <utility>
 
+#include "preprocess/addition/series_steps.h"
 #include "preprocess/addition/shared_series.h"
-#include "preprocess/addition/step_references.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/preflight.h"
-#include "stream/base/count_text.h"
-#include "stream/base/disk_full.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
-#include "stream/base/message.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
+#include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/partial_folder.h"
 

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "preprocess/addition/add_step.h"
-#include "preprocess/addition/series_input.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/progress.h"
@@ -21,7 +20,7 @@ struct SeriesOptions {
   ConvertOptions convert;               // of the first step; `scalars` is not used
   bool keep_going = false;              // leave out steps that do not fit
   bool add = false;                     // to an existing cache, which has other steps
-  bool to_part = false;                 // the first step is there for its geometry (series_part.h)
+  bool to_part = false;                 // the first step is there for its geometry (series_steps.h)
   std::function<void()> before_change;  // called before the cache changes, if it does; may throw Error
 };
 
@@ -34,7 +33,7 @@ struct SeriesEvent {
   std::string reason;
 };
 
-/// What takeStep() (series_part.h) needs to know of a step that was converted.
+/// What takeStep() (series_steps.h) needs to know of a step that was converted.
 struct StepOrigin {
   bool states_time = true;
   std::vector<std::string> sources;

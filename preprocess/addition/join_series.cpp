@@ -8,16 +8,14 @@
 #include <string>
 #include <system_error>
 
-#include "preprocess/addition/series_part.h"
-#include "preprocess/addition/step_references.h"
-#include "stream/base/disk_full.h"
+#include "preprocess/addition/series_steps.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/json_document.h"
-#include "stream/base/paths.h"
-#include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_update.h"
 #include "stream/cache/partial_folder.h"
 
 namespace curvisplat {

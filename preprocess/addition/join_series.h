@@ -1,5 +1,5 @@
 // Series whose steps several processes convert without knowing of each other (`convert --part i/n`), and what joins them.
-// Each writes a part (series_part.h) into NAME.splats.parts, the folder beside the cache-to-be:
+// Each writes a part (series_steps.h) into NAME.splats.parts, the folder beside the cache-to-be:
 //
 //    NAME.splats.parts/3of8.splats   step 0, and the third eighth of the further steps
 //    NAME.splats.parts/3of8.json     once that is complete: which steps it has

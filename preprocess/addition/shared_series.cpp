@@ -11,16 +11,14 @@
 #include <system_error>
 #include <utility>
 
-#include "preprocess/addition/series_part.h"
-#include "preprocess/addition/step_references.h"
+#include "preprocess/addition/series_steps.h"
 #include "preprocess/convert/preflight.h"
 #include "stream/base/checksum.h"
-#include "stream/base/disk_full.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/paths.h"
-#include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_update.h"
 
 namespace curvisplat {
 namespace {

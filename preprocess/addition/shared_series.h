@@ -1,8 +1,8 @@
 // Further steps of a series, converted by several ranks: each rank converts whole steps, a group of steps that are
-// predicted from each other (step_references.h) at a time.
+// predicted from each other (series_steps.h) at a time.
 //
 //    rank 0   the rest of the group that the cache is in --> the cache
-//    rank 1   the next group --> a part (series_part.h) --+
+//    rank 1   the next group --> a part (series_steps.h) --+
 //    rank 2   the group after that --> a part ------------+--> rank 0 takes the steps over, in order
 //
 // So a round ends; the next begins behind the last step that was taken over. A step that does not fit what one process
@@ -18,8 +18,7 @@
 #include <vector>
 
 #include "preprocess/addition/add_step.h"
-#include "preprocess/addition/series_input.h"
-#include "preprocess/convert/scratch_folder.h"
+#include "preprocess/convert/conversion_workspace.h"
 #include "stream/base/ranks.h"
 #include "stream/cache/partial_folder.h"
 

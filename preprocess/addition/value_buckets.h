@@ -1,28 +1,127 @@
-// Records of new values on their way to their bricks: buckets of bricks that follow one another in the order
-// of conversion, and fit in memory with the geometry that the cache has of them.
+// Values of new scalars on their way into a cache that has their splats' geometry: each is a record, routed
+// to the leaf brick that has its splat (ConversionOrder) through buckets of bricks, which fit in memory
+// with their geometry (ValueBuckets; ValueSink writes them, ValueLoader reads them).
 //
-// Unlike in conversion, what each brick will get is known from the start, so no bucket turns out too large.
-// If there are more buckets than a file can have, each of the file's holds several, and is divided when its
-// turn comes.
+// A record takes 14 + 16 v bytes for v variables, not aligned, in the machine's own byte order:
+//
+//    0   node number: 47 bits, and bit 47 says "with variances"     48 bits
+//    6   place of the leaf brick, in the order of conversion         32 bits
+//   10   where in the brick's cell: 10 bits an axis, x lowest        32 bits
+//   14   mean w0 w1 w2                                               4 x float a variable
+//        with variances: variance                                    1 x float a variable
+//
+// Records begin with the node as those of splat_record.h do, so that sortByNode() serves both. Values are
+// rounded as they are there. Unlike in conversion, what each brick will get is known from the start, so no
+// bucket turns out too large.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <functional>
+#include <map>
 #include <span>
 #include <vector>
 
-#include "preprocess/addition/conversion_order.h"
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/build_cell.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/scatter.h"
+#include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/read_ahead.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/model/octree.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 
+/// Numbers of nodes in the whole grid: block after block, i fastest, then j, k.
+class NodeNumbers {
+ public:
+  explicit NodeNumbers(const std::vector<BlockInfo>& blocks);
+
+  /// Of the first node of a run. Throws Error if the run is not in the grid.
+  uint64_t firstOf(const NodeRun& run) const;
+  /// The node's place, in words.
+  std::string nameOf(uint64_t node) const;
+
+ private:
+  std::vector<BlockInfo> blocks_;
+  std::vector<uint64_t> first_nodes_;  // [block]
+};
+
+/// A cache's octree as conversion goes through it: bricks in post-order, the order in which their streams
+/// lie in the files, and the leaf brick that a node's splat is in. Immutable: any thread.
+class ConversionOrder {
+ public:
+  /// `cache` must outlive it. Reads the geometry of leaves that share a cell, since only their nodes tell
+  /// them apart.
+  explicit ConversionOrder(const CacheReader& cache);
+
+  size_t size() const { return order_.size(); }
+  /// [position in the order]: the brick in the order of bricks.bin.
+  uint32_t operator[](size_t position) const { return order_[position]; }
+  /// The other way round.
+  uint32_t positionOf(uint32_t brick) const { return positions_[brick]; }
+
+  /// The leaf brick that holds the splat of `node` at `position`; kNoBrick if there is no cell for it.
+  uint32_t leafOf(const RootPosition& position, uint64_t node) const;
+  /// Whether the brick's cell is another brick's too, so that leafOf() depends on the node.
+  bool sharesItsCell(uint32_t brick) const;
+
+ private:
+  void append(uint32_t brick);
+
+  std::span<const Brick> bricks_;
+  std::vector<uint32_t> order_, positions_;
+  std::map<uint32_t, uint64_t> first_nodes_;  // of bricks that share their cell
+};
+
+inline constexpr int kPlaceBits = 10;
+
+inline constexpr size_t minValueRecordBytes(size_t variables) {
+  return 14 + 16 * variables;
+}
+inline constexpr size_t maxValueRecordBytes(size_t variables) {
+  return minValueRecordBytes(variables) + 4 * variables;
+}
+
+/// Where `position` is in `cell`, which holds it: the highest kPlaceBits bits of each axis. The cell's level
+/// is at most kMaxLevel.
+inline std::array<uint32_t, 3> placeInCell(const RootPosition& position, const Cell& cell) {
+  std::array<uint32_t, 3> place;
+  for (int axis = 0; axis < 3; ++axis)
+    place[axis] = static_cast<uint32_t>(position.at[axis] >> (kPositionBits - kPlaceBits - cell.level)) &
+                  ((1u << kPlaceBits) - 1);
+  return place;
+}
+
+/// Appends a record.
+void packValueRecord(uint64_t node, uint32_t brick, const std::array<uint32_t, 3>& place,
+                     std::span<const SplatScalar> values, std::vector<std::byte>& out);
+
+inline uint32_t valueRecordBrick(const std::byte* record) {
+  uint32_t brick = 0;
+  std::memcpy(&brick, record + 6, sizeof brick);
+  return brick;
+}
+inline std::array<uint32_t, 3> valueRecordPlace(const std::byte* record) {
+  uint32_t bits = 0;
+  std::memcpy(&bits, record + 10, sizeof bits);
+  constexpr uint32_t kMask = (1u << kPlaceBits) - 1;
+  return {bits & kMask, bits >> kPlaceBits & kMask, bits >> (2 * kPlaceBits) & kMask};
+}
+inline size_t valueRecordBytes(const std::byte* record, size_t variables) {
+  return recordIsIrregular(record) ? maxValueRecordBytes(variables) : minValueRecordBytes(variables);
+}
+
+/// Reads a record's values, one a variable.
+void unpackValueRecord(const std::byte* record, std::span<SplatScalar> values);
+
+/// Buckets of bricks that follow one another in the order of conversion, and fit in memory with the
+/// geometry that the cache has of them. If there are more buckets than a file can have, each of the file's
+/// holds several, and is divided when its turn comes. Immutable: any thread.
 class ValueBuckets {
  public:
   /// Bricks are taken together while what building takes of them stays within `most_bytes`.

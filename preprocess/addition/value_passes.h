@@ -1,30 +1,34 @@
-// The passes that bring the values of scalars to the bricks of a cache whose geometry is that of the grid: what
-// adding a scalar and adding a time step have in common.
+// The passes that bring the values of scalars to the bricks of a cache whose geometry is that of the grid,
+// and to the faces of the grid that the cache has: what adding a scalar and adding a time step have in
+// common.
 //
 //   scatter   the grid's splats go to buckets of bricks; those of block faces to the seam merger
 //   seams     the merged splats of block faces follow
 //   build     bucket after bucket, the streams
+//   faces     a file of faces with the new values
 //
-// Several ranks scatter together: each a share of the grid, into a file of its own. Rank 0 merges the seams and builds,
-// from all ranks' files.
+// Several ranks scatter together: each a share of the grid, into a file of its own. Rank 0 merges the seams
+// and builds, from all ranks' files. One thread calls; passes are parallel loops.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "preprocess/addition/conversion_order.h"
-#include "preprocess/addition/step_references.h"
+#include "preprocess/addition/series_steps.h"
 #include "preprocess/addition/value_buckets.h"
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_origin.h"
+#include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/splats/seams.h"
+#include "preprocess/seams/seams.h"
 #include "preprocess/survey/block_overlap.h"
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"
@@ -33,15 +37,16 @@
 
 namespace curvisplat {
 
-/// For one thread, which calls the passes in order.
+/// The passes up to "build", to be called in order.
 class ValuePasses {
  public:
   /// All references must outlive it. `scratch`: a folder for temporary files.
   ValuePasses(const CacheReader& cache, size_t variables, const MemoryPlan& plan,
               std::filesystem::path scratch, Progress& progress);
 
-  /// Before scatter(): all ranks call scatter() and mergeSeams() together, and rank 0 alone build(). `shared`: a folder
-  /// for temporary files that all of them see. The plan has to be the same at all ranks (commonPlan()).
+  /// Before scatter(): all ranks call scatter() and mergeSeams() together, and rank 0 alone build().
+  /// `shared`: a folder for temporary files that all of them see. The plan has to be the same at all ranks
+  /// (commonPlan()).
   void shareWith(Ranks& ranks, std::filesystem::path shared);
   /// Before scatter(): the overlaps of the grid's blocks, for a cache in which each point is drawn once.
   void setOverlaps(std::vector<BlockOverlap> overlaps) { overlaps_ = std::move(overlaps); }
@@ -50,8 +55,8 @@ class ValuePasses {
   /// Of an unstructured grid, after its survey(); rank 0 makes all its splats.
   void scatter(SplatOrigin& origin);
   void mergeSeams();
-  /// `references`: what the values are predicted from; may be null. Throws Error if the splats are not those of the
-  /// cache.
+  /// `references`: what the values are predicted from; may be null. Throws Error if the splats are not those
+  /// of the cache.
   void build(ValuesWriter& writer, const StepReferences* references = nullptr);
 
   /// Of the scattered values of all ranks, after mergeSeams(); at rank 0.
@@ -80,5 +85,23 @@ class ValuePasses {
   int coordinate_bytes_ = 0;
   uint64_t temporary_bytes_ = 0;
 };
+
+/// Faces of a cache's grid with further values: of scalars that are added, or of a time step.
+struct FurtherFaces {
+  const CacheReader& cache;  // at a step of the geometry
+  const NodeReader& reader;  // of the grid, with the values
+  std::filesystem::path scratch;
+  std::string name;                 // of the file, in the cache's own folder
+  std::vector<uint32_t> variables;  // numbers in the cache
+};
+
+/// Writes the faces that faces.bin of the geometry has: outer faces, and the index planes inside of blocks
+/// that a conversion was asked for. Returns nothing, and writes no file, where there is no faces.bin. Reads
+/// the faces' slabs of the grid once more. Throws Error as writeGridFaces().
+std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryPlan& plan,
+                                          Progress& progress);
+
+/// The index planes inside of blocks that a cache has.
+std::vector<IndexPlane> planesOf(const CacheReader& cache);
 
 }  // namespace curvisplat

@@ -9,13 +9,13 @@
 #include <optional>
 #include <thread>
 
-#include "stream/base/check.h"
 #include "stream/base/checksum.h"
 #include "stream/base/compute_permits.h"
+#include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/freed_memory.h"
+#include "stream/base/memory.h"
 #include "stream/base/mutex.h"
-#include "stream/base/thread_name.h"
+#include "stream/base/threads.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {

@@ -19,8 +19,7 @@
 
 #include "preprocess/convert/bucket_builds.h"
 #include "preprocess/convert/bucket_file.h"
-#include "preprocess/convert/bucket_loader.h"
-#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/bucket_plan.h"
 #include "preprocess/convert/build_cell.h"
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/progress.h"

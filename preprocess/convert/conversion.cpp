@@ -8,32 +8,24 @@
 #include <system_error>
 
 #include "preprocess/convert/bucket_file.h"
-#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/bucket_plan.h"
 #include "preprocess/convert/build_octree.h"
+#include "preprocess/convert/conversion_journal.h"
 #include "preprocess/convert/conversion_workspace.h"
-#include "preprocess/convert/counting_grid.h"
-#include "preprocess/convert/disk_check.h"
 #include "preprocess/convert/grid_origin.h"
-#include "preprocess/convert/interrupted_scatter.h"
 #include "preprocess/convert/mesh_origin.h"
-#include "preprocess/convert/new_manifest.h"
-#include "preprocess/convert/plan_buckets.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scatter.h"
-#include "preprocess/convert/scattered_splats.h"
-#include "preprocess/convert/shared_build.h"
-#include "preprocess/convert/shared_folder.h"
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/convert/splat_record.h"
-#include "stream/base/disk_full.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/freed_memory.h"
-#include "stream/base/nameless_file.h"
-#include "stream/base/paths.h"
-#include "stream/base/thread_name.h"
+#include "stream/base/memory.h"
+#include "stream/base/temporary_files.h"
+#include "stream/base/threads.h"
 #include "stream/base/trace.h"
 #include "stream/cache/cache_writer.h"
 #include "stream/cache/faces_file.h"
@@ -204,13 +196,13 @@ class Conversion {
   void count() {
     if (takeUpScattered()) return;
     const uint64_t counted = nodes_ / origin_->splatsPerCounted();
-    CountingGrid counts(countingLevel(counted, splats_.survey.upper - splats_.survey.lower),
-                        plan_.counting_bytes);
-    if (makesSplats()) origin_->count(root_, counts, progress_);
-    if (ranks_ && shares_splats_) sendCountsToFirst(counts, *ranks_);
+    const auto counts = makeCountingGrid(countingLevel(counted, splats_.survey.upper - splats_.survey.lower),
+                                         plan_.counting_bytes);
+    if (makesSplats()) origin_->count(root_, *counts, progress_);
+    if (ranks_ && shares_splats_) sendCountsToFirst(*counts, *ranks_);
     if (isFirst()) {
-      counts.close();
-      planBuckets(counts, plan_, splats_.tree);
+      counts->close();
+      planBuckets(*counts, plan_, splats_.tree);
     }
     if (ranks_) splats_.tree = broadcastTree(splats_.tree, *ranks_);
     uint32_t buckets = 0;

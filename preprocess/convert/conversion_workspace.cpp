@@ -1,12 +1,65 @@
 #include "preprocess/convert/conversion_workspace.h"
 
-#include <set>
+#include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "preprocess/faces/grid_faces_pass.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/cache/brick_log.h"
+#include "stream/cache/partial_folder.h"
 
 namespace curvisplat {
+
+std::string ScratchFolder::beginOfName(const std::filesystem::path& cache) {
+  constexpr size_t kMaxBytes =
+      200;  // of the 255 of most file systems; others append 36, process and number included
+  return cache.filename().string().substr(0, kMaxBytes);
+}
+
+std::filesystem::path ScratchFolder::newPath(const std::filesystem::path& parent, const std::string& name) {
+  static std::atomic<unsigned> made = 0;  // several conversions in one process, as in tests
+  return parent / fmt::format("{}.{}.{}", name, ::getpid(), made++);
+}
+
+ScratchFolder::ScratchFolder(std::filesystem::path path, Folder folder) : path_(std::move(path)) {
+  if (folder == Folder::kTakeOver) return;
+  try {
+    makeFolder(path_);
+  } catch (const DiskFull&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error("{}; temporary files go there: choose another directory with --tmp", error.what());
+  }
+}
+
+ScratchFolder::~ScratchFolder() {
+  if (!leave_) removeAll(path_);
+}
+
+std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& ranks) {
+  std::string name;
+  if (ranks.isFirst()) name = std::filesystem::absolute(folder).string();
+  const auto sent = fromBytes<char>(ranks.broadcast(toBytes(std::vector<char>(name.begin(), name.end()))));
+  const std::filesystem::path shared(std::string(sent.begin(), sent.end()));
+  if (!std::filesystem::is_directory(shared))
+    throw Error("{}: does not exist here; several ranks need a file system that they share", shared.string());
+  return shared;
+}
+
+std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, unsigned rank) {
+  const std::filesystem::path own = shared / fmt::format("rank{}", rank);
+  removeAll(own);
+  makeFolder(own);
+  return own;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -131,6 +184,46 @@ std::optional<std::vector<ConversionFact>> ConversionWorkspace::clearKilled(cons
   removeScratch(*journal, output);
   for (const char* name : {kBrickLogName, kPartialLock, kJournalName}) removeAll(output / name);
   return std::move(journal->facts);
+}
+
+namespace {
+
+/// `needs` of the whole, less what an interrupted conversion has left, with what else the passes write.
+DiskNeeds leftOf(const UncheckedConversion& conversion, DiskNeeds needs, const TemporaryNeeds& temporary) {
+  const auto& [options, origin, nodes, workspace, estimate] = conversion;
+  if (workspace.splats())
+    needs.temporary_bytes -= std::min(needs.temporary_bytes, workspace.splats()->buckets.size);
+  if (workspace.hasAllSplats()) needs.temporary_bytes = 0;
+  if (options.ranks)
+    needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
+  if (options.surfaces)
+    needs.temporary_bytes += temporaryBytesOfFaces(origin.blocks(), options.planes, options.scalars.size());
+  needs.cache_bytes -= std::min(needs.cache_bytes, workspace.bytesInPartial());
+  return with(temporary, needs);
+}
+
+DiskNeeds likelyNeeds(const UncheckedConversion& conversion, const DiskNeeds& most) {
+  const auto likely =
+      conversion.estimate ? conversion.estimate(conversion.workspace.scratch() / "sample") : std::nullopt;
+  if (!likely) return most;
+  return {std::min(likely->temporary_bytes, most.temporary_bytes),
+          std::min(likely->cache_bytes, most.cache_bytes), 0};
+}
+
+}  // namespace
+
+void checkDiskOf(const UncheckedConversion& conversion, Progress& progress) {
+  const auto& [options, origin, nodes, workspace, estimate] = conversion;
+  if (!options.check_disk_space) return;
+  const DiskNeeds most = diskNeeds(nodes, options.scalars.size());
+  const TemporaryNeeds most_temporary =
+      workspace.hasAllSplats() ? TemporaryNeeds{} : origin.mostTemporaryNeeds();
+  const std::filesystem::path folder = temporaryFolder(options);
+  if (hasDiskSpace(leftOf(conversion, most, most_temporary), options.output, folder)) return;
+  const TemporaryNeeds forecast =
+      workspace.hasAllSplats() ? TemporaryNeeds{} : origin.temporaryNeeds(progress);
+  checkDiskSpace(leftOf(conversion, likelyNeeds(conversion, most), forecast), options.output, folder,
+                 options.full_disk_hint.empty() ? kSmallDiskHint : options.full_disk_hint);
 }
 
 }  // namespace curvisplat

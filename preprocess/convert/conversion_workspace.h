@@ -1,29 +1,69 @@
-// The folders that a conversion works in, and the files of an interrupted conversion that it finds there.
+// The folders that a conversion works in: its own, those that ranks share, the files of an interrupted
+// conversion that it finds there, and whether the disks have room for it.
 //
-//    NAME.splats.partial/    beside the output, locked: the cache as it grows, and
-//      journal               what is converted, where the scratch folder is, and the splats once all are there
-//      bricks.log            the bricks that have been appended (CacheWriter)
-//    NAME.splats.tmp.<...>/  in the temporary folder: splats.bin, and what buckets are divided into
+//    NAME.splats.partial/  beside the output, locked: the cache as it grows, and
+//      journal             what is converted, where the scratch folder is, and the splats once all are there
+//      bricks.log          the bricks that have been appended (CacheWriter)
+//    NAME.splats.tmp.<..>/ in the temporary folder: splats.bin, and what buckets are divided into
 //
 //    begun --noteSplats()--> splats on disk --> bricks appended --CacheWriter::finish()--> in place
 //      ^                          |  ^             | one by one
 //      +------- lost by the disk -+  +-- goes on --+
 //
 // A process may die at any moment, so a conversion that resumes checks all files that it finds. It resumes
-// only if all splats, or some bricks, are there. Otherwise it removes the files and starts anew.
+// only if all splats, or some bricks, are there. Otherwise it removes the files and starts anew. One thread
+// calls.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "preprocess/convert/conversion_journal.h"
-#include "preprocess/convert/scratch_folder.h"
+#include "preprocess/convert/convert_options.h"
+#include "preprocess/convert/preflight.h"
+#include "preprocess/convert/splat_origin.h"
+#include "stream/base/progress.h"
+#include "stream/base/ranks.h"
 #include "stream/cache/partial_folder.h"
 
 namespace curvisplat {
+
+/// The folder of a conversion's temporary files: made for it, and removed with all in it when it ends,
+/// unless another conversion is to go on with them.
+class ScratchFolder {
+ public:
+  /// How names of temporary folders for a cache begin: so much of its name that what follows fits, too.
+  static std::string beginOfName(const std::filesystem::path& cache);
+  /// A name that no other process uses: `parent`/`name`.<process number>.<n>
+  static std::filesystem::path newPath(const std::filesystem::path& parent, const std::string& name);
+
+  enum class Folder { kMake, kTakeOver };
+  /// Makes the folder, which must not exist, or takes over one that was left. Throws Error if it cannot.
+  ScratchFolder(std::filesystem::path path, Folder folder);
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  /// The destructor leaves the folder.
+  void leave() { leave_ = true; }
+
+ private:
+  std::filesystem::path path_;
+  bool leave_ = false;
+};
+
+/// Rank 0's `folder`, on a file system that all ranks share, at every rank: an absolute path. All have to
+/// call it. Throws Error at a rank that does not see it.
+std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& ranks);
+
+/// Makes an empty folder for a rank's own temporary files in `shared`. Throws Error if it cannot.
+std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, unsigned rank);
 
 /// What to do about an unfinished conversion to the same output.
 enum class Unfinished {
@@ -32,6 +72,7 @@ enum class Unfinished {
   kRemove,
 };
 
+/// The folders of one conversion, with its journal.
 class ConversionWorkspace {
  public:
   /// Makes the folders, or takes over those of an interrupted conversion. Throws Error if the output may not
@@ -39,8 +80,8 @@ class ConversionWorkspace {
   /// resumed had other `facts`.
   ConversionWorkspace(const std::filesystem::path& output, bool overwrite, Unfinished unfinished,
                       const std::filesystem::path& temporary_folder, std::vector<ConversionFact> facts);
-  /// Removes the folders unless leaveForResuming() was called; once the cache is in place, only the temporary
-  /// files that are left.
+  /// Removes the folders unless leaveForResuming() was called; once the cache is in place, only the
+  /// temporary files that are left.
   ~ConversionWorkspace();
 
   bool resumed() const { return resumed_; }
@@ -80,5 +121,22 @@ class ConversionWorkspace {
   std::unique_ptr<ScratchFolder> scratch_;
   bool resumed_ = false;
 };
+
+/// What the conversion will need on disk, from a sample that is converted within `folder`, a new one in the
+/// conversion's own. nullopt: that is not known. Throws Interrupted.
+using EstimateNeeds = std::function<std::optional<DiskNeeds>(const std::filesystem::path& folder)>;
+
+/// A conversion that has not begun its passes, or takes up what an interrupted one has left in its folders.
+struct UncheckedConversion {
+  const ConvertOptions& options;
+  const SplatOrigin& origin;
+  uint64_t nodes;
+  const ConversionWorkspace& workspace;
+  const EstimateNeeds& estimate;  // called only where the most that it may need does not fit; may be empty
+};
+
+/// Before the first pass. Throws Error if the disks have too little room, unless options.check_disk_space is
+/// false; Interrupted.
+void checkDiskOf(const UncheckedConversion& conversion, Progress& progress);
 
 }  // namespace curvisplat

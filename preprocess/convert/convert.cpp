@@ -1,31 +1,33 @@
 #include "preprocess/convert/convert.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "preprocess/convert/conversion.h"
-#include "preprocess/convert/conversion_threads.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/preflight.h"
-#include "preprocess/convert/sampled_conversion.h"
-#include "preprocess/convert/scratch_folder.h"
 #include "preprocess/convert/shared_passes.h"
-#include "preprocess/grid/sample_source.h"
-#include "stream/base/count_text.h"
+#include "preprocess/faces/grid_faces_pass.h"
+#include "preprocess/grid/grid_views.h"
+#include "preprocess/grid/parallel.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/paths.h"
+#include "stream/base/text.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/manifest.h"
 
 namespace curvisplat {
 namespace {
 
-// Of the cache: samples of eight million nodes promised 0.73 to 1.20 of what grids of 12 to 64 million then took.
+// Of the cache: samples of eight million nodes promised 0.73 to 1.20 of what grids of 12 to 64 million then
+// took.
 constexpr double kSampleMargin = 1.15;
 
 /// At most.
@@ -36,7 +38,8 @@ uint64_t samplesOf(const GridDescription& description) {
   return samples;
 }
 
-/// The shape of the grid and its scalars, in words. Without files' names and times, which may differ between machines.
+/// The shape of the grid and its scalars, in words. Without files' names and times, which may differ between
+/// machines.
 std::string shapeOf(const GridDescription& description, const std::vector<uint32_t>& scalars) {
   std::string shape = description.blocks.empty() ? "" : countText(description.blocks.size(), "block") + " of";
   for (const GridBlock& block : description.blocks)
@@ -66,8 +69,8 @@ uint64_t bucketSplatsOfRanks(const DataSource& source, const Ranks& ranks) {
                             4 * kMaxBrickSplats);
 }
 
-/// Whether only the traces of a finished conversion were to be removed. Throws Error if the output is in the way.
-/// Rank 0 finds out, for all.
+/// Whether only the traces of a finished conversion were to be removed. Throws Error if the output is in the
+/// way. Rank 0 finds out, for all.
 bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>& facts) {
   const auto found = [&] {
     if (options.resume) {
@@ -166,6 +169,46 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given_opti
   report.threads = plan.threads;
   report.memory_bytes = plan.cap_bytes;
   return report;
+}
+
+namespace {
+
+uint64_t nodesOf(const GridDescription& description) {
+  uint64_t nodes = 0;
+  for (const GridBlock& block : description.blocks) nodes += block.nodes();
+  return nodes;
+}
+
+}  // namespace
+
+uint64_t times(uint64_t count, double factor) {
+  return static_cast<uint64_t>(std::llround(static_cast<double>(count) * factor));
+}
+
+SampleScale SampleScale::of(const GridDescription& whole, const GridDescription& sample,
+                            const ConvertOptions& options) {
+  const auto of_faces = [&](const GridDescription& grid, std::span<const IndexPlane> planes) {
+    return static_cast<double>(temporaryBytesOfFaces(grid.blocks, planes, options.scalars.size()));
+  };
+  return {static_cast<double>(nodesOf(whole)) / static_cast<double>(nodesOf(sample)),
+          of_faces(whole, options.planes) / of_faces(sample, {})};
+}
+
+uint64_t SampleScale::bytesOf(const std::vector<FileReport>& files) const {
+  uint64_t bytes = 0;
+  for (const FileReport& file : files) bytes += times(file.bytes, isFacesFile(file.name) ? faces : volume);
+  return bytes;
+}
+
+ConvertOptions optionsOfSample(const ConvertOptions& options, const std::filesystem::path& folder) {
+  ConvertOptions of_sample = options;
+  of_sample.output = folder / "sample.splats";
+  of_sample.temporary_folder = folder;
+  if (of_sample.given_folders.empty()) of_sample.given_folders = {temporaryFolder(options)};
+  of_sample.overwrite = of_sample.resume = false;
+  of_sample.planes.clear();  // the sample may not have them
+  of_sample.ranks = nullptr;
+  return of_sample;
 }
 
 }  // namespace curvisplat

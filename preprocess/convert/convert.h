@@ -1,8 +1,10 @@
-// Conversion: a grid of any size becomes a splat cache, in bounded memory. DESIGN.md, "Conversion".
+// Conversion: a grid of any size becomes a splat cache, in bounded memory. DESIGN.md, "Conversion". And an
+// estimate of what a conversion will take, from that of a sample of the grid. One thread calls.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "preprocess/convert/convert_options.h"
 #include "preprocess/convert/preflight.h"
@@ -11,33 +13,52 @@
 
 namespace curvisplat {
 
-/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three times, and once
-/// more for surfaces. The bytes of the cache depend on source, scalars and blank value alone. Peak memory of the process,
-/// everything included: options.memory_bytes.
+/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three
+/// times, and once more for surfaces. The bytes of the cache depend on source, scalars and blank value
+/// alone. Peak memory of the process, everything included: options.memory_bytes.
 ///
-/// Throws Error (and UsageError) if input, disk or options are at fault. Then no temporary file and no partial cache is
-/// left, and an existing output is unchanged.
+/// Throws Error (and UsageError) if input, disk or options are at fault. Then no temporary file and no
+/// partial cache is left, and an existing output is unchanged.
 ///
-/// After SIGKILL, or a crash of the machine, a partial folder is left, which is not a cache; `resume` continues from it.
-/// progress.stop() leaves one, too (convert() then throws Interrupted), and with `resume` set an Error does. If there is
-/// such a folder, a conversion to the same output throws Error unless `resume` is set, or `overwrite`, which starts anew.
-/// An interruption before there is anything worth resuming removes all files.
+/// After SIGKILL, or a crash of the machine, a partial folder is left, which is not a cache; `resume`
+/// continues from it. progress.stop() leaves one, too (convert() then throws Interrupted), and with `resume`
+/// set an Error does. If there is such a folder, a conversion to the same output throws Error unless
+/// `resume` is set, or `overwrite`, which starts anew. An interruption before there is anything worth
+/// resuming removes all files.
 ///
-/// Several ranks share the work of all passes; scratch folder and output must be on a file system that they share.
-/// Rank 0's report is of the whole. Each rank keeps to options.memory_bytes. When a rank throws, the others do not end by
-/// themselves: whoever started them has to end them; what rank 0 leaves is as described above. Unstructured grids are
-/// converted by one rank only.
+/// Several ranks share the work of all passes; scratch folder and output must be on a file system that they
+/// share. Rank 0's report is of the whole. Each rank keeps to options.memory_bytes. When a rank throws, the
+/// others do not end by themselves: whoever started them has to end them; what rank 0 leaves is as described
+/// above. Unstructured grids are converted by one rank only.
 ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress);
 
-/// Of a sample for sampledNeeds() and `--dry-run`. Fewer have too few bricks of coarser levels, of which the caches of large
-/// grids have a third of their bytes: of one million out of 27, estimates were 0.57 to 0.84 of what was taken.
+/// Nodes of a sample for sampledNeeds() and `--dry-run`. Smaller samples have too few bricks of coarser
+/// levels, of which the caches of large grids have a third of their bytes: of one million out of 27,
+/// estimates were 0.57 to 0.84 of what was taken.
 inline constexpr uint64_t kSampledNodes = 8'000'000;
 
-/// What convert() will take on disk, from a sample of about `nodes` nodes, which is converted within `folder`; that is made
-/// and removed. The whole takes within a factor of 1.5 of it. Throws Error if the sample cannot be converted, Interrupted
-/// once `progress` is stopped.
+/// What convert() will take on disk, from a sample of about `nodes` nodes, which is converted within
+/// `folder`; that is made and removed. The whole takes within a factor of 1.5 of it. Throws Error if the
+/// sample cannot be converted, Interrupted once `progress` is stopped.
 DiskNeeds sampledNeeds(const GridSource& grid, const ConvertOptions& options,
                        const std::filesystem::path& folder, const Progress& progress,
                        uint64_t nodes = kSampledNodes);
+
+/// count * factor, rounded.
+uint64_t times(uint64_t count, double factor);
+
+/// How much larger a structured grid is than its sample: for sampledNeeds(), and for `convert --dry-run`.
+struct SampleScale {
+  double volume = 1, faces = 1;
+
+  /// `options`: those of the whole grid.
+  static SampleScale of(const GridDescription& whole, const GridDescription& sample,
+                        const ConvertOptions& options);
+  /// Bytes of the whole grid's cache, from the files of the sample's.
+  uint64_t bytesOf(const std::vector<FileReport>& files) const;
+};
+
+/// The options for a sample, which is converted within `folder`.
+ConvertOptions optionsOfSample(const ConvertOptions& options, const std::filesystem::path& folder);
 
 }  // namespace curvisplat

@@ -13,7 +13,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/overset/block_owners.h"
 #include "stream/base/calendar.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
 #include "stream/base/ranks.h"
 #include "stream/codec/values_codec.h"
 

@@ -7,13 +7,13 @@
 #include <optional>
 #include <vector>
 
+#include "preprocess/coincidence/abutting_faces.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/overset/block_owners.h"
-#include "preprocess/splats/abutting_faces.h"
-#include "preprocess/splats/seams.h"
-#include "preprocess/survey/position_sample.h"
+#include "preprocess/seams/seams.h"
+#include "preprocess/survey/grid_survey.h"
 
 namespace curvisplat {
 

@@ -8,12 +8,11 @@
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
-#include "stream/base/byte_text.h"
-#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/freed_memory.h"
-#include "stream/model/brick.h"
+#include "stream/base/memory.h"
+#include "stream/base/text.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
 namespace {

@@ -1,11 +1,17 @@
-// The splats of an unstructured grid: of its points, from the moments of their dual cells, or of its cells where the
-// scalars are cell-centred. DESIGN.md, "Unstructured grids".
+// The splats of an unstructured grid: of its points, from the moments of their dual cells, or of its cells
+// where the scalars are cell-centred. DESIGN.md, "Unstructured grids". surveyMesh(), the first of its
+// passes, also serves `info`.
 //
 //    survey    cells: which points are used; points: bounds, ranges, which are the same in several pieces
 //    count     points
 //    scatter   cells with their corners (corner_gather) --> point_sums or cell_slopes --> splats
+//
+// Memory grows with the mesh by a bit a point, and 16 bytes for each point that several pieces share. One
+// thread calls.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -14,14 +20,15 @@
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/gather/gather_forecast.h"
 #include "preprocess/gather/mesh_reader.h"
-#include "preprocess/gather/point_numbers.h"
+#include "preprocess/survey/grid_survey.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 
 class MeshOrigin final : public SplatOrigin {
  public:
-  /// `source` must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and cell-centred
-  /// scalars are mixed.
+  /// `source` must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and
+  /// cell-centred scalars are mixed.
   MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
              const MemoryPlan& plan, ScratchFiles scratch);
 
@@ -54,5 +61,18 @@ class MeshOrigin final : public SplatOrigin {
   std::vector<bool> used_;  // [point]: a cell that is drawn has it
   uint64_t drawn_cells_ = 0, chunk_bytes_ = 0;
 };
+
+/// What is in an unstructured grid.
+struct MeshSurvey {
+  GridSurvey grid;                     // samples: points or cells, as the reader's scalars are
+  std::array<uint64_t, 6> cells_of{};  // [CellKind]; kNone: hidden ones and those that are not solid
+  uint64_t drawn_cells = 0, unused_points = 0;
+  uint64_t chunk_bytes = 0;  // of the largest chunk of cells that was read
+  std::vector<bool> used;    // [point]: a cell that is drawn has it
+};
+
+/// The first pass, for conversion and for `info`: reads cells, then points. Memory: a bit a point and a few
+/// chunks. Throws Error if the files are damaged or if nothing is drawn. Does not depend on threads.
+MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress);
 
 }  // namespace curvisplat

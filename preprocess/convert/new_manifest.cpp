@@ -1,10 +1,9 @@
-#include "preprocess/convert/new_manifest.h"
+#include "preprocess/convert/conversion.h"
 
 #include <cmath>
 
-#include "preprocess/grid/time_steps.h"
-#include "stream/cache/border_style.h"
-#include "stream/cache/cell_octants.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/cache/manifest.h"
 
 namespace curvisplat {
 

@@ -9,11 +9,10 @@
 #include <optional>
 
 #include "preprocess/convert/splat_record.h"
-#include "stream/base/byte_text.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/free_space.h"
-#include "stream/base/paths.h"
+#include "stream/base/text.h"
 #include "stream/cache/partial_folder.h"
 
 namespace curvisplat {

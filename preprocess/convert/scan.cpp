@@ -11,7 +11,7 @@
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/survey/grid_checksum.h"
+#include "preprocess/survey/grid_survey.h"
 #include "stream/base/error.h"
 #include "stream/base/trace.h"
 

@@ -7,10 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/bucket_plan.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/survey/cell_survey.h"
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"

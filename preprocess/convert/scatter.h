@@ -9,14 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/coincidence/abutting_faces.h"
 #include "preprocess/convert/bucket_file.h"
-#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/bucket_plan.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/overset/block_owners.h"
-#include "preprocess/splats/abutting_faces.h"
-#include "preprocess/splats/seams.h"
+#include "preprocess/seams/seams.h"
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"
 #include "stream/model/octree.h"

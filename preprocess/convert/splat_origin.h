@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/bucket_plan.h"
 #include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/splats/node_splats.h"

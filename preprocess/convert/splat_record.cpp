@@ -4,7 +4,7 @@
 #include <bit>
 #include <limits>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

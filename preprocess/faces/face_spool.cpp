@@ -8,7 +8,7 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/parallel.h"
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 #include "stream/base/mutex.h"
 #include "stream/base/trace.h"
 

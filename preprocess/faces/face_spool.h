@@ -12,12 +12,12 @@
 #include <span>
 #include <vector>
 
+#include "preprocess/coincidence/abutting_faces.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/splats/abutting_faces.h"
 #include "stream/base/mutex.h"
-#include "stream/base/nameless_file.h"
 #include "stream/base/progress.h"
+#include "stream/base/temporary_files.h"
 #include "stream/model/grid_faces.h"
 
 namespace curvisplat {

@@ -2,10 +2,9 @@
 
 #include <algorithm>
 
+#include "preprocess/coincidence/abutting_faces.h"
 #include "preprocess/faces/face_patches.h"
-#include "preprocess/faces/face_regions.h"
 #include "preprocess/faces/face_spool.h"
-#include "preprocess/splats/abutting_faces.h"
 #include "stream/base/error.h"
 #include "stream/base/trace.h"
 #include "stream/cache/faces_file.h"

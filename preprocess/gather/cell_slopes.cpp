@@ -10,7 +10,7 @@
 
 #include "preprocess/gather/streams_file.h"
 #include "preprocess/grid/parallel.h"
-#include "stream/base/freed_memory.h"
+#include "stream/base/memory.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {

@@ -11,11 +11,11 @@
 #include <memory>
 #include <vector>
 
-#include "preprocess/gather/cell_faces.h"
 #include "preprocess/gather/corner_gather.h"
+#include "preprocess/gather/face_matcher.h"
 #include "preprocess/gather/outer_planes.h"
 #include "preprocess/gather/point_sums.h"
-#include "stream/base/nameless_file.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 

@@ -10,8 +10,8 @@
 #include "preprocess/gather/point_pages.h"
 #include "preprocess/gather/streams_file.h"
 #include "preprocess/grid/parallel.h"
-#include "stream/base/check.h"
 #include "stream/base/compute_permits.h"
+#include "stream/base/error.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -272,16 +272,16 @@ void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedB
     reader_->forEachCells(group.ranges, [&](const LoadedCells& loaded) {
       for (size_t next = 0; next < loaded.cells.size();) {
         const TraceScope trace("gather corners");
-        GatheredCells& cells = used.next();
-        next = take(loaded, next, cells);
-        for (size_t n = 0; n < cells.corners.size(); ++n, ++slot) {
+        GatheredCells& gathered = used.next();
+        next = take(loaded, next, gathered);
+        for (size_t n = 0; n < gathered.corners.size(); ++n, ++slot) {
           const std::byte* from = slots.data() + slot * point_bytes;
-          std::memcpy(static_cast<void*>(&cells.at[n]), from, sizeof(glm::dvec3));
+          std::memcpy(static_cast<void*>(&gathered.at[n]), from, sizeof(glm::dvec3));
           if (corner_fields_ > 0)
-            std::memcpy(&cells.corner_values[n * corner_fields_], from + sizeof(glm::dvec3),
+            std::memcpy(&gathered.corner_values[n * corner_fields_], from + sizeof(glm::dvec3),
                         corner_fields_ * sizeof(float));
         }
-        for (size_t n = 0; n < cells.size(); ++n) dropIfBlanked(cells, n);
+        for (size_t n = 0; n < gathered.size(); ++n) dropIfBlanked(gathered, n);
         used.use();
       }
       progress_->advance(loaded.range.count);

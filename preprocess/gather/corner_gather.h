@@ -17,9 +17,8 @@
 #include <vector>
 
 #include "preprocess/gather/mesh_reader.h"
-#include "preprocess/gather/point_numbers.h"
-#include "preprocess/moments/four_cells.h"
-#include "stream/base/nameless_file.h"
+#include "preprocess/moments/cell_moments.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 

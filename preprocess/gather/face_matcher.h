@@ -1,14 +1,17 @@
-// Finds which faces two cells share, and which only one has: the outer ones. Cells come in the mesh's order, and
-// most pairs are near one another there: up to 2^17 faces without their second cell wait in memory. If there are more,
+// Finds which faces two cells share, and which only one has: the outer ones. FaceList lists the faces of
+// gathered cells, in parallel; FaceMatcher pairs them. Cells come in the mesh's order, and most pairs are
+// near one another there: up to 2^17 faces without their second cell wait in memory. If there are more,
 // some go to disk, and are sorted at the end.
 //
 //    faces --> waiting in memory --+--> pairs
 //                   | too many     |
 //                   +--> streams by a hash of the corners, sorted --> pairs, single ones
 //
-// Faces are alike if their three lowest corners are. How many wait does not depend on the memory that there is, so
-// which two of three alike faces are a pair does not, either.
+// Faces are alike if their three lowest corners are. How many wait does not depend on the memory that there
+// is, so which two of three alike faces are a pair does not, either.
 #pragma once
+
+#include <glm/vec3.hpp>
 
 #include <array>
 #include <cstddef>
@@ -19,9 +22,10 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/streams_file.h"
-#include "stream/base/nameless_file.h"
 #include "stream/base/progress.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 
@@ -37,6 +41,7 @@ struct FaceCalls {
   std::function<void(std::span<const std::byte> first, size_t second)> pair_with_earlier = {};
 };
 
+/// For one thread, except for FaceCalls::put.
 class FaceMatcher {
  public:
   using TakePair = std::function<void(std::span<const std::byte>, std::span<const std::byte>)>;
@@ -46,7 +51,8 @@ class FaceMatcher {
   FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes, ScratchFiles scratch);
   ~FaceMatcher();
 
-  /// Calls for some of the pairs, in this thread. Records are made of the faces that have no second one among these.
+  /// Calls for some of the pairs, in this thread. Records are made of the faces that have no second one
+  /// among these.
   void add(std::span<const FaceCorners> faces, const FaceCalls& calls);
   /// The others, and those without another. Once, after all faces.
   void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
@@ -85,6 +91,37 @@ class FaceMatcher {
   uint32_t next_to_spill_ = 0;
   std::unique_ptr<StreamsFile> spilled_;
   std::vector<std::byte> scratch_;
+};
+
+/// A face as one of its cells has it.
+struct HalfFace {
+  size_t cell = 0;                    // among the gathered ones
+  std::span<const uint32_t> corners;  // places among the cell's
+  bool of_plain_cell = false;         // which is no polyhedron, and whose corners are different points
+  glm::dvec3 inward{0.0};             // at right angles to it, as long as its area, into the cell
+  glm::dvec3 centre{0.0};             // the mean of its corners
+};
+
+/// The faces of all cells in their order. Collapsed ones, with fewer than three corners, are left out.
+class FaceList {
+ public:
+  /// Which face.
+  struct Place {
+    uint32_t cell, at;  // among the gathered ones; where it begins in facesOf() the cell
+    bool of_plain_cell;
+  };
+  std::vector<FaceCorners> corners;
+  std::vector<Place> places;
+
+  void assign(const GatheredCells& cells);  // in parallel; keeps the capacity
+  /// Face n, measured. Any thread.
+  HalfFace face(const GatheredCells& cells, size_t n) const;
+
+ private:
+  bool assignCell(const GatheredCells& cells, size_t n);
+  void leaveOutCollapsed();
+
+  std::vector<size_t> begins_{0};  // [cell + 1], in corners, with collapsed ones
 };
 
 }  // namespace curvisplat

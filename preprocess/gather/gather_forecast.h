@@ -1,15 +1,77 @@
-// What CornerGather, and PointSums or CellSlopes behind it, will write to temporary files: found from the cells' corners alone,
-// by the same decisions about pages and streams.
+// How many bytes CornerGather, and PointSums or CellSlopes behind it, will write to temporary files, known
+// before anything is written: found from the cells' corners alone, by the same decisions about pages and
+// streams. boundOfGather() reads a few chunks of cells, forecastOfGather() all of them. Of the faces that
+// wait for their second cell, WaitingFaces follows only a share. One thread calls.
 #pragma once
 
 #include <cstdint>
+#include <unordered_map>
+#include <vector>
 
 #include "preprocess/gather/cell_slopes.h"
-#include "preprocess/gather/page_slots.h"
+#include "preprocess/gather/face_matcher.h"
+#include "preprocess/gather/point_pages.h"
 #include "preprocess/gather/point_sums.h"
-#include "preprocess/gather/waiting_faces.h"
 
 namespace curvisplat {
+
+/// How many faces a FaceMatcher will write to disk: follows the faces whose lowest corner is one of a share
+/// of all points, through a table that is smaller than FaceMatcher's by that share. Small meshes are
+/// followed whole. Memory: some 80 bytes for each of 2^19 faces, mostly fewer.
+class WaitingFaces {
+ public:
+  /// `faces`: the faces of all cells, so that inner ones count twice. `range_cells`: cells that become
+  /// splats together.
+  WaitingFaces(uint64_t faces, uint64_t range_cells);
+
+  /// Whether cells with this corner have faces that are followed.
+  bool follows(uint64_t corner) const { return share_ == 0 || (corner * kMix) >> (64 - share_) == 0; }
+  /// The faces of cells that have such corners, in the mesh's order. Positions are not needed.
+  void add(const GatheredCells& cells);
+
+  struct Counts {
+    uint64_t spilled = 0;                      // those that wait at the end, too
+    uint64_t outer = 0, corners_of_outer = 0;  // that have planes of them, in points
+    struct Pairs {
+      uint64_t in_range = 0, across = 0;  // of cells of one range; of two
+    };
+    Pairs found, found_late;  // while cells come; when all have come
+  };
+  /// Of the whole mesh, after all cells.
+  Counts counts() const;
+
+ private:
+  static constexpr uint64_t kMix = 0x9e3779b97f4a7c15;
+  static constexpr uint32_t kSpilled = UINT32_MAX;
+  struct Seen {
+    uint64_t cell;
+    uint32_t entry;  // of waiting_; or kSpilled
+    uint32_t corners;
+  };
+  struct Hash {
+    size_t operator()(const FaceCorners& corners) const {
+      uint64_t hash = 0;
+      for (const uint64_t corner : corners) hash = ((hash ^ corner) * kMix) ^ (hash >> 29);
+      return hash;
+    }
+  };
+  struct Entry {
+    FaceCorners corners;
+    bool is_second;  // its first one is on disk; it is counted already
+  };
+  void add(const FaceCorners& corners, uint64_t cell, uint32_t corners_of_cell);
+  uint32_t newEntry(const Entry& entry);
+
+  const uint64_t range_cells_;
+  unsigned share_ = 0;  // one point of 2^share_
+  uint32_t most_waiting_;
+  std::vector<Entry> waiting_;
+  std::vector<uint32_t> free_;
+  uint32_t next_to_spill_ = 0;
+  std::unordered_map<FaceCorners, Seen, Hash> open_;  // without a second cell so far
+  Counts counts_;                                     // of those that are followed
+  FaceList list_;
+};
 
 /// Splats of a mesh's points or cells, made within some memory.
 struct GatherJob {
@@ -25,12 +87,14 @@ struct GatherNeeds {
   uint64_t samples = 0;        // points, or cells that are drawn
 };
 
-/// At the most, whatever the order of the cells. Reads a few chunks of them; `reader` needs no scalars.
+/// The most that may be needed, whatever the order of the cells. Reads a few chunks of them; `reader` needs
+/// no scalars.
 GatherNeeds boundOfGather(const MeshReader& reader, const GatherJob& job);
-/// Reads all cells. Points that several pieces share count as different ones, so that this is too much for many small pieces.
+/// What will be needed. Reads all cells. Points that several pieces share count as different ones, so that
+/// this is too much for many small pieces.
 GatherNeeds forecastOfGather(const MeshReader& reader, const GatherJob& job, const Progress& progress);
 
-/// What both count.
+/// The counts that both functions make, and the bytes that follow from them.
 class GatherCounts {
  public:
   /// `chunk_bytes`: of the largest chunk of cells.

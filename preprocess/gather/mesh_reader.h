@@ -1,16 +1,21 @@
-// Reads a mesh and decides, for all of conversion, which of its points and cells are blanked: by the file, by
-// `--blank VALUE`, or because a number is not finite. Numbers points and cells through all pieces.
+// Reads a mesh in chunks, one ahead, and decides for all of conversion which of its points and cells are
+// blanked: by the file, by `--blank VALUE`, or because a number is not finite. MeshReader numbers points
+// and cells through all pieces; PointNumbers finds the points that several pieces share. Memory: a few
+// chunks, and 16 bytes for each shared point. Any thread may read.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/read_ahead.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/progress.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 
@@ -20,6 +25,7 @@ struct MeshRange {
   uint64_t first = 0, count = 0, number = 0;
 };
 
+/// A chunk of points, or of cells, with the number of those that were blanked here.
 struct LoadedPoints {
   MeshRange range;
   MeshPoints points;
@@ -55,14 +61,14 @@ class MeshReader {
   uint64_t points() const { return points_; }
   uint64_t cells() const { return cells_; }
 
-  /// Calls use() for all points, in order, some at a time, one chunk read ahead. A blanked point has an x that is
-  /// NaN. Scalars are read where they are node-centred. Throws Error if the file is damaged.
+  /// Calls use() for all points, in order, some at a time, one chunk read ahead. A blanked point has an x
+  /// that is NaN. Scalars are read where they are node-centred. Throws Error if the file is damaged.
   void forEachPoints(const std::function<void(const LoadedPoints&)>& use) const;
   /// Points of the whole mesh by number.
   void readPoints(uint64_t first, uint64_t count, const std::function<void(const LoadedPoints&)>& use) const;
 
-  /// Calls use() for all cells, or those of `ranges`, in order, one chunk read ahead. A blanked cell, and one that
-  /// is not drawn, is kNone. Scalars are read where they are cell-centred.
+  /// Calls use() for all cells, or those of `ranges`, in order, one chunk read ahead. A blanked cell, and
+  /// one that is not drawn, is kNone. Scalars are read where they are cell-centred.
   void forEachCells(const std::function<void(const LoadedCells&)>& use) const;
   void forEachCells(const std::vector<MeshRange>& ranges,
                     const std::function<void(const LoadedCells&)>& use) const;
@@ -87,6 +93,27 @@ class MeshReader {
   std::optional<double> blank_value_;
   Centring centring_;
   uint64_t points_ = 0, cells_ = 0;
+};
+
+/// The numbers of points through all pieces of a mesh. Points of different pieces at the same position, bit
+/// by bit, are one point, which has the lowest of their numbers: a mesh in pieces has the splats of the
+/// whole one. Points of the same piece stay apart, as on the two sides of a thin wall.
+class PointNumbers {
+ public:
+  /// One piece has no such points and takes no time. Otherwise reads all points; external, except for 16
+  /// bytes a point that has become another one. Throws Error if these are more than `memory_bytes`.
+  PointNumbers(const MeshReader& reader, uint64_t memory_bytes, const ScratchFiles& scratch,
+               const Progress& progress);
+
+  /// The number of a point that has this number, piece after piece. Any thread.
+  uint64_t operator()(uint64_t number) const;
+  /// The number of points that have become another one.
+  uint64_t merged() const { return merged_.size(); }
+  /// These points, rising, and what each has become.
+  std::span<const std::pair<uint64_t, uint64_t>> mergedPoints() const { return merged_; }
+
+ private:
+  std::vector<std::pair<uint64_t, uint64_t>> merged_;  // by number
 };
 
 }  // namespace curvisplat

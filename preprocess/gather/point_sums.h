@@ -1,6 +1,7 @@
-// Sums what cells give to their corners, in the order of the cells, and makes a splat of each point: the mesh's
-// node-centred splats. The sums of all points (148 bytes a point with one field) need not fit in memory (sum_pages.h).
-// Where cells refer to points all over the mesh, they wait on disk, once for each range of points that they have corners in.
+// Sums what cells give to their corners, in the order of the cells, and makes a splat of each point: the
+// mesh's node-centred splats. The sums of all points (148 bytes a point with one field) need not fit in
+// memory (point_pages.h). Where cells refer to points all over the mesh, they wait on disk, once for each
+// range of points that they have corners in.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +10,10 @@
 #include <vector>
 
 #include "preprocess/gather/corner_gather.h"
-#include "preprocess/gather/point_borders.h"
-#include "preprocess/gather/sum_pages.h"
+#include "preprocess/gather/outer_planes.h"
+#include "preprocess/gather/point_pages.h"
 #include "preprocess/moments/mesh_splats.h"
-#include "stream/base/nameless_file.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 
@@ -21,7 +22,8 @@ using TakeSplat = std::function<void(const NodeSplat&, std::span<const SplatScal
 
 class PointSums {
  public:
-  /// `points`: how many points there are; their numbers are below it. `cells`: about how many cells will be added.
+  /// `points`: how many points there are; their numbers are below it. `cells`: about how many cells will be
+  /// added.
   PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
             const ScratchFiles& scratch);
   ~PointSums();

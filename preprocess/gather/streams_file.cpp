@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "stream/base/freed_memory.h"
+#include "stream/base/memory.h"
 
 namespace curvisplat {
 StreamsFile::StreamsFile(ScratchFiles scratch, size_t streams, uint64_t memory_bytes)

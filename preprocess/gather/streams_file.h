@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "stream/base/nameless_file.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 

@@ -1,8 +1,10 @@
-// GridSource, the interface that readers offer to conversion: blocks of nodes, read by boxes of rows, with
-// scalars and blanking. One implementation for each file format. No source holds a whole grid in memory.
+// GridSource, the interface that readers of structured grids offer to conversion: blocks of nodes, read by
+// boxes of rows, with scalars and blanking. Each file format has one implementation. No source holds a
+// whole grid in memory, and any number of threads may read one.
 //
 // A source reports only the blanking in its files. NodeReader (node_reader.h) adds `--blank` and non-finite
-// values.
+// values. The functions at the end are shared by the readers of all formats: they compare names of scalars
+// and choose a time step.
 #pragma once
 
 #include <array>
@@ -15,8 +17,8 @@
 
 namespace curvisplat {
 
-/// Half-open ranges of node indices of one block, the unit of reading: j0 <= j < j1, k0 <= k < k1, and all i, or
-/// i0 <= i < i1 of each row.
+/// Half-open ranges of node indices of one block, the unit of reading: j0 <= j < j1, k0 <= k < k1, and all
+/// i, or i0 <= i < i1 of each row.
 struct NodeBox {
   uint64_t j0 = 0, j1 = 0, k0 = 0, k1 = 0;
   uint64_t i0 = 0, i1 = UINT64_MAX;  // i1 above the block's ni: to the end of the row
@@ -47,7 +49,7 @@ enum class Centring { kNode, kCell };
 struct GridScalar {
   std::string name;                  // "density"; for vectors "Velocity:mag", "Velocity:x", ...
   std::string unit;                  // may be empty
-  std::vector<std::string> aliases;  // alternative names, simplified (scalar_names.h)
+  std::vector<std::string> aliases;  // alternative names, simplified (simplifiedName())
   uint32_t number = 0;               // of the variable in its PLOT3D function file, from 1; 0: none
   Centring centring = Centring::kNode;
   uint32_t function = 0;  // PLOT3D's function number; 0: none
@@ -114,19 +116,21 @@ class DataSource {
 
 class GridSource : public DataSource {
  public:
-  /// Reads the nodes of `box`, which has whole rows, in block number `block`: coordinates, the block's own blanking,
-  /// and the scalars with the given indices in description().scalars. Any number of threads may read concurrently.
-  /// Throws Error with the file and the offset.
+  /// Reads the nodes of `box`, which has whole rows, in block number `block`: coordinates, the block's own
+  /// blanking, and the scalars with the given indices in description().scalars. Any number of threads may
+  /// read concurrently. Throws Error with the file and the offset.
   virtual void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                     NodeArrays& out) const = 0;
-  /// The same for parts of rows: `out` gets box.rowNodes() nodes of each. The default reads whole rows, one after the
-  /// other.
+  /// The same for parts of rows: `out` gets box.rowNodes() nodes of each. The default reads whole rows, one
+  /// after the other.
   virtual void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                               NodeArrays& out) const;
-  /// The number of whole rows that readPartOfRows() holds in memory beside `out`: 0 if it reads the parts alone.
+  /// The number of whole rows that readPartOfRows() holds in memory beside `out`: 0 if it reads the parts
+  /// alone.
   virtual uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const { return 1; }
-  /// Which nodes of the box, which has whole rows, are fringe: interpolated from another block (a negative iblank).
-  /// Fills `out` with 1 or 0 for each and returns true; returns false if the grid does not tell. As read().
+  /// Which nodes of the box, which has whole rows, are fringe: interpolated from another block (a negative
+  /// iblank). Fills `out` with 1 or 0 for each and returns true; returns false if the grid does not tell. As
+  /// read().
   virtual bool readFringe(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<uint8_t>& /*out*/) const {
     return false;
   }
@@ -142,5 +146,25 @@ inline void readBox(const GridSource& source, uint32_t block, const NodeBox& box
   else
     source.readPartOfRows(block, box, scalars, out);
 }
+
+/// The name in lower case without spaces, underscores and hyphens, in which files, programs and users
+/// differ.
+std::string simplifiedName(const std::string& name);
+
+/// Whether `simple` (a simplified name) is the scalar's name or one of its aliases.
+bool answersTo(const GridScalar& scalar, const std::string& simple);
+
+/// The step that the user chose, or the first. Throws Error if `file` has no such step; a file without times
+/// has a single step.
+uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
+                        std::optional<uint32_t> asked);
+
+/// A note for users who have not chosen between several steps: "3 time steps from 0 to 2.5; using the first:
+/// choose with --time-step 0..2". nullopt if there is a single step, or if the user chose one.
+std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked);
+
+/// The time that the files state for the open step: that of the step, or that in the Q file's header unless
+/// it is 0, which many programs write for all steps.
+std::optional<double> statedTime(const GridDescription& description);
 
 }  // namespace curvisplat

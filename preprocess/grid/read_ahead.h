@@ -15,7 +15,7 @@
 
 #include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
-#include "stream/base/thread_name.h"
+#include "stream/base/threads.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {

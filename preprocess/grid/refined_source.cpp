@@ -1,4 +1,4 @@
-#include "preprocess/grid/refined_source.h"
+#include "preprocess/grid/grid_views.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

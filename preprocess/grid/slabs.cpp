@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "stream/base/error.h"
-#include "stream/base/huge_pages.h"
+#include "stream/base/memory.h"
 
 namespace curvisplat {
 namespace {

@@ -1,20 +1,83 @@
-// MeshSource, the interface that readers of unstructured grids offer to conversion: points and cells of one or
-// more pieces, read in chunks. The unstructured counterpart of GridSource. No source holds a whole mesh in
-// memory.
+// MeshSource, the interface that readers of unstructured grids offer to conversion: points and cells of one
+// or more pieces, read in chunks by any number of threads. It is the unstructured counterpart of
+// GridSource. No source holds a whole mesh in memory.
 //
-// Cells refer to points by their number in the piece. Pieces may repeat one another's points (partitions do):
-// points of different pieces at the same position are one point (preprocess/gather/point_numbers.h).
+// Cells refer to points by their number in the piece. Pieces may repeat one another's points (partitions
+// do): points of different pieces at the same position are one point (PointNumbers,
+// preprocess/gather/mesh_reader.h). Cells come in any mix of shapes:
+//
+//      tetrahedron    pyramid        wedge          hexahedron
+//           3            4             5               7-----6
+//          /|\          /|\           /|\             /|    /|
+//         / | \        / | \         3-+-4           4-----5 |
+//        0--+--2      3--+--2        | 2 |           | 3---|-2
+//         \ | /       | /   /        |/ \|           |/    |/
+//           1         0----1         0---1           0-----1
+//
+// A polyhedron has its corners and, for each face, the places of its corners among them. Corners and faces
+// may go round either way: only volumes without sign are taken of them. A cell with repeated corners is
+// degenerate and allowed.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
-#include "preprocess/mesh/mesh_cells.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
+
+enum class CellKind : uint8_t {
+  kNone,  // not drawn: a vertex, a line, a face
+  kTetrahedron,
+  kPyramid,
+  kWedge,
+  kHexahedron,
+  kPolyhedron,
+};
+
+/// Corners of a shape; 0 for kNone and kPolyhedron.
+size_t cornersOf(CellKind shape);
+
+/// Cells that follow one another in a piece. Readers begin with clear() and append.
+struct MeshCells {
+  std::vector<CellKind> shapes;
+  std::vector<size_t> corner_begin{0};  // [cell + 1], in corners
+  std::vector<uint64_t> corners;        // points, by their number in the piece
+  std::vector<size_t> face_begin{0};    // [cell + 1], in faces
+  std::vector<uint32_t> faces;          // of a polyhedron: of each face the number of its corners, and their
+                                        // places among the cell's corners
+  std::vector<uint8_t> hidden;          // 1: blanked by the file, or another piece's
+  std::vector<std::vector<float>> scalars;  // [requested scalar][cell]
+
+  size_t size() const { return shapes.size(); }
+  std::span<const uint64_t> cornersOfCell(size_t n) const {
+    return std::span(corners).subspan(corner_begin[n], corner_begin[n + 1] - corner_begin[n]);
+  }
+  std::span<const uint32_t> facesOfCell(size_t n) const {
+    return std::span(faces).subspan(face_begin[n], face_begin[n + 1] - face_begin[n]);
+  }
+
+  void clear();
+  /// A cell of any shape but kPolyhedron; further corners (of quadratic cells) are left out.
+  void append(CellKind shape, std::span<const uint64_t> of_cell);
+  /// A prism over a polygon: the points of its bottom, then those of its top. kNone with fewer than 6 or an
+  /// odd number.
+  void appendPrism(std::span<const uint64_t> points);
+  /// A polyhedron: of each face the number of its points and the points themselves, `count` faces in all.
+  /// Returns false, and appends a cell of kNone, if `stream` is not exactly that.
+  bool appendPolyhedron(uint64_t count, std::span<const uint64_t> stream);
+};
+
+/// The faces of a cell, by places among its corners, in the form of MeshCells::faces; `own`: those of a
+/// polyhedron.
+std::span<const uint32_t> facesOf(CellKind shape, std::span<const uint32_t> own);
+
+/// Throws Error, which names the piece's file and the cell, if one refers to a point that does not exist.
+/// `first`: the number of the first of them.
+void checkCells(const MeshCells& cells, const MeshPiece& piece, uint64_t first);
 
 /// Points of one piece. The source resizes the arrays, which keep their capacity.
 struct MeshPoints {
@@ -31,12 +94,12 @@ class MeshSource : public DataSource {
                           MeshPoints& out) const = 0;
 
   /// Cells [first, first + count) of a piece, and cell-centred scalars. Numbers of points are as stored:
-  /// checkCells() (mesh_cells.h) refuses those that do not exist.
+  /// checkCells() refuses those that do not exist.
   virtual void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                          MeshCells& out) const = 0;
 
-  /// To be called before these scalars are read, in one thread: computes those that are made of the whole mesh,
-  /// within `memory_bytes`. May be called again. Throws Interrupted once `progress` is stopped.
+  /// To be called before these scalars are read, in one thread: computes those that are made of the whole
+  /// mesh, within `memory_bytes`. May be called again. Throws Interrupted once `progress` is stopped.
   virtual void prepare(std::span<const uint32_t> /*scalars*/, uint64_t /*memory_bytes*/,
                        const Progress& /*progress*/) const {}
 

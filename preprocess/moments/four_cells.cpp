@@ -1,8 +1,8 @@
-#include "preprocess/moments/four_cells.h"
+#include "preprocess/moments/cell_moments.h"
 
 #include <array>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 #include "stream/base/vector_clones.h"
 
 // About functions that take or return vectors: all of them are inlined.

@@ -1,14 +1,17 @@
-// Splats of unstructured grids: of a point from the moments of its dual cell, of a cell from its own and its
-// neighbours' values. DESIGN.md, "Unstructured grids".
+// Splats of unstructured grids: of a point from the moments of its dual cell, of a cell from its own and
+// its neighbours' values; and where they end, at the outer faces of the mesh, which only one cell has.
+// DESIGN.md, "Unstructured grids". Pure: any thread.
 #pragma once
 
-#include <cstdint>
 #include <glm/vec3.hpp>
+
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "preprocess/moments/cell_moments.h"
 #include "preprocess/splats/node_splats.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 
@@ -19,10 +22,11 @@ struct DualCell {
   std::span<const double> moments;
 };
 
-/// The splat of a dual cell with volume; `node`: its number. Values are [field]. Pure: any thread.
+/// The splat of a dual cell with volume; `node`: its number. Values are [field].
 void splatOfPoint(uint64_t node, const DualCell& dual, NodeSplat& splat, std::span<SplatScalar> values);
 
-/// The neighbours of a cell: where their centres are from its own, and their values, [neighbour * fields + field].
+/// The neighbours of a cell: where their centres are from its own, and their values, [neighbour * fields +
+/// field].
 struct CellNeighbours {
   std::span<const glm::dvec3> steps;
   std::span<const float> values;
@@ -35,5 +39,20 @@ void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, 
 /// The splat of a cell.
 void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own,
                  const CellNeighbours& neighbours, NodeSplat& splat, std::span<SplatScalar> values);
+
+/// A share of an outer face, at which splats end.
+struct OuterPlane {
+  glm::dvec3 inward{0.0};  // at right angles to the face, as long as the share is large; not 0
+  glm::dvec3 point{0.0};   // the face's centre
+  bool touches =
+      true;  // it is a face of the splat's; else of one beside it, which the splat may reach beyond
+};
+
+/// The border code (stream/model/border_code.h) of a splat near these faces, whose order counts in the last
+/// bits. `next`: how much longer the splats behind it are, across the face.
+uint32_t meshBorderCode(std::span<const OuterPlane> planes, const Splat& splat, double next);
+
+/// Dual cells of outer points are half as thick as those behind them; cells are alike.
+inline constexpr double kNextOfPoints = 2, kNextOfCells = 1;
 
 }  // namespace curvisplat

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "preprocess/grid/parallel.h"
-#include "preprocess/splats/covered_part.h"
+#include "preprocess/shape/covered_part.h"
 
 namespace curvisplat {
 namespace {

@@ -1,16 +1,16 @@
 // Which block draws the data where several overlap: every point of space has one owner.
 //
-// The owner of a point is, of the blocks with a cell that holds it, the one whose node next to the point is no
-// fringe (GridSource::readFringe), and of several such the one with the smallest cell (cell_size.h), and of those of
-// one size the first. That depends on the grid alone. A sample's cell is looked at in 64 points
-// (splats/covered_part.h), but only where owners change: every sample is located once in each block that its own
-// one overlaps, and where it and all of its neighbours lie inside, nothing more is asked.
+// The owner of a point is, of the blocks with a cell that holds it, the one whose node next to the point is
+// no fringe (GridSource::readFringe), and of several such the one with the smallest cell (cell_tree.h), and
+// of those of one size the first. That depends on the grid alone. A sample's cell is looked at in 64 points
+// (shape/covered_part.h), but only where owners change: every sample is located once in each block that its
+// own one overlaps, and where it and all of its neighbours lie inside, nothing more is asked.
 //
 //    slab of block A --samples--> CellTree of a part of block B --> covered points of A's samples
 //                                 (tiles: the parts in memory)
 //
-// Cells are those of which all corners are there. Only pairs of blocks that findOverlaps() has found are compared, so
-// that blocks that abut lose nothing to one another.
+// Cells are those of which all corners are there. Only pairs of blocks that findOverlaps() has found are
+// compared, so that blocks that abut lose nothing to one another.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,6 @@
 
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/overset/cell_size.h"
 #include "preprocess/overset/cell_tree.h"
 #include "preprocess/overset/sample_cells.h"
 #include "preprocess/survey/block_overlap.h"
@@ -39,13 +38,13 @@ enum class Overlap {
 /// For one thread, which calls; its functions are parallel loops.
 class BlockOwners {
  public:
-  /// Reads the blocks that overlap once. `reader` gives the samples that are there. Memory: `memory_bytes`, but at least
-  /// for some rows. Throws Error if a file cannot be read.
+  /// Reads the blocks that overlap once. `reader` gives the samples that are there. Memory: `memory_bytes`,
+  /// but at least for some rows. Throws Error if a file cannot be read.
   BlockOwners(NodeReader reader, const std::vector<BlockOverlap>& overlaps, uint64_t memory_bytes);
 
-  /// Sets covered[n], of sample n of the slab's window, for the samples of its box: the points that another block
-  /// owns (splats/covered_part.h). Empty if there are none. The window has a halo of at least a sample before and
-  /// after (two for cells). Throws Error if a file cannot be read.
+  /// Sets covered[n], of sample n of the slab's window, for the samples of its box: the points that another
+  /// block owns (shape/covered_part.h). Empty if there are none. The window has a halo of at least a sample
+  /// before and after (two for cells). Throws Error if a file cannot be read.
   void cover(const LoadedSlab& loaded, std::vector<uint64_t>& covered);
 
  private:
@@ -75,7 +74,8 @@ class BlockOwners {
   uint64_t kept_bytes_ = 0;
 };
 
-/// What BlockOwners reads for the samples of `reader`. `everywhere`: they all have values where the grid has nodes.
+/// What BlockOwners reads for the samples of `reader`. `everywhere`: they all have values where the grid has
+/// nodes.
 NodeReader ownersReader(const NodeReader& reader, bool everywhere);
 
 }  // namespace curvisplat

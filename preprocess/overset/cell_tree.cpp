@@ -6,7 +6,7 @@
 
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/parallel.h"
-#include "stream/base/freed_memory.h"
+#include "stream/base/memory.h"
 
 namespace curvisplat {
 

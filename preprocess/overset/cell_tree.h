@@ -1,31 +1,46 @@
-// The cells of a part of one block, found by position.
-//
-// A tree over the block's lattice: each node halves the longest of its three index ranges, and has the bounding
-// box of its cells. So the tree has no indices, and follows thin and curved cells, as any cells next to one another
-// in the lattice are next to one another in space. About 50 bytes a node of the grid.
+// The cells of a part of one block, found by position, and the sizes of cells, by which overlapping blocks
+// are compared. About 50 bytes a node of the grid. A tree is immutable: any thread may ask.
 #pragma once
 
+#include <glm/vec3.hpp>
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <glm/vec3.hpp>
+#include <limits>
 #include <optional>
 #include <vector>
 
 #include "preprocess/grid/hexahedron.h"
-#include "preprocess/grid/hexahedron_location.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/overset/cell_size.h"
 #include "preprocess/survey/bounding_tree.h"
 
 namespace curvisplat {
 
-/// Immutable; any thread may ask.
+/// A cell's volume in quarters of a power of two: coarse enough that cells of the same size compare equal,
+/// whatever their rounding.
+using CellSize = int16_t;
+inline constexpr CellSize kNoCell = std::numeric_limits<CellSize>::max();
+
+/// A cell without volume is the smallest; one that is not finite, or kNoCell, is none. The limits between
+/// sizes are off the volumes that grids of round numbers have.
+inline CellSize cellSize(const std::array<glm::dvec3, 8>& corners) {
+  constexpr double kOffset = 0.137;
+  const double volume = std::abs(Hexahedron(corners).volume());
+  if (!std::isfinite(volume)) return kNoCell;
+  if (volume == 0) return std::numeric_limits<CellSize>::min();
+  return static_cast<CellSize>(std::clamp(std::floor(4 * std::log2(volume) + kOffset), -32000.0, 32000.0));
+}
+
+/// A tree over the block's lattice: each node halves the longest of its three index ranges, and has the
+/// bounding box of its cells. So the tree has no indices, and follows thin and curved cells, since cells
+/// next to one another in the lattice are next to one another in space.
 class CellTree {
  public:
-  /// Of the cells whose lowest nodes are in the slab's box and that are there; the window has the nodes behind them
-  /// (Halo{0, 1}). `loaded` as a NodeReader of scalars of this centring gives it. `fringe`: [node of the window], or
-  /// empty.
+  /// The tree of the cells whose lowest nodes are in the slab's box and that are there; the window has the
+  /// nodes behind them (Halo{0, 1}). `loaded` as a NodeReader of scalars of this centring gives it.
+  /// `fringe`: [node of the window], or empty.
   CellTree(const GridBlock& block, LoadedSlab loaded, std::vector<uint8_t> fringe, Centring centring);
 
   /// Of all cells; empty if there are none.
@@ -42,7 +57,8 @@ class CellTree {
     std::optional<size_t> cell;
   };
 
-  /// Whether `visit(Holder)` is true for a cell that holds the point. A point of a common face is in all of its cells.
+  /// Whether `visit(Holder)` is true for a cell that holds the point. A point of a common face is in all of
+  /// its cells.
   template <typename Visit>
   bool anyHolder(const glm::dvec3& point, Hint& hint, const Visit& visit) const;
   /// Whether the box meets a group of some cells.
@@ -73,8 +89,8 @@ class CellTree {
   };
 
   static constexpr uint64_t kLeafCells = 8;
-  // What a point may lie outside of a cell that holds it, in the cell's local coordinates: on the face between two
-  // cells it is in both.
+  // What a point may lie outside of a cell that holds it, in the cell's local coordinates: on the face
+  // between two cells it is in both.
   static constexpr double kOnFace = 1e-9;
 
   uint32_t build(const Range& range);

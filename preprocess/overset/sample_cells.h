@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "preprocess/grid/slabs.h"
-#include "preprocess/overset/cell_size.h"
+#include "preprocess/overset/cell_tree.h"
 #include "preprocess/survey/bounding_tree.h"
 
 namespace curvisplat {

@@ -1,6 +1,6 @@
 #include "preprocess/scenes/scenes.h"
 
-#include <fmt/ranges.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,8 @@
 #include <numbers>
 
 #include "preprocess/scenes/rough_scenes.h"
-#include "stream/base/check.h"
 #include "stream/base/error.h"
-#include "stream/base/suggestion.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

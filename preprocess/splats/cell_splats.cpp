@@ -8,12 +8,10 @@
 #include <limits>
 
 #include "preprocess/grid/hexahedron.h"
-#include "preprocess/grid/lattice_gradient.h"
 #include "preprocess/grid/node_reader.h"
-#include "preprocess/splats/covered_part.h"
-#include "preprocess/splats/lq.h"
-#include "preprocess/splats/shape.h"
-#include "stream/base/check.h"
+#include "preprocess/shape/covered_part.h"
+#include "preprocess/shape/shape.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

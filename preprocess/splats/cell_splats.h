@@ -17,8 +17,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "preprocess/coincidence/abutting_faces.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/splats/abutting_faces.h"
 #include "preprocess/splats/node_splats.h"
 
 namespace curvisplat {

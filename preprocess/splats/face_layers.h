@@ -1,17 +1,26 @@
-// The faces that a cell lies in the layers behind of, where its border code has several directions: those of nodes on one face of a
-// block and one node away from another, and of nodes one away from two or three faces (stream/model/border_code.h).
+// The faces of its block that a cell lies one node behind, and what they make of its splat. First its
+// border code, where that has several directions: of nodes on one face and one away from another, and of
+// nodes one away from two or three faces (stream/model/border_code.h). Then where the splat is cut
+// (FacesBehind), and how it is made to fit there (fitToLayers()).
 //
-// Whether such a face is a seam is known at the node of the face next to the cell, not at the cell's own. So a probe is sent there,
-// one for each face, and the cell waits for the answers (seams.h).
+// Whether such a face is a seam is known at the node of the face next to the cell, not at the cell's own.
+// So a probe is sent there, one for each face, and the cell waits for the answers
+// (preprocess/seams/seams.h). Pure: any thread.
 #pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 
+#include "preprocess/splats/block_window.h"
+#include "preprocess/splats/stretch.h"
 #include "stream/model/border_code.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 
@@ -29,15 +38,15 @@ struct LayerAxis {
   double distance = 1;     // of the face from the cell's middle, in cells
 };
 
-/// A code with layers. Two bits for each of its axes: 0, or 1 and the axis of the lattice along which the cell lies
-/// behind a face.
+/// A code with layers. Two bits for each of its axes: 0, or 1 and the axis of the lattice along which the
+/// cell lies behind a face.
 struct LayeredBorder {
   uint32_t code = kNoBorder;
   uint8_t layers = 0;
 };
 
-/// Of a cell that ends at the borders `ends`, all of them faces, and lies behind those of `layers`: at right angles, three
-/// directions in all at the most.
+/// Of a cell that ends at the borders `ends`, all of them faces, and lies behind those of `layers`: at right
+/// angles, three directions in all at the most.
 LayeredBorder layeredBorder(std::span<const glm::dvec3> ends, std::span<const LayerAxis> layers);
 
 /// The axis of the lattice of the code's axis n; -1 if that is no layer's.
@@ -47,5 +56,119 @@ inline int latticeAxis(uint8_t layers, int n) {
 
 /// What is left of `border` if the faces across some axes of the lattice are seams: bit n, axis n.
 LayeredBorder withoutSeams(const LayeredBorder& border, uint32_t axes);
+
+/// The faces of a block that a node is one away from: along i, j and k 1 from the lower one, -1 from the
+/// upper one, or 0.
+using Layers = std::array<int, 3>;
+
+/// Of a node with this index along an axis of `count` nodes; 0 in blocks of three nodes or fewer.
+inline int layerOf(uint64_t index, uint64_t count) {
+  if (count < 4) return 0;
+  return index == 1 ? 1 : index + 2 == count ? -1 : 0;
+}
+
+struct NodeBehind {
+  ptrdiff_t at = 0;  // element of NodeArrays
+  Neighbours neighbours;
+  Layers layers{};
+};
+
+/// Where the cell of a node ends that is behind one face.
+struct CutBehindFace {
+  uint32_t border_code = kNoBorder;
+  glm::dvec3 face_node{0.0};  // the face's, next to the node
+  double spacing = 0;         // NodeSplat's, of that one
+};
+
+/// The same behind several faces, or where the cell ends at others.
+struct CutBehindFaces {
+  LayeredBorder border;
+  std::array<FaceProbe, 3> probes{};
+  size_t count = 0;  // of the probes; 0: the cell is not cut
+};
+
+/// Cuts the splats of nodes that are one away from faces of their block: they reach beyond these faces by a
+/// hundredth of a cell's weight.
+class FacesBehind {
+ public:
+  /// `middles`: as in NodeSplatCorrections, the face goes through the middles of its cells. The lattice
+  /// outlives it.
+  FacesBehind(const NodeLattice& lattice, bool middles) : lattice_(lattice), middles_(middles) {}
+
+  /// Of a node's splat that is behind a face of one axis, whose neighbours along it are both there; none if
+  /// the face has collapsed.
+  std::optional<CutBehindFace> cutAtOne(const NodeBehind& behind, int axis, const Splat& splat) const;
+
+  /// Of a node's splat that ends at faces (`inwards`, as borderCode() takes it) or is behind several.
+  /// `along`: columns, the frame's images of the directions inwards from these faces along i, j, k.
+  CutBehindFaces cutAtSeveral(const NodeBehind& behind, const std::array<double, 3>& inwards,
+                              const glm::dmat3& along, const Splat& splat) const;
+
+ private:
+  /// A face of the block, at the node of it next to the node behind.
+  struct Face {
+    ptrdiff_t node;            // element of NodeArrays
+    Neighbours beside;         // its own
+    glm::dvec3 position{0.0};  // of the plane, with the
+    glm::dvec3 normal{0.0};    // inwards; zero where the face has collapsed
+  };
+  Face faceOf(const NodeBehind& behind, int axis) const;
+
+  const NodeLattice& lattice_;
+  const bool middles_;
+};
+
+/// How a cell in the layers behind faces is made to fit where the renderer cuts it.
+///
+/// The code of a cell behind several faces, or behind one and at another, has no distances: it is cut about
+/// one length from its middle (stream/model/border_code.h). Where cells shrink suddenly towards the face,
+/// the face is nearer: at 0.83 where the last cell is half as long as the one before. The part beyond it, a
+/// hundredth of the cell's weight, is seen as a fringe. With x, the logarithm of the factor by which the
+/// cell is too long, cells become shorter and move inwards, by half of what would fit, and the half cells
+/// at the face follow, so that a uniform medium is as even as before:
+///
+///                      ln s       growth inwards    drift inwards
+///     one behind     -0.34 x          1.25 x          0.13 x
+///     at the face    -0.4 x              x
+///
+/// The numbers are by least squares in one dimension, over lines whose last cell is shorter, of the density
+/// and of the length beyond the face, which counts 0.13; then 1.3 times as much, so that less than 0.1 %
+/// lies outside of multi_bin. Share outside, rms and p98/p2 of multi_bin:
+///
+///     nothing      0.32 %    2.64 %    1.126
+///     1 times      0.13      2.74      1.131
+///     1.3 times    0.09      2.79      1.134
+///     1.5 times    0.05      2.86      1.136
+///
+/// Cells that fit exactly leave 0.01 %, but make a band along the edges of the block, rms 4.4 %.
+///
+/// Where the face turns out to be a joint of blocks, all of it is undone
+/// (preprocess/seams/joint_sides.cpp), so x is found from the row that is known there, too (JointLine,
+/// stretch.h). Elements of three steps have x = 0.075, and fit well enough as they are.
+struct LayerFit {
+  double factor = 1;             // of the length
+  double growth = 0, drift = 0;  // inwards
+};
+
+/// Of a cell one away from the face, by its line across it.
+LayerFit fitBehindFace(const JointLine& line);
+/// Of a half cell at the face.
+LayerFit fitAtFace(const JointLine& line);
+
+/// What a node's cell ends at and is behind along i, j and k, as computeNodeSplats() has it.
+struct CellAtFaces {
+  const std::array<double, 3>& inwards;  // borderCode()'s
+  const Layers& layers;
+  const std::array<JointLine, 3>& lines;
+};
+/// Where its middle is from the node, how much longer its splat is, and how it grows.
+struct CellOnLattice {
+  glm::dvec3 &middle, &stretch;
+  std::array<float, 3>& growth;
+};
+
+/// Makes a cell that ends at several faces, or is behind some, fit where it is cut. False if it is another
+/// cell.
+bool fitToLayers(const CellAtFaces& at, const CellOnLattice& cell);
 
 }  // namespace curvisplat

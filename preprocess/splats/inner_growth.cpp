@@ -1,6 +1,6 @@
-#include "preprocess/splats/inner_growth.h"
+#include "preprocess/splats/inner_nodes.h"
 
-#include "stream/model/growth_frames.h"
+#include "stream/model/growth_code.h"
 
 // Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
 #undef HWY_TARGET_INCLUDE

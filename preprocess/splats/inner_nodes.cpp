@@ -1,6 +1,6 @@
 #include "preprocess/splats/inner_nodes.h"
 
-#include "preprocess/splats/shape.h"
+#include "preprocess/shape/shape.h"
 
 // Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
 #undef HWY_TARGET_INCLUDE

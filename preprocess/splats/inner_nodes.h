@@ -1,10 +1,12 @@
-// Numbers of the splats of nodes that have all six neighbours and lie behind no face: nearly all nodes of a grid. Several at
-// once, by vector instructions; the same bits as one after the other (node_splats.cpp, which has the formulas' reasons),
-// whatever the instruction set: nothing is fused, and sums have the same order.
+// Numbers and growth codes of the splats of nodes that have all six neighbours and lie behind no face:
+// nearly all nodes of a grid. They are computed several at once, by vector instructions, and have the same
+// bits as one after the other (node_splats.cpp, which has the formulas' reasons), whatever the instruction
+// set: nothing is fused, and sums have the same order. Pure: any thread. Never allocates.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "preprocess/splats/stretch.h"
@@ -34,8 +36,20 @@ struct alignas(64) InnerSplats {
   bool is_plain[kInnerNodesAtOnce];  // no axis is floored; else the node's numbers are of no use
 };
 
-/// Of nodes `first` to first + kInnerNodesAtOnce - 1 of the row, with all corrections (NodeSplatCorrections). `values`: [node of
-/// these * scalars + scalar]. Pure: any thread. Never allocates.
+/// Of nodes `first` to first + kInnerNodesAtOnce - 1 of the row, with all corrections
+/// (NodeSplatCorrections). `values`: [node of these * scalars + scalar].
 void computeInnerNodes(const InnerRow& row, size_t first, InnerSplats& out, SplatScalar* values);
+
+/// In place of a code (stream/model/growth_code.h): the cell grows along several axes.
+inline constexpr int32_t kGrowsAlongSeveral = -1;
+
+struct alignas(64) InnerGrowthCodes {
+  int32_t of[kInnerNodesAtOnce];  // as growthCode(), the same bits; or kGrowsAlongSeveral
+};
+
+/// The growth codes of the nodes of `splats`. Most cells grow along one axis of the lattice, or along none;
+/// the codes of the others are left to growthCode(). `growth`: [axis][node].
+void findInnerGrowth(const InnerSplats& splats, const std::array<const float*, 3>& growth,
+                     InnerGrowthCodes& out);
 
 }  // namespace curvisplat

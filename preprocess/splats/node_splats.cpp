@@ -8,16 +8,13 @@
 #include <limits>
 #include <optional>
 
-#include "preprocess/splats/covered_part.h"
-#include "preprocess/splats/faces_behind.h"
-#include "preprocess/splats/inner_growth.h"
+#include "preprocess/shape/covered_part.h"
+#include "preprocess/shape/shape.h"
+#include "preprocess/splats/block_window.h"
+#include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/inner_nodes.h"
-#include "preprocess/splats/lq.h"
-#include "preprocess/splats/node_lattice.h"
-#include "preprocess/splats/several_layers.h"
-#include "preprocess/splats/shape.h"
 #include "preprocess/splats/window_lines.h"
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -16,7 +16,7 @@
 // A splat is longer or shorter than the cell along each axis, by a factor near 1, so that uniform data looks
 // uniform where cells of different sizes meet (stretch.h). Its weight stays the volume of the cell, its slope
 // stays the scalar's gradient, and its middle stays; that of a half cell moves with the stretch, since its
-// border stays, and it is stretched by less (joint_line.h).
+// border stays, and it is stretched by less (JointLine, stretch.h).
 //
 // Where cells grow steadily along an axis the kernel is skewed (stream/model/growth_code.h).
 //
@@ -42,7 +42,6 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/block_window.h"
 #include "preprocess/splats/face_layers.h"
-#include "preprocess/splats/joint_line.h"
 #include "preprocess/splats/stretch.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
@@ -100,7 +99,7 @@ struct NodeSplat {
   // LayeredBorder's: layers behind faces that SeamMerger may find to be closed, where the code has several directions.
   uint8_t layers = 0;
   StretchFit fit = StretchFit::kSteep;  // what the stretch was found by
-  bool fits_layers = false;             // it was made to fit where it is cut (several_layers.h)
+  bool fits_layers = false;             // it was made to fit where it is cut (face_layers.h)
   // No splat, but a FaceProbe of the node: node_position and spacing are of the face. See SeamMerger.
   bool is_probe = false;
 

@@ -7,9 +7,7 @@
 #include <cstdint>
 
 #include "preprocess/splats/block_window.h"
-#include "preprocess/splats/faces_behind.h"
-#include "preprocess/splats/joint_line.h"
-#include "preprocess/splats/node_lattice.h"
+#include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/stretch.h"
 
 namespace curvisplat {

@@ -13,9 +13,8 @@
 
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/survey/box_tree.h"
+#include "preprocess/survey/bounding_tree.h"
 #include "preprocess/survey/overlap_points.h"
-#include "preprocess/survey/point_holders.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

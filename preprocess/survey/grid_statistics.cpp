@@ -8,7 +8,7 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/slabs.h"
-#include "preprocess/survey/cell_survey.h"
+#include "preprocess/survey/grid_survey.h"
 
 namespace curvisplat {
 namespace {

@@ -1,8 +1,20 @@
 #include "preprocess/survey/grid_survey.h"
 
-#include <algorithm>
-#include <cstddef>
+#include <tbb/blocked_range.h>
 #include <glm/common.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <span>
+
+#include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/parallel.h"
+#include "preprocess/grid/slabs.h"
+#include "stream/base/checksum.h"
+#include "stream/base/mutex.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
@@ -17,6 +29,187 @@ GridSurvey unitedSurvey(GridSurvey a, const GridSurvey& b) {
     a.ranges[scalar].max = std::max(a.ranges[scalar].max, b.ranges[scalar].max);
   }
   return a;
+}
+
+namespace {
+
+/// 0 .. count - 1, evenly spread, from the number of a row's first node: rows that lie side by side begin
+/// apart.
+uint64_t phaseOf(uint64_t node, uint64_t count) {
+  uint64_t bits = node * 0x9e3779b97f4a7c15;
+  bits = (bits ^ bits >> 32) * 0xd6e8feb86659fd93;
+  return (bits ^ bits >> 32) % count;
+}
+
+}  // namespace
+
+PositionSample::PositionSample(uint64_t nodes, uint64_t most)
+    // A row begins anywhere, so there may be one more of each; a little room is for that.
+    : nodes_each_(static_cast<uint32_t>(nodes / (most - most / 16) + 1)) {
+  positions_.reserve(std::min(nodes / nodes_each_ + nodes / nodes_each_ / 16 + 64, most));
+}
+
+void PositionSample::add(const LoadedSlab& loaded, const GridBlock& block) {
+  const auto& [slab, nodes, ignored] = loaded;
+  const WindowStrides strides(slab.window, block.ni);
+  for (uint64_t k = slab.box.k0; k < slab.box.k1; ++k)
+    for (uint64_t j = slab.box.j0; j < slab.box.j1; ++j) {
+      const uint64_t phase = phaseOf(slab.first_node + (k * block.nj + j) * block.ni, nodes_each_);
+      // The first i >= i0 with i % nodes_each_ == phase.
+      uint64_t i = slab.box.i0 + (phase + nodes_each_ - slab.box.i0 % nodes_each_) % nodes_each_;
+      for (; i < slab.box.endOfRow(block.ni); i += nodes_each_)
+        if (const size_t at = strides.at(i, j, k); !nodes.blank[at])
+          positions_.emplace_back(nodes.x[at], nodes.y[at], nodes.z[at]);
+    }
+}
+
+namespace {
+
+constexpr uint64_t kNodesOfTask = 16384;
+
+/// Of x, y, z and blank of a row.
+uint64_t checksumOfRow(uint32_t block, uint64_t j, uint64_t k, const std::array<uint64_t, 4>& arrays) {
+  const std::array<uint64_t, 7> parts{block, j, k, arrays[0], arrays[1], arrays[2], arrays[3]};
+  return checksumOf(std::as_bytes(std::span(parts)));
+}
+
+}  // namespace
+
+void GridChecksum::add(const LoadedSlab& loaded, const GridBlock& block) {
+  const Slab& slab = loaded.slab;
+  const NodeArrays& nodes = loaded.nodes;
+  const WindowStrides strides(slab.window, block.ni);
+  const uint64_t width = slab.box.j1 - slab.box.j0, row_nodes = slab.box.rowNodes(block.ni);
+  const bool whole = slab.box.hasWholeRows(block.ni);
+  if (!whole && slab.box.i0 == 0) rows_ = std::vector<Row>(rowsOf(slab.box));
+  const auto of_row = [&](uint64_t row) {
+    const uint64_t j = slab.box.j0 + row % width, k = slab.box.k0 + row / width;
+    if (!whole) return ofParts(rows_[row], loaded, block, j, k);
+    const size_t first = strides.at(0, j, k);
+    const auto of = [&](const auto& values) {
+      return checksumOf(std::as_bytes(std::span(values).subspan(first, block.ni)));
+    };
+    return checksumOfRow(slab.block, j, k, {of(nodes.x), of(nodes.y), of(nodes.z), of(nodes.blank)});
+  };
+  sum_ += parallelReduce(
+      tbb::blocked_range<uint64_t>(0, rowsOf(slab.box), kNodesOfTask / row_nodes + 1), uint64_t{0},
+      [&](const tbb::blocked_range<uint64_t>& range, uint64_t sum) {
+        const TraceScope trace("checksum");
+        for (uint64_t row = range.begin(); row < range.end(); ++row) sum += of_row(row);
+        return sum;
+      },
+      std::plus<>());
+}
+
+/// The row's checksum if the slab has its last part, else 0.
+uint64_t GridChecksum::ofParts(Row& row, const LoadedSlab& loaded, const GridBlock& block, uint64_t j,
+                               uint64_t k) const {
+  const Slab& slab = loaded.slab;
+  const NodeArrays& nodes = loaded.nodes;
+  const size_t first = WindowStrides(slab.window, block.ni).at(slab.box.i0, j, k);
+  const size_t count = slab.box.rowNodes(block.ni);
+  const auto add = [&](const auto& values, Checksum& to) {
+    to.add(std::as_bytes(std::span(values).subspan(first, count)));
+  };
+  add(nodes.x, row.x);
+  add(nodes.y, row.y);
+  add(nodes.z, row.z);
+  add(nodes.blank, row.blank);
+  if (slab.box.i1 < block.ni) return 0;
+  return checksumOfRow(slab.block, j, k, {row.x.value(), row.y.value(), row.z.value(), row.blank.value()});
+}
+
+namespace {
+
+constexpr size_t kNodesPerTask = 16384;
+
+/// Adds a cell to the survey. Returns whether the cell is drawn.
+bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
+  ++survey.nodes;
+  const uint8_t own = nodes.blank[at];
+  if ((cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) || (own & kNoValue)) {
+    ++survey.blanked.by_grid;
+    return false;
+  }
+  if (own & kBlankValue) {
+    ++survey.blanked.by_value;
+    return false;
+  }
+  if (own & kValueNotFinite) {
+    ++survey.blanked.not_finite;
+    return false;
+  }
+  for (const glm::dvec3& corner :
+       cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, row_stride, plane_stride)) {
+    survey.lower = glm::min(survey.lower, corner);
+    survey.upper = glm::max(survey.upper, corner);
+  }
+  for (size_t scalar = 0; scalar < survey.ranges.size(); ++scalar) {
+    const double value = nodes.scalars[scalar][at];
+    survey.ranges[scalar].min = std::min(survey.ranges[scalar].min, value);
+    survey.ranges[scalar].max = std::max(survey.ranges[scalar].max, value);
+  }
+  return true;
+}
+
+}  // namespace
+
+GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, const SurveyExtras& extras,
+                       Progress& progress) {
+  AbuttingFaces* const faces = extras.faces;
+  Mutex adding_faces;  // guards *faces
+  GridSurvey nothing;
+  nothing.ranges.resize(reader.scalars());
+  GridSurvey survey = nothing;
+  GridChecksum checksum;
+  SlabStream slabs(reader, slab_bytes, kCornerHalo);
+  while (const LoadedSlab* loaded = slabs.next()) {
+    const Slab& slab = loaded->slab;
+    const NodeArrays& nodes = loaded->nodes;
+    const GridBlock& block = reader.source().description().blocks[slab.block];
+    const WindowStrides strides(slab.window, block.ni);
+    const uint64_t rows = slab.box.j1 - slab.box.j0, row_nodes = slab.box.rowNodes(block.ni);
+    const auto add_ends = [&](const std::array<uint64_t, 3>& cell, size_t at,
+                              std::vector<AbuttingFaces::Centre>& ends) {
+      for (int axis = 0; axis < 3; ++axis)
+        for (const bool upper : {false, true})
+          if (const CellFace face{slab.block, cell, axis, upper}; faces->isAtEnd(face))
+            ends.push_back(faces->centreOf(face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at,
+                                                           strides.row, strides.plane)));
+    };
+    const auto add_row = [&](size_t row, GridSurvey& to, std::vector<AbuttingFaces::Centre>& ends) {
+      const uint64_t j = slab.box.j0 + row % rows, k = slab.box.k0 + row / rows;
+      if (j + 1 == block.nj || k + 1 == block.nk) return;
+      const bool row_at_end = j == 0 || j + 2 == block.nj || k == 0 || k + 2 == block.nk;
+      size_t at = strides.at(slab.box.i0, j, k);
+      for (uint64_t i = slab.box.i0; i < slab.box.i1 && i + 1 < block.ni; ++i, ++at) {
+        const bool is_there = addCell(nodes, at, strides.row, strides.plane, to);
+        const bool at_end = row_at_end || i == 0 || i + 2 == block.ni;
+        if (faces && is_there && at_end) add_ends({i, j, k}, at, ends);
+      }
+    };
+    // Counts, minima and maxima do not depend on how the work is divided.
+    survey = unitedSurvey(
+        std::move(survey),
+        parallelReduce(
+            tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / row_nodes + 1), nothing,
+            [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
+              const TraceScope trace("scan cells");
+              std::vector<AbuttingFaces::Centre> ends;
+              for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range, ends);
+              if (!ends.empty()) {
+                const MutexLock lock(adding_faces);
+                faces->add(ends);
+              }
+              return of_range;
+            },
+            unitedSurvey));
+    checksum.add(*loaded, block);
+    if (extras.sample) extras.sample->add(*loaded, block);
+    progress.advance(rowsOf(slab.box) * row_nodes);
+  }
+  survey.grid_checksum = checksum.value();
+  return survey;
 }
 
 }  // namespace curvisplat

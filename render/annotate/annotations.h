@@ -1,5 +1,9 @@
-// Annotations drawn over a picture: scalar bars, the directions of the axes, the box around the data, a grid with
-// coordinates. The same in `render` and in the window.
+// Annotations drawn over a picture: scalar bars, the directions of the axes, the box around the data, a grid
+// with coordinates; and a picture of the built-in colour maps. `render` and the window share them.
+//
+// Scalar bars have a strip of their own at the right, so that they never cover data. Drawing takes up to 40
+// bytes a pixel (annotatedBytes()). Pure; any thread. In a build without Cairo asking for an annotation is a
+// UsageError.
 #pragma once
 
 #include <cstdint>
@@ -21,17 +25,17 @@ struct Annotations {
   bool operator==(const Annotations&) const = default;
 };
 
-/// The size of the left part of `picture` that shows the data: all of it, or what the scalar bars leave. They
-/// have a strip of their own, so that they never cover data. Its width depends on the labels and the
-/// picture's height, and is at most half of the picture's.
+/// The size of the left part of `picture` that shows the data: all of it, or what the scalar bars leave. The
+/// width of their strip depends on the labels and the picture's height, and is at most half of the
+/// picture's.
 ImageSize dataSize(const Annotations& annotations, ImageSize picture,
                    std::span<const ShownFunction> functions);
-/// With one bar.
+/// The size with one bar.
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function);
 
-/// The whole picture: `data`, which has the size of scene.view, over the background where it is transparent, and the
-/// annotations. The text's size follows
-/// the picture's height. Throws Error if the picture is larger than Cairo supports (32,767 pixels a side).
+/// The whole picture: `data`, which has the size of scene.view, over the background where it is transparent,
+/// and the annotations. The text's size follows the picture's height. Throws Error if the picture is larger
+/// than Cairo supports (32,767 pixels a side).
 Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& scene);
 
 /// Memory that annotated() needs, its result included.
@@ -41,7 +45,8 @@ uint64_t annotatedBytes(ImageSize picture);
 /// premultiplied). Throws as annotated() does.
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene);
 
-/// "density [kg/m3]", or "density" if the unit is unknown.
-std::string scalarTitle(const std::string& name, const std::string& unit);
+/// A picture of the built-in colour maps with their names: by category, in three columns on white. Throws
+/// UsageError in a build without Cairo.
+Image colourMapSheet();
 
 }  // namespace curvisplat

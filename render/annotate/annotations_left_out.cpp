@@ -39,4 +39,10 @@ std::vector<uint8_t> annotationLayer(const Annotations& annotations, const Annot
   return std::vector<uint8_t>(4 * scene.picture.pixels());
 }
 
+Image colourMapSheet() {
+  throw UsageError(
+      "this program was built without drawing text (CMake's option CURVISPLAT_ANNOTATIONS); leave out "
+      "--output to list the maps");
+}
+
 }  // namespace curvisplat

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "render/annotate/axis_ticks.h"
+#include "render/annotate/annotated_scene.h"
 #include "render/annotate/canvas.h"
 
 namespace curvisplat {

@@ -1,24 +1,57 @@
-// What annotations are drawn with: a canvas of Cairo's, ink, text and lines in space.
+// What annotations are drawn with: pictures in memory that Cairo draws on (CairoSurface, Canvas), ink, text,
+// and lines in space.
+//
+// Sizes and places are in pixels, from the top left. A surface belongs to one thread at a time, and a Canvas
+// takes four bytes a pixel. Cairo is used in this room and in tools/throughput only, whose plots are drawn
+// on a CairoSurface, too.
 #pragma once
 
 #include <cairo/cairo.h>
-
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "render/annotate/cairo_surface.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
+
+/// A picture in memory, and Cairo's context that draws on it.
+class CairoSurface {
+ public:
+  /// Throws Error if Cairo cannot make one of this size.
+  CairoSurface(cairo_format_t format, int width, int height)
+      : surface_(cairo_image_surface_create(format, width, height)), cairo_(cairo_create(surface_.get())) {
+    if (const cairo_status_t status = cairo_status(cairo_.get()); status != CAIRO_STATUS_SUCCESS)
+      throw Error("cannot draw on a picture of {}x{} pixels: {}", width, height,
+                  cairo_status_to_string(status));
+  }
+
+  cairo_t* cairo() const { return cairo_.get(); }
+  /// The surface, with all that was drawn in its pixels.
+  cairo_surface_t* flushed() const {
+    cairo_surface_flush(surface_.get());
+    return surface_.get();
+  }
+
+ private:
+  struct Destroy {
+    void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
+    void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
+  };
+  std::unique_ptr<cairo_surface_t, Destroy> surface_;
+  std::unique_ptr<cairo_t, Destroy> cairo_;
+};
 
 /// A transparent Cairo surface for lines and text, to be composited over an Image.
 class Canvas {
@@ -54,6 +87,7 @@ class Canvas {
   CairoSurface surface_;
 };
 
+/// Black over light backgrounds, white over dark ones.
 inline glm::dvec3 inkFor(const glm::vec4& background) {
   const glm::dvec3 over_white = glm::dvec3(background) + (1.0 - background.a);
   return glm::dvec3(glm::dot(over_white, glm::dvec3(0.299, 0.587, 0.114)) > 0.5 ? 0.0 : 1.0);
@@ -63,6 +97,7 @@ inline void setInk(cairo_t* cairo, const glm::dvec3& rgb, double alpha = 1) {
   cairo_set_source_rgba(cairo, rgb.x, rgb.y, rgb.z, alpha);
 }
 
+/// In pixels, for a picture of this size.
 inline double fontSize(ImageSize size) {
   return std::clamp(size.height / 42.0, 9.0, 96.0);
 }

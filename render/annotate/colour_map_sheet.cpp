@@ -1,4 +1,4 @@
-#include "render/annotate/colour_map_sheet.h"
+#include "render/annotate/annotations.h"
 
 #include <cairo/cairo.h>
 
@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "render/colour/published_maps.h"
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
 

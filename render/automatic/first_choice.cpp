@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
-#include "render/automatic/rounded.h"
-#include "render/automatic/seen_area.h"
+#include "render/colour/function_parts.h"
 
 namespace curvisplat {
 namespace {

@@ -2,7 +2,8 @@
 // DESIGN.md, "The first picture", gives the rule and its reasons. Everything that is chosen has few digits
 // and can be given as options: the same options draw the same picture.
 //
-// Opening reads a coarse level of the cache: 0.1 to 0.3 s and 50 MB for any cache. Then immutable; any thread.
+// Opening reads a coarse level of the cache: 0.1 to 0.3 s and 50 MB for any cache. Then immutable; any
+// thread.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +12,7 @@
 #include <string>
 
 #include "render/automatic/coarse_samples.h"
-#include "render/automatic/silhouette.h"
-#include "render/automatic/value_distribution.h"
+#include "render/automatic/opacity_rule.h"
 #include "render/camera/camera.h"
 #include "render/colour/function_parts.h"
 
@@ -38,7 +38,7 @@ class FirstChoice {
 
   /// Range, opacities and opacity unit; `map`: a preset, or empty to have one chosen.
   FunctionParts function(const std::string& map = "") const;
-  /// The opacity unit at which the function absorbs 65 % on the average over what it shows (seen_area.h). Its
+  /// The opacity unit at which the function absorbs 65 % on the average over what it shows (seenArea()). Its
   /// own unit does not matter. A function that is transparent for the data gets 1/100 of its diagonal.
   double opacityUnitOf(const TransferFunction& function) const;
   /// The value below which `part` (0..1) of the volume lies.

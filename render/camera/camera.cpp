@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "stream/base/error.h"
-#include "stream/base/suggestion.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

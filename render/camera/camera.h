@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 #include <string_view>
 
-#include "render/image/image_size.h"
+#include "render/image/image.h"
 
 namespace curvisplat {
 

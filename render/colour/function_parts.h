@@ -1,6 +1,7 @@
 // A transfer function as command-line options state it: a colour map, the range that it spans, a curve of
-// opacities over that range and the opacity unit. Short enough to print, and what it prints gives the same
-// function.
+// opacities over that range and the opacity unit. It is short enough to print, and what is printed gives the
+// same function: roundedTo() makes numbers of few digits, which people can read and type. Plain values; any
+// thread.
 #pragma once
 
 #include <optional>
@@ -22,8 +23,8 @@ struct AsinhScale {
   double scalar(double coordinate) const;
 };
 
-/// A definition over 0..1 spread over `range`: linearly, or by `asinh`, where its curves are replaced by short straight
-/// lines. Throws UsageError if the range is reversed or empty.
+/// A definition over 0..1 spread over `range`: linearly, or by `asinh`, where its curves are replaced by
+/// short straight lines. Throws UsageError if the range is reversed or empty.
 TransferFunctionDefinition spreadOver(TransferFunctionDefinition definition, std::pair<double, double> range,
                                       const std::optional<AsinhScale>& asinh);
 
@@ -44,7 +45,11 @@ struct FunctionParts {
 /// two or more. Points at 0 and 1 are added where the list lacks them. Throws UsageError that begins with
 /// `option`.
 std::vector<OpacityPoint> parseOpacities(std::string_view option, std::string_view text);
-/// The text that parseOpacities() reads.
+/// Writes the text that parseOpacities() reads.
 std::string textOf(const std::vector<OpacityPoint>& opacities);
+
+/// `value` rounded to `digits` decimal digits of `scale` (> 0): 0.1234 for (0.12344, 0.5, 4). The result is
+/// the double nearest to the decimal number, so that it prints with few digits.
+double roundedTo(double value, double scale, int digits);
 
 }  // namespace curvisplat

@@ -145,7 +145,7 @@ def main():
 //               the others: matplotlib's own (PSF-based licence)
 //   cmocean     K. Thyng (MIT): Thyng et al., "True colors of oceanography", Oceanography 29 (2016)
 //   ParaView    5.11 (BSD-3-Clause). The maps with many points are F. Samsel's, Los Alamos National Laboratory
-#include "render/colour/published_maps.h"
+#include "render/colour/transfer_function.h"
 
 namespace curvisplat {
 namespace {

@@ -5,7 +5,6 @@
 #include <limits>
 #include <optional>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -1,19 +1,23 @@
-// Transfer functions: scalar -> (colour, extinction). A preset by name, or a ParaView colour-map file.
+// Transfer functions: scalar -> (colour, extinction). A preset by name, or a ParaView colour-map file; and
+// the list of the built-in colour maps that presets are made of.
 //
 //   Opacity o accumulates over the opacity unit u, and is capped at 0.9999: extinction κ = -ln(1 - o) / u.
 //
 // A look-up takes well under a microsecond; a table of 65,536 values takes milliseconds in any colour space.
+// Functions and lists are immutable; any thread.
 #pragma once
 
-#include <filesystem>
 #include <glm/vec3.hpp>
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "render/colour/colour_map.h"
-#include "render/colour/opacity_curve.h"
+#include "render/colour/control_points.h"
 
 namespace curvisplat {
 
@@ -32,7 +36,6 @@ struct TransferFunctionDefinition {
   std::vector<std::string> notes;       // for the user
 };
 
-/// Immutable; any thread may ask.
 class TransferFunction {
  public:
   struct Value {
@@ -97,9 +100,31 @@ std::vector<OpacityPoint> defaultOpacityRamp(double low, double high);
 
 /// Reads the first preset of a ParaView colour-map file. Throws Error with the file and the field.
 TransferFunctionDefinition readParaViewPreset(const std::filesystem::path& path);
-/// The same from text; `path` is used in messages.
+/// Reads the first preset of such a file's text; `path` is used in messages.
 TransferFunctionDefinition parseParaViewPreset(const std::string& text, const std::filesystem::path& path);
 /// The text of a colour-map file with this preset, for readParaViewPreset() and ParaView.
 std::string toParaViewPreset(const TransferFunctionDefinition& definition);
+
+enum class MapCategory { kSequential, kDiverging, kCyclic };
+
+/// A colour map with the points that its authors published.
+struct PublishedMap {
+  struct Point {
+    double x, red, green, blue;  // each 0..1
+  };
+
+  std::string_view name, source;  // "thermal", "cmocean"
+  MapCategory category = MapCategory::kSequential;
+  bool colour_blind_safe = false;  // told apart with the common forms of colour blindness
+  ColourSpace space = ColourSpace::kRgb;
+  std::span<const Point> points = {};  // sorted by x, from 0 to 1
+};
+
+/// The maps of matplotlib, cmocean and ParaView; published_maps.cpp names versions and licences.
+std::span<const PublishedMap> publishedMaps();
+
+/// All maps that --tf knows. The five that transfer_function_presets.cpp defines come first; their `points`
+/// are empty.
+std::span<const PublishedMap> builtInMaps();
 
 }  // namespace curvisplat

@@ -10,11 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "render/colour/published_maps.h"
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
-#include "stream/base/suggestion.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

@@ -12,10 +12,8 @@
 #include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
 #include "render/cpu/tile_windows.h"
-#include "render/project/paint_loop.h"
 #include "stream/base/compute_permits.h"
-#include "stream/base/stage_timer.h"
-#include "stream/base/thread_count.h"
+#include "stream/base/threads.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {

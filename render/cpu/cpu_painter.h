@@ -8,7 +8,7 @@
 // The picture's bits depend neither on threads nor on batches: a pixel's splats are blended one after the
 // other, in their order.
 //
-// Any thread, one at a time. It works on that one and on TBB's (paint_loop.h).
+// Any thread, one at a time. It works on that one and on TBB's (PaintLoop in splat_bins.h).
 #pragma once
 
 #include <cstdint>

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "render/cpu/tile.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 
 // Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
 #undef HWY_TARGET_INCLUDE

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "render/colour/classification.h"
-#include "render/project/footprint_skew.h"
+#include "render/project/footprint.h"
 #include "render/project/screen_splat.h"
 #include "render/project/tile_set.h"
 

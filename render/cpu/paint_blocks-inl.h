@@ -10,8 +10,7 @@
 
 #include "render/cpu/paint_shade-inl.h"
 #include "render/cpu/tile.h"
-#include "render/project/footprint_skew.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace curvisplat {

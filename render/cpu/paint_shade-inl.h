@@ -63,8 +63,8 @@ HWY_INLINE hn::Vec<Ints> element(V x) {
   return hn::ConvertTo(Ints(), hn::Clamp(hn::Add(x, hn::Set(d, 1.0f)), hn::Zero(d), hn::Set(d, kLast)));
 }
 
-/// What pixels with these means see, in cells: never less than a cell. An interval beyond an end of the table
-/// sees the same wherever it lies there; it begins where float still tells cells apart.
+/// What pixels with these means see, in cells: never less than a cell. An interval beyond an end of the
+/// table sees the same wherever it lies there; it begins where float still tells cells apart.
 HWY_INLINE Range locate(const ShadingTable& table, V mean, V half_width, size_t lane, Intervals& out) {
   static_assert(sizeof(ShadingTable::Cell) == 8 * sizeof(float));
   const Floats d;
@@ -141,7 +141,7 @@ struct Fits {
   }
 };
 
-/// How far the parabola through both ends and the middle is off, at the most (shading_table.h). An interval
+/// How far the parabola through both ends and the middle is off, at the most (ShadingTable). An interval
 /// that is narrower by 2 x `width_loss` cells sees something else by a quarter of that times the sum of
 /// |second differences|, at the most: so much if they are all in its middle.
 HWY_INLINE V errorOver(const ShadingTable& table, const Range& low, const Range& high, V low_scale,
@@ -250,8 +250,8 @@ struct alignas(64) LongRow {
   HWY_INLINE void repeatLast() { at[kLanes] = at[kLanes - 1]; }
 };
 
-/// Of one piece. Whether it is good enough. Over a move by h cells a straight line is off by at most 0.25 h m
-/// sum of |second differences| (shading_table.h); and on a logarithmic scale, where the move itself is bent,
+/// Of one piece. Whether it is good enough. Over a move by h cells a straight line is off by at most 0.25 h
+/// m sum of |second differences| (ShadingTable); and on a logarithmic scale, where the move itself is bent,
 /// by an eighth of r (of twice that, since r <= 0.3 changes within the move) times the largest slope.
 HWY_INLINE bool fitPolyline(const ShadingTable& table, const Pieces& pieces, size_t n, Polyline& line) {
   const Floats d;

@@ -16,7 +16,7 @@
 #include "render/cpu/paint_blocks-inl.h"
 #include "render/cpu/paint_shade-inl.h"
 #include "render/cpu/tile.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace curvisplat {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "render/cpu/tile.h"
-#include "render/project/kernel.h"
-#include "stream/base/check.h"
+#include "render/project/footprint.h"
+#include "stream/base/error.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {

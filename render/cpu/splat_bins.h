@@ -1,49 +1,116 @@
-// Which splats of a batch touch which tiles: for every tile a list of indices, in the batch's order.
+// How a batch of splats goes to tiles, and tiles to threads: PaintLoop runs a painter's loops, and SplatBins
+// lists for every tile the splats of a batch that touch it.
 //
-// A batch is either collected, add() by add(), and then sorted, or borrowed: splats that are many enough stay where
-// they are, and nothing of the work is left to a single thread.
-//
-// A counting sort: splats are counted tile by tile in a few pieces of the batch at a time, in parallel, and
-// each piece then writes where its counts say. The lists do not depend on how many pieces there were.
-// Tiles can be closed: they take no more, and splats that touch no other tiles are left out.
-// Takes 52 bytes a splat, 4 an entry, 4 a tile and piece, all at its construction.
+// The lists have the batch's order, and depend on nothing but the batch and the tiles that are closed: the
+// same for any threads. All memory is taken when the bins are made: 52 bytes a splat, 4 an entry, 4 a tile
+// and piece. One thread at a time may use either; they work on that thread and on TBB's.
 #pragma once
 
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "render/camera/camera.h"
-#include "render/project/paint_loop.h"
 #include "render/project/screen_splat.h"
+#include "stream/base/compute_permits.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
+/// A painter's loops: on the calling thread and on TBB's, as many at a time as there are permits to compute.
+///
+/// Each thread that gets a permit takes a few neighbours at a time until none is left, and gives way to
+/// urgent threads in between. The loop ends when the last job has ended, and does not wait for threads that
+/// have no permit then.
+class PaintLoop {
+ public:
+  /// `permits` outlives the loop; null: there is no bound but `threads`.
+  PaintLoop(unsigned threads, ComputePermits* permits)
+      : threads_(threads),
+        permits_(permits),
+        // TBB warns of more than there are cores.
+        arena_(std::min(static_cast<int>(threads), tbb::info::default_concurrency())) {}
+
+  unsigned threads() const { return threads_; }
+  ComputePermits* permits() const { return permits_; }
+
+  /// job(n), for all n below `count`, `neighbours` of them one after the other. `name`: of these in the
+  /// trace. Rethrows what a job throws. One caller at a time.
+  template <typename Job>
+  void forAll(const char* name, size_t count, size_t neighbours, const Job& job) {
+    std::atomic<size_t> next = 0;
+    const auto isTaken = [&] { return next.load(std::memory_order_relaxed) >= count; };
+    const auto takeSome = [&] {
+      const size_t begin = next.fetch_add(neighbours, std::memory_order_relaxed);
+      if (begin >= count) return;
+      const TraceScope trace(name);
+      for (size_t n = begin; n < std::min(begin + neighbours, count); ++n) job(n);
+    };
+    const auto work = [&](unsigned) {
+      while (!isTaken()) {
+        const Computing computing(permits_, Urgency::kNormal, isTaken);
+        if (!computing.granted()) return;
+        do takeSome();
+        while (!isTaken() && !(permits_ && permits_->isWantedUrgently()));
+        if (permits_ && isTaken()) permits_->recheck();
+      }
+    };
+    const GivenBackPermit given_back;  // to the threads of the loop, of which this is one
+    const size_t parts = (count + neighbours - 1) / neighbours;
+    if (parts <= 1 || threads_ == 1) {
+      work(0);
+      return;
+    }
+    const unsigned threads = static_cast<unsigned>(std::min<size_t>(threads_, parts));
+    arena_.execute([&] { tbb::parallel_for(0u, threads, work, tbb::simple_partitioner()); });
+  }
+
+ private:
+  unsigned threads_;
+  ComputePermits* permits_;
+  tbb::task_arena arena_;
+};
+
+/// Which splats of a batch touch which tiles: for every tile a list of indices, in the batch's order.
+///
+/// A batch is either collected, add() by add(), and then sorted, or borrowed: splats that are many enough
+/// stay where they are, and nothing of the work is left to a single thread.
+///
+/// This is a counting sort: splats are counted tile by tile in a few pieces of the batch at a time, in
+/// parallel, and each piece then writes where its counts say. The lists do not depend on how many pieces
+/// there were. Tiles can be closed: they take no more, and splats that touch no other tiles are left out.
 class SplatBins {
  public:
-  /// For batches of at most `splats` splats and their records, or up to three more where the last is a splat with
-  /// its records, which touch `entries` tiles in all.
+  /// For batches of at most `splats` splats and their records, or up to three more where the last is a splat
+  /// with its records, which touch `entries` tiles in all.
   SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pieces);
   static uint64_t bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces);
 
   int columns() const { return columns_; }
   int rows() const { return rows_; }
 
-  /// Adds what fits of `splats` behind those there are, and says how much that was, with those that were left
-  /// out. Something always fits while empty(). Nearest first: a splat's records come before it, and are kept
-  /// until it does; in splats() they are the elements before.
+  /// Adds what fits of `splats` behind those there are, and says how much that was, with those that were
+  /// left out. Something always fits while empty(). Nearest first: a splat's records come before it, and are
+  /// kept until it does; in splats() they are the elements before.
   size_t add(std::span<const ScreenSplat> splats);
   /// Whether records were added whose splat was not.
   bool awaitsSplat() const { return record_count_ > 0; }
   /// Fills the lists with what was added.
   void sort(PaintLoop& loop);
 
-  /// Fills the lists with what fits of `splats`, which stay where they are until clear(), and says how much that was: all
-  /// but records at the end, unless they are too many. Something always fits, but not of records alone. While empty()
-  /// and not awaitsSplat().
+  /// Fills the lists with what fits of `splats`, which stay where they are until clear(), and says how much
+  /// that was: all but records at the end, unless they are too many. Something always fits, but not of
+  /// records alone. While empty() and not awaitsSplat().
   size_t sortBorrowed(std::span<const ScreenSplat> splats, PaintLoop& loop);
 
   bool empty() const { return batch_.empty(); }

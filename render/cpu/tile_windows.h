@@ -16,8 +16,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
-#include "render/project/paint_loop.h"
 #include "render/project/pixel_layers.h"
 
 namespace curvisplat {

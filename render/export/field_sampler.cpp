@@ -12,10 +12,10 @@
 #include <glm/matrix.hpp>
 #include <utility>
 
-#include "render/project/border_parts.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
+#include "render/project/splat_pieces.h"
 #include "stream/base/error.h"
-#include "stream/cache/border_style.h"
+#include "stream/cache/manifest.h"
 
 namespace curvisplat {
 namespace {

@@ -1,17 +1,23 @@
+// Files of 3D Gaussian splats: the bytes of each format, .ply, .spz and .glb, and then the file.
 #include "render/export/gaussian_files.h"
 
 #include <fmt/format.h>
 #include <zlib.h>
+#include <glm/common.hpp>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
-#include <glm/common.hpp>
+#include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "render/export/gaussian_glb.h"
+#include "render/export/gaussian_splats.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 
@@ -64,7 +70,7 @@ uint8_t byteOf(float value) {
   return static_cast<uint8_t>(std::clamp(std::round(value), 0.0f, 255.0f));
 }
 
-/// The file before compression: a header, then each quantity of all splats.
+/// A .spz file before compression: a header, then each quantity of all splats.
 std::vector<std::byte> spzBytes(std::span<const GaussianSplat> splats) {
   struct Header {
     uint32_t magic = 0x5053474e, version = 2, points = 0;
@@ -84,7 +90,8 @@ std::vector<std::byte> spzBytes(std::span<const GaussianSplat> splats) {
       for (int byte = 0; byte < 3; ++byte) out.push_back(static_cast<std::byte>(fixed >> (8 * byte) & 0xff));
     }
   }
-  // Rounded down, as viewers round those of other files: they draw footprints wider than they are (README.md).
+  // Rounded down, as viewers round those of other files: they draw footprints wider than they are
+  // (README.md).
   for (const GaussianSplat& splat : splats) append(out, byteOf(std::floor(255 * splat.opacity)));
   for (const GaussianSplat& splat : splats) {
     const glm::vec3 coefficient = coefficientOf(splat.colour);
@@ -125,6 +132,138 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
   deflateEnd(&stream);
   out.resize(given);
   return out;
+}
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFloats = 5126, kBytes = 5121, kPoints = 0, kVertices = 34962;
+
+/// A quarter turn about x: (x, y, z) becomes (x, z, -y).
+const glm::quat kUpright{std::sqrt(0.5f), -std::sqrt(0.5f), 0, 0};
+
+glm::vec3 upright(const glm::vec3& p) {
+  return {p.x, p.z, -p.y};
+}
+
+/// A glTF file while it is put together: attributes one after the other in one buffer.
+class Glb {
+ public:
+  explicit Glb(size_t splats) : splats_(splats) {}
+
+  /// Adds an attribute of `parts` numbers for each splat; `write` appends those of one.
+  template <typename T, size_t parts, typename Of>
+  void add(const char* name, std::span<const GaussianSplat> splats, const Of& of) {
+    static constexpr std::array<const char*, 5> kTypes{"", "SCALAR", "", "VEC3", "VEC4"};
+    const size_t begin = bytes_.size();
+    for (const GaussianSplat& splat : splats) {
+      const std::array<T, parts> numbers = of(splat);
+      const auto* const from = reinterpret_cast<const std::byte*>(numbers.data());
+      bytes_.insert(bytes_.end(), from, from + sizeof numbers);
+    }
+    views_.push_back(
+        {{"buffer", 0}, {"byteOffset", begin}, {"byteLength", bytes_.size() - begin}, {"target", kVertices}});
+    Json accessor = {{"bufferView", accessors_.size()},
+                     {"componentType", sizeof(T) == 4 ? kFloats : kBytes},
+                     {"count", splats_},
+                     {"type", kTypes[parts]}};
+    if (sizeof(T) == 1) accessor["normalized"] = true;
+    attributes_[name] = accessors_.size();
+    accessors_.push_back(std::move(accessor));
+  }
+
+  /// Sets the bounds of the attribute that was added last.
+  void setBounds(const glm::vec3& lower, const glm::vec3& upper) {
+    accessors_.back()["min"] = {lower.x, lower.y, lower.z};
+    accessors_.back()["max"] = {upper.x, upper.y, upper.z};
+  }
+
+  std::vector<std::byte> file() const {
+    const Json extension = {{"kernel", "ellipse"},
+                            {"colorSpace", "srgb_rec709_display"},
+                            {"projection", "perspective"},
+                            {"sortingMethod", "cameraDistance"}};
+    const Json primitive = {{"attributes", attributes_},
+                            {"mode", kPoints},
+                            {"extensions", {{"KHR_gaussian_splatting", extension}}}};
+    const Json json = {{"asset", {{"version", "2.0"}, {"generator", "curvisplat " CURVISPLAT_VERSION}}},
+                       {"extensionsUsed", Json::array({"KHR_gaussian_splatting"})},
+                       {"buffers", Json::array({{{"byteLength", bytes_.size()}}})},
+                       {"bufferViews", views_},
+                       {"accessors", accessors_},
+                       {"meshes", Json::array({{{"primitives", Json::array({primitive})}}})},
+                       {"nodes", Json::array({{{"mesh", 0}}})},
+                       {"scenes", Json::array({{{"nodes", Json::array({0})}}})},
+                       {"scene", 0}};
+    std::string text = json.dump();
+    text.resize((text.size() + 3) / 4 * 4, ' ');
+    const uint64_t total = 12 + 8 + text.size() + 8 + bytes_.size();
+    if (total > std::numeric_limits<uint32_t>::max())
+      throw Error("{} splats make a .glb of {} bytes, but its header allows 4 GiB; lower --max-splats",
+                  splats_, total);
+    std::vector<std::byte> out;
+    out.reserve(total);
+    const auto append = [&](const void* from, size_t size) {
+      const auto* const bytes = static_cast<const std::byte*>(from);
+      out.insert(out.end(), bytes, bytes + size);
+    };
+    const auto append_number = [&](uint64_t number) {
+      const auto word = static_cast<uint32_t>(number);
+      append(&word, sizeof word);
+    };
+    append("glTF", 4);
+    append_number(2);
+    append_number(total);
+    append_number(text.size());
+    append("JSON", 4);
+    append(text.data(), text.size());
+    append_number(bytes_.size());
+    append("BIN\0", 4);
+    append(bytes_.data(), bytes_.size());
+    return out;
+  }
+
+ private:
+  const size_t splats_;
+  std::vector<std::byte> bytes_;  // whole numbers of four
+  Json views_ = Json::array(), accessors_ = Json::array(), attributes_ = Json::object();
+};
+
+/// Binary glTF with the extension KHR_gaussian_splatting. Scales are lengths and opacities 0..1, other than
+/// in .ply. glTF's y axis is up: positions and axes are turned so that our z is. Throws Error if the file
+/// would have 4 GiB or more, which its header cannot state.
+std::vector<std::byte> glbOf(std::span<const GaussianSplat> splats) {
+  using Three = std::array<float, 3>;
+  if (splats.empty()) throw Error("no splat is visible: a .glb needs one or more; choose another function");
+  Glb glb(splats.size());
+  glm::vec3 lower = upright(splats.front().position), upper = lower;
+  glb.add<float, 3>("POSITION", splats, [&](const GaussianSplat& splat) {
+    const glm::vec3 p = upright(splat.position);
+    lower = glm::min(lower, p);
+    upper = glm::max(upper, p);
+    return Three{p.x, p.y, p.z};
+  });
+  glb.setBounds(lower, upper);
+  glb.add<float, 4>("KHR_gaussian_splatting:ROTATION", splats, [](const GaussianSplat& splat) {
+    const glm::quat q = glm::normalize(kUpright * splat.rotation);
+    return std::array<float, 4>{q.x, q.y, q.z, q.w};
+  });
+  glb.add<float, 3>("KHR_gaussian_splatting:SCALE", splats, [](const GaussianSplat& splat) {
+    return Three{splat.deviation.x, splat.deviation.y, splat.deviation.z};
+  });
+  glb.add<float, 1>("KHR_gaussian_splatting:OPACITY", splats,
+                    [](const GaussianSplat& splat) { return std::array<float, 1>{splat.opacity}; });
+  glb.add<float, 3>("KHR_gaussian_splatting:SH_DEGREE_0_COEF_0", splats, [](const GaussianSplat& splat) {
+    const glm::vec3 c = coefficientOf(splat.colour);
+    return Three{c.x, c.y, c.z};
+  });
+  glb.add<uint8_t, 4>("COLOR_0", splats, [](const GaussianSplat& splat) {
+    const auto byte = [](float value) {
+      return static_cast<uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255 + 0.5f);
+    };
+    return std::array<uint8_t, 4>{byte(splat.colour.r), byte(splat.colour.g), byte(splat.colour.b),
+                                  byte(splat.opacity)};
+  });
+  return glb.file();
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 #include "render/export/vdb_file.h"
 
 #include <fmt/format.h>
-#include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <array>
@@ -13,11 +11,12 @@
 #include <string>
 
 #include "render/export/field_sampler.h"
-#include "stream/base/byte_text.h"
-#include "stream/base/disk_full.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
+#include "stream/base/text.h"
+#include "stream/vdb/fog_volume.h"
 
 namespace curvisplat {
 namespace {
@@ -64,57 +63,24 @@ unsigned threadsFor(const SampleLattice& lattice, const VdbOptions& options) {
   return threads;
 }
 
-class Grids {
- public:
-  Grids(const SampleLattice& lattice, uint64_t memory_bytes)
-      : lattice_(lattice), memory_bytes_(memory_bytes) {
-    value = openvdb::FloatGrid::create(0.0f);
-    density = openvdb::FloatGrid::create(0.0f);
-    value->setName("value");
-    density->setName("density");
-    density->setGridClass(openvdb::GRID_FOG_VOLUME);
-    const openvdb::math::Transform::Ptr transform =
-        openvdb::math::Transform::createLinearTransform(lattice.spacing.x);
-    transform->postTranslate({lattice.origin.x, lattice.origin.y, lattice.origin.z});
-    value->setTransform(transform);
-    density->setTransform(transform->copy());
-  }
-
-  void add(uint32_t k_begin, uint32_t k_end, const FieldSamples& samples) {
-    auto values = value->getAccessor(), densities = density->getAccessor();
-    size_t n = 0;
-    for (uint32_t k = k_begin; k < k_end; ++k)
-      for (uint32_t j = 0; j < lattice_.size[1]; ++j)
-        for (uint32_t i = 0; i < lattice_.size[0]; ++i, ++n) {
-          if (!(samples.density[n] > kMinDensity)) continue;
-          const openvdb::Coord at(static_cast<int>(i), static_cast<int>(j), static_cast<int>(k));
-          values.setValue(at, samples.value[n]);
-          densities.setValue(at, samples.density[n]);
-        }
-    if (value->memUsage() + density->memUsage() > memory_bytes_ / 2)
-      throw UsageError(
-          "--memory {}: the voxels take more than half of it; give --memory {} or fewer --voxels",
-          byteText(memory_bytes_), sufficientMemory(lattice_));
-  }
-
-  openvdb::FloatGrid::Ptr value, density;
-
- private:
-  const SampleLattice lattice_;
-  const uint64_t memory_bytes_;
-};
+void add(FogVolume& volume, const SampleLattice& lattice, uint32_t k_begin, uint32_t k_end,
+         const FieldSamples& samples) {
+  size_t n = 0;
+  for (uint32_t k = k_begin; k < k_end; ++k)
+    for (uint32_t j = 0; j < lattice.size[1]; ++j)
+      for (uint32_t i = 0; i < lattice.size[0]; ++i, ++n)
+        if (samples.density[n] > kMinDensity) volume.set({i, j, k}, samples.value[n], samples.density[n]);
+}
 
 /// By a stream of ours that throws: OpenVDB's own file does not look whether its stream has failed.
-void writeGrids(const Grids& grids, const std::filesystem::path& path) {
+void writeVolume(const FogVolume& volume, const std::filesystem::path& path) {
   TemporaryFile temporary(writableTarget(path));
   errno = 0;
   try {
     std::ofstream file;
     file.exceptions(std::ios::badbit | std::ios::failbit);
     file.open(temporary.path(), std::ios::binary);
-    openvdb::io::Stream stream(file);
-    stream.setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
-    stream.write(openvdb::GridPtrVec{grids.density, grids.value});
+    volume.write(file);
     file.close();
   } catch (const std::ios::failure&) {  // its words are "basic_ios::clear: iostream error"
     const int error = errno ? errno : EIO;
@@ -130,20 +96,21 @@ void writeGrids(const Grids& grids, const std::filesystem::path& path) {
 
 VdbReport writeVdb(const CacheReader& cache, size_t variable, const VdbOptions& options,
                    const std::filesystem::path& path, Progress& progress) {
-  openvdb::initialize();
   const SampleLattice lattice = latticeOf(cache.manifest(), options.voxels);
   const unsigned threads = threadsFor(lattice, options);
   const FieldSampler sampler(cache, variable, bricksOfDetail(cache, 0.5 * lattice.spacing.x), lattice);
-  Grids grids(lattice, options.memory_bytes);
+  const auto volume = makeFogVolume(lattice.origin, lattice.spacing.x);
   sampler.sweep(kSlab, threads, progress, [&](uint32_t k_begin, uint32_t k_end, const FieldSamples& samples) {
-    grids.add(k_begin, k_end, samples);
+    add(*volume, lattice, k_begin, k_end, samples);
+    if (volume->bytes() > options.memory_bytes / 2)
+      throw UsageError(
+          "--memory {}: the voxels take more than half of it; give --memory {} or fewer --voxels",
+          byteText(options.memory_bytes), sufficientMemory(lattice));
   });
   const VariableInfo& info = cache.manifest().variables.at(variable);
-  grids.value->insertMeta("scalar", openvdb::StringMetadata(info.name));
-  grids.value->insertMeta("unit", openvdb::StringMetadata(info.unit));
-  grids.value->insertMeta("time", openvdb::DoubleMetadata(cache.time()));
-  writeGrids(grids, path);
-  return {grids.density->activeVoxelCount(), lattice.origin - 0.5 * lattice.spacing, lattice.spacing.x};
+  volume->describe(info.name, info.unit, cache.time());
+  writeVolume(*volume, path);
+  return {volume->activeVoxels(), lattice.origin - 0.5 * lattice.spacing, lattice.spacing.x};
 }
 
 }  // namespace curvisplat

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

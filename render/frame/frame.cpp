@@ -1,13 +1,14 @@
 #include "render/frame/frame.h"
 
+#include <utility>
+
+#include "render/backend/pixel_values.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_pipeline.h"
 #include "render/frame/frame_plan.h"
-#include "render/frame/joined_tiles.h"
-#include "render/frame/value_painter.h"
-#include "stream/base/check.h"
+#include "render/ranks/picture_shares.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
-#include "stream/base/stage_timer.h"
 
 namespace curvisplat {
 namespace {
@@ -194,6 +195,29 @@ void FrameRenderer::setTransferFunction(const TransferFunction& transfer_functio
 
 ScreenView FrameRenderer::screenView(const Camera& camera, const FrameOptions& options) const {
   return state_->planner.screenView(camera, options, options.size);
+}
+
+StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend)
+    : cache_(cache),
+      scalars_(scalars),
+      backend_(backend),
+      renderer_(std::make_unique<FrameRenderer>(cache, scalars, backend)) {}
+
+void StepPlayer::setTransferFunction(const TransferFunction& transfer_function) {
+  scalars_.opacity.function = transfer_function;
+  renderer_->setTransferFunction(transfer_function);
+}
+
+void StepPlayer::goTo(const StepPosition& position) {
+  if (position == cache_.position()) return;
+  CacheReader next = cache_.at(position);
+  if (next.sharesGeometryWith(cache_)) {
+    renderer_->changeStep([&] { cache_ = std::move(next); });
+    return;
+  }
+  renderer_.reset();  // reads the cache
+  cache_ = std::move(next);
+  renderer_ = std::make_unique<FrameRenderer>(cache_, scalars_, backend_);
 }
 
 }  // namespace curvisplat

@@ -12,7 +12,8 @@
 //
 // A progressive frame consists of two frames: a first picture of the coarse levels, which is small enough to
 // be read and drawn in a fraction of a second whatever the size of the cache, and then the frame that
-// render() draws.
+// render() draws. The time steps of a cache are frames of one renderer as long as the geometry stays
+// (StepPlayer). One caller at a time.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +22,13 @@
 #include <string>
 #include <vector>
 
+#include "render/backend/backend.h"
+#include "render/backend/pixel_values.h"
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
-#include "render/frame/backend.h"
-#include "render/frame/drawn_scalars.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_statistics.h"
-#include "render/frame/pixel_values.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
 #include "stream/base/compute_permits.h"
@@ -37,9 +37,8 @@
 
 namespace curvisplat {
 
-/// Draws frames of one variable, or two, of one cache. Owns the threads and the painter, and the memory that they
-/// share: decoded bricks are kept for the next frame. One caller at a time. The cache must outlive
-/// the renderer.
+/// Draws frames of one variable, or two, of one cache. Owns the threads and the painter, and the memory that
+/// they share: decoded bricks are kept for the next frame. The cache must outlive the renderer.
 class FrameRenderer {
  public:
   /// Throws Error if the backend is not available; the message names the library that was tried and its
@@ -47,28 +46,29 @@ class FrameRenderer {
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
                 Backend backend = Backend::kAutomatic)
       : FrameRenderer(cache, DrawnScalars(variable, transfer_function), backend) {}
-  /// Of one scalar, or two.
+  /// For pictures of one scalar, or two.
   FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend = Backend::kAutomatic);
   ~FrameRenderer();
 
   /// Draws one frame. Throws UsageError for an invalid view, and for too little memory or too small a
-  /// max_splats (the message says how much is needed); Error if reading or drawing fails;
-  /// Interrupted once options.stop or `progress` are stopped, at the latest when each worker has finished its brick and the
+  /// max_splats (the message says how much is needed); Error if reading or drawing fails; Interrupted once
+  /// options.stop or `progress` are stopped, at the latest when each worker has finished its brick and the
   /// painter its segment. The renderer can be used again after each of them. `statistics` is overwritten.
   /// With options.ranks all ranks have to call it: rank 0 returns the picture, which has the bits of one
   /// process's, the others only their tiles. Statistics are each rank's own.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
 
-  /// The same, with what lies where the picture's pixels have half of their opacity. Takes about three times as long:
-  /// the splats are drawn again, by the processor. Of several ranks the first gets the values.
+  /// Draws one frame as render() does, and finds what lies where the picture's pixels have half of their
+  /// opacity. Takes about three times as long: the splats are drawn again, by the processor. Of several
+  /// ranks the first gets the values.
   Image renderWithValues(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                          PixelValues& values, Progress* progress = nullptr);
 
   using ShowPicture = std::function<void(const Image& image, bool is_final)>;
   /// Calls `show` with a first, coarse picture and then with the picture that render() returns, bit for bit;
-  /// only once if the first picture is already the final one. `statistics` describes the picture shown and is
-  /// set before each call. Throws what render() and `show` throw.
+  /// only once if the first picture is already the final one. `statistics` describes the picture shown and
+  /// is set before each call. Throws what render() and `show` throw.
   void renderProgressively(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                            const ShowPicture& show, Progress* progress = nullptr);
 
@@ -82,22 +82,24 @@ class FrameRenderer {
   /// need, as far as they fit in the cache of bricks. The next frame or prefetch() ends it. Its errors are
   /// not reported; render() reports those that matter to it.
   void prefetch(const Camera& camera, const FrameOptions& options);
-  /// The same for renderQuickly().
+  /// Does so for renderQuickly() with these arguments.
   void prefetch(const Camera& camera, const FrameOptions& options, const QuickLimits& limits);
 
-  /// Goes to another time step of the same geometry: calls `change`, which has to replace the cache's reader by one
-  /// at that step, while nothing reads. Decoded geometry is kept. Ends a prefetch; a prefetch from now on is of the
-  /// new step. Throws what `change` throws.
+  /// Goes to another time step of the same geometry: calls `change`, which has to replace the cache's reader
+  /// by one at that step, while nothing reads. Decoded geometry is kept. Ends a prefetch; a prefetch from
+  /// now on is of the new step. Throws what `change` throws.
   void changeStep(const std::function<void()>& change);
 
-  /// That of the opacities. Takes effect with the next frame. Decoded bricks are kept. Ends a prefetch.
+  /// Replaces the function of the opacities. Takes effect with the next frame. Decoded bricks are kept. Ends
+  /// a prefetch.
   void setTransferFunction(const TransferFunction& transfer_function);
 
   /// The projection that render() uses for these arguments. Throws UsageError as render() does.
   ScreenView screenView(const Camera& camera, const FrameOptions& options) const;
 
-  /// A thread that computes between frames, while bricks are fetched ahead, holds one of these: no more threads than
-  /// the last frame's options.threads compute then. Null before the first frame. Valid until the next.
+  /// A thread that computes between frames, while bricks are fetched ahead, holds one of these: no more
+  /// threads than the last frame's options.threads compute then. Null before the first frame. Valid until
+  /// the next.
   ComputePermits* permits() const;
 
   /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
@@ -108,6 +110,28 @@ class FrameRenderer {
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+/// Draws the time steps of a cache: one renderer as long as the geometry stays, so that decoded geometry is
+/// kept while values change.
+class StepPlayer {
+ public:
+  /// `cache` must outlive it, and is at the step that is drawn. Throws Error as FrameRenderer.
+  StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend);
+
+  FrameRenderer& renderer() { return *renderer_; }
+  /// Replaces the function of the opacities, for this step and those to come.
+  void setTransferFunction(const TransferFunction& transfer_function);
+  /// Makes this step, or time between two, the one that is drawn. Throws Error as CacheReader.
+  void goTo(const StepPosition& position);
+  /// The time that is drawn.
+  double time() const { return cache_.time(); }
+
+ private:
+  CacheReader& cache_;
+  DrawnScalars scalars_;
+  const Backend backend_;
+  std::unique_ptr<FrameRenderer> renderer_;
 };
 
 }  // namespace curvisplat

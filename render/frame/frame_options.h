@@ -1,15 +1,23 @@
-// How a frame looks, and which resources it may use.
+// What a picture is drawn of, how it looks, and which resources drawing it may use: the inputs of a frame,
+// but for the cache and the camera.
+//
+// DrawnScalars are fixed for a renderer, apart from the opacities' function; FrameOptions are given with
+// each frame. Plain values; the ranks are borrowed.
 #pragma once
 
-#include <cstdint>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
-#include "render/image/image_size.h"
+#include "render/colour/transfer_function.h"
+#include "render/image/image.h"
 #include "render/project/projection.h"
 #include "render/project/screen_view.h"
 #include "render/surface/surface_scene.h"
@@ -18,12 +26,34 @@
 
 namespace curvisplat {
 
+/// A variable of the cache, and the transfer function that it is drawn with.
+struct DrawnScalar {
+  size_t variable = 0;  // of the cache
+  TransferFunction function;
+};
+
+/// The scalars of a picture. Of one scalar: its function has colours and opacities. Of two: the opacities
+/// are one scalar's, and so are isosurfaces and light; the colours are the other's, those of slices and
+/// surfaces too.
+struct DrawnScalars {
+  DrawnScalar opacity;
+  std::optional<DrawnScalar> colour = std::nullopt;  // none: also the opacity's
+
+  DrawnScalars(size_t variable, const TransferFunction& function) : opacity{variable, function} {}
+  DrawnScalars(DrawnScalar of_opacity, DrawnScalar of_colour)
+      : opacity(std::move(of_opacity)), colour(std::move(of_colour)) {}
+
+  /// The cache's variable that slices show.
+  size_t shownVariable() const { return colour ? colour->variable : opacity.variable; }
+};
+
 enum class Classification { kPixel, kFlat };  // flat: one colour and extinction per splat, as in the paper
 
+/// How a frame looks, and which resources it may use.
 struct FrameOptions {
   ImageSize size;
   Classification classification = Classification::kPixel;
-  double lod_pixels = 1;               // screen-space error allowed (error_weight.h); 0 is the finest level
+  double lod_pixels = 1;               // screen-space error allowed (errorWeight()); 0 is the finest level
   std::optional<uint64_t> max_splats;  // splat limit; the largest screen error is refined first
   glm::dvec3 scale{1.0};               // stretches the data about the world's origin: D S Dᵀ, V det D
   std::optional<WorldBox> clip_box;    // nothing outside it is drawn
@@ -37,7 +67,7 @@ struct FrameOptions {
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
   PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;
-  /// Those that draw the picture together, each some of its tiles; null: this process alone.
+  /// The processes that draw the picture together, each some of its tiles; null: this process alone.
   Ranks* ranks = nullptr;
   bool direct_reads = true;  // bypass the page cache if the file system can
   std::stop_token stop;      // ends the drawing with Interrupted

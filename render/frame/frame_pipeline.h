@@ -1,34 +1,43 @@
 // The stages of a frame after its plan, and the memory and threads that frames share:
 //
+//   LayerDrawer --layers of the pixels, into the plan-----------+
+//                                                               v
 //   BrickSource --bricks--> FrameWorkers --SegmentRing--> painter
 //   fetch                   prepare ^ |                   draw
 //                                   | v
 //                                 SweepBuffer
 //
-// A frame is one sweep along the depth, or one for each region of the picture if the budget cannot hold a layer of the cut
-// (frame_regions.h), or several slabs of one. The source and the workers start again with each slab; the painter continues.
+// A frame is one sweep along the depth, or one for each region of the picture if the budget cannot hold a
+// layer of the cut (frame_memory.h), or several slabs of one. The source and the workers start again with
+// each slab; the painter continues.
 //
-// All memory is in pools, which are allocated when the first frame needs them and sized from the budget. They
-// are replaced only if the budget's shares change. Between frames the workers can fill the cache of bricks.
+// All memory is in pools, which are allocated when the first frame needs them and sized from the budget.
+// They are replaced only if the budget's shares change. Between frames the workers can fill the cache of
+// bricks.
 //
-// A stop that is requested in another thread closes the stages' queues; the thread that draws then finds no more to do,
-// and throws.
+// One caller at a time. A stop that is requested in another thread closes the stages' queues; the thread
+// that draws then finds no more to do, and throws. Included by frame.cpp and the pipeline's own sources
+// only.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "render/frame/backend.h"
-#include "render/frame/frame_budget.h"
+#include "render/backend/backend.h"
+#include "render/frame/frame_memory.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_plan.h"
-#include "render/frame/frame_regions.h"
 #include "render/frame/frame_statistics.h"
-#include "render/frame/hidden_bricks.h"
-#include "render/frame/layer_drawer.h"
-#include "render/frame/splat_exchange.h"
+#include "render/ranks/splat_exchange.h"
+#include "render/surface/face_meshes.h"
+#include "render/surface/iso_layers.h"
+#include "render/surface/scene_triangles.h"
+#include "render/sweep/hidden_bricks.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
 #include "stream/base/progress.h"
@@ -38,31 +47,74 @@ namespace curvisplat {
 
 struct SamplingWork;
 
-/// The stages and pools of one variable, or two, of one cache. One caller at a time.
+/// Draws what lies in the volume before the volume is drawn: surfaces, faces of the grid, slices and
+/// isosurfaces. They become layers of the plan's pixels. DESIGN.md, "Splats", "Surfaces and slices" and
+/// "Isosurfaces". Keeps the surfaces' memory from picture to picture.
+class LayerDrawer {
+ public:
+  /// Gives the splats of some bricks to whoever samples them, and returns once all are sampled.
+  using Sample = std::function<void(const SamplingWork& work)>;
+
+  /// The cache and the planner must outlive it.
+  LayerDrawer(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner)
+      : cache_(cache),
+        variable_(scalars.opacity.variable),
+        coloured_by_(scalars.colour ? std::optional(scalars.colour->variable) : std::nullopt),
+        planner_(planner) {}
+
+  /// Draws options.scene, if there is one, and puts its layers into the plan. Adds to `statistics`. Throws
+  /// UsageError where options.memory_bytes does not suffice, and what `sample` throws.
+  void draw(FramePlan& plan, const FrameOptions& options, const Sample& sample, FrameStatistics& statistics);
+  /// Gives up the memory that is kept from picture to picture.
+  void release() { surface_memory_ = {}; }
+
+  /// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles,
+  /// samples of slices and of surfaces, and a layer and a half a pixel with a window behind it. The same for
+  /// all pictures of one size.
+  static uint64_t bytes(const FrameOptions& options);
+
+ private:
+  struct IsoInput {
+    const Sample& sample;
+    double depth_origin;
+    const ColourTable* opacities;  // of the picture's function; null: not needed
+  };
+  std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
+                                       const IsoInput& input, FrameStatistics& statistics) const;
+
+  const CacheReader& cache_;
+  const size_t variable_;
+  const std::optional<size_t> coloured_by_;  // another variable
+  const FramePlanner& planner_;
+  FaceMeshes face_meshes_;
+  ScreenVertices surface_memory_;  // of the last picture's surfaces, for the next one's
+};
+
+/// The stages and pools of one variable, or two, of one cache.
 class FramePipeline {
  public:
-  /// Draws what `planner` plans for those variables of the cache; both must outlive the pipeline. Throws Error
-  /// if the backend is not available.
+  /// Draws what `planner` plans for those variables of the cache; both must outlive the pipeline. Throws
+  /// Error if the backend is not available.
   FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
                 Backend backend);
   FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
                 std::unique_ptr<PaintingBackend> backend);
   ~FramePipeline();
 
-  /// Before a frame, and before what it draws is changed.
+  /// Ends a prefetch. To be called before a frame, and before what it draws is changed.
   void endPrefetch();
   /// Fetches, prepares and draws. Memory is divided for a picture of options.size, which may be larger than
   /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
              Progress* progress);
-  /// Frames leave `bytes` of the memory to a further painter, for drawBy(), until it is called again. False, and they leave
-  /// nothing, if the memory is too little for that.
+  /// Frames leave `bytes` of the memory to a further painter, for drawBy(), until it is called again. False,
+  /// and they leave nothing, if the memory is too little for that.
   bool setAside(uint64_t bytes, const FrameOptions& options);
   /// draw() by that painter, on the processor: of the bricks that are kept, in the same memory.
   Image drawBy(PaintingBackend& painter, const FramePlan& plan, const FrameOptions& options,
                FrameStatistics& statistics, Progress* progress);
-  /// Draws the surfaces, slices and isosurfaces of options.scene, if there is one, and puts them into the plan as its layers.
-  /// Before draw(), and as draw().
+  /// Draws the surfaces, slices and isosurfaces of options.scene, if there is one, and puts them into the
+  /// plan as its layers. Before draw(), and as draw().
   void drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
 
   /// Begins to fetch the plan's bricks in the background. Throws UsageError if there is too little memory.

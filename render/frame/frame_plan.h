@@ -1,5 +1,9 @@
-// The stage "plan" of a frame: which parts of which bricks the view needs, the order in which they are swept,
-// and how their splats are projected. Pure; it reads the octree only, and no bricks.
+// The stage "plan" of a frame: which parts of which bricks the view needs, the order in which they are
+// swept, and how their splats are projected. It reads the octree only, and no bricks.
+//
+// The cut is chosen by the error that bricks have on the screen, weighted by what the transfer function
+// shows of it (errorWeight()). The same cache, view and options give the same plan. Any number of threads
+// may plan at a time.
 #pragma once
 
 #include <algorithm>
@@ -12,17 +16,15 @@
 
 #include "render/camera/camera.h"
 #include "render/colour/classification.h"
-#include "render/colour/classification_change.h"
-#include "render/frame/drawn_scalars.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
-#include "render/frame/splat_exchange.h"
-#include "render/frame/sweep_buffer.h"
-#include "render/project/depth_keys.h"
+#include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "render/project/tile_set.h"
-#include "render/surface/colour_table.h"
+#include "render/ranks/splat_exchange.h"
+#include "render/sweep/sweep_buffer.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/model/octree.h"
 #include "stream/paging/cut.h"
 
 namespace curvisplat {
@@ -69,7 +71,7 @@ struct QuickPlan {
   }
 };
 
-/// Plans frames of one variable, or two, of one cache, which must outlive it. Any number of threads may plan.
+/// Plans frames of one variable, or two, of one cache, which must outlive it.
 class FramePlanner {
  public:
   FramePlanner(const CacheReader& cache, const DrawnScalars& scalars);
@@ -88,8 +90,8 @@ class FramePlanner {
     return screenViewOf(cache_.manifest(), camera, options, size);
   }
 
-  /// Deals the picture and the parts to be prepared out to options.ranks, and leaves out of plan.parts what lies in the
-  /// tiles of others. Nothing is left out if `keep_going`. All ranks have to call it.
+  /// Deals the picture and the parts to be prepared out to options.ranks, and leaves out of plan.parts what
+  /// lies in the tiles of others. Nothing is left out if `keep_going`. All ranks have to call it.
   void share(FramePlan& plan, const FrameOptions& options) const;
 
   /// Puts the layers of its scene into a plan. What is behind opaque ones everywhere is left out, unless
@@ -134,5 +136,29 @@ class FramePlanner {
   std::vector<ValueBounds> subtrees_;
   std::vector<ValueBounds> colour_subtrees_;  // of the scalar of the colours, if there is one
 };
+
+/// The least weight, for this error allowed on the screen. The detail of bricks that count least is at most
+/// 4 pixels: borders show with any function. At 4 pixels and more, and at 0, everything counts (1).
+double leastErrorWeight(double lod_pixels);
+
+/// What merging into one voxel loses. The scalar inside a voxel is known only to within the deviation that
+/// its slope leaves, so the transfer function is wrong by at most its change within that deviation. And
+/// merged kernels do not add up to one: they ripple with the voxels' lattice, which shows where a ray passes
+/// many voxels at the same place.
+struct VoxelLoss {
+  double changed = 0;   // the optical depth that its unknown scalar changes
+  double rippling = 0;  // the optical depth that rays pass in step with the lattice
+  double share = 0;     // its length, of the data's
+};
+
+/// How much of a brick's error on the screen counts towards the cut (stream/paging/cut.h): all of it, down
+/// to a quarter where nothing that merging loses can be seen. DESIGN.md, "The cut". In [least, 1]. Voxels
+/// longer than 1/48 of the data count whole: in so few, borders are most of the picture.
+double errorWeight(const VoxelLoss& loss, double least);
+
+/// The length, stretched, over which rays pass a lattice in step: voxels of the length `voxel` along the
+/// axes, seen by `view` anywhere in the brick's box. At most `whole`, the data's length. For a ray with the
+/// direction d it is voxel / (π |d_i|), i the axis that d is nearest to being at right angles to.
+double lengthInStep(const Brick& brick, const CutView& view, double voxel, double whole);
 
 }  // namespace curvisplat

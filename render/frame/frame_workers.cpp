@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "render/project/depth_sort.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
-#include "stream/base/stage_timer.h"
 
 namespace curvisplat {
 

@@ -15,16 +15,16 @@
 
 #include "render/colour/classification.h"
 #include "render/frame/frame_statistics.h"
-#include "render/frame/hidden_bricks.h"
-#include "render/frame/segment_ring.h"
-#include "render/frame/splat_exchange.h"
-#include "render/frame/sweep_buffer.h"
-#include "render/project/depth_keys.h"
+#include "render/project/depth_sort.h"
 #include "render/project/projection.h"
+#include "render/ranks/splat_exchange.h"
 #include "render/surface/slice_sampler.h"
+#include "render/sweep/hidden_bricks.h"
+#include "render/sweep/segment_ring.h"
+#include "render/sweep/sweep_buffer.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/mutex.h"
-#include "stream/base/worker_team.h"
+#include "stream/base/threads.h"
 #include "stream/paging/brick_source.h"
 
 namespace curvisplat {

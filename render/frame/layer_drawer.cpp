@@ -1,4 +1,4 @@
-#include "render/frame/layer_drawer.h"
+#include "render/frame/frame_pipeline.h"
 
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
@@ -10,9 +10,9 @@
 #include "render/frame/frame_workers.h"
 #include "render/surface/scene_layers.h"
 #include "render/surface/slice_sampler.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
-#include "stream/base/stage_timer.h"
-#include "stream/base/thread_count.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/gl/egl_context.h"
+#include "render/gl/gl_context.h"
 
 #define EGL_NO_X11
 #include <EGL/egl.h>

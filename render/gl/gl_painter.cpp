@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "render/gl/gl_objects.h"
+#include "render/gl/gl_functions.h"
 #include "render/gl/splat_shader.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
-#include "stream/base/stage_timer.h"
 
 namespace curvisplat {
 namespace {

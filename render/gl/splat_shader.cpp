@@ -31,7 +31,7 @@ flat out float colour_correlation;
 flat out mat3 faces;    // a face a column; of the splats that are cut
 flat out vec2 cut;      // far_sides, correlation
 flat out vec2 light;    // diffuse, specular
-flat out vec4 skew;       // t30, t21, t12, t03: footprint_skew.h
+flat out vec4 skew;       // t30, t21, t12, t03: footprint.h
 flat out vec4 depth_line;  // of the splats that meet layers: the middle, by u, deviations per depth; else no more than 0
 
 vec4 skewOf(int bits) {

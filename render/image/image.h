@@ -1,16 +1,30 @@
-// An image in 32-bit floats, and how far two images are apart.
+// Pictures in memory: their size, their pixels as 32-bit floats, a further channel beside the colours, and
+// what is measured of pictures: how far two are apart, and how much there is to see in one.
+//
+// Rows count from the top and pixels from the left. Colours are premultiplied by alpha. A picture takes 16
+// bytes a pixel, and measuring it is one pass over the pixels, or two. Any thread may call the functions; a
+// picture that is written belongs to one thread.
 #pragma once
+
+#include <glm/vec4.hpp>
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
-
-#include "render/image/image_size.h"
 
 namespace curvisplat {
 
-/// Rows from the top, pixels from the left; four floats a pixel: red, green and blue, premultiplied by alpha,
-/// and alpha.
+/// In pixels.
+struct ImageSize {
+  int width = 600;
+  int height = 600;
+
+  bool operator==(const ImageSize&) const = default;
+  uint64_t pixels() const { return static_cast<uint64_t>(width) * static_cast<uint64_t>(height); }
+};
+
+/// Four floats a pixel: red, green and blue, premultiplied by alpha, and alpha.
 struct Image {
   ImageSize size{0, 0};
   std::vector<float> rgba;
@@ -28,5 +42,21 @@ struct ImageDifference {
 /// Compares two images, each composited over white. Throws Error if the sizes differ or a pixel is not
 /// finite.
 ImageDifference compareImages(const Image& a, const Image& b);
+
+/// One number a pixel, beside an image's colours.
+struct ImageChannel {
+  std::string name;           // unique, and not that of a colour; at most 255 bytes
+  std::vector<float> values;  // [pixels]
+};
+
+/// How much there is to see in a picture, as shares of its pixels. Two colours are distinct if a channel
+/// differs by 0.1 or more.
+struct PictureContrast {
+  double seen = 0;   // distinct from the background
+  double other = 0;  // of these, distinct from the most frequent colour among them too
+};
+
+/// Measures a picture. `background`: premultiplied red, green, blue and alpha. Deterministic.
+PictureContrast contrastOf(const Image& image, const glm::vec4& background);
 
 }  // namespace curvisplat

@@ -13,8 +13,7 @@
 #include <memory>
 #include <string_view>
 
-#include "render/image/image_formats.h"
-#include "stream/base/check.h"
+#include "render/image/image_file.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

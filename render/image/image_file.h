@@ -1,13 +1,18 @@
-// Reads and writes image files.
+// Reads and writes image files, and encodes and decodes each format in memory: PNG, EXR and PFM.
+//
+// A file that is written appears whole or not at all. Decoders take untrusted bytes: every size is compared
+// with the number of bytes given before anything is allocated. They throw Error with a message that begins
+// with the file's name. Encoding takes up to 48 bytes a pixel beside the image (writingBytes()). Any thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "render/image/image.h"
-#include "render/image/image_channel.h"
 
 namespace curvisplat {
 
@@ -16,11 +21,11 @@ namespace curvisplat {
 /// file appears whole or not at all. Throws UsageError for any other extension, Error if the file cannot be
 /// written.
 void writeImage(const Image& image, const std::filesystem::path& path);
-/// With further channels, as EXR.
+/// Writes an EXR file that has further channels beside the colours.
 void writeExr(const Image& image, std::span<const ImageChannel> more, const std::filesystem::path& path);
 /// The memory that a further channel takes for each pixel, beside its own.
 inline constexpr uint64_t kChannelBytes = 8;
-/// The channels of an EXR file but for its colours. Throws Error.
+/// Reads the channels of an EXR file that are not colours. Throws Error.
 std::vector<ImageChannel> readChannels(const std::filesystem::path& path);
 /// Whether writeImage() takes the name: .png, .exr or .pfm.
 bool isImageName(const std::filesystem::path& path);
@@ -30,5 +35,37 @@ void checkImageName(const std::filesystem::path& path);
 uint64_t writingBytes(const std::filesystem::path& path, ImageSize size);
 /// Reads PNG (8 and 16 bits a channel), scan-line EXR and PFM files. Throws Error.
 Image readImage(const std::filesystem::path& path);
+
+/// An encoded image: all bytes of its file.
+using Bytes = std::vector<std::byte>;
+
+/// Longest side of an image, decoded or encoded, in pixels.
+inline constexpr int kLargestImageSide = 1 << 16;
+
+/// kQuick encodes the same pixels five times as fast into files that are some tenths larger.
+enum class PngEffort { kUsual, kQuick };
+Bytes encodePng(const Image& image);
+Bytes encodePng(const Image& image, PngEffort effort);
+Bytes encodeExr(const Image& image);
+Bytes encodeExr(const Image& image, std::span<const ImageChannel> more);
+Bytes encodePfm(const Image& image);
+
+/// `name` is the file's, for messages.
+Image decodePng(std::span<const std::byte> bytes, const std::string& name);
+Image decodeExr(std::span<const std::byte> bytes, const std::string& name);
+/// Decodes the channels that are not colours.
+std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, const std::string& name);
+Image decodePfm(std::span<const std::byte> bytes, const std::string& name);
+
+/// Throws Error unless width and height are in [1, kLargestImageSide] and `packed_bytes` can hold that many
+/// pixels of `bytes_per_pixel`, compressed by at most `largest_ratio`.
+void requirePlausibleSize(int64_t width, int64_t height, uint64_t bytes_per_pixel, uint64_t packed_bytes,
+                          uint64_t largest_ratio, const std::string& name);
+
+/// A channel as 8 bits: clamped to 0..1 and rounded; NaN gives 0.
+uint8_t toByte(float value);
+
+/// Whether every alpha is 1.
+bool isOpaque(const Image& image);
 
 }  // namespace curvisplat

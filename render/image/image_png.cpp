@@ -7,8 +7,7 @@
 #include <csetjmp>
 #include <cstring>
 
-#include "render/image/image_formats.h"
-#include "stream/base/check.h"
+#include "render/image/image_file.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

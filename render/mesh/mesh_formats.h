@@ -1,4 +1,8 @@
-// The formats of mesh_file.h, one a function. `path` is for messages; each throws Error.
+// The formats that readMeshFile() knows (triangle_mesh.h), a function for each, and what they share: text in
+// lines and words, and polygons as fans of triangles.
+//
+// Their results are checked in mesh_file.cpp: a parser may give indices and positions as the file has them.
+// `path` is for messages; each function throws Error. Any thread. Included by the parsers only.
 #pragma once
 
 #include <charconv>

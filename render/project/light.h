@@ -15,8 +15,8 @@
 #include <glm/vec3.hpp>
 #include <optional>
 
+#include "render/project/footprint.h"
 #include "render/project/screen_view.h"
-#include "render/project/splat_ellipse.h"
 
 namespace curvisplat {
 

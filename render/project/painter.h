@@ -13,7 +13,6 @@
 #include "render/colour/classification.h"
 #include "render/image/image.h"
 #include "render/project/pixel_layers.h"
-#include "render/project/screen_box.h"
 #include "render/project/screen_splat.h"
 #include "render/project/tile_set.h"
 #include "stream/base/compute_permits.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "stream/base/check.h"
-#include "stream/base/huge_pages.h"
+#include "stream/base/error.h"
+#include "stream/base/memory.h"
 
 namespace curvisplat {
 namespace {

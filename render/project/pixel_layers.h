@@ -17,8 +17,8 @@
 #include <span>
 #include <vector>
 
-#include "render/image/image_size.h"
-#include "render/project/screen_box.h"
+#include "render/image/image.h"
+#include "render/project/tile_set.h"
 
 namespace curvisplat {
 

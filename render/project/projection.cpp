@@ -3,26 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/project/border_parts.h"
-#include "render/project/clip_planes.h"
-#include "render/project/colour_scalar.h"
-#include "render/project/face_cut.h"
-#include "render/project/footprint_box.h"
-#include "render/project/footprint_skew.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 #include "render/project/light.h"
-#include "render/project/local_layers.h"
-#include "render/project/placed_piece.h"
+#include "render/project/plane_cuts.h"
 #include "render/project/splat_chooser.h"
-#include "render/project/splat_cutter.h"
-#include "render/project/splat_ellipse.h"
-#include "render/project/splat_maps.h"
-#include "stream/base/check.h"
+#include "render/project/splat_pieces.h"
+#include "stream/base/error.h"
 #include "stream/base/vector_clones.h"
 #include "stream/model/border_code.h"
-#include "stream/model/border_pairs.h"
 #include "stream/model/growth_code.h"
-#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {

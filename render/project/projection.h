@@ -17,14 +17,14 @@
 #include <vector>
 
 #include "render/colour/classification.h"
-#include "render/project/clip_planes.h"
 #include "render/project/light.h"
 #include "render/project/pixel_layers.h"
+#include "render/project/plane_cuts.h"
 #include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
 #include "render/project/tile_set.h"
 #include "stream/model/border_code.h"
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
@@ -55,8 +55,8 @@ struct ProjectionSettings {
   bool lit() const { return light.has_value(); }
 };
 
-/// The values of a brick's splats: of the scalar that is classified, and in pictures of two scalars of that which gives
-/// the colours.
+/// The values of a brick's splats: of the scalar that is classified, and in pictures of two scalars of that
+/// which gives the colours.
 struct BrickValues {
   VariableArrays<const float> scalar;
   std::optional<VariableArrays<const float>> colours = std::nullopt;
@@ -71,11 +71,11 @@ struct BrickValues {
 /// Projects bricks. Each projector belongs to one thread.
 class BrickProjector {
  public:
-  /// A brick gives at most kMaxBrickSplats splats, each with a ScreenColour in pictures of two scalars, plus this many
-  /// records of pieces. If borders and perspective would make more, cells at borders are drawn as one splat instead
-  /// of two; if that is too many as well, like any cell, clip planes keep or drop whole splats instead of cutting
-  /// them, and perspective cuts more coarsely and drops more of the splats that are
-  /// close to the eye.
+  /// A brick gives at most kMaxBrickSplats splats, each with a ScreenColour in pictures of two scalars, plus
+  /// this many records of pieces. If borders and perspective would make more, cells at borders are drawn as
+  /// one splat instead of two; if that is too many as well, like any cell, clip planes keep or drop whole
+  /// splats instead of cutting them, and perspective cuts more coarsely and drops more of the splats that
+  /// are close to the eye.
   static constexpr size_t kMaxPieces = 65536;
   static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;
 
@@ -83,7 +83,7 @@ class BrickProjector {
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
-  /// out what cannot be seen. Cells at borders are cut or drawn in parts (border_parts.h). Splats that reach
+  /// out what cannot be seen. Cells at borders are cut or drawn in parts (splat_pieces.h). Splats that reach
   /// behind the near plane or span a wide angle are cut along their longest column into two that merge into
   /// them exactly, until they are small for their distance; what then lies before the near plane is dropped.
   /// Overwrites splats() and depths(). Pure.

@@ -1,6 +1,6 @@
-// The records that the projection passes to the painters: splats as ellipses on the screen; what cuts them: faces,
-// and the layers of the pixels; and the scalar of their colours, if it is not that of their opacity. Every record
-// takes 44 bytes.
+// The records that the projection passes to the painters: splats as ellipses on the screen; what cuts them:
+// faces, and the layers of the pixels; and the scalar of their colours, if it is not that of their opacity.
+// Every record takes 44 bytes.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@ namespace curvisplat {
 
 /// One splat as the painters take it. With d the offset of a pixel's centre from (x, y) in pixels and u the
 /// solution of L u = d, L = | l11 0; l21 l22 | (S2 and the low-pass = L Lᵀ): rho² = |u|², optical depth per
-/// unit of extinction = amplitude F(rho), but for the skew; scalar = mean + slope·u, spread evenly over ± half_width around
-/// that.
+/// unit of extinction = amplitude F(rho), but for the skew; scalar = mean + slope·u, spread evenly over ±
+/// half_width around that.
 struct ScreenSplat {
   float x, y;            // pixels from the left and the top
   float l11, l21, l22;   // pixels
@@ -20,7 +20,7 @@ struct ScreenSplat {
   float mean;            // the scalar's unit, and so for the rest
   float slope0, slope1;  // along the columns of L
   float half_width;      // √3 deviations along the ray at rho = 0; in lit pictures with the light (light.h)
-  uint32_t skew;         // of the footprint, packed (footprint_skew.h); 0: none
+  uint32_t skew;         // of the footprint, packed (footprint.h); 0: none
 };
 static_assert(sizeof(ScreenSplat) == 44);
 // So that the large buffers of a frame take no memory before they are filled.
@@ -28,15 +28,15 @@ static_assert(std::is_trivially_default_constructible_v<ScreenSplat>);
 
 /// The faces that a splat is cut at: a record of its own, directly before the splat where splats come from
 /// the nearest to the farthest, and directly behind it where they come from the farthest to the nearest. The
-/// splat's amplitude is then negative: minus what it would be. A splat that has a ScreenDepth as well has that
-/// beside it, and the ScreenCut beyond.
+/// splat's amplitude is then negative: minus what it would be. A splat that has a ScreenDepth as well has
+/// that beside it, and the ScreenCut beyond.
 ///
 /// Along the ray of a pixel the splat lies about its middle with a distribution of deviation 1: the
 /// biweight's, b(x) = 15 / (16 √7) (1 - x²/7)², |x| <= √7. A face leaves what is nearer than, or farther
-/// than, a = faces[n][0] + (faces[n][1], faces[n][2]) · u deviations before, or behind, the middle; all faces
-/// together an interval [lo, hi]. What is left of the optical depth is the interval's share M of the
-/// distribution; and with its mean m and variance v, the scalar's mean changes by k m and its variance by -k²
-/// (1 - v), where k = correlation half_width / √3.
+/// than, a = faces[n][0] + (faces[n][1], faces[n][2]) · u deviations before, or behind, the middle; all
+/// faces together an interval [lo, hi]. What is left of the optical depth is the interval's share M of the
+/// distribution; and with its mean m and variance v, the scalar's mean changes by k m and its variance by
+/// -k² (1 - v), where k = correlation half_width / √3.
 struct ScreenCut {
   static constexpr int kFaces = 3;
 
@@ -52,8 +52,8 @@ struct ScreenCut {
   static ScreenCut of(const ScreenSplat& record);
 };
 
-/// Where a splat lies along the ray, for those that may meet the layers of their pixels (pixel_layers.h). The
-/// middle's depth at u is middle + by[0] u0 + by[1] u1; a layer at the depth z is (z - that) per_depth
+/// Where a splat lies along the ray, for those that may meet the layers of their pixels (pixel_layers.h).
+/// The middle's depth at u is middle + by[0] u0 + by[1] u1; a layer at the depth z is (z - that) per_depth
 /// deviations behind it. A window between two layers is one more interval that the splat is cut to, together
 /// with those of its faces. A splat without this record lies in front of all layers.
 struct ScreenDepth {
@@ -67,8 +67,9 @@ struct ScreenDepth {
   static ScreenDepth of(const ScreenSplat& record);
 };
 
-/// The scalar that a splat takes its colours from, where the opacity is another's: along the columns of L as the
-/// splat's own scalar. In pictures of two scalars every splat has one, directly beside it, before any other record.
+/// The scalar that a splat takes its colours from, where the opacity is another's: along the columns of L as
+/// the splat's own scalar. In pictures of two scalars every splat has one, directly beside it, before any
+/// other record.
 struct ScreenColour {
   float mean = 0;
   std::array<float, 2> slope{};
@@ -131,7 +132,8 @@ inline ScreenColour ScreenColour::of(const ScreenSplat& r) {
   return {r.x, {r.y, r.l21}, r.l22, -r.l11 - 194.0f};
 }
 
-/// A splat's records, found beside it. `step` is -1 where splats come from the nearest to the farthest, else 1.
+/// A splat's records, found beside it. `step` is -1 where splats come from the nearest to the farthest, else
+/// 1.
 struct SplatRecords {
   const ScreenSplat* cut = nullptr;
   const ScreenSplat* depth = nullptr;

@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -1,6 +1,6 @@
 #include "render/project/tile_set.h"
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 

@@ -1,5 +1,9 @@
-// Some of a picture's shared tiles: those that one of several processes draws, or that are drawn at a time. They are smaller
-// than the painters' tiles, so that a few pixels with many splats can be divided.
+// Parts of a picture: rectangles in pixels, tiles, and sets of tiles: those that one of several processes
+// draws, or those that are drawn at a time.
+//
+// Sets are of shared tiles, which are smaller than the painters' tiles, so that a few pixels with many
+// splats can be divided; a painter's tile is a whole number of them. Whether a box touches a set is a
+// question of four look-ups, in sums over the picture: 5 bytes a shared tile. Immutable; any thread.
 #pragma once
 
 #include <algorithm>
@@ -7,10 +11,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/image/image_size.h"
-#include "render/project/screen_box.h"
+#include "render/image/image.h"
 
 namespace curvisplat {
+
+/// A rectangle of the picture in pixels, with the coordinates of ScreenSplat::x and y.
+struct ScreenBox {
+  float x0, y0, x1, y1;
+};
 
 inline constexpr int kTileSide = 32;       // pixels: of painters
 inline constexpr int kSharedTileSide = 8;  // of TileSet
@@ -26,7 +34,7 @@ struct TileBox {
   size_t tiles() const { return static_cast<size_t>(columns()) * static_cast<size_t>(rows()); }
 };
 
-/// Immutable; any thread.
+/// Some of a picture's shared tiles.
 class TileSet {
  public:
   /// Boxes touch tiles that are this close, in pixels: between corners and centres, and rounding.
@@ -35,7 +43,7 @@ class TileSet {
   /// `owners` [shared tile], in rows from the top: the set has those of `owner`.
   TileSet(ImageSize size, const std::vector<uint32_t>& owners, uint32_t owner);
 
-  /// Painters' tiles, or others.
+  /// The number of tiles along a side, or in a picture: painters' tiles, unless `side` is given.
   static int tilesAlong(int pixels, int side = kTileSide) { return (pixels + side - 1) / side; }
   static size_t tilesOf(ImageSize size, int side = kTileSide) {
     return static_cast<size_t>(tilesAlong(size.width, side)) *

@@ -11,8 +11,7 @@
 #include <memory>
 
 #include "render/project/tile_set.h"
-#include "render/surface/pixel_rays.h"
-#include "render/surface/surface_light.h"
+#include "render/surface/surface_shader.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "render/colour/classification.h"
 #include "render/project/light.h"
 #include "render/project/pixel_layers.h"
-#include "render/surface/colour_table.h"
 #include "render/surface/iso_rays.h"
 
 namespace curvisplat {

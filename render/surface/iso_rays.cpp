@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 
 namespace curvisplat {
 namespace {

@@ -17,7 +17,7 @@
 #include <span>
 #include <vector>
 
-#include "render/surface/colour_table.h"
+#include "render/colour/classification.h"
 #include "render/surface/iso_splats.h"
 
 namespace curvisplat {

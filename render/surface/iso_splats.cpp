@@ -5,8 +5,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "render/project/border_parts.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
+#include "render/project/splat_pieces.h"
 #include "render/project/tile_set.h"
 
 namespace curvisplat {

@@ -12,11 +12,11 @@
 #include <span>
 #include <vector>
 
-#include "render/project/clip_planes.h"
+#include "render/project/plane_cuts.h"
 #include "render/project/screen_view.h"
-#include "render/project/splat_cutter.h"
+#include "render/project/splat_pieces.h"
 #include "stream/model/border_code.h"
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
 

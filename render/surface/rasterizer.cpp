@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "render/surface/small_triangles.h"
-
 namespace curvisplat {
 namespace {
 

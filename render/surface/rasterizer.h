@@ -1,18 +1,20 @@
 // Which triangle is seen at each of a pixel's samples, tile by tile.
 //
-// Vertices are moved to a grid of 1/16 pixel, in which edge functions are exact, in float for small triangles and
-// in double for others: triangles that share an edge leave no gap and share no sample. Eight samples a pixel, whose
-// mean is its centre. A sample keeps the least (value, triangle), so the result depends neither on the order of the
-// triangles nor on threads.
+// Vertices are moved to a grid of 1/16 pixel, in which edge functions are exact, in float for small
+// triangles and in double for others: triangles that share an edge leave no gap and share no sample. Eight
+// samples a pixel, whose mean is its centre. A sample keeps the least (value, triangle), so the result
+// depends neither on the order of the triangles nor on threads.
+//
+// SampleTile draws a tile, on one thread. Triangles of at most 64 pixels go through drawSmallTriangles(), in
+// the widest vectors there are, to the same bits in all instruction sets.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "render/surface/pixel_samples.h"
 #include "render/surface/scene_triangles.h"
-#include "render/surface/triangle_bins.h"
 
 namespace curvisplat {
 
@@ -21,8 +23,8 @@ class SampleTile {
  public:
   SampleTile() : samples_(static_cast<size_t>(kSampleTileWidth) * kSampleTileHeight) {}
 
-  /// Draws the triangles that a tile sees; with `before`, of the same tile, those that lie behind what its samples
-  /// see. False if nothing is seen: then samples are undefined.
+  /// Draws the triangles that a tile sees; with `before`, of the same tile, those that lie behind what its
+  /// samples see. False if nothing is seen: then samples are undefined.
   bool draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row,
             const SampleTile* before = nullptr);
 
@@ -45,5 +47,28 @@ class SampleTile {
   const SampleTile* before_ = nullptr;  // while it draws
   std::vector<PixelSamples> samples_;   // [kSampleTileHeight][kSampleTileWidth]
 };
+
+/// The most pixels along a side of a small triangle: products of a small triangle's differences have fewer
+/// bits than a float.
+inline constexpr int kSmallTriangle = 64;
+
+/// Triangles of a surface, among which are those to draw.
+struct SmallTriangles {
+  const ScreenVertex* vertices;
+  const std::array<uint32_t, 3>* triangles;
+  std::span<const uint32_t> numbers;  // of those to draw
+  uint32_t first_number = 0;          // of triangle 0, in the scene
+};
+
+/// Pixels [x0, x1] x [y0, y1] of the picture, with rows of kSampleTileWidth.
+struct SampleBox {
+  PixelSamples* samples;
+  const PixelSamples* before;  // only what lies behind these is drawn; may be null
+  int x0, y0, x1, y1;
+};
+
+/// Draws the small ones into the samples of a tile. Writes the others to `left` ([numbers]), and returns how
+/// many they are. Pure but for what it writes; any thread.
+size_t drawSmallTriangles(const SmallTriangles& work, const SampleBox& box, uint32_t* left);
 
 }  // namespace curvisplat

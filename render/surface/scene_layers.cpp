@@ -1,21 +1,280 @@
+// The layers of a picture, tile by tile of samples and row by row: SampledLayers makes those of triangles
+// from the samples of pixels, PixelSlices those of slices; iso_layers.h has found those of isosurfaces.
 #include "render/surface/scene_layers.h"
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-
-#include <algorithm>
-#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <utility>
 
-#include "render/surface/pixel_rays.h"
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "render/project/pixel_layers.h"
 #include "render/surface/rasterizer.h"
-#include "render/surface/sampled_layers.h"
+#include "render/surface/scene_triangles.h"
 #include "render/surface/surface_shader.h"
 
 namespace curvisplat {
 namespace {
+
+/// The layers that the samples of a row of pixels make, from the nearest on.
+///
+/// Samples of a pixel whose depths hardly differ are one layer. Its triangles are shaded in the middle of
+/// their samples: one for those that share a vertex, up to three that do not. The pixels of a row are
+/// collected and then shaded together. One thread at a time. Keeps its memory.
+class SampledLayers {
+ public:
+  /// Both outlive it.
+  SampledLayers(const SceneTriangles& triangles, const SurfaceShader& shader);
+
+  /// Whether what lies behind a surface may be seen through it.
+  bool hasTranslucent() const { return has_translucent_; }
+
+  void clear();
+  /// Adds the layers of a pixel's samples. `hidden`: the samples behind something opaque, which are left
+  /// out; adds to it.
+  void append(const PixelSamples& samples, int x, int y, unsigned& hidden);
+  /// What is appended next is the next pixel's.
+  void endPixel() { ends_.push_back(unshaded_.size()); }
+  /// After the last pixel.
+  void shade();
+  /// The layers of a pixel, in the order of append().
+  std::span<const PixelLayer> at(size_t pixel) const {
+    const size_t begin = pixel > 0 ? ends_[pixel - 1] : 0;
+    return std::span(layers_).subspan(begin, ends_[pixel] - begin);
+  }
+
+ private:
+  /// A sample that sees a triangle.
+  struct Seen {
+    float value;
+    uint32_t number, place;
+
+    bool operator<(const Seen& other) const {
+      return value < other.value || (value == other.value && number < other.number);
+    }
+  };
+  struct Unshaded {
+    size_t first_spot, spots;
+    float x, y;  // the pixel's middle
+    float part;  // of the pixel, that it covers
+    float depth;
+  };
+
+  size_t endOfLayer(const std::array<Seen, kSamples>& seen, size_t begin, size_t count) const;
+  void appendLayer(std::span<const Seen> seen, int x, int y, size_t& left, unsigned& hidden);
+  size_t appendSpots(std::span<const Seen> seen, float middle_x, float middle_y);
+  double pixelOf(float value) const;
+  double toleranceOf(const Seen& sample) const;
+  void shadeBlock(size_t first, size_t count);
+
+  const SceneTriangles& triangles_;
+  const SurfaceShader& shader_;
+  const bool has_translucent_;
+  std::vector<SurfaceShader::Spot> spots_;
+  std::vector<float> samples_;                // [spots]: how many each stands for
+  std::vector<SurfaceShader::Point> points_;  // [spots]
+  std::vector<Unshaded> unshaded_;
+  std::vector<PixelLayer> layers_;  // [unshaded]
+  std::vector<size_t> ends_;        // [pixels]
+};
+
+// Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and
+// by no more than this many pixels.
+constexpr double kSteepest = 4, kNear = 0.25;
+constexpr size_t kMaxShaded = 3;  // of a pixel and layer: triangles that do not meet
+constexpr float kSmooth = 0.97f;  // of the cosine between normals: what is in a pixel is lit once
+
+SampledLayers::SampledLayers(const SceneTriangles& triangles, const SurfaceShader& shader)
+    : triangles_(triangles),
+      shader_(shader),
+      has_translucent_(std::any_of(triangles.scene().surfaces.begin(), triangles.scene().surfaces.end(),
+                                   [](const Surface& surface) { return !surface.opacity.opaque(); })) {}
+
+void SampledLayers::clear() {
+  spots_.clear();
+  samples_.clear();
+  unshaded_.clear();
+  ends_.clear();
+}
+
+void SampledLayers::append(const PixelSamples& samples, int x, int y, unsigned& hidden) {
+  std::array<Seen, kSamples> seen;
+  size_t count = 0, nearest = 0;
+  float farthest = -INFINITY;
+  for (size_t n = 0; n < kSamples; ++n) {
+    if (samples.numbers[n] == PixelSamples::kNothing || (hidden >> n & 1) != 0) continue;
+    seen[count] = {samples.values[n], samples.numbers[n], static_cast<uint32_t>(n)};
+    if (seen[count] < seen[nearest]) nearest = count;
+    farthest = std::max(farthest, samples.values[n]);
+    ++count;
+  }
+  if (count == 0) return;
+  size_t left = kSamples - static_cast<size_t>(std::popcount(hidden));
+  // Most pixels have one layer: its samples need not be in order.
+  const double spread = double{farthest} - double{seen[nearest].value};
+  if (spread <= kNear * pixelOf(seen[nearest].value) || spread <= toleranceOf(seen[nearest])) {
+    appendLayer(std::span(seen).first(count), x, y, left, hidden);
+    return;
+  }
+  for (size_t n = 1; n < count; ++n)  // a few
+    for (size_t at = n; at > 0 && seen[at] < seen[at - 1]; --at) std::swap(seen[at], seen[at - 1]);
+  for (size_t begin = 0; begin < count;) {
+    const size_t end = endOfLayer(seen, begin, count);
+    appendLayer(std::span(seen).subspan(begin, end - begin), x, y, left, hidden);
+    begin = end;
+  }
+}
+
+/// Of sorted samples, the first that is not of the layer that begins at `begin`.
+size_t SampledLayers::endOfLayer(const std::array<Seen, kSamples>& seen, size_t begin, size_t count) const {
+  double tolerance = 0;
+  size_t known = begin;  // the samples before it are in the tolerance
+  size_t end = begin + 1;
+  for (; end < count; ++end) {
+    const double gap = double{seen[end].value} - double{seen[end - 1].value};
+    if (gap <= kNear * pixelOf(seen[end].value)) continue;  // whatever the slope
+    for (; known <= end; ++known)
+      if (known == begin || seen[known].number != seen[known - 1].number)
+        tolerance = std::max(tolerance, toleranceOf(seen[known]));
+    if (gap > tolerance) break;
+  }
+  return end;
+}
+
+/// Of the samples of one layer. `left`: samples that nothing opaque has hidden so far.
+void SampledLayers::appendLayer(std::span<const Seen> seen, int x, int y, size_t& left, unsigned& hidden) {
+  size_t opaque = seen.size();
+  if (has_translucent_) {
+    opaque = 0;
+    for (const Seen& sample : seen)
+      if (shader_.isOpaque(sample.number)) {
+        ++opaque;
+        hidden |= 1u << sample.place;
+      }
+  }
+  // Opaque ones hide what is left; translucent ones cover their part of the pixel.
+  const float part =
+      static_cast<float>(seen.size()) / static_cast<float>(opaque == seen.size() ? left : kSamples);
+  left -= opaque;
+  double value = 0;
+  for (const Seen& sample : seen) value += double{sample.value};
+  const float middle_x = static_cast<float>(x) + 0.5f, middle_y = static_cast<float>(y) + 0.5f;
+  const size_t first = spots_.size();
+  unshaded_.push_back(
+      {first, appendSpots(seen, middle_x, middle_y), middle_x, middle_y, part,
+       triangles_.depthOf(static_cast<float>(value / static_cast<double>(seen.size())), middle_x, middle_y)});
+}
+
+/// Where the triangles of a layer are shaded: those that meet an earlier one with it, in the middle of all
+/// their samples.
+size_t SampledLayers::appendSpots(std::span<const Seen> seen, float middle_x, float middle_y) {
+  struct Part {
+    uint32_t number, last;  // the first triangle, and the last that was taken
+    float x, y, count;
+  };
+  std::array<Part, kMaxShaded> parts;
+  size_t count = 0;
+  for (const Seen& sample : seen) {
+    size_t n = 0;
+    while (n < count && parts[n].number != sample.number && parts[n].last != sample.number) ++n;
+    if (n == count) {
+      n = 0;
+      while (n < count && !shader_.meet(parts[n].number, sample.number)) ++n;
+      if (n == kMaxShaded) continue;
+      if (n == count) parts[count++] = {sample.number, sample.number, 0, 0, 0};
+      parts[n].last = sample.number;
+    }
+    parts[n].x += static_cast<float>(kSampleOffsets[sample.place][0]);
+    parts[n].y += static_cast<float>(kSampleOffsets[sample.place][1]);
+    ++parts[n].count;
+  }
+  for (size_t n = 0; n < count; ++n) {
+    const Part& part = parts[n];
+    spots_.push_back(
+        {part.number, middle_x + part.x / (16 * part.count), middle_y + part.y / (16 * part.count)});
+    samples_.push_back(part.count);
+  }
+  return count;
+}
+
+void SampledLayers::shade() {
+  points_.resize(spots_.size());
+  shader_.shade(spots_, points_);
+  layers_.resize(unshaded_.size());
+  for (size_t first = 0; first < unshaded_.size(); first += LitPoints::kAtOnce)
+    shadeBlock(first, std::min(LitPoints::kAtOnce, unshaded_.size() - first));
+}
+
+void SampledLayers::shadeBlock(size_t first, size_t count) {
+  const auto put = [](const glm::vec3& value, size_t n, LitPoints::Vectors& to) {
+    to[0][n] = value.x;
+    to[1][n] = value.y;
+    to[2][n] = value.z;
+  };
+  LitPoints lit;
+  uint64_t rough = 0;  // bits of layers whose triangles are lit one by one
+  static_assert(LitPoints::kAtOnce == 64);
+  const bool perspective = triangles_.view().projection == Projection::kPerspective;
+  glm::vec3 towards = towardsViewer(triangles_.view(), 0, 0);
+  for (size_t n = 0; n < count; ++n) {
+    const Unshaded& layer = unshaded_[first + n];
+    if (perspective) towards = towardsViewer(triangles_.view(), layer.x, layer.y);
+    SurfaceShader::Point mean;
+    float shaded = 0;
+    bool smooth = true;
+    const glm::vec3 of_first = points_[layer.first_spot].normal;
+    for (size_t spot = layer.first_spot; spot < layer.first_spot + layer.spots; ++spot) {
+      SurfaceShader::Point& point = points_[spot];
+      const float facing = glm::dot(point.normal, of_first);
+      if (facing < 0) point.normal = -point.normal;
+      smooth = smooth && std::abs(facing) > kSmooth;
+      mean.colour += samples_[spot] * point.colour;
+      mean.normal += samples_[spot] * point.normal;
+      mean.opacity += samples_[spot] * point.opacity;
+      shaded += samples_[spot];
+    }
+    mean.colour /= shaded;
+    const float alpha = has_translucent_ ? layer.part * mean.opacity / shaded : layer.part;
+    layers_[first + n] = {layer.depth, glm::vec4(0, 0, 0, alpha)};
+    put(mean.normal, n, lit.normal);
+    put(towards, n, lit.towards_viewer);
+    put(mean.colour, n, lit.colour);
+    if (smooth) continue;
+    rough |= uint64_t{1} << n;
+    glm::vec3 colour(0.0f);
+    for (size_t spot = layer.first_spot; spot < layer.first_spot + layer.spots; ++spot)
+      colour +=
+          samples_[spot] / shaded * shader_.light().lit(points_[spot].colour, points_[spot].normal, towards);
+    layers_[first + n].colour = glm::vec4(alpha * colour, alpha);
+  }
+  shader_.light().light(lit, count);
+  for (size_t n = 0; n < count; ++n) {
+    glm::vec4& colour = layers_[first + n].colour;
+    if ((rough >> n & 1) == 0)
+      colour =
+          glm::vec4(colour.w * glm::vec3(lit.colour[0][n], lit.colour[1][n], lit.colour[2][n]), colour.w);
+  }
+}
+
+/// A pixel's size, in values: perspective, d(-1/z) = dz / z², and a pixel is z / focal.
+double SampledLayers::pixelOf(float value) const {
+  const ScreenView& view = triangles_.view();
+  return view.projection == Projection::kPerspective ? std::abs(double{value}) / view.focal_px
+                                                     : 1 / view.focal_px;
+}
+
+double SampledLayers::toleranceOf(const Seen& sample) const {
+  const double pixel = pixelOf(sample.value);
+  return std::min(double{shader_.steepness(sample.number)}, kSteepest * pixel) + kNear * pixel;
+}
 
 /// The layers that slices make of a pixel.
 class PixelSlices {
@@ -40,8 +299,8 @@ class PixelSlices {
   }
 
  private:
-  /// What clip planes leave of a slice at a point. They keep what lies in them: a slice in a clip plane shows the cut, and
-  /// coverageAt() would leave half of it.
+  /// What clip planes leave of a slice at a point. They keep what lies in them: a slice in a clip plane
+  /// shows the cut, and coverageAt() would leave half of it.
   float leftOf(size_t slice, const glm::dvec3& at, double pixel) const {
     constexpr double kParallel = 1e-6, kInPlane = 0.01;  // of an angle; pixels
     const glm::dvec3 normal = glm::normalize(scene_.slices[slice].normal);

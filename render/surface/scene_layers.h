@@ -1,4 +1,7 @@
-// Puts surfaces and slices together as the layers of a picture.
+// Puts surfaces, slices and isosurfaces together as the layers of a picture: what the samples of its pixels
+// see of triangles, and where their rays cross planes and isosurfaces, in the order of depth.
+//
+// The same bits for any number of threads. Parallel on the caller's TBB arena, a tile of samples at a time.
 #pragma once
 
 #include <memory>
@@ -6,10 +9,10 @@
 #include <span>
 #include <vector>
 
+#include "render/colour/classification.h"
 #include "render/project/light.h"
 #include "render/project/pixel_layers.h"
 #include "render/project/screen_view.h"
-#include "render/surface/colour_table.h"
 #include "render/surface/iso_layers.h"
 #include "render/surface/scene_triangles.h"
 #include "render/surface/slice_sampler.h"
@@ -22,17 +25,16 @@ struct SceneLook {
   std::optional<Light> light;              // of surfaces; none: a light at the viewer
   std::span<const ClipPlane> clip_planes;  // of slices
   double depth_origin = 0;
-  // Of slices and surfaces whose opacities are the picture's function's: it, and where it is of another scalar, that one's
-  // samples of slices.
+  // Of slices and surfaces whose opacities are the picture's function's: it, and where it is of another
+  // scalar, that one's samples of slices.
   const ColourTable* opacities = nullptr;
   std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
   const IsoLayers* isosurfaces = nullptr;
 };
 
-/// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread (with
-/// translucent surfaces 1 MiB), and 12 bytes a vertex and at most some 8 a triangle of surfaces; the vertices' stay in
-/// `memory`, if there is one, for the next picture. Parallel on the caller's TBB arena; the same bits for any number of
-/// threads.
+/// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread
+/// (with translucent surfaces 1 MiB), and 12 bytes a vertex and at most some 8 a triangle of surfaces; the
+/// vertices' stay in `memory`, if there is one, for the next picture.
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
                      std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,
                      ScreenVertices* memory = nullptr);

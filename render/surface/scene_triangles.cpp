@@ -7,12 +7,13 @@
 #include <cmath>
 #include <limits>
 
-#include "stream/base/huge_pages.h"
+#include "stream/base/memory.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr size_t kVerticesAtOnce = 4096;
+constexpr uint32_t kTrianglesAtOnce = 4096;
 
 }  // namespace
 
@@ -107,6 +108,113 @@ SceneTriangles::Place SceneTriangles::placeOfSeveral(uint32_t number) const {
   const auto after = std::upper_bound(begins_.begin(), begins_.end(), number);
   const auto surface = static_cast<size_t>(after - begins_.begin()) - 1;
   return {surface, number - begins_[surface]};
+}
+
+TriangleBins::TriangleBins(const SceneTriangles& triangles)
+    : columns_((triangles.view().size.width + kSampleTileWidth - 1) / kSampleTileWidth),
+      rows_((triangles.view().size.height + kSampleTileHeight - 1) / kSampleTileHeight),
+      size_(triangles.view().size) {
+  for (size_t surface = 0; surface < triangles.scene().surfaces.size(); ++surface) {
+    const auto count = static_cast<uint32_t>(triangles.scene().surfaces[surface].mesh->triangles.size());
+    for (uint32_t first = 0; first < count; first += kTrianglesAtOnce) {
+      Batch& batch = batches_.emplace_back();
+      batch.surface = surface;
+      batch.first = first;
+      batch.count = std::min(kTrianglesAtOnce, count - first);
+    }
+  }
+  tbb::parallel_for(size_t{0}, batches_.size(), [&](size_t n) { sort(triangles, batches_[n]); });
+}
+
+/// Vertices on the grid of samples lie up to 1/32 pixel away, and samples 1/16 inside of their pixels.
+TriangleBins::TileBox TriangleBins::tilesOf(const ScreenVertex* vertices, size_t count) const {
+  float x0 = vertices[0].x, x1 = x0, y0 = vertices[0].y, y1 = y0;
+  for (size_t n = 1; n < count; ++n) {
+    x0 = std::min(x0, vertices[n].x);
+    x1 = std::max(x1, vertices[n].x);
+    y0 = std::min(y0, vertices[n].y);
+    y1 = std::max(y1, vertices[n].y);
+  }
+  const auto width = static_cast<float>(size_.width), height = static_cast<float>(size_.height);
+  // NaN and infinity are nowhere.
+  if (!(x0 < width && x1 >= 0 && y0 < height && y1 >= 0 && x0 > -INFINITY && x1 < INFINITY &&
+        y0 > -INFINITY && y1 < INFINITY))
+    return {};
+  const auto tile = [](float at, float most, int side) {
+    return static_cast<int16_t>(static_cast<unsigned>(std::clamp(at, 0.0f, most - 1)) /
+                                static_cast<unsigned>(side));
+  };
+  return {tile(x0, width, kSampleTileWidth), tile(y0, height, kSampleTileHeight),
+          tile(x1, width, kSampleTileWidth), tile(y1, height, kSampleTileHeight)};
+}
+
+std::vector<TriangleBins::Piece> TriangleBins::piecesOf(const SceneTriangles& triangles,
+                                                        const Batch& batch) const {
+  const TriangleMesh& mesh = *triangles.scene().surfaces[batch.surface].mesh;
+  const std::vector<ScreenVertex>& vertices = triangles.verticesOf(batch.surface);
+  std::vector<Piece> pieces;
+  // The last piece's tile in pixels, where it is one tile: most triangles lie in their predecessor's.
+  float left = 0, top = 0, right = 0, bottom = 0;
+  uint32_t end = 0;  // of the last piece
+  for (uint32_t n = batch.first; n < batch.first + batch.count; ++n) {
+    const auto& corners = mesh.triangles[n];
+    const ScreenVertex at[3] = {vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]};
+    const bool before_near = std::isnan(at[0].value + at[1].value + at[2].value);
+    const bool within =
+        std::min({at[0].x, at[1].x, at[2].x}) >= left && std::max({at[0].x, at[1].x, at[2].x}) < right &&
+        std::min({at[0].y, at[1].y, at[2].y}) >= top && std::max({at[0].y, at[1].y, at[2].y}) < bottom;
+    if (within && !before_near && end == n) {
+      ++pieces.back().run.count;
+      ++end;
+      continue;
+    }
+    TileBox box;
+    if (before_near) {
+      const NearPolygon polygon = triangles.behindNear(batch.surface, corners);
+      if (polygon.count >= 3) box = tilesOf(polygon.vertices.data(), polygon.count);
+    } else {
+      box = tilesOf(at, 3);
+    }
+    if (box.empty()) continue;
+    if (end == n && !pieces.empty() && pieces.back().box == box) {
+      ++pieces.back().run.count;
+    } else {
+      pieces.push_back({box, {n, 1}});
+      const bool one = box.x0 == box.x1 && box.y0 == box.y1;
+      left = static_cast<float>(box.x0 * kSampleTileWidth);
+      top = static_cast<float>(box.y0 * kSampleTileHeight);
+      right = one ? static_cast<float>(std::min((box.x0 + 1) * kSampleTileWidth, size_.width)) : left;
+      bottom = static_cast<float>(std::min((box.y0 + 1) * kSampleTileHeight, size_.height));
+    }
+    end = n + 1;
+  }
+  return pieces;
+}
+
+void TriangleBins::sort(const SceneTriangles& triangles, Batch& batch) const {
+  const std::vector<Piece> pieces = piecesOf(triangles, batch);
+  if (pieces.empty()) return;
+  TileBox all = pieces.front().box;
+  for (const Piece& piece : pieces) {
+    all.x0 = std::min(all.x0, piece.box.x0);
+    all.y0 = std::min(all.y0, piece.box.y0);
+    all.x1 = std::max(all.x1, piece.box.x1);
+    all.y1 = std::max(all.y1, piece.box.y1);
+  }
+  batch.box = all;
+  const auto width = static_cast<size_t>(all.x1 - all.x0 + 1);
+  const auto forEach = [&](const auto& visit) {
+    for (const Piece& piece : pieces)
+      for (int y = piece.box.y0; y <= piece.box.y1; ++y)
+        for (int x = piece.box.x0; x <= piece.box.x1; ++x)
+          visit(static_cast<size_t>(y - all.y0) * width + static_cast<size_t>(x - all.x0), piece.run);
+  };
+  batch.begins.assign(width * static_cast<size_t>(all.y1 - all.y0 + 1) + 2, 0);
+  forEach([&](size_t tile, const TriangleRun&) { ++batch.begins[tile + 2]; });
+  for (size_t n = 2; n < batch.begins.size(); ++n) batch.begins[n] += batch.begins[n - 1];
+  batch.runs.resize(batch.begins.back());
+  forEach([&](size_t tile, const TriangleRun& run) { batch.runs[batch.begins[tile + 1]++] = run; });
+  batch.begins.pop_back();
 }
 
 }  // namespace curvisplat

@@ -1,10 +1,21 @@
-// The triangles of all surfaces of a scene in one view: their vertices on the screen.
+// The triangles of all surfaces of a scene in one view: their vertices on the screen, the samples that
+// pixels see them with, and the tiles of the picture that they may be seen in.
+//
+//   SurfaceScene -> SceneTriangles: vertices -> TriangleBins: by tile -> rasterizer.h: PixelSamples
+//
+// A triangle's number counts through all surfaces, so that samples can name it. Vertices take 12 bytes each,
+// bins at most some 8 bytes a triangle. Both are built in parallel, on the caller's TBB arena, and are
+// immutable then; any thread.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -28,14 +39,15 @@ struct NearPolygon {
   size_t count = 0;
 };
 
-/// Numbers of triangles count through all surfaces. Immutable; any thread.
+/// Numbers of triangles count through all surfaces.
 class SceneTriangles {
  public:
-  /// The scene outlives it. Transforms all vertices, in parallel: 12 bytes each, in `memory` that another one gave back.
+  /// The scene outlives it. Transforms all vertices, in parallel: 12 bytes each, in `memory` that another
+  /// one gave back.
   SceneTriangles(const SurfaceScene& scene, const ScreenView& view, double depth_origin,
                  ScreenVertices memory = {});
 
-  /// For the next picture's. Nothing may be asked of this one afterwards.
+  /// The memory, for the next picture's triangles. Nothing may be asked of this object afterwards.
   ScreenVertices takeMemory() { return std::move(vertices_); }
 
   uint32_t count() const { return begins_.back(); }
@@ -68,6 +80,98 @@ class SceneTriangles {
   const double depth_origin_;
   std::vector<uint32_t> begins_;  // [surfaces + 1]
   ScreenVertices vertices_;
+};
+
+/// Pixels: the tiles in which samples are drawn.
+inline constexpr int kSampleTileWidth = 128, kSampleTileHeight = 32;
+inline constexpr size_t kSamples = 8;
+/// From the pixel's centre, in 1/16 pixel.
+inline constexpr std::array<std::array<int, 2>, kSamples> kSampleOffsets{
+    {{1, -3}, {-1, 3}, {5, 1}, {-3, -5}, {-5, 5}, {-7, -1}, {3, 7}, {7, -7}}};
+/// The offsets in floats, for vectors.
+struct SamplePlaces {
+  alignas(64) std::array<float, kSamples> x{}, y{};
+  constexpr SamplePlaces() {
+    for (size_t n = 0; n < kSamples; ++n) {
+      x[n] = static_cast<float>(kSampleOffsets[n][0]);
+      y[n] = static_cast<float>(kSampleOffsets[n][1]);
+    }
+  }
+};
+inline constexpr SamplePlaces kSamplePlaces;
+
+/// What the samples of a pixel see: the triangle's number, and its value there.
+struct PixelSamples {
+  static constexpr uint32_t kNothing = std::numeric_limits<uint32_t>::max();
+
+  alignas(32) std::array<float, kSamples> values;
+  std::array<uint32_t, kSamples> numbers;
+};
+static_assert(sizeof(PixelSamples) == 64);
+
+/// Consecutive triangles of a surface.
+struct TriangleRun {
+  uint32_t first, count;
+};
+
+/// Which triangles may be seen in which tiles of a picture.
+///
+/// A triangle is listed in every tile that its box of pixels touches; triangles outside of the picture,
+/// before the near plane or without a size on the grid of samples are listed nowhere. Batches of triangles
+/// are sorted by tile in parallel, each on its own. Consecutive triangles in the same tiles, which meshes
+/// mostly have, are one run: 8 bytes a run and tile.
+class TriangleBins {
+ public:
+  explicit TriangleBins(const SceneTriangles& triangles);
+
+  int columns() const { return columns_; }
+  int rows() const { return rows_; }
+  /// Calls draw(surface, runs of its triangles) for each batch that the tile sees a part of; false if none.
+  template <typename Draw>
+  bool forTile(int column, int row, const Draw& draw) const {
+    bool any = false;
+    for (const Batch& batch : batches_) {
+      const std::span<const TriangleRun> seen = batch.at(column, row);
+      if (seen.empty()) continue;
+      any = true;
+      draw(batch.surface, seen);
+    }
+    return any;
+  }
+
+ private:
+  /// Tiles, the last included.
+  struct TileBox {
+    int16_t x0 = 0, y0 = 0, x1 = -1, y1 = -1;
+    bool empty() const { return x0 > x1 || y0 > y1; }
+    bool operator==(const TileBox&) const = default;
+  };
+  struct Batch {
+    size_t surface = 0;
+    uint32_t first = 0, count = 0;
+    TileBox box;
+    std::vector<uint32_t> begins;  // [tiles of the box + 1], into `runs`
+    std::vector<TriangleRun> runs;
+
+    std::span<const TriangleRun> at(int column, int row) const {
+      if (column < box.x0 || column > box.x1 || row < box.y0 || row > box.y1) return {};
+      const auto tile = static_cast<size_t>(row - box.y0) * static_cast<size_t>(box.x1 - box.x0 + 1) +
+                        static_cast<size_t>(column - box.x0);
+      return {runs.data() + begins[tile], begins[tile + 1] - begins[tile]};
+    }
+  };
+  /// Consecutive triangles that touch the same tiles.
+  struct Piece {
+    TileBox box;
+    TriangleRun run;
+  };
+  TileBox tilesOf(const ScreenVertex* vertices, size_t count) const;
+  std::vector<Piece> piecesOf(const SceneTriangles& triangles, const Batch& batch) const;
+  void sort(const SceneTriangles& triangles, Batch& batch) const;
+
+  int columns_, rows_;
+  ImageSize size_;
+  std::vector<Batch> batches_;
 };
 
 }  // namespace curvisplat

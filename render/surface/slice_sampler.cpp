@@ -4,8 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "render/project/border_parts.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
+#include "render/project/splat_pieces.h"
 
 namespace curvisplat {
 namespace {

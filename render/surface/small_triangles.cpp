@@ -1,4 +1,4 @@
-#include "render/surface/small_triangles.h"
+#include "render/surface/rasterizer.h"
 
 // Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
 #undef HWY_TARGET_INCLUDE

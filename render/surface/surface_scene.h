@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "render/colour/classification.h"
 #include "render/mesh/triangle_mesh.h"
-#include "render/project/clip_planes.h"
-#include "render/surface/colour_table.h"
+#include "render/project/plane_cuts.h"
 #include "stream/cache/faces_file.h"
 
 namespace curvisplat {

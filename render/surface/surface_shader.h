@@ -1,19 +1,62 @@
-// What triangles look like where they are seen: colour, normal and opacity at points of the picture. Many at a time, since
-// the arithmetic is in vectors.
+// What surfaces look like where they are seen: SurfaceShader finds the colours, normals and opacities of
+// triangles at points of the picture, and SurfaceLight lights them, as it lights slices and isosurfaces.
+// Clip planes cut all of them along the rays of pixels: towardsViewer(), pixelSide() and coverageAt().
+//
+// A point has the same bits, whether it is shaded alone or with others. Many are shaded at a time, since the
+// arithmetic is in vectors of 64 points. Immutable; any thread.
 #pragma once
 
-#include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 
-#include "render/surface/colour_table.h"
+#include "render/colour/classification.h"
+#include "render/project/light.h"
+#include "render/project/plane_cuts.h"
+#include "render/project/screen_view.h"
 #include "render/surface/scene_triangles.h"
-#include "render/surface/surface_light.h"
 
 namespace curvisplat {
 
-/// Immutable; any thread.
+/// Points of surfaces, the components of their vectors apart.
+struct LitPoints {
+  static constexpr size_t kAtOnce = 64;
+  using Vectors = std::array<std::array<float, kAtOnce>, 3>;
+
+  alignas(64) Vectors normal;  // in data coordinates, of any length above 0
+  Vectors towards_viewer;      // in stretched space, of length 1
+  Vectors colour;
+};
+
+/// Light on surfaces: that of the volume (render/project/light.h) with a strength of 1.
+class SurfaceLight {
+ public:
+  /// `light`: none: a light where the viewer is.
+  SurfaceLight(const std::optional<Light>& light, const ScreenView& view);
+
+  /// `normal` in data coordinates, of any length above 0; `towards_viewer` in stretched space, of length 1.
+  glm::vec3 lit(const glm::vec3& colour, const glm::vec3& normal, const glm::vec3& towards_viewer) const;
+  /// Lights the colours of the first `count` points, to the same bits.
+  void light(LitPoints& points, size_t count) const;
+
+ private:
+  template <bool kAtViewer>
+  glm::vec3 litBy(const glm::vec3& colour, const glm::vec3& normal, const glm::vec3& towards_viewer) const;
+  template <bool kAtViewer>
+  void lightBy(LitPoints& points, size_t count) const;
+
+  const Light light_;
+  const glm::vec3 per_scale_;
+  glm::vec3 towards_{0};
+};
+
+/// What triangles look like where they are seen: colour, normal and opacity at points of the picture.
 class SurfaceShader {
  public:
   /// The picture's tables. `opacities`: null, if no surface has the function's.
@@ -24,7 +67,8 @@ class SurfaceShader {
   /// `light`: none: a light at the viewer. The triangles and the tables outlive it.
   SurfaceShader(const SceneTriangles& triangles, const Tables& tables, const std::optional<Light>& light);
 
-  /// A triangle, and the point of the picture at which it is seen: that of the triangle next to it, if it lies beside it.
+  /// A triangle, and the point of the picture at which it is seen: that of the triangle next to it, if it
+  /// lies beside it.
   struct Spot {
     uint32_t number;
     float x, y;
@@ -41,8 +85,8 @@ class SurfaceShader {
   }
   const SurfaceLight& light() const { return light_; }
 
-  /// Whether two triangles share a vertex. There a surface is smooth, since vertices are doubled at edges, and each of
-  /// them tells what it looks like on the other.
+  /// Whether two triangles share a vertex. There a surface is smooth, since vertices are doubled at edges,
+  /// and each of them tells what it looks like on the other.
   bool meet(uint32_t a, uint32_t b) const;
   /// How much the value changes over a pixel, at most.
   float steepness(uint32_t number) const;
@@ -62,5 +106,28 @@ class SurfaceShader {
   const SurfaceLight light_;
   bool has_scalars_ = false, has_others_ = false;
 };
+
+/// The direction from a point of the picture to the viewer, in stretched space, of length 1. `x`, `y`: the
+/// point.
+inline glm::vec3 towardsViewer(const ScreenView& view, float x, float y) {
+  if (view.projection != Projection::kPerspective) return glm::vec3(-view.forward);
+  const double across = (double{x} - 0.5 * view.size.width) / view.focal_px;
+  const double down = (double{y} - 0.5 * view.size.height) / view.focal_px;
+  return glm::vec3(-glm::normalize(view.forward + across * view.right + down * view.down));
+}
+
+/// The side of a pixel in data coordinates, at a distance along the view.
+inline double pixelSide(const ScreenView& view, double distance) {
+  return (view.projection == Projection::kPerspective ? distance : 1) / view.focal_px /
+         std::max({view.scale.x, view.scale.y, view.scale.z});
+}
+
+/// What clip planes leave of a sheet at a point, smoothed over a pixel.
+inline float coverageAt(std::span<const ClipPlane> planes, const glm::dvec3& at, double pixel) {
+  double coverage = 1;
+  for (const ClipPlane& plane : planes)
+    coverage *= std::clamp(0.5 + glm::dot(glm::normalize(plane.normal), at - plane.point) / pixel, 0.0, 1.0);
+  return static_cast<float>(coverage);
+}
 
 }  // namespace curvisplat

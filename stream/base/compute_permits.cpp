@@ -9,7 +9,7 @@ thread_local Computing* this_thread = nullptr;
 
 }  // namespace
 
-/// Others take a permit only where there is one more than urgent threads wait for.
+/// A thread that is not urgent takes a permit only if more are free than urgent threads wait for.
 bool ComputePermits::take(Urgency urgency, const Unneeded& unneeded) {
   MutexLock lock(mutex_);
   const bool is_urgent = urgency == Urgency::kUrgent;

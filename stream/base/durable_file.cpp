@@ -9,12 +9,9 @@
 #include <string_view>
 #include <utility>
 
-#include "stream/base/disk_full.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/file.h"
-#include "stream/base/new_file.h"
-#include "stream/base/open_retrying.h"
-#include "stream/base/paths.h"
-#include "stream/base/temporary_names.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 namespace {

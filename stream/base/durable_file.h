@@ -11,15 +11,15 @@
 
 namespace curvisplat {
 
-/// A file has its new name, but its folder could not be synced, and the name could not be taken back: a power
-/// loss may do that.
+/// A file has its new name, but its folder could not be synced, and the name could not be taken back: a
+/// power loss may do that.
 class NameNotSynced : public Error {
  public:
   using Error::Error;
 };
 
-/// Renames a synced file within its folder, replaces what is at `to`, and syncs the folder. If that fails, puts
-/// the names back and throws Error; NameNotSynced where that is impossible.
+/// Renames a synced file within its folder, replaces what is at `to`, and syncs the folder. If that fails,
+/// puts the names back and throws Error; NameNotSynced where that is impossible.
 void renameDurably(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// A new, empty file beside `target`, which it is to replace: ".curvisplat.<16 hexadecimal digits>.part".
@@ -37,7 +37,7 @@ class TemporaryFile {
   const std::filesystem::path& target() const { return target_; }
   /// Syncs the file, whoever has written it, and gives it the name of the target. Throws as renameDurably().
   void putIntoPlace();
-  /// `message` with the target's name instead of this file's, which the user has never heard of.
+  /// The text of an error with the target's name instead of this file's, which the user has never heard of.
   std::string aboutTarget(std::string message) const;
 
  private:

@@ -9,12 +9,12 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
-#include "stream/base/check.h"
-#include "stream/base/disk_full.h"
-#include "stream/base/open_retrying.h"
-#include "stream/base/paths.h"
+#include "stream/base/disk_space.h"
+#include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -38,16 +38,16 @@ int openWith(Caching caching, const std::filesystem::path& path, int flags, unsi
   return openRetrying(path, flags, mode);
 }
 
-/// For a transfer that has failed: whether alignment was the reason. If so, switches the descriptor to the
-/// page cache, so that the transfer can be retried. (A short transfer continues at any byte, aligned or not.)
+/// Whether alignment was the reason for a failed transfer. If so, switches the descriptor to the page cache,
+/// so that the transfer can be retried. (A short transfer continues at any byte, aligned or not.)
 bool stoppedBeingDirect(int fd) {
   if (errno != EINVAL) return false;
   const int flags = ::fcntl(fd, F_GETFL);
   return flags >= 0 && (flags & O_DIRECT) != 0 && ::fcntl(fd, F_SETFL, flags & ~O_DIRECT) == 0;
 }
 
-/// Throws the error of `file` for a value of errno: DiskFull if there is no room for `what`, else one that says what
-/// `cannot` be done. Messages name `shown`.
+/// Throws the error of `file` for a value of errno: DiskFull if there is no room for `what`, otherwise an
+/// OutputError that says what `cannot` be done. Messages name `shown`.
 [[noreturn]] void fail(int error, const std::filesystem::path& file, const std::filesystem::path& shown,
                        const std::string& what, const std::string& cannot) {
   if (DiskFull::is(error)) throw DiskFull(file, shown, what, error);
@@ -66,12 +66,37 @@ void syncRetrying(int fd, const std::filesystem::path& path, const std::filesyst
 
 }  // namespace
 
-int openRetrying(const std::filesystem::path& path, int flags, unsigned mode) {
-  int fd;
-  do {
-    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, mode);
-  } while (fd < 0 && errno == EINTR);
-  return fd;
+std::filesystem::path folderOf(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
+
+std::string extensionOf(const std::filesystem::path& path) {
+  return lowerCase(path.extension().string());
+}
+
+bool isRegularFile(const std::filesystem::path& path) noexcept {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
+std::filesystem::path linkTarget(std::filesystem::path path) {
+  constexpr int kMaxLinks = 40;  // the kernel's limit
+  const std::filesystem::path first = path;
+  for (int links = 0; links <= kMaxLinks; ++links) {
+    std::error_code ignored;
+    if (!std::filesystem::is_symlink(path, ignored)) return path;
+    path =
+        folderOf(path) / std::filesystem::read_symlink(path);  // an absolute target replaces the whole path
+  }
+  throw Error("{}: its symbolic links form a cycle", first.string());
+}
+
+std::filesystem::path writableTarget(const std::filesystem::path& path) {
+  const std::filesystem::path target = linkTarget(path);
+  std::error_code ignored;
+  if (std::filesystem::exists(target, ignored) && !isRegularFile(target))
+    throw Error("{}: exists and is not a regular file; choose another name", path.string());
+  return target;
 }
 
 int SystemCalls::open(const char* path, int flags, unsigned mode) {
@@ -115,6 +140,14 @@ bool SystemCalls::areReal() {
 ScopedSystemCalls::ScopedSystemCalls(SystemCalls& calls) : previous_(current_calls.exchange(&calls)) {}
 ScopedSystemCalls::~ScopedSystemCalls() {
   current_calls.store(previous_);
+}
+
+int openRetrying(const std::filesystem::path& path, int flags, unsigned mode) {
+  int fd;
+  do {
+    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, mode);
+  } while (fd < 0 && errno == EINTR);
+  return fd;
 }
 
 InputFile::InputFile(std::filesystem::path path, Caching caching) : path_(std::move(path)) {

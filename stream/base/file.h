@@ -1,8 +1,13 @@
-// Positional file access. All I/O of the program's own code goes through these classes and functions, and
-// they go through one table of system calls, so that a test can substitute a failing disk. (Reads by io_uring
-// bypass the table: async_reads.h. So do libraries that read or write files themselves: CGNS, HDF5, NetCDF.)
-// Every failure is an Error that names the path, the byte offset and the system's reason, and DiskFull
-// (disk_full.h) where there is no room. Short transfers and EINTR are retried; they are not failures.
+// Positional file access, and the paths that users supply.
+//
+// All I/O of the program's own code goes through these classes and functions, and they go through one table
+// of system calls (SystemCalls), so that a test can substitute a failing disk. Two kinds of reads bypass the
+// table: those by io_uring (stream/paging/async_reads.h), and those of libraries that do their own I/O
+// (CGNS, HDF5, NetCDF).
+//
+// Every failure is an Error that names the path, the byte offset and the system's reason; it is a DiskFull
+// (stream/base/disk_space.h) where there is no room. Short transfers and EINTR are not failures: they are
+// retried. Any thread may call the functions; the classes say what their threads may do.
 #pragma once
 
 #include <sys/types.h>
@@ -18,6 +23,23 @@
 #include "stream/base/error.h"
 
 namespace curvisplat {
+
+/// The folder that contains `path`: "." for a plain name.
+std::filesystem::path folderOf(const std::filesystem::path& path);
+
+/// The ending of the name in small letters: ".png" for "a.PNG"; empty if there is none.
+std::string extensionOf(const std::filesystem::path& path);
+
+/// Whether `path` is a regular file, or links that end at one. False for names that no file can have, such
+/// as names that are too long.
+bool isRegularFile(const std::filesystem::path& path) noexcept;
+
+/// `path` itself, or the path at the end of its symbolic links, whether that exists or not. Throws Error if
+/// the links form a cycle.
+std::filesystem::path linkTarget(std::filesystem::path path);
+
+/// linkTarget() for a file to be written. Throws Error if the target exists and is not a regular file.
+std::filesystem::path writableTarget(const std::filesystem::path& path);
 
 /// The system calls behind file access. The default calls POSIX. An override fails by setting errno and
 /// returning -1.
@@ -55,6 +77,11 @@ class ScopedSystemCalls {
  private:
   SystemCalls* previous_;
 };
+
+/// SystemCalls::open() with O_CLOEXEC, retried on EINTR. Returns the descriptor, or -1 with errno set. It is
+/// for code that keeps the descriptor; files that are only read or written are an InputFile or an
+/// OutputFile.
+int openRetrying(const std::filesystem::path& path, int flags, unsigned mode = 0);
 
 /// kPages: transfers go through the page cache. kDirect: transfers bypass it if the file system can
 /// (O_DIRECT), and fall back to the page cache otherwise. Direct transfers need offsets, sizes and addresses
@@ -103,8 +130,9 @@ class OutputFile {
  public:
   enum class Existing { kEmpty, kKeep };
 
-  /// Creates `path`. If it exists, empties it or keeps its bytes. Throws Error if that fails. Messages name `shown`, unless
-  /// it is empty: of a temporary file, the file or folder that the user knows.
+  /// Creates `path`. If it exists, empties it or keeps its bytes. Throws Error if that fails. Messages name
+  /// `shown` instead of `path` unless it is empty: a user has never heard of a temporary file, but knows
+  /// what it is for.
   explicit OutputFile(std::filesystem::path path, Caching caching = Caching::kPages,
                       Existing existing = Existing::kEmpty, std::filesystem::path shown = {});
   OutputFile(OutputFile&& other) noexcept;

@@ -1,22 +1,56 @@
-// Progress of a job, in phases, for display; and requests to stop the job.
+// How far a job is: its phases for the display and for --stats, with what each took of the machine, and
+// requests to stop it.
+//
+// One thread runs a job and begins its phases. Any thread counts steps, which costs an atomic addition, and
+// any thread, even a signal handler, asks the job to stop. The job then ends with the exception Interrupted,
+// which advance() and throwIfStopped() throw.
 #pragma once
 
 #include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "stream/base/interrupted.h"
+#include "stream/base/error.h"
 #include "stream/base/mutex.h"
-#include "stream/base/process_usage.h"
 
 namespace curvisplat {
 
-/// Progress of a job in phases. begin() is for the thread that runs the job. advance() is for any thread and
-/// costs an atomic addition.
+/// The system's counters of this process.
+struct ProcessUsage {
+  double cpu_seconds = 0;   // all threads, user and system time
+  uint64_t bytes_read = 0;  // by system calls, from the page cache or the disk
+  uint64_t bytes_written = 0;
+  uint64_t memory_bytes = 0;       // VmRSS: resident memory
+  uint64_t peak_memory_bytes = 0;  // VmHWM: the largest VmRSS so far
+
+  /// Totals since the process started; 0 for numbers that the system does not provide. Any thread; takes
+  /// about 20 us.
+  static ProcessUsage now();
+};
+
+/// Thrown by work that was asked to stop, by Progress::stop() or a std::stop_token. Not a failure.
+class Interrupted : public Error {
+ public:
+  Interrupted(int signal, const std::string& text) : Error(text), signal_(signal) {}
+  /// The signal that Progress::stop() was given; 0: none.
+  int signal() const { return signal_; }
+
+ private:
+  int signal_;
+};
+
+/// Throws Interrupted once a stop of `token` was requested. Any thread; costs a load.
+inline void throwIfStopped(const std::stop_token& token) {
+  if (token.stop_requested()) throw Interrupted(0, "interrupted");
+}
+
+/// Progress of a job in phases. begin(), skip() and end() are for the thread that runs the job, advance()
+/// for any thread.
 class Progress {
  public:
   /// The current phase.

@@ -5,7 +5,6 @@
 #include <thread>
 #include <utility>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
 

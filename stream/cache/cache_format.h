@@ -21,7 +21,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
 

@@ -5,11 +5,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "stream/base/check.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
-#include "stream/base/huge_pages.h"
-#include "stream/cache/cache_file.h"
+#include "stream/base/memory.h"
 #include "stream/cache/cache_format.h"
 
 namespace curvisplat {
@@ -38,8 +36,9 @@ uint64_t maxValuesBytes(uint64_t splats) {
   return (16 << 10) + 31 * splats;  // a row (10) and 5 arrays of 4 planes
 }
 
-/// Whether extents follow one another in the octree's post-order, in which writers append them, within [begin, end).
-/// Then none overlap, and nothing has to be sorted: of a million bricks that takes longer than reading them.
+/// Whether extents follow one another in the octree's post-order, in which writers append them, within
+/// [begin, end). Then none overlap, and nothing has to be sorted: of a million bricks that takes longer than
+/// reading them.
 template <typename ExtentOf>
 class PostOrder {
  public:
@@ -72,7 +71,8 @@ class PostOrder {
   const uint64_t end_;
 };
 
-/// Throws Error unless the extents of all bricks, whose links have been checked, are in [begin, end) and none overlap.
+/// Throws Error unless the extents of all bricks, whose links have been checked, are in [begin, end) and
+/// none overlap.
 template <typename ExtentOf>
 void checkExtents(const fs::path& path, std::span<const Brick> bricks, const ExtentOf& extent_of,
                   uint64_t begin, uint64_t end) {
@@ -210,8 +210,8 @@ class IndexChecker {
 };
 
 /// Calls `use` for each record of a table whose header has been read. The number of records is checked
-/// against the file's size. A sparse file can be large and hold nothing, so the records are read a piece at a
-/// time, and `use` checks each record before memory is allocated for the next.
+/// against the file's size. A sparse file can be large and hold nothing, so the records are read a piece at
+/// a time, and `use` checks each record before memory is allocated for the next.
 template <typename Record, typename Header, typename Use>
 void readRecords(const InputFile& file, const Header& header, uint64_t offset, uint64_t bricks,
                  const FileInfo& info, const Use& use) {
@@ -241,8 +241,9 @@ void readRecords(const InputFile& file, const Header& header, uint64_t offset, u
   checkChecksum(file.path(), info, checksum.value());
 }
 
-/// So that growing needs no copies: those are twice the memory, and a third of the time that opening takes. Pages that
-/// are not written take no memory, so that a sparse file gets none; the limit is for the address space.
+/// So that growing needs no copies: those are twice the memory, and a third of the time that opening takes.
+/// Pages that are not written take no memory, so that a sparse file gets none; the limit is for the address
+/// space.
 void reserveBricks(std::vector<Brick>& bricks, uint64_t count) {
   constexpr uint64_t kMaxBytes = uint64_t{256} << 20;
   bricks.reserve(std::min<uint64_t>(count, kMaxBytes / sizeof(Brick)));
@@ -250,6 +251,28 @@ void reserveBricks(std::vector<Brick>& bricks, uint64_t count) {
 }
 
 }  // namespace
+
+fs::path cacheFile(const fs::path& cache, const std::string& name) {
+  fs::path path = cache / name;
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(path, error);
+  if (fs::is_symlink(status))
+    throw Error(
+        "{}: is a symbolic link; expected a file in the cache's own directory: replace the link by a copy",
+        path.string());
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    throw Error("{}: is not a regular file", path.string());
+  return path;
+}
+
+fs::path cacheFolder(const fs::path& cache, const std::string& name) {
+  fs::path path = cache / name;
+  std::error_code error;
+  if (!fs::is_directory(fs::symlink_status(path, error)))
+    throw Error("{}: is not a directory of the cache's own; the cache is damaged: convert again",
+                path.string());
+  return path;
+}
 
 std::string variableFileName(const VariableInfo& variable) {
   return fmt::format("var.{}.bin", variable.number);

@@ -1,8 +1,12 @@
-// Reads the tables of a cache and refuses invalid ones. After these checks every link of the octree is
-// consistent, every extent lies inside its file and overlaps no other, and every number is finite. Code that
-// uses the tables relies on that. This is where a damaged disk or a hostile cache is stopped.
+// Opens the files of a cache safely and reads its tables, refusing invalid ones. A cache may come from
+// anyone: this is where a damaged disk or a hostile cache is stopped.
+//
+// After these checks every link of the octree is consistent, every extent lies inside its file and overlaps
+// no other, and every number is finite. Code that uses the tables relies on that. Tables are read a piece at
+// a time, so that a sparse file cannot claim memory. Any thread may call the functions.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -10,9 +14,17 @@
 
 #include "stream/base/file.h"
 #include "stream/cache/manifest.h"
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
+
+/// The path of the file `name` (a plain file name) in the folder `cache`, checked before it is opened.
+/// Throws Error if it is a symbolic link, which may lead out of the folder, or exists but is not a regular
+/// file: opening a pipe may block forever.
+std::filesystem::path cacheFile(const std::filesystem::path& cache, const std::string& name);
+
+/// The path of the folder `name` in the folder `cache`. Throws Error if it is a link, or not a folder.
+std::filesystem::path cacheFolder(const std::filesystem::path& cache, const std::string& name);
 
 std::string variableFileName(const VariableInfo& variable);
 

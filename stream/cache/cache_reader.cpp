@@ -6,18 +6,17 @@
 #include <map>
 #include <utility>
 
-#include "stream/base/check.h"
 #include "stream/base/checksum.h"
+#include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
-#include "stream/base/stage_timer.h"
-#include "stream/base/suggestion.h"
-#include "stream/cache/between_steps.h"
+#include "stream/base/text.h"
 #include "stream/cache/cache_index.h"
-#include "stream/cache/geometry_folder.h"
+#include "stream/cache/series.h"
+#include "stream/cache/series_values.h"
 #include "stream/codec/brick_codec.h"
-#include "stream/codec/fine_means.h"
+#include "stream/codec/values_codec.h"
 
 namespace curvisplat {
 namespace {
@@ -390,6 +389,16 @@ void CacheReader::decode(uint32_t brick, size_t variable, std::span<const std::b
   const ValuesFile& file = *state_->values[variable];
   State::verify(file.file, brick, file.table[brick].values, values, times);
   state_->decodeValues({brick, variable, times, kept}, values, out);
+}
+
+double storedWithin(const CacheReader& reader, size_t variable) {
+  double range = 0;
+  for (size_t n = 0; n < reader.bricks().size(); ++n) {
+    if (!reader.bricks()[n].isLeaf()) continue;
+    const BrickVariable& values = reader.brickVariables(variable)[n];
+    range = std::max(range, double{values.max} - double{values.min});
+  }
+  return range * (reader.manifest().hasFeature(kFineValues) ? kLargestFineMeanError : kLargestMeanError);
 }
 
 }  // namespace curvisplat

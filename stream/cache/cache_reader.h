@@ -1,9 +1,10 @@
 // Opens a splat cache at a time step and reads bricks. An open reader looks like one of a cache of that step
-// alone; one between two steps, like that of a cache of blended samples (between_steps.h). Opening reads the manifest and the tables, and checks every size
-// against the real files and every link of the octree. It never reads payloads (streams). An open CacheReader
-// is immutable: any number of threads may read.
+// alone; one between two steps, like that of a cache of blended samples (series_values.h). Opening reads the
+// manifest and the tables, and checks every size against the real files and every link of the octree. It
+// never reads payloads (streams). An open CacheReader is immutable: any number of threads may read.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -11,10 +12,10 @@
 #include <vector>
 
 #include "stream/base/error.h"
-#include "stream/cache/kept_values.h"
 #include "stream/cache/manifest.h"
-#include "stream/cache/steps_file.h"
-#include "stream/model/brick.h"
+#include "stream/cache/series.h"
+#include "stream/cache/series_values.h"
+#include "stream/model/octree.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
@@ -33,10 +34,11 @@ class DamagedBrick : public Error {
   using Error::Error;
 };
 
+/// An open cache at a step, or between two.
 class CacheReader {
  public:
-  /// Opens the cache at a step, the first unless told otherwise. Throws an Error that names the file, what was
-  /// found and what was expected.
+  /// Opens the cache at a step, the first unless told otherwise. Throws an Error that names the file, what
+  /// was found and what was expected.
   explicit CacheReader(const std::filesystem::path& cache, uint64_t step = 0);
   ~CacheReader();
   CacheReader(CacheReader&&) noexcept;
@@ -44,7 +46,7 @@ class CacheReader {
 
   /// The folder of the step's geometry: the cache's own, unless the series has several.
   const std::filesystem::path& path() const;
-  /// As of a cache of the step alone.
+  /// The manifest as a cache of this step alone would have it.
   const Manifest& manifest() const;
 
   /// The folder of the cache, and its manifest as it is there: of the whole series.
@@ -55,22 +57,23 @@ class CacheReader {
   uint64_t step() const { return position().step; }
   const StepPosition& position() const;
   double time() const { return series().timeAt(position()); }
-  /// The same cache at another step. Shares the tables of the geometry if that is the same. Throws Error as the
-  /// constructor.
+  /// The same cache at another step. Shares the tables of the geometry if that is the same. Throws Error as
+  /// the constructor.
   CacheReader atStep(uint64_t step) const { return at({step}); }
-  /// The same, or between two steps, with the extents and streams of the earlier one. Throws Error if the two have
-  /// different geometries.
+  /// The same, or between two steps, with the extents and streams of the earlier one. Throws Error if the
+  /// two have different geometries.
   CacheReader at(const StepPosition& position) const;
   /// Whether the bricks and geometry streams of both are the same ones.
   bool sharesGeometryWith(const CacheReader& other) const;
 
-  /// The octree, level by level. The root is brick 0, or the first few bricks if several share the root cell.
+  /// The octree, level by level. The root is brick 0, or the first few bricks if several share the root
+  /// cell.
   std::span<const Brick> bricks() const;
   /// [brick]: the table of manifest().variables[variable].
   std::span<const BrickVariable> brickVariables(size_t variable) const;
 
-  /// The index in manifest().variables of the variable `name`, which its unit may follow ("T [K]"); 0 for the empty name.
-  /// Throws a UsageError that lists the names if there is none.
+  /// The index in manifest().variables of the variable `name`, which its unit may follow ("T [K]"); 0 for
+  /// the empty name. Throws a UsageError that lists the names if there is none.
   size_t variableNamed(std::string_view name) const;
 
   /// Reads, verifies and decodes a brick. Throws DamagedBrick if the checksum does not match, the file ends
@@ -97,5 +100,10 @@ class CacheReader {
   explicit CacheReader(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
+
+/// How finely the cache stores a scalar: the largest distance, in the scalar's unit, between a sample's mean
+/// and the stored one at the reader's step. It is half an interval of the leaf with the widest range;
+/// rounding to a float comes on top. Reads tables only.
+double storedWithin(const CacheReader& reader, size_t variable);
 
 }  // namespace curvisplat

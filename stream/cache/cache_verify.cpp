@@ -9,12 +9,12 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/cache/brick_grids.h"
-#include "stream/cache/cache_file.h"
+#include "stream/vdb/brick_grids.h"
+#include "stream/cache/cache_index.h"
 #include "stream/cache/faces_file.h"
-#include "stream/cache/series_histogram.h"
+#include "stream/cache/value_histogram.h"
 #include "stream/model/border_code.h"
-#include "stream/model/shape_extent.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 namespace {

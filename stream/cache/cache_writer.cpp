@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <numeric>
 
-#include "stream/base/check.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/cache/brick_grids.h"
-#include "stream/cache/brick_log.h"
+#include "stream/vdb/brick_grids.h"
 #include "stream/cache/cache_format.h"
 #include "stream/cache/cache_index.h"
+#include "stream/cache/partial_folder.h"
 #include "stream/cache/stream_file.h"
 
 namespace curvisplat {

@@ -3,8 +3,9 @@
 // folder to its final name. Until then nothing opens as a cache, and an older cache at the output stays in
 // place.
 //
-// A log (brick_log.h) records the appended bricks. Nothing is synced before finish(): a conversion that
-// continues an interrupted one checks every stream against its checksum, and rewrites what the disk has lost.
+// A log (partial_folder.h) records the appended bricks. Nothing is synced before finish(): a conversion that
+// continues an interrupted one checks every stream against its checksum, and rewrites what the disk has
+// lost.
 #pragma once
 
 #include <filesystem>
@@ -14,12 +15,11 @@
 #include <vector>
 
 #include "stream/base/progress.h"
-#include "stream/cache/brick_log.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/value_histogram.h"
 #include "stream/codec/brick_codec.h"
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
 
@@ -51,23 +51,28 @@ class CacheWriter {
   /// threads may read at the same time, while nothing is appended.
   BrickSplats readBack(uint64_t id) const;
 
-  /// For the histograms of the variables: finish() writes those to which every leaf was added. Any thread may add.
+  /// For the histograms of the variables: finish() writes those to which every leaf was added. Any thread
+  /// may add.
   HistogramSums& histograms();
 
   /// What append() has noted of a brick.
   AppendedBrick appended(uint64_t id) const;
-  /// Syncs the streams and the log: what was appended outlasts a crash of the machine. Not while something is appended.
+  /// Syncs the streams and the log: what was appended outlasts a crash of the machine. Not while something
+  /// is appended.
   void sync();
-  /// Syncs and closes the streams and the log, so that another machine may read them. Only readBack() may follow.
+  /// Syncs and closes the streams and the log, so that another machine may read them. Only readBack() may
+  /// follow.
   void closeStreams();
 
-  /// In place of append(), for bricks whose streams other processes write: sets the offsets of all of them, which
-  /// must come in the same order. Nothing may have been appended. The streams have to be in the files before finish().
+  /// In place of append(), for bricks whose streams other processes write: sets the offsets of all of them,
+  /// which must come in the same order. Nothing may have been appended. The streams have to be in the files
+  /// before finish().
   void reserve(std::vector<AppendedBrick>& bricks);
 
   /// Sorts the records by level and Morton order and links parents and children. Writes bricks.bin, the
   /// variables' tables, bricks.vdb and the manifest, whose root, counts, levels, volume and files it fills
-  /// in; files that the manifest lists already stand in the folder, and stay listed. Renames the folder to its final name. Returns the manifest as written.
+  /// in; files that the manifest lists already stand in the folder, and stay listed. Renames the folder to
+  /// its final name. Returns the manifest as written.
   Manifest finish(Manifest manifest);
 
  private:

@@ -7,7 +7,6 @@
 
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
-#include "stream/cache/cache_file.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/stream_file.h"
 #include "stream/codec/face_codec.h"

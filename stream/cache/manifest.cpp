@@ -12,7 +12,6 @@
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
 #include "stream/cache/cache_format.h"
-#include "stream/cache/cell_octants.h"
 #include "stream/codec/values_codec.h"
 
 namespace curvisplat {

@@ -1,15 +1,21 @@
 // manifest.json: describes a cache's contents, for people and for the reader; stream/FORMAT.md lists its
 // keys. It is written last, by rename: a cache folder without it is unfinished.
+//
+// A cache has features, by names in the manifest: a reader must know those that it requires. They also say
+// how the cells at the borders of the cache are drawn (borderStyleOf()). Plain data and pure functions: any
+// thread may use them.
 #pragma once
+
+#include <glm/vec3.hpp>
 
 #include <cstdint>
 #include <filesystem>
-#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/model/border_code.h"
 #include "stream/model/octree.h"
 
 namespace curvisplat {
@@ -21,15 +27,15 @@ struct VariableInfo {
   double min = 0, max = 0;  // of the samples' values, before merging
 };
 
-/// One time step. A manifest lists the first; a series has the others in steps.bin (steps_file.h).
+/// One time step. A manifest lists the first; a series has the others in steps.bin (series.h).
 struct StepInfo {
   double time = 0;
   std::string geometry = "geometry.bin";
   std::vector<uint32_t> variables;  // numbers
 };
 
-/// Size and checksum (64-bit XXH3) of one of the cache's files. A payload file's checksum covers the table of
-/// its streams' checksums instead of the streams themselves, so that opening a cache reads no payloads.
+/// Size and checksum (64-bit XXH3) of one of the cache's files. A payload file's checksum covers the table
+/// of its streams' checksums instead of the streams themselves, so that opening a cache reads no payloads.
 struct FileInfo {
   std::string name;
   uint64_t size = 0;
@@ -47,17 +53,22 @@ class OtherVersion : public Error {
   using Error::Error;
 };
 
-/// What a reader must know of to read a cache, by the names in the manifest. Of a version 2 cache only: it is
-/// one of version 1 but for these.
+// The features of caches, which a reader must know to read one that requires them. Only caches of version 2
+// have any; apart from them, these are like caches of version 1. border_code.h and growth_code.h are in
+// stream/model.
 inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut at faces (border_code.h)
 inline constexpr const char* kCellGrowth = "cell-growth";    // kernels are skewed (growth_code.h)
 inline constexpr const char* kMergedBorders =
     "merged-borders";  // merged splats are cut at faces (border_code.h), and have an even blur
 inline constexpr const char* kFaceLayers =
-    "face-layers";  // cells are cut at more faces that they are behind (layers_code.h)
+    "face-layers";  // cells are cut at more faces that they are behind (border_code.h)
 inline constexpr const char* kBorderPairs =
-    "border-pairs";                             // cells at faces are drawn as two splats (border_pairs.h)
-inline constexpr const char* kSteps = "steps";  // a series of time steps (steps_file.h)
+    "border-pairs";                             // cells at faces are drawn as two splats (border_code.h)
+inline constexpr const char* kSteps = "steps";  // a series of time steps (series.h)
+/// Splats at nodes beside blanked ones lack the octants of their cells that lie in cells with a blanked node
+/// (preprocess/splats/node_splats.h). A reader need not do anything, but a program that adds scalars has to
+/// make the same splats.
+inline constexpr const char* kCellOctants = "cell-octants";
 
 // Manifest::overlap.
 inline constexpr const char* kOverlapAll = "all";      // every block is drawn
@@ -84,11 +95,12 @@ struct Manifest {
   uint64_t bricks = 0;
   uint32_t levels = 0;  // deepest level + 1
   double volume = 0;    // sum of the finest level's weights
-  std::string
-      overlap;  // what was done where the grid's blocks overlap: kOverlapAll ...; empty: of one block, or not known
+  /// What was done where the grid's blocks overlap: kOverlapAll, ...; empty if it has one block, or that is
+  /// not known.
+  std::string overlap;
   std::string stretch;  // how long splats are where cells grow: kSteepStretch; empty: by StretchFit::kGentle
   std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
-                                          // their geometry (preprocess/survey/grid_checksum.h)
+                                          // their geometry (preprocess/survey/grid_survey.h)
   std::string time_unit;  // of the steps' times, such as "days since 1900-01-01"; may be empty
   std::string calendar;   // of the time unit, by the CF conventions; may be empty
   std::vector<VariableInfo> variables;
@@ -101,9 +113,15 @@ struct Manifest {
 
   std::string toJson() const;
   /// Throws an Error that names `path` if a field is missing, of the wrong type or out of range, or if a
-  /// file's name is not a plain name. Throws OtherVersion if the program does not read this version, or does not
-  /// know a feature that the cache requires.
+  /// file's name is not a plain name. Throws OtherVersion if the program does not read this version, or does
+  /// not know a feature that the cache requires.
   static Manifest fromJson(const std::string& text, const std::filesystem::path& path);
 };
+
+/// How the cells at the borders of a cache are drawn, by its centring and its features.
+inline BorderStyle borderStyleOf(const Manifest& manifest) {
+  if (!manifest.cells) return kHalfCellStyle;
+  return manifest.hasFeature(kBorderPairs) ? kWholeCellPairs : kWholeCellStyle;
+}
 
 }  // namespace curvisplat

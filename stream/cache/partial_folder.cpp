@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <optional>
@@ -12,12 +13,11 @@
 #include <string>
 #include <utility>
 
-#include "stream/base/check.h"
-#include "stream/base/disk_full.h"
+#include "stream/base/checksum.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/open_retrying.h"
-#include "stream/base/paths.h"
+#include "stream/cache/cache_format.h"
 #include "stream/cache/manifest.h"
 
 namespace curvisplat {
@@ -43,7 +43,8 @@ fs::path partialOf(const fs::path& target) {
   return withSuffix(withoutSlash(target), kPartialSuffix);
 }
 
-/// removeAll() of a folder, its mark last: killed meanwhile, it leaves a folder that the next conversion removes.
+/// removeAll() of a folder, its mark last: killed meanwhile, it leaves a folder that the next conversion
+/// removes.
 std::error_code removeMarked(const fs::path& path) {
   std::error_code error, first;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
@@ -56,8 +57,8 @@ void requireRemoved(std::error_code error, const fs::path& path, const char* wha
   if (error) throw OutputError("{}: the {} cannot be removed: {}", path.string(), what, error.message());
 }
 
-/// Text of the lock in `folder`; nullopt if it is missing, no regular file or too long for a mark. Throws Error
-/// if it cannot be read.
+/// Text of the lock in `folder`; nullopt if it is missing, no regular file or too long for a mark. Throws
+/// Error if it cannot be read.
 std::optional<std::string> lockText(const fs::path& folder) {
   const fs::path lock = folder / kPartialLock;
   std::error_code error;
@@ -246,6 +247,80 @@ void PartialFolder::putIntoPlace() {
 void PartialFolder::removeReplaced() {
   const fs::path old = std::exchange(replaced_, {});
   if (!old.empty()) requireRemoved(removeMarked(old), old, "old cache, which has been replaced,");
+}
+
+namespace {
+
+constexpr uint64_t kReadBytes = uint64_t{1} << 20;
+
+size_t entryBytes(size_t variables) {
+  return sizeof(BrickRecord) + sizeof(double) + variables * sizeof(VariableRecord) + sizeof(uint64_t);
+}
+
+template <typename T>
+void put(const T& value, std::vector<std::byte>& out) {
+  const size_t begin = out.size();
+  out.resize(begin + sizeof value);
+  std::memcpy(&out[begin], &value, sizeof value);
+}
+
+template <typename T>
+T take(const std::byte*& at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  at += sizeof value;
+  return value;
+}
+
+}  // namespace
+
+void forEachLogged(const std::filesystem::path& folder, size_t variables,
+                   const std::function<bool(AppendedBrick&&)>& use) {
+  if (!std::filesystem::exists(folder / kBrickLogName)) return;
+  const InputFile file(folder / kBrickLogName);
+  const size_t entry_bytes = entryBytes(variables);
+  const uint64_t entries = file.size() / entry_bytes, at_once = kReadBytes / entry_bytes + 1;
+  std::vector<std::byte> buffer;
+  for (uint64_t first = 0; first < entries; first += at_once) {
+    buffer.resize(std::min(at_once, entries - first) * entry_bytes);
+    file.readAt(first * entry_bytes, std::span(buffer));
+    for (size_t begin = 0; begin < buffer.size(); begin += entry_bytes) {
+      const auto entry = std::span<const std::byte>(buffer).subspan(begin, entry_bytes);
+      const std::byte* at = entry.data();
+      AppendedBrick brick;
+      brick.brick = brickOf(take<BrickRecord>(at));
+      brick.weight = take<double>(at);
+      for (size_t v = 0; v < variables; ++v)
+        brick.variables.push_back(brickVariableOf(take<VariableRecord>(at)));
+      if (take<uint64_t>(at) != checksumOf(entry.first(entry_bytes - sizeof(uint64_t)))) return;
+      if (!use(std::move(brick))) return;
+    }
+  }
+}
+
+std::vector<AppendedBrick> readBrickLog(const std::filesystem::path& folder, size_t variables) {
+  std::vector<AppendedBrick> bricks;
+  forEachLogged(folder, variables, [&](AppendedBrick&& brick) {
+    bricks.push_back(std::move(brick));
+    return true;
+  });
+  return bricks;
+}
+
+BrickLog::BrickLog(const std::filesystem::path& folder, size_t variables)
+    : variables_(variables), file_(folder / kBrickLogName, Caching::kPages, OutputFile::Existing::kKeep) {}
+
+void BrickLog::append(const AppendedBrick& brick) {
+  entry_.clear();
+  put(recordOf(brick.brick), entry_);
+  put(brick.weight, entry_);
+  for (const BrickVariable& variable : brick.variables) put(recordOf(variable), entry_);
+  put(checksumOf(entry_), entry_);
+  file_.append(std::span<const std::byte>(entry_));
+}
+
+void BrickLog::keep(uint64_t count) {
+  file_.truncate(count * entryBytes(variables_));
 }
 
 }  // namespace curvisplat

@@ -10,10 +10,19 @@
 //
 // The lock file contains kPartialMark. Only folders with this mark, or without any files, are taken over and
 // emptied, so that other people's files are never removed.
+//
+// A log in the folder (BrickLog) records the bricks that have been appended to the cache's files, so that an
+// interrupted conversion can continue. Both classes are for one thread at a time.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string_view>
+#include <vector>
+
+#include "stream/base/file.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
 
@@ -27,13 +36,15 @@ void checkReplaceable(const std::filesystem::path& target, bool overwrite);
 /// Whether a conversion to `target` is running or was interrupted.
 bool hasUnfinished(const std::filesystem::path& target);
 
+/// The folder of an unfinished cache; the states are drawn above.
 class PartialFolder {
  public:
   enum class Rest { kRemove, kKeep };
 
   /// Creates and locks the folder. `rest`: remove the files of an unfinished conversion, or keep them, which
-  /// implies leave() where there are any. Throws Error as checkReplaceable(), if another conversion to `target` is running, and if
-  /// the folder's name is a link or a folder that no conversion has made.
+  /// implies leave() if the folder exists. Throws Error as checkReplaceable(), if another conversion to
+  /// `target` is running, and if the folder's name is that of a link or of a folder that no conversion has
+  /// made.
   PartialFolder(std::filesystem::path target, bool overwrite, Rest rest = Rest::kRemove);
   /// Removes the folder, unless putIntoPlace() or leave() was called.
   ~PartialFolder();
@@ -67,6 +78,47 @@ class PartialFolder {
   std::filesystem::path replaced_;  // path of the old cache; empty if there is none
   int lock_ = -1;
   bool leave_ = false;
+};
+
+inline constexpr const char* kBrickLogName = "bricks.log";
+
+/// A brick, without links to parent and children, and the extents of its streams.
+struct AppendedBrick {
+  Brick brick;
+  double weight = 0;  // EncodedBrick::weight
+  std::vector<BrickVariable> variables;
+};
+
+/// Calls `use` for each entry of the log in `folder`, until it returns false or an entry is damaged. Does
+/// nothing if there is no log. Throws Error if the disk fails.
+void forEachLogged(const std::filesystem::path& folder, size_t variables,
+                   const std::function<bool(AppendedBrick&&)>& use);
+
+/// The entries of the log in `folder`, up to the first damaged one; empty if there is no log. Throws Error
+/// if the disk fails.
+std::vector<AppendedBrick> readBrickLog(const std::filesystem::path& folder, size_t variables);
+
+/// The log of the bricks that a CacheWriter has appended. It is in the partial folder beside the streams,
+/// and never becomes part of a cache. Appending does not sync: the log ends at the first entry whose
+/// checksum is wrong.
+///
+///   entry:  BrickRecord 144 | weight 8 | VariableRecord 40 x variables | checksum of the bytes before it 8
+class BrickLog {
+ public:
+  /// Opens the log in `folder`; creates it if it does not exist. Throws Error.
+  BrickLog(const std::filesystem::path& folder, size_t variables);
+
+  void append(const AppendedBrick& brick);
+  void sync() { file_.sync(); }
+  /// Syncs and closes the log, so that another machine may read it. Nothing may be appended afterwards.
+  void close() { file_.close(); }
+  /// Truncates the log to its first `count` entries.
+  void keep(uint64_t count);
+
+ private:
+  size_t variables_;
+  OutputFile file_;
+  std::vector<std::byte> entry_;
 };
 
 }  // namespace curvisplat

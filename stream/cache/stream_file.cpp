@@ -3,8 +3,8 @@
 #include <array>
 #include <utility>
 
-#include "stream/base/check.h"
 #include "stream/base/checksum.h"
+#include "stream/base/error.h"
 #include "stream/cache/cache_format.h"
 
 namespace curvisplat {

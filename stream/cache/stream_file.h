@@ -12,7 +12,7 @@
 #include "stream/cache/manifest.h"
 #include "stream/cache/value_histogram.h"
 #include "stream/codec/brick_codec.h"
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
 

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <limits>
 
-#include "stream/base/check.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/prediction.h"
 #include "stream/codec/values_codec.h"
 #include "stream/model/border_code.h"
-#include "stream/model/shape_extent.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 namespace {

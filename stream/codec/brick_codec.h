@@ -19,8 +19,6 @@
 #include <vector>
 
 #include "stream/codec/values_codec.h"
-#include "stream/model/brick.h"
-#include "stream/model/brick_splats.h"
 #include "stream/model/octree.h"
 #include "stream/model/splats.h"
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
 #include "stream/codec/prediction.h"
 

@@ -6,7 +6,6 @@
 
 #include "stream/base/error.h"
 #include "stream/codec/geometry_codec.h"
-#include "stream/codec/geometry_steps.h"
 #include "stream/codec/planes.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"

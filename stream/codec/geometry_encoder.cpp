@@ -5,13 +5,12 @@
 #include <optional>
 
 #include "stream/codec/geometry_codec.h"
-#include "stream/codec/geometry_steps.h"
 #include "stream/codec/log_codes.h"
 #include "stream/codec/planes.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
 #include "stream/model/kernel.h"
-#include "stream/model/shape_extent.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 namespace {

@@ -1,9 +1,14 @@
-// Positive numbers as whole steps of their logarithms.
+// Positive numbers as whole steps of their logarithms, and back: logCodes() for the encoder, LogTable for
+// both the encoder and the decoder. What a code stands for is part of the format (stream/FORMAT.md, "Tables
+// of exponentials"): all programs get the same bits. Pure functions and immutable tables: any thread may use
+// them.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 namespace curvisplat {
 
@@ -12,10 +17,29 @@ struct LogCodes {
   uint32_t largest = 0;  // no code is larger
 };
 
-/// codes[n] = (log(values[n]) - lowest) / step, rounded, by std::log(). Several at once, by vector instructions: where their
-/// logarithms, which differ in the last bits, leave the code in doubt, std::log() decides. `values`: none is negative or NaN. None, and
-/// `codes` are of no use, if they are to reach `too_large` steps, or the logarithm of one is not finite. Pure: any thread.
+/// codes[n] = (log(values[n]) - lowest) / step, rounded, by std::log(). Vector instructions compute several
+/// at once; their logarithms differ from std::log() in the last bits, so std::log() decides where that
+/// leaves the code in doubt. `values`: none is negative or NaN. nullopt, with unspecified `codes`, if a code
+/// would reach `too_large` or a logarithm is not finite.
 std::optional<LogCodes> logCodes(std::span<const double> values, double step, uint32_t too_large,
                                  uint32_t* codes);
+
+/// e^(base + n step) for whole n, as the product of two entries of small tables, which is faster than an
+/// exponential. Its rounding is part of the format.
+class LogTable {
+ public:
+  LogTable() = default;
+  /// For n from 0 to `largest`. Costs about 64 + largest / 64 exponentials.
+  LogTable(double base, double step, uint32_t largest) : coarse_((largest >> kFineBits) + 1), fine_(kFine) {
+    for (uint32_t n = 0; n < kFine; ++n) fine_[n] = std::exp(n * step);
+    for (uint32_t n = 0; n < coarse_.size(); ++n) coarse_[n] = std::exp(base + n * (kFine * step));
+  }
+
+  double operator[](uint32_t n) const { return coarse_[n >> kFineBits] * fine_[n & (kFine - 1)]; }
+
+ private:
+  static constexpr uint32_t kFineBits = 6, kFine = 1u << kFineBits;
+  std::vector<double> coarse_, fine_;
+};
 
 }  // namespace curvisplat

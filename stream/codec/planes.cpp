@@ -7,7 +7,6 @@
 #include <memory>
 #include <new>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "stream/base/error.h"
-#include "stream/codec/fine_means.h"
 #include "stream/codec/planes.h"
 
 namespace curvisplat {

@@ -1,19 +1,21 @@
-// The values stream of a brick: one scalar of its splats.
+// The values stream of a brick: one scalar of its splats. All functions are pure, with scratch memory of
+// each thread: any thread may call them.
 //
 //   ValuesHeader | zstd frame: rows (varints) | planes of mean, slope0, slope1, slope2, deviation
 //
-//   span        the range of the brick's means, or its largest |slope component| or deviation if that is more
-//   mean        16 bits over the range of the brick's means; with ValuePrecision::kFine 24 bits, as floats have
-//   slope       in steps of 2^-10 of the span, with kFine 2^-13: at the edge of a splat's support, 1.556 from its
-//               centre, the scalar is wrong by at most 1.3e-3 of the span, or 1.7e-4. Errors of the splats along a ray
-//               even out: DESIGN.md, "The codec", has what is seen of them
+//   span        the range of the brick's means, or its largest |slope component| or deviation if larger
+//   mean        16 bits over the range of the brick's means; with ValuePrecision::kFine 24, as floats have
+//   slope       in steps of 2^-10 of the span, with kFine 2^-13: at the edge of a splat's support, 1.556 from
+//               its centre, the scalar is wrong by at most 1.3e-3 of the span, or 1.7e-4. Errors of the splats
+//               along a ray even out: DESIGN.md, "The codec", says how much of them is seen
 //   deviation   √variance in steps of 2^-12 of the span; 0 stays 0
 //
 // The stream contains the rows if a predictor uses them, so that it decodes without the geometry stream.
 //
-// In a series a stream may be predicted in time: the header says how many steps back its references are, and an
-// array's code whether its predictor applies to the codes or to their differences from what the references have
-// there, in this stream's steps. What decodes is the same either way. stream/FORMAT.md has every formula.
+// In a series a stream may be predicted in time: the header says how many steps back its references are, and
+// an array's code says whether its predictor applies to the codes or to their differences from what the
+// references have there, in this stream's steps. What decodes is the same either way. stream/FORMAT.md has
+// every formula.
 #pragma once
 
 #include <array>
@@ -31,11 +33,12 @@ namespace curvisplat {
 /// How finely means are stored.
 enum class ValuePrecision { kNormal, kFine };
 
-/// The cache's feature (manifest.h) whose streams may have fine means: a bit in the array code of the means.
+/// The feature of caches (stream/cache/manifest.h) whose streams may have fine means, by a bit in the array
+/// code of the means.
 inline constexpr const char* kFineValues = "fine-values";
 
-/// How far a decoded mean is from the encoded one at most, as a share of the range of the brick's means; rounding to
-/// floats adds to it.
+/// How far a decoded mean is from the encoded one at most, as a share of the range of the brick's means;
+/// rounding to floats adds to it.
 inline constexpr double kLargestMeanError = 0.5 / 65535, kLargestFineMeanError = 0.5 / 16777215;
 
 struct ValuesHeader {
@@ -53,9 +56,14 @@ struct TimeReferences {
   std::array<VariableArrays<const float>, 2> values{};  // of as many splats as the stream
 };
 
-/// How many steps back the references of a stream are: zeros where it has none. Untrusted bytes: throws Error if
-/// they hold no header, or a second reference that is not further back than the first.
+/// How many steps back the references of a stream are; zero for those that it does not have. The bytes are
+/// untrusted: throws Error if they hold no header, or a second reference that is not further back than the
+/// first.
 std::array<uint8_t, 2> stepsBackOf(std::span<const std::byte> stream);
+
+/// Whether the stream has fine means, which only streams of a cache with the feature kFineValues may have.
+/// Throws Error as stepsBackOf().
+bool hasFineMeans(std::span<const std::byte> stream);
 
 /// Encodes `values` and replaces them by the decoded values. `rows`: the rows of the brick's geometry
 /// (rowsOf()). Predicts from `references` those arrays for which that takes fewer bits.

@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "stream/model/kernel.h"
-#include "stream/model/layers_code.h"
 
 namespace curvisplat {
 namespace {

@@ -1,20 +1,34 @@
-// Where a cell ends at a border. A node at the end of its block, or beside a blank one, owns half a cell
-// along that axis, two axes or three; its splat remembers in which directions the data goes on. So does that
-// of a cell of cell-centred data, though the cell is whole.
-//
-// The directions are unit vectors in the frame of the splat's A (A q is from the border inwards, as long as
-// the cell is in that direction) and at right angles to one another, since J = A Q with Q orthogonal. They
-// are kept as a rotation, good to 0.006 (0.02 at the most) in the cell's own measure whatever its aspect ratio, and each has a
-// bit that says how the renderer is to draw it: in parts, or cut at the border's face.
+// Where a cell ends at a border, or at a face that it is behind, in a code of 32 bits; and how the renderer
+// draws such a cell: in parts, cut, or as a pair. A node at the end of its block, or beside a blank one,
+// owns half a cell along one axis, two or three; its splat remembers in which directions the data goes on.
+// So does the splat of a cell of cell-centred data, though that cell is whole. All functions are pure: any
+// thread may call them.
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace curvisplat {
+
+// A code has one of four forms. In the first, the cell ends at borders. The directions are unit vectors in
+// the frame of the splat's A (A q is from the border inwards, as long as the cell is in that direction) and
+// at right angles to one another, since J = A Q with Q orthogonal. They are kept as a rotation, good to
+// 0.006 (0.02 at the most) in the cell's own measure whatever its aspect ratio, and each has a bit that says
+// how the renderer is to draw it: in parts, or cut at the border's face. Bits 5-7 of directions beyond their
+// number mark other directions, which lead from faces that the cell is in the layer behind of.
 //
 //   bits 0-1   number of directions
 //        2     the third is opposite to the rotation's
 //        3-4   which of the quaternion's numbers, w x y z, is the largest and left out
-//        5-7   direction 0, 1, 2 ends at a face to be cut at
+//        5-7   direction 0, 1, 2 starts at a face to be cut at
 //        8-31  the quaternion's other numbers, 8 bits each
 //
-// A node's cell in the layer behind such a face is whole, but its splat reaches beyond the face and is cut
-// there, too. It has a code of another form:
+// In the second form, a whole cell is in the layer behind one such face: its splat reaches beyond the face
+// and is cut there, too.
 //
 //   bits 0-1   zero
 //        2     one
@@ -22,24 +36,25 @@
 //        8-23  the direction from the face inwards: the octahedron's map, 8 bits each
 //        24-31 how far the face is from the cell's middle, in 1/128 of the cell's length in that direction
 //
-// A merged splat that ends at one face has this form with a number n from 1 to 21 in bits 3-7, and a distance of 1 at
-// the most: the splats behind it are 3/4 2^((n - 1) / 10) times as long as twice the distance, or 3 times as long as the
-// splat, if that is less. It is drawn as the first form is, fitted for this ratio: the lattice of voxels makes
-// the layer at a face as thick as it happens to be.
+// The third form is of a merged splat that ends at one face: as the second, but with a number n from 1 to 21
+// in bits 3-7, and a distance of at most 1. The splats behind it are 3/4 2^((n - 1) / 10) times as long as
+// twice the distance, or 3 times as long as the splat, if that is less. It is drawn as the first form is,
+// fitted for this ratio: the lattice of voxels makes the layer at a face as thick as it happens to be.
 //
-// The first version of the format has only zeros in bits 5-7 of the first form, and has not the others.
-#pragma once
+// In the fourth form, a cell that ends at no border is behind two or three faces:
+//
+//   bits 0-2   4
+//        3-4   which of the quaternion's numbers is left out
+//        5     one for three directions, zero for two
+//        6-7   3: more than any ratio of a merged splat
+//        8-31  the rotation, as in the first form; the directions are its first columns
+//
+// The first version of the format has only zeros in bits 5-7 of the first form, and none of the other forms.
 
-#include <array>
-#include <cstdint>
-#include <glm/vec3.hpp>
-#include <span>
-
-namespace curvisplat {
-
-/// Of a cell that ends at none.
+/// The code of a cell that ends at no border and is behind no face.
 inline constexpr uint32_t kNoBorder = 0;
 
+/// The directions of a code, from the border or face inwards.
 struct InwardAxes {
   std::array<glm::vec3, 3> axis;  // unit length, orthogonal
   int count = 0;                  // 0..3
@@ -51,37 +66,56 @@ struct InwardAxes {
   bool hasFace(int n) const { return (faces >> n & 1) != 0; }
 };
 
-/// `inward`: none to three such vectors. `faces`: InwardAxes'.
+/// A code of the first form. `inward`: up to three unit vectors at right angles. `faces`: as in InwardAxes.
 uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces = 0);
-/// Of a cell in the layer behind a face; kNoBorder where the distance, of the face from the cell's middle in
-/// cells, is not in the code's range.
+/// A code of the second form, of a cell in the layer behind a face. `distance`: of the face from the cell's
+/// middle, in cells. kNoBorder if the distance is out of the code's range.
 uint32_t packLayerCode(const glm::dvec3& inward, double distance);
-/// Of a merged splat; distance as above, the splats behind it are `ratio` times as long as twice that. kNoBorder as above.
+/// A code of the third form, of a merged splat. `distance`: as for packLayerCode(); the splats behind it are
+/// `ratio` times as long as twice the distance. kNoBorder if the distance is out of the code's range.
 uint32_t packMergedCode(const glm::dvec3& inward, double distance, double ratio);
-InwardAxes inwardAxes(uint32_t border_code);
+/// A code for a cell that is behind faces, at least one: of the first form if it also ends at borders,
+/// otherwise of the fourth. `inward`: two or three directions at right angles. The first `count` lead from
+/// borders that are faces, the others from faces that the cell is behind; three of the latter are in a
+/// right-handed order.
+uint32_t packLayersCode(std::span<const glm::dvec3> inward, size_t count);
 
-/// False for what packBorderCode() gives to no cell; whatever passes has inward axes.
+InwardAxes inwardAxes(uint32_t border_code);
+/// The directions of the code that lead from faces which the cell is behind, in the forms of
+/// packLayersCode(): bit n stands for axis[n] of the code's InwardAxes, which is not one of its `count`.
+/// Zero for codes of the other forms, the second included (InwardAxes::behind).
+uint32_t layersOf(uint32_t border_code);
+/// How far such a face is from the cell's middle, in cells, where cells grow steadily inwards by e^growth.
+/// It is about one length of the cell: a hundredth of the weight is cut there.
+inline float layerDistance(float growth) {
+  return 1 - 0.106f * growth;
+}
+
+/// Whether a code is kNoBorder or has one of the four forms. Only such codes may be passed to the other
+/// functions.
 bool isPossibleBorderCode(uint32_t border_code);
 
-// How the renderer draws a cell at a border: cut, as one wider splat of which the part behind the face is not
-// drawn (render/project/border_parts.h), or in two parts, a narrow one at the border and a wide one behind
-// it. In units of the cell's length in that direction, from its middle inwards; the shares are of its weight.
+/// A splat that stands for a cell at a border, in units of the cell's length in the direction from the
+/// border inwards: its offset from the cell's middle, its size, and its share of the cell's weight.
 struct BorderPart {
   float offset, size, share;
 };
+/// How the renderer draws a cell at a border: cut, as one wider splat of which the part behind the face is
+/// not drawn (render/project/splat_pieces.h), or in two parts, a narrow one at the border and a wide one
+/// behind it.
 struct BorderStyle {
   BorderPart cut;
   std::array<BorderPart, 2> parts;  // their shares sum to one
 };
 
-// By least squares in one dimension, for the step that a uniform half space is. `kHalf`: half cells, of
-// nodes; `kWhole`: cells of cell-centred data.
+// The styles of half cells, of nodes, and of whole cells, of cell-centred data. They are the least squares
+// in one dimension for a step, which is what a uniform medium is that ends at the border.
 //
 //                   squared error   outside of the border   density behind it
-//   kHalf   one splat       0.048        0.079                 0.83 and more
+//   half    one splat       0.048        0.079                 0.83 and more
 //           in parts        0.019        0.033                 0.87 to 1.07
 //           cut            0.0004        0.010, of the next layer's splats    0.989 to 1.004
-//   kWhole  one splat       0.083        0.138
+//   whole   one splat       0.083        0.138
 //           in parts        0.027        0.045                 0.87 and more
 //           cut            0.0008        0                     0.932 to 1.030
 inline constexpr BorderStyle kHalfCellStyle{{-0.646f, 2.13f, 2.31f},
@@ -89,22 +123,33 @@ inline constexpr BorderStyle kHalfCellStyle{{-0.646f, 2.13f, 2.31f},
 inline constexpr BorderStyle kWholeCellStyle{{-0.243f, 1.264f, 1.507f},
                                              {{{-0.342f, 0.25f, 0.197f}, {0.111f, 0.769f, 0.803f}}}};
 
-/// How a merged splat with `inward.ratio` is drawn, in units of its length: as `cut` above, which is this for the ratios 2
-/// (kHalf) and 1 (kWhole). The same least squares for any ratio, as polynomials of its inverse; squared errors are
-/// 0.004 at the smallest ratio, 0.001 and less from 1 on.
+/// The style of whole cells that are drawn as two splats: the cell itself, which is its `cut`, and the one
+/// that would be next to it beyond the face, as cells inside of the grid are drawn
+/// (render/project/splat_pieces.cpp). In one dimension, the density behind the border of an even grid is
+/// 0.999 to 1.001; it is 0.932 to 1.030 with one wider splat, and 0.928 to 1.033 where cells grow by 0.865.
+inline constexpr BorderStyle kWholeCellPairs{{0, 1, 1}, kWholeCellStyle.parts};
+
+inline bool isOfPairs(const BorderStyle& style) {
+  return style.cut.size == kWholeCellPairs.cut.size;
+}
+
+/// How a merged splat with `inward.ratio` is drawn, in units of its length. It generalises `cut` above,
+/// which is the result for the ratios 2 (half cells) and 1 (whole cells): the same least squares for any
+/// ratio, as polynomials of its inverse. Squared errors are 0.004 at the smallest ratio, and 0.001 and less
+/// from 1 on.
 BorderPart mergedPart(const InwardAxes& inward);
 
-/// How much farther than the splat itself it reaches as it is drawn, at the most, in units of its largest
-/// axis: the inner parts' offset along three axes; and a half cell's wide splat, but for what lies behind the
-/// face. Of a merged splat's code: in units of its length in the code's direction.
+/// How much farther than the splat itself its drawn parts reach, at most, in units of its largest axis; for
+/// a merged splat's code, in units of its length in the code's direction. kPartsReach is the inner parts'
+/// offset along three axes; kCutReach is a half cell's wide splat, without what lies behind the face.
 inline constexpr double kPartsReach = 0.52, kCutReach = 1.25, kMergedReach = 2.9;
 double borderReach(uint32_t border_code);
-/// |w|, as stream/model/splats.h has it, of the splat as it is drawn, at the most.
+/// An upper bound of |w| (stream/model/splats.h) of the splat as it is drawn.
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code);
-/// By inwardAxes() of its code.
+/// The same, for the inwardAxes() of the code.
 double drawnSlope(const glm::dvec3& slope, const InwardAxes& inward);
-/// What half cells that shrink inwards add to the size of a cut (render/project/border_parts.cpp). Caches without
-/// kMergedBorders recorded slopes without it: drawnSlope() is at most kEarlierSlopes times as large.
+/// What half cells that shrink inwards add to the size of a cut (render/project/splat_pieces.cpp). Caches
+/// without kMergedBorders recorded slopes without it: drawnSlope() is at most kEarlierSlopes times as large.
 inline constexpr double kWidening = 0.13;
 inline constexpr double kEarlierSlopes = 1 + kWidening / kHalfCellStyle.cut.size;
 

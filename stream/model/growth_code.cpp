@@ -7,8 +7,6 @@
 #include <glm/mat3x3.hpp>
 #include <numeric>
 
-#include "stream/model/growth_frames.h"
-
 namespace curvisplat {
 namespace {
 

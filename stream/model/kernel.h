@@ -1,5 +1,5 @@
-// The numbers of the reconstruction kernel K(r), in units of a cell, which conversion, cache and drawing share. DESIGN.md,
-// "Splats"; render/project/kernel.h has the kernel itself.
+// The numbers of the reconstruction kernel K(r), in units of a cell, which conversion, cache and drawing
+// share. DESIGN.md, "Splats"; render/project/footprint.h has the kernel itself.
 #pragma once
 
 namespace curvisplat {

@@ -1,4 +1,7 @@
-// Splats as the pipeline passes them on: structures of arrays in float, relative to one brick.
+// Splats: one by one in double precision, as conversion makes and merges them; a brick of them in double
+// precision, on its way into the codec or out of it; and a decoded brick as structures of arrays in float,
+// relative to the brick's cell, as rendering reads it. Also how far splats reach. Plain data and pure
+// functions: any thread may use them.
 //
 //   shape    S = A Aᵀ, A lower triangular with positive diagonal:
 //
@@ -17,11 +20,13 @@
 //   variance r >= 0, the residual in-cell variance: t of DESIGN.md is |w|²/12 + r. Zero for a node's cell.
 #pragma once
 
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/mat3x3.hpp>
-#include <glm/vec3.hpp>
+#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -59,7 +64,7 @@ struct SplatScalar {
   double variance = 0;
 };
 
-/// What a splat's surroundings are like.
+/// The codes that describe a splat's surroundings.
 struct SplatCodes {
   uint32_t border = kNoBorder, growth = kNoGrowth;  // border_code.h, growth_code.h
 };
@@ -71,15 +76,14 @@ struct SplatGeometry {
   std::vector<float> shear10, shear20, shear21;
   std::vector<float> weight;          // world units cubed
   std::vector<uint32_t> border_code;  // stream/model/border_code.h: kNoBorder except for cells at a border
-  std::vector<uint32_t>
-      growth_code;  // stream/model/growth_code.h: kNoGrowth where cells are about as long as their neighbours
+  std::vector<uint32_t> growth_code;  // stream/model/growth_code.h: kNoGrowth where cells grow little
 
   size_t size() const { return x.size(); }
   void resize(size_t count);
 };
 
-/// Calls visit() with each array of a SplatGeometry or a GeometryArrays; the codes, which are of another type, come
-/// last.
+/// Calls visit() with each array of a SplatGeometry or a GeometryArrays; the codes, which are of another
+/// type, come last.
 template <typename Geometry, typename Visit>
 void forEachArrayOfGeometry(Geometry&& g, Visit&& visit) {
   for (auto* array :
@@ -88,12 +92,12 @@ void forEachArrayOfGeometry(Geometry&& g, Visit&& visit) {
   visit(g.border_code);
   visit(g.growth_code);
 }
-/// The same for a SplatVariable or a VariableArrays.
+/// Calls visit() with each array of a SplatVariable or a VariableArrays.
 template <typename Variable, typename Visit>
 void forEachArrayOfVariable(Variable&& v, Visit&& visit) {
   for (auto* array : {&v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance}) visit(*array);
 }
-/// How many arrays these two visit.
+/// How many arrays these two functions visit together.
 inline constexpr size_t kArraysOfSplats = 17;
 
 /// The geometry's arrays, borrowed: where a decoder writes (T = float) or a projector reads (T = const
@@ -123,7 +127,7 @@ struct SplatVariable {
   void resize(size_t count);
 };
 
-/// As GeometryArrays.
+/// The arrays of a SplatVariable, borrowed as in GeometryArrays.
 template <typename T>
 struct VariableArrays {
   T* mean;
@@ -137,13 +141,39 @@ struct VariableArrays {
   }
 };
 
-/// To write into; what they borrow lives until the next resize().
+/// The arrays, to write into or to read from. They are valid until the next resize().
 GeometryArrays<float> arraysOf(SplatGeometry& geometry);
 VariableArrays<float> arraysOf(SplatVariable& variable);
-/// Both have the same size.
-void copyValues(const VariableArrays<const float>& from, const VariableArrays<float>& to);
-/// To read from.
 GeometryArrays<const float> arraysOf(const SplatGeometry& geometry);
 VariableArrays<const float> arraysOf(const SplatVariable& variable);
+/// Copies all values. Both have the same size.
+void copyValues(const VariableArrays<const float>& from, const VariableArrays<float>& to);
+
+/// One brick in double precision, in the order in which it will be stored: conversion encodes it, and
+/// decodes it for merging.
+struct BrickSplats {
+  Cell cell;
+  std::vector<NodeRun> runs;  // leaves: the nodes behind the splats, counts sum to size(); else empty
+  std::vector<RootPosition> positions;              // in `cell`
+  std::vector<Splat> splats;                        // .position is ignored in favour of `positions`
+  std::vector<uint32_t> border_codes;               // [splat]; stream/model/border_code.h. Empty: no borders
+  std::vector<uint32_t> growth_codes;               // [splat]; stream/model/growth_code.h. Empty: no growth
+  std::vector<std::vector<SplatScalar>> variables;  // [variable][splat]
+
+  size_t size() const { return splats.size(); }
+};
+
+/// The largest singular value of A over `splats`: the longest half axis of the kernel's unit sphere. At most
+/// 1e-6 too large, never too small. World units.
+double largestSingularValue(std::span<const Splat> splats);
+
+/// The smallest singular value of A over `splats`: at most 1e-6 too small, and too large by a ratio of at
+/// most 1 + `slack`. A little slack saves much time. The precision of positions depends on it. World units.
+double smallestSingularValue(std::span<const Splat> splats, double slack = 0);
+
+/// The farthest that any splat's support reaches from its centre, with those of the parts that it is drawn
+/// as at a border. At most 1e-6 too large, except for half cells. `border_codes`: as in BrickSplats. World
+/// units.
+double largestReach(std::span<const Splat> splats, std::span<const uint32_t> border_codes);
 
 }  // namespace curvisplat

@@ -1,29 +1,65 @@
 // Decoded bricks of one variable, or two, that outlive a frame, in an arena of fixed size.
 //
-// Invariant: every brick is charged the bytes of its 17 arrays, or 21 with a second variable; the charges and the holes make up the
-// capacity; a pinned brick is never evicted. Of the others the least recently used is evicted first, but none
-// that was used in the current epoch (a frame, or a prefetch). If a frame needs more bricks than the cache
-// holds, plain least recently used would evict each brick shortly before the next frame needs it, and nothing
-// would ever be found. Here the frame's first bricks stay, and its last ones are not kept.
+// Invariant: every brick is charged the bytes of its 17 arrays, or 22 with a second variable; the charges
+// and the holes make up the capacity; a pinned brick is never evicted. Of the others the least recently used
+// is evicted first, but none that was used in the current epoch (a frame, or a prefetch). If a frame needs
+// more bricks than the cache holds, plain least recently used would evict each brick shortly before the next
+// frame needs it, and nothing would ever be found. Here the frame's first bricks stay, and its last ones are
+// not kept.
 //
 // Bricks are kept decoded, not packed: decoding takes two thirds of preparing a brick, and a disk delivers
 // packed bricks faster than all cores decode them. bench/README.md has the figures.
 //
-// Any thread. The arrays of a pinned brick are read without a lock.
+// Any thread may use a BrickCache. The arrays of a pinned brick are read without a lock.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <list>
+#include <map>
+#include <memory>
 #include <optional>
 #include <unordered_map>
 #include <vector>
 
 #include "stream/base/mutex.h"
 #include "stream/model/splats.h"
-#include "stream/paging/arena.h"
 
 namespace curvisplat {
 
+/// An allocator for blocks of any size in memory of a fixed size. Unlike malloc, it bounds the memory that
+/// is lost to fragmentation between blocks of changing sizes. It takes the first hole that fits, and merges
+/// neighbouring holes. A page that was never used takes no memory. One thread at a time.
+class Arena {
+ public:
+  /// Blocks begin at multiples of it.
+  static constexpr uint64_t kBlockAlignment = 64;
+
+  explicit Arena(uint64_t capacity);
+
+  /// Returns null if no hole is large enough.
+  std::byte* allocate(uint64_t bytes);
+  /// `bytes` as in allocate().
+  void free(std::byte* block, uint64_t bytes);
+
+  /// The memory in bytes that a block of `bytes` takes up.
+  static uint64_t charge(uint64_t bytes) {
+    return (bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
+  }
+  uint64_t capacity() const { return capacity_; }
+
+ private:
+  struct Free {
+    void operator()(std::byte* bytes) const { std::free(bytes); }
+  };
+
+  const uint64_t capacity_;
+  std::unique_ptr<std::byte, Free> memory_;
+  std::map<uint64_t, uint64_t> holes_;  // offset -> bytes, no two touch
+};
+
+/// The decoded bricks. Threads find() a brick, or make a Slot for it, decode into that, and keep() it.
 class BrickCache {
   struct Entry;
 
@@ -41,8 +77,8 @@ class BrickCache {
     GeometryArrays<const float> geometry() const;
     VariableArrays<const float> values() const;
     VariableArrays<const float> second() const;  // of two variables
-    /// Calls decode(values, second) to fill the values anew if they are of an earlier step. One thread for each brick. If it
-    /// throws, they stay what they were.
+    /// Calls decode(values, second) to fill the values anew if they are of an earlier step. One thread for
+    /// each brick. If it throws, they stay what they were.
     template <typename Decode>
     void refresh(const Decode& decode) const {
       if (entry_->step == cache_->step_) return;
@@ -83,14 +119,14 @@ class BrickCache {
   void beginEpoch(const std::vector<uint32_t>& bricks);
   /// The brick, pinned and used in this epoch; nullopt if it is not in the cache.
   std::optional<Pin> find(uint32_t brick);
-  /// Space for a brick that is not in the cache; evicts others if necessary. nullopt if too much is pinned or
-  /// used in this epoch, or if the brick is in the cache or has a slot already.
+  /// Space for a brick that is not in the cache; evicts others if necessary. nullopt if too much is pinned
+  /// or used in this epoch, or if the brick is in the cache or has a slot already.
   std::optional<Slot> makeSlot(uint32_t brick, uint32_t splats);
 
   bool contains(uint32_t brick) const;
 
-  /// From now on the values of bricks that are here are of an earlier step; their geometry stays. Nothing may be
-  /// pinned.
+  /// From now on the values of bricks that are here are of an earlier step; their geometry stays. Nothing
+  /// may be pinned.
   void stepChanged();
   /// Whether the brick is here with values of an earlier step.
   bool isStale(uint32_t brick) const;

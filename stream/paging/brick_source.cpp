@@ -5,8 +5,8 @@
 #include <unordered_set>
 #include <utility>
 
-#include "stream/base/check.h"
-#include "stream/base/stage_timer.h"
+#include "stream/base/compute_permits.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

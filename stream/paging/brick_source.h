@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "stream/cache/cache_reader.h"
-#include "stream/cache/kept_values.h"
-#include "stream/model/brick.h"
+#include "stream/cache/series_values.h"
+#include "stream/model/octree.h"
 #include "stream/model/splats.h"
 #include "stream/paging/brick_cache.h"
 #include "stream/paging/pager.h"

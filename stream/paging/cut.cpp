@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <queue>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -1,14 +1,14 @@
 // Which bricks one view needs: a pure function, apart from reading and drawing them.
 // DESIGN.md, "The pipeline".
 //
-// The cut starts at the root and goes down until a brick's error counts little enough on the screen, or it is a
-// leaf; what is outside the image or transparent is left out with all that lies below it. The result's cells
-// are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree node
-// the child farther along every axis comes first), so that bricks which are needed about the same time are
-// named so. Splats are drawn in an order of their own (render/frame/sweep_buffer.h).
+// The cut starts at the root and goes down until a brick's error counts little enough on the screen, or it
+// is a leaf; what is outside the image or transparent is left out with all that lies below it. The result's
+// cells are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree
+// node the child farther along every axis comes first), so that bricks which are needed about the same time
+// are named so. Splats are drawn in an order of their own (render/sweep/sweep_buffer.h).
 //
-// Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant by
-// octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
+// Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant
+// by octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
 // larger limit gives a refinement of the same cut. At most one brick is drawn in part: the last one.
 //
 // Costs about 35 ns a brick looked at, under a limit 70 to 150 (bench/cut_bench.cpp).
@@ -21,7 +21,6 @@
 #include <span>
 #include <vector>
 
-#include "stream/model/brick.h"
 #include "stream/model/octree.h"
 
 namespace curvisplat {
@@ -68,8 +67,8 @@ struct CutOptions {
   static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
   double lod_pixels = 1;  // error allowed on the screen; at 0 only leaves are taken
-  /// A brick's error counts this much, from 0 to 1, when it is compared with lod_pixels; not in the order of refinement.
-  /// Null: all errors count whole.
+  /// A brick's error counts this much, from 0 to 1, when it is compared with lod_pixels; not in the order of
+  /// refinement. Null: all errors count whole.
   std::function<double(uint32_t brick)> error_weight = nullptr;
   DrawingOrder order = DrawingOrder::kBackToFront;
   /// What the cut may hold, and what its bricks' streams may take on disk. The root is drawn even where it
@@ -83,8 +82,8 @@ struct Cut {
   uint64_t bytes = 0;  // of the parts' bricks
   uint32_t deepest_level = 0;
   bool complete = true;  // false: a limit keeps some of it coarser than lod_pixels asks for
-  /// On the screen, of what is drawn; at most lod_pixels where its weight makes it fine enough. Infinite around a
-  /// perspective eye.
+  /// On the screen, of what is drawn; at most lod_pixels where its weight makes it fine enough. Infinite
+  /// around a perspective eye.
   double largest_error_px = 0;
   uint64_t out_of_image = 0;  // bricks left out, each standing for all below it
   uint64_t transparent = 0;

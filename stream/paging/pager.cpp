@@ -5,10 +5,9 @@
 #include <new>
 #include <utility>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/thread_name.h"
+#include "stream/base/threads.h"
 #include "stream/cache/cache_format.h"
 
 namespace curvisplat {

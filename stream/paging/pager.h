@@ -35,7 +35,6 @@
 #include <thread>
 #include <vector>
 
-#include "stream/base/direct_file.h"
 #include "stream/base/mutex.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/paging/async_reads.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 #include "stream/cache/cache_format.h"
 
 namespace curvisplat {

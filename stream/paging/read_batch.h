@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
 
 namespace curvisplat {
 

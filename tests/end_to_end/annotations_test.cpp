@@ -10,32 +10,17 @@
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
-class Annotations : public testing::Test {
+class Annotations : public ProgramSuite<Annotations> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    run({"generate", "half-annulus", "--size", "24x12x12", "-o", file("a")});
-    run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
-  }
-  static void TearDownTestSuite() { folder_.reset(); }
+  static void prepare() { madeCache(file("a"), "half-annulus", "24x12x12"); }
 
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
-  static void run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
-  }
-  static Image render(std::vector<std::string> options, const std::string& output = "a.exr") {
-    options.insert(options.begin(), {"render", file("a.splats"), "-o", file(output)});
-    if (std::find(options.begin(), options.end(), "--size") == options.end())
-      options.insert(options.end(), {"--size", "200x160"});
-    run(options);
-    return readImage(file(output));
+  static Image render(const Words& options, const std::string& output = "a.exr") {
+    return pictureOf(file("a.splats"), file(output), options, "200x160");
   }
 
   /// Pixels of [x0, x1) x [y0, y1) that differ between `a` and `b`.
@@ -45,10 +30,7 @@ class Annotations : public testing::Test {
       for (int x = x0; x < x1; ++x) count += !std::equal(a.pixel(x, y), a.pixel(x, y) + 3, b.pixel(x, y));
     return count;
   }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
 };
-std::unique_ptr<TemporaryFolder> Annotations::folder_;
 
 TEST_F(Annotations, EachIsDrawnInItsPlace) {
   const Image plain = render({});
@@ -125,8 +107,7 @@ TEST_F(Annotations, TheAxesGridLiesBehindTheDataAndHasCoordinatesAroundIt) {
   const ProgramResult wrong =
       runProgram({"render", file("a.splats"), "-o", file("b.png"), "--axes-titles", "x,y"});
   EXPECT_EQ(wrong.status, 2);
-  EXPECT_NE(wrong.err.find("--axes-titles x,y: expected three titles, X,Y,Z"), std::string::npos)
-      << wrong.err;
+  expectSays(wrong.err, "--axes-titles x,y: expected three titles, X,Y,Z");
 }
 
 TEST_F(Annotations, EachFunctionHasABarWithATitleOfItsOwn) {
@@ -136,9 +117,7 @@ TEST_F(Annotations, EachFunctionHasABarWithATitleOfItsOwn) {
   const ProgramResult wrong = runProgram({"render", file("a.splats"), "-o", file("b.png"),
                                           "--scalar-bar-title", "a", "--scalar-bar-title", "b"});
   EXPECT_EQ(wrong.status, 2);
-  EXPECT_NE(wrong.err.find("--scalar-bar-title: given 2 times; the picture shows 1 function"),
-            std::string::npos)
-      << wrong.err;
+  expectSays(wrong.err, "--scalar-bar-title: given 2 times; the picture shows 1 function");
 }
 
 TEST_F(Annotations, TheScalarBarHasTheFunctionsColoursTheHighestOnTop) {
@@ -186,8 +165,7 @@ TEST_F(Annotations, OverTransparencyTheyAreOpaque) {
 }
 
 TEST_F(Annotations, EglDrawsWhatOsMesaDraws) {
-  const ProgramResult system = runProgram({"info", "--system", "--json"});
-  ASSERT_EQ(system.status, 0) << system.err;
+  const ProgramResult system = run({"info", "--system", "--json"});
   const auto json = nlohmann::json::parse(system.out);
   for (const auto& backend : json.at("backends"))
     if (!backend.at("works").get<bool>()) GTEST_SKIP() << backend.dump();

@@ -1,20 +1,23 @@
-// OpenGL and the processor draw the same picture of every scene.
+// OpenGL and the processor draw the same picture of every scene, and of what lies around the volume: surfaces,
+// slices, isosurfaces, light, cuts and two scalars. There EGL is compared, too, where the machine has it, if only in
+// software.
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
 struct BackendScene {
   std::string scene;
-  std::vector<std::string> options;  // of `generate`
+  Words options;  // of `generate`
 };
 
 void PrintTo(const BackendScene& scene, std::ostream* out) {
@@ -22,23 +25,11 @@ void PrintTo(const BackendScene& scene, std::ostream* out) {
   for (const std::string& option : scene.options) *out << ' ' << option;
 }
 
-class EveryScene : public testing::TestWithParam<BackendScene> {
+class EveryScene : public ProgramTest, public testing::WithParamInterface<BackendScene> {
  protected:
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
-  static void run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
+  Image render(const std::string& backend, const Words& view, const std::string& function) {
+    return pictureOf(file("a.splats"), file("a.pfm"), Words{"--backend", backend, "--tf", function} + view);
   }
-  Image render(const std::string& backend, const std::vector<std::string>& view,
-               const std::string& function) {
-    std::vector<std::string> arguments{"render", file("a.splats"), "-o",    file("a.pfm"), "--backend",
-                                       backend,  "--size",         "96x96", "--tf",        function};
-    arguments.insert(arguments.end(), view.begin(), view.end());
-    run(arguments);
-    return readImage(file("a.pfm"));
-  }
-
-  const TemporaryFolder folder_;
 };
 
 INSTANTIATE_TEST_SUITE_P(, EveryScene,
@@ -49,20 +40,67 @@ INSTANTIATE_TEST_SUITE_P(, EveryScene,
                                          BackendScene{"sheared-waves", {}}, BackendScene{"wake", {}}));
 
 TEST_P(EveryScene, IsTheSameByOpenGlAndByTheProcessor) {
-  std::vector<std::string> generate{"generate", GetParam().scene, "--size", "32x20x20", "-o", file("a")};
-  generate.insert(generate.end(), GetParam().options.begin(), GetParam().options.end());
-  run(generate);
+  run(Words{"generate", GetParam().scene, "--size", "32x20x20", "-o", file("a")} + GetParam().options);
   run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
-  if (HasFatalFailure()) return;
-  const std::vector<std::vector<std::string>> views{
+  const std::vector<Words> views{
       {}, {"--view", "-z"}, {"--view", "+x"}, {"--view-angle", "60"}, {"--lod-pixels", "8"}};
   for (const auto& view : views)
     for (const std::string function : {"viridis", "cool-warm"}) {
       const ImageDifference difference =
           compareImages(render("osmesa", view, function), render("cpu", view, function));
-      if (HasFatalFailure()) return;
       EXPECT_GE(difference.psnr_db, 50) << function << ' ' << testing::PrintToString(view);
     }
+}
+
+const Words kAround[] = {
+    {"--surface", "kmin,jmax"},
+    {"--surface", "kmin,jmax", "--surface-opacity", "0.4"},
+    {"--surface", "kmin", "--surface-by", "f", "--surface-opacity", "function"},
+    {"--surface", "sheet.obj"},
+    {"--slice=2,0,2,1,0.3,0.2", "--slice=2,0,2,0,0.4,1"},
+    {"--slice=2,0,2,0.3,1,0.2", "--slice-opacity", "0.5"},
+    {"--slice=2,0,2,0.3,1,0.2", "--volume", "off"},
+    {"--iso", "0.5"},
+    {"--iso", "0.3,0.6", "--iso-opacity", "0.5"},
+    {"--shade"},
+    {"--light-direction", "1,0.4,0.6", "--light", "0.2,0.8,0.4"},
+    {"--clip-plane=2,0,2,1,0.3,0.2", "--clip-plane=2,0,2,0,-0.4,1"},
+    {"--clip-box=-1,5,-1,1,1,3"},
+    {"--surface", "kmin", "--clip-plane=2,0,2,1,0.3,0.2", "--shade"},
+    {"--scalar", "jacobian", "--opacity-by", "f", "--opacity-range", "0,1"},
+};
+
+class AroundBackends : public ProgramTest, public testing::WithParamInterface<std::string> {
+ protected:
+  void SetUp() override {
+    const ProgramResult system = run({"info", "--system", "--json"});
+    const auto report = nlohmann::json::parse(system.out);
+    for (const auto& backend : report.at("backends"))
+      if (backend.at("name") == GetParam() && !backend.at("works").get<bool>())
+        GTEST_SKIP() << backend.dump();
+    madeCache(file("wake"), "wake", "48x32x24", {"--scalar", "f,jacobian"});
+    std::ofstream(file("sheet.obj")) << "v -3 -2 1\nv 6 -2 2.5\nv 6 2 3\nv -3 2 1.5\nf 1 2 3 4\n";
+  }
+  Image drawn(const std::string& backend, const Words& view, const Words& more) const {
+    Words words = Words{"--backend", backend, "--range", "0,1", "--view", "iso"} + view;
+    for (const std::string& option : more) words.push_back(option == "sheet.obj" ? file(option) : option);
+    return pictureOf(file("wake.splats"), file("a.pfm"), words, "160x120");
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(, AroundBackends, testing::Values("osmesa", "egl"),
+                         [](const testing::TestParamInfo<std::string>& tested) { return tested.param; });
+
+TEST_P(AroundBackends, DrawWhatTheProcessorDraws) {
+  for (const Words& view : {Words{}, Words{"--view-angle", "40"}}) {
+    const Image plain = drawn("cpu", view, {});
+    for (const Words& options : kAround) {
+      const Image cpu = drawn("cpu", view, options), image = drawn(GetParam(), view, options);
+      EXPECT_LT(compareImages(cpu, plain).psnr_db, 60)  // a nearly transparent face: 57.5
+          << "changes nothing: " << testing::PrintToString(options);
+      EXPECT_GE(compareImages(image, cpu).psnr_db, 50) << testing::PrintToString(options);
+    }
+  }
 }
 
 }  // namespace

@@ -1,41 +1,38 @@
-// Bad input to the real program: exit status 1 (2 for wrong usage), exactly one line on stderr that names the
-// file, what was expected and what was found, and nothing left behind that opens as if whole.
+// Bad input to the real program: exit status 1 (2 for wrong usage), exactly one line on stderr that names
+// the file, what was expected and what was found, and nothing left behind that opens as if whole. What
+// people mistype: the line names the word and what was probably meant.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/file.h"
 #include "stream/base/progress.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
-class BadInput : public testing::Test {
+class BadInput : public ProgramSuite<BadInput> {
  protected:
-  static void SetUpTestSuite() {
-    shared_ = std::make_unique<TemporaryFolder>();
+  static void prepare() {
     writeScene("scene", {12, 10, 8});
     writeScene("other", {12, 10, 9});
-    writeFileAtomically(*shared_ / "text.xyz", std::string("Dear reader,\nthis is a letter and no grid.\n"));
-    writeFileAtomically(*shared_ / "empty.xyz", std::string());
-    const ProgramResult result =
-        runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("whole.splats")});
-    ASSERT_EQ(result.status, 0) << result.err;
+    writeFileAtomically(*folder_ / "text.xyz", std::string("Dear reader,\nthis is a letter and no grid.\n"));
+    writeFileAtomically(*folder_ / "empty.xyz", std::string());
+    run({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("whole.splats")});
   }
-  static void TearDownTestSuite() { shared_.reset(); }
-
-  static std::string file(const std::string& name) { return (*shared_ / name).string(); }
 
   static void writeScene(const std::string& name, SceneGridSize size) {
     Progress progress;
-    writePlot3d(SceneGridSource(makeScene("half-annulus"), size), *shared_ / name, progress);
+    writePlot3d(SceneGridSource(makeScene("half-annulus"), size), *folder_ / name, progress);
   }
 
   /// The first `bytes` bytes of a file of the folder.
@@ -45,38 +42,22 @@ class BadInput : public testing::Test {
     return path;
   }
 
-  static void expectOneLine(const ProgramResult& result, int status, const std::vector<std::string>& words) {
-    EXPECT_EQ(result.status, status) << result.err;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    for (const std::string& word : words)
-      EXPECT_NE(result.err.find(word), std::string::npos) << "'" << word << "' is not in: " << result.err;
-  }
-
   /// Converts into a folder of its own, expects to be refused, and that nothing is left there.
-  static void expectNotConverted(std::vector<std::string> inputs, const std::vector<std::string>& words,
-                                 int status = 1) {
+  static void expectNotConverted(const Words& inputs, const Words& says, int status = 1) {
     const TemporaryFolder output;
-    std::vector<std::string> arguments{"convert", "-o", (output / "out.splats").string()};
-    arguments.insert(arguments.begin() + 1, inputs.begin(), inputs.end());
-    expectOneLine(runProgram(arguments), status, words);
+    expectRefused(Words{"convert"} + inputs + Words{"-o", (output / "out.splats").string()}, status, says);
     for (const auto& left : std::filesystem::directory_iterator(output.path()))
       ADD_FAILURE() << "left behind: " << left.path();
   }
 
-  static void expectNotRendered(const std::string& cache, const std::vector<std::string>& more,
-                                const std::vector<std::string>& words, int status = 1) {
+  static void expectNotRendered(const std::string& cache, const Words& more, const Words& says,
+                                int status = 1) {
     const TemporaryFolder output;
-    std::vector<std::string> arguments{"render", cache,  "-o", (output / "out.png").string(),
-                                       "--size", "16x16"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    expectOneLine(runProgram(arguments), status, words);
+    expectRefused(Words{"render", cache, "-o", (output / "out.png").string(), "--size", "16x16"} + more,
+                  status, says);
     EXPECT_TRUE(std::filesystem::is_empty(output.path()));
   }
-
-  static std::unique_ptr<TemporaryFolder> shared_;
 };
-
-std::unique_ptr<TemporaryFolder> BadInput::shared_;
 
 TEST_F(BadInput, MissingGrid) {
   expectNotConverted({file("missing.xyz"), file("scene.fun")}, {"missing.xyz"});
@@ -87,7 +68,7 @@ TEST_F(BadInput, MissingSolution) {
 }
 
 TEST_F(BadInput, FolderInsteadOfAFile) {
-  expectNotConverted({shared_->path().string(), file("scene.fun")}, {shared_->path().filename().string()});
+  expectNotConverted({folder_->path().string(), file("scene.fun")}, {folder_->path().filename().string()});
 }
 
 TEST_F(BadInput, EmptyGrid) {
@@ -127,16 +108,15 @@ TEST_F(BadInput, UnknownScalar) {
 }
 
 TEST_F(BadInput, UnwritableCache) {
-  const ProgramResult result =
-      runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("nowhere/out.splats")});
-  expectOneLine(result, 1, {"nowhere"});
+  expectRefused({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("nowhere/out.splats")}, 1,
+                {"nowhere"});
 }
 
 TEST_F(BadInput, ExistingCacheIsNotOverwritten) {
   const std::string before = readTextFile(file("whole.splats/manifest.json"));
   const ProgramResult result =
       runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("whole.splats")});
-  expectOneLine(result, result.status, {"whole.splats", "--overwrite"});
+  expectRefused(result, result.status, {"whole.splats", "--overwrite"});
   EXPECT_NE(result.status, 0);
   EXPECT_EQ(readTextFile(file("whole.splats/manifest.json")), before);
 }
@@ -145,7 +125,7 @@ TEST_F(BadInput, OrdinaryFileIsNotOverwritten) {
   writeFileAtomically(file("letter"), std::string("precious"));
   const ProgramResult result =
       runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("letter"), "--overwrite"});
-  expectOneLine(result, result.status, {"letter"});
+  expectRefused(result, result.status, {"letter"});
   EXPECT_NE(result.status, 0);
   EXPECT_EQ(readTextFile(file("letter")), "precious");
 }
@@ -190,30 +170,28 @@ TEST_F(BadInput, BrokenTransferFunction) {
 }
 
 TEST_F(BadInput, PictureNameWithAnotherEnding) {
-  const ProgramResult result = runProgram({"render", file("whole.splats"), "-o", file("out.jpg")});
-  expectOneLine(result, 2, {"out.jpg", ".png", ".exr", ".pfm"});
+  expectRefused({"render", file("whole.splats"), "-o", file("out.jpg")}, 2,
+                {"out.jpg", ".png", ".exr", ".pfm"});
   EXPECT_FALSE(std::filesystem::exists(file("out.jpg")));
 }
 
 TEST_F(BadInput, UnwritablePicture) {
-  const ProgramResult result =
-      runProgram({"render", file("whole.splats"), "-o", file("nowhere/out.png"), "--size", "16x16"});
-  expectOneLine(result, 1, {"nowhere"});
+  expectRefused({"render", file("whole.splats"), "-o", file("nowhere/out.png"), "--size", "16x16"}, 1,
+                {"nowhere"});
 }
 
 TEST_F(BadInput, WrongUsage) {
-  expectOneLine(runProgram({}), 2, {"subcommand", "see curvisplat --help"});
-  expectOneLine(runProgram({"frobnicate"}), 2, {"frobnicate"});
-  expectOneLine(runProgram({"convert"}), 2, {"see curvisplat convert --help"});
-  expectOneLine(runProgram({"render"}), 2, {"CACHE is required", "see curvisplat render --help"});
-  expectOneLine(runProgram({"compare", file("scene.xyz")}), 2, {"see curvisplat compare --help"});
-  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "4x4"}), 2,
-                {"--sise"});
+  expectRefused(runProgram({}), 2, {"subcommand", "see curvisplat --help"});
+  expectRefused({"frobnicate"}, 2, {"frobnicate"});
+  expectRefused({"convert"}, 2, {"see curvisplat convert --help"});
+  expectRefused({"render"}, 2, {"CACHE is required", "see curvisplat render --help"});
+  expectRefused({"compare", file("scene.xyz")}, 2, {"see curvisplat compare --help"});
+  expectRefused({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "4x4"}, 2, {"--sise"});
 }
 
 TEST_F(BadInput, InvalidOptionValues) {
   const auto refused = [](const std::vector<std::string>& arguments, const std::string& text) {
-    expectOneLine(runProgram(arguments), 2, {text});
+    expectRefused(arguments, 2, {text});
   };
   // The unknown option comes first, whatever else is missing.
   refused({"render", "--sise"}, "unknown option --sise (did you mean --size?)");
@@ -225,40 +203,131 @@ TEST_F(BadInput, InvalidOptionValues) {
           "--threads '1025': expected a number from 0 to 1024");
   refused({"convert", file("scene.xyz"), "--threads", ""}, "--threads ''");
   refused({"convert", file("scene.xyz"), "-o"}, "--output needs a value");
-  expectOneLine(runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"),
-                            "--memory", "1K"}),
-                1, {"--memory 1 KiB: conversion of 1 scalar takes at least 160 MiB"});
-  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--memory", "1K"}), 2,
+  expectRefused(
+      {"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"), "--memory", "1K"}, 1,
+      {"--memory 1 KiB: conversion of 1 scalar takes at least 160 MiB"});
+  expectRefused({"render", file("whole.splats"), "-o", file("a.png"), "--memory", "1K"}, 2,
                 {"--memory 1 KiB: too little"});
 }
 
 TEST_F(BadInput, MisspeltSubcommandGetsTheListOfThem) {
-  expectOneLine(runProgram({"rendr", file("whole.splats")}), 2,
-                {"rendr", "did you mean render?", "convert", "info"});
-  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "9x9"}), 2,
+  expectRefused({"rendr", file("whole.splats")}, 2, {"rendr", "did you mean render?", "convert", "info"});
+  expectRefused({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "9x9"}, 2,
                 {"unknown option --sise (did you mean --size?); see"});
-  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--zzzzzz=3"}), 2,
+  expectRefused({"render", file("whole.splats"), "-o", file("a.png"), "--zzzzzz=3"}, 2,
                 {"unknown option --zzzzzz; see curvisplat render --help"});
 }
 
 TEST_F(BadInput, UnknownScene) {
-  const ProgramResult result = runProgram({"generate", "pipe", "--size", "4x4x4", "-o", file("pipe")});
-  expectOneLine(result, 2, {"pipe", "half-annulus", "wake"});
+  expectRefused({"generate", "pipe", "--size", "4x4x4", "-o", file("pipe")}, 2,
+                {"pipe", "half-annulus", "wake"});
 }
 
 TEST_F(BadInput, InvalidSizeOfAScene) {
   for (const char* size :
        {"", "4", "4x4", "4x4x4x4", "4x4x1", "ax4x4", "-4x4x4", "4x4x4 ", "99999999999999999999x4x4"})
-    expectOneLine(runProgram({"generate", "wake", "--size", size, "-o", file("sized")}), 2, {"NIxNJxNK"});
+    expectRefused({"generate", "wake", "--size", size, "-o", file("sized")}, 2, {"NIxNJxNK"});
 }
 
 TEST_F(BadInput, ComparingAFileThatIsNotAPicture) {
-  expectOneLine(runProgram({"compare", file("text.xyz"), file("text.xyz")}), 1, {"text.xyz", "PNG"});
+  expectRefused({"compare", file("text.xyz"), file("text.xyz")}, 1, {"text.xyz", "PNG"});
 }
 
 TEST_F(BadInput, InfoWithoutAnArgument) {
-  expectOneLine(runProgram({"info", file("missing.splats")}), 1, {"missing.splats"});
-  expectOneLine(runProgram({"info", file("text.xyz")}), 1, {"text.xyz"});
+  expectRefused({"info", file("missing.splats")}, 1, {"missing.splats"});
+  expectRefused({"info", file("text.xyz")}, 1, {"text.xyz"});
+}
+
+class Suggestions : public ProgramSuite<Suggestions> {
+ protected:
+  static void prepare() {
+    run({"generate", "half-annulus", "--size", "16x10x8", "-o", file("a")});
+    run({"convert", file("a.xyz"), file("a.fun"), "-o", file("flow.splats"), "--scalar", "f,volume"});
+  }
+  static void expectMeant(const Words& words, const std::string& meant) {
+    const ProgramResult result = runProgram(words);
+    EXPECT_NE(result.status, 0) << testing::PrintToString(words);
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find(meant), std::string::npos)
+        << testing::PrintToString(words) << ": " << result.err;
+  }
+  /// `render` of the cache with these options.
+  static void expectMeantByRender(const Words& options, const std::string& meant) {
+    expectMeant(Words{"render", file("flow.splats"), "-o", file("a.png")} + options, meant);
+  }
+};
+
+TEST_F(Suggestions, Subcommands) {
+  for (const auto& [wrong, right] :
+       std::vector<std::pair<std::string, std::string>>{{"rendr", "render"},
+                                                        {"veiw", "view"},
+                                                        {"convret", "convert"},
+                                                        {"inof", "info"},
+                                                        {"colourmaps", "colormaps"}})
+    expectMeant({wrong}, fmt::format("unknown subcommand '{}' (did you mean {}?)", wrong, right));
+  expectMeant({"--versoin"}, "unknown option --versoin (did you mean --version?)");
+}
+
+TEST_F(Suggestions, Options) {
+  for (const auto& [wrong, right] :
+       std::vector<std::pair<std::string, std::string>>{{"--sise", "--size"},
+                                                        {"--opcity", "--opacity"},
+                                                        {"--colormap", "--tf"},
+                                                        {"--cmap", "--tf"},
+                                                        {"--time-step", "--step"},
+                                                        {"--fps", "--frame-rate"},
+                                                        {"--contour", "--iso"}})
+    expectMeantByRender({wrong, "1"}, fmt::format("unknown option {} (did you mean {}?)", wrong, right));
+}
+
+TEST_F(Suggestions, OptionsWithoutTheirValues) {
+  expectMeantByRender({"--orbit", "--size", "9x9"}, "--orbit: needs a value (found the option --size)");
+  expectMeantByRender({"--scalar", "--size", "9x9"}, "--scalar: needs a value (found the option --size)");
+}
+
+TEST_F(Suggestions, Values) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases{
+      {{"--scalar", "volum"}, "(did you mean volume?); it has f, volume"},
+      {{"--scalar", "vol"}, "did you mean volume?"},
+      {{"--scalar", "f,volume"}, "a picture shows one scalar"},
+      {{"--scalar", "all"}, "a picture shows one scalar"},
+      {{"--opacity-by", "volme"}, "did you mean volume?"},
+      {{"--surface-by", "volme", "--surface", "kmin"}, "did you mean volume?"},
+      {{"--tf", "virdis"}, "did you mean viridis?"},
+      {{"--tf", "cool warm"}, "did you mean cool-warm?"},
+      {{"--view", "isometric"}, "did you mean iso?"},
+      {{"--view", "top"}, "did you mean +z?"},
+      {{"--view", "x"}, "did you mean +x?"},
+      {{"--surface", "kmn"}, "did you mean kmin?"},
+      {{"--surface", "wals"}, "did you mean walls?"},
+      {{"--surface", "block 0:kmin"}, "the grid has one block, block 1"},
+      {{"--surface", "block 2:kmin"}, "the grid has one block, block 1"},
+      {{"--backend", "osmsa"}, "did you mean osmesa?"},
+      {{"--background", "wite"}, "did you mean white?"},
+      {{"--classify", "flt"}, "did you mean flat?"},
+      {{"--volume", "of", "--surface", "kmin"}, "did you mean off?"},
+      {{"--size", "100*80"}, "did you mean 100x80?"},
+      {{"--size", "100,80"}, "did you mean 100x80?"},
+      {{"--size", "100"}, "expected WIDTHxHEIGHT, found 1 number"},
+      {{"--step", "3"}, "--step 3: is out of range"},
+      {{"--orbit", "360"}, "use a name such as frame_%04d.png, or a movie"}};
+  for (const auto& [options, meant] : cases) expectMeantByRender(options, meant);
+  expectMeant({"render", file("flow.splats"), "-o", file("a.pgn")}, "did you mean .png?");
+  expectMeant({"render", file("flow.splats"), "-o", file("a.exr"), "--channels", "dept"},
+              "did you mean depth?");
+  expectMeant({"render", file("flwo.splats"), "-o", file("a.png")},
+              fmt::format("did you mean {}?", file("flow.splats")));
+  expectMeant({"generate", "half-anulus", "-o", file("x")}, "did you mean half-annulus?");
+  expectMeant({"generate", "wake", "-o", file("x")}, "--size NIxNJxNK is required");
+  expectMeant({"info", file("flow.splats"), "--probe", "1,2"}, "--probe needs 3 values, found 2");
+  const auto convert = [](const Words& options, const std::string& meant) {
+    expectMeant(Words{"convert", file("a.xyz"), file("a.fun"), "-o", file("b.splats")} + options, meant);
+  };
+  convert({"--scalar", "volum"}, "did you mean volume?");
+  convert({"--byte-order", "litle"},
+          "--byte-order 'litle': expected one of big, little (did you mean little?)");
+  convert({"--overlap", "ownr"}, "did you mean owner?");
+  convert({"--time-step", "4"}, "--time-step 4 is out of range");
 }
 
 }  // namespace

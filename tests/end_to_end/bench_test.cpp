@@ -6,36 +6,23 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "render/image/image.h"
 #include "render/image/image_file.h"
-#include "stream/base/file.h"
-#include "tests/support/folder_watch.h"
-#include "tests/support/lattice_cache.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Bench : public testing::Test {
+class Bench : public ProgramTest {
  protected:
   void writeCache() { writeLatticeCache(folder_ / "a.splats", 0.2, {0.01, 0.01, 0.01}); }
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
-
-  static void expectOneLine(const ProgramResult& result, int status, const std::string& words) {
-    EXPECT_EQ(result.status, status) << result.err;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find(words), std::string::npos) << "'" << words << "' is not in: " << result.err;
-  }
-
-  const TemporaryFolder folder_;
 };
 
 /// What compare.py relies on.
 nlohmann::json readReport(const std::string& path) {
-  const auto json = nlohmann::json::parse(readTextFile(path));
+  const auto json = jsonOf(path);
   EXPECT_EQ(json["schema"], 1);
   EXPECT_EQ(json["program"], "curvisplat");
   EXPECT_TRUE(json["version"].is_string());
@@ -59,9 +46,8 @@ std::set<std::string> namesIn(const nlohmann::json& report) {
 
 TEST_F(Bench, MeasuresEveryRowOfACache) {
   writeCache();
-  const ProgramResult result = runProgram({"bench", file("a.splats"), "--quick", "--json", file("b.json"),
-                                           "--plot", file("plots"), "--threads", "2", "--size", "100x80"});
-  ASSERT_EQ(result.status, 0) << result.err;
+  const ProgramResult result = run({"bench", file("a.splats"), "--quick", "--json", file("b.json"), "--plot",
+                                    file("plots"), "--threads", "2", "--size", "100x80"});
   const auto report = readReport(file("b.json"));
   const std::set<std::string> names = namesIn(report);
   for (const char* way : {"direct", "direct-pread", "buffered-cold", "buffered-warm"}) {
@@ -83,10 +69,10 @@ TEST_F(Bench, MeasuresEveryRowOfACache) {
 
   ASSERT_TRUE(report.contains("verdict"));
   const std::string first = report["verdict"]["lines"][0];
-  EXPECT_NE(first.find("bounds the frame"), std::string::npos) << first;
+  expectSays(first, "bounds the frame");
   for (const std::string& words : {std::string("Disk: geometry.bin"), std::string("buffered, warm"),
                                    std::string("draw, cpu"), std::string("1 px"), first})
-    EXPECT_NE(result.out.find(words), std::string::npos) << words << "\n" << result.out;
+    expectSays(result.out, words);
   for (const char* plot : {"disk.png", "stages.png", "frames.png"})
     EXPECT_GT(readImage(fs::path(file("plots")) / plot).size.width, 100) << plot;
 }
@@ -94,16 +80,15 @@ TEST_F(Bench, MeasuresEveryRowOfACache) {
 TEST_F(Bench, MeasuresAConversionAndLeavesNothingBehind) {
   fs::create_directory(file("tmp"));
   const ProgramResult result =
-      runProgram({"bench", "--convert", "--nodes", "9K", "--quick", "--memory", "256M", "--tmp", file("tmp"),
-                  "--json", file("b.json"), "--plot", folder_.path().string()});
-  ASSERT_EQ(result.status, 0) << result.err;
+      run({"bench", "--convert", "--nodes", "9K", "--quick", "--memory", "256M", "--tmp", file("tmp"),
+           "--json", file("b.json"), "--plot", folder_.path().string()});
   EXPECT_TRUE(fs::is_empty(file("tmp")));
   const auto report = readReport(file("b.json"));
   const bool cold = report["conversion"]["grid_files_cold"];
   const std::set<std::string> names = namesIn(report);
   for (const char* name : {"rate", "phase/scan", "phase/scatter", "phase/build", "peak_memory", "cache"})
     EXPECT_EQ(names.count(fmt::format("conversion/{}/{}", cold ? "cold" : "warm", name)), 1u) << name;
-  EXPECT_NE(result.out.find("nodes/s"), std::string::npos) << result.out;
+  expectSays(result.out, "nodes/s");
   EXPECT_GT(readImage(file("conversion.png")).size.width, 100);
 }
 
@@ -114,28 +99,27 @@ TEST_F(Bench, ConversionThatIsInterruptedLeavesNothingBehind) {
   FolderWatch(tmp).waitUntil([&] { return !fs::is_empty(tmp); });
   program.signal(SIGINT);
   const ProgramResult result = program.wait();
-  EXPECT_EQ(result.status, 128 + SIGINT) << result.err;
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  expectRefused(result, 128 + SIGINT, {});
   EXPECT_TRUE(fs::is_empty(tmp));
 }
 
 TEST_F(Bench, ReportsWrongUsage) {
   writeCache();
   const std::string cache = file("a.splats");
-  expectOneLine(runProgram({"bench"}), 2, "--convert");
-  expectOneLine(runProgram({"bench", cache, "--convert"}), 2, "give either a cache or --convert");
-  expectOneLine(runProgram({"bench", cache, "--nodes", "8M"}), 2, "--nodes needs --convert");
+  expectRefused({"bench"}, 2, {"--convert"});
+  expectRefused({"bench", cache, "--convert"}, 2, {"give either a cache or --convert"});
+  expectRefused({"bench", cache, "--nodes", "8M"}, 2, {"--nodes needs --convert"});
   for (const char* nodes : {"0", "-5", "many", "8MM", "99999999999999999999", "999"})
-    expectOneLine(runProgram({"bench", "--convert", std::string("--nodes=") + nodes}), 2, nodes);
-  expectOneLine(runProgram({"bench", "--convert", "--nodes", "999999G"}), 1, "MiB free");
-  expectOneLine(runProgram({"bench", "--convert", "--tmp", file("nowhere")}), 1, "nowhere");
-  expectOneLine(runProgram({"bench", file("none.splats")}), 1, "none.splats");
-  expectOneLine(runProgram({"bench", cache, "--scalar", "heat"}), 1, "heat");
-  expectOneLine(runProgram({"bench", cache, "--lod-pixels", "1,-2"}), 2, "-2");
-  expectOneLine(runProgram({"bench", cache, "--lod-pixels", "1,,2"}), 2, "--lod-pixels");
-  expectOneLine(runProgram({"bench", cache, "--plot", file("no/where")}), 1, "--plot");
-  expectOneLine(runProgram({"bench", cache, "--plot", cache + "/manifest.json"}), 1, "is not a directory");
-  expectOneLine(runProgram({"bench", cache, "--json", file("no/b.json")}), 1, "--json");
+    expectRefused({"bench", "--convert", std::string("--nodes=") + nodes}, 2, {nodes});
+  expectRefused({"bench", "--convert", "--nodes", "999999G"}, 1, {"MiB free"});
+  expectRefused({"bench", "--convert", "--tmp", file("nowhere")}, 1, {"nowhere"});
+  expectRefused({"bench", file("none.splats")}, 1, {"none.splats"});
+  expectRefused({"bench", cache, "--scalar", "heat"}, 1, {"heat"});
+  expectRefused({"bench", cache, "--lod-pixels", "1,-2"}, 2, {"-2"});
+  expectRefused({"bench", cache, "--lod-pixels", "1,,2"}, 2, {"--lod-pixels"});
+  expectRefused({"bench", cache, "--plot", file("no/where")}, 1, {"--plot"});
+  expectRefused({"bench", cache, "--plot", cache + "/manifest.json"}, 1, {"is not a directory"});
+  expectRefused({"bench", cache, "--json", file("no/b.json")}, 1, {"--json"});
 }
 
 }  // namespace

@@ -11,8 +11,7 @@
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/faces_file.h"
 #include "tests/support/cache_summary.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -36,7 +35,7 @@ TEST_P(CacheVersion, IsStillRead) {
     const CacheReader cache(base.string() + ".splats");
     EXPECT_TRUE(verifyCache(cache).findings.empty());
 
-    const auto expected = nlohmann::json::parse(readTextFile(base.string() + ".json"));
+    const auto expected = jsonOf(base.string() + ".json");
     const auto found = summaryOf(cache);
     EXPECT_EQ(found.size(), expected.size());
     for (const auto& [what, sum] : found) {
@@ -85,22 +84,17 @@ TEST(CacheVersions, UnknownVersionsAreRefusedWithAdvice) {
     const std::string picture = folder / "a.png";
     for (const std::vector<std::string>& command :
          {std::vector<std::string>{"info", cache}, {"render", cache, "-o", picture}}) {
-      const ProgramResult result = runProgram(command);
-      EXPECT_EQ(result.status, 1);
-      EXPECT_EQ(lineCount(result.err), 1) << result.err;
-      EXPECT_NE(result.err.find(fmt::format("version {}", version)), std::string::npos) << result.err;
-      EXPECT_NE(result.err.find(what_to_do), std::string::npos) << result.err;
+      expectRefused(command, 1, {fmt::format("version {}", version), what_to_do});
     }
     // And do it.
     const std::string grid = folder / "grid";
-    ASSERT_EQ(runProgram({"generate", "wake", "--size", "8x8x8", "-o", grid}).status, 0);
+    run({"generate", "wake", "--size", "8x8x8", "-o", grid});
     const std::vector<std::string> convert{"convert", grid + ".xyz", grid + ".fun", "-o", cache};
     EXPECT_EQ(runProgram(convert).status, 1);
     std::vector<std::string> overwrite = convert;
     overwrite.push_back("--overwrite");
-    const ProgramResult result = runProgram(overwrite);
-    EXPECT_EQ(result.status, 0) << result.err;
-    EXPECT_EQ(runProgram({"info", cache}).status, 0);
+    run(overwrite);
+    run({"info", cache});
   }
 }
 
@@ -108,16 +102,12 @@ TEST(CacheVersions, UnknownFeaturesAreRefused) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "a.splats";
   fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/cells.splats", cache);
-  EXPECT_EQ(runProgram({"info", cache}).status, 0);
+  run({"info", cache});
   auto manifest = nlohmann::ordered_json::parse(readTextFile(cache / "manifest.json"));
   manifest.erase("checksum");
   manifest["requires"].push_back("colours");
   writeFileAtomically(cache / "manifest.json", manifest.dump());
-  const ProgramResult result = runProgram({"info", cache});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  for (const char* part : {"'colours'", "newer program"})
-    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+  expectRefused({"info", cache}, 1, {"'colours'", "newer program"});
 }
 
 }  // namespace

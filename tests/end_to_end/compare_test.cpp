@@ -6,13 +6,12 @@
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
-class Compare : public testing::Test {
+class Compare : public ProgramTest {
  protected:
   Compare() {
     Image image({8, 4});
@@ -23,48 +22,32 @@ class Compare : public testing::Test {
     writeImage(image, folder_ / "dot.pfm");
     writeImage(Image({4, 8}), folder_ / "turned.pfm");
   }
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
-
-  TemporaryFolder folder_;
 };
 
 TEST_F(Compare, ReportsIdenticalPicturesAcrossFormats) {
-  const ProgramResult result =
-      runProgram({"compare", file("white.pfm"), file("white.png"), "--min-psnr", "200"});
-  EXPECT_EQ(result.status, 0) << result.err;
+  const ProgramResult result = run({"compare", file("white.pfm"), file("white.png"), "--min-psnr", "200"});
   EXPECT_EQ(result.out, "identical\n");
 }
 
 TEST_F(Compare, ReportsPsnrAndTheWorstPixel) {
-  const ProgramResult result =
-      runProgram({"compare", file("white.pfm"), file("dot.pfm"), "--min-psnr", "25.8"});
-  EXPECT_EQ(result.status, 0) << result.err;
+  const ProgramResult result = run({"compare", file("white.pfm"), file("dot.pfm"), "--min-psnr", "25.8"});
   // One of 96 values is off by a half: 10 log10(96 / 0.25).
   EXPECT_EQ(result.out, "PSNR 25.84 dB, largest difference 0.500000 at pixel (5, 2)\n");
 }
 
 TEST_F(Compare, FailsBelowTheLimit) {
-  const ProgramResult result =
-      runProgram({"compare", file("white.pfm"), file("dot.pfm"), "--min-psnr", "25.9"});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1);
-  EXPECT_NE(result.err.find("25.84"), std::string::npos) << result.err;
+  expectRefused({"compare", file("white.pfm"), file("dot.pfm"), "--min-psnr", "25.9"}, 1, {"25.84"});
 }
 
 TEST_F(Compare, WritesTheDifference) {
-  const ProgramResult result =
-      runProgram({"compare", file("white.pfm"), file("dot.pfm"), "--difference", file("difference.png")});
-  EXPECT_EQ(result.status, 0) << result.err;
+  run({"compare", file("white.pfm"), file("dot.pfm"), "--difference", file("difference.png")});
   const Image difference = readImage(file("difference.png"));
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 8; ++x) EXPECT_EQ(difference.pixel(x, y)[0], x == 5 && y == 2 ? 1 : 0);
 }
 
 TEST_F(Compare, RefusesOtherSizes) {
-  const ProgramResult result = runProgram({"compare", file("white.pfm"), file("turned.pfm")});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1);
-  EXPECT_NE(result.err.find("turned.pfm"), std::string::npos) << result.err;
+  expectRefused({"compare", file("white.pfm"), file("turned.pfm")}, 1, {"turned.pfm"});
 }
 
 }  // namespace

@@ -1,54 +1,42 @@
-// The convert subcommand, option by option, on the real program.
+// The convert subcommand, option by option, on the real program; also --add-scalar and --refine.
 #include <gtest/gtest.h>
-
-#include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <vector>
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/file.h"
 #include "stream/base/progress.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
-class ConvertOptionsTest : public testing::Test {
+class ConvertOptionsTest : public ProgramTest {
  protected:
   void SetUp() override {
     Progress progress;
     writePlot3d(SceneGridSource(makeScene("wake"), {60, 50, 40}), folder_ / "wake", progress);
   }
 
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
-
-  ProgramResult convert(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(),
-                     {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("wake.splats")});
-    return runProgram(arguments);
+  Words convert(const Words& more) const {
+    return Words{"convert", file("wake.xyz"), file("wake.fun"), "-o", file("wake.splats")} + more;
   }
-
-  std::map<std::string, std::string> cacheFiles() const {
-    std::map<std::string, std::string> files;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "wake.splats"))
-      files[entry.path().filename().string()] = readTextFile(entry.path());
-    return files;
-  }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(ConvertOptionsTest, PrintsWhatItDid) {
-  const ProgramResult result = convert({"--stats", file("stats.json")});
-  ASSERT_EQ(result.status, 0) << result.err;
+  const ProgramResult result = run(convert({"--stats", file("stats.json")}));
   EXPECT_EQ(lineCount(result.out), 3) << result.out;
-  EXPECT_NE(result.out.find("120000 samples, 118000 splats"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("rounded within"), std::string::npos) << result.out;
-  EXPECT_NE(result.err.find("2000 nodes on block faces coincide"), std::string::npos) << result.err;
+  expectSays(result.out, "120000 samples, 118000 splats");
+  expectSays(result.out, "rounded within");
+  expectSays(result.err, "2000 nodes on block faces coincide");
 
-  const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
+  const auto stats = jsonOf(folder_ / "stats.json");
   EXPECT_EQ(stats["samples"], 120000);
   EXPECT_EQ(stats["merged_nodes"], 2000);
   EXPECT_GT(stats["peak_memory_bytes"], 0);
@@ -66,57 +54,43 @@ TEST_F(ConvertOptionsTest, PrintsWhatItDid) {
 }
 
 TEST_F(ConvertOptionsTest, GivesTheSameCacheForAnyThreadsAndMemory) {
-  ASSERT_EQ(convert({"--threads", "1", "--memory", "200M"}).status, 0);
-  const auto one = cacheFiles();
-  const ProgramResult result = convert({"--threads", "2", "--memory", "8G", "--overwrite"});
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_TRUE(cacheFiles() == one);
+  run(convert({"--threads", "1", "--memory", "200M"}));
+  const Files one = filesOf(folder_ / "wake.splats");
+  run(convert({"--threads", "2", "--memory", "8G", "--overwrite"}));
+  EXPECT_TRUE(filesOf(folder_ / "wake.splats") == one);
 }
 
 TEST_F(ConvertOptionsTest, PutsTemporaryFilesIntoTheGivenFolderAndRemovesThem) {
   std::filesystem::create_directory(folder_ / "tmp");
-  ASSERT_EQ(convert({"--tmp", file("tmp")}).status, 0);
+  run(convert({"--tmp", file("tmp")}));
   EXPECT_TRUE(std::filesystem::is_empty(folder_ / "tmp"));
-  const ProgramResult result = convert({"--tmp", file("none"), "--overwrite"});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("--tmp"), std::string::npos) << result.err;
+  expectRefused(convert({"--tmp", file("none"), "--overwrite"}), 1, {"--tmp"});
 }
 
 TEST_F(ConvertOptionsTest, RefusesLessMemoryThanItNeeds) {
-  const ProgramResult result = convert({"--memory", "10M"});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("--memory"), std::string::npos) << result.err;
+  expectRefused(convert({"--memory", "10M"}), 1, {"--memory"});
   EXPECT_FALSE(std::filesystem::exists(folder_ / "wake.splats"));
 }
 
 TEST_F(ConvertOptionsTest, TakesATrailingSlash) {
-  const ProgramResult result =
-      runProgram({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("slash.splats/")});
-  ASSERT_EQ(result.status, 0) << result.err;
+  run({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("slash.splats/")});
   EXPECT_TRUE(std::filesystem::exists(folder_ / "slash.splats" / "manifest.json"));
 }
 
 /// --dry-run's forecast, and the conversion that it is of.
-void expectForecastHolds(const std::vector<std::string>& conversion, const TemporaryFolder& folder) {
-  std::vector<std::string> dry = conversion, real = conversion;
-  dry.insert(dry.end(), {"--dry-run", "--stats", (folder / "dry.json").string()});
-  real.insert(real.end(), {"--stats", (folder / "real.json").string()});
-  const ProgramResult forecast = runProgram(dry);
-  ASSERT_EQ(forecast.status, 0) << forecast.err;
+void expectForecastHolds(const Words& conversion, const TemporaryFolder& folder) {
+  const ProgramResult forecast =
+      run(conversion + Words{"--dry-run", "--stats", (folder / "dry.json").string()});
   EXPECT_FALSE(std::filesystem::exists(folder / "out.splats"));
   for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
     EXPECT_EQ(entry.path().filename().string().find("dry-run"), std::string::npos) << entry.path();
-  const ProgramResult converted = runProgram(real);
-  ASSERT_EQ(converted.status, 0) << converted.err;
+  run(conversion + Words{"--stats", (folder / "real.json").string()});
   uint64_t bytes = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder / "out.splats"))
     bytes += entry.file_size();
-  const auto found = nlohmann::json::parse(readTextFile(folder / "dry.json"))["dry_run"];
+  const auto found = jsonOf(folder / "dry.json")["dry_run"];
   EXPECT_NEAR(found["cache_bytes"].get<double>() / static_cast<double>(bytes), 1, 0.05) << forecast.out;
-  const auto peak =
-      nlohmann::json::parse(readTextFile(folder / "real.json"))["peak_memory_bytes"].get<double>();
+  const auto peak = jsonOf(folder / "real.json")["peak_memory_bytes"].get<double>();
   EXPECT_NEAR(found["memory_bytes"].get<double>() / peak, 1, 0.3) << forecast.out;
 }
 
@@ -125,8 +99,7 @@ TEST_F(ConvertOptionsTest, ADryRunPredictsCostsAndLeavesNothing) {
 }
 
 TEST_F(ConvertOptionsTest, ADryRunOfASeriesCountsItsSteps) {
-  ASSERT_EQ(runProgram({"generate", "wake", "--size", "40x30x20", "--steps", "4", "-o", file("s")}).status,
-            0);
+  run({"generate", "wake", "--size", "40x30x20", "--steps", "4", "-o", file("s")});
   expectForecastHolds({"convert", file("s.xyz"), file("s_*.fun"), "-o", file("out.splats")}, folder_);
 }
 
@@ -137,10 +110,169 @@ TEST_F(ConvertOptionsTest, ADryRunNeedsANewCache) {
   EXPECT_EQ(
       added.err,
       "curvisplat: --dry-run: is for a new cache; leave out --add-scalar, --add-steps, --to and --follow\n");
-  ASSERT_EQ(convert({}).status, 0);
-  const ProgramResult in_the_way = convert({"--dry-run"});
+  run(convert({}));
+  const ProgramResult in_the_way = runProgram(convert({"--dry-run"}));
   EXPECT_EQ(in_the_way.status, 1);
-  EXPECT_NE(in_the_way.err.find("--overwrite"), std::string::npos) << in_the_way.err;
+  expectSays(in_the_way.err, "--overwrite");
+}
+
+class AddScalarCommand : public ProgramTest {
+ protected:
+  AddScalarCommand() {
+    run({"generate", "wake", "--size", "60x40x20", "-o", file("scene")});
+    // A function file of a second scalar: four integers, then a number a node.
+    std::string bytes = bytesOfFile(file("scene.fun"));
+    for (size_t at = 16; at + sizeof(float) <= bytes.size(); at += sizeof(float)) {
+      float value;
+      std::memcpy(&value, &bytes[at], sizeof value);
+      value = std::sin(10 * value);
+      std::memcpy(&bytes[at], &value, sizeof value);
+    }
+    std::ofstream(file("more.fun"), std::ios::binary) << bytes;
+    std::ofstream(file("more.nam")) << "wave\n";
+    run({"convert", file("scene.xyz"), file("scene.fun"), "-o", cache});
+  }
+
+  const std::string cache = file("a.splats");
+};
+
+TEST_F(AddScalarCommand, AddsAScalarThatCanBeDrawn) {
+  const std::string geometry = bytesOfFile(file("a.splats/geometry.bin"));
+  const ProgramResult added = run({"convert", file("scene.xyz"), file("more.fun"), "--add-scalar", "wave",
+                                   "--to", cache + "/", "--memory", "256M", "--stats", file("stats.json")});
+  expectSays(added.out, "added wave");
+  EXPECT_EQ(lineCount(added.out), 2) << added.out;
+  EXPECT_TRUE(bytesOfFile(file("a.splats/geometry.bin")) == geometry);
+
+  const auto stats = jsonOf(file("stats.json"));
+  EXPECT_EQ(stats["samples"], 60 * 40 * 20);
+  EXPECT_EQ(stats["phases"].size(), 6u);
+  EXPECT_EQ(stats["files"].size(), 2u);  // of the scalar, and of its values on faces
+
+  run({"info", cache, "--verify"});
+  const auto info = nlohmann::json::parse(run({"info", cache, "--json"}).out);
+  ASSERT_EQ(info["variables"].size(), 2u);
+  EXPECT_EQ(info["variables"][1]["name"], "wave");
+  EXPECT_EQ(info["variables"][1]["number"], 1);
+
+  // Drawn from the added scalar as from a cache that never had another.
+  run({"convert", file("scene.xyz"), file("more.fun"), "-o", file("b.splats")});
+  run({"render", cache, "--scalar", "wave", "-o", file("a.png"), "--size", "64x64"});
+  run({"render", file("b.splats"), "-o", file("b.png"), "--size", "64x64"});
+  EXPECT_TRUE(bytesOfFile(file("a.png")) == bytesOfFile(file("b.png")));
+  run({"render", cache, "-o", file("first.png"), "--size", "64x64"});
+  EXPECT_FALSE(bytesOfFile(file("a.png")) == bytesOfFile(file("first.png")));
+}
+
+TEST_F(AddScalarCommand, RefusesInOneLine) {
+  const auto refused = [&](const Words& more, int status, const std::string& says) {
+    expectRefused(Words{"convert", file("scene.xyz"), file("more.fun")} + more, status, {says});
+  };
+  refused({"--add-scalar", "wave"}, 2, "--to");
+  refused({"--to", cache}, 2, "--add-scalar");
+  refused({"--add-scalar", "wave", "--to", cache, "-o", file("b.splats")}, 2, "--output");
+  refused({"--add-scalar", "wave", "--to", cache, "--scalar", "wave"}, 2, "--scalar");
+  refused({"--add-scalar", "wave", "--to", cache, "--overwrite"}, 2, "--overwrite");
+  refused({}, 2, "--output is required");
+  refused({"--add-scalar", "missing", "--to", cache}, 1, "missing");
+  refused({"--add-scalar", "wave", "--to", file("none.splats")}, 1, "none.splats");
+  refused({"--add-scalar", "wave", "--to", file("scene.fun")}, 1, "scene.fun");
+  refused({"--add-scalar", "wave", "--to", cache, "--memory", "1M"}, 1, "--memory");
+  run({"convert", file("scene.xyz"), file("more.fun"), "--add-scalar", "wave", "--to", cache});
+  refused({"--add-scalar", "wave", "--to", cache}, 2, "already");
+}
+
+class RefineCommand : public ProgramTest {
+ protected:
+  RefineCommand() {
+    Progress progress;
+    writePlot3d(SceneGridSource(makeScenes("duct"), {9, 7, 6}), folder_ / "duct", progress);
+  }
+
+  Words convert(const std::string& cache, const Words& more = {}) const {
+    return Words{"convert", file("duct.xyz"), file("duct.fun"), "-o", file(cache)} + more;
+  }
+  nlohmann::json manifest(const std::string& cache) const {
+    return jsonOf(folder_ / cache / "manifest.json");
+  }
+};
+
+TEST_F(RefineCommand, CutsEachCellAndSaysSo) {
+  run(convert("1.splats"));
+  run(convert("2.splats", {"--refine", "2", "--threads", "1"}));
+  const nlohmann::json whole = manifest("1.splats"), fine = manifest("2.splats");
+  EXPECT_FALSE(whole.contains("refined"));
+  EXPECT_EQ(fine["refined"], 2);
+  EXPECT_EQ(fine["nodes"], 3 * 17 * 13 * 11);
+  EXPECT_EQ(fine["blocks"][0]["ni"], 17);
+  EXPECT_NEAR(fine["volume"].get<double>() / whole["volume"].get<double>(), 1, 1e-3);
+  EXPECT_EQ(fine["lower"], whole["lower"]);
+  EXPECT_EQ(fine["upper"], whole["upper"]);
+  const ProgramResult info = runProgram({"info", file("2.splats")});
+  expectSays(info.out, "2 x 2 x 2");
+  const ProgramResult probe = runProgram({"info", file("2.splats"), "--probe", "0.5,0.5,0.5"});
+  expectSays(probe.out, "in the refined grid");
+  EXPECT_EQ(runProgram({"info", file("1.splats")}).out.find("refined"), std::string::npos);
+
+  const Files one = filesOf(folder_ / "2.splats");
+  run(convert("2.splats", {"--refine", "2", "--threads", "2", "--memory", "200M", "--overwrite"}));
+  EXPECT_TRUE(filesOf(folder_ / "2.splats") == one);
+  run(convert("1.splats", {"--refine", "1", "--overwrite"}));
+  EXPECT_EQ(manifest("1.splats"), whole);
+}
+
+TEST_F(RefineCommand, FurtherScalarsFollowTheCache) {
+  run(convert("a.splats", {"--refine", "2"}));
+  const auto add = [&](const char* scalar, const Words& more) {
+    return Words{"convert", file("duct.xyz"), "--add-scalar", scalar, "--to", file("a.splats")} + more;
+  };
+  run(add("i", {}));
+  run(add("j", {"--refine", "2"}));
+  expectRefused(add("k", {"--refine", "3"}), 2, {"was converted with --refine 2"});
+  const nlohmann::json variables = manifest("a.splats")["variables"];
+  ASSERT_EQ(variables.size(), 3u);
+  EXPECT_EQ(variables[1]["max"], 8) << "the index of the grid's own nodes, interpolated";
+  run({"info", file("a.splats"), "--verify"});
+}
+
+TEST_F(RefineCommand, ASeriesGoesOnAsItBegan) {
+  run({"generate", "wake", "--size", "9x8x7", "--steps", "3", "-o", file("s")});
+  const auto series = [&](const std::string& cache, const Words& more) {
+    return Words{"convert", file("s.xyz"), file("s_*.fun"), "-o", file(cache)} + more;
+  };
+  run(series("all.splats", {"--refine", "2"}));
+  run(series("some.splats", {"--refine", "2", "--steps", "0:1"}));
+  expectRefused(series("some.splats", {"--resume", "--refine", "4"}), 2, {"was converted with --refine 2"});
+  run(series("some.splats", {"--resume"}));
+  EXPECT_TRUE(filesOf(folder_ / "some.splats") == filesOf(folder_ / "all.splats"));
+
+  run(series("added.splats", {"--refine", "2", "--steps", "0:0"}));
+  const auto add = [&](const Words& more) {
+    return Words{"convert",     file("s.xyz"), file("s_0001.fun"),  file("s_0002.fun"),
+                 "--add-steps", "--to",        file("added.splats")} +
+           more;
+  };
+  expectRefused(add({"--refine", "3"}), 2, {"was converted with --refine 2"});
+  run(add({}));
+  EXPECT_TRUE(filesOf(folder_ / "added.splats") == filesOf(folder_ / "all.splats"));
+}
+
+TEST_F(RefineCommand, RefusesWhatCannotBeRefined) {
+  writeFileAtomically(folder_ / "tetrahedron.vtk",
+                      "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+                      "POINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n"
+                      "POINT_DATA 4\nSCALARS s float\nLOOKUP_TABLE default\n1 2 3 4\n");
+  const auto convert_it = [&](const char* parts) {
+    return Words{"convert", file("tetrahedron.vtk"), "-o", file("t.splats"), "--refine", parts};
+  };
+  expectRefused(convert_it("2"), 1, {"--refine is for structured grids"});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "t.splats"));
+  run(convert_it("1"));
+  for (const char* const parts : {"0", "17", "x"}) {
+    const ProgramResult result = runProgram(convert("no.splats", {"--refine", parts}));
+    EXPECT_EQ(result.status, 2);
+    expectSays(result.err, "--refine");
+  }
 }
 
 }  // namespace

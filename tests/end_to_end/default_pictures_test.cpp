@@ -1,54 +1,45 @@
 // Pictures without options: each shows something, and the options that the program prints draw it again.
+// --lod-pixels at its default against the finest level: coarser where the function hides it, and nowhere
+// else.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <ostream>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "render/image/contrast.h"
+#include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr std::string_view kChosen = "chosen from the data: ";
 
-class DefaultPictures : public testing::TestWithParam<const char*> {
+class DefaultPictures : public ProgramTest, public testing::WithParamInterface<const char*> {
  protected:
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
-
-  ProgramResult run(const std::vector<std::string>& arguments) const {
-    const ProgramResult result = runProgram(arguments);
-    EXPECT_EQ(result.status, 0) << result.err;
-    return result;
+  void convert(const std::string& scene, const std::string& size) const { madeCache(file("a"), scene, size); }
+  ProgramResult render(const Words& options, const std::string& name = "a.png") const {
+    return run(Words{"render", file("a.splats"), "-o", file(name), "--size", "160x160"} + options);
   }
-  void convert(const std::string& scene, const std::string& size) const {
-    run({"generate", scene, "--size", size, "-o", file("a")});
-    run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
-  }
-  ProgramResult render(std::vector<std::string> options, const std::string& name = "a.png") const {
-    options.insert(options.begin(), {"render", file("a.splats"), "-o", file(name), "--size", "160x160"});
-    return run(options);
-  }
-  static std::vector<std::string> chosenOptions(const std::string& out) {
+  static Words chosenOptions(const std::string& out) {
     const size_t at = out.find(kChosen);
     EXPECT_NE(at, std::string::npos) << out;
     if (at == std::string::npos) return {};
     std::istringstream words(out.substr(at + kChosen.size()));
-    std::vector<std::string> options;
+    Words options;
     for (std::string word; words >> word;) options.push_back(word);
     return options;
   }
-
-  TemporaryFolder folder_;
 };
 
 TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
@@ -89,7 +80,7 @@ TEST_P(DefaultPictures, HoldTheWholeData) {
   for (const char* const stretched : {"1,1,1", "8,1,1", "1,0.05,1"})
     for (const char* const size : {"160x160", "240x80", "80x240"})
       for (const bool outline : {false, true}) {
-        std::vector<std::string> words{"--size", size, "--scale", stretched, "--backend", "cpu"};
+        Words words{"--size", size, "--scale", stretched, "--backend", "cpu"};
         if (outline) words.push_back("--outline");
         words.insert(words.begin(), {"render", file("a.splats"), "-o", file("a.png")});
         const ProgramResult result = run(words);
@@ -111,13 +102,13 @@ INSTANTIATE_TEST_SUITE_P(Scenes, DefaultPictures,
 /// Real grids, which lie in a folder beside the project, where they are there; and the scalars that vary.
 struct RealGrid {
   const char* name;
-  std::vector<std::string> files, scalars;
+  Words files, scalars;
 };
 void PrintTo(const RealGrid& grid, std::ostream* out) {
   *out << grid.name;
 }
 std::vector<RealGrid> realGrids() {
-  const std::vector<std::string> whole_flow{"density", "momentum_x", "momentum_y", "momentum_z", "energy"};
+  const Words whole_flow{"density", "momentum_x", "momentum_y", "momentum_z", "energy"};
   return {
       {"bluntfin", {"bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin"}, whole_flow},
       {"delta_wing", {"delta_wing/delta_vertex.cgns"}, {"Density", "mach_number", "vorticity_magnitude"}},
@@ -145,17 +136,15 @@ TEST_P(DefaultPicturesOfRealGrids, ShowSomething) {
   if (!std::filesystem::exists(data / GetParam().files.front()))
     GTEST_SKIP() << data.string() << " is not there";
   const TemporaryFolder folder;
-  std::vector<std::string> words{"convert"};
+  Words words{"convert"};
   for (const std::string& name : GetParam().files) words.push_back((data / name).string());
   words.insert(words.end(), {"-o", (folder / "a.splats").string()});
   for (const std::string& scalar : GetParam().scalars) words.insert(words.end(), {"--scalar", scalar});
-  const ProgramResult converted = runProgram(words);
-  ASSERT_EQ(converted.status, 0) << converted.err;
+  run(words);
   for (const std::string& scalar : GetParam().scalars) {
     const std::string picture = (folder / "a.png").string();
-    const ProgramResult drawn = runProgram(
+    const ProgramResult drawn = run(
         {"render", (folder / "a.splats").string(), "-o", picture, "--size", "240x240", "--scalar", scalar});
-    ASSERT_EQ(drawn.status, 0) << drawn.err;
     EXPECT_GE(contrastOf(readImage(picture), glm::vec4(1)).other, 0.05) << scalar << ": " << drawn.out;
   }
 }
@@ -175,7 +164,7 @@ TEST_F(DefaultPictures, RangesByPercentilesAndOfAllData) {
     const ProgramResult result =
         runProgram({"render", file("a.splats"), "-o", file("w.png"), fmt::format("--range={}", wrong)});
     EXPECT_EQ(result.status, 2) << wrong << result.err;
-    EXPECT_NE(result.err.find("--range"), std::string::npos) << result.err;
+    expectSays(result.err, "--range");
   }
 }
 
@@ -184,20 +173,95 @@ TEST_F(DefaultPictures, AConstantScalarIsNotChosen) {
   run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats"), "--scalar", "all", "--scalar",
        "volume"});
   const ProgramResult result = render({});
-  EXPECT_NE(result.out.find("--scalar volume"), std::string::npos) << result.out;
+  expectSays(result.out, "--scalar volume");
 }
 
 TEST_F(DefaultPictures, PoorPicturesAreAnsweredWithAnOption) {
   convert("half-annulus", "24x16x16");
   const ProgramResult pale = render({"--range", "data", "--opacity-unit", "50"});
-  EXPECT_NE(pale.err.find("leave out --range and --opacity-unit"), std::string::npos) << pale.err;
+  expectSays(pale.err, "leave out --range and --opacity-unit");
   // Large, so that the edges of the silhouette are a small part of it.
   const ProgramResult flat =
       run({"render", file("a.splats"), "-o", file("f.png"), "--size", "800x800", "--tf", "grey", "--range",
            "100,200", "--opacity", "0:1,1:1", "--opacity-unit", "1e-4"});
-  EXPECT_NE(flat.err.find("of one colour; leave out --tf, --range, --opacity and --opacity-unit"),
-            std::string::npos)
-      << flat.err;
+  expectSays(flat.err, "of one colour; leave out --tf, --range, --opacity and --opacity-unit");
+}
+
+const Words kStep = {"--opacity", "0:0,0.499:0,0.501:0.9,1:0.9"};
+const Words kEven = {"--opacity", "0:0.3,1:0.3", "--tf", "grey"};
+const Words kFaint = {"--opacity", "0:0.01,1:0.03"};
+
+class DefaultDetail : public ProgramSuite<DefaultDetail> {
+ protected:
+  static void prepare() {
+    for (const auto& [scene, size] :
+         {std::pair{"half-annulus", "192x96x96"}, std::pair{"sheared-waves", "128x128x128"}})
+      madeCache(file(scene), scene, size);
+  }
+
+  /// Draws `scene` as `name`.pfm. Returns the number of splats.
+  static uint64_t draw(const std::string& scene, const std::string& name, const Words& options,
+                       const Words& more = {}) {
+    run(Words{"render", file(scene + ".splats"), "-o", file(name + ".pfm"), "--size", "128x128", "--stats",
+              file("stats.json")} +
+        options + more);
+    return jsonOf(file("stats.json"))["frames"][0]["splats_drawn"];
+  }
+  static double psnr(const std::string& a, const std::string& b) {
+    return compareImages(readImage(file(a + ".pfm")), readImage(file(b + ".pfm"))).psnr_db;
+  }
+};
+
+TEST_F(DefaultDetail, HoldsFiftyDecibelsAgainstTheFinestLevel) {
+  for (const char* scene : {"half-annulus", "sheared-waves"}) {
+    for (const char* view : {"iso", "+x"}) {
+      for (const auto& function : {Words{}, kStep, kEven, kFaint}) {
+        const Words options = Words{"--view", view} + function;
+        const uint64_t finest = draw(scene, "finest", options, {"--lod-pixels", "0"});
+        const uint64_t drawn = draw(scene, "drawn", options);
+        const double psnr_db = psnr("finest", "drawn");
+        fmt::print("{} {} {}: {} of {} splats, {:.1f} dB\n", scene, view, function.empty() ? "" : function[1],
+                   drawn, finest, psnr_db);
+        EXPECT_GE(psnr_db, 50) << scene << ' ' << view;
+        EXPECT_LE(drawn, finest);
+      }
+    }
+  }
+}
+
+/// Where only the geometry counts, as in lit pictures, the error on the screen alone decides. Along an axis of the lattice its
+/// ripples would show.
+TEST_F(DefaultDetail, DrawsFewerSplatsWhereTheFunctionHidesTheirDetail) {
+  const auto splatsOf = [](const Words& options, const Words& more) {
+    return draw("half-annulus", "drawn", options, more);
+  };
+  const uint64_t lit = splatsOf({"--view", "iso", "--shade"}, {});
+  EXPECT_LE(1.5 * static_cast<double>(splatsOf({"--view", "iso"}, {})), static_cast<double>(lit));
+  EXPECT_LE(3 * splatsOf({"--view", "iso"}, kFaint), lit);
+  EXPECT_LE(3 * splatsOf({"--view", "iso"}, kEven), lit);
+  EXPECT_EQ(splatsOf({"--view", "+x"}, kEven), splatsOf({"--view", "+x", "--shade"}, kEven));
+  // At 4 pixels and more nothing is hidden further.
+  const Words coarse = {"--view", "iso", "--lod-pixels", "4"};
+  EXPECT_EQ(splatsOf({}, coarse), splatsOf({"--shade"}, coarse));
+}
+
+/// A step may lie in every brick.
+TEST_F(DefaultDetail, KeepsStepsAsTheyWere) {
+  std::string steps = "0:0.9";
+  for (int n = 1; n < 20; ++n)
+    steps += fmt::format(",{}:{},{}:{}", 0.05 * n, n % 2 ? 0.9 : 0.1, 0.05 * n + 0.001, n % 2 ? 0.1 : 0.9);
+  const Words function = {"--view",         "iso", "--range", "0,1", "--opacity", steps + ",1:0.1",
+                          "--opacity-unit", "0.2"};
+  EXPECT_EQ(draw("sheared-waves", "drawn", function), draw("sheared-waves", "lit", function, {"--shade"}));
+}
+
+TEST_F(DefaultDetail, MorePixelsNeverDrawMoreSplats) {
+  uint64_t finer = UINT64_MAX;
+  for (const char* lod_pixels : {"0", "0.3", "0.5", "1", "1.5", "2", "3", "4", "8", "1000"}) {
+    const uint64_t drawn = draw("half-annulus", "drawn", {"--view", "iso", "--lod-pixels", lod_pixels});
+    EXPECT_LE(drawn, finer) << lod_pixels;
+    finer = drawn;
+  }
 }
 
 }  // namespace

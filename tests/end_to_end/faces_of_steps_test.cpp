@@ -12,8 +12,7 @@
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/function_grid.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -55,7 +54,12 @@ ConvertOptions optionsFor(const std::filesystem::path& output, std::vector<uint3
   return options;
 }
 
-class FacesOfSteps : public testing::Test {
+/// Where the faces are in sight, without the volume.
+const Words kView = {"--size",         "160x120", "--position",       "40,-50,60", "--focal-point", "15,6,6",
+                     "--view-up",      "0,0,1",   "--parallel-scale", "16",        "--range",       "-1,1",
+                     "--opacity-unit", "5",       "--volume",         "off"};
+
+class FacesOfSteps : public ProgramTest {
  protected:
   void convertSteps(const std::string& name, const std::vector<uint64_t>& steps) const {
     SeriesInput input;
@@ -68,35 +72,9 @@ class FacesOfSteps : public testing::Test {
     Progress progress;
     convertSeries(input, options, progress, [](const SeriesEvent&) {});
   }
-  Image drawn(const std::string& cache, const std::vector<std::string>& more) const {
-    const std::string output = (folder_ / "a.pfm").string();
-    std::vector<std::string> command{"render",
-                                     (folder_ / cache).string(),
-                                     "-o",
-                                     output,
-                                     "--size",
-                                     "160x120",
-                                     "--position",
-                                     "40,-50,60",
-                                     "--focal-point",
-                                     "15,6,6",
-                                     "--view-up",
-                                     "0,0,1",
-                                     "--parallel-scale",
-                                     "16",
-                                     "--range",
-                                     "-1,1",
-                                     "--opacity-unit",
-                                     "5",
-                                     "--volume",
-                                     "off"};
-    command.insert(command.end(), more.begin(), more.end());
-    const ProgramResult result = runProgram(command);
-    EXPECT_EQ(result.status, 0) << result.err;
-    return readImage(output);
+  Image drawn(const std::string& cache, const Words& more) const {
+    return pictureOf(file(cache), file("a.pfm"), kView + more);
   }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(FacesOfSteps, AStepHasTheFacesAndValuesOfItsOwn) {
@@ -115,36 +93,11 @@ TEST_F(FacesOfSteps, AStepHasTheFacesAndValuesOfItsOwn) {
       before = series;
     }
   }
-  EXPECT_EQ(runProgram({"info", (folder_ / "series.splats").string(), "--verify"}).status, 0);
+  run({"info", file("series.splats"), "--verify"});
   // Frames of steps one after the other.
-  const std::string frames = (folder_ / "f_%02d.pfm").string();
-  const ProgramResult result = runProgram({"render",
-                                           (folder_ / "series.splats").string(),
-                                           "-o",
-                                           frames,
-                                           "--size",
-                                           "160x120",
-                                           "--steps",
-                                           "0:3",
-                                           "--position",
-                                           "40,-50,60",
-                                           "--focal-point",
-                                           "15,6,6",
-                                           "--view-up",
-                                           "0,0,1",
-                                           "--parallel-scale",
-                                           "16",
-                                           "--range",
-                                           "-1,1",
-                                           "--opacity-unit",
-                                           "5",
-                                           "--volume",
-                                           "off",
-                                           "--surface",
-                                           "kmax,imax",
-                                           "--surface-by",
-                                           "s0"});
-  ASSERT_EQ(result.status, 0) << result.err;
+  run(Words{"render", file("series.splats"), "-o", file("f_%02d.pfm"), "--steps", "0:3", "--surface",
+            "kmax,imax", "--surface-by", "s0"} +
+      kView);
   for (uint64_t step = 0; step < 4; ++step)
     EXPECT_EQ(readImage(folder_ / ("f_0" + std::to_string(step) + ".pfm")).rgba,
               drawn("series.splats",
@@ -164,11 +117,11 @@ TEST_F(FacesOfSteps, AnAddedScalarColoursTheFaces) {
   addScalars(grid, adding, progress);
   for (const char* face : {"kmax,imax", "k=5"})
     for (const char* scalar : {"s0", "s1"}) {
-      const std::vector<std::string> options{"--scalar", scalar, "--surface", face, "--surface-by", scalar};
+      const Words options{"--scalar", scalar, "--surface", face, "--surface-by", scalar};
       EXPECT_EQ(drawn("added.splats", options).rgba, drawn("both.splats", options).rgba)
           << face << ", " << scalar;
     }
-  EXPECT_EQ(runProgram({"info", (folder_ / "added.splats").string(), "--verify"}).status, 0);
+  run({"info", file("added.splats"), "--verify"});
 }
 
 }  // namespace

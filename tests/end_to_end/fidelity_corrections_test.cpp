@@ -14,7 +14,6 @@
 #include "tests/reference/function_grid.h"
 #include "tests/reference/grid_field.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/reference/rearranged_grid.h"
 
 namespace curvisplat {
 namespace {

@@ -18,8 +18,8 @@
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "tests/reference/direct_picture.h"
+#include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/reference/rearranged_grid.h"
 #include "tests/reference/reference_march.h"
 #include "tests/support/temporary_folder.h"
 

@@ -15,9 +15,7 @@
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
-#include "tests/support/folder_watch.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -39,53 +37,26 @@ class ScopedEnvironment {
   const std::string before_;
 };
 
-class Frames : public testing::Test {
+class Frames : public ProgramSuite<Frames> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    makeCache("small", "half-annulus", "48x24x24");
-  }
-  static void TearDownTestSuite() { folder_.reset(); }
+  static void prepare() { madeCache(file("small"), "half-annulus", "48x24x24"); }
 
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
   static std::string cache(const std::string& name = "small") { return file(name + ".splats"); }
-
-  static void makeCache(const std::string& name, const std::string& scene, const std::string& size) {
-    ProgramResult result = runProgram({"generate", scene, "--size", size, "-o", file(name)});
-    ASSERT_EQ(result.status, 0) << result.err;
-    result = runProgram({"convert", file(name + ".xyz"), file(name + ".fun"), "-o", cache(name)});
-    ASSERT_EQ(result.status, 0) << result.err;
-  }
 
   /// Of 2 M nodes; made by the first who asks.
   static std::string large() {
-    if (!fs::exists(cache("large"))) makeCache("large", "half-annulus", "256x128x64");
+    if (!fs::exists(cache("large"))) madeCache(file("large"), "half-annulus", "256x128x64");
     return cache("large");
   }
 
-  /// Draws small pictures of the small cache; a later --size holds.
-  static ProgramResult render(const std::vector<std::string>& options) {
-    std::vector<std::string> arguments{"render", cache()};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    if (std::find(options.begin(), options.end(), "--size") == options.end())
-      arguments.insert(arguments.end(), {"--size", "64x48"});
-    return runProgram(arguments);
-  }
-  static void expectDrawn(const std::vector<std::string>& options) {
-    const ProgramResult result = render(options);
-    EXPECT_EQ(result.status, 0) << result.err;
+  /// Draws small pictures of the small cache, unless `options` have another size.
+  static Words cached(const Words& options) { return sized(Words{"render", cache()} + options, "64x48"); }
+  static void expectDrawn(const Words& options) {
+    const ProgramResult result = run(cached(options));
     EXPECT_EQ(result.err, "");
     EXPECT_EQ(lineCount(result.out), 2) << result.out;  // the second: what was chosen from the data
   }
-  static void expectRefused(const std::vector<std::string>& options, int status, const std::string& word) {
-    const ProgramResult result = render(options);
-    EXPECT_EQ(result.status, status) << result.err;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find(word), std::string::npos) << result.err << "lacks " << word;
-  }
-  static nlohmann::json json(const std::string& name) {
-    return nlohmann::json::parse(readTextFile(file(name)));
-  }
+  static nlohmann::json json(const std::string& name) { return jsonOf(file(name)); }
   static std::string bytes(const std::string& name) { return readTextFile(file(name)); }
 
   /// A program of that name in a folder of its own, which becomes all of PATH but for the system's.
@@ -96,11 +67,7 @@ class Frames : public testing::Test {
     fs::permissions(folder + "/" + program, fs::perms::owner_all);
     return folder + ":/usr/bin:/bin";
   }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
 };
-
-std::unique_ptr<TemporaryFolder> Frames::folder_;
 
 TEST_F(Frames, AnOrbitOfTwoTurnsDrawsEachPictureTwice) {
   expectDrawn({"-o", file("turn_%03d.png"), "--orbit", "720", "--frames", "8"});
@@ -112,19 +79,15 @@ TEST_F(Frames, AnOrbitOfTwoTurnsDrawsEachPictureTwice) {
 }
 
 TEST_F(Frames, AnOrbitBeginsAtTheCameraThatWasGiven) {
-  const std::vector<std::string> camera{"--view", "+x", "--view-angle", "25"};
-  std::vector<std::string> orbit{"-o", file("o%d.exr"), "--orbit", "90", "--frames", "2"},
-      still{"-o", file("still.exr")}, aside{"-o", file("aside.exr"), "--view", "+y", "--view-angle", "25"};
-  orbit.insert(orbit.end(), camera.begin(), camera.end());
-  still.insert(still.end(), camera.begin(), camera.end());
+  const Words camera{"--view", "+x", "--view-angle", "25"};
+  Words orbit = Words{"-o", file("o%d.exr"), "--orbit", "90", "--frames", "2"} + camera;
   expectDrawn(orbit);
-  expectDrawn(still);
+  expectDrawn(Words{"-o", file("still.exr")} + camera);
   EXPECT_EQ(bytes("o0.exr"), bytes("still.exr"));
   // 180 degrees in two steps: the second looks from +y.
   orbit[3] = "180";
   orbit[1] = file("p%d.exr");
-  orbit.insert(orbit.end(), {"--stats", file("p.json")});
-  expectDrawn(orbit);
+  expectDrawn(orbit + Words{"--stats", file("p.json")});
   const auto position = json("p.json")["frames"][1]["camera"]["position"];
   const auto focal_point = json("p.json")["frames"][1]["camera"]["focal_point"];
   EXPECT_NEAR(position[0].get<double>(), focal_point[0].get<double>(), 1e-9);
@@ -144,18 +107,21 @@ TEST_F(Frames, AnOrbitKeepsAllOfTheDataInEveryPicture) {
 TEST_F(Frames, NamesNeedExactlyOneFrameNumber) {
   for (const char* name : {"a.png", "a%d%d.png", "a%s.png", "a%.png", "a%5.png", "a%x.png", "a%-3d.png",
                            "a%ld.png", "a%0100d.png", "a%%d.png", "a%d_%04d.exr"})
-    expectRefused({"-o", file(name), "--orbit", "90", "--frames", "2"}, 2, "frame_%04d.png");
-  expectRefused({"-o", file("a%d.jpg"), "--orbit", "90", "--frames", "2"}, 2, ".png");
+    expectRefused(cached({"-o", file(name), "--orbit", "90", "--frames", "2"}), 2, {"frame_%04d.png"});
+  expectRefused(cached({"-o", file("a%d.jpg"), "--orbit", "90", "--frames", "2"}), 2, {".png"});
   expectDrawn({"-o", file("100%%_%2d.png"), "--orbit", "90", "--frames", "1"});
   EXPECT_TRUE(fs::exists(file("100%_ 0.png")));
   // Nor may a frame be what else is written.
-  expectRefused({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("./a01.png")}, 1,
-                "a frame of -o would overwrite it");
-  expectRefused({"-o", file("a%2d.png"), "--orbit", "90", "--frames", "2", "--first-image", file("a 0.png")},
-                1, "a frame of -o would overwrite it");
+  expectRefused(
+      cached({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("./a01.png")}), 1,
+      {"a frame of -o would overwrite it"});
+  expectRefused(
+      cached({"-o", file("a%2d.png"), "--orbit", "90", "--frames", "2", "--first-image", file("a 0.png")}), 1,
+      {"a frame of -o would overwrite it"});
   fs::create_symlink("a01.png", file("linked.json"));
-  expectRefused({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("linked.json")},
-                1, "a frame of -o would overwrite it");
+  expectRefused(
+      cached({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("linked.json")}), 1,
+      {"a frame of -o would overwrite it"});
   expectDrawn({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "1", "--stats", file("a1.png")});
   expectDrawn({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "1", "--stats", file("a01.png")});
   // One picture is written to the name as it is.
@@ -164,11 +130,8 @@ TEST_F(Frames, NamesNeedExactlyOneFrameNumber) {
 }
 
 TEST_F(Frames, PartsDrawTheFramesOfTheWhole) {
-  const std::vector<std::string> orbit{"--orbit", "360", "--frames", "5"};
-  const auto with = [&](std::vector<std::string> options) {
-    options.insert(options.end(), orbit.begin(), orbit.end());
-    return options;
-  };
+  const Words orbit{"--orbit", "360", "--frames", "5"};
+  const auto with = [&](const Words& options) { return options + orbit; };
   expectDrawn(with({"-o", file("whole_%d.png")}));
   for (const char* part : {"1/3", "2/3", "3/3"}) {
     const std::string json_name = fmt::format("part{}.json", part[0]);
@@ -182,19 +145,19 @@ TEST_F(Frames, PartsDrawTheFramesOfTheWhole) {
   expectDrawn(with({"-o", file("one_%d.png"), "--part", "2/3"}));
   for (int n = 0; n < 5; ++n) EXPECT_EQ(fs::exists(file(fmt::format("one_{}.png", n))), n % 3 == 1) << n;
   // More parts than frames: some have nothing to do.
-  const ProgramResult idle = render(with({"-o", file("idle_%d.png"), "--part", "7/9"}));
-  EXPECT_EQ(idle.status, 0) << idle.err;
-  EXPECT_NE(idle.out.find("no frames in this part"), std::string::npos) << idle.out;
+  const ProgramResult idle = run(cached(with({"-o", file("idle_%d.png"), "--part", "7/9"})));
+  expectSays(idle.out, "no frames in this part");
 }
 
 TEST_F(Frames, ImpossiblePartsAreWrongUsage) {
   for (const char* part : {"0/3", "4/3", "1", "/3", "1/", "a/3", "1/3x", "-1/3", "1/1000000"})
-    expectRefused({"-o", file("p_%d.png"), "--orbit", "9", "--frames", "2", "--part", part}, 2,
-                  "--part " + std::string(part));
-  expectRefused({"-o", file("p.png"), "--part", "1/2"}, 2, "there is only one");
-  expectRefused({"-o", file("p.mp4"), "--orbit", "9", "--part", "1/2"}, 2, "ffmpeg");
-  expectRefused({"-o", file("p_%d.png"), "--orbit", "9", "--part", "1/2", "--first-image", file("f.png")}, 2,
-                "--first-image");
+    expectRefused(cached({"-o", file("p_%d.png"), "--orbit", "9", "--frames", "2", "--part", part}), 2,
+                  {"--part " + std::string(part)});
+  expectRefused(cached({"-o", file("p.png"), "--part", "1/2"}), 2, {"there is only one"});
+  expectRefused(cached({"-o", file("p.mp4"), "--orbit", "9", "--part", "1/2"}), 2, {"ffmpeg"});
+  expectRefused(
+      cached({"-o", file("p_%d.png"), "--orbit", "9", "--part", "1/2", "--first-image", file("f.png")}), 2,
+      {"--first-image"});
 }
 
 TEST_F(Frames, APathGoesThroughItsKeyFrames) {
@@ -214,9 +177,10 @@ TEST_F(Frames, APathGoesThroughItsKeyFrames) {
   EXPECT_EQ(bytes("path_4.png"), bytes("key_2.png"));
   EXPECT_NE(bytes("path_2.png"), bytes("path_3.png"));
   std::ofstream(file("broken.json")) << R"({"key_frames": [{"time": 0, "position": [5, 0]}]})";
-  expectRefused({"-o", file("broken_%d.png"), "--path", file("broken.json"), "--frames", "5"}, 1,
-                "key_frames[0].position");
-  expectRefused({"-o", file("broken_%d.png"), "--path", file("none.json"), "--frames", "5"}, 1, "none.json");
+  expectRefused(cached({"-o", file("broken_%d.png"), "--path", file("broken.json"), "--frames", "5"}), 1,
+                {"key_frames[0].position"});
+  expectRefused(cached({"-o", file("broken_%d.png"), "--path", file("none.json"), "--frames", "5"}), 1,
+                {"none.json"});
 }
 
 TEST_F(Frames, AFailingFrameIsNamedAndTheOnesBeforeItStay) {
@@ -224,13 +188,13 @@ TEST_F(Frames, AFailingFrameIsNamedAndTheOnesBeforeItStay) {
   std::ofstream(file("through.json")) << R"({"key_frames": [
     {"time": 0, "position": [4, 0, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "parallel_scale": 2},
     {"time": 4, "position": [-4, 0, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "parallel_scale": 2}]})";
-  expectRefused({"-o", file("through_%d.png"), "--path", file("through.json"), "--frames", "5"}, 1,
-                "frame 2:");
+  expectRefused(cached({"-o", file("through_%d.png"), "--path", file("through.json"), "--frames", "5"}), 1,
+                {"frame 2:"});
   EXPECT_TRUE(fs::exists(file("through_1.png")));
   EXPECT_FALSE(fs::exists(file("through_2.png")));
 
   fs::create_directory(file("disk_3.png"));  // nothing can be written there
-  expectRefused({"-o", file("disk_%d.png"), "--orbit", "90", "--frames", "5"}, 1, "frame 3:");
+  expectRefused(cached({"-o", file("disk_%d.png"), "--orbit", "90", "--frames", "5"}), 1, {"frame 3:"});
   EXPECT_TRUE(fs::exists(file("disk_2.png")));
   EXPECT_FALSE(fs::exists(file("disk_4.png")));
 }
@@ -264,13 +228,10 @@ TEST_F(Frames, StatisticsListFramesAndTheirPercentiles) {
 }
 
 TEST_F(Frames, MaxSplatsHolds) {
-  const auto draw = [](const std::string& output, const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{
-        "render",       large(), "-o",     file(output), "--stats", file("splats.json"),
-        "--lod-pixels", "0",     "--size", "64x64"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const ProgramResult result = runProgram(arguments);
-    EXPECT_EQ(result.status, 0) << result.err;
+  const auto draw = [](const std::string& output, const Words& more) {
+    run(Words{"render", large(), "-o", file(output), "--stats", file("splats.json"), "--lod-pixels", "0",
+              "--size", "64x64"} +
+        more);
   };
   draw("few.exr", {"--max-splats", "123456"});
   EXPECT_LE(json("splats.json")["frames"][0]["splats_read"], 123456);
@@ -282,15 +243,11 @@ TEST_F(Frames, MaxSplatsHolds) {
 }
 
 TEST_F(Frames, AFirstImageIsWrittenEarlierAndLooksLikeTheFinalOne) {
-  const std::vector<std::string> direct{"render", large(),   "-o",         file("direct.exr"),
-                                        "--size", "256x256", "--channels", "none"};
-  std::vector<std::string> progressive = direct;
+  const Words direct{"render", large(), "-o", file("direct.exr"), "--size", "256x256", "--channels", "none"};
+  Words progressive = direct;
   progressive[3] = file("final.exr");
-  progressive.insert(progressive.end(), {"--first-image", file("first.exr"), "--stats", file("first.json")});
-  for (const auto& arguments : {direct, progressive}) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
-  }
+  run(direct);
+  run(progressive + Words{"--first-image", file("first.exr"), "--stats", file("first.json")});
   EXPECT_EQ(bytes("final.exr"), bytes("direct.exr"));
 
   const double psnr_db = compareImages(readImage(file("first.exr")), readImage(file("final.exr"))).psnr_db;
@@ -314,8 +271,7 @@ TEST_F(Frames, AMovieIsRawFramesToFfmpeg) {
   expectDrawn({"-o", file("movie_%d.png"), "--orbit", "90", "--frames", "3"});
   const std::string movie = bytes("movie.mp4"), words = bytes("words");
   ASSERT_EQ(movie.size(), 3u * 64 * 48 * 3);
-  for (const char* word : {"\n64x48\n", "\n12.5\n", "\nrgb24\n", "\nrawvideo\n"})
-    EXPECT_NE(words.find(word), std::string::npos) << word << "is not in " << words;
+  for (const char* word : {"\n64x48\n", "\n12.5\n", "\nrgb24\n", "\nrawvideo\n"}) expectSays(words, word);
   for (int frame = 0; frame < 3; ++frame) {
     const Image picture = readImage(file(fmt::format("movie_{}.png", frame)));
     for (size_t pixel = 0; pixel < 64 * 48; ++pixel)
@@ -336,12 +292,10 @@ TEST_F(Frames, StoppedByASignalAreReportedAndLeaveNothingUnfinished) {
     watch.waitUntil([&] { return fs::exists(out / "f_2.png"); });
     program.signal(signal);
     const ProgramResult result = program.wait();
-    EXPECT_EQ(result.status, 128 + signal) << result.err;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    expectRefused(result, 128 + signal, {});
     const size_t frames = json(out / "stats.json")["frames"].size();
     EXPECT_GE(frames, 3u);
-    EXPECT_NE(result.err.find(fmt::format("interrupted after {} of 99999 frames", frames)), std::string::npos)
-        << result.err;
+    expectSays(result.err, fmt::format("interrupted after {} of 99999 frames", frames));
     EXPECT_EQ(std::distance(fs::directory_iterator(out), {}), static_cast<ptrdiff_t>(frames + 1));
   }
 }
@@ -364,7 +318,7 @@ TEST_F(Frames, AMovieStoppedByASignalIsRemoved) {
   program.signal(SIGTERM);
   const ProgramResult result = program.wait();
   EXPECT_EQ(result.status, 128 + SIGTERM) << result.err;
-  EXPECT_NE(result.err.find("m.mp4 was not written"), std::string::npos) << result.err;
+  expectSays(result.err, "m.mp4 was not written");
   EXPECT_TRUE(fs::is_empty(out));
 }
 
@@ -396,29 +350,32 @@ TEST_F(Frames, AMovieFollowsALink) {
 }
 
 TEST_F(Frames, AMovieThatFailsLeavesNothing) {
-  const std::vector<std::string> movie{"-o", file("failed.mp4"), "--orbit", "90", "--frames", "3"};
+  const Words movie{"-o", file("failed.mp4"), "--orbit", "90", "--frames", "3"};
   {
     const ScopedEnvironment path("PATH",
                                  folderWith("ffmpeg", "echo 'no such encoder' >&2\necho more >&2\nexit 3\n"));
-    expectRefused(movie, 1, "ffmpeg ended with status 3 before the movie was complete: no such encoder");
+    expectRefused(cached(movie), 1,
+                  {"ffmpeg ended with status 3 before the movie was complete: no such encoder"});
   }
   {
     const ScopedEnvironment path("PATH", folderWith("ffmpeg", "cat > /dev/null\nkill -9 $$\n"));
-    expectRefused(movie, 1, "signal 9");
+    expectRefused(cached(movie), 1, {"signal 9"});
   }
   {
     const ScopedEnvironment path("PATH", file("empty"));
-    expectRefused(movie, 1, "ffmpeg, which writes movies, was not found in PATH");
+    expectRefused(cached(movie), 1, {"ffmpeg, which writes movies, was not found in PATH"});
   }
   for (const auto& entry : fs::directory_iterator(folder_->path()))
     for (const char* part : {"failed", ".curvisplat"})
       EXPECT_EQ(entry.path().filename().string().find(part), std::string::npos) << entry.path();
-  expectRefused({"-o", file("failed.mp4")}, 2, "--orbit, --path or --steps");
-  expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--size", "65x48"}, 2, "even");
-  expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--background", "transparent"}, 2,
-                "transparent");
-  expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--frame-rate", "0"}, 2,
-                "--frame-rate");
+  expectRefused(cached({"-o", file("failed.mp4")}), 2, {"--orbit, --path or --steps"});
+  expectRefused(cached({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--size", "65x48"}), 2,
+                {"even"});
+  expectRefused(
+      cached({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--background", "transparent"}), 2,
+      {"transparent"});
+  expectRefused(cached({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--frame-rate", "0"}), 2,
+                {"--frame-rate"});
 }
 
 TEST_F(Frames, AMovieIsMadeWhereThereIsFfmpeg) {

@@ -1,5 +1,7 @@
-// Grid files of other formats through the real program: from the file to a cache and a picture.
+// Grid files of other formats, VTK's among them, through the real program: from the command line to a cache
+// and a picture.
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <filesystem>
 #include <string>
@@ -10,70 +12,55 @@
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/support/earth_files.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
-class GridFormats : public testing::Test {
+class GridFormats : public ProgramTest {
  protected:
-  std::string folder(const char* name) const { return folder_ / name; }
-
-  void convert(const std::vector<std::string>& words, const std::string& cache) const {
-    std::vector<std::string> arguments = {"convert"};
-    arguments.insert(arguments.end(), words.begin(), words.end());
-    arguments.insert(arguments.end(), {"-o", cache});
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
-    const ProgramResult verified = runProgram({"info", cache, "--verify"});
-    ASSERT_EQ(verified.status, 0) << verified.err;
+  static void convert(const Words& words, const std::string& cache) {
+    run(Words{"convert"} + words + Words{"-o", cache});
+    run({"info", cache, "--verify"});
   }
 
-  std::string picture(const std::string& cache, const std::vector<std::string>& words) const {
-    const std::string file = folder("picture.pfm");
-    std::vector<std::string> arguments = {"render", cache, "-o", file, "--size", "200x200"};
-    arguments.insert(arguments.end(), words.begin(), words.end());
-    const ProgramResult result = runProgram(arguments);
-    EXPECT_EQ(result.status, 0) << result.err;
-    return readTextFile(file);
+  /// The bytes of the picture, which is picture.pfm.
+  std::string picture(const std::string& cache, const Words& more) const {
+    pictureOf(cache, file("picture.pfm"), more, "200x200");
+    return readTextFile(file("picture.pfm"));
   }
-
-  TemporaryFolder folder_;
 };
 
 TEST_F(GridFormats, AnOceanOnTheSphereAndOnTheMap) {
-  const std::string file = folder("roms.nc");
-  roms::write(file, NetcdfFileType::kNetcdf4Compressed, "ocean_s_coordinate_g2");
+  const std::string roms_file = file("roms.nc");
+  roms::write(roms_file, NetcdfFileType::kNetcdf4Compressed, "ocean_s_coordinate_g2");
   // The next word after --sphere is the grid, not a radius.
-  convert({"--sphere", file, "--vertical-scale", "100"}, folder("sphere.splats"));
-  const Manifest sphere = CacheReader(folder("sphere.splats")).manifest();
+  convert({"--sphere", roms_file, "--vertical-scale", "100"}, file("sphere.splats"));
+  const Manifest sphere = CacheReader(file("sphere.splats")).manifest();
   EXPECT_EQ(sphere.variables.at(0).name, "temp");
   EXPECT_EQ(sphere.blanked_nodes, 4 * roms::kLevels);
   EXPECT_NEAR(sphere.upper.x, 6371 * 0.76, 60);  // at 40 degrees north
 
-  convert({"--flat", file, "--scalar", "u"}, folder("flat.splats"));
-  const Manifest flat = CacheReader(folder("flat.splats")).manifest();
+  convert({"--flat", roms_file, "--scalar", "u"}, file("flat.splats"));
+  const Manifest flat = CacheReader(file("flat.splats")).manifest();
   EXPECT_EQ(flat.variables.at(0).name, "u");
   EXPECT_EQ(flat.nodes, (roms::kXi - 1) * roms::kEta * roms::kLevels);
   EXPECT_LT(flat.upper.x, 0);  // west of Greenwich
   EXPECT_GT(flat.lower.z, -1);
 
-  EXPECT_EQ(runProgram({"info", file, "--sphere=0"}).status, 2);
-  EXPECT_EQ(runProgram({"info", file, "--sphere", "--flat"}).status, 2);
-  EXPECT_EQ(
-      runProgram({"convert", file, "-o", folder("none.splats"), "--scalar", "temp", "--scalar", "u"}).status,
-      1);
+  EXPECT_EQ(runProgram({"info", roms_file, "--sphere=0"}).status, 2);
+  EXPECT_EQ(runProgram({"info", roms_file, "--sphere", "--flat"}).status, 2);
+  EXPECT_EQ(runProgram({"convert", roms_file, "-o", file("none.splats"), "--scalar", "temp", "--scalar", "u"})
+                .status,
+            1);
 }
 
 TEST_F(GridFormats, AScalarIsAddedToAnOcean) {
-  const std::string file = folder("roms.nc");
-  roms::write(file, NetcdfFileType::kClassic, "ocean_s_coordinate_g2");
-  convert({file, "--scalar", "temp"}, folder("ocean.splats"));
-  const ProgramResult added =
-      runProgram({"convert", file, "--add-scalar", "salt", "--to", folder("ocean.splats")});
-  ASSERT_EQ(added.status, 0) << added.err;
-  const Manifest manifest = CacheReader(folder("ocean.splats")).manifest();
+  const std::string roms_file = file("roms.nc");
+  roms::write(roms_file, NetcdfFileType::kClassic, "ocean_s_coordinate_g2");
+  convert({roms_file, "--scalar", "temp"}, file("ocean.splats"));
+  run({"convert", roms_file, "--add-scalar", "salt", "--to", file("ocean.splats")});
+  const Manifest manifest = CacheReader(file("ocean.splats")).manifest();
   ASSERT_EQ(manifest.variables.size(), 2u);
   EXPECT_EQ(manifest.variables[1].name, "salt");
 }
@@ -87,17 +74,16 @@ class SharedGridFormats : public GridFormats {
 };
 
 TEST_F(SharedGridFormats, TheDeltaWingHasItsVortex) {
-  const std::string cache = folder("delta.splats");
+  const std::string cache = file("delta.splats");
   convert({shared() / "delta_wing/delta_vertex.cgns", "--scalar", "Density"}, cache);
   // Seen from behind, of a slice across the rear of the wing: low density only above one half of it.
-  writeFileAtomically(folder("vortex.json"),
+  writeFileAtomically(file("vortex.json"),
                       std::string(R"([{"ColorSpace": "RGB", "RGBPoints": [0.86, 1, 0, 0, 1.02, 0, 0, 1],
                          "Points": [0.86, 0.9, 0.5, 0, 0.94, 0.5, 0.5, 0, 0.96, 0, 0.5, 0, 1.02, 0, 0.5, 0]}])"));
-  const std::string file = folder("picture.pfm");
-  picture(cache, {"--scalar", "Density", "--tf", folder("vortex.json"), "--opacity-unit", "0.02",
-                  "--clip-box", "0.7,0.9,0,0.6,-0.3,0.5", "--position", "4,0.2,0.1", "--focal-point",
-                  "0.8,0.2,0.1", "--view-up", "0,0,1", "--parallel-scale", "0.3"});
-  const Image image = readImage(file);
+  picture(cache, {"--scalar", "Density", "--tf", file("vortex.json"), "--opacity-unit", "0.02", "--clip-box",
+                  "0.7,0.9,0,0.6,-0.3,0.5", "--position", "4,0.2,0.1", "--focal-point", "0.8,0.2,0.1",
+                  "--view-up", "0,0,1", "--parallel-scale", "0.3"});
+  const Image image = readImage(file("picture.pfm"));
   double red_weight = 0, y = 0, z = 0;
   for (int row = 0; row < image.size.height; ++row)
     for (int column = 0; column < image.size.width; ++column) {
@@ -113,9 +99,9 @@ TEST_F(SharedGridFormats, TheDeltaWingHasItsVortex) {
 }
 
 TEST_F(SharedGridFormats, CellsInAdfAndInHdf5AreOnePicture) {
-  std::vector<std::string> pictures;
+  Words pictures;
   for (const char* type : {"adf", "hdf"}) {
-    const std::string cache = folder(type) + ".splats";
+    const std::string cache = file(type) + ".splats";
     convert({shared() / ("cgns/sqnz_s." + std::string(type) + ".cgns"), "--scalar", "Density"}, cache);
     const Manifest manifest = CacheReader(cache).manifest();
     EXPECT_TRUE(manifest.cells);
@@ -123,6 +109,59 @@ TEST_F(SharedGridFormats, CellsInAdfAndInHdf5AreOnePicture) {
     pictures.push_back(picture(cache, {}));
   }
   EXPECT_EQ(pictures[0], pictures[1]);
+}
+
+const std::string kMade = std::string(CURVISPLAT_TEST_DATA) + "/vtk/";
+
+class VtkProgram : public ProgramTest {
+ protected:
+  Words convert(const std::string& grid, const Words& more = {}) const {
+    return Words{"convert", grid, "-o", cache_, "--overwrite"} + more;
+  }
+
+  const std::string cache_ = (folder_ / "out.splats").string();
+};
+
+TEST_F(VtkProgram, ReportsTimeStepsUnlessOneIsChosen) {
+  ProgramResult result = run(convert(kMade + "series.pvd"));
+  expectSays(result.err, "note: 3 time steps from 0.5 to 4; using the first: choose with --time-step 0..2");
+  EXPECT_EQ(CacheReader(cache_).manifest().steps.at(0).time, 0.5);
+
+  result = run(convert(kMade + "series.pvd", {"--time-step", "2", "--scalar", "wall_distance"}));
+  EXPECT_EQ(result.err.find("time step"), std::string::npos) << result.err;
+  const CacheReader cache(cache_);
+  EXPECT_EQ(cache.manifest().steps.at(0).time, 4.0);
+  EXPECT_EQ(cache.manifest().variables.at(0).name, "wall distance");
+  EXPECT_FLOAT_EQ(static_cast<float>(cache.manifest().variables[0].min), 4.70710678f);
+
+  expectRefused(convert(kMade + "series.pvd", {"--time-step", "3"}), 1, {});
+}
+
+TEST_F(VtkProgram, AddsAScalarOfAVector) {
+  run(convert(kMade + "ghosts.pvts", {"--scalar", "RTData"}));
+  run(convert(kMade + "raw_lz4_64.vts", {"--scalar", "p"}));
+  run({"convert", kMade + "raw_lz4_64.vts", "--add-scalar", "U:mag", "--to", cache_});
+  EXPECT_EQ(CacheReader(cache_).manifest().variables.at(1).name, "U:mag");
+  run({"info", "--verify", cache_});
+}
+
+TEST_F(VtkProgram, ConvertsValuesInCells) {
+  run(convert(kMade + "ghosts.pvts", {"--scalar", "RTData:cell"}));
+  EXPECT_EQ(CacheReader(cache_).manifest().splats, 8u * 7 * 6);
+}
+
+TEST_F(VtkProgram, InfoReportsNodesAndCells) {
+  const ProgramResult result = run({"info", "--json", kMade + "blocks.vtm"});
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json["nodes"], 120);
+  EXPECT_EQ(json["blanked"]["not_finite"], 0);
+  EXPECT_EQ(json["blocks"][1]["name"], "outlet");
+  EXPECT_EQ(json["scalars"][0]["name"], "p");
+  EXPECT_EQ(json["scalars"][0]["centring"], "node");
+  const auto& last = json["scalars"].back();
+  EXPECT_EQ(last["name"], "flux:z");
+  EXPECT_EQ(last["centring"], "cell");
+  EXPECT_EQ(last["max"], 46);  // of 24 cells
 }
 
 }  // namespace

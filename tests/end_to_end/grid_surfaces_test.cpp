@@ -17,8 +17,7 @@
 #include "stream/base/error.h"
 #include "stream/cache/faces_file.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -158,71 +157,34 @@ TEST(GridSurfaces, LevelsMeetWithoutGaps) {
   EXPECT_GT(compareImages(picture, fine).psnr_db, 35);
 }
 
-class GridSurfaceOptions : public testing::Test {
+class GridSurfaceOptions : public ProgramSuite<GridSurfaceOptions> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
+  static void prepare() {
     run({"generate", "wake", "--size", "96x64x48", "-o", file("wake")});
     run({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("wake.splats"), "--surface", "k=20"});
     run({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("bare.splats"), "--no-surfaces"});
   }
-  static void TearDownTestSuite() { folder_.reset(); }
 
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
-  static void run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
+  static Words render(const Words& more, const std::string& cache = "wake.splats") {
+    return Words{"render", file(cache), "-o", file("a.pfm"), "--size", "200x150", "--view", "iso"} + more;
   }
-  static ProgramResult render(std::vector<std::string> more, const std::string& cache = "wake.splats") {
-    more.insert(more.begin(),
-                {"render", file(cache), "-o", file("a.pfm"), "--size", "200x150", "--view", "iso"});
-    return runProgram(more);
-  }
-  static Image picture(const std::vector<std::string>& more) {
-    const ProgramResult result = render(more);
-    EXPECT_EQ(result.status, 0) << result.err;
+  static Image picture(const Words& more) {
+    run(render(more));
     return readImage(file("a.pfm"));
   }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
 };
-
-std::unique_ptr<TemporaryFolder> GridSurfaceOptions::folder_;
 
 TEST_F(GridSurfaceOptions, EveryPainterDrawsTheSame) {
   for (const char* angle : {"", "40"}) {
-    std::vector<std::string> options{"--surface",    "jmin,kmax",    "--surface",
-                                     "k=20:i=10-60", "--surface-by", "f"};
-    if (*angle) options.insert(options.end(), {"--view-angle", angle});
-    const auto with = [&](std::vector<std::string> more) {
-      more.insert(more.end(), options.begin(), options.end());
-      return picture(more);
-    };
-    const Image cpu = with({"--backend", "cpu"});
-    EXPECT_GT(compareImages(cpu, with({"--backend", "osmesa"})).psnr_db, 50) << angle;
-    EXPECT_EQ(with({"--backend", "cpu", "--threads", "1"}).rgba, cpu.rgba);
-    EXPECT_EQ(with({"--backend", "cpu", "--threads", "3", "--memory", "160M"}).rgba, cpu.rgba);
-    run({"render",
-         file("wake.splats"),
-         "-o",
-         file("a.pfm"),
-         "--size",
-         "200x150",
-         "--view",
-         "iso",
-         "--backend",
-         "cpu",
-         "--first-image",
-         file("first.png"),
-         "--surface",
-         "jmin,kmax",
-         "--surface",
-         "k=20:i=10-60",
-         "--surface-by",
-         "f",
-         *angle ? "--view-angle" : "--lod-pixels",
-         *angle ? angle : "1"});
-    EXPECT_EQ(readImage(file("a.pfm")).rgba, cpu.rgba);
+    Words options{"--surface", "jmin,kmax", "--surface", "k=20:i=10-60", "--surface-by", "f"};
+    if (*angle) options = options + Words{"--view-angle", angle};
+    const Image cpu = picture(Words{"--backend", "cpu"} + options);
+    EXPECT_GT(compareImages(cpu, picture(Words{"--backend", "osmesa"} + options)).psnr_db, 50) << angle;
+    EXPECT_EQ(picture(Words{"--backend", "cpu", "--threads", "1"} + options).rgba, cpu.rgba);
+    EXPECT_EQ(picture(Words{"--backend", "cpu", "--threads", "3", "--memory", "160M"} + options).rgba,
+              cpu.rgba);
+    const Image last = picture(Words{"--backend", "cpu", "--first-image", file("first.png")} + options);
+    EXPECT_EQ(last.rgba, cpu.rgba);
   }
 }
 
@@ -243,7 +205,7 @@ TEST_F(GridSurfaceOptions, APartOfAFaceIsAPartOfItsPicture) {
 TEST_F(GridSurfaceOptions, VerifyFindsDamagedFaces) {
   const std::filesystem::path damaged = file("damaged.splats");
   std::filesystem::copy(file("wake.splats"), damaged, std::filesystem::copy_options::recursive);
-  EXPECT_EQ(runProgram({"info", damaged.string(), "--verify"}).status, 0);
+  run({"info", damaged.string(), "--verify"});
   const auto flip = [&](uint64_t at) {
     std::fstream faces(damaged / "faces.bin", std::ios::in | std::ios::out | std::ios::binary);
     faces.seekg(static_cast<std::streamoff>(at));
@@ -255,17 +217,17 @@ TEST_F(GridSurfaceOptions, VerifyFindsDamagedFaces) {
   const ProgramResult of_stream = runProgram({"info", damaged.string(), "--verify"});
   EXPECT_EQ(of_stream.status, 1);
   const std::string said = of_stream.out + of_stream.err;
-  EXPECT_NE(said.find("of the faces: has a wrong checksum"), std::string::npos) << said;
+  expectSays(said, "of the faces: has a wrong checksum");
   flip(sizeof(FacesHeader) + 100);
   flip(std::filesystem::file_size(damaged / "faces.bin") - 200);  // in the table
   const ProgramResult of_table = runProgram({"info", damaged.string(), "--verify"});
   EXPECT_EQ(of_table.status, 1);
-  EXPECT_NE((of_table.out + of_table.err).find("faces.bin: has a wrong checksum"), std::string::npos);
+  expectSays((of_table.out + of_table.err), "faces.bin: has a wrong checksum");
 }
 
 TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
   const struct {
-    std::vector<std::string> options;
+    Words options;
     std::string cache;
     int status;
     std::string words;
@@ -301,21 +263,17 @@ TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
        "the cache has no surfaces: it was converted with --no-surfaces"},
       {{"--surface", "kmin", "--surface-by", "nothing"}, "wake.splats", 1, "--surface-by: "},
       {{"--surface-by", "f"}, "wake.splats", 2, "--surface-by f needs faces of the grid"}};
-  for (const auto& [options, cache, status, words] : refused) {
-    const ProgramResult result = render(options, cache);
-    EXPECT_EQ(result.status, status) << words << "\n" << result.err;
-    EXPECT_NE(result.err.find(words), std::string::npos) << result.err << "  lacks " << words;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  }
+  for (const auto& [options, cache, status, words] : refused)
+    expectRefused(render(options, cache), status, {words});
   // No conversion keeps a plane that the grid does not have.
   for (const char* face : {"block 9:k=0", "k=48"}) {
-    const ProgramResult result = render({"--surface", face});
+    const ProgramResult result = runProgram(render({"--surface", face}));
     EXPECT_EQ(result.err.find("convert --surface"), std::string::npos) << result.err;
   }
   const ProgramResult plane = runProgram(
       {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("no.splats"), "--surface", "k=200"});
   EXPECT_EQ(plane.status, 1);
-  EXPECT_NE(plane.err.find("no block has k=200; expected 0 to 47"), std::string::npos) << plane.err;
+  expectSays(plane.err, "no block has k=200; expected 0 to 47");
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <cstring>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
@@ -18,9 +17,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/file.h"
 #include "stream/base/progress.h"
-#include "tests/support/folder_watch.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -36,29 +33,24 @@ std::map<std::string, uint64_t> checksumsOf(const fs::path& folder) {
   return checksums;
 }
 
-class InterruptedConversion : public testing::Test {
+class InterruptedConversion : public ProgramSuite<InterruptedConversion> {
  protected:
   // So many that the least memory takes several buckets.
-  static void SetUpTestSuite() {
-    inputs_ = std::make_unique<TemporaryFolder>();
+  static void prepare() {
     Progress progress;
-    writePlot3d(SceneGridSource(makeScene("wake"), {160, 100, 90}), *inputs_ / "in", progress);
-    const fs::path undisturbed = *inputs_ / "a.splats";
-    ASSERT_EQ(runProgram(wordsFor(undisturbed, {})).status, 0);
+    writePlot3d(SceneGridSource(makeScene("wake"), {160, 100, 90}), *folder_ / "in", progress);
+    const fs::path undisturbed = *folder_ / "a.splats";
+    run(wordsFor(undisturbed, {}));
     expected_ = checksumsOf(undisturbed);
   }
-  static void TearDownTestSuite() { inputs_.reset(); }
 
-  static std::vector<std::string> wordsFor(const fs::path& output, std::vector<std::string> more) {
-    std::vector<std::string> words{
-        "convert", *inputs_ / "in.xyz", *inputs_ / "in.fun", "-o", output, "--memory", "192M"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+  static Words wordsFor(const fs::path& output, const Words& more) {
+    return Words{"convert", file("in.xyz"), file("in.fun"), "-o", output, "--memory", "192M"} + more;
   }
-  ProgramResult convert(std::vector<std::string> more) const { return runProgram(wordsFor(output_, more)); }
+  Words convert(const Words& more) const { return wordsFor(output_, more); }
 
   /// Starts a conversion, and returns once it has appended `bricks`.
-  std::unique_ptr<RunningProgram> startedUntil(int bricks, std::vector<std::string> more = {}) const {
+  std::unique_ptr<RunningProgram> startedUntil(int bricks, const Words& more = {}) const {
     FolderWatch outside(output_.parent_path());
     auto program = std::make_unique<RunningProgram>(wordsFor(output_, more));
     outside.waitUntil([&] { return fs::exists(partial()); });
@@ -68,7 +60,7 @@ class InterruptedConversion : public testing::Test {
   }
 
   int bricksAppended() const {
-    constexpr uintmax_t kLogEntryBytes = 200;  // stream/brick_log.h, with one variable
+    constexpr uintmax_t kLogEntryBytes = 200;  // stream/cache/partial_folder.h, with one variable
     std::error_code error;
     const auto bytes = fs::file_size(partial() / "bricks.log", error);
     return error ? -1 : static_cast<int>(bytes / kLogEntryBytes);
@@ -77,28 +69,19 @@ class InterruptedConversion : public testing::Test {
   fs::path partial() const { return output_.string() + ".partial"; }
 
   void expectUnfinished() const {
-    for (const fs::path& path : {output_, partial()}) {
-      const ProgramResult info = runProgram({"info", path});
-      EXPECT_EQ(info.status, 1) << info.out;
-      EXPECT_EQ(lineCount(info.err), 1) << info.err;
-    }
+    for (const fs::path& path : {output_, partial()}) expectRefused({"info", path}, 1, {});
   }
 
   /// The cache is there, as if nothing had happened, and nothing else is.
   void expectWhole() const {
     EXPECT_TRUE(checksumsOf(output_) == expected_);
-    EXPECT_EQ(entries(), 1);
+    EXPECT_EQ(entriesOf(output_.parent_path()), 1u);
   }
-  long entries() const { return std::distance(fs::directory_iterator(output_.parent_path()), {}); }
 
-  static std::unique_ptr<TemporaryFolder> inputs_;
-  static std::map<std::string, uint64_t> expected_;
-  const TemporaryFolder folder_;
-  fs::path output_ = folder_ / "a.splats";
+  static inline std::map<std::string, uint64_t> expected_;
+  const TemporaryFolder own_folder_;  // of the test
+  fs::path output_ = own_folder_ / "a.splats";
 };
-
-std::unique_ptr<TemporaryFolder> InterruptedConversion::inputs_;
-std::map<std::string, uint64_t> InterruptedConversion::expected_;
 
 TEST_F(InterruptedConversion, KilledItIsResumed) {
   for (const int bricks : {-1, 0, 1, 12}) {
@@ -107,15 +90,14 @@ TEST_F(InterruptedConversion, KilledItIsResumed) {
     program->signal(SIGKILL);
     EXPECT_EQ(program->wait().status, 128 + SIGKILL);
     expectUnfinished();
-    const fs::path statistics = *inputs_ / "stats.json";
-    const ProgramResult resumed = convert({"--resume", "--stats", statistics, "--threads", "1"});
-    EXPECT_EQ(resumed.status, 0) << resumed.err;
+    const fs::path statistics = *folder_ / "stats.json";
+    const ProgramResult resumed = run(convert({"--resume", "--stats", statistics, "--threads", "1"}));
     expectWhole();
-    const auto json = nlohmann::json::parse(readTextFile(statistics));
+    const auto json = jsonOf(statistics);
     EXPECT_EQ(json["resumed"], bricks > 0);
     if (bricks > 0) {
       EXPECT_GE(json["resumed_bricks"], bricks);
-      EXPECT_NE(resumed.err.find("resumed"), std::string::npos) << resumed.err;
+      expectSays(resumed.err, "resumed");
     }
     fs::remove_all(output_);
   }
@@ -125,14 +107,11 @@ TEST_F(InterruptedConversion, KilledItBlocksAnotherToTheSameOutput) {
   const auto program = startedUntil(1);
   program->signal(SIGKILL);
   program->wait();
-  const ProgramResult another = convert({});
-  EXPECT_EQ(another.status, 1);
-  EXPECT_EQ(lineCount(another.err), 1) << another.err;
-  EXPECT_NE(another.err.find("--resume"), std::string::npos) << another.err;
-  const ProgramResult different = convert({"--resume", "--blank", "7"});
+  expectRefused(convert({}), 1, {"--resume"});
+  const ProgramResult different = runProgram(convert({"--resume", "--blank", "7"}));
   EXPECT_EQ(different.status, 1);
-  EXPECT_NE(different.err.find("--blank has changed from none to 7"), std::string::npos) << different.err;
-  EXPECT_EQ(convert({"--overwrite"}).status, 0);
+  expectSays(different.err, "--blank has changed from none to 7");
+  run(convert({"--overwrite"}));
   expectWhole();
 }
 
@@ -147,37 +126,30 @@ TEST_F(InterruptedConversion, StoppedItPrintsHowToContinue) {
       stopped = program->wait();
       if (stopped.status != 0) break;
     }
-    EXPECT_EQ(stopped.status, 128 + signal) << stopped.err;
-    EXPECT_EQ(lineCount(stopped.err), 1) << stopped.err;
-    EXPECT_NE(stopped.err.find("--resume"), std::string::npos) << stopped.err;
+    expectRefused(stopped, 128 + signal, {"--resume"});
     expectUnfinished();
-    const ProgramResult resumed = convert({"--resume"});
-    EXPECT_EQ(resumed.status, 0) << resumed.err;
-    EXPECT_NE(resumed.err.find("resumed"), std::string::npos) << resumed.err;
+    const ProgramResult resumed = run(convert({"--resume"}));
+    expectSays(resumed.err, "resumed");
     expectWhole();
     fs::remove_all(output_);
   }
 }
 
 TEST_F(InterruptedConversion, StoppedEarlyItLeavesNothing) {
-  FolderWatch outside(folder_.path());
+  FolderWatch outside(own_folder_.path());
   RunningProgram program(wordsFor(output_, {}));
   outside.waitUntil([&] { return fs::exists(partial()); });
   program.signal(SIGINT);
   const ProgramResult stopped = program.wait();
-  EXPECT_EQ(stopped.status, 128 + SIGINT) << stopped.err;
-  EXPECT_EQ(lineCount(stopped.err), 1) << stopped.err;
-  EXPECT_EQ(entries(), 0);
+  expectRefused(stopped, 128 + SIGINT, {});
+  EXPECT_EQ(entriesOf(output_.parent_path()), 0u);
 }
 
 TEST_F(InterruptedConversion, LocksItsOutput) {
   const auto program = startedUntil(0);
   program->signal(SIGSTOP);
   for (const char* word : {"--resume", "--overwrite"}) {
-    const ProgramResult second = convert({word});
-    EXPECT_EQ(second.status, 1);
-    EXPECT_EQ(lineCount(second.err), 1) << second.err;
-    EXPECT_NE(second.err.find("another conversion"), std::string::npos) << second.err;
+    expectRefused(convert({word}), 1, {"another conversion"});
   }
   program->signal(SIGCONT);
   const ProgramResult first = program->wait();
@@ -219,38 +191,33 @@ class SmallDisk {
 };
 
 TEST_F(InterruptedConversion, OnAFullDiskLosesNothing) {
-  const SmallDisk disk(folder_ / "disk");
+  const SmallDisk disk(own_folder_ / "disk");
   if (!disk.mounted()) GTEST_SKIP() << "no small disk can be mounted: " << disk.why();
-  output_ = folder_ / "disk/a.splats";
-  fs::copy(*inputs_ / "a.splats", output_);
+  output_ = own_folder_ / "disk/a.splats";
+  fs::copy(*folder_ / "a.splats", output_);
   const auto program = startedUntil(0, {"--overwrite"});
   program->signal(SIGSTOP);
   disk.fill();
   program->signal(SIGCONT);
   const ProgramResult failed = program->wait();
-  EXPECT_EQ(failed.status, 1);
-  EXPECT_EQ(lineCount(failed.err), 1) << failed.err;
-  EXPECT_NE(failed.err.find("No space left on device"), std::string::npos) << failed.err;
+  expectRefused(failed, 1, {"No space left on device"});
   disk.empty();
   expectWhole();  // the old one
 }
 
 TEST_F(InterruptedConversion, OnAFullDiskKeepsFinishedWorkForResuming) {
-  const SmallDisk disk(folder_ / "disk");
+  const SmallDisk disk(own_folder_ / "disk");
   if (!disk.mounted()) GTEST_SKIP() << "no small disk can be mounted: " << disk.why();
-  output_ = folder_ / "disk/a.splats";
+  output_ = own_folder_ / "disk/a.splats";
   const auto program = startedUntil(1, {"--resume"});
   program->signal(SIGSTOP);
   disk.fill();
   program->signal(SIGCONT);
   const ProgramResult failed = program->wait();
-  EXPECT_EQ(failed.status, 1);
-  EXPECT_EQ(lineCount(failed.err), 1) << failed.err;
-  EXPECT_NE(failed.err.find("continue with --resume"), std::string::npos) << failed.err;
+  expectRefused(failed, 1, {"continue with --resume"});
   disk.empty();
   expectUnfinished();
-  const ProgramResult resumed = convert({"--resume"});
-  EXPECT_EQ(resumed.status, 0) << resumed.err;
+  run(convert({"--resume"}));
   expectWhole();
 }
 

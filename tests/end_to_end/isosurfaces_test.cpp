@@ -9,8 +9,7 @@
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image_file.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -18,7 +17,7 @@ namespace {
 constexpr ImageSize kSize{256, 256};
 constexpr double kValue = 0.5;
 
-class Isosurfaces : public testing::Test {
+class Isosurfaces : public ProgramTest {
  protected:
   Isosurfaces() { convertGrid(SceneGridSource(annulus_, {128, 64, 64}), folder_ / "a.splats"); }
 
@@ -58,7 +57,6 @@ class Isosurfaces : public testing::Test {
     return drawCache(folder_ / "a.splats", table, halfAnnulusCamera(), options, nullptr, resources.backend);
   }
 
-  const TemporaryFolder folder_;
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
 };
 
@@ -105,22 +103,19 @@ TEST_F(Isosurfaces, EveryPainterDrawsTheSame) {
 }
 
 TEST_F(Isosurfaces, TheProgramDrawsThemAndRefusesWrongUsage) {
-  const std::string cache = (folder_ / "a.splats").string(), output = (folder_ / "a.pfm").string();
-  const auto run = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"render", cache, "-o", output, "--size", "150x150", "--view", "iso"});
-    return runProgram(more);
+  const std::string output = file("a.pfm");
+  const auto render = [&](const Words& more) {
+    return Words{"render", file("a.splats"), "-o", output, "--size", "150x150", "--view", "iso"} + more;
   };
-  EXPECT_EQ(run({"--iso", "0.4,0.6", "--volume", "off"}).status, 0);
+  run(render({"--iso", "0.4,0.6", "--volume", "off"}));
   const Image once = readImage(output);
   size_t seen = 0;
   for (size_t n = 0; n < once.rgba.size(); n += 4) seen += once.rgba[n] < 0.9f;
   EXPECT_GT(seen, 500u);
-  EXPECT_EQ(
-      run({"--iso", "0.4", "--iso", "0.6", "--volume", "off", "--threads", "1", "--memory", "96M"}).status,
-      0);
+  run(render({"--iso", "0.4", "--iso", "0.6", "--volume", "off", "--threads", "1", "--memory", "96M"}));
   EXPECT_EQ(readImage(output).rgba, once.rgba);
   const struct {
-    std::vector<std::string> options;
+    Words options;
     int status;
     std::string words;
   } refused[] = {{{"--iso", "7"}, 1, "--iso 7: no isosurface: the values of f go from "},
@@ -128,9 +123,9 @@ TEST_F(Isosurfaces, TheProgramDrawsThemAndRefusesWrongUsage) {
                  {{"--iso-opacity", "0.5"}, 2, "--iso-opacity needs an isosurface: --iso VALUE"},
                  {{"--iso", "0.5", "--iso-opacity", "2"}, 2, "--iso-opacity 2: expected a number above 0"}};
   for (const auto& [options, status, words] : refused) {
-    const ProgramResult result = run(options);
+    const ProgramResult result = runProgram(render(options));
     EXPECT_EQ(result.status, status) << result.err;
-    EXPECT_NE(result.err.find(words), std::string::npos) << result.err << " lacks " << words;
+    expectSays(result.err, words);
   }
 }
 

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "stream/base/file.h"
-#include "tests/end_to_end/kept_caches_fixture.h"
+#include "tests/end_to_end/window_fixture.h"
 #include "tests/support/vts_writer.h"
 
 namespace curvisplat {
@@ -19,8 +19,8 @@ TEST_F(KeptCaches, ProcessesMayOpenOneNewFileAtOnce) {
     fs::remove_all("kept");
     std::vector<std::unique_ptr<RunningProgram>> programs;
     for (int n = 0; n < 4; ++n)
-      programs.push_back(std::make_unique<RunningProgram>(std::vector<std::string>{
-          "render", "a.xyz", "a.fun", "-o", fmt::format("at_once_{}.png", n), "--size", "20x20"}));
+      programs.push_back(std::make_unique<RunningProgram>(
+          Words{"render", "a.xyz", "a.fun", "-o", fmt::format("at_once_{}.png", n), "--size", "20x20"}));
     for (const auto& program : programs) {
       const ProgramResult result = program->wait();
       EXPECT_EQ(result.status, 0) << result.err;
@@ -29,14 +29,14 @@ TEST_F(KeptCaches, ProcessesMayOpenOneNewFileAtOnce) {
 }
 
 TEST_F(KeptCaches, WhatIsKnownOfAFileMayBeDamaged) {
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  run(render("a.xyz", "a.fun"));
   const fs::path known = "kept/curvisplat/known";
   std::vector<fs::path> notes(fs::directory_iterator(known), {});
   ASSERT_EQ(notes.size(), 2u);
   fs::remove(notes[0]);
   fs::create_directory(notes[0]);
   std::ofstream(notes[1]) << std::string(100'000, '1');
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  run(render("a.xyz", "a.fun"));
   EXPECT_EQ(kept().size(), 1u);
 }
 
@@ -54,9 +54,7 @@ TEST_F(KeptCaches, AFullDiskIsRefusedWithWhatHelpsThere) {
     GTEST_SKIP() << "no file system can be mounted here: " << result.err;
   EXPECT_EQ(result.status, 1);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_NE(result.err.find("make room, or set XDG_CACHE_HOME to a folder on another disk"),
-            std::string::npos)
-      << result.err;
+  expectSays(result.err, "make room, or set XDG_CACHE_HOME to a folder on another disk");
   EXPECT_EQ(result.err.find("--"), std::string::npos) << result.err;
   EXPECT_FALSE(fs::exists("full.png"));
 }
@@ -74,12 +72,11 @@ TEST_F(KeptCaches, FilesThatChangeMeanwhileAreConvertedAgain) {
   fs::last_write_time("changing.fun", fs::file_time_type::clock::now());
   const ProgramResult changed = first.wait();
   EXPECT_EQ(changed.status, 0) << changed.err;
-  EXPECT_NE(changed.err.find("changed while it was converted"), std::string::npos) << changed.err;
+  expectSays(changed.err, "changed while it was converted");
   const auto made = fs::last_write_time(kept().at(0) / "manifest.json");
   for (const bool again : {true, false}) {
     const auto before = fs::last_write_time(kept().at(0) / "manifest.json");
-    const ProgramResult result = render("changing.xyz", "changing.fun");
-    EXPECT_EQ(result.status, 0);
+    const ProgramResult result = run(render("changing.xyz", "changing.fun"));
     EXPECT_EQ(result.err.find("changed while"), std::string::npos) << result.err;
     EXPECT_EQ(fs::last_write_time(kept().at(0) / "manifest.json") != before, again);
   }
@@ -118,10 +115,9 @@ void writeSet(const std::string& set, const std::string& file, int times) {
 TEST_F(KeptCaches, InfoOfASetThatNamesOneFileThousandsOfTimesEnds) {
   writeFileAtomically("one.vts", vtsFile(annulusVtsGrid(2, 2, 2), {}));
   writeSet("many.vtm", "one.vts", 5000);
-  const ProgramResult result = runProgram({"info", "many.vtm"});
-  EXPECT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.out.find("nodes     40000 in 5000 blocks"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("cells     5000; 0 degenerate"), std::string::npos) << result.out;
+  const ProgramResult result = run({"info", "many.vtm"});
+  expectSays(result.out, "nodes     40000 in 5000 blocks");
+  expectSays(result.out, "cells     5000; 0 degenerate");
 }
 
 TEST_F(KeptCaches, SetsThatNameFilesThousandsOfTimesAreSearchedOnce) {

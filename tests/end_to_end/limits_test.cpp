@@ -1,60 +1,54 @@
-// As little memory, as many threads, as large and as small a picture as there may be.
+// As little memory, as many threads, as large and as small a picture as there may be; and an index of a
+// million bricks, as 10^10 nodes have: opened, planned and drawn in bounded memory. How long that takes is
+// for bench/index_bench.cpp to say.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
 #include "tests/support/cube_files.h"
-#include "tests/support/run_program.h"
-#include "tests/support/sanitizers.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/memory_limit.h"
+#include "tests/support/program_test.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {
 
-class LimitsTest : public testing::Test {
+class LimitsTest : public ProgramSuite<LimitsTest> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
+  static void prepare() {
     writeCube(*folder_ / "cube", 12, [](const GridNode& node, NodeValues& values) {
       values.scalars[0] = static_cast<float>(node.i);
     });
-    const ProgramResult result = runProgram(cubeArguments(file("cube")));
-    ASSERT_EQ(result.status, 0) << result.err;
+    run(cubeArguments(file("cube")));
   }
-  static void TearDownTestSuite() { folder_.reset(); }
 
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
-
-  /// Draws the cube to `name` (100x100 unless told), and returns what the program said.
-  static ProgramResult render(const std::string& name, std::vector<std::string> more = {}) {
-    more.insert(more.begin(), {"render", file("cube.splats"), "-o", file(name)});
-    if (std::find(more.begin(), more.end(), "--size") == more.end())
-      more.insert(more.end(), {"--size", "100x100"});
-    return runProgram(more);
+  /// Draws the cube to `name`, 100x100 unless `more` has another size.
+  static Words render(const std::string& name, const Words& more = {}) {
+    return sized(Words{"render", file("cube.splats"), "-o", file(name)} + more, "100x100");
   }
-  static std::string rendered(const std::string& name, const std::vector<std::string>& more = {}) {
-    const ProgramResult result = render(name, more);
-    EXPECT_EQ(result.status, 0) << result.err;
-    return result.status == 0 ? readTextFile(file(name)) : std::string();
+  static std::string rendered(const std::string& name, const Words& more = {}) {
+    run(render(name, more));
+    return readTextFile(file(name));
   }
 
   /// N of "at least N MiB" in the one line that a program has said; 0: none.
   static uint64_t leastMebibytes(const ProgramResult& result) {
     EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find("--memory"), std::string::npos) << result.err;
+    expectSays(result.err, "--memory");
     const std::string before = "at least ";
     const size_t at = result.err.find(before);
     EXPECT_NE(at, std::string::npos) << result.err;
@@ -67,10 +61,7 @@ class LimitsTest : public testing::Test {
     EXPECT_EQ(getrusage(RUSAGE_CHILDREN, &usage), 0);
     return static_cast<uint64_t>(usage.ru_maxrss) >> 10;
   }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
 };
-std::unique_ptr<TemporaryFolder> LimitsTest::folder_;
 
 /// Sanitizers need memory of their own.
 void expectAtMost(uint64_t mebibytes, uint64_t peak_bytes) {
@@ -85,16 +76,15 @@ std::string mebibytes(uint64_t count) {
 
 TEST_F(LimitsTest, ConversionNamesTheLeastMemoryThatItTakes) {
   const auto convert = [&](uint64_t least) {
-    return runProgram(cubeArguments(file("cube"), {"--memory", mebibytes(least)}, file("least.splats")));
+    return cubeArguments(file("cube"), {"--memory", mebibytes(least)}, file("least.splats"));
   };
-  const ProgramResult refused = convert(1);
+  const ProgramResult refused = runProgram(convert(1));
   EXPECT_EQ(refused.status, 1);
   const uint64_t least = leastMebibytes(refused);
   ASSERT_GT(least, 1u);
-  EXPECT_EQ(convert(least - 1).status, 1);
+  EXPECT_EQ(runProgram(convert(least - 1)).status, 1);
   EXPECT_FALSE(std::filesystem::exists(file("least.splats")));
-  const ProgramResult taken = convert(least);
-  EXPECT_EQ(taken.status, 0) << taken.err;
+  run(convert(least));
 }
 
 TEST_F(LimitsTest, LongRowsAreConvertedWithinTheMemory) {
@@ -102,17 +92,14 @@ TEST_F(LimitsTest, LongRowsAreConvertedWithinTheMemory) {
   // Rows that have to be cut, of ever larger cross sections.
   for (const char* size : {"500000x2x2", "100000x3x2", "20000x9x9"}) {
     SCOPED_TRACE(size);
-    ASSERT_EQ(runProgram({"generate", "wake", "--size", size, "-o", file("long")}).status, 0);
-    const ProgramResult result =
-        runProgram({"convert", file("long.xyz"), file("long.fun"), "-o", file("long.splats"), "--overwrite",
-                    "--memory", mebibytes(kMebibytes), "--stats", file("long.json")});
-    EXPECT_EQ(result.status, 0) << result.err;
-    const auto stats = nlohmann::json::parse(readTextFile(file("long.json")));
+    run({"generate", "wake", "--size", size, "-o", file("long")});
+    run({"convert", file("long.xyz"), file("long.fun"), "-o", file("long.splats"), "--overwrite", "--memory",
+         mebibytes(kMebibytes), "--stats", file("long.json")});
+    const auto stats = jsonOf(file("long.json"));
     expectAtMost(kMebibytes, stats["peak_memory_bytes"].get<uint64_t>());
   }
-  const ProgramResult added = runProgram({"convert", file("long.xyz"), "--add-scalar", "j", "--to",
-                                          file("long.splats"), "--memory", mebibytes(kMebibytes)});
-  EXPECT_EQ(added.status, 0) << added.err;
+  run({"convert", file("long.xyz"), "--add-scalar", "j", "--to", file("long.splats"), "--memory",
+       mebibytes(kMebibytes)});
 }
 
 // Whose boxes overlap, so that the check for overlaps picks the points of all of them.
@@ -141,11 +128,9 @@ TEST_F(LimitsTest, ManySmallBlocksAreConvertedWithinTheMemory) {
   };
   write(file("blocks.xyz"), grid_header, coordinates);
   write(file("blocks.fun"), function_header, values);
-  const ProgramResult result =
-      runProgram({"convert", file("blocks.xyz"), file("blocks.fun"), "-o", file("blocks.splats"), "--memory",
-                  mebibytes(kMebibytes), "--stats", file("blocks.json")});
-  EXPECT_EQ(result.status, 0) << result.err;
-  const auto stats = nlohmann::json::parse(readTextFile(file("blocks.json")));
+  run({"convert", file("blocks.xyz"), file("blocks.fun"), "-o", file("blocks.splats"), "--memory",
+       mebibytes(kMebibytes), "--stats", file("blocks.json")});
+  const auto stats = jsonOf(file("blocks.json"));
   expectAtMost(kMebibytes, stats["peak_memory_bytes"].get<uint64_t>());
 }
 
@@ -159,7 +144,7 @@ TEST_F(LimitsTest, TheLayoutOfAFileWithLongRowsIsFoundWithinTheMemory) {
   const uint64_t before = largestProgram();
   const ProgramResult result = runProgram(
       {"convert", grid, "--scalar", "none", "-o", file("none.splats"), "--memory", mebibytes(kMebibytes)});
-  EXPECT_NE(result.err.find("no scalar 'none'"), std::string::npos) << result.err;
+  expectSays(result.err, "no scalar 'none'");
   if (!kIsSanitized) {
     EXPECT_LE(largestProgram(), std::max(before, kMebibytes));
   }
@@ -167,25 +152,24 @@ TEST_F(LimitsTest, TheLayoutOfAFileWithLongRowsIsFoundWithinTheMemory) {
 
 TEST_F(LimitsTest, AddingAScalarNamesTheLeastMemoryThatItTakes) {
   const auto add = [&](uint64_t least) {
-    return runProgram({"convert", file("cube.xyz"), file("cube.fun"), "--add-scalar", "j", "--to",
-                       file("added.splats"), "--memory", mebibytes(least)});
+    return Words{"convert", file("cube.xyz"),     file("cube.fun"), "--add-scalar",  "j",
+                 "--to",    file("added.splats"), "--memory",       mebibytes(least)};
   };
   std::filesystem::copy(file("cube.splats"), file("added.splats"));
-  const ProgramResult refused = add(1);
+  const ProgramResult refused = runProgram(add(1));
   EXPECT_EQ(refused.status, 1);
   const uint64_t least = leastMebibytes(refused);
   ASSERT_GT(least, 1u);
-  EXPECT_EQ(add(least - 1).status, 1);
-  const ProgramResult taken = add(least);
-  EXPECT_EQ(taken.status, 0) << taken.err;
+  EXPECT_EQ(runProgram(add(least - 1)).status, 1);
+  run(add(least));
 }
 
 TEST_F(LimitsTest, RenderingNamesTheLeastMemoryThatItTakes) {
-  const ProgramResult refused = render("least.png", {"--memory", "1"});
+  const ProgramResult refused = runProgram(render("least.png", {"--memory", "1"}));
   EXPECT_EQ(refused.status, 2);
   const uint64_t least = leastMebibytes(refused);
   ASSERT_GT(least, 1u);
-  EXPECT_EQ(leastMebibytes(render("least.png", {"--memory", mebibytes(least - 1)})), least);
+  EXPECT_EQ(leastMebibytes(runProgram(render("least.png", {"--memory", mebibytes(least - 1)}))), least);
   EXPECT_FALSE(std::filesystem::exists(file("least.png")));
   EXPECT_EQ(rendered("least.png", {"--memory", mebibytes(least)}), rendered("much.png"));
 }
@@ -194,28 +178,28 @@ TEST_F(LimitsTest, AHugePictureNamesItsMemoryBeforeItTakesAny) {
   constexpr uint64_t kPictureMebibytes = 16384 / 1024 * (16384 / 1024) * 16;
   for (const char* backend : {"cpu", "osmesa"}) {
     SCOPED_TRACE(backend);
-    const ProgramResult refused = render("huge.png", {"--size", "16384x16384", "--backend", backend});
+    const ProgramResult refused =
+        runProgram(render("huge.png", {"--size", "16384x16384", "--backend", backend}));
     EXPECT_EQ(refused.status, 2);
     EXPECT_GT(leastMebibytes(refused), kPictureMebibytes);
   }
   EXPECT_LT(largestProgram(), kPictureMebibytes / 4);
-  EXPECT_EQ(render("huge.png", {"--size", "16385x1"}).status, 2);
+  EXPECT_EQ(runProgram(render("huge.png", {"--size", "16385x1"})).status, 2);
 }
 
 TEST_F(LimitsTest, FewAndManyThreadsDrawTheSame) {
   const std::string one = rendered("threads.pfm", {"--threads", "1"});
   EXPECT_EQ(rendered("threads.pfm", {"--threads", "64"}), one) << "as many of them as the memory is for";
   EXPECT_EQ(rendered("threads.pfm", {"--threads", "64", "--memory", "8G"}), one);
-  EXPECT_EQ(render("threads.pfm", {"--threads", "1025"}).status, 2);
-  EXPECT_EQ(render("threads.pfm", {"--threads", "-1"}).status, 2);
+  EXPECT_EQ(runProgram(render("threads.pfm", {"--threads", "1025"})).status, 2);
+  EXPECT_EQ(runProgram(render("threads.pfm", {"--threads", "-1"})).status, 2);
 }
 
 TEST_F(LimitsTest, FewAndManyThreadsConvertToTheSame) {
   for (const char* threads : {"1", "64"}) {
     SCOPED_TRACE(threads);
-    const ProgramResult result = runProgram(cubeArguments(
-        file("cube"), {"--overwrite", "--threads", threads, "--memory", "8G"}, file("threads.splats")));
-    EXPECT_EQ(result.status, 0) << result.err;
+    run(cubeArguments(file("cube"), {"--overwrite", "--threads", threads, "--memory", "8G"},
+                      file("threads.splats")));
     for (const char* name : {"manifest.json", "bricks.bin", "geometry.bin", "var.0.bin", "bricks.vdb"})
       EXPECT_EQ(readTextFile(file("threads.splats/") + name), readTextFile(file("cube.splats/") + name))
           << name;
@@ -241,6 +225,50 @@ TEST_F(LimitsTest, ALineOfPixelsHasRoomForAnnotations) {
     SCOPED_TRACE(size);
     rendered("line.png", {"--size", size, "--scalar-bar", "--axes", "--outline", "--view-angle", "40",
                           "--first-image", file("first.png")});
+  }
+}
+
+constexpr uint64_t kBricks = 1'000'001;  // the root, and eights
+// Of 144 + 40 bytes a brick on disk, and what the program takes without them.
+constexpr uint64_t kMaxMemoryBytes = uint64_t{320} << 20;
+
+class SparseCache : public ProgramSuite<SparseCache> {
+ protected:
+  static void prepare() { writeSparseCache(*folder_ / "sparse.splats", kBricks); }
+
+  struct Drawn {
+    std::string picture;
+    nlohmann::json statistics;
+  };
+  static Drawn draw(const std::string& cache, const Words& options) {
+    run(Words{"render", cache, "-o", file("a.pfm"), "--size", "256x256", "--tf", "viridis", "--stats",
+              file("a.json"), "--range", "0,32", "--view", "iso", "--opacity", "0:0.5,1:0.5",
+              "--opacity-unit", "0.5"} +
+        options);
+    return {readTextFile(file("a.pfm")), jsonOf(file("a.json"))};
+  }
+};
+
+TEST_F(SparseCache, IsDescribed) {
+  const ProgramResult result = run({"info", file("sparse.splats"), "--json"});
+  const auto info = nlohmann::json::parse(result.out);
+  EXPECT_EQ(info["bricks"], kBricks);
+  EXPECT_GT(info["splats"], 9'000'000'000);
+}
+
+/// Its coarse levels are those of the lattice, of which the third is the finest.
+TEST_F(SparseCache, IsDrawnAsTheLatticeWithinItsMemory) {
+  writeLatticeCache(file("lattice.splats"), 0, {1, 0, 0});
+  // On the screen a cell of level n is 150 / 2^n pixels long; the sparse cache's errors are a sixteenth of that.
+  for (const auto& [lod_pixels, bricks] : {std::pair("30", 1), std::pair("9", 8), std::pair("4", 64)}) {
+    SCOPED_TRACE(lod_pixels);
+    const Drawn sparse = draw(file("sparse.splats"), {"--lod-pixels", lod_pixels});
+    ASSERT_FALSE(sparse.picture.empty());
+    EXPECT_EQ(sparse.statistics["frames"][0]["bricks_drawn"], bricks);
+    EXPECT_TRUE(sparse.picture == draw(file("lattice.splats"), {"--lod-pixels", lod_pixels}).picture);
+    if (!kIsSanitized) {
+      EXPECT_LE(sparse.statistics["peak_memory_bytes"], kMaxMemoryBytes);
+    }
   }
 }
 

@@ -13,38 +13,27 @@
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
-#include "stream/base/count_text.h"
 #include "stream/base/file.h"
+#include "stream/base/text.h"
 #include "tests/support/cube_files.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 #include "tests/support/vts_writer.h"
 
 namespace curvisplat {
 namespace {
 
-class OddDataTest : public testing::Test {
+class OddDataTest : public ProgramTest {
  protected:
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
-
-  ProgramResult convert(uint64_t side, const CubeNode& node,
-                        const std::vector<std::string>& more = {}) const {
+  /// Writes the cube, and how to convert it.
+  Words convert(uint64_t side, const CubeNode& node, const Words& more = {}) const {
     writeCube(folder_ / "cube", side, node);
-    return runProgram(cubeArguments(folder_ / "cube", more));
+    return cubeArguments(folder_ / "cube", more);
   }
-  void expectConverted(uint64_t side, const CubeNode& node) {
-    const ProgramResult result = convert(side, node);
-    ASSERT_EQ(result.status, 0) << result.err;
-    said_ = result.err;
-  }
+  void expectConverted(uint64_t side, const CubeNode& node) { said_ = run(convert(side, node)).err; }
   /// Draws the cube, 64x64, and keeps what was said.
-  Image render(std::vector<std::string> options = {}) {
-    options.insert(options.begin(),
-                   {"render", file("cube.splats"), "-o", file("out.pfm"), "--size", "64x64"});
-    const ProgramResult result = runProgram(options);
-    said_ = result.err;
-    EXPECT_EQ(result.status, 0) << result.err;
-    return result.status == 0 ? readImage(file("out.pfm")) : Image({64, 64});
+  Image render(const Words& options = {}) {
+    said_ = run(Words{"render", file("cube.splats"), "-o", file("out.pfm"), "--size", "64x64"} + options).err;
+    return readImage(file("out.pfm"));
   }
   static bool isWhite(const Image& image) {
     return std::all_of(image.rgba.begin(), image.rgba.end(), [](float value) { return value == 1; });
@@ -55,14 +44,13 @@ class OddDataTest : public testing::Test {
   }
   bool said(const std::string& words) const { return said_.find(words) != std::string::npos; }
   /// An empty picture, and one warning, which has `words` in it.
-  void expectEmpty(const std::vector<std::string>& options, const std::string& words) {
+  void expectEmpty(const Words& options, const std::string& words) {
     EXPECT_TRUE(isWhite(render(options)));
     EXPECT_TRUE(said("the picture is empty: ")) << said_;
     EXPECT_TRUE(said(words)) << said_ << "lacks: " << words;
     EXPECT_EQ(said_.find("the picture is empty"), said_.rfind("the picture is empty")) << said_;
   }
 
-  const TemporaryFolder folder_;
   std::string said_;
 };
 
@@ -73,15 +61,13 @@ void along(const GridNode& node, NodeValues& values) {
 TEST_F(OddDataTest, ACacheOfOneSplatIsDrawn) {
   VtsGrid grid = annulusVtsGrid(2, 2, 2);
   writeFileAtomically(folder_ / "one.vts", vtsFile(grid, VtsEncoding{}));
-  const ProgramResult result =
-      runProgram({"convert", file("one.vts"), "-o", file("cube.splats"), "--scalar", "T"});
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.out.find("1 splat in 1 brick, 1 level"), std::string::npos) << result.out;
+  const ProgramResult result = run({"convert", file("one.vts"), "-o", file("cube.splats"), "--scalar", "T"});
+  expectSays(result.out, "1 splat in 1 brick, 1 level");
   const Image image = render({"--opacity-unit", "0.01", "--parallel-scale", "5"});
   EXPECT_LT(image.pixel(32, 32)[0], 0.9f) << said_;
   EXPECT_EQ(image.pixel(0, 0)[0], 1);
   EXPECT_TRUE(isFinite(image));
-  EXPECT_EQ(runProgram({"info", file("cube.splats"), "--verify"}).status, 0);
+  run({"info", file("cube.splats"), "--verify"});
 }
 
 TEST_F(OddDataTest, ASingleRemainingNodeHasNoVolumeWhichIsReported) {
@@ -117,7 +103,7 @@ TEST_F(OddDataTest, FlatSamplesAreInvisibleAndBothCommandsSaySo) {
              "rendering"))
         << said_;
     EXPECT_FALSE(said("drawn with")) << said_;
-    const std::vector<std::string> front{"--view", "+z", "--range", "0,15"};
+    const Words front{"--view", "+z", "--range", "0,15"};
     if (all) {
       expectEmpty(front, "are flat and have no volume, so they are invisible in volume rendering");
       continue;
@@ -130,10 +116,8 @@ TEST_F(OddDataTest, FlatSamplesAreInvisibleAndBothCommandsSaySo) {
 }
 
 TEST_F(OddDataTest, AGridWithoutNodesIsNotConverted) {
-  const ProgramResult result = convert(2, [](const GridNode&, NodeValues& values) { values.blank = true; });
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("8 by the grid"), std::string::npos) << result.err;
+  expectRefused(convert(2, [](const GridNode&, NodeValues& values) { values.blank = true; }), 1,
+                {"8 by the grid"});
   EXPECT_FALSE(std::filesystem::exists(file("cube.splats")));
 }
 
@@ -205,17 +189,14 @@ TEST_F(OddDataTest, NonFiniteSamplesAreCountedSkippedAndReported) {
     if (number.k == 4 && number.j == 5) values.position.y = infinity;
   };
   writeCube(folder_ / "cube", 8, node);
-  const ProgramResult result = runProgram(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("note: 208 samples are not finite in single precision (NaN, infinite, or a value "
-                            "beyond 3.4e+38 in magnitude) and are blanked"),
-            std::string::npos)
-      << result.err;
-  const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
+  const ProgramResult result = run(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
+  expectSays(result.err,
+             "note: 208 samples are not finite in single precision (NaN, infinite, or a value "
+             "beyond 3.4e+38 in magnitude) and are blanked");
+  const auto stats = jsonOf(folder_ / "stats.json");
   EXPECT_EQ(stats["blanked"]["not_finite"], 208);
   EXPECT_EQ(stats["splats"], 512 - 208);
-  const ProgramResult info = runProgram({"info", file("cube.splats"), "--json", "--verify"});
-  EXPECT_EQ(info.status, 0) << info.err;
+  const ProgramResult info = run({"info", file("cube.splats"), "--json", "--verify"});
   const auto manifest = nlohmann::json::parse(info.out);
   EXPECT_EQ(manifest["blanked_nodes"], 208);
   EXPECT_EQ(manifest["variables"][0]["min"], 0);
@@ -264,16 +245,13 @@ TEST_F(OddDataTest, ValuesBeyondSinglePrecisionAreCountedAndTheLimitIsNamed) {
       writeFileAtomically(folder_ / "huge.vtk", vtkOfDoubles(mesh, in_cells, [](int n) {
                             return n == 5 ? 1e300 : n == 6 ? -1e39 : n == 7 ? 3.4e38 : n;
                           }));
-      const ProgramResult info = runProgram({"info", file("huge.vtk")});
-      EXPECT_EQ(info.status, 0) << info.err;
+      const ProgramResult info = run({"info", file("huge.vtk")});
       const std::string counted = mesh ? "2 of its values are " : in_cells ? "2 with values " : "grid, 2 ";
-      EXPECT_NE(info.out.find(counted + named), std::string::npos) << info.out;
-      EXPECT_NE(info.out.find("0 .. 3.4e+38"), std::string::npos) << info.out;
-      const ProgramResult converted = runProgram(
-          {"convert", file("huge.vtk"), "-o", file("huge.splats"), "--overwrite", "--blank", "3.4e38"});
-      EXPECT_EQ(converted.status, 0) << converted.err;
-      EXPECT_NE(converted.err.find("note: 2 samples are " + named + " and are blanked"), std::string::npos)
-          << converted.err;
+      expectSays(info.out, counted + named);
+      expectSays(info.out, "0 .. 3.4e+38");
+      const ProgramResult converted =
+          run({"convert", file("huge.vtk"), "-o", file("huge.splats"), "--overwrite", "--blank", "3.4e38"});
+      expectSays(converted.err, "note: 2 samples are " + named + " and are blanked");
     }
 }
 
@@ -282,15 +260,10 @@ TEST_F(OddDataTest, ValuesTooFarApartAreRefusedUnlessTheyAreBlank) {
     along(number, values);
     if (number.i == 0) values.scalars[0] = 1e20f;
   };
-  const ProgramResult refused = convert(8, node);
-  EXPECT_EQ(refused.status, 1);
-  EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
-  EXPECT_NE(refused.err.find("f: its values go from 1 to 1e+20"), std::string::npos) << refused.err;
-  EXPECT_NE(refused.err.find("--blank"), std::string::npos) << refused.err;
+  expectRefused(convert(8, node), 1, {"f: its values go from 1 to 1e+20", "--blank"});
   EXPECT_FALSE(std::filesystem::exists(file("cube.splats")));
-  const ProgramResult taken = convert(8, node, {"--blank", "1e20"});
-  EXPECT_EQ(taken.status, 0) << taken.err;
-  EXPECT_NE(taken.err.find("64 samples have the blank value"), std::string::npos) << taken.err;
+  const ProgramResult taken = run(convert(8, node, {"--blank", "1e20"}));
+  expectSays(taken.err, "64 samples have the blank value");
   EXPECT_FALSE(isWhite(render()));
 }
 
@@ -300,13 +273,9 @@ TEST_F(OddDataTest, ValuesTooFarApartAreNotAdded) {
       folder_ / "far", 8,
       [](const GridNode& number, NodeValues& values) { values.scalars[0] = number.i == 0 ? 1e20f : 1; },
       "far");
-  const ProgramResult refused =
-      runProgram(cubeAdditionWords(folder_ / "far", "far", folder_ / "cube.splats"));
-  EXPECT_EQ(refused.status, 1);
-  EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
-  EXPECT_NE(refused.err.find("far: its values go from 1 to 1e+20"), std::string::npos) << refused.err;
-  const ProgramResult info = runProgram({"info", file("cube.splats"), "--verify", "--json"});
-  EXPECT_EQ(info.status, 0) << info.err;
+  expectRefused(cubeAdditionWords(folder_ / "far", "far", folder_ / "cube.splats"), 1,
+                {"far: its values go from 1 to 1e+20"});
+  const ProgramResult info = run({"info", file("cube.splats"), "--verify", "--json"});
   EXPECT_EQ(nlohmann::json::parse(info.out)["variables"].size(), 1u);
 }
 
@@ -319,7 +288,7 @@ TEST_F(OddDataTest, ValuesFarApartButNotTooFarAreDrawn) {
     EXPECT_TRUE(isFinite(image)) << backend;
     EXPECT_FALSE(isWhite(image)) << backend;
   }
-  EXPECT_EQ(runProgram({"info", file("cube.splats"), "--verify"}).status, 0);
+  run({"info", file("cube.splats"), "--verify"});
 }
 
 }  // namespace

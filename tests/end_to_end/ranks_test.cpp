@@ -4,38 +4,25 @@
 
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "stream/base/file.h"
-#include "tests/support/folder_files.h"
-#include "tests/support/mpi_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
 
-class RanksCommand : public testing::Test {
+class RanksCommand : public ProgramSuite<RanksCommand> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    ASSERT_EQ(runProgram({"generate", "half-annulus", "--size", "64x32x32", "-o", file("g")}).status, 0);
-    const ProgramResult made = runProgram({"convert", file("g.xyz"), file("g.fun"), "-o", file("g.splats")});
-    ASSERT_EQ(made.status, 0) << made.err;
-  }
-  static void TearDownTestSuite() { folder_.reset(); }
+  static void prepare() { madeCache(file("g"), "half-annulus", "64x32x32"); }
   void SetUp() override {
     const std::string why_not = whyNoRanks();
     if (!why_not.empty()) GTEST_SKIP() << why_not;
   }
 
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
-  static std::vector<std::string> renderTo(const std::string& name, std::vector<std::string> more = {}) {
-    std::vector<std::string> words{"render", file("g.splats"), "-o",        file(name),
-                                   "--size", "150x100",        "--threads", "1"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+  static Words renderTo(const std::string& name, const Words& more = {}) {
+    return Words{"render", file("g.splats"), "-o", file(name), "--size", "150x100", "--threads", "1"} + more;
   }
   /// A script that draws never.png: the given rank from a cache of its own, the others from `cache`.
   static std::string renderScript(unsigned rank, const std::string& its_cache, const std::string& cache) {
@@ -51,25 +38,19 @@ class RanksCommand : public testing::Test {
   static void expectSameFile(const std::string& a, const std::string& b) {
     EXPECT_TRUE(readTextFile(file(a)) == readTextFile(file(b))) << a << " and " << b;
   }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
 };
 
-std::unique_ptr<TemporaryFolder> RanksCommand::folder_;
-
 TEST_F(RanksCommand, DrawOnePictureTogether) {
-  const std::vector<std::string> looks[] = {
-      {}, {"--slice=-0.4,0.1,0.5,1,0.3,0", "--shade", "--outline", "--scalar-bar"}};
-  for (const std::vector<std::string>& look : looks) {
-    ASSERT_EQ(runProgram(renderTo("one.exr", look)).status, 0);
+  const Words looks[] = {{}, {"--slice=-0.4,0.1,0.5,1,0.3,0", "--shade", "--outline", "--scalar-bar"}};
+  for (const Words& look : looks) {
+    run(renderTo("one.exr", look));
     for (const unsigned count : {2u, 3u}) {
-      std::vector<std::string> more = look;
-      more.insert(more.end(), {"--stats", file("s.json")});
-      const ProgramResult shared = runAsRanks(count, renderTo("shared.exr", more));
+      const ProgramResult shared =
+          runAsRanks(count, renderTo("shared.exr", look + Words{"--stats", file("s.json")}));
       EXPECT_EQ(shared.status, 0) << shared.err;
       EXPECT_EQ(lineCount(shared.out), 2) << shared.out;  // of rank 0 alone
       expectSameFile("one.exr", "shared.exr");
-      const auto json = nlohmann::json::parse(readTextFile(file("s.json")));
+      const auto json = jsonOf(file("s.json"));
       EXPECT_EQ(json["ranks"], count);
       ASSERT_EQ(json["frames"].size(), 1u);
       EXPECT_EQ(json["frames"][0]["of_ranks"].size(), count);
@@ -78,14 +59,13 @@ TEST_F(RanksCommand, DrawOnePictureTogether) {
 }
 
 TEST_F(RanksCommand, ShareOutFrames) {
-  const std::vector<std::string> orbit{"--orbit", "360", "--frames", "5"};
-  ASSERT_EQ(runProgram(renderTo("one_%d.png", orbit)).status, 0);
-  std::vector<std::string> more = orbit;
-  more.insert(more.end(), {"--stats", file("s.json")});
-  const ProgramResult shared = runAsRanks(2, renderTo("shared_%d.png", more));
+  const Words orbit{"--orbit", "360", "--frames", "5"};
+  run(renderTo("one_%d.png", orbit));
+  const ProgramResult shared =
+      runAsRanks(2, renderTo("shared_%d.png", orbit + Words{"--stats", file("s.json")}));
   EXPECT_EQ(shared.status, 0) << shared.err;
   for (int n = 0; n < 5; ++n) expectSameFile(fmt::format("one_{}.png", n), fmt::format("shared_{}.png", n));
-  const auto frames = nlohmann::json::parse(readTextFile(file("s.json")))["frames"];
+  const auto frames = jsonOf(file("s.json"))["frames"];
   ASSERT_EQ(frames.size(), 5u);
   for (int n = 0; n < 5; ++n) EXPECT_EQ(frames[static_cast<size_t>(n)]["frame"], n);
   // Fewer frames than ranks: each is drawn together.
@@ -95,19 +75,12 @@ TEST_F(RanksCommand, ShareOutFrames) {
 }
 
 TEST_F(RanksCommand, ReportAFailureOnce) {
-  const ProgramResult usage = runAsRanks(3, renderTo("a.png", {"--lod-pixels", "-1"}));
-  EXPECT_EQ(usage.status, 2);
-  EXPECT_EQ(lineCount(usage.err), 1) << usage.err;
-  EXPECT_NE(usage.err.find("rank 0 of 3"), std::string::npos) << usage.err;
-  EXPECT_NE(usage.err.find("--lod-pixels"), std::string::npos) << usage.err;
-  const ProgramResult first = runAsRanks(2, renderTo("a.png", {"--first-image", file("f.png")}));
-  EXPECT_EQ(first.status, 2);
-  EXPECT_EQ(lineCount(first.err), 1) << first.err;
+  expectRefused(runAsRanks(3, renderTo("a.png", {"--lod-pixels", "-1"})), 2, {"rank 0 of 3", "--lod-pixels"});
+  expectRefused(runAsRanks(2, renderTo("a.png", {"--first-image", file("f.png")})), 2, {});
 }
 
 TEST_F(RanksCommand, ReportADamagedStepOfASeriesOnce) {
-  ASSERT_EQ(runProgram({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")}).status,
-            0);
+  run({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")});
   for (const int damaged : {1, 2, 3}) {  // of rank 0, and of another, which rank 0 tries again
     const std::string name = file(fmt::format("s_{:04}.fun", damaged));
     const auto size = fs::file_size(name);
@@ -115,16 +88,12 @@ TEST_F(RanksCommand, ReportADamagedStepOfASeriesOnce) {
     const ProgramResult result = runAsRanks(3, {"convert", file("s.xyz"), file("s_%04d.fun"), "-o",
                                                 file("s.splats"), "--overwrite", "--threads", "1"});
     fs::resize_file(name, size);
-    EXPECT_EQ(result.status, 1);
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find("rank 0 of 3"), std::string::npos) << result.err;
-    EXPECT_NE(result.err.find(fmt::format("s_{:04}.fun", damaged)), std::string::npos) << result.err;
+    expectRefused(result, 1, {"rank 0 of 3", fmt::format("s_{:04}.fun", damaged)});
   }
 }
 
 TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
-  ASSERT_EQ(runProgram({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")}).status,
-            0);
+  run({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")});
   // Rank 1 sees another version of the last step's file.
   fs::create_directory(file("other"));
   for (const char* name : {"s.xyz", "s_0000.fun", "s_0000.nam", "s_0001.fun", "s_0001.nam", "s_0002.fun",
@@ -142,11 +111,9 @@ TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
   const ProgramResult result = runAsRanks(3, {}, script);
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("warning: rank 1 could not convert step 3 (s_0003.fun)"), std::string::npos)
-      << result.err;
-  const ProgramResult alone = runProgram({"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1",
-                                          "--overwrite", "-o", file("alone.splats")});
-  ASSERT_EQ(alone.status, 0) << alone.err;
+  expectSays(result.err, "warning: rank 1 could not convert step 3 (s_0003.fun)");
+  run({"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1", "--overwrite", "-o",
+       file("alone.splats")});
   for (const auto& [name, bytes] : filesOf(file("alone.splats")))
     if (name != "manifest.json") {
       EXPECT_TRUE(readTextFile(file("s.splats/" + name)) == bytes) << name;
@@ -155,8 +122,7 @@ TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
 
 TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
   fs::create_directory(file("elsewhere"));
-  ASSERT_EQ(runProgram({"generate", "half-annulus", "--size", "60x32x32", "-o", file("elsewhere/g")}).status,
-            0);
+  run({"generate", "half-annulus", "--size", "60x32x32", "-o", file("elsewhere/g")});
   ASSERT_EQ(runProgram({"convert", file("elsewhere/g.xyz"), file("elsewhere/g.fun"), "-o",
                         file("elsewhere/g.splats")})
                 .status,
@@ -170,11 +136,7 @@ TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
                                             "exec \"{}\" {} \"{}\"\n",
                                             file(""), CURVISPLAT_PROGRAM, command, output));
     fs::permissions(script, fs::perms::owner_all);
-    const ProgramResult result = runAsRanks(3, {}, script);
-    EXPECT_EQ(result.status, 1) << result.err;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find("rank 2 of 3"), std::string::npos) << result.err;
-    EXPECT_NE(result.err.find("here than at rank 0"), std::string::npos) << result.err;
+    expectRefused(runAsRanks(3, {}, script), 1, {"rank 2 of 3", "here than at rank 0"});
     for (const auto& entry : fs::directory_iterator(file("")))
       EXPECT_FALSE(entry.path().filename().string().starts_with("mixed")) << entry.path();
   }
@@ -183,22 +145,14 @@ TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
 TEST_F(RanksCommand, OfSeveralThatFailOfOneCauseTheLowestReports) {
   // All ranks but the first see no cache; rank 0 fails later than they do, as it hears of it.
   const std::string script = renderScript(0, file("g.splats"), file("missing.splats"));
-  const ProgramResult result = runAsRanks(4, {}, script);
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("rank 1 of 4"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("missing.splats"), std::string::npos) << result.err;
+  expectRefused(runAsRanks(4, {}, script), 1, {"rank 1 of 4", "missing.splats"});
   EXPECT_FALSE(fs::exists(file("never.png")));
 }
 
 TEST_F(RanksCommand, AreEndedByTheOneThatFails) {
   // Rank 1 sees no cache, as on a machine where the file system is not mounted.
   const std::string script = renderScript(1, file("missing.splats"), file("g.splats"));
-  const ProgramResult result = runAsRanks(3, {}, script);
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("rank 1 of 3"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("missing.splats"), std::string::npos) << result.err;
+  expectRefused(runAsRanks(3, {}, script), 1, {"rank 1 of 3", "missing.splats"});
   EXPECT_FALSE(fs::exists(file("never.png")));
 }
 
@@ -214,71 +168,66 @@ TEST_F(RanksCommand, ConvertTogether) {
     const Files found = filesOf(file("shared.splats"));
     ASSERT_EQ(found.size(), expected.size());
     for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
-    EXPECT_EQ(nlohmann::json::parse(readTextFile(file("c.json")))["ranks"], count);
+    EXPECT_EQ(jsonOf(file("c.json"))["ranks"], count);
   }
   for (const auto& entry : fs::directory_iterator(folder_->path()))
     EXPECT_EQ(entry.path().filename().string().find("shared.splats."), std::string::npos) << entry.path();
 }
 
 TEST_F(RanksCommand, ConvertASeriesTogether) {
-  ASSERT_EQ(runProgram({"generate", "wake", "--size", "40x30x16", "--steps", "7", "-o", file("s")}).status,
-            0);
-  std::vector<std::string> words{"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1", "-o"};
-  const auto to = [&](const std::string& name, std::vector<std::string> more = {}) {
-    more.insert(more.begin(), words.begin(), words.end());
-    more.insert(more.begin() + static_cast<std::ptrdiff_t>(words.size()), file(name));
-    return more;
+  run({"generate", "wake", "--size", "40x30x16", "--steps", "7", "-o", file("s")});
+  const auto to = [&](const std::string& name, const Words& more = {}) {
+    return Words{"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1", "-o", file(name)} + more;
   };
-  ASSERT_EQ(runProgram(to("s1.splats")).status, 0);
+  run(to("s1.splats"));
   const Files expected = filesOf(file("s1.splats"));
   const ProgramResult shared = runAsRanks(2, to("s2.splats", {"--stats", file("s.json")}));
   EXPECT_EQ(shared.status, 0) << shared.err;
   EXPECT_EQ(lineCount(shared.out), 3) << shared.out;
   EXPECT_TRUE(filesOf(file("s2.splats")) == expected);
-  const auto json = nlohmann::json::parse(readTextFile(file("s.json")));
+  const auto json = jsonOf(file("s.json"));
   EXPECT_EQ(json["ranks"], 2);
   EXPECT_EQ(json["each_step"].size(), 7u);
 
   // Parts by processes that know nothing of each other; the last one has nothing to do.
   for (const char* part : {"2/4", "4/4", "1/4"}) {
-    const ProgramResult made = runProgram(to("s3.splats", {"--part", part, "--stats", file("p.json")}));
-    EXPECT_EQ(made.status, 0) << made.err;
+    const ProgramResult made = run(to("s3.splats", {"--part", part, "--stats", file("p.json")}));
     EXPECT_EQ(lineCount(made.out), 1) << made.out;
-    const auto numbers = nlohmann::json::parse(readTextFile(file("p.json")));
+    const auto numbers = jsonOf(file("p.json"));
     EXPECT_EQ(numbers["each_step"].size(), numbers["converted"]);
     fs::remove(file("p.json"));
   }
-  const std::vector<std::string> join{"convert", "--join", file("s3.splats.parts"), "-o", file("s3.splats")};
-  const ProgramResult early = runProgram(join);
-  EXPECT_EQ(early.status, 1);
-  EXPECT_EQ(lineCount(early.err), 1) << early.err;
-  EXPECT_NE(early.err.find("part 3 of 4 is missing"), std::string::npos) << early.err;
-  EXPECT_EQ(runProgram(to("s3.splats", {"--part", "3/4"})).status, 0);
-  const ProgramResult joined = runProgram(join);
-  EXPECT_EQ(joined.status, 0) << joined.err;
+  const Words join{"convert", "--join", file("s3.splats.parts"), "-o", file("s3.splats")};
+  expectRefused(join, 1, {"part 3 of 4 is missing"});
+  run(to("s3.splats", {"--part", "3/4"}));
+  run(join);
   EXPECT_TRUE(filesOf(file("s3.splats")) == expected);
-  for (const std::vector<std::string>& wrong :
+  for (const Words& wrong :
        {to("w.splats", {"--part", "5/4"}),
         to("w.splats", {"--part", "1/2", "--keep-going"}),
         to("w.splats", {"--part", "1/2", "--dry-run"}),
-        {"convert", "--join", file("s3.splats.parts"), "-o", file("w.splats"), "--resume"}}) {
-    const ProgramResult refused = runProgram(wrong);
-    EXPECT_EQ(refused.status, 2);
-    EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
-  }
+        {"convert", "--join", file("s3.splats.parts"), "-o", file("w.splats"), "--resume"}})
+    expectRefused(wrong, 2, {});
   EXPECT_FALSE(fs::exists(file("w.splats.parts")));
 }
 
 TEST_F(RanksCommand, AddScalarsTogether) {
-  const auto adding = [](const std::string& cache, std::vector<std::string> more = {}) {
-    std::vector<std::string> words{
-        "convert",   file("g.xyz"), file("g.fun"), "--add-scalar", "volume,jacobian", "--to", file(cache),
-        "--threads", "1",           "--memory",    "256M"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+  const auto adding = [](const std::string& cache, const Words& more = {}) {
+    return Words{"convert",
+                 file("g.xyz"),
+                 file("g.fun"),
+                 "--add-scalar",
+                 "volume,jacobian",
+                 "--to",
+                 file(cache),
+                 "--threads",
+                 "1",
+                 "--memory",
+                 "256M"} +
+           more;
   };
   fs::copy(file("g.splats"), file("one.splats"));
-  ASSERT_EQ(runProgram(adding("one.splats")).status, 0);
+  run(adding("one.splats"));
   const Files expected = filesOf(file("one.splats"));
   for (const unsigned count : {2u, 3u}) {
     fs::remove_all(file("added.splats"));
@@ -287,12 +236,9 @@ TEST_F(RanksCommand, AddScalarsTogether) {
     EXPECT_EQ(shared.status, 0) << shared.err;
     EXPECT_EQ(lineCount(shared.out), 2) << shared.out;  // of rank 0 alone
     EXPECT_TRUE(filesOf(file("added.splats")) == expected);
-    EXPECT_EQ(nlohmann::json::parse(readTextFile(file("a.json")))["ranks"], count);
+    EXPECT_EQ(jsonOf(file("a.json"))["ranks"], count);
   }
-  const ProgramResult again = runAsRanks(2, adding("added.splats"));
-  EXPECT_EQ(again.status, 2);
-  EXPECT_EQ(lineCount(again.err), 1) << again.err;
-  EXPECT_NE(again.err.find("already has a scalar"), std::string::npos) << again.err;
+  expectRefused(runAsRanks(2, adding("added.splats")), 2, {"already has a scalar"});
   EXPECT_TRUE(filesOf(file("added.splats")) == expected);
   for (const auto& entry : fs::directory_iterator(folder_->path()))
     EXPECT_EQ(entry.path().filename().string().find("added.splats."), std::string::npos) << entry.path();
@@ -311,11 +257,9 @@ TEST_F(RanksCommand, LeaveTheCacheWhereOneFailsInAnAddition) {
                             "exec \"{}\" convert \"$grid\" \"{}\" --add-scalar volume --to \"{}\"\n",
                             file("g.xyz"), fault, CURVISPLAT_PROGRAM, file("g.fun"), file("kept.splats")));
     fs::permissions(script, fs::perms::owner_all);
-    const ProgramResult result = runAsRanks(3, {}, script);
-    EXPECT_EQ(result.status, 1) << fault;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find("rank 1 of 3"), std::string::npos) << result.err;
-    EXPECT_TRUE(filesOf(file("kept.splats")) == before) << fault;
+    SCOPED_TRACE(fault);
+    expectRefused(runAsRanks(3, {}, script), 1, {"rank 1 of 3"});
+    EXPECT_TRUE(filesOf(file("kept.splats")) == before);
     for (const auto& entry : fs::directory_iterator(folder_->path()))
       EXPECT_EQ(entry.path().filename().string().find("kept.splats."), std::string::npos) << entry.path();
   }
@@ -331,10 +275,7 @@ TEST_F(RanksCommand, LeaveNothingWhereOneFailsInAConversion) {
                                   "exec \"{2}\" convert \"$grid\" \"{1}\" -o \"{3}\"\n",
                                   file("g.xyz"), file("g.fun"), CURVISPLAT_PROGRAM, file("never.splats")));
   fs::permissions(script, fs::perms::owner_all);
-  const ProgramResult result = runAsRanks(2, {}, script);
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("rank 1 of 2"), std::string::npos) << result.err;
+  expectRefused(runAsRanks(2, {}, script), 1, {"rank 1 of 2"});
   for (const auto& entry : fs::directory_iterator(folder_->path()))
     EXPECT_EQ(entry.path().filename().string().find("never"), std::string::npos) << entry.path();
 }
@@ -347,20 +288,15 @@ TEST_F(RanksCommand, NameTheRankWhoseDiskIsFull) {
                                   "exec \"{}\" convert \"{}\" \"{}\" -o \"{}\"\n",
                                   CURVISPLAT_PROGRAM, file("g.xyz"), file("g.fun"), file("never.splats")));
   fs::permissions(script, fs::perms::owner_all);
-  const ProgramResult result = runAsRanks(3, {}, script);
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("rank 1 of 3"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("File too large"), std::string::npos) << result.err;
+  expectRefused(runAsRanks(3, {}, script), 1, {"rank 1 of 3", "File too large"});
   for (const auto& entry : fs::directory_iterator(folder_->path()))
     EXPECT_EQ(entry.path().filename().string().find("never.splats"), std::string::npos) << entry.path();
 }
 
 TEST_F(RanksCommand, AreSimulatedFromTheIndex) {
-  const ProgramResult result = runProgram({"bench", file("g.splats"), "--ranks", "1,2,16,1024", "--size",
-                                           "640x480", "--json", file("b.json"), "--plot", file("plots")});
-  EXPECT_EQ(result.status, 0) << result.err;
-  const auto counts = nlohmann::json::parse(readTextFile(file("b.json")))["ranks"]["counts"];
+  run({"bench", file("g.splats"), "--ranks", "1,2,16,1024", "--size", "640x480", "--json", file("b.json"),
+       "--plot", file("plots")});
+  const auto counts = jsonOf(file("b.json"))["ranks"]["counts"];
   ASSERT_EQ(counts.size(), 4u);
   EXPECT_EQ(counts[0]["efficiency"], 1);
   EXPECT_EQ(counts[0]["pixel_bytes"], 0);
@@ -371,15 +307,13 @@ TEST_F(RanksCommand, AreSimulatedFromTheIndex) {
     EXPECT_GE(one["painted_splats"].get<double>(), counts[0]["painted_splats"].get<double>());
   }
   EXPECT_TRUE(fs::exists(file("plots/ranks.png")));
-  const ProgramResult wrong = runProgram({"bench", file("g.splats"), "--ranks", "0"});
-  EXPECT_EQ(wrong.status, 2);
-  EXPECT_EQ(lineCount(wrong.err), 1) << wrong.err;
+  expectRefused({"bench", file("g.splats"), "--ranks", "0"}, 2, {});
 }
 
 TEST_F(RanksCommand, ASingleOneNeedsNoMpi) {
   const ProgramResult alone = runAsRanks(1, renderTo("alone.exr"));
   EXPECT_EQ(alone.status, 0) << alone.err;
-  ASSERT_EQ(runProgram(renderTo("one.exr")).status, 0);
+  run(renderTo("one.exr"));
   expectSameFile("one.exr", "alone.exr");
 }
 

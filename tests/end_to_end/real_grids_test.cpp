@@ -18,8 +18,7 @@
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/probe.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -96,19 +95,15 @@ double hexahedronVolumes(const GridBlock& block, const NodeArrays& nodes) {
   return sum;
 }
 
-class RealGrids : public testing::TestWithParam<RealGrid> {
+class RealGrids : public ProgramTest, public testing::WithParamInterface<RealGrid> {
  protected:
   void SetUp() override {
     if (!GetParam().grid) {
-      const ProgramResult made =
-          runProgram({"generate", GetParam().name, "--size", "41x33x25", "-o", folder_ / "scene"});
-      ASSERT_EQ(made.status, 0) << made.err;
+      run({"generate", GetParam().name, "--size", "41x33x25", "-o", folder_ / "scene"});
     }
     for (const std::filesystem::path& file : {gridFile(), solutionFile()})
       if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs " << file;
-    const ProgramResult result =
-        runProgram({"convert", gridFile(), solutionFile(), "-o", cache(), "--scalar", GetParam().scalar});
-    ASSERT_EQ(result.status, 0) << result.err;
+    run({"convert", gridFile(), solutionFile(), "-o", cache(), "--scalar", GetParam().scalar});
   }
 
   std::filesystem::path gridFile() const {
@@ -118,23 +113,14 @@ class RealGrids : public testing::TestWithParam<RealGrid> {
     return GetParam().grid ? dataFile(GetParam().solution) : folder_ / "scene.fun";
   }
   std::string cache() const { return folder_ / "grid.splats"; }
-
-  TemporaryFolder folder_;
 };
 
 TEST_P(RealGrids, MakeAWholeCacheAndAPictureThatRepeats) {
-  const ProgramResult verified = runProgram({"info", cache(), "--verify"});
-  EXPECT_EQ(verified.status, 0) << verified.err << verified.out;
-
+  run({"info", cache(), "--verify"});
   for (const std::string view : {"iso", "+z", "-y"}) {
     const std::string picture = folder_ / "picture.pfm", again = folder_ / "again.pfm";
-    const std::vector<std::string> render{"render", cache(), "--view", view, "--size", "300x300", "-o"};
-    for (const auto& [file, threads] : {std::pair{picture, "1"}, std::pair{again, "2"}}) {
-      std::vector<std::string> arguments = render;
-      arguments.insert(arguments.end(), {file, "--threads", threads});
-      const ProgramResult result = runProgram(arguments);
-      ASSERT_EQ(result.status, 0) << result.err;
-    }
+    for (const auto& [file, threads] : {std::pair{picture, "1"}, std::pair{again, "2"}})
+      run({"render", cache(), "--view", view, "--size", "300x300", "-o", file, "--threads", threads});
     EXPECT_EQ(readTextFile(picture), readTextFile(again)) << view;
 
     const Image image = readImage(picture);

@@ -8,17 +8,14 @@
 #include <fstream>
 #include <glm/vec4.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
-#include "stream/base/file.h"
 #include "stream/base/progress.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -42,56 +39,40 @@ class StretchedSource : public GridSource {
   const GridSource& source_;
 };
 
-class RenderOptions : public testing::Test {
+class RenderOptions : public ProgramSuite<RenderOptions> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
+  static void prepare() {
     const SceneGridSource scene(makeScene("half-annulus", std::nullopt), {48, 24, 24});
     convert(scene, "plain");
     convert(StretchedSource(scene), "stretched");
   }
-  static void TearDownTestSuite() { folder_.reset(); }
 
   static void convert(const GridSource& source, const std::string& name) {
     Progress progress;
     writePlot3d(source, *folder_ / name, progress);
-    const ProgramResult result =
-        runProgram({"convert", file(name + ".xyz"), file(name + ".fun"), "-o", cache(name)});
-    ASSERT_EQ(result.status, 0) << result.err;
+    run({"convert", file(name + ".xyz"), file(name + ".fun"), "-o", cache(name)});
   }
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
   static std::string cache(const std::string& name = "plain") { return file(name + ".splats"); }
 
-  /// Renders the plain cache at 96x96 (the last of several --size holds) and expects success.
-  static Image render(std::vector<std::string> options, const std::string& output = "a.exr",
+  /// Renders the plain cache at 96x96, unless `options` have another size, and expects success.
+  static Image render(const Words& options, const std::string& output = "a.exr",
                       const std::string& which = "plain") {
-    options.insert(options.begin(), {"render", cache(which), "-o", file(output)});
-    if (std::find(options.begin(), options.end(), "--size") == options.end())
-      options.insert(options.end(), {"--size", "96x96"});
-    last_ = runProgram(options);
-    EXPECT_EQ(last_.status, 0) << last_.err;
-    return last_.status == 0 ? readImage(file(output)) : Image({1, 1});
+    last_ = run(sized(Words{"render", cache(which), "-o", file(output)} + options, "96x96"));
+    return readImage(file(output));
   }
   /// Expects one line on stderr with `word` in it, this exit status, and no picture.
-  static void expectRefused(std::vector<std::string> arguments, int status, const std::string& word) {
+  static void expectNotDrawn(const Words& arguments, int status, const std::string& word) {
     const ProgramResult result = runProgram(arguments);
-    EXPECT_EQ(result.status, status) << result.err;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find(word), std::string::npos) << result.err << "lacks " << word;
+    expectRefused(result, status, {word});
     EXPECT_EQ(result.out, "");
   }
-  static void expectUsageError(std::vector<std::string> options, const std::string& word) {
-    options.insert(options.begin(), {"render", cache(), "-o", file("refused.png")});
-    expectRefused(options, 2, word);
+  static void expectUsageError(const Words& options, const std::string& word) {
+    expectNotDrawn(Words{"render", cache(), "-o", file("refused.png")} + options, 2, word);
     EXPECT_FALSE(std::filesystem::exists(file("refused.png")));
   }
 
-  static std::unique_ptr<TemporaryFolder> folder_;
-  static ProgramResult last_;
+  static inline ProgramResult last_;
 };
-
-std::unique_ptr<TemporaryFolder> RenderOptions::folder_;
-ProgramResult RenderOptions::last_;
 
 void expectPixel(const Image& image, int x, int y, const glm::vec4& expected, float tolerance = 0) {
   for (int c = 0; c < 4; ++c) EXPECT_NEAR(image.pixel(x, y)[c], expected[c], tolerance) << "channel " << c;
@@ -109,7 +90,7 @@ TEST_F(RenderOptions, DefaultsGiveAPictureAndTheOptionsThatWereChosen) {
   const Image image = render({}, "a.png");
   EXPECT_EQ(last_.err, "");
   EXPECT_EQ(lineCount(last_.out), 2) << last_.out;
-  EXPECT_NE(last_.out.find("chosen from the data: --tf viridis --range"), std::string::npos) << last_.out;
+  expectSays(last_.out, "chosen from the data: --tf viridis --range");
   EXPECT_GT(pixelsOtherThan(image, {1, 1, 1, 1}), 96u * 96 / 10);
 }
 
@@ -141,10 +122,8 @@ TEST_F(RenderOptions, TransparentPngHasTheDatasAlpha) {
 }
 
 TEST_F(RenderOptions, ClipBoxLeavesTheRestEmpty) {
-  const std::vector<std::string> camera{"--view", "+z", "--parallel-scale", "1.2"};
-  std::vector<std::string> clipped = camera;
-  clipped.insert(clipped.end(), {"--clip-box", "-2,2,-2,0,-2,2"});
-  const Image whole = render(camera), half = render(clipped);
+  const Words camera{"--view", "+z", "--parallel-scale", "1.2"};
+  const Image whole = render(camera), half = render(camera + Words{"--clip-box", "-2,2,-2,0,-2,2"});
   // Seen along z with y up and its centre, 0, in the middle: what is left is in the lower half.
   size_t above = 0, below_differs = 0, above_whole = 0;
   for (int y = 0; y < 96; ++y)
@@ -194,12 +173,10 @@ TEST_F(RenderOptions, APlacedCameraIsTheNamedOne) {
 }
 
 TEST_F(RenderOptions, AClipPlaneLeavesWhatABoxWithThatFaceLeaves) {
-  const std::vector<std::string> camera{"--view", "+z", "--parallel-scale", "1.2"};
-  std::vector<std::string> by_box = camera, by_plane = camera, by_two = camera;
-  by_box.insert(by_box.end(), {"--clip-box", "-9,9,-9,0.25,-9,9"});
-  by_plane.insert(by_plane.end(), {"--clip-plane", "3,0.25,7,0,-2,0"});
-  by_two.insert(by_two.end(), {"--clip-plane", "0,0.25,0,0,-1,0", "--clip-plane=0,0,0,1,0,0"});
-  const Image box = render(by_box), plane = render(by_plane), two = render(by_two);
+  const Words camera{"--view", "+z", "--parallel-scale", "1.2"};
+  const Image box = render(camera + Words{"--clip-box", "-9,9,-9,0.25,-9,9"}),
+              plane = render(camera + Words{"--clip-plane", "3,0.25,7,0,-2,0"}),
+              two = render(camera + Words{"--clip-plane", "0,0.25,0,0,-1,0", "--clip-plane=0,0,0,1,0,0"});
   EXPECT_LT(compareImages(box, plane).largest, 1e-5);
   EXPECT_GT(pixelsOtherThan(box, {1, 1, 1, 1}), 500u);
   size_t left = 0, right = 0;
@@ -214,15 +191,13 @@ TEST_F(RenderOptions, AClipPlaneLeavesWhatABoxWithThatFaceLeaves) {
 }
 
 TEST_F(RenderOptions, LightChangesColoursAndNotWhatIsCovered) {
-  const std::vector<std::string> lights[] = {{"--shade"},
-                                             {"--light", "0.2,0.5,0"},
-                                             {"--light-direction", "1,0,1"},
-                                             {"--shade", "--classify", "flat"}};
+  const Words lights[] = {{"--shade"},
+                          {"--light", "0.2,0.5,0"},
+                          {"--light-direction", "1,0,1"},
+                          {"--shade", "--classify", "flat"}};
   const Image unlit = render({"--background", "transparent"}, "a.exr");
   for (const auto& words : lights) {
-    std::vector<std::string> all{"--background", "transparent"};
-    all.insert(all.end(), words.begin(), words.end());
-    const Image shaded = render(all, "a.exr");
+    const Image shaded = render(Words{"--background", "transparent"} + words, "a.exr");
     double changed = 0, alpha = 0;
     for (size_t n = 0; n < shaded.rgba.size(); ++n) {
       double& of = n % 4 == 3 ? alpha : changed;
@@ -237,35 +212,34 @@ TEST_F(RenderOptions, LightChangesColoursAndNotWhatIsCovered) {
 
 TEST_F(RenderOptions, ARangeThatMissesTheScalarIsWarnedOf) {
   render({"--range", "5,6"});
-  EXPECT_NE(last_.err.find("warning: the range 5..6"), std::string::npos) << last_.err;
-  EXPECT_NE(last_.err.find("the picture is empty"), std::string::npos) << last_.err;
-  EXPECT_NE(last_.err.find("fully transparent"), std::string::npos) << last_.err;
+  expectSays(last_.err, "warning: the range 5..6");
+  expectSays(last_.err, "the picture is empty");
+  expectSays(last_.err, "fully transparent");
   render({"--range", "-6,-5"});
-  EXPECT_NE(last_.err.find("warning: the range -6..-5"), std::string::npos) << last_.err;
+  expectSays(last_.err, "warning: the range -6..-5");
   EXPECT_EQ(last_.err.find("empty"), std::string::npos) << last_.err;
 }
 
 TEST_F(RenderOptions, AnEmptyPictureIsExplained) {
   EXPECT_EQ(pixelsOtherThan(render({"--clip-box", "5,6,5,6,5,6"}), {1, 1, 1, 1}), 0u);
-  EXPECT_NE(last_.err.find("--clip-box contains none of the data"), std::string::npos) << last_.err;
+  expectSays(last_.err, "--clip-box contains none of the data");
   EXPECT_EQ(pixelsOtherThan(render({"--clip-plane", "9,0,0,1,0,0"}), {1, 1, 1, 1}), 0u);
-  EXPECT_NE(last_.err.find("--clip-plane and --clip-box leave none of the data"), std::string::npos)
-      << last_.err;
+  expectSays(last_.err, "--clip-plane and --clip-box leave none of the data");
   EXPECT_EQ(
       pixelsOtherThan(render({"--position", "9,0,0", "--focal-point", "9,9,0", "--parallel-scale", "1"}),
                       {1, 1, 1, 1}),
       0u);
-  EXPECT_NE(last_.err.find("does not see the data's box"), std::string::npos) << last_.err;
+  expectSays(last_.err, "does not see the data's box");
   render({"--opacity-unit", "1e12"}, "a.png");
-  EXPECT_NE(last_.err.find("--opacity-unit"), std::string::npos) << last_.err;
+  expectSays(last_.err, "--opacity-unit");
 }
 
 TEST_F(RenderOptions, TransferFunctionFilesAreUsedAndTheirNotesPrinted) {
   std::ofstream(file("red.json")) << R"([{"Name": "red", "RGBPoints": [0,1,0,0, 1,1,0,0]}])";
   const Image image = render({"--tf", file("red.json"), "--background", "black"});
   EXPECT_EQ(lineCount(last_.err), 1) << last_.err;
-  EXPECT_NE(last_.err.find("note: "), std::string::npos) << last_.err;
-  EXPECT_NE(last_.err.find("no Points"), std::string::npos) << last_.err;
+  expectSays(last_.err, "note: ");
+  expectSays(last_.err, "no Points");
   float red = 0, others = 0;
   for (size_t n = 0; n < image.rgba.size(); n += 4) {
     red = std::max(red, image.rgba[n]);
@@ -275,7 +249,8 @@ TEST_F(RenderOptions, TransferFunctionFilesAreUsedAndTheirNotesPrinted) {
   EXPECT_EQ(others, 0.0f);
 
   std::ofstream(file("bad.json")) << R"([{"Name": "bad", "RGBPoints": [0,1,0]}])";
-  expectRefused({"render", cache(), "-o", file("refused.png"), "--tf", file("bad.json")}, 1, "RGBPoints is ");
+  expectNotDrawn({"render", cache(), "-o", file("refused.png"), "--tf", file("bad.json")}, 1,
+                 "RGBPoints is ");
 }
 
 TEST_F(RenderOptions, FlatClassificationAndLodDiffer) {
@@ -285,7 +260,7 @@ TEST_F(RenderOptions, FlatClassificationAndLodDiffer) {
 
 TEST_F(RenderOptions, WrongOptionsAreUsageErrors) {
   const struct {
-    std::vector<std::string> options;
+    Words options;
     const char* word;
   } cases[] = {{{"--view", "iso", "--position", "1,2,3"}, "--view"},
                {{"--view", "iso", "--view-up", "0,0,1"}, "--view"},
@@ -343,39 +318,37 @@ TEST_F(RenderOptions, WrongOptionsAreUsageErrors) {
     SCOPED_TRACE(c.options[0] + " " + c.options[1]);
     expectUsageError(c.options, c.word);
   }
-  expectRefused({"render", cache(), "-o", file("a.jpg")}, 2, ".png");
-  expectRefused({"render", cache(), "-o", file("a.avi"), "--orbit", "90"}, 2, "'.avi' is not the ending of");
-  expectRefused({"render", cache(), "-o", file("a.pfm"), "--background", "transparent"}, 2, "transparent");
+  expectNotDrawn({"render", cache(), "-o", file("a.jpg")}, 2, ".png");
+  expectNotDrawn({"render", cache(), "-o", file("a.avi"), "--orbit", "90"}, 2, "'.avi' is not the ending of");
+  expectNotDrawn({"render", cache(), "-o", file("a.pfm"), "--background", "transparent"}, 2, "transparent");
 }
 
 TEST_F(RenderOptions, BadInputAndOutputAreOneLine) {
-  expectRefused({"render", cache(), "-o", file("a.png"), "--scalar", "entropy"}, 1, "entropy");
-  expectRefused({"render", cache("missing"), "-o", file("a.png")}, 1, "missing.splats");
-  expectRefused({"render", file("plain.xyz"), "-o", file("a.png")}, 1, "plain.xyz");
-  expectRefused({"render", cache(), "-o", file("no/a.png")}, 1, "no");
-  expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("no/a.json")}, 1, "--stats");
-  expectRefused({"render", cache(), "-o", file("a.png"), "--tf", file("missing.json")}, 1, "missing.json");
+  expectNotDrawn({"render", cache(), "-o", file("a.png"), "--scalar", "entropy"}, 1, "entropy");
+  expectNotDrawn({"render", cache("missing"), "-o", file("a.png")}, 1, "missing.splats");
+  expectNotDrawn({"render", file("plain.xyz"), "-o", file("a.png")}, 1, "plain.xyz");
+  expectNotDrawn({"render", cache(), "-o", file("no/a.png")}, 1, "no");
+  expectNotDrawn({"render", cache(), "-o", file("a.png"), "--stats", file("no/a.json")}, 1, "--stats");
+  expectNotDrawn({"render", cache(), "-o", file("a.png"), "--tf", file("missing.json")}, 1, "missing.json");
   std::filesystem::create_directory(file("folder.png"));
-  expectRefused({"render", cache(), "-o", file("folder.png")}, 1, "folder.png");
+  expectNotDrawn({"render", cache(), "-o", file("folder.png")}, 1, "folder.png");
 }
 
 TEST_F(RenderOptions, ALimitAboveTheMachinesMemoryIsAccepted) {
   render({"--memory", "1000T"});
-  const ProgramResult result = runProgram(
-      {"convert", file("plain.xyz"), file("plain.fun"), "-o", file("bounded.splats"), "--memory", "1000T"});
-  EXPECT_EQ(result.status, 0) << result.err;
+  run({"convert", file("plain.xyz"), file("plain.fun"), "-o", file("bounded.splats"), "--memory", "1000T"});
 }
 
 TEST_F(RenderOptions, AnUnknownScalarNamesThoseThereAre) {
   const ProgramResult result = runProgram({"render", cache(), "-o", file("a.png"), "--scalar", "entropy"});
-  EXPECT_NE(result.err.find("it has f"), std::string::npos) << result.err;
+  expectSays(result.err, "it has f");
   render({"--scalar", "f"});
 }
 
 TEST_F(RenderOptions, StatisticsReportWhatWasDone) {
   const std::string stats = file("stats.json");
   render({"--stats", stats, "--threads", "2", "--view-angle", "25", "--scale", "1,1,2", "--memory", "64M"});
-  const auto json = nlohmann::json::parse(readTextFile(stats));
+  const auto json = jsonOf(stats);
   for (const char* key : {"program",
                           "version",
                           "command",

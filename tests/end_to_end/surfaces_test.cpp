@@ -14,31 +14,21 @@
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
-class SurfaceOptions : public testing::Test {
+class SurfaceOptions : public ProgramSuite<SurfaceOptions> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    for (const auto& arguments :
-         {std::vector<std::string>{"generate", "wake", "--size", "96x64x48", "-o", file("wake")},
-          {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("wake.splats")}}) {
-      const ProgramResult result = runProgram(arguments);
-      ASSERT_EQ(result.status, 0) << result.err;
-    }
+  static void prepare() {
+    madeCache(file("wake"), "wake", "96x64x48");
     writeFileAtomically(*folder_ / "sphere.obj", sphere());
     // Before all of the wake, seen from +z.
     writeFileAtomically(
         *folder_ / "wall.obj",
         std::string("v -1e3 -1e3 50\nv 1e3 -1e3 50\nv 1e3 1e3 50\nv -1e3 1e3 50\nf 1 2 3 4\n"));
   }
-  static void TearDownTestSuite() { folder_.reset(); }
-
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
 
   static std::string sphere() {
     constexpr int kAround = 64, kUp = 32;
@@ -57,40 +47,28 @@ class SurfaceOptions : public testing::Test {
     return text;
   }
 
-  static ProgramResult render(const std::vector<std::string>& more, const std::string& output = "a.pfm") {
-    std::vector<std::string> arguments{"render", file("wake.splats"), "-o",      file(output),
-                                       "--size", "200x150",           "--stats", file("stats.json")};
+  static Words render(const Words& more, const std::string& output = "a.pfm") {
     const auto is_view = [](const std::string& word) {
       return word == "--view" || word.starts_with("--view=");
     };
-    if (std::none_of(more.begin(), more.end(), is_view)) arguments.insert(arguments.end(), {"--view", "iso"});
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return runProgram(arguments);
+    const bool has_view = std::any_of(more.begin(), more.end(), is_view);
+    return Words{"render", file("wake.splats"), "-o",      file(output),
+                 "--size", "200x150",           "--stats", file("stats.json")} +
+           (has_view ? Words{} : Words{"--view", "iso"}) + more;
   }
-  static Image picture(const std::vector<std::string>& more) {
-    const ProgramResult result = render(more);
-    EXPECT_EQ(result.status, 0) << result.err;
+  static Image picture(const Words& more) {
+    run(render(more));
     return readImage(file("a.pfm"));
   }
-  static nlohmann::json statistics() {
-    return nlohmann::json::parse(readTextFile(file("stats.json")))["frames"][0];
-  }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
+  static nlohmann::json statistics() { return jsonOf(file("stats.json"))["frames"][0]; }
 };
-
-std::unique_ptr<TemporaryFolder> SurfaceOptions::folder_;
 
 TEST_F(SurfaceOptions, EveryPainterDrawsTheSame) {
   for (const char* angle : {"0", "40"}) {
-    std::vector<std::string> options{"--surface",    file("sphere.obj"), "--slice",         "4,0,0,1,0.2,0.1",
-                                     "--slice",      "4,0,0,0,0,1",      "--slice-opacity", "0.6",
-                                     "--clip-plane", "2,0,0,1,0,0"};
-    if (angle != std::string("0")) options.insert(options.end(), {"--view-angle", angle});
-    const auto with = [&](std::vector<std::string> more) {
-      more.insert(more.end(), options.begin(), options.end());
-      return picture(more);
-    };
+    Words options{"--surface",   file("sphere.obj"), "--slice", "4,0,0,1,0.2,0.1", "--slice",
+                  "4,0,0,0,0,1", "--slice-opacity",  "0.6",     "--clip-plane",    "2,0,0,1,0,0"};
+    if (angle != std::string("0")) options = options + Words{"--view-angle", angle};
+    const auto with = [&](const Words& more) { return picture(more + options); };
     const Image cpu = with({"--backend", "cpu"});
     const ImageDifference difference = compareImages(cpu, with({"--backend", "osmesa"}));
     EXPECT_GT(difference.psnr_db, 70) << angle;
@@ -132,16 +110,14 @@ TEST_F(SurfaceOptions, APolygonFileOfVtkIsTheSameSurface) {
     std::string changed = text;
     changed.replace(changed.find(from), from.size(), to);
     writeFileAtomically(file("wrong.vtp"), changed);
-    const ProgramResult result = render({"--surface", file("wrong.vtp")});
+    const ProgramResult result = runProgram(render({"--surface", file("wrong.vtp")}));
     EXPECT_EQ(result.status, 1) << result.err;
     return result.err;
   };
-  EXPECT_NE(with("ascii\">0 ", "ascii\">99999 ").find("a cell refers to a point that does not exist"),
-            std::string::npos);
-  EXPECT_NE(with("ascii\">4 8", "ascii\">8 4").find("the offsets of its cells do not increase"),
-            std::string::npos);
-  EXPECT_NE(with("NumberOfPolys", "NumberOfLines").find("has no polygons"), std::string::npos);
-  EXPECT_NE(with("</PolyData></VTKFile>", "").find("wrong.vtp: "), std::string::npos);
+  expectSays(with("ascii\">0 ", "ascii\">99999 "), "a cell refers to a point that does not exist");
+  expectSays(with("ascii\">4 8", "ascii\">8 4"), "the offsets of its cells do not increase");
+  expectSays(with("NumberOfPolys", "NumberOfLines"), "has no polygons");
+  expectSays(with("</PolyData></VTKFile>", ""), "wrong.vtp: ");
 }
 
 TEST_F(SurfaceOptions, WhatAWallHidesIsNotRead) {
@@ -164,11 +140,8 @@ TEST_F(SurfaceOptions, VolumeOffLeavesSurfacesAndSlices) {
 }
 
 TEST_F(SurfaceOptions, SlicesKeepTheColoursOfTheScalarBarInLight) {
-  const std::vector<std::string> slice{"--volume", "off", "--slice", "4,0,0,0,0,1", "--view", "+z"};
-  const auto with = [&](std::vector<std::string> more) {
-    more.insert(more.end(), slice.begin(), slice.end());
-    return picture(more);
-  };
+  const Words slice{"--volume", "off", "--slice", "4,0,0,0,0,1", "--view", "+z"};
+  const auto with = [&](const Words& more) { return picture(more + slice); };
   const Image unlit = with({});
   EXPECT_EQ(with({"--shade"}).rgba, unlit.rgba);
   EXPECT_EQ(with({"--shade", "--light-direction", "1,1,1"}).rgba, unlit.rgba);
@@ -201,24 +174,23 @@ TEST_F(SurfaceOptions, AClipPlaneKeepsTheSliceInIt) {
 
 /// A surface that fills the picture with one colour is what was asked for: no option of the volume changes it.
 TEST_F(SurfaceOptions, WarningsOfSurfacesAloneDoNotMentionTheVolume) {
-  const ProgramResult wall = render({"--view", "+z", "--surface", file("wall.obj")});
+  const ProgramResult wall = runProgram(render({"--view", "+z", "--surface", file("wall.obj")}));
   EXPECT_EQ(wall.err.find("warning"), std::string::npos) << wall.err;
   const ProgramResult nothing =
-      render({"--volume", "off", "--surface", file("sphere.obj"), "--focal-point", "900,0,0"});
-  EXPECT_NE(nothing.err.find("no surface, slice or isosurface is in sight"), std::string::npos)
-      << nothing.err;
+      runProgram(render({"--volume", "off", "--surface", file("sphere.obj"), "--focal-point", "900,0,0"}));
+  expectSays(nothing.err, "no surface, slice or isosurface is in sight");
   EXPECT_EQ(nothing.err.find("transfer function"), std::string::npos) << nothing.err;
 }
 
 TEST_F(SurfaceOptions, SaysWhyNoIsosurfaceIsSeen) {
-  const ProgramResult nothing = render({"--volume", "off", "--iso", "0.5", "--focal-point", "900,0,0"});
-  EXPECT_NE(nothing.err.find("no isosurface of 0.5 is in sight"), std::string::npos) << nothing.err;
-  EXPECT_NE(nothing.err.find("f goes from 0 to 0.99859"), std::string::npos) << nothing.err;
+  const ProgramResult nothing =
+      runProgram(render({"--volume", "off", "--iso", "0.5", "--focal-point", "900,0,0"}));
+  expectSays(nothing.err, "no isosurface of 0.5 is in sight");
+  expectSays(nothing.err, "f goes from 0 to 0.99859");
 }
 
 TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
-  const ProgramResult result = render({"--slice", "0,0,900,0,0,1"});
-  EXPECT_EQ(result.status, 0);
+  const ProgramResult result = run(render({"--slice", "0,0,900,0,0,1"}));
   EXPECT_TRUE(result.err.find("warning: --slice 0,0,900,0,0,1 misses the data, which lies in x ") !=
               std::string::npos)
       << result.err;
@@ -228,7 +200,7 @@ TEST_F(SurfaceOptions, RefusesWrongUsage) {
   writeFileAtomically(*folder_ / "cut.stl", readTextFile(file("wall.obj")));
   const std::string cut = file("cut.stl"), sphere = file("sphere.obj");
   const struct {
-    std::vector<std::string> options;
+    Words options;
     int status;
     std::string words;
   } refused[] = {
@@ -245,15 +217,14 @@ TEST_F(SurfaceOptions, RefusesWrongUsage) {
       {{"--surface", cut}, 1, cut + ": is truncated"},
       {{"--surface", file("none.stl")}, 1, file("none.stl")}};
   for (const auto& [options, status, words] : refused) {
-    const ProgramResult result = render(options, "refused.png");
+    const ProgramResult result = runProgram(render(options, "refused.png"));
     EXPECT_EQ(result.status, status) << words << "\n" << result.err;
-    EXPECT_NE(result.err.find(words), std::string::npos) << result.err << "  lacks " << words;
+    expectSays(result.err, words);
     EXPECT_FALSE(std::filesystem::exists(file("refused.png")));
   }
-  std::vector<std::string> many;
+  Words many;
   for (int n = 0; n < 9; ++n) many.insert(many.end(), {"--slice", "0,0,0,0,0,1"});
-  EXPECT_NE(render(many).err.find("--slice: given 9 times; a picture has at most 8 slices"),
-            std::string::npos);
+  expectSays(runProgram(render(many)).err, "--slice: given 9 times; a picture has at most 8 slices");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-"""Which places a test of damage tries (tests/support/sweep.h)."""
+"""Which places a test of damage tries (tests/support/fault_sweep.h)."""
 import os
 
 IS_WHOLE = "CURVISPLAT_WHOLE_SWEEPS" in os.environ

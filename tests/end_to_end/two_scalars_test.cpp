@@ -15,8 +15,7 @@
 #include "stream/base/progress.h"
 #include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -34,13 +33,9 @@ const TransferFunction& hues() {
   return function;
 }
 
-class TwoScalarsTest : public testing::Test {
+class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
  protected:
-  static void SetUpTestSuite() {
-    kept_.emplace();
-    convertTo("a.splats", 0);
-  }
-  static void TearDownTestSuite() { kept_.reset(); }
+  static void prepare() { convertTo("a.splats", 0); }
 
   static void convertTo(const char* name, double added_to_hues) {
     const auto annulus = makeScene("half-annulus");
@@ -52,7 +47,7 @@ class TwoScalarsTest : public testing::Test {
           return NodeValues{at, {float(annulus->scalar(at)), float(hueAt(at) + added_to_hues)}};
         });
     ConvertOptions options;
-    options.output = *kept_ / name;
+    options.output = *folder_ / name;
     options.scalars = {0, 1};
     Progress progress;
     convert(source, options, progress);
@@ -67,7 +62,7 @@ class TwoScalarsTest : public testing::Test {
   }
   Image drawn(const TransferFunction& opacity, const FrameOptions& options,
               Backend backend = Backend::kCpu) const {
-    const CacheReader cache(folder_ / "a.splats");
+    const CacheReader cache(*folder_ / "a.splats");
     FrameRenderer renderer(cache, DrawnScalars({0, opacity}, {1, hues()}), backend);
     FrameStatistics statistics;
     return renderer.render(halfAnnulusCamera(), options, statistics);
@@ -76,8 +71,6 @@ class TwoScalarsTest : public testing::Test {
     return compareImages(image, reference).psnr_db;
   }
 
-  static inline std::optional<TemporaryFolder> kept_;
-  const TemporaryFolder& folder_ = *kept_;
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
   const SceneField field_{*annulus_};
 };
@@ -196,7 +189,7 @@ TEST_F(TwoScalarsTest, SurfacesHaveTheOpacitiesOfTheOther) {
   FrameOptions options = knownFrame(kSize);
   auto scene = std::make_shared<SurfaceScene>();
   GridSurface& surface = scene->grid_surfaces.emplace_back();
-  surface.faces = FacesReader::open(folder_ / "a.splats", CacheReader(folder_ / "a.splats").manifest());
+  surface.faces = FacesReader::open(*folder_ / "a.splats", CacheReader(*folder_ / "a.splats").manifest());
   for (uint32_t n = 0; n < surface.faces->faces().size(); ++n) {
     const GridFace& face = surface.faces->faces()[n];
     if (face.axis == 1 && face.side == FaceSide::kMin)
@@ -280,7 +273,7 @@ TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
   const TransferFunction opacity = KnownFunction::of("smooth").table;
   const Image near = drawn(opacity, options);
   options.scene = sceneWith(10.6);
-  const CacheReader cache(folder_ / "far.splats");
+  const CacheReader cache(*folder_ / "far.splats");
   const TransferFunction far_hues = TransferFunction::preset("cool-warm", 10, 11, 1);
   FrameRenderer renderer(cache, DrawnScalars({0, opacity}, {1, far_hues}), Backend::kCpu);
   FrameStatistics statistics;
@@ -296,7 +289,7 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
   options.scene = scene;
   const TransferFunction opacity = KnownFunction::of("smooth").table;
   const Image coloured = drawn(opacity, options);
-  const CacheReader cache(folder_ / "a.splats");
+  const CacheReader cache(*folder_ / "a.splats");
   FrameRenderer renderer(cache, 0, opacity, Backend::kCpu);
   FrameStatistics statistics;
   const Image plain = renderer.render(halfAnnulusCamera(), options, statistics);
@@ -355,19 +348,17 @@ TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
 }
 
 TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
-  const std::string cache = (folder_ / "a.splats").string(), output = (folder_ / "a.pfm").string();
-  const auto run = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"render", cache, "-o", output, "--size", "150x150", "--view", "iso"});
-    return runProgram(more);
+  const std::string cache = file("a.splats"), output = file("a.pfm");
+  const auto render = [&](const Words& more) {
+    return Words{"render", cache, "-o", output, "--size", "150x150", "--view", "iso"} + more;
   };
-  const ProgramResult chosen = run({"--scalar", "s1", "--opacity-by", "s0"});
-  EXPECT_EQ(chosen.status, 0) << chosen.err;
+  const ProgramResult chosen = run(render({"--scalar", "s1", "--opacity-by", "s0"}));
   const Image once = readImage(output);
   // What it chose draws the same picture.
   const std::string words = "chosen from the data: ";
   const size_t at = chosen.out.find(words);
   ASSERT_NE(at, std::string::npos) << chosen.out;
-  std::vector<std::string> same{"--scalar", "s1", "--opacity-by", "s0"};
+  Words same{"--scalar", "s1", "--opacity-by", "s0"};
   std::string rest = chosen.out.substr(at + words.size());
   rest.resize(rest.find('\n'));
   for (size_t begin = 0; begin < rest.size();) {
@@ -375,17 +366,15 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
     same.push_back(rest.substr(begin, end - begin));
     begin = end + 1;
   }
-  EXPECT_NE(rest.find("--opacity-range"), std::string::npos) << rest;
-  EXPECT_EQ(run(same).status, 0) << rest;
+  expectSays(rest, "--opacity-range");
+  run(render(same));
   EXPECT_EQ(readImage(output).rgba, once.rgba) << rest;
 
-  EXPECT_EQ(run({"--scalar", "s1", "--iso-by", "s0", "--iso", "0.5", "--volume", "off"}).status, 0);
+  run(render({"--scalar", "s1", "--iso-by", "s0", "--iso", "0.5", "--volume", "off"}));
   // Faces and isosurfaces with the opacities of the other.
-  const std::vector<std::string> two{"--scalar", "s1", "--opacity-by", "s0"};
-  const auto with = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), two.begin(), two.end());
-    const ProgramResult result = run(more);
-    EXPECT_EQ(result.status, 0) << result.err;
+  const Words two{"--scalar", "s1", "--opacity-by", "s0"};
+  const auto with = [&](const Words& more) {
+    run(render(two + more));
     return readImage(output);
   };
   const Image plain = with({"--surface", "jmin"}),
@@ -396,7 +385,7 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
   EXPECT_LT(db(with({"--iso", "0.6"}), of_colours), 40);
   EXPECT_LT(db(with({"--iso-by", "s1", "--iso", "0.6", "--iso-opacity", "function"}), of_colours), 40);
   const struct {
-    std::vector<std::string> options;
+    Words options;
     int status;
     std::string words;
   } refused[] = {
@@ -410,9 +399,9 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
        2,
        "--opacity-tf viridis: expected a ParaView preset"}};
   for (const auto& [options, status, expected] : refused) {
-    const ProgramResult result = run(options);
+    const ProgramResult result = runProgram(render(options));
     EXPECT_EQ(result.status, status) << result.err;
-    EXPECT_NE(result.err.find(expected), std::string::npos) << result.err << " lacks " << expected;
+    expectSays(result.err, expected);
   }
 }
 

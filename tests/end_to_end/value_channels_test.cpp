@@ -12,10 +12,8 @@
 #include <vector>
 
 #include "preprocess/scenes/scenes.h"
-#include "render/image/image_file.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -27,7 +25,7 @@ struct At {
   glm::dvec3 normal{0.0};
 };
 
-class ValueChannelsTest : public testing::Test {
+class ValueChannelsTest : public ProgramTest {
  protected:
   ValueChannelsTest() { convertGrid(SceneGridSource(annulus_, {128, 64, 64}), folder_ / "a.splats"); }
 
@@ -110,7 +108,6 @@ class ValueChannelsTest : public testing::Test {
     return medians;
   }
 
-  const TemporaryFolder folder_;
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
 };
 
@@ -188,40 +185,39 @@ TEST_F(ValueChannelsTest, ThePictureAndTheValuesDoNotDependOnThreads) {
 }
 
 TEST_F(ValueChannelsTest, TheProgramWritesThem) {
-  const std::string cache = (folder_ / "a.splats").string(), output = (folder_ / "a.exr").string();
-  const auto run = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"render", cache, "-o", output, "--size", "150x100", "--view", "iso"});
-    return runProgram(more);
+  const std::string output = file("a.exr");
+  const auto render = [&](const Words& more) {
+    return Words{"render", file("a.splats"), "-o", output, "--size", "150x100", "--view", "iso"} + more;
   };
   const auto names = [&] {
-    std::vector<std::string> found;
+    Words found;
     for (const ImageChannel& channel : readChannels(output)) {
       found.push_back(channel.name);
       EXPECT_EQ(channel.values.size(), 15000u);
     }
     return found;
   };
-  EXPECT_EQ(run({}).status, 0);
-  EXPECT_EQ(names(), std::vector<std::string>{"Z"});
-  EXPECT_EQ(run({"--channels", "normal,scalar", "--scalar-bar"}).status, 0);
-  EXPECT_EQ(names(), (std::vector<std::string>{"N.X", "N.Y", "N.Z", "scalar"}));
-  EXPECT_EQ(run({"--channels", "none"}).status, 0);
+  run(render({}));
+  EXPECT_EQ(names(), Words{"Z"});
+  run(render({"--channels", "normal,scalar", "--scalar-bar"}));
+  EXPECT_EQ(names(), (Words{"N.X", "N.Y", "N.Z", "scalar"}));
+  run(render({"--channels", "none"}));
   EXPECT_TRUE(names().empty());
   const struct {
-    std::vector<std::string> options;
+    Words options;
     std::string words;
   } refused[] = {
       {{"--channels", "alpha"}, "--channels alpha: unknown channel 'alpha'; expected none, or some of"},
-      {{"--channels", "depth", "--first-image", (folder_ / "b.exr").string()}, "leave out --channels"}};
+      {{"--channels", "depth", "--first-image", file("b.exr")}, "leave out --channels"}};
   for (const auto& [options, words] : refused) {
-    const ProgramResult result = run(options);
+    const ProgramResult result = runProgram(render(options));
     EXPECT_EQ(result.status, 2) << result.err;
-    EXPECT_NE(result.err.find(words), std::string::npos) << result.err << " lacks " << words;
+    expectSays(result.err, words);
   }
   const ProgramResult of_png =
-      runProgram({"render", cache, "-o", (folder_ / "a.png").string(), "--channels", "depth"});
+      runProgram({"render", file("a.splats"), "-o", file("a.png"), "--channels", "depth"});
   EXPECT_EQ(of_png.status, 2);
-  EXPECT_NE(of_png.err.find("only .exr files have channels"), std::string::npos) << of_png.err;
+  expectSays(of_png.err, "only .exr files have channels");
 }
 
 }  // namespace

@@ -1,10 +1,23 @@
-// Where the window cannot open, it ends with one line and status 1; where its cache goes bad under it, it lives and says so.
+// Where the window cannot open, it ends with one line and status 1; where its cache goes bad under it, it
+// lives and says so. Then odd circumstances: it is closed while it loads, has too little memory, or nowhere
+// to remember the view.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/end_to_end/window_fixture.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/virtual_display.h"
 
 namespace curvisplat {
 namespace {
@@ -13,9 +26,9 @@ namespace fs = std::filesystem;
 
 class NoWindow : public WindowTest {
  protected:
-  static void expectFailure(const ProgramResult& result, const std::vector<std::string>& parts) {
+  static void expectFailure(const ProgramResult& result, const Words& parts) {
     EXPECT_EQ(result.status, 1) << result.err;
-    const std::vector<std::string> lines = linesOf(result.err);
+    const Words lines = linesOf(result.err);
     ASSERT_FALSE(lines.empty());
     for (const std::string& part : parts) EXPECT_NE(lines.back().find(part), std::string::npos) << result.err;
     // Before it there is nothing but the window's OpenGL.
@@ -33,24 +46,24 @@ TEST_F(NoWindow, WithoutADisplay) {
   const ProgramResult result = runProgram({"view", "a.splats"});
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
   expectFailure(result, {"cannot open a window", "DISPLAY", "curvisplat render"});
-  EXPECT_NE(system().out.find("display    none"), std::string::npos) << system().out;
-  EXPECT_NE(system().out.find("window     not available: cannot open a window"), std::string::npos);
+  expectSays(system().out, "display    none");
+  expectSays(system().out, "window     not available: cannot open a window");
 }
 
 TEST_F(NoWindow, WhereOpenGlIsTooOld) {
-  EXPECT_NE(system().out.find("window     OpenGL"), std::string::npos) << system().out;
+  expectSays(system().out, "window     OpenGL");
   setenv("MESA_GL_VERSION_OVERRIDE", "2.1", 1);
   const ProgramResult result = runProgram({"view", "a.splats"});
   const std::string report = system().out;
   unsetenv("MESA_GL_VERSION_OVERRIDE");
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
   expectFailure(result, {"cannot open a window", "it needs OpenGL 3.3"});
-  EXPECT_NE(report.find("window     not available: cannot open a window"), std::string::npos) << report;
+  expectSays(report, "window     not available: cannot open a window");
 }
 
 TEST_F(NoWindow, OnADisplayWithoutOpenGl) {
   display_.reset();
-  display_.emplace(kScreen, std::vector<std::string>{"-extension", "GLX"});
+  display_.emplace(kScreen, Words{"-extension", "GLX"});
   const ProgramResult result = runProgram({"view", "a.splats"});
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
   expectFailure(result, {"cannot open a window", "GLX", "it needs OpenGL 3.3"});
@@ -126,7 +139,7 @@ TEST_F(WindowOnTwoLevels, DrawsWithoutTheBricksThatAreDamaged) {
   EXPECT_TRUE(eventually([] { return hasMessage("bricks cannot be read; coarser data is drawn there"); }));
   const Image coarser = saveAndCopy();
   EXPECT_TRUE(eventually([] { return hasMessage("damaged brick"); }));  // that picture is without them
-  const std::vector<std::string> command = close().back();
+  const Words command = close().back();
   EXPECT_EQ(command.back(), "--keep-going");
   expectDraws(command, coarser);
 }
@@ -162,6 +175,69 @@ TEST_F(WindowOnACopy, LivesAndSaysSoWhereItIsDeleted) {
   chooseSecondScalar();
   EXPECT_TRUE(eventually([] { return hasWidget("message "); }));
   close();
+}
+
+class WindowLimitsTest : public ProgramSuite<WindowLimitsTest> {
+ protected:
+  static void prepare() { madeCache(file("a"), "half-annulus", "128x64x64"); }
+  void SetUp() override {
+    if (const std::string missing = VirtualDisplay::missing(); !missing.empty())
+      GTEST_SKIP() << missing << " is not installed";
+    display_.emplace(kScreen);
+    setenv("XDG_CONFIG_HOME", file("config").c_str(), 1);
+  }
+
+  static constexpr ImageSize kScreen{700, 400};
+
+  /// A window as large as the screen, with the mouse over it.
+  std::unique_ptr<RunningProgram> open(const Words& options = {}) const {
+    const std::string size = fmt::format("{}x{}", kScreen.width, kScreen.height);
+    auto window = std::make_unique<RunningProgram>(Words{"view", file("a.splats"), "--size", size} + options);
+    display_->act({"mousemove", std::to_string(kScreen.width / 2), std::to_string(kScreen.height / 2)});
+    EXPECT_TRUE(eventually([&] { return display_->screenshot().pixel(10, kScreen.height - 10)[0] > 0.01f; }));
+    return window;
+  }
+  ProgramResult closed(RunningProgram& window) const {
+    display_->act({"key", "ctrl+q"});
+    return window.wait();
+  }
+
+  std::optional<VirtualDisplay> display_;
+};
+
+// What leaks is for the address sanitizer to say, which then ends the program with another status.
+TEST_F(WindowLimitsTest, ClosesWhileItLoads) {
+  for (const char* zoom : {"0", "3", "9"}) {
+    SCOPED_TRACE(zoom);
+    const auto window = open({"--memory", "80M"});
+    // Each turn of the wheel is another picture, which is given up for the next.
+    if (std::string(zoom) != "0") display_->act({"click", "--repeat", zoom, "4"});
+    const ProgramResult result = closed(*window);
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;  // which OpenGL the window has
+  }
+}
+
+TEST_F(WindowLimitsTest, TooLittleMemoryIsReported) {
+  const auto window = open({"--memory", "1M"});
+  // Another size, another word: the window lives.
+  const ImageSize smaller{kScreen.width - 100, kScreen.height - 100};
+  display_->act({"search", "--onlyvisible", "--name", "curvisplat", "windowsize",
+                 std::to_string(smaller.width), std::to_string(smaller.height)});
+  EXPECT_TRUE(eventually(
+      [&] { return display_->screenshot().pixel(smaller.width + 50, smaller.height + 50)[0] < 0.01f; }));
+  const ProgramResult result = closed(*window);
+  EXPECT_EQ(result.status, 0) << result.err;
+  expectSays(result.err, "warning: --memory 1 MiB: too little");
+  expectSays(result.err, "give at least");
+}
+
+TEST_F(WindowLimitsTest, WithNowhereToRememberItOpens) {
+  setenv("XDG_CONFIG_HOME", "/proc/self/fd/none", 1);
+  const auto window = open();
+  const ProgramResult result = closed(*window);
+  EXPECT_EQ(result.status, 0) << result.err;
+  expectSays(result.err, "warning: cannot save the view");
 }
 
 }  // namespace

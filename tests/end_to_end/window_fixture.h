@@ -1,4 +1,6 @@
-// A window on a small cache of two scalars, f and volume, on a display of its own: what its tests share.
+// A window on a small cache of two scalars, f and volume, on a display of its own: what the window's tests
+// share (WindowTest); and the same with an empty folder of caches of grids that are opened without `convert`
+// (KeptCaches).
 #pragma once
 
 #include <fmt/format.h>
@@ -17,19 +19,17 @@
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 #include "tests/support/virtual_display.h"
 
 namespace curvisplat {
 
-class WindowTest : public testing::Test {
+class WindowTest : public ProgramSuite<WindowTest> {
  protected:
   using Place = std::pair<int, int>;
   static constexpr ImageSize kScreen{1000, 700}, kWindow{900, 600};
 
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
+  static void prepare() {
     old_folder_ = std::filesystem::current_path();
     std::filesystem::current_path(folder_->path());  // where pictures are saved
     setenv("XDG_CONFIG_HOME", file("config").c_str(), 1);
@@ -39,7 +39,7 @@ class WindowTest : public testing::Test {
   }
   static void TearDownTestSuite() {
     std::filesystem::current_path(old_folder_);
-    folder_.reset();
+    ProgramSuite::TearDownTestSuite();
   }
   void SetUp() override {
     if (const std::string missing = VirtualDisplay::missing(); !missing.empty())
@@ -50,29 +50,23 @@ class WindowTest : public testing::Test {
       for (int n = 1; n < 40; ++n) std::filesystem::remove(picture(n, stem));
   }
 
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
-  static void run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
-  }
   static std::string picture(int number, const std::string& stem = "a") {
     return fmt::format("{}_{:04}.png", stem, number);
   }
 
-  void open(std::vector<std::string> options = {}, ImageSize size = kWindow) {
-    options.insert(options.begin(),
-                   {"view", cache_ + ".splats", "--size", fmt::format("{}x{}", size.width, size.height)});
+  void open(const Words& options = {}, ImageSize size = kWindow) {
     saved_ = 0;
     while (std::filesystem::exists(picture(saved_ + 1, cache_))) ++saved_;
     std::filesystem::remove("widgets");
-    window_ = std::make_unique<RunningProgram>(options);
+    window_ = std::make_unique<RunningProgram>(
+        Words{"view", cache_ + ".splats", "--size", fmt::format("{}x{}", size.width, size.height)} + options);
     rest_ = {size.width / 2, size.height / 2};
     moveTo(rest_);
     // The panels are dark grey, the screen behind the window is black.
     ASSERT_TRUE(eventually([&] { return display_->screenshot().pixel(10, size.height - 10)[0] > 0.01f; }));
   }
 
-  void act(const std::vector<std::string>& words) { display_->act(words); }
+  void act(const Words& words) { display_->act(words); }
   void press(const std::string& key) { act({"key", key}); }
   void moveTo(Place place) { act({"mousemove", std::to_string(place.first), std::to_string(place.second)}); }
   /// A place in a widget of the panels, which is waited for. `across` and `down`: shares of its size.
@@ -148,11 +142,11 @@ class WindowTest : public testing::Test {
     return save();
   }
   /// Closes the window: the words of the commands that were copied, without the program's name.
-  std::vector<std::vector<std::string>> close() {
+  std::vector<Words> close() {
     press("ctrl+q");
     const ProgramResult result = window_->wait();
     EXPECT_EQ(result.status, 0) << result.err;
-    std::vector<std::vector<std::string>> commands;
+    std::vector<Words> commands;
     for (const std::string& line : linesOf(result.out)) commands.push_back(wordsOf(line));
     return commands;
   }
@@ -193,12 +187,12 @@ class WindowTest : public testing::Test {
     return false;
   }
   /// The command's picture is `picture`.
-  static void expectDraws(const std::vector<std::string>& command, const Image& picture) {
+  static void expectDraws(const Words& command, const Image& picture) {
     run(command);
     EXPECT_GE(difference(readImage("picture.png"), picture), 50) << testing::PrintToString(command);
   }
   /// What follows `option` in a command: "--option value" or "--option=value"; empty if it is not there.
-  static std::string valueOf(const std::vector<std::string>& command, const std::string& option) {
+  static std::string valueOf(const Words& command, const std::string& option) {
     for (size_t n = 0; n < command.size(); ++n) {
       if (command[n] == option) return n + 1 < command.size() ? command[n + 1] : "";
       if (command[n].starts_with(option + "=")) return command[n].substr(option.size() + 1);
@@ -206,14 +200,14 @@ class WindowTest : public testing::Test {
     return {};
   }
 
-  static std::vector<std::string> linesOf(const std::string& text) {
-    std::vector<std::string> lines;
+  static Words linesOf(const std::string& text) {
+    Words lines;
     std::istringstream stream(text);
     for (std::string line; std::getline(stream, line);) lines.push_back(line);
     return lines;
   }
   /// The words of a shell command without its first.
-  static std::vector<std::string> wordsOf(const std::string& command) {
+  static Words wordsOf(const std::string& command) {
     const ProgramResult result =
         RunningProgram({"sh", "-c", "set -- " + command + "; shift; printf '%s\\n' \"$@\""}, "/usr/bin/env")
             .wait();
@@ -239,9 +233,28 @@ class WindowTest : public testing::Test {
   Place rest_{};  // where the mouse stays: the window's middle, which is in the picture if there is one
 
  private:
-  static inline std::unique_ptr<TemporaryFolder> folder_;
   static inline std::filesystem::path old_folder_;
   int saved_ = 0;
+};
+
+/// Caches of grids that were opened without `convert`, in a folder of the test's own.
+class KeptCaches : public WindowTest {
+ protected:
+  void SetUp() override {
+    setenv("XDG_CACHE_HOME", file("kept").c_str(), 1);
+    unsetenv("CURVISPLAT_CACHE_SIZE");
+    std::filesystem::remove_all("kept");
+  }
+  static std::vector<std::filesystem::path> kept() {
+    std::vector<std::filesystem::path> caches;
+    if (!std::filesystem::exists("kept/curvisplat")) return caches;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator("kept/curvisplat"))
+      if (entry.path().filename() == "manifest.json") caches.push_back(entry.path().parent_path());
+    return caches;
+  }
+  static Words render(const std::string& grid, const std::string& function) {
+    return {"render", grid, function, "-o", "grid.png", "--size", "100x80"};
+  }
 };
 
 }  // namespace curvisplat

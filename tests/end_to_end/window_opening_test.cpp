@@ -4,7 +4,7 @@
 #include <chrono>
 #include <thread>
 
-#include "tests/end_to_end/kept_caches_fixture.h"
+#include "tests/end_to_end/window_fixture.h"
 
 namespace curvisplat {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST_F(KeptCaches, RenderDrawsAGridAsItsCache) {
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  run(render("a.xyz", "a.fun"));
   ASSERT_EQ(kept().size(), 1u);
   EXPECT_EQ(kept()[0].filename(), "a.splats");
   const Image drawn = readImage("grid.png");
@@ -22,47 +22,44 @@ TEST_F(KeptCaches, RenderDrawsAGridAsItsCache) {
 }
 
 TEST_F(KeptCaches, AreFoundAgainByContent) {
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  run(render("a.xyz", "a.fun"));
   const auto made = fs::last_write_time(kept().at(0) / "manifest.json");
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  run(render("a.xyz", "a.fun"));
   // The same bytes elsewhere, written later.
   fs::create_directory("elsewhere");
   for (const char* name : {"a.xyz", "a.fun"})
     fs::copy_file(name, fs::path("elsewhere") / name, fs::copy_options::overwrite_existing);
-  ASSERT_EQ(render("elsewhere/a.xyz", "elsewhere/a.fun").status, 0);
+  run(render("elsewhere/a.xyz", "elsewhere/a.fun"));
   ASSERT_EQ(kept().size(), 1u);
   EXPECT_EQ(fs::last_write_time(kept()[0] / "manifest.json"), made);
   // Other bytes are another cache, at the same path.
   run({"generate", "half-annulus", "--size", "24x12x12", "-o", "elsewhere/a"});
-  ASSERT_EQ(render("elsewhere/a.xyz", "elsewhere/a.fun").status, 0);
+  run(render("elsewhere/a.xyz", "elsewhere/a.fun"));
   EXPECT_EQ(kept().size(), 2u);
 }
 
 TEST_F(KeptCaches, TheLeastRecentlyUsedGoFirst) {
   for (const char* name : {"b", "c"})
     run({"generate", "half-annulus", "--size", *name == 'b' ? "24x12x12" : "20x12x12", "-o", name});
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
-  ASSERT_EQ(render("b.xyz", "b.fun").status, 0);
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);  // used again
+  run(render("a.xyz", "a.fun"));
+  run(render("b.xyz", "b.fun"));
+  run(render("a.xyz", "a.fun"));  // used again
   uint64_t bytes = 0;
   for (const fs::path& cache : kept())
     for (const auto& entry : fs::recursive_directory_iterator(cache)) bytes += entry.file_size();
   setenv("CURVISPLAT_CACHE_SIZE", std::to_string(bytes).c_str(), 1);
-  ASSERT_EQ(render("c.xyz", "c.fun").status, 0);
-  std::vector<std::string> names;
+  run(render("c.xyz", "c.fun"));
+  Words names;
   for (const fs::path& cache : kept()) names.push_back(cache.filename());
   std::sort(names.begin(), names.end());
-  EXPECT_EQ(names, (std::vector<std::string>{"a.splats", "c.splats"}));
+  EXPECT_EQ(names, (Words{"a.splats", "c.splats"}));
 }
 
 /// A .p3d file names others: their bytes count.
 TEST_F(KeptCaches, AreMadeAgainWhenANamedFileChanges) {
   run({"generate", "half-annulus", "--size", "20x12x12", "-o", "named"});
   std::ofstream("named.p3d") << R"({"filenames": [{"xyz": "named.xyz", "function": "named.fun"}]})";
-  const auto draw = [] {
-    const ProgramResult result = runProgram({"render", "named.p3d", "-o", "p.png", "--size", "60x50"});
-    EXPECT_EQ(result.status, 0) << result.err;
-  };
+  const auto draw = [] { run({"render", "named.p3d", "-o", "p.png", "--size", "60x50"}); };
   draw();
   draw();
   EXPECT_EQ(kept().size(), 1u);
@@ -73,23 +70,22 @@ TEST_F(KeptCaches, AreMadeAgainWhenANamedFileChanges) {
 
 TEST_F(KeptCaches, RenderAddsAScalarThatTheFilesHave) {
   const ProgramResult result =
-      runProgram({"render", "a.xyz", "a.fun", "-o", "v.png", "--size", "60x50", "--scalar", "volume"});
-  EXPECT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.out.find("volume"), std::string::npos) << result.out;
+      run({"render", "a.xyz", "a.fun", "-o", "v.png", "--size", "60x50", "--scalar", "volume"});
+  expectSays(result.out, "volume");
   const ProgramResult unknown =
       runProgram({"render", "a.xyz", "a.fun", "-o", "v.png", "--size", "60x50", "--scalar", "volum"});
   EXPECT_EQ(unknown.status, 1);
-  EXPECT_NE(unknown.err.find("did you mean volume?"), std::string::npos) << unknown.err;
+  expectSays(unknown.err, "did you mean volume?");
 }
 
 /// One adds it, the others wait; the pattern is not expanded by a shell.
 TEST_F(KeptCaches, ProcessesThatNeedOneScalarAtOnceAllDraw) {
-  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  run(render("a.xyz", "a.fun"));
   std::vector<std::unique_ptr<RunningProgram>> all;
   for (int n = 1; n <= 4; ++n)
-    all.push_back(std::make_unique<RunningProgram>(std::vector<std::string>{
-        "render", "a.xyz", "a.fu*", "-o", "part_%d.png", "--size", "60x50", "--scalar", "volume", "--orbit",
-        "90", "--frames", "4", "--part", fmt::format("{}/4", n)}));
+    all.push_back(std::make_unique<RunningProgram>(
+        Words{"render", "a.xyz", "a.fu*", "-o", "part_%d.png", "--size", "60x50", "--scalar", "volume",
+              "--orbit", "90", "--frames", "4", "--part", fmt::format("{}/4", n)}));
   for (const auto& one : all) {
     const ProgramResult result = one->wait();
     EXPECT_EQ(result.status, 0) << result.err;
@@ -99,9 +95,9 @@ TEST_F(KeptCaches, ProcessesThatNeedOneScalarAtOnceAllDraw) {
 
 TEST_F(KeptCaches, ErrorsNameTheFile) {
   std::ofstream("no.xyz") << "no grid";
-  const ProgramResult result = render("no.xyz", "a.fun");
+  const ProgramResult result = runProgram(render("no.xyz", "a.fun"));
   EXPECT_EQ(result.status, 1);
-  EXPECT_NE(result.err.find("no.xyz"), std::string::npos) << result.err;
+  expectSays(result.err, "no.xyz");
   EXPECT_TRUE(kept().empty());
 }
 
@@ -112,17 +108,15 @@ class WindowOpening : public KeptCaches {
     if (IsSkipped()) return;
     KeptCaches::SetUp();
   }
-  void openWith(const std::vector<std::string>& files) {
-    std::vector<std::string> words{"view"};
-    words.insert(words.end(), files.begin(), files.end());
-    words.insert(words.end(), {"--size", fmt::format("{}x{}", kWindow.width, kWindow.height)});
+  void openWith(const Words& files) {
     fs::remove("widgets");
-    window_ = std::make_unique<RunningProgram>(words);
+    window_ = std::make_unique<RunningProgram>(
+        Words{"view"} + files + Words{"--size", fmt::format("{}x{}", kWindow.width, kWindow.height)});
     rest_ = {kWindow.width / 2, kWindow.height / 2};
     moveTo(rest_);
   }
-  static std::string outputOf(const std::vector<std::string>& words) {
-    return RunningProgram(std::vector<std::string>(words.begin() + 1, words.end()), words.front()).wait().out;
+  static std::string outputOf(const Words& words) {
+    return RunningProgram(Words(words.begin() + 1, words.end()), words.front()).wait().out;
   }
   static std::string windowNumber() {
     const std::string out =
@@ -133,11 +127,10 @@ class WindowOpening : public KeptCaches {
     return outputOf({"/usr/bin/env", "xdotool", "getwindowname", windowNumber()});
   }
   /// As from a file manager.
-  static void drop(const std::vector<std::string>& files) {
-    std::vector<std::string> words{"python3", CURVISPLAT_TEST_DATA "/../support/drop_files.py",
-                                   windowNumber(), "560", "300"};
-    words.insert(words.end(), files.begin(), files.end());
-    const ProgramResult result = RunningProgram(words, "/usr/bin/env").wait();
+  static void drop(const Words& files) {
+    const Words words{"python3", CURVISPLAT_TEST_DATA "/../support/drop_files.py", windowNumber(), "560",
+                      "300"};
+    const ProgramResult result = RunningProgram(words + files, "/usr/bin/env").wait();
     EXPECT_EQ(result.status, 0) << result.err;
   }
   /// How many folders of previews there are.
@@ -167,8 +160,7 @@ TEST_F(WindowOpening, TheGridNeedNotComeFirst) {
   placeOf("curve");
   saveAndCopy();
   const auto command = close().at(0);
-  EXPECT_EQ(std::vector<std::string>(command.begin(), command.begin() + 3),
-            (std::vector<std::string>{"render", "a.xyz", "a.fun"}));
+  EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "a.xyz", "a.fun"}));
 }
 
 TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {
@@ -241,8 +233,7 @@ TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
   const auto command = close().at(0);
   cache_ = "a";
   // The command names the grid, not a folder of the user's.
-  EXPECT_EQ(std::vector<std::string>(command.begin(), command.begin() + 3),
-            (std::vector<std::string>{"render", "middle.xyz", "middle.fun"}));
+  EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "middle.xyz", "middle.fun"}));
   expectDraws(command, picture);
 }
 
@@ -350,9 +341,7 @@ TEST_F(WindowOpening, ASeriesIsOpened) {
   placeOf("step");
   close();
   ASSERT_EQ(kept().size(), 1u);
-  const ProgramResult drawn =
-      runProgram({"render", "s.xyz", "s_%04d.fun", "--steps", "all", "-o", "s_%d.png", "--size", "60x50"});
-  EXPECT_EQ(drawn.status, 0) << drawn.err;
+  run({"render", "s.xyz", "s_%04d.fun", "--steps", "all", "-o", "s_%d.png", "--size", "60x50"});
   EXPECT_TRUE(fs::exists("s_2.png"));
   EXPECT_EQ(kept().size(), 1u);  // the same one
 }
@@ -360,7 +349,7 @@ TEST_F(WindowOpening, ASeriesIsOpened) {
 /// Of a series that was stopped nothing stays once the window has left it.
 TEST_F(WindowOpening, ASeriesThatIsStoppedLeavesNothing) {
   run({"generate", "wake", "--size", "96x64x48", "--steps", "8", "-o", "long"});
-  std::vector<std::string> files{"long.xyz"};
+  Words files{"long.xyz"};
   for (int n = 0; n < 8; ++n) files.push_back(fmt::format("long_{:04}.fun", n));
   openWith(files);
   EXPECT_TRUE(eventually([] { return hasWidget("state preview of the first time step"); }));

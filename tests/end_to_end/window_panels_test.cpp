@@ -80,9 +80,8 @@ TEST_F(WindowPanels, AClickKeepsAMarkerWhichIsRenamedUndoneAndRemoved) {
   EXPECT_TRUE(gone("editing marker 1"));  // with Control of the next key, Dear ImGui would drop the letters
   close();
   const auto state = fs::directory_iterator("config/curvisplat/views")->path();
-  std::ifstream file(state);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  EXPECT_NE(text.find("nose"), std::string::npos) << text;
+  const std::string text = bytesOfFile(state);
+  expectSays(text, "nose");
   open();
   widget("sign of marker 1");
   openMarkers();

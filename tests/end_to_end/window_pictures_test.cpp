@@ -1,7 +1,11 @@
-// Pictures that the window saves in another size than it shows.
+// Pictures that the window saves in another size than it shows; movies that it saves, which are the pictures
+// that `render` draws; and a session from the beginning to the end, with a screenshot after every step: for
+// people to look at, too.
+#include <cmath>
 #include <csignal>
 #include <functional>
 
+#include "render/image/image_file.h"
 #include "tests/end_to_end/window_fixture.h"
 
 namespace curvisplat {
@@ -51,7 +55,7 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   EXPECT_EQ(twice.size.height, 2 * shown.height);
   const auto commands = close();
   ASSERT_EQ(commands.size(), 1u);
-  std::vector<std::string> command = commands[0];
+  Words command = commands[0];
   for (size_t n = 0; n + 1 < command.size(); ++n)
     if (command[n] == "--size") command[n + 1] = fmt::format("{}x{}", twice.size.width, twice.size.height);
   expectDraws(command, twice);
@@ -125,6 +129,168 @@ TEST_F(WindowPictures, ThatAreNarrowerHoldWhatIsShown) {
     EXPECT_EQ(narrow.pixel(199, y)[0], 1) << y;
   }
   close();
+}
+
+namespace fs = std::filesystem;
+
+class WindowMovie : public WindowTest {
+ protected:
+  void SetUp() override {
+    WindowTest::SetUp();
+    if (IsSkipped()) return;
+    fs::remove_all("movie");
+    fs::create_directory("movie");
+  }
+  void TearDown() override { cache_ = "a"; }
+
+  /// Chooses it from the menu and types the name; waits until it is saved, or does not.
+  void saveMovie(const std::string& item, const std::string& name) {
+    choose("File", item);
+    answer(name);
+  }
+  static bool isSaved() {
+    return eventually([] { return hasWidget("message saved ") && !hasWidget("movie"); }, 300);
+  }
+  static size_t filesIn(const fs::path& folder) {
+    return static_cast<size_t>(std::distance(fs::directory_iterator(folder), {}));
+  }
+  /// The frames of a command as render draws them into movie/r_NNNN.png, in the size of the window's.
+  static void draw(Words command, const Words& more) {
+    const ImageSize size = readImage("movie/m_0000.png").size;
+    for (size_t n = 0; n + 1 < command.size(); ++n) {
+      if (command[n] == "-o") command[n + 1] = "movie/r_%04d.png";
+      if (command[n] == "--size") command[n + 1] = fmt::format("{}x{}", size.width, size.height);
+    }
+    run(command + more);
+  }
+  static void expectSame(int frame) {
+    const Image ours = readImage(fmt::format("movie/m_{:04}.png", frame));
+    EXPECT_GE(difference(ours, readImage(fmt::format("movie/r_{:04}.png", frame))), 50) << frame;
+  }
+};
+
+/// A small window, so that 90 pictures are quick.
+TEST_F(WindowMovie, OnceAroundIsWhatRenderDraws) {
+  open({"--scalar", "volume"}, {600, 420});
+  press("h");  // without the panels
+  ASSERT_TRUE(eventually([] { return !hasWidget("curve"); }));
+  saveMovie("Save movie: once around...", "movie/m.png");
+  placeOf("stop movie");
+  press("x");  // the movie is of what was shown then
+  EXPECT_TRUE(isSaved());
+  press("ctrl+z");
+  press("ctrl+shift+c");
+  save();
+  const auto command = close().at(0);
+  EXPECT_EQ(filesIn("movie"), 90u);
+  EXPECT_EQ(valueOf(command, "--orbit"), "360");
+  draw(command, {});
+  for (const int frame : {0, 30, 89}) expectSame(frame);
+  EXPECT_LT(difference(readImage("movie/m_0000.png"), readImage("movie/m_0030.png")), 40);
+}
+
+TEST_F(WindowMovie, AllTimeStepsAreItsFrames) {
+  run({"generate", "wake", "--size", "32x24x12", "--steps", "4", "-o", "w"});
+  run({"convert", "w.xyz", "w_%04d.fun", "-o", "steps.splats", "--overwrite"});
+  cache_ = "steps";
+  open({"--step", "2"});
+  saveMovie("Save movie: all time steps...", "movie/m.png");
+  EXPECT_TRUE(isSaved());
+  saveAndCopy();
+  Words command = close().at(0);
+  EXPECT_EQ(filesIn("movie"), 4u);
+  const auto step = std::find(command.begin(), command.end(), "--step");
+  ASSERT_NE(step, command.end());
+  command.erase(step, step + 2);
+  draw(command, {"--steps", "all"});
+  for (int frame = 0; frame < 4; ++frame) expectSame(frame);
+}
+
+TEST_F(WindowMovie, OneThatIsStoppedLeavesNothing) {
+  if (!fs::exists("/usr/bin/ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
+  open();
+  saveMovie("Save movie: once around...", "movie/m.mp4");
+  click("stop movie");
+  EXPECT_TRUE(eventually([] { return hasWidget("message Stopped. The movie was not saved."); }));
+  EXPECT_EQ(filesIn("movie"), 0u);
+  save();  // the window goes on
+  close();
+}
+
+TEST_F(WindowMovie, IsAFileThatPlays) {
+  if (!fs::exists("/usr/bin/ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
+  open({}, {601, 421});  // H.264 needs an even size
+  saveMovie("Save movie: once around...", "movie/m.mp4");
+  EXPECT_TRUE(isSaved());
+  close();
+  const ProgramResult frames = RunningProgram({"ffprobe", "-v", "error", "-count_frames", "-show_entries",
+                                               "stream=nb_read_frames", "-of", "csv=p=0", "movie/m.mp4"},
+                                              "/usr/bin/env")
+                                   .wait();
+  EXPECT_EQ(frames.out.substr(0, 2), "90") << frames.err;
+}
+
+TEST_F(WindowMovie, AnEndingThatCannotBeWrittenIsSaid) {
+  open();
+  saveMovie("Save movie: once around...", "movie/m.avi");
+  EXPECT_TRUE(eventually([] { return hasWidget("message "); }));
+  EXPECT_EQ(filesIn("movie"), 0u);
+  save();
+  close();
+}
+
+class WindowSession : public WindowTest {
+ protected:
+  static constexpr ImageSize kWhole{1280, 800};
+
+  void SetUp() override {
+    WindowTest::SetUp();
+    if (IsSkipped()) return;
+    display_.emplace(kWhole);
+    fs::remove_all(folder());
+    fs::create_directories(folder());
+  }
+  /// Beside the program, in the build's folder.
+  static fs::path folder() {
+    return fs::path(CURVISPLAT_PROGRAM).parent_path().parent_path() / "window_session";
+  }
+
+  /// Waits for the final picture and keeps what is on the screen then.
+  Image look(const std::string& name) {
+    const Image picture = save();
+    EXPECT_TRUE(eventually([&] { return difference(shown(picture.size), picture) > 45; }, 60)) << name;
+    Image screen = display_->screenshot();
+    writeImage(screen, folder() / (name + ".png"));
+    return screen;
+  }
+};
+
+TEST_F(WindowSession, LeavesAScreenshotOfEveryStep) {
+  open({}, kWhole);
+  Image before = look("1_opened");
+  const auto shows = [&](const std::string& name, double below_db) {
+    Image after = look(name);
+    EXPECT_LT(difference(before, after), below_db) << name;
+    before = std::move(after);
+  };
+  dragPicture(1, 0.15, 0.08);
+  shows("2_rotated", 25);
+  moveTo(placeOf("picture"));
+  act({"click", "--repeat", "5", "4"});
+  shows("3_zoomed", 25);
+  addPoint();
+  shows("4_opacity_edited", 35);
+  chooseScalar("volume");
+  shows("5_another_scalar", 35);
+  click("dark");
+  shows("6_dark", 15);
+  resize({900, 640});
+  shows("7_resized", 35);
+  const Image picture = saveAndCopy();
+  writeImage(picture, folder() / "8_saved.png");
+  const auto command = close().at(0);
+  EXPECT_EQ(valueOf(command, "--scalar"), "volume");
+  expectDraws(command, picture);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ class WindowSurfaces : public WindowTest {
     return eventually([&] { return !hasWidget(begin); });
   }
   /// Opens the window with room for the panels of surfaces.
-  void openWithRoom(const std::vector<std::string>& options = {}) {
+  void openWithRoom(const Words& options = {}) {
     open(options);
     for (const auto& [section, inside] :
          {std::pair("Colours and opacities", "curve"), {"Scalar", "opacity by"}, {"View", "view name"}}) {

@@ -33,7 +33,7 @@ constexpr double kRounded = 1e-4;  // of the data's size: commands have six digi
 
 class WindowsCamera : public WindowTest {
  protected:
-  static SeenFrom cameraOf(const std::vector<std::string>& command) {
+  static SeenFrom cameraOf(const Words& command) {
     const auto number = [&](const std::string& option) {
       const std::string value = valueOf(command, option);
       return value.empty() ? 0 : std::stod(value);
@@ -251,10 +251,9 @@ TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
   EXPECT_EQ(valueOf(commands[0], "--scalar"), "volume");
   EXPECT_NE(valueOf(commands[0], "--clip-box"), "");
   EXPECT_EQ(valueOf(commands[0], "--background"), "black");
-  std::ifstream function(valueOf(commands[0], "--tf"));
-  const std::string text{std::istreambuf_iterator<char>(function), {}};
-  EXPECT_NE(text.find("\"UseLogScale\": 1"), std::string::npos) << text;
-  EXPECT_NE(text.find("2e-05"), std::string::npos) << text;
+  const std::string text = bytesOfFile(valueOf(commands[0], "--tf"));
+  expectSays(text, "\"UseLogScale\": 1");
+  expectSays(text, "2e-05");
   expectDraws(commands[0], clipped);
 }
 
@@ -338,7 +337,7 @@ TEST_F(WindowTest, ClosesInOrderWhenASignalAsksItTo) {
     window_->signal(signal);
     const ProgramResult result = window_->wait();
     EXPECT_EQ(result.status, 128 + signal) << result.err;
-    EXPECT_NE(result.err.find("interrupted"), std::string::npos) << result.err;
+    expectSays(result.err, "interrupted");
     open();
     EXPECT_GE(difference(save(), before), 50) << signal;
     close();

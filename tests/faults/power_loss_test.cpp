@@ -1,13 +1,307 @@
-// What is left when the power goes at any moment of a conversion, an addition, or the writing of a picture: a
-// cache that is whole, or none; the old one or the new one.
+// What is left when the power goes at any moment of a conversion, an addition, or the writing of a picture:
+// a cache that is whole, or none; the old one or the new one. Calls are recorded as they are made, and
+// replayed on a model of a disk that keeps for certain only what was synced:
+//
+//   a file's bytes      as they were at its last fsync, or later ones, or zeros in their place, or half of them
+//   names in a folder   as they were at the last fsync of the folder, or as they are; each folder on its own
+//                       (a file system's journal is kinder, and promises no more than this)
+//
+// Renaming and exchanging within a folder is one step.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/faults/small_conversion.h"
-#include "tests/support/power_loss.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat::faults {
+namespace {
+
+/// One call that changes the disk.
+struct DiskCall {
+  enum class Kind { kOpen, kWrite, kTruncate, kSync, kRename, kExchange, kMakeFolder, kRemove } kind;
+  std::string path, other;  // as given
+  int fd = -1;
+  int flags = 0;
+  int64_t offset = 0;  // or size
+  std::string bytes;
+};
+
+/// Does the calls, but for syncing, and writes them down. Put in place with ScopedSystemCalls; any thread.
+class RecordingSystemCalls : public SystemCalls {
+ public:
+  /// In their order, when no more are made.
+  const std::vector<DiskCall>& calls() const { return calls_; }
+
+  int open(const char* path, int flags, unsigned mode) override;
+  ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset) override;
+  int truncate(int fd, int64_t size) override;
+  int fsync(int fd) override;
+  int rename(const char* from, const char* to) override;
+  int exchange(const char* a, const char* b) override;
+  int mkdir(const char* path, unsigned mode) override;
+  int remove(const char* path) override;
+
+ private:
+  std::mutex mutex_;  // the order of calls is that of their effects
+  std::vector<DiskCall> calls_;
+};
+
+/// Folders below the root, and their files.
+using DiskState = std::map<std::string, Files>;
+
+/// Calls `check` with every state that a loss of power could leave of what is below `root` (folders, and
+/// files in them; files in the root itself are in the folder ""), and with the number of calls made until
+/// then. `before`: what was there for certain before the first of `calls`. A state that has been checked is
+/// not checked again.
+void forEachPowerLoss(const std::filesystem::path& root, const DiskState& before,
+                      const std::vector<DiskCall>& calls,
+                      const std::function<void(const DiskState&, size_t call)>& check);
+
+using Kind = DiskCall::Kind;
+
+/// A file or a folder, as it is and as it was when it was synced last.
+struct Node {
+  bool is_folder = false;
+  std::string bytes, synced_bytes;
+  using Names = std::map<std::string, std::shared_ptr<Node>>;
+  Names names, synced_names;
+};
+using NodeOf = std::shared_ptr<Node>;
+
+enum class Unsynced { kLost, kKept, kZeros, kHalf };
+
+class Disk {
+ public:
+  Disk(const std::filesystem::path& root, const DiskState& before)
+      : root_path_(root.string()), root_(std::make_shared<Node>()) {
+    root_->is_folder = true;
+    for (const auto& [name, files] : before) {
+      NodeOf folder = root_;
+      if (!name.empty()) {
+        folder = root_->names[name] = std::make_shared<Node>();
+        folder->is_folder = true;
+      }
+      for (const auto& [file, bytes] : files) {
+        const auto node = folder->names[file] = std::make_shared<Node>();
+        node->bytes = node->synced_bytes = bytes;
+      }
+      folder->synced_names = folder->names;
+    }
+    root_->synced_names = root_->names;
+  }
+
+  void apply(const DiskCall& call) {
+    switch (call.kind) {
+      case Kind::kOpen:
+        return open(call);
+      case Kind::kWrite:
+        return write(call);
+      case Kind::kTruncate:
+        if (const NodeOf node = opened_[call.fd]) node->bytes.resize(static_cast<size_t>(call.offset));
+        return;
+      case Kind::kSync:
+        return sync(call);
+      case Kind::kRename:
+        if (const NodeOf from = parentOf(call.path)) {
+          const NodeOf node = from->names.at(nameOf(call.path));
+          from->names.erase(nameOf(call.path));
+          parentOf(call.other)->names[nameOf(call.other)] = node;
+        }
+        return;
+      case Kind::kExchange:
+        if (const NodeOf from = parentOf(call.path))
+          std::swap(from->names.at(nameOf(call.path)), parentOf(call.other)->names.at(nameOf(call.other)));
+        return;
+      case Kind::kMakeFolder:
+        if (const NodeOf parent = parentOf(call.path)) {
+          const auto node = parent->names[nameOf(call.path)] = std::make_shared<Node>();
+          node->is_folder = true;
+        }
+        return;
+      case Kind::kRemove:
+        if (const NodeOf parent = parentOf(call.path)) parent->names.erase(nameOf(call.path));
+        return;
+    }
+  }
+
+  void forEachState(const std::function<void(const DiskState&)>& use) const {
+    std::vector<const Node*> unsynced;  // folders
+    std::set<const Node*> seen;
+    bool has_unsynced_bytes = false;
+    look(*root_, unsynced, has_unsynced_bytes, seen);
+    for (size_t choice = 0; choice < size_t{1} << unsynced.size(); ++choice) {
+      std::set<const Node*> old_names;
+      for (size_t n = 0; n < unsynced.size(); ++n)
+        if ((choice >> n & 1) != 0) old_names.insert(unsynced[n]);
+      for (const Unsynced bytes : {Unsynced::kKept, Unsynced::kLost, Unsynced::kZeros, Unsynced::kHalf}) {
+        DiskState state;
+        fill(*root_, "", old_names, bytes, state);
+        use(state);
+        if (!has_unsynced_bytes) break;
+      }
+    }
+  }
+
+ private:
+  static std::string nameOf(const std::string& path) { return std::filesystem::path(path).filename(); }
+
+  /// Null for what is not below the root, or was not there before.
+  NodeOf at(const std::string& path) const {
+    if (path == root_path_) return root_;
+    const NodeOf parent = parentOf(path);
+    if (!parent) return nullptr;
+    const auto found = parent->names.find(nameOf(path));
+    return found == parent->names.end() ? nullptr : found->second;
+  }
+  NodeOf parentOf(const std::string& path) const {
+    if (path.size() <= root_path_.size() || !path.starts_with(root_path_)) return nullptr;
+    return at(std::filesystem::path(path).parent_path());
+  }
+
+  void open(const DiskCall& call) {
+    NodeOf node = at(call.path);
+    if (!node && (call.flags & O_CREAT) != 0)
+      if (const NodeOf parent = parentOf(call.path))
+        node = parent->names[nameOf(call.path)] = std::make_shared<Node>();
+    if (node && (call.flags & O_TRUNC) != 0) node->bytes.clear();
+    opened_[call.fd] = node;
+  }
+
+  void write(const DiskCall& call) {
+    const NodeOf node = opened_[call.fd];
+    if (!node) return;
+    const auto begin = static_cast<size_t>(call.offset);
+    if (node->bytes.size() < begin + call.bytes.size()) node->bytes.resize(begin + call.bytes.size());
+    std::copy(call.bytes.begin(), call.bytes.end(), node->bytes.begin() + call.offset);
+  }
+
+  void sync(const DiskCall& call) {
+    const NodeOf node = opened_[call.fd];
+    if (!node) return;
+    node->synced_bytes = node->bytes;
+    node->synced_names = node->names;
+  }
+
+  static void look(const Node& node, std::vector<const Node*>& unsynced, bool& has_unsynced_bytes,
+                   std::set<const Node*>& seen) {
+    if (!seen.insert(&node).second) return;
+    has_unsynced_bytes |= node.bytes != node.synced_bytes;
+    if (node.names != node.synced_names) unsynced.push_back(&node);
+    for (const Node::Names* names : {&node.names, &node.synced_names})
+      for (const auto& [name, below] : *names) look(*below, unsynced, has_unsynced_bytes, seen);
+  }
+
+  static void fill(const Node& folder, const std::string& name, const std::set<const Node*>& old_names,
+                   Unsynced bytes, DiskState& state) {
+    Files& files = state[name];
+    for (const auto& [below, node] : old_names.contains(&folder) ? folder.synced_names : folder.names) {
+      if (node->is_folder)
+        fill(*node, name.empty() ? below : name + "/" + below, old_names, bytes, state);
+      else
+        files[below] = bytesOf(*node, bytes);
+    }
+  }
+
+  static std::string bytesOf(const Node& file, Unsynced unsynced) {
+    if (file.bytes == file.synced_bytes || unsynced == Unsynced::kKept) return file.bytes;
+    if (unsynced == Unsynced::kLost) return file.synced_bytes;
+    if (unsynced == Unsynced::kZeros) return std::string(file.bytes.size(), '\0');
+    return file.bytes.substr(0, file.bytes.size() / 2);
+  }
+
+  const std::string root_path_;
+  NodeOf root_;
+  std::map<int, NodeOf> opened_;  // by descriptor; null: outside of the root
+};
+
+int RecordingSystemCalls::open(const char* path, int flags, unsigned mode) {
+  const std::lock_guard lock(mutex_);
+  const int fd = SystemCalls::open(path, flags, mode);
+  if (fd >= 0) calls_.push_back({Kind::kOpen, path, "", fd, flags, 0, ""});
+  return fd;
+}
+
+ssize_t RecordingSystemCalls::pwrite(int fd, const void* from, size_t count, int64_t offset) {
+  const std::lock_guard lock(mutex_);
+  const ssize_t put = SystemCalls::pwrite(fd, from, count, offset);
+  if (put >= 0)
+    calls_.push_back({Kind::kWrite, "", "", fd, 0, offset,
+                      std::string(static_cast<const char*>(from), static_cast<size_t>(put))});
+  return put;
+}
+
+int RecordingSystemCalls::truncate(int fd, int64_t size) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::truncate(fd, size);
+  if (result == 0) calls_.push_back({Kind::kTruncate, "", "", fd, 0, size, ""});
+  return result;
+}
+
+int RecordingSystemCalls::fsync(int fd) {
+  const std::lock_guard lock(mutex_);
+  calls_.push_back({Kind::kSync, "", "", fd, 0, 0, ""});
+  return 0;
+}
+
+int RecordingSystemCalls::rename(const char* from, const char* to) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::rename(from, to);
+  if (result == 0) calls_.push_back({Kind::kRename, from, to, -1, 0, 0, ""});
+  return result;
+}
+
+int RecordingSystemCalls::exchange(const char* a, const char* b) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::exchange(a, b);
+  if (result == 0) calls_.push_back({Kind::kExchange, a, b, -1, 0, 0, ""});
+  return result;
+}
+
+int RecordingSystemCalls::mkdir(const char* path, unsigned mode) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::mkdir(path, mode);
+  if (result == 0) calls_.push_back({Kind::kMakeFolder, path, "", -1, 0, 0, ""});
+  return result;
+}
+
+int RecordingSystemCalls::remove(const char* path) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::remove(path);
+  if (result == 0) calls_.push_back({Kind::kRemove, path, "", -1, 0, 0, ""});
+  return result;
+}
+
+void forEachPowerLoss(const std::filesystem::path& root, const DiskState& before,
+                      const std::vector<DiskCall>& calls,
+                      const std::function<void(const DiskState&, size_t call)>& check) {
+  Disk disk(root, before);
+  std::set<DiskState> checked;
+  for (size_t n = 0; n <= calls.size(); ++n) {
+    disk.forEachState([&](const DiskState& state) {
+      if (checked.insert(state).second) check(state, n);
+    });
+    if (n < calls.size()) disk.apply(calls[n]);
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat::faults
 
 namespace curvisplat {
 namespace {

@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "render/project/screen_view.h"
-#include "stream/base/check.h"
 #include "stream/base/checksum.h"
+#include "stream/base/error.h"
 #include "stream/cache/cache_format.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/stream_file.h"

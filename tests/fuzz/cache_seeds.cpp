@@ -9,15 +9,15 @@
 #include <utility>
 
 #include "preprocess/convert/conversion_journal.h"
-#include "stream/cache/brick_log.h"
 #include "stream/cache/cache_format.h"
 #include "stream/cache/faces_file.h"
+#include "stream/cache/partial_folder.h"
 #include "stream/codec/face_codec.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/values_codec.h"
 #include "stream/model/border_code.h"
-#include "tests/stream/test_bricks.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
 namespace curvisplat {
 namespace {
 

@@ -1,8 +1,8 @@
 // What a fuzz target is: a function of bytes that returns, or throws an Error of one line, whatever they are.
 // Anything else (a signal, a failed check, another exception, a finding of a sanitizer) is a finding.
 //
-// A file a target. The same function is run by libFuzzer (preset "fuzz", a program a target), and on every
-// input of corpus/<target>/ by the ordinary tests (replay_test.cpp, all targets in one program).
+// The same function is run by libFuzzer (preset "fuzz", a program for each target), and on every input of corpus/<target>/ by the
+// ordinary tests (replay_test.cpp, all targets in one program).
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@
 namespace curvisplat {
 
 struct FuzzTarget {
-  const char* name;  // its file's, and its corpus folder's
+  const char* name;  // its corpus folder's, too
   void (*run)(std::span<const std::byte> bytes);
 };
 

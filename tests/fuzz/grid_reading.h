@@ -6,7 +6,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_source.h"
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 

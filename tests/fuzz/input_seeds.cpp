@@ -9,12 +9,12 @@
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "tests/preprocess/plot3d_bytes.h"
-#include "tests/stream/test_bricks.h"
 #include "tests/support/earth_files.h"
 #include "tests/support/netcdf_writer.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
 #include "tests/support/vts_writer.h"
-#include "tools/viewer/view_state.h"
+#include "tools/view/view_state.h"
 namespace curvisplat {
 namespace {
 

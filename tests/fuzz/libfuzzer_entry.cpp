@@ -10,7 +10,9 @@
 #include <unistd.h>
 #include <unwind.h>
 
+#include <algorithm>
 #include <csignal>
+#include <span>
 #include <string_view>
 
 #include "tests/fuzz/fuzz_target.h"
@@ -50,6 +52,8 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  curvisplat::runFuzzTarget(curvisplat::fuzzTargets().front(), std::as_bytes(std::span(data, size)));
+  static const curvisplat::FuzzTarget target = *std::ranges::find(
+      curvisplat::fuzzTargets(), std::string_view(CURVISPLAT_FUZZ_TARGET), &curvisplat::FuzzTarget::name);
+  curvisplat::runFuzzTarget(target, std::as_bytes(std::span(data, size)));
   return 0;
 }

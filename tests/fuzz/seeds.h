@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "tests/stream/test_bricks.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 

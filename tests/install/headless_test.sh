@@ -22,7 +22,7 @@ unset CURVISPLAT_UNITY CURVISPLAT_PRECOMPILE  # targets of single sources are bu
 quietly cmake --preset headless -S "$root" -B "$folder/build" "${without[@]}"
 tools=tools/CMakeFiles/curvisplat.dir
 quietly cmake --build "$folder/build" --target \
-  $tools/viewer/window_left_out.cpp.o $tools/commands/{view,serve,bench}_left_out.cpp.o \
+  $tools/window/window_left_out.cpp.o $tools/commands/{view,serve,bench}_left_out.cpp.o \
   render/annotate/CMakeFiles/curvisplat_render_annotate.dir/annotations_left_out.cpp.o
 
 quietly cmake -S "$root" -B "$folder/build" -DCURVISPLAT_THROUGHPUT=ON

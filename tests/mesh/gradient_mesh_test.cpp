@@ -1,5 +1,5 @@
 // Quantities of gradients, of unstructured grids, against closed forms.
-#include "preprocess/gather/gradient_mesh.h"
+#include "preprocess/gradients/gradient_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +11,7 @@
 
 #include "preprocess/scenes/scenes.h"
 #include "tests/reference/array_mesh.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -166,12 +167,7 @@ TEST_F(Gradients, KeepToTheirMemoryAndAreTheSameInAny) {
   const std::vector<float> ample = of(uint64_t{64} << 20);
   EXPECT_EQ(of(uint64_t{256} << 10), ample) << "points and sums wait on disk";
   // 16 bytes for each point that several pieces have take more than an eighth of this.
-  try {
-    of(uint64_t{4} << 10);
-    FAIL() << "shared points fit in half a KiB";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("increase --memory"), std::string::npos) << error.what();
-  }
+  expectError([&] { of(uint64_t{4} << 10); }, {"increase --memory"});
 }
 
 TEST_F(Gradients, StopWithTheProgress) {

@@ -19,14 +19,14 @@
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/array_mesh.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
 
 namespace curvisplat {
 namespace {
-
-using Files = std::map<std::string, std::string>;
 
 class MeshConvert : public ::testing::Test {
  protected:
@@ -39,31 +39,13 @@ class MeshConvert : public ::testing::Test {
     return options;
   }
 
-  static ConvertReport run(const DataSource& source, const ConvertOptions& options) {
-    Progress progress;
-    return convert(source, options, progress);
-  }
-
   Files filesOf(const DataSource& source, const ConvertOptions& how) const {
-    run(source, how);
-    return filesIn(how.output);
-  }
-  static Files filesIn(const std::filesystem::path& folder) {
-    Files files;
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      std::ifstream file(entry.path(), std::ios::binary);
-      files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
-    }
-    return files;
+    converted(source, how);
+    return allFilesOf(how.output);
   }
 
   std::string errorOf(const DataSource& source, const ConvertOptions& how) const {
-    try {
-      run(source, how);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return curvisplat::errorOf([&] { converted(source, how); });
   }
 
   const std::shared_ptr<const Scene> scene_ = makeScene("half-annulus");
@@ -122,18 +104,14 @@ TEST_F(MeshConvert, BytesAreTheSameForAnyThreadsAndMemory) {
                               ArrayMesh(split(hexahedra_, 3, [](size_t cell) { return cell / 50 % 3; }))};
   for (const ArrayMesh& mesh : meshes)
     for (const uint32_t scalar : {0u, 1u}) {
-      const Files expected = filesOf(mesh, options(scalar));
-      ConvertOptions how = options(scalar);
-      how.threads = 1;
-      EXPECT_EQ(filesOf(mesh, how), expected) << "one thread";
-      for (const uint64_t bytes : {400'000u, 200'000u, 20'000u}) {
-        // Points that pieces share have to fit.
-        if (bytes < 100'000 && mesh.description().pieces.size() > 1) continue;
-        how.mesh_bytes = bytes;
-        EXPECT_EQ(filesOf(mesh, how), expected) << bytes << " bytes";
-      }
-      how.threads = 2;
-      EXPECT_EQ(filesOf(mesh, how), expected) << "two threads and little memory";
+      // Points that pieces share have to fit.
+      const uint64_t least = mesh.description().pieces.size() > 1 ? 200'000 : 20'000;
+      expectSameCaches(mesh, options(scalar),
+                       {{.threads = 1},
+                        {.threads = 1, .mesh_bytes = 400'000},
+                        {.threads = 1, .mesh_bytes = 200'000},
+                        {.threads = 1, .mesh_bytes = least},
+                        {.threads = 2, .mesh_bytes = least}});
     }
 }
 
@@ -156,14 +134,9 @@ TEST_F(MeshConvert, PagesOfPointsMakeTheSameBytes) {
   const ArrayMesh meshes[] = {ArrayMesh({hexahedra}), ArrayMesh({shuffledFrom(30'000, hexahedra)}),
                               ArrayMesh(split(hexahedra, 3, [](size_t cell) { return cell / 5000 % 3; }))};
   for (const ArrayMesh& mesh : meshes)
-    for (const uint32_t scalar : {0u, 1u}) {
-      const Files expected = filesOf(mesh, options(scalar));
-      ConvertOptions how = options(scalar);
-      for (const uint64_t bytes : {30'000'000u, 16'000'000u, 3'000'000u}) {
-        how.mesh_bytes = bytes;
-        EXPECT_EQ(filesOf(mesh, how), expected) << bytes << " bytes";
-      }
-    }
+    for (const uint32_t scalar : {0u, 1u})
+      expectSameCaches(mesh, options(scalar),
+                       {{.mesh_bytes = 30'000'000}, {.mesh_bytes = 16'000'000}, {.mesh_bytes = 3'000'000}});
 }
 
 TEST_F(MeshConvert, SeveralRanksMakeTheSameBytes) {
@@ -175,16 +148,7 @@ TEST_F(MeshConvert, SeveralRanksMakeTheSameBytes) {
     for (const uint32_t scalar : {0u, 1u}) {
       ConvertOptions how = options(scalar);
       how.threads = 1;
-      const Files expected = filesOf(mesh, how);
-      for (const unsigned count : {2u, 3u}) {
-        runRanks(count, [&](Ranks& ranks) {
-          ConvertOptions of_rank = how;
-          of_rank.ranks = &ranks;
-          of_rank.bucket_splats = 9000;
-          run(mesh, of_rank);
-        });
-        EXPECT_EQ(filesIn(how.output), expected) << count << " ranks";
-      }
+      expectSameCaches(mesh, how, {{.bucket_splats = 9000, .ranks = 2}, {.bucket_splats = 9000, .ranks = 3}});
     }
 }
 
@@ -229,15 +193,15 @@ TEST_F(MeshConvert, InterruptedConversionsResumeToTheSameBytes) {
     if (!std::filesystem::exists(how.output / "manifest.json")) {
       how.overwrite = false;
       how.resume = true;
-      run(mesh, how);
+      converted(mesh, how);
     }
-    EXPECT_EQ(filesIn(how.output), expected);
+    EXPECT_EQ(allFilesOf(how.output), expected);
   }
 }
 
 TEST_F(MeshConvert, WeightsSumToTheVolume) {
   const ArrayMesh cube({mixedCube(10)});
-  for (const uint32_t scalar : {0u, 1u}) EXPECT_NEAR(run(cube, options(scalar)).volume, 1, 1e-4);
+  for (const uint32_t scalar : {0u, 1u}) EXPECT_NEAR(converted(cube, options(scalar)).volume, 1, 1e-4);
   // The tetrahedra's own volume, which is less than the scene's.
   double volume = 0;
   for (size_t n = 0; n < tetrahedra_.cells.size(); ++n) {
@@ -246,7 +210,8 @@ TEST_F(MeshConvert, WeightsSumToTheVolume) {
     volume += std::abs(glm::dot(at(1) - at(0), glm::cross(at(2) - at(0), at(3) - at(0)))) / 6;
   }
   const ArrayMesh mesh({tetrahedra_});
-  for (const uint32_t scalar : {0u, 1u}) EXPECT_NEAR(run(mesh, options(scalar)).volume / volume, 1, 1e-4);
+  for (const uint32_t scalar : {0u, 1u})
+    EXPECT_NEAR(converted(mesh, options(scalar)).volume / volume, 1, 1e-4);
 }
 
 TEST_F(MeshConvert, LinearFieldsAreExact) {
@@ -255,7 +220,7 @@ TEST_F(MeshConvert, LinearFieldsAreExact) {
     ArrayPiece linear = piece;
     const glm::dvec3 gradient(1, -2, 0.5);
     setValues(linear, [&](const glm::dvec3& x) { return 3 + glm::dot(gradient, x); });
-    run(ArrayMesh({linear}), options(0));
+    converted(ArrayMesh({linear}), options(0));
     const CacheReader cache(folder_ / "mesh.splats");
     for (uint32_t number = 0; number < cache.bricks().size(); ++number) {
       if (!cache.bricks()[number].isLeaf()) continue;
@@ -275,24 +240,24 @@ TEST_F(MeshConvert, LinearFieldsAreExact) {
 TEST_F(MeshConvert, BlankedPointsTakeTheirCellsAlong) {
   ArrayPiece piece = hexahedra_;
   const uint64_t corner = piece.cells.cornersOfCell(0)[0];  // of one cell only
-  const double whole = run(ArrayMesh({piece}), options(0)).volume;
-  const double whole_cells = run(ArrayMesh({piece}), options(1)).volume;
+  const double whole = converted(ArrayMesh({piece}), options(0)).volume;
+  const double whole_cells = converted(ArrayMesh({piece}), options(1)).volume;
   piece.point_values[corner] = std::numeric_limits<float>::quiet_NaN();
-  ConvertReport report = run(ArrayMesh({piece}), options(0));
+  ConvertReport report = converted(ArrayMesh({piece}), options(0));
   EXPECT_EQ(report.blanked.not_finite, 1u);
   EXPECT_EQ(report.splats, piece.points.size() - 1);
   EXPECT_LT(report.volume, whole);
   piece.point_values[corner] = -99;
   ConvertOptions how = options(0);
   how.blank_value = -99;
-  report = run(ArrayMesh({piece}), how);
+  report = converted(ArrayMesh({piece}), how);
   EXPECT_EQ(report.blanked.by_value, 1u);
   const double by_value = report.volume;
   piece.points[corner].y = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(run(ArrayMesh({piece}), options(0)).volume, by_value);
-  EXPECT_LT(run(ArrayMesh({piece}), options(1)).volume, whole_cells);
+  EXPECT_EQ(converted(ArrayMesh({piece}), options(0)).volume, by_value);
+  EXPECT_LT(converted(ArrayMesh({piece}), options(1)).volume, whole_cells);
   piece.cell_values[3] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(run(ArrayMesh({piece}), options(1)).blanked.not_finite, 1u);
+  EXPECT_EQ(converted(ArrayMesh({piece}), options(1)).blanked.not_finite, 1u);
 }
 
 TEST_F(MeshConvert, OddMeshesAreConvertedAndTheirOdditiesCounted) {
@@ -309,11 +274,10 @@ TEST_F(MeshConvert, OddMeshesAreConvertedAndTheirOdditiesCounted) {
   setValues(piece, [&](const glm::dvec3& x) { return x.x; });
   piece.point_values.back() = 1e30f;
   for (const uint32_t scalar : {0u, 1u}) {
-    const ConvertReport report = run(ArrayMesh({piece}), options(scalar));
+    const ConvertReport report = converted(ArrayMesh({piece}), options(scalar));
     ASSERT_EQ(report.warnings.size(), 1u);
-    EXPECT_NE(report.warnings[0].find("1 of 1378 points belong to no solid cell"), std::string::npos)
-        << report.warnings[0];
-    EXPECT_NEAR(report.volume, run(ArrayMesh({hexahedra_}), options(scalar)).volume, 1e-3);
+    expectSays(report.warnings[0], "1 of 1378 points belong to no solid cell");
+    EXPECT_NEAR(report.volume, converted(ArrayMesh({hexahedra_}), options(scalar)).volume, 1e-3);
     EXPECT_LT(CacheReader(folder_ / "mesh.splats").manifest().upper.x, 10);
   }
 }
@@ -322,21 +286,21 @@ TEST_F(MeshConvert, WrongNumbersGiveOneLine) {
   ArrayPiece piece = hexahedra_;
   piece.cells.corners[100] = piece.points.size();
   const std::string error = errorOf(ArrayMesh({piece}), options(0));
-  EXPECT_NE(error.find("mesh: cell 12 refers to point 1377; expected 0 to 1376"), std::string::npos) << error;
+  expectSays(error, "mesh: cell 12 refers to point 1377; expected 0 to 1376");
   EXPECT_EQ(error.find('\n'), std::string::npos);
 
   ArrayPiece blank = hexahedra_;
   for (float& value : blank.point_values) value = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_NE(errorOf(ArrayMesh({blank}), options(0)).find("there is nothing to draw"), std::string::npos);
+  expectSays(errorOf(ArrayMesh({blank}), options(0)), "there is nothing to draw");
 
   ConvertOptions both = options(0);
   both.scalars = {0, 1};
-  EXPECT_NE(errorOf(ArrayMesh({hexahedra_}), both).find("convert them to two caches"), std::string::npos);
+  expectSays(errorOf(ArrayMesh({hexahedra_}), both), "convert them to two caches");
 }
 
 TEST_F(MeshConvert, PiecesShareTheirPoints) {
   const ArrayMesh parts(split(hexahedra_, 2, [](size_t cell) { return cell < 500 ? 0 : 1; }));
-  const ConvertReport report = run(parts, options(0));
+  const ConvertReport report = converted(parts, options(0));
   EXPECT_EQ(report.splats, hexahedra_.points.size());
   EXPECT_EQ(report.nodes, hexahedra_.points.size() + report.merged_nodes);
   EXPECT_GT(report.merged_nodes, 0u);

@@ -1,17 +1,23 @@
-// Pictures of unstructured grids against the field itself.
+// Pictures of unstructured grids against the field itself; and a uniform medium in an unstructured grid,
+// which is even inside, and ends at the outer faces.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/reference/array_mesh.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/support/sweep.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -94,7 +100,8 @@ TEST_F(MeshFidelity, CoarseLevels) {
 }
 
 TEST_F(MeshFidelity, FinerTetrahedra) {
-  if (!faults::isWholeSweep()) GTEST_SKIP() << "two minutes of processor time; see tests/support/sweep.h";
+  if (!faults::isWholeSweep())
+    GTEST_SKIP() << "two minutes of processor time; see tests/support/fault_sweep.h";
   const ArrayMesh mesh({tetrahedraOf(*scene_, 100, 50, 50)});
   const double least_points[] = {66, 67, 56}, least_cells[] = {64, 64.5, 56};
   for (size_t n = 0; n < 3; ++n) {
@@ -127,6 +134,232 @@ TEST_F(MeshFidelity, NumbersAndPiecesChangeNothing) {
     const Image expected = draw(whole, scalar, "smooth");
     EXPECT_GE(compareImages(draw(mixed, scalar, "smooth"), expected).psnr_db, 70) << scalar;
     EXPECT_GE(compareImages(draw(parts, scalar, "smooth"), expected).psnr_db, 70) << scalar;
+  }
+}
+
+constexpr ImageSize kSize{192, 192};
+constexpr int kEdge = 3;  // pixels from the outline that are neither inside nor outside
+
+/// Optical depths of a picture over white of a medium of one colour.
+std::vector<double> depthsOf(const Image& image, const glm::dvec3& colour) {
+  int channel = 0;
+  for (int n = 1; n < 3; ++n)
+    if (colour[n] < colour[channel]) channel = n;
+  std::vector<double> depths(image.rgba.size() / 4);
+  for (size_t n = 0; n < depths.size(); ++n) {
+    const double shown = image.rgba[4 * n + static_cast<size_t>(channel)] + (1 - image.rgba[4 * n + 3]);
+    depths[n] = -std::log(std::clamp((shown - colour[channel]) / (1 - colour[channel]), 1e-6, 1.0));
+  }
+  return depths;
+}
+
+struct Evenness {
+  double db = 0;
+  double spread = 0;   // p98 / p2 of the depth against the true one, inside
+  double mean = 0;     // of the same
+  double outside = 0;  // share of the depth
+};
+
+class MeshBorders : public testing::Test {
+ protected:
+  MeshBorders() {
+    OpticalFunction exact = function_.exact;
+    colour_ = exact(0.5).colour;
+  }
+
+  Evenness measure(const DataSource& source, uint32_t scalar, const Camera& camera) {
+    ConvertOptions options;
+    options.output = folder_ / "mesh.splats";
+    options.scalars = {scalar};
+    options.overwrite = true;
+    Progress progress;
+    convert(source, options, progress);
+    const Image picture = drawCache(options.output, function_.table, camera, knownFrame(kSize));
+    const Image reference = toImage(referenceMarch(*scene_, function_.exact, camera, kSize));
+    const std::vector<double> drawn = depthsOf(picture, colour_), truth = depthsOf(reference, colour_);
+
+    Evenness found;
+    found.db = compareImages(picture, reference).psnr_db;
+    std::vector<double> ratios;
+    double all = 0, outside = 0, shown = 0, true_depth = 0;
+    for (int y = kEdge; y + kEdge < kSize.height; ++y)
+      for (int x = kEdge; x + kEdge < kSize.width; ++x) {
+        bool any = false, every = true;
+        for (int dy = -kEdge; dy <= kEdge; ++dy)
+          for (int dx = -kEdge; dx <= kEdge; ++dx) {
+            const bool there = truth[at(x + dx, y + dy)] > 0;
+            any |= there;
+            every &= there;
+          }
+        all += drawn[at(x, y)];
+        if (!any) outside += drawn[at(x, y)];
+        if (!every) continue;
+        ratios.push_back(drawn[at(x, y)] / truth[at(x, y)]);
+        shown += drawn[at(x, y)];
+        true_depth += truth[at(x, y)];
+      }
+    std::sort(ratios.begin(), ratios.end());
+    found.spread = ratios[ratios.size() * 98 / 100] / ratios[ratios.size() * 2 / 100];
+    found.mean = shown / true_depth;
+    found.outside = outside / all;
+    return found;
+  }
+
+  void expectEven(const char* what, const ArrayPiece& piece, uint32_t scalar, double oblique_db,
+                  double edge_on_db) {
+    const ArrayMesh mesh({piece});
+    const struct {
+      const char* name;
+      Camera camera;
+      double db;
+    } views[] = {{"obliquely", halfAnnulusCamera(), oblique_db}, {"edge-on", edgeOnCamera(), edge_on_db}};
+    for (const auto& [view, camera, db] : views) {
+      const Evenness found = measure(mesh, scalar, camera);
+      fmt::print("{}, {}: {:.1f} dB, p98/p2 {:.3f}, density {:.4f}, outside {:.4f} %\n", what, view, found.db,
+                 found.spread, found.mean, 100 * found.outside);
+      EXPECT_GE(found.db, db) << what << ", " << view;
+      EXPECT_LE(found.outside, 1e-4) << what << ", " << view;
+      EXPECT_NEAR(found.mean, 1, 0.01) << what << ", " << view;
+    }
+  }
+
+  static size_t at(int x, int y) { return static_cast<size_t>(y) * kSize.width + static_cast<size_t>(x); }
+
+  const std::shared_ptr<const Scene> scene_ = makeScene("half-annulus-constant");
+  const KnownFunction function_ = KnownFunction::of("smooth");
+  glm::dvec3 colour_{0.0};
+  const TemporaryFolder folder_;
+};
+
+TEST_F(MeshBorders, OfPoints) {
+  expectEven("points of hexahedra", hexahedraOf(*scene_, 31, 15, 15), 0, 50, 37);
+  expectEven("points of tetrahedra", tetrahedraOf(*scene_, 24, 12, 12), 0, 46.5, 35.5);
+}
+
+TEST_F(MeshBorders, OfCells) {
+  expectEven("hexahedra", hexahedraOf(*scene_, 31, 15, 15), 1, 47.5, 36);
+  expectEven("tetrahedra", tetrahedraOf(*scene_, 24, 12, 12), 1, 43.5, 33);
+}
+
+/// Boxes of hexahedra side by side along x: n cells to a unit of length in each.
+ArrayPiece boxes(std::initializer_list<uint64_t> cells) {
+  ArrayPiece all;
+  std::map<std::array<uint64_t, 3>, uint64_t> numbers;  // points, in 1/64
+  uint64_t box = 0;
+  for (const uint64_t n : cells) {
+    const auto point = [&](uint64_t i, uint64_t j, uint64_t k) {
+      const std::array<uint64_t, 3> at{64 * box + 64 * i / n, 64 * j / n, 64 * k / n};
+      const auto [found, is_new] = numbers.emplace(at, all.points.size());
+      if (is_new) all.points.push_back(glm::dvec3(at[0], at[1], at[2]) / 64.0);
+      return found->second;
+    };
+    for (uint64_t k = 0; k < n; ++k)
+      for (uint64_t j = 0; j < n; ++j)
+        for (uint64_t i = 0; i < n; ++i)
+          all.cells.append(CellKind::kHexahedron,
+                           std::array{point(i, j, k), point(i + 1, j, k), point(i + 1, j + 1, k),
+                                      point(i, j + 1, k), point(i, j, k + 1), point(i + 1, j, k + 1),
+                                      point(i + 1, j + 1, k + 1), point(i, j + 1, k + 1)});
+    ++box;
+  }
+  setValues(all, [](const glm::dvec3& x) { return x.x; });
+  return all;
+}
+
+/// Converts the scalar at points, and calls use(position, border code) for each splat of the finest level.
+template <typename Use>
+void forEachSplat(const ArrayPiece& piece, const std::filesystem::path& folder, const Use& use) {
+  ConvertOptions options;
+  options.output = folder / "splats.splats";
+  options.scalars = {0};
+  options.overwrite = true;
+  Progress progress;
+  convert(ArrayMesh({piece}), options, progress);
+  const CacheReader cache(options.output);
+  for (uint32_t number = 0; number < cache.bricks().size(); ++number) {
+    if (!cache.bricks()[number].isLeaf()) continue;
+    SplatGeometry geometry;
+    cache.readGeometry(number, geometry);
+    const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[number].cell);
+    for (size_t n = 0; n < geometry.size(); ++n)
+      use(corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]), geometry.border_code[n]);
+  }
+}
+
+TEST_F(MeshBorders, HangingNodesAreInside) {
+  size_t inside = 0, cut = 0;
+  forEachSplat(boxes({8, 16}), folder_.path(), [&](const glm::dvec3& x, uint32_t border_code) {
+    const double edge = std::min({x.x, 2 - x.x, x.y, 1 - x.y, x.z, 1 - x.z});
+    if (edge < 0.02) {
+      ++cut;
+      EXPECT_NE(border_code, kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
+    }
+    if (edge < 0.2 || std::abs(x.x - 1) > 0.2) return;
+    ++inside;
+    EXPECT_EQ(border_code, kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
+  });
+  EXPECT_GT(inside, 100u);
+  EXPECT_GT(cut, 500u);
+}
+
+/// The scene in hexahedra: nu x nv x nw, with every cell beyond the middle of `axis` cut into eight.
+ArrayPiece jointOf(const Scene& scene, const std::array<uint64_t, 3>& cells, size_t axis) {
+  ArrayPiece all;
+  std::map<std::array<uint64_t, 3>, uint64_t> numbers;  // points, in half cells
+  const auto point = [&](const std::array<uint64_t, 3>& at) {
+    const auto [found, is_new] = numbers.emplace(at, all.points.size());
+    glm::dvec3 place(0.0);
+    for (int n = 0; n < 3; ++n)
+      place[n] = static_cast<double>(at[static_cast<size_t>(n)]) /
+                 static_cast<double>(2 * cells[static_cast<size_t>(n)]);
+    if (is_new) all.points.push_back(scene.position(place));
+    return found->second;
+  };
+  constexpr std::array<std::array<uint64_t, 3>, 8> kCorners{
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
+  const auto append = [&](const std::array<uint64_t, 3>& low, uint64_t size) {
+    std::array<uint64_t, 8> corners;
+    for (size_t n = 0; n < 8; ++n)
+      corners[n] = point(
+          {low[0] + size * kCorners[n][0], low[1] + size * kCorners[n][1], low[2] + size * kCorners[n][2]});
+    all.cells.append(CellKind::kHexahedron, corners);
+  };
+  for (uint64_t k = 0; k < 2 * cells[2]; k += 2)
+    for (uint64_t j = 0; j < 2 * cells[1]; j += 2)
+      for (uint64_t i = 0; i < 2 * cells[0]; i += 2) {
+        const std::array<uint64_t, 3> low{i, j, k};
+        if (low[axis] < cells[axis])
+          append(low, 2);
+        else
+          for (const auto& corner : kCorners)
+            append({low[0] + corner[0], low[1] + corner[1], low[2] + corner[2]}, 1);
+      }
+  setValues(all, [&](const glm::dvec3& x) { return scene.scalar(x); });
+  return all;
+}
+
+TEST_F(MeshBorders, HangingNodesOnCurvedJoints) {
+  // The fine faces' hanging nodes lie on the arc, beside the plane of the coarse face.
+  const struct {
+    const char* what;
+    size_t axis;
+  } joints[] = {{"the angle", 0}, {"the radius", 1}, {"the height", 2}};
+  for (const auto& [what, axis] : joints) {
+    const ArrayPiece piece = jointOf(*scene_, {32, 16, 16}, axis);
+    size_t inside = 0, cut = 0;
+    forEachSplat(piece, folder_.path(),
+                 [&, axis_of_joint = static_cast<int>(axis)](const glm::dvec3& x, uint32_t border_code) {
+                   const std::optional<glm::dvec3> uvw = scene_->inverse(x);
+                   if (!uvw || std::abs((*uvw)[axis_of_joint] - 0.5) > 0.15) return;
+                   for (int n = 0; n < 3; ++n)
+                     if (n != axis_of_joint && std::abs((*uvw)[n] - 0.5) > 0.35) return;
+                   ++inside;
+                   cut += border_code != kNoBorder;
+                 });
+    EXPECT_GT(inside, 500u) << what;
+    EXPECT_EQ(cut, 0u) << "of " << inside << " points at a joint across " << what;
+    expectEven(fmt::format("points, joint across {}", what).c_str(), piece, 0, 49, 36.5);
+    expectEven(fmt::format("cells, joint across {}", what).c_str(), piece, 1, 48, 36);
   }
 }
 

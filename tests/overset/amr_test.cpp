@@ -7,7 +7,7 @@
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/open_grid.h"
-#include "preprocess/formats/vtk/amr_boxes.h"
+#include "preprocess/formats/vtk/vtk_grid.h"
 #include "stream/base/error.h"
 #include "tests/support/temporary_folder.h"
 

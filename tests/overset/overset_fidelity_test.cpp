@@ -14,7 +14,6 @@
 #include "render/image/image_file.h"
 #include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/reference/overset_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

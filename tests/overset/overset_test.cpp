@@ -16,13 +16,13 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/overset/block_owners.h"
 #include "preprocess/scenes/scenes.h"
-#include "preprocess/splats/covered_part.h"
+#include "preprocess/shape/covered_part.h"
 #include "preprocess/survey/block_overlap.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/function_grid.h"
-#include "tests/reference/overset_grid.h"
-#include "tests/support/folder_files.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
 
@@ -39,10 +39,6 @@ class Overset : public testing::Test {
     options.title = "overset";
     options.surfaces = false;
     return options;
-  }
-  ConvertReport convertWith(const GridSource& source, const ConvertOptions& options) const {
-    Progress progress;
-    return convert(source, options, progress);
   }
   Manifest manifestOf(const std::string& name) const { return CacheReader(folder_ / name).manifest(); }
 
@@ -89,16 +85,16 @@ TEST_F(Overset, TheVolumeIsThatOfTheUnion) {
        64}};
   for (const Centring centring : {Centring::kNode, Centring::kCell})
     for (const auto& [name, all, volume] : cases) {
-      const ConvertReport owned = convertWith(boxes(all, 1, centring), optionsFor("owned.splats"));
+      const ConvertReport owned = converted(boxes(all, 1, centring), optionsFor("owned.splats"));
       std::printf("%s: %g, of %g\n", name, owned.volume, volume);
       EXPECT_NEAR(owned.volume, volume, 0.01 * volume) << name;
       EXPECT_EQ(manifestOf("owned.splats").overlap, "owner");
       ASSERT_EQ(owned.notes.size(), 1u);
-      EXPECT_NE(owned.notes[0].find("--overlap all"), std::string::npos) << owned.notes[0];
+      expectSays(owned.notes[0], "--overlap all");
       EXPECT_TRUE(owned.warnings.empty());
       ConvertOptions options = optionsFor("all.splats");
       options.overlap = Overlap::kAll;
-      const ConvertReport every = convertWith(boxes(all, 1, centring), options);
+      const ConvertReport every = converted(boxes(all, 1, centring), options);
       EXPECT_GT(every.volume, owned.volume * 1.01) << name;
       EXPECT_EQ(manifestOf("all.splats").overlap, "all");
       EXPECT_EQ(every.warnings.size(), 1u);
@@ -108,18 +104,18 @@ TEST_F(Overset, TheVolumeIsThatOfTheUnion) {
 TEST_F(Overset, BlocksThatAbutLoseNothing) {
   const FunctionGridSource source =
       boxes({{{0, 0, 0}, {1, 1, 1}, 9}, {{1, 0, 0}, {1, 1, 1}, 14}, {{0, 1, 0}, {2, 1, 1}, 6}});
-  const ConvertReport owned = convertWith(source, optionsFor("owner.splats"));
+  const ConvertReport owned = converted(source, optionsFor("owner.splats"));
   EXPECT_TRUE(owned.notes.empty());
   EXPECT_EQ(manifestOf("owner.splats").overlap, "none");
   ConvertOptions options = optionsFor("all.splats");
   options.overlap = Overlap::kAll;
-  convertWith(source, options);
+  converted(source, options);
   Files of_owner = filesOf(folder_ / "owner.splats"), of_all = filesOf(folder_ / "all.splats");
   for (const auto& [name, bytes] : of_all)
     if (name != "manifest.json") {
       EXPECT_TRUE(of_owner.at(name) == bytes) << name;
     }
-  convertWith(boxes({{{0, 0, 0}, {1, 1, 1}, 9}}), optionsFor("one.splats"));
+  converted(boxes({{{0, 0, 0}, {1, 1, 1}, 9}}), optionsFor("one.splats"));
   EXPECT_EQ(manifestOf("one.splats").overlap, "");
 }
 
@@ -164,7 +160,7 @@ TEST_F(Overset, ABlockManyTimesIsComparedOnce) {
 TEST_F(Overset, PartsOfCellsKeepALinearField) {
   const FunctionGridSource source =
       boxes({{{0, 0, 0}, {4, 4, 4}, 17}, {{1.1, 1.2, 1.3}, {1.5, 1.5, 1.5}, 31}});
-  convertWith(source, optionsFor("linear.splats"));
+  converted(source, optionsFor("linear.splats"));
   const CacheReader cache(folder_ / "linear.splats");
   size_t parts = 0;
   for (uint32_t brick = 0; brick < cache.bricks().size(); ++brick) {
@@ -187,28 +183,9 @@ TEST_F(Overset, BytesDependNeitherOnThreadsNorMemoryNorRanks) {
   for (const Centring centring : {Centring::kNode, Centring::kCell}) {
     const FunctionGridSource grid =
         oversetGrid(scene_, gridBlock(40, 24, 24), boxesInHalfAnnulus(3, 20), centring);
-    convertWith(grid, optionsFor("one.splats"));
-    const Files expected = filesOf(folder_ / "one.splats");
-    const auto expect_same = [&](const char* what) {
-      const Files found = filesOf(folder_ / "other.splats");
-      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << what << " " << name;
-    };
-    ConvertOptions options = optionsFor("other.splats");
-    options.threads = 1;
-    convertWith(grid, options);
-    expect_same("threads");
-    options = optionsFor("other.splats");
-    options.owner_bytes = 1;  // a few rows at a time
-    options.memory_bytes = uint64_t{200} << 20;
-    convertWith(grid, options);
-    expect_same("memory");
-    options = optionsFor("other.splats");
-    runRanks(3, [&](Ranks& ranks) {
-      ConvertOptions of_rank = options;
-      of_rank.ranks = &ranks;
-      convertWith(grid, of_rank);
-    });
-    expect_same("ranks");
+    // A byte for owners: a few rows at a time.
+    expectSameCaches(grid, optionsFor("one.splats"),
+                     {{.threads = 1}, {.memory_bytes = uint64_t{200} << 20, .owner_bytes = 1}, {.ranks = 3}});
   }
 }
 
@@ -217,8 +194,8 @@ TEST_F(Overset, AScalarIsAddedAsIfItHadBeenConverted) {
   const FunctionGridSource source = boxes(all, 2);
   ConvertOptions options = optionsFor("both.splats");
   options.scalars = {0, 1};
-  convertWith(source, options);
-  convertWith(source, optionsFor("added.splats"));
+  converted(source, options);
+  converted(source, optionsFor("added.splats"));
   AddScalarOptions adding;
   adding.cache = folder_ / "added.splats";
   adding.scalars = {1};
@@ -231,7 +208,7 @@ TEST_F(Overset, AScalarIsAddedAsIfItHadBeenConverted) {
 
 TEST_F(Overset, AStepSharesTheGeometry) {
   const std::vector<Box> all{{{0, 0, 0}, {4, 4, 4}, 17}, {{1.1, 1.2, 1.3}, {1.5, 1.5, 1.5}, 31}};
-  convertWith(boxes(all), optionsFor("steps.splats"));
+  converted(boxes(all), optionsFor("steps.splats"));
   AddStepOptions adding;
   adding.cache = folder_ / "steps.splats";
   Progress progress;
@@ -261,7 +238,7 @@ class FringedBoxes : public FunctionGridSource {
 };
 
 TEST_F(Overset, AFringeIsDrawnByTheBlockThatItWasInterpolatedFrom) {
-  const ConvertReport fringed = convertWith(FringedBoxes(), optionsFor("fringed.splats"));
+  const ConvertReport fringed = converted(FringedBoxes(), optionsFor("fringed.splats"));
   EXPECT_NEAR(fringed.volume, 64, 0.64);
   const CacheReader cache(folder_ / "fringed.splats");
   uint64_t of_fine = 0;
@@ -307,12 +284,12 @@ TEST_F(Overset, ARealGridHasTheVolumeOfItsDomain) {
   if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "needs " << folder;
   const WithX abutting(folder / "cylinder_chimera_abutting.x");
   const WithX overlapping(folder / "cylinder_chimera_overlapping_singledonor.x");
-  const ConvertReport expected = convertWith(abutting, optionsFor("abutting.splats"));
+  const ConvertReport expected = converted(abutting, optionsFor("abutting.splats"));
   EXPECT_TRUE(expected.notes.empty());
-  const ConvertReport owned = convertWith(overlapping, optionsFor("owned.splats"));
+  const ConvertReport owned = converted(overlapping, optionsFor("owned.splats"));
   ConvertOptions options = optionsFor("all.splats");
   options.overlap = Overlap::kAll;
-  const ConvertReport all = convertWith(overlapping, options);
+  const ConvertReport all = converted(overlapping, options);
   std::printf("abutting %g, owners %g, all %g; %s\n", expected.volume, owned.volume, all.volume,
               owned.notes.at(0).c_str());
   EXPECT_NEAR(owned.volume, expected.volume, 1e-3 * expected.volume);

@@ -16,14 +16,15 @@
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/cache/brick_log.h"
-#include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_update.h"
 #include "stream/cache/cache_verify.h"
-#include "stream/cache/cell_octants.h"
+#include "stream/cache/manifest.h"
 #include "stream/cache/partial_folder.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -33,17 +34,6 @@ namespace fs = std::filesystem;
 
 constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 constexpr float kBlank = 9999;
-
-using Files = std::map<std::string, std::string>;
-
-Files filesOf(const fs::path& folder) {
-  Files files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::ifstream file(entry.path(), std::ios::binary);
-    files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
-  }
-  return files;
-}
 
 void convertTo(const fs::path& output, const GridSource& source, std::vector<uint32_t> scalars) {
   ConvertOptions options;
@@ -66,11 +56,6 @@ AddScalarOptions adding(const fs::path& cache, std::vector<uint32_t> scalars) {
   return options;
 }
 
-AddScalarReport addQuietly(const GridSource& source, const AddScalarOptions& options) {
-  Progress progress;
-  return addScalars(source, options, progress);
-}
-
 void changeManifest(const fs::path& cache, const std::function<void(nlohmann::ordered_json&)>& change) {
   auto manifest = nlohmann::ordered_json::parse(readTextFile(cache / "manifest.json"));
   manifest.erase("checksum");
@@ -80,12 +65,7 @@ void changeManifest(const fs::path& cache, const std::function<void(nlohmann::or
 
 /// What adding throws, as text; empty if it does not.
 std::string refusal(const GridSource& source, const AddScalarOptions& options) {
-  try {
-    addQuietly(source, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return curvisplat::errorOf([&] { added(source, options); });
 }
 
 /// That `files` has all payload and index files of `others`, byte for byte.
@@ -101,7 +81,7 @@ void expectAsAtOnce(const GridSource& source) {
   const TemporaryFolder folder;
   convertTo(folder / "all.splats", source, {0, 1, 2});
   convertTo(folder / "first.splats", source, {0});
-  const Files all = filesOf(folder / "all.splats"), first = filesOf(folder / "first.splats");
+  const Files all = allFilesOf(folder / "all.splats"), first = allFilesOf(folder / "first.splats");
   const CacheReader expected(folder / "all.splats");
 
   struct Way {
@@ -124,10 +104,10 @@ void expectAsAtOnce(const GridSource& source) {
     options.memory_bytes = way.memory_bytes;
     options.bucket_splats = way.bucket_splats;
     options.most_buckets = way.most_buckets;
-    const AddScalarReport report = addQuietly(source, options);
+    const AddScalarReport report = added(source, options);
     EXPECT_EQ(report.splats, expected.manifest().splats);
 
-    const Files added = filesOf(cache);
+    const Files added = allFilesOf(cache);
     EXPECT_EQ(added.size(), all.size()) << way.name;
     expectHolds(added, all, way.name);
     expectHolds(added, first, way.name);
@@ -235,8 +215,8 @@ TEST(AddScalar, CutsOctantsInCachesThatHaveThemOnly) {
   const fs::path cache = folder / "a.splats";
   convertTo(cache, source, {0});
   ASSERT_TRUE(CacheReader(cache).manifest().hasFeature(kCellOctants));
-  addQuietly(source, adding(cache, {1}));
-  const Files files = filesOf(cache);
+  added(source, adding(cache, {1}));
+  const Files files = allFilesOf(cache);
   EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
 
   // Of a cache without the feature, whole pieces are expected: they lie elsewhere.
@@ -244,8 +224,7 @@ TEST(AddScalar, CutsOctantsInCachesThatHaveThemOnly) {
   changeManifest(folder / "older.splats", [](nlohmann::ordered_json& json) {
     std::erase(json["requires"].get_ref<nlohmann::ordered_json::array_t&>(), kCellOctants);
   });
-  EXPECT_NE(refusal(source, adding(folder / "older.splats", {1})).find("another position"),
-            std::string::npos);
+  expectSays(refusal(source, adding(folder / "older.splats", {1})), "another position");
 }
 
 TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
@@ -263,15 +242,14 @@ TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
   const fs::path cache = folder / "a.splats";
   convertTo(cache, source, {0});
   ASSERT_EQ(CacheReader(cache).manifest().stretch, kSteepStretch);
-  addQuietly(source, adding(cache, {1}));
-  const Files files = filesOf(cache);
+  added(source, adding(cache, {1}));
+  const Files files = allFilesOf(cache);
   EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
 
   // Of a cache from before, splats as they were then are expected.
   convertTo(folder / "older.splats", source, {0});
   changeManifest(folder / "older.splats", [](nlohmann::ordered_json& json) { json.erase("stretch"); });
-  EXPECT_NE(refusal(source, adding(folder / "older.splats", {1})).find("another position"),
-            std::string::npos);
+  expectSays(refusal(source, adding(folder / "older.splats", {1})), "another position");
 }
 
 TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
@@ -303,10 +281,9 @@ TEST(AddScalar, RefusesBlanksThatTheCacheLeavesAmbiguous) {
     return values;
   });
   convertTo(folder / "a.splats", source, {0});
-  const Files before = filesOf(folder / "a.splats");
-  EXPECT_NE(refusal(source, adding(folder / "a.splats", {1})).find("convert again with all scalars"),
-            std::string::npos);
-  EXPECT_TRUE(filesOf(folder / "a.splats") == before);
+  const Files before = allFilesOf(folder / "a.splats");
+  expectSays(refusal(source, adding(folder / "a.splats", {1})), "convert again with all scalars");
+  EXPECT_TRUE(allFilesOf(folder / "a.splats") == before);
 }
 
 TEST(AddScalar, AddsOneAfterTheOther) {
@@ -314,9 +291,9 @@ TEST(AddScalar, AddsOneAfterTheOther) {
   const FunctionGridSource source = bentBoxSource(30, 30, 30);
   convertTo(folder / "all.splats", source, {0, 1, 2});
   convertTo(folder / "a.splats", source, {0});
-  addQuietly(source, adding(folder / "a.splats", {1}));
-  addQuietly(source, adding(folder / "a.splats", {2}));
-  const Files all = filesOf(folder / "all.splats"), added = filesOf(folder / "a.splats");
+  added(source, adding(folder / "a.splats", {1}));
+  added(source, adding(folder / "a.splats", {2}));
+  const Files all = allFilesOf(folder / "all.splats"), added = allFilesOf(folder / "a.splats");
   expectHolds(added, all, "one after the other");
   EXPECT_EQ(added.size(), all.size());
   const CacheReader reader(folder / "a.splats");
@@ -326,18 +303,18 @@ TEST(AddScalar, AddsOneAfterTheOther) {
 /// A cache of a bent box with scalar 0, and what it was.
 class ToAnExistingCache : public ::testing::Test {
  protected:
-  ToAnExistingCache() { convertTo(cache, source, {0}), before = filesOf(cache); }
+  ToAnExistingCache() { convertTo(cache, source, {0}), before = allFilesOf(cache); }
 
   /// That adding is refused with these words, and changes nothing.
   void expectRefused(const GridSource& from, const AddScalarOptions& options, const std::string& words) {
     const std::string text = refusal(from, options);
-    EXPECT_NE(text.find(words), std::string::npos) << text;
+    expectSays(text, words);
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
     expectUnchanged("after a refusal");
   }
 
   void expectUnchanged(const std::string& when) {
-    EXPECT_TRUE(filesOf(cache) == before) << when;
+    EXPECT_TRUE(allFilesOf(cache) == before) << when;
     EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1) << when;
   }
 
@@ -358,7 +335,7 @@ class ToAnExistingCache : public ::testing::Test {
 };
 
 TEST_F(ToAnExistingCache, RefusesNamesThatItHas) {
-  EXPECT_THROW(addQuietly(source, adding(cache, {1, 0})), UsageError);
+  EXPECT_THROW(added(source, adding(cache, {1, 0})), UsageError);
   expectRefused(source, adding(cache, {0}), "already has a scalar 's0'; it has s0");
 }
 
@@ -397,7 +374,7 @@ TEST_F(ToAnExistingCache, RefusesOtherNodesInTheSamePlace) {
   // Cells that touch the blanked node and have no volume are not drawn, so its neighbours differ; any brick may be the first.
   fs::remove_all(cache);
   convertTo(cache, allButOne(9), {0});
-  before = filesOf(cache);
+  before = allFilesOf(cache);
   expectRefused(allButOne(10), adding(cache, {1}), "of block 1, but the grid has node 9 ");
 }
 
@@ -416,7 +393,7 @@ TEST_F(ToAnExistingCache, RefusesAFolderThatIsNotACache) {
   EXPECT_NE(refusal(source, adding(folder / "missing", {1})), "");
   AddScalarOptions options = adding(cache, {1});
   options.temporary_folder = folder / "missing";
-  EXPECT_NE(refusal(source, options).find("--tmp"), std::string::npos);
+  expectSays(refusal(source, options), "--tmp");
 }
 
 TEST_F(ToAnExistingCache, RefusesWhileAnotherChangesIt) {
@@ -432,7 +409,7 @@ TEST_F(ToAnExistingCache, RefusesDamagedGeometry) {
   file.seekp(500);
   file.put(static_cast<char>(before["geometry.bin"][500] ^ 1));
   file.close();
-  before = filesOf(cache);
+  before = allFilesOf(cache);
   expectRefused(source, adding(cache, {1}), "checksum");
 }
 
@@ -440,8 +417,8 @@ TEST_F(ToAnExistingCache, ClearsWhatAKilledOneLeft) {
   std::ofstream(cache / "var.1.bin.part") << "rest";
   std::ofstream(cache / "var.2.bin.part") << "rest";
   EXPECT_TRUE(verifyCache(CacheReader(cache)).findings.empty());
-  addQuietly(source, adding(cache, {1}));
-  const Files after = filesOf(cache);
+  added(source, adding(cache, {1}));
+  const Files after = allFilesOf(cache);
   EXPECT_EQ(after.size(), before.size() + 1);
   EXPECT_TRUE(after.contains("var.1.bin"));
 }
@@ -453,8 +430,8 @@ TEST_F(ToAnExistingCache, ClearsAConversionKilledAtItsEnd) {
   writeJournal(cache, {{}, scratch, std::nullopt});
   std::ofstream(cache / kBrickLogName) << "rest";
   std::ofstream(cache / kPartialLock) << kPartialMark;
-  addQuietly(source, adding(cache, {1}));
-  EXPECT_EQ(filesOf(cache).size(), before.size() + 1);
+  added(source, adding(cache, {1}));
+  EXPECT_EQ(allFilesOf(cache).size(), before.size() + 1);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
@@ -469,9 +446,9 @@ TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
     const ScopedSystemCalls scope(counting);
     AddScalarOptions of_copy = options;
     of_copy.cache = copy;
-    addQuietly(source, of_copy);
+    added(source, of_copy);
   }
-  const Files whole = filesOf(copy);
+  const Files whole = allFilesOf(copy);
   fs::remove_all(copy);
 
   struct Kind {
@@ -494,7 +471,7 @@ TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
         EXPECT_NE(refusal(source, options), "") << when;
       }
       // The last sync comes when the new manifest is in place.
-      if (filesOf(cache) == whole) {
+      if (allFilesOf(cache) == whole) {
         EXPECT_EQ(when, fmt::format("sync {0} of {1}", kind.count - 1, kind.count));
         break;
       }

@@ -1,23 +1,107 @@
-// Blocks in one another are found with their volume, and blocks side by side are not.
-#include "preprocess/survey/block_overlap.h"
-
+// Blocks in one another are found with their volume, and blocks side by side are not. The sample points of
+// blocks have their places in the order of the cells, however they are divided.
 #include <gtest/gtest.h>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
 
 #include <atomic>
 #include <cmath>
-#include <glm/mat3x3.hpp>
-#include <glm/vec3.hpp>
+#include <cstdint>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/survey/block_overlap.h"
+#include "preprocess/survey/overlap_points.h"
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
+
+TEST(AxisSampling, StandsForAllCellsInOrder) {
+  for (const uint64_t cells : {1, 2, 3, 4, 7, 100, 1001})
+    for (const uint64_t wanted : {0, 1, 2, 5, 30, 2000})
+      for (const bool few : {false, true}) {
+        const AxisSampling axis(cells, wanted, few);
+        uint64_t points = 0, sampled = 0;
+        double represented = 0;
+        for (uint64_t cell = 0; cell < cells; ++cell) {
+          const AxisSampling::Cell at = axis.at(cell);
+          ASSERT_EQ(at.before, points) << cells << " " << wanted << " " << cell;
+          points += at.points.size();
+          sampled += !at.points.empty();
+          for (const AxisSampling::Point& point : at.points) {
+            represented += point.cells;
+            EXPECT_TRUE(point.t > 0 && point.t < 1);
+          }
+        }
+        EXPECT_EQ(axis.points(), points);
+        EXPECT_EQ(axis.at(cells).before, points);
+        EXPECT_NEAR(represented, static_cast<double>(cells), 1e-9 * static_cast<double>(cells));
+        EXPECT_EQ(sampled, std::min(cells, 2 + std::max<uint64_t>(1, wanted)));
+      }
+}
+
+TEST(BlockSampling, IsCutIntoPartsThatFit) {
+  for (const GridBlock& block : {gridBlock(40, 30, 20), gridBlock(3000, 2, 2), gridBlock(2, 3, 900)})
+    for (const uint64_t most : {216u, 500u, 5000u}) {
+      const BlockSampling sampling(block, 1e6, 2);
+      uint64_t begin = 0, points = 0, parts = 0;
+      while (begin < sampling.endOfCells()) {
+        const uint64_t end = sampling.endOfPart(begin, most);
+        ASSERT_GT(end, begin);
+        const uint64_t count = sampling.pointsBefore(end) - sampling.pointsBefore(begin);
+        EXPECT_LE(count, most);
+        points += count;
+        begin = end;
+        ++parts;
+      }
+      EXPECT_EQ(points, sampling.points());
+      EXPECT_LE(parts, 2 + 2 * points / (most - 215));  // nearly as many as fit
+    }
+}
+
+TEST(PointPicker, GivesTheSamePointsOfPartsAndSlabs) {
+  const GridBlock block = gridBlock(14, 9, 11);
+  const FunctionGridSource source({block}, 0, [](const GridNode& node) {
+    return NodeValues{
+        {node.i + 0.1 * node.j, 1.0 * node.j, node.k + 0.2 * node.i}, {}, node.i == 0 && node.j < 3};
+  });
+  const NodeReader reader(source, {}, std::nullopt);
+  const BlockSampling sampling(block, 3e7, 2);
+  const auto pick = [&](uint64_t most, uint64_t slab_bytes, double& volume) {
+    std::vector<BlockPoint> points;
+    for (uint64_t begin = 0; begin < sampling.endOfCells();) {
+      const CellPart part{0, begin, sampling.endOfPart(begin, most)};
+      PointPicker picker(block, sampling, part, points);
+      SlabStream slabs(reader, slab_bytes, kCornerHalo);
+      while (const LoadedSlab* loaded = slabs.next()) picker.add(*loaded);
+      picker.finish(volume, nullptr);
+      begin = part.end;
+    }
+    return points;
+  };
+  double volume = 0;
+  const std::vector<BlockPoint> all = pick(1'000'000, 1 << 20, volume);
+  EXPECT_LT(all.size(), sampling.points());  // some are blanked
+  EXPECT_GT(all.size(), sampling.points() / 2);
+  for (const auto& [most, slab_bytes] :
+       {std::pair(300u, 1u << 20), std::pair(1'000'000u, 2000u), std::pair(777u, 5000u)}) {
+    double other_volume = 0;
+    const std::vector<BlockPoint> others = pick(most, slab_bytes, other_volume);
+    EXPECT_EQ(other_volume, volume);
+    ASSERT_EQ(others.size(), all.size());
+    for (size_t n = 0; n < all.size(); ++n) {
+      ASSERT_EQ(others[n].position, all[n].position) << n;
+      ASSERT_EQ(others[n].volume, all[n].volume) << n;
+    }
+  }
+}
 
 constexpr uint64_t kSlabBytes = 200'000, kPointBytes = uint64_t{1} << 30;
 
@@ -56,7 +140,7 @@ TEST(BlockOverlap, IsFoundWithItsVolume) {
   EXPECT_NEAR(overlaps[0].volume, 0.5 * 1.5 * 2, 0.15);
   EXPECT_NEAR(overlaps[0].share, overlaps[0].volume / 8, 0.01);
   const std::string warning = overlapWarning(source.description(), overlaps);
-  EXPECT_NE(warning.find("box 1 and box 2"), std::string::npos) << warning;
+  expectSays(warning, "box 1 and box 2");
   EXPECT_EQ(warning.find("box 3"), std::string::npos) << warning;
   // However it is read.
   EXPECT_EQ(overlapsIn(source, 20'000)[0].volume, overlaps[0].volume);
@@ -105,15 +189,11 @@ TEST(BlockOverlap, InMorePairsThanFitIsRefusedWithASufficientSize) {
     return findOverlaps(source, {kSlabBytes, point_bytes, [](uint64_t bytes) { return bytes; }}, Progress());
   };
   const auto all = overlapsIn(source);
-  try {
-    find(1 << 20);
-    FAIL() << "more pairs than fit were kept";
-  } catch (const Error& error) {
-    const std::string line = error.what(), before = "give at least ";
-    const size_t at = line.find(before);
-    ASSERT_NE(at, std::string::npos) << line;
-    expectSame(find(std::stoull(line.substr(at + before.size())) << 20), all);
-  }
+  // More pairs than fit.
+  const std::string error = errorOf([&] { find(1 << 20); }), before = "give at least ";
+  const size_t at = error.find(before);
+  ASSERT_NE(at, std::string::npos) << error;
+  expectSame(find(std::stoull(error.substr(at + before.size())) << 20), all);
 }
 
 TEST(BlockOverlap, OfASmallBlockWithinACellIsItsOwnVolume) {
@@ -132,7 +212,7 @@ TEST(BlockOverlap, OfOneBlockManyTimesIsFoundInFewPairs) {
   EXPECT_LE(overlaps.size(), 16 * kBlocks);
   for (const BlockOverlap& overlap : overlaps) ASSERT_NEAR(overlap.share, 1, 1e-9);
   const std::string note = overlapNote(source.description(), overlaps);
-  EXPECT_NE(note.find(", 100 % of the smaller; "), std::string::npos) << note;
+  expectSays(note, ", 100 % of the smaller; ");
   EXPECT_EQ(overlapsIn(source, 2'000).size(), overlaps.size());  // however it is read
 }
 

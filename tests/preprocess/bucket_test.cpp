@@ -11,13 +11,14 @@
 #include <set>
 #include <string>
 
+#include "preprocess/convert/bucket_builds.h"
 #include "preprocess/convert/bucket_file.h"
-#include "preprocess/convert/bucket_loader.h"
-#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/bucket_plan.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/error.h"
-#include "stream/model/brick.h"
+#include "stream/model/octree.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
 
@@ -368,13 +369,7 @@ TEST(MemoryPlan, LeavesMemoryForALargeIndex) {
   // Too small a limit is refused, and the one that is named suffices for any number of threads.
   for (const unsigned threads : {1u, 16u}) {
     MemoryPlan small = MemoryPlan::of(leastMemory(1), 1, threads);
-    std::string message;
-    try {
-      small.suit(kSamples, 1);
-    } catch (const Error& error) {
-      message = error.what();
-    }
-    const std::string before = "at least ";
+    const std::string message = errorOf([&] { small.suit(kSamples, 1); }), before = "at least ";
     ASSERT_NE(message.find(before), std::string::npos);
     const uint64_t least = std::stoull(message.substr(message.find(before) + before.size())) << 20;
     MemoryPlan enough = MemoryPlan::of(least, 1, threads);

@@ -13,24 +13,13 @@
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
-#include "tests/reference/cell_grid.h"
 #include "tests/reference/function_grid.h"
-#include "tests/reference/rearranged_grid.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
 namespace {
-
-using Files = std::map<std::string, std::string>;
-
-Files filesOf(const std::filesystem::path& folder) {
-  Files files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    std::ifstream file(entry.path(), std::ios::binary);
-    files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
-  }
-  return files;
-}
 
 ConvertOptions optionsFor(const std::filesystem::path& output, std::vector<uint32_t> scalars) {
   ConvertOptions options;
@@ -41,11 +30,6 @@ ConvertOptions optionsFor(const std::filesystem::path& output, std::vector<uint3
   return options;
 }
 
-ConvertReport convertQuietly(const GridSource& source, const ConvertOptions& options) {
-  Progress progress;
-  return convert(source, options, progress);
-}
-
 AddScalarReport addQuietly(const GridSource& source, const std::filesystem::path& cache, uint32_t scalar) {
   AddScalarOptions options;
   options.cache = cache;
@@ -53,16 +37,6 @@ AddScalarReport addQuietly(const GridSource& source, const std::filesystem::path
   options.memory_bytes = uint64_t{1} << 30;
   Progress progress;
   return addScalars(source, options, progress);
-}
-
-template <typename Work>
-std::string errorOf(const Work& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 double field(const GridCell& cell) {
@@ -78,7 +52,7 @@ struct CellScene {
 TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
   const TemporaryFolder folder;
   const CellScene scene;
-  const ConvertReport report = convertQuietly(scene.source, optionsFor(folder / "c.splats", {1}));
+  const ConvertReport report = converted(scene.source, optionsFor(folder / "c.splats", {1}));
   EXPECT_EQ(report.centring, Centring::kCell);
   EXPECT_EQ(report.nodes, 32u * 39 * 36);
   EXPECT_EQ(report.splats, report.nodes);
@@ -103,20 +77,10 @@ TEST(CellConvert, HasTheSameBytesForAnyThreadsAndMemory) {
       cut, {[](const GridCell& cell) {
         return cell.i + cell.j + 5 * cell.k == 50 ? std::numeric_limits<double>::quiet_NaN() : field(cell);
       }});
-  Files expected;
-  for (const unsigned threads : {2u, 1u}) {
-    ConvertOptions options = optionsFor(folder / "c.splats", {1});
-    options.overwrite = true;
-    options.threads = threads;
-    if (threads == 1) {
-      options.memory_bytes = leastMemory(1);
-      options.bucket_splats = 30'000;
-    }
-    convertQuietly(source, options);
-    const Files files = filesOf(options.output);
-    if (expected.empty()) expected = files;
-    EXPECT_TRUE(files == expected) << threads;
-  }
+  ConvertOptions options = optionsFor(folder / "c.splats", {1});
+  options.threads = 2;
+  expectSameCaches(source, options,
+                   {{.threads = 1, .memory_bytes = leastMemory(1), .bucket_splats = 30'000}});
 }
 
 TEST(CellConvert, NamesTheMemoryThatManySmallBlocksTake) {
@@ -126,10 +90,8 @@ TEST(CellConvert, NamesTheMemoryThatManySmallBlocksTake) {
   const CellGridSource source(nodes, {field});
   const TemporaryFolder folder;
   ConvertOptions options = optionsFor(folder / "c.splats", {0});
-  const std::string error = errorOf([&] { convertQuietly(source, options); });
-  EXPECT_NE(error.find("matching the faces of this grid's blocks takes 215 MiB; give at least 3748 MiB"),
-            std::string::npos)
-      << error;
+  const std::string error = errorOf([&] { converted(source, options); });
+  expectSays(error, "matching the faces of this grid's blocks takes 215 MiB; give at least 3748 MiB");
   EXPECT_FALSE(std::filesystem::exists(options.output));
 }
 
@@ -148,7 +110,7 @@ TEST(CellConvert, LeavesOutCellsWithoutACornerOrAValue) {
                               }});
   ConvertOptions options = optionsFor(folder / "c.splats", {0});
   options.blank_value = -99;
-  const ConvertReport report = convertQuietly(source, options);
+  const ConvertReport report = converted(source, options);
   EXPECT_EQ(report.nodes, 512u + 8);
   EXPECT_EQ(report.blanked.by_grid, 8u + 2);
   EXPECT_EQ(report.blanked.by_value, 1u);
@@ -165,20 +127,20 @@ TEST(CellConvert, RefusesNodesAndCellsInOneCache) {
   const TemporaryFolder folder;
   const CellScene scene;
   const std::string error = errorOf([&] {
-    convertQuietly(scene.source, optionsFor(folder / "c.splats", {0, 1}));
+    converted(scene.source, optionsFor(folder / "c.splats", {0, 1}));
   });
-  EXPECT_NE(error.find("f is node-centred, but c0 is cell-centred"), std::string::npos) << error;
+  expectSays(error, "f is node-centred, but c0 is cell-centred");
   EXPECT_FALSE(std::filesystem::exists(folder / "c.splats"));
 }
 
 TEST(CellConvert, AddsAScalarAsIfItHadBeenThereFromTheStart) {
   const TemporaryFolder folder;
   const CellScene scene;
-  convertQuietly(scene.source, optionsFor(folder / "both.splats", {1, 2}));
-  convertQuietly(scene.source, optionsFor(folder / "one.splats", {1}));
+  converted(scene.source, optionsFor(folder / "both.splats", {1, 2}));
+  converted(scene.source, optionsFor(folder / "one.splats", {1}));
   const AddScalarReport report = addQuietly(scene.source, folder / "one.splats", 2);
   EXPECT_EQ(report.splats, 32u * 39 * 36);
-  Files both = filesOf(folder / "both.splats"), one = filesOf(folder / "one.splats");
+  Files both = allFilesOf(folder / "both.splats"), one = allFilesOf(folder / "one.splats");
   for (Files* files : {&both, &one}) {
     files->erase("manifest.json");
     // faces.bin has the scalars of the conversion, faces.var1.bin that of the addition.
@@ -187,7 +149,7 @@ TEST(CellConvert, AddsAScalarAsIfItHadBeenThereFromTheStart) {
   EXPECT_TRUE(both == one);
 
   const std::string error = errorOf([&] { addQuietly(scene.source, folder / "one.splats", 0); });
-  EXPECT_NE(error.find("are cell-centred, but f is node-centred"), std::string::npos) << error;
+  expectSays(error, "are cell-centred, but f is node-centred");
 }
 
 TEST(CellConvert, AddsToTheCellsThatOlderScalarsLeft) {
@@ -197,17 +159,16 @@ TEST(CellConvert, AddsToTheCellsThatOlderScalarsLeft) {
     return (cell.i + cell.j + cell.k) % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : field(cell);
   };
   const CellGridSource source(nodes, {holes, field});
-  convertQuietly(source, optionsFor(folder / "both.splats", {1, 2}));
-  convertQuietly(source, optionsFor(folder / "one.splats", {1}));
+  converted(source, optionsFor(folder / "both.splats", {1, 2}));
+  converted(source, optionsFor(folder / "one.splats", {1}));
   addQuietly(source, folder / "one.splats", 2);
-  Files both = filesOf(folder / "both.splats"), one = filesOf(folder / "one.splats");
+  Files both = allFilesOf(folder / "both.splats"), one = allFilesOf(folder / "one.splats");
   EXPECT_TRUE(both["var.1.bin"] == one["var.1.bin"]);
   EXPECT_TRUE(both["geometry.bin"] == one["geometry.bin"]);
 
   // The other way round a value is missing.
-  convertQuietly(source, optionsFor(folder / "whole.splats", {2}));
-  EXPECT_NE(errorOf([&] { addQuietly(source, folder / "whole.splats", 1); }).find("convert again"),
-            std::string::npos);
+  converted(source, optionsFor(folder / "whole.splats", {2}));
+  expectSays(errorOf([&] { addQuietly(source, folder / "whole.splats", 1); }), "convert again");
 }
 
 }  // namespace

@@ -10,10 +10,9 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/node_reader.h"
-#include "preprocess/splats/shape.h"
+#include "preprocess/shape/shape.h"
 #include "stream/model/border_code.h"
 #include "tests/reference/mapped_block.h"
-#include "tests/reference/part_of_nodes.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -15,6 +15,7 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "tests/support/cgns_writer.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -42,12 +43,7 @@ class Cgns : public testing::TestWithParam<CgnsFileType> {
   }
 
   std::string errorOf(std::optional<uint32_t> step = {}) const {
-    try {
-      open(step);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return curvisplat::errorOf([&] { open(step); });
   }
 
   static NodeArrays readAll(const GridSource& source, uint32_t block, const std::vector<uint32_t>& scalars) {

@@ -16,6 +16,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -27,20 +28,6 @@ ConvertOptions optionsFor(const GridSource& source, const std::filesystem::path&
   options.memory_bytes = uint64_t{1} << 30;
   for (uint32_t n = 0; n < source.description().scalars.size(); ++n) options.scalars.push_back(n);
   return options;
-}
-
-ConvertReport convertQuietly(const GridSource& source, const ConvertOptions& options) {
-  Progress progress;
-  return convert(source, options, progress);
-}
-
-std::map<std::string, std::string> filesOf(const std::filesystem::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    std::ifstream file(entry.path(), std::ios::binary);
-    files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
-  }
-  return files;
 }
 
 double weightOf(const SplatGeometry& geometry) {
@@ -108,7 +95,7 @@ FunctionGridSource bentBoxSource(uint64_t ni, uint64_t nj, uint64_t nk, size_t s
 TEST(Convert, KeepsEveryNodeAndItsVolume) {
   const TemporaryFolder folder;
   const SceneGridSource source(makeScene("half-annulus"), {96, 48, 48});
-  const ConvertReport report = convertQuietly(source, optionsFor(source, folder / "a.splats"));
+  const ConvertReport report = converted(source, optionsFor(source, folder / "a.splats"));
   EXPECT_EQ(report.nodes, 96u * 48 * 48);
   EXPECT_EQ(report.splats, report.nodes);
   EXPECT_EQ(report.merged_nodes, 0u);
@@ -127,29 +114,15 @@ TEST(Convert, GivesTheSameBytesForAnyThreadsAndMemory) {
   options.title = "the same";
   options.threads = 2;
   options.memory_bytes = uint64_t{8} << 30;
-  const ConvertReport report = convertQuietly(source, options);
+  const uint64_t least = leastMemory(1);
+  const ConvertReport report = expectSameCaches(source, options,
+                                                {{.threads = 1},
+                                                 {.threads = 1, .memory_bytes = least},
+                                                 {.memory_bytes = least, .bucket_splats = 100000},
+                                                 {.memory_bytes = least, .bucket_splats = 20000},
+                                                 {.memory_bytes = least, .bucket_splats = 500}});
   EXPECT_GT(report.merged_nodes, 0u);  // the O-grid closes on itself
   checkCache(options.output, report.nodes - report.merged_nodes);
-  const auto expected = filesOf(options.output);
-
-  options.overwrite = true;
-  const auto expectSame = [&](const char* what) {
-    convertQuietly(source, options);
-    const auto files = filesOf(options.output);
-    for (const auto& [name, bytes] : expected) EXPECT_TRUE(files.at(name) == bytes) << what << ": " << name;
-    EXPECT_EQ(files.size(), expected.size());
-  };
-  options.threads = 1;
-  expectSame("one thread");
-  options.memory_bytes = leastMemory(1);
-  expectSame("the least memory");
-  options.threads = 2;
-  options.bucket_splats = 100000;
-  expectSame("buckets above a brick");
-  options.bucket_splats = 20000;
-  expectSame("buckets below a brick");
-  options.bucket_splats = 500;
-  expectSame("tiny buckets");
 }
 
 TEST(Convert, DividesBucketsThatThePlanLeftTooLarge) {
@@ -162,13 +135,8 @@ TEST(Convert, DividesBucketsThatThePlanLeftTooLarge) {
     return values;
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
-  const ConvertReport report = convertQuietly(source, options);
+  const ConvertReport report = expectSameCaches(source, options, {{.bucket_splats = 3000}});
   checkCache(options.output, report.splats);
-  const auto expected = filesOf(options.output);
-  options.overwrite = true;
-  options.bucket_splats = 3000;
-  convertQuietly(source, options);
-  EXPECT_TRUE(filesOf(options.output) == expected);
 }
 
 TEST(Convert, TakesNodesThatAllCoincide) {
@@ -177,16 +145,11 @@ TEST(Convert, TakesNodesThatAllCoincide) {
     return NodeValues{glm::dvec3(1, 2, 3), {static_cast<float>(node.i)}, false};
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
-  const ConvertReport report = convertQuietly(source, options);
+  const ConvertReport report = expectSameCaches(source, options, {{.bucket_splats = 10000}});
   checkCache(options.output, report.splats);
   EXPECT_GT(report.splats, 2 * 65536u);
   EXPECT_EQ(report.levels, 1u);
   EXPECT_EQ(report.bricks, (report.splats + 65535) / 65536);
-  const auto expected = filesOf(options.output);
-  options.overwrite = true;
-  options.bucket_splats = 10000;
-  convertQuietly(source, options);
-  EXPECT_TRUE(filesOf(options.output) == expected);
 }
 
 TEST(Convert, TakesAClusterOfCoincidentNodesInAGrid) {
@@ -198,14 +161,8 @@ TEST(Convert, TakesAClusterOfCoincidentNodesInAGrid) {
     return values;
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
-  const ConvertReport report = convertQuietly(source, options);
+  const ConvertReport report = expectSameCaches(source, options, {{.threads = 1, .bucket_splats = 2000}});
   checkCache(options.output, report.splats);
-  const auto expected = filesOf(options.output);
-  options.overwrite = true;
-  options.bucket_splats = 2000;
-  options.threads = 1;
-  convertQuietly(source, options);
-  EXPECT_TRUE(filesOf(options.output) == expected);
 }
 
 TEST(Convert, TakesBlocksOneNodeThick) {
@@ -215,7 +172,7 @@ TEST(Convert, TakesBlocksOneNodeThick) {
        {std::array{300, 1, 1}, {1, 300, 1}, {1, 1, 300}, {40, 40, 1}, {1, 40, 40}, {40, 1, 40}, {1, 1, 1}}) {
     const FunctionGridSource source = bentBoxSource(ni, nj, nk);
     const auto output = folder / fmt::format("{}.splats", number++);
-    const ConvertReport report = convertQuietly(source, optionsFor(source, output));
+    const ConvertReport report = converted(source, optionsFor(source, output));
     EXPECT_EQ(report.nodes, static_cast<uint64_t>(ni * nj * nk));
     checkCache(output, report.nodes - report.merged_nodes);
   }
@@ -231,22 +188,17 @@ TEST(Convert, TakesManySmallBlocks) {
     return NodeValues{at, {static_cast<float>(at.x)}, false};
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
-  const ConvertReport report = convertQuietly(source, options);
+  const ConvertReport report = expectSameCaches(source, options, {{.bucket_splats = 5000}});
   EXPECT_EQ(report.splats, 37u * 31 * 28);
   EXPECT_EQ(report.merged_nodes, 1080u * 64 - report.splats);
   EXPECT_NEAR(report.volume, 36 * 30 * 27, 36 * 30 * 27e-3);
   checkCache(options.output, report.splats);
-  const auto expected = filesOf(options.output);
-  options.overwrite = true;
-  options.bucket_splats = 5000;
-  convertQuietly(source, options);
-  EXPECT_TRUE(filesOf(options.output) == expected);
 }
 
 TEST(Convert, TakesExtremeAspectRatios) {
   const TemporaryFolder folder;
   const FunctionGridSource source = bentBoxSource(50, 50, 50, 1, 1e-5);
-  const ConvertReport report = convertQuietly(source, optionsFor(source, folder / "a.splats"));
+  const ConvertReport report = converted(source, optionsFor(source, folder / "a.splats"));
   checkCache(folder / "a.splats", 125000);
   EXPECT_EQ(report.degenerate, 0u);
   EXPECT_NEAR(report.volume, 1e-5, 1e-7);
@@ -265,7 +217,7 @@ TEST(Convert, LeavesBlankedNodesOutAndCountsThem) {
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.blank_value = 9999;
-  const ConvertReport report = convertQuietly(source, options);
+  const ConvertReport report = converted(source, options);
   EXPECT_EQ(report.blanked.by_grid, 600u);
   EXPECT_EQ(report.blanked.by_value, 200u);
   EXPECT_EQ(report.blanked.not_finite, 400u);
@@ -291,7 +243,7 @@ TEST(Convert, RefusesAGridWithNothingToDraw) {
   const FunctionGridSource source({gridBlock(4, 4, 4)}, 1, [](const GridNode&) {
     return NodeValues{{}, {0}, true};
   });
-  EXPECT_THROW(convertQuietly(source, optionsFor(source, folder / "a.splats")), Error);
+  EXPECT_THROW(converted(source, optionsFor(source, folder / "a.splats")), Error);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
@@ -299,12 +251,12 @@ TEST(Convert, KeepsSeveralScalarsApart) {
   const TemporaryFolder folder;
   const FunctionGridSource source = bentBoxSource(50, 40, 45, 2);
   ConvertOptions options = optionsFor(source, folder / "both.splats");
-  convertQuietly(source, options);
+  converted(source, options);
   checkCache(options.output, 90000);
   options.output = folder / "second.splats";
   options.scalars = {1};
-  convertQuietly(source, options);
-  const auto both = filesOf(folder / "both.splats"), second = filesOf(folder / "second.splats");
+  converted(source, options);
+  const auto both = allFilesOf(folder / "both.splats"), second = allFilesOf(folder / "second.splats");
   EXPECT_TRUE(both.at("geometry.bin") == second.at("geometry.bin"));
   EXPECT_TRUE(both.at("var.1.bin") == second.at("var.0.bin"));
 }
@@ -313,28 +265,28 @@ TEST(Convert, RefusesAnOutputThatExists) {
   const TemporaryFolder folder;
   const FunctionGridSource source = bentBoxSource(10, 10, 10);
   const ConvertOptions options = optionsFor(source, folder / "a.splats");
-  convertQuietly(source, options);
-  const auto before = filesOf(options.output);
-  EXPECT_THROW(convertQuietly(source, options), Error);
-  EXPECT_TRUE(filesOf(options.output) == before);
+  converted(source, options);
+  const auto before = allFilesOf(options.output);
+  EXPECT_THROW(converted(source, options), Error);
+  EXPECT_TRUE(allFilesOf(options.output) == before);
 }
 
 TEST(Convert, RefusesFoldersThatItCannotUse) {
   const TemporaryFolder folder;
   const FunctionGridSource source = bentBoxSource(10, 10, 10);
-  EXPECT_THROW(convertQuietly(source, optionsFor(source, folder / "none/a.splats")), Error);
+  EXPECT_THROW(converted(source, optionsFor(source, folder / "none/a.splats")), Error);
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.temporary_folder = folder / "none";
-  EXPECT_THROW(convertQuietly(source, options), Error);
-  EXPECT_THROW(convertQuietly(source, optionsFor(source, "/proc/a.splats")), Error);
+  EXPECT_THROW(converted(source, options), Error);
+  EXPECT_THROW(converted(source, optionsFor(source, "/proc/a.splats")), Error);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
 TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   const TemporaryFolder folder;
   const FunctionGridSource before_source = bentBoxSource(10, 10, 10);
-  convertQuietly(before_source, optionsFor(before_source, folder / "a.splats"));
-  const auto before = filesOf(folder / "a.splats");
+  converted(before_source, optionsFor(before_source, folder / "a.splats"));
+  const auto before = allFilesOf(folder / "a.splats");
 
   const FunctionGridSource source = bentBoxSource(44, 44, 44);
   ConvertOptions options = optionsFor(source, folder / "a.splats");
@@ -344,7 +296,7 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   {
     const ScopedSystemCalls scope(disk);
     options.output = folder / "b.splats";
-    convertQuietly(source, options);
+    converted(source, options);
     std::filesystem::remove_all(options.output);
     options.output = folder / "a.splats";
   }
@@ -354,8 +306,8 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
     faults::FaultySystemCalls full;
     full.fail_write_at = at;
     const ScopedSystemCalls scope(full);
-    EXPECT_THROW(convertQuietly(source, options), Error) << "write " << at << " of " << writes;
-    EXPECT_TRUE(filesOf(options.output) == before);
+    EXPECT_THROW(converted(source, options), Error) << "write " << at << " of " << writes;
+    EXPECT_TRUE(allFilesOf(options.output) == before);
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "at write " << at;
   }
   for (auto call : {&faults::FaultySystemCalls::fail_sync_at, &faults::FaultySystemCalls::fail_read_at}) {
@@ -363,8 +315,8 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
     failing.*call = 2;
     failing.error = EIO;
     const ScopedSystemCalls scope(failing);
-    EXPECT_THROW(convertQuietly(source, options), Error);
-    EXPECT_TRUE(filesOf(options.output) == before);
+    EXPECT_THROW(converted(source, options), Error);
+    EXPECT_TRUE(allFilesOf(options.output) == before);
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
   }
 }

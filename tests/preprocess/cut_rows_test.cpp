@@ -13,12 +13,12 @@
 #include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/scenes/scenes.h"
 #include "preprocess/splats/cell_splats.h"
-#include "preprocess/survey/grid_checksum.h"
+#include "preprocess/survey/grid_survey.h"
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
-#include "tests/reference/overset_grid.h"
-#include "tests/support/folder_files.h"
-#include "tests/support/parts_of_rows.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/grid_nodes.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
 
@@ -39,12 +39,6 @@ class CutRows : public testing::Test {
     return options;
   }
 
-  Files convertTo(const GridSource& source, const ConvertOptions& options) const {
-    Progress progress;
-    convert(source, options, progress);
-    return filesOf(options.output);
-  }
-
   static uint64_t bytesFor(uint64_t window_nodes, size_t scalars) {
     return window_nodes * slabBytesPerNode(scalars);
   }
@@ -63,19 +57,15 @@ class CutRows : public testing::Test {
 
   void expectSameBytes(const GridSource& source, std::initializer_list<uint64_t> windows,
                        std::optional<uint64_t> owner_bytes = {}) const {
-    ConvertOptions options = optionsFor("whole.splats", source);
-    const Files expected = convertTo(source, options);
-    options.output = folder_ / "cut.splats";
-    options.owner_bytes = owner_bytes;
+    const ConvertOptions options = optionsFor("rows.splats", source);
+    std::vector<Variation> cut;
     for (const uint64_t window : windows) {
-      SCOPED_TRACE(window);
-      ASSERT_GT(partsOfRows(source, window), 2u);
-      options.slab_bytes = bytesFor(window, options.scalars.size());
-      options.threads = 1 + window % 2;
-      const Files found = convertTo(source, options);
-      ASSERT_EQ(found.size(), expected.size());
-      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
+      ASSERT_GT(partsOfRows(source, window), 2u) << window;
+      cut.push_back({.threads = static_cast<unsigned>(1 + window % 2),
+                     .slab_bytes = bytesFor(window, options.scalars.size()),
+                     .owner_bytes = owner_bytes});
     }
+    expectSameCaches(source, options, cut);
   }
 
   const TemporaryFolder folder_;
@@ -144,21 +134,10 @@ TEST_F(CutRows, OfOverlappingBlocksGiveTheBytesOfWholeRows) {
 TEST_F(CutRows, AreSharedByRanks) {
   for (const Centring centring : {Centring::kNode, Centring::kCell}) {
     const FunctionGridSource source = blocksWithSeams(centring);
-    ConvertOptions options = optionsFor("one.splats", source);
-    const Files expected = convertTo(source, options);
-    options.output = folder_ / "ranks.splats";
-    options.slab_bytes = bytesFor(1500, 2);
-    for (const unsigned count : {2u, 5u}) {
-      runRanks(count, [&](Ranks& ranks) {
-        ConvertOptions of_rank = options;
-        of_rank.ranks = &ranks;
-        of_rank.threads = 1;
-        Progress progress;
-        convert(source, of_rank, progress);
-      });
-      const Files found = filesOf(options.output);
-      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << count << name;
-    }
+    const uint64_t slab_bytes = bytesFor(1500, 2);
+    expectSameCaches(source, optionsFor("ranks.splats", source),
+                     {{.threads = 1, .slab_bytes = slab_bytes, .ranks = 2},
+                      {.threads = 1, .slab_bytes = slab_bytes, .ranks = 5}});
   }
 }
 
@@ -169,25 +148,12 @@ TEST_F(CutRows, TakeAFurtherScalarAsWholeOnesDo) {
       ConvertOptions options = optionsFor("first.splats", source);
       options.scalars = {0};
       if (blanks) options.blank_value = kMissing;
-      const auto added = [&](const char* name, std::optional<uint64_t> slab_bytes) {
-        options.output = folder_ / name;
-        convertTo(source, options);
-        AddScalarOptions adding;
-        adding.cache = options.output;
-        adding.scalars = {1};
-        adding.slab_bytes = slab_bytes;
-        Progress progress;
-        addScalars(source, adding, progress);
-        return filesOf(options.output);
-      };
-      const Files expected = added("whole.splats", std::nullopt),
-                  found = added("cut.splats", bytesFor(1500, 1));
-      ASSERT_TRUE(expected.contains("var.1.bin"));
-      for (const auto& [name, bytes] : expected) {
-        if (name != "manifest.json") {
-          EXPECT_TRUE(found.at(name) == bytes) << name << ' ' << blanks;
-        }
-      }
+      converted(source, options);
+      AddScalarOptions adding;
+      adding.cache = folder_ / "added.splats";
+      adding.scalars = {1};
+      expectSameAdditions(source, options.output, adding, {{.slab_bytes = bytesFor(1500, 1)}});
+      EXPECT_TRUE(std::filesystem::exists(adding.cache / "var.1.bin"));
     }
 }
 
@@ -196,7 +162,7 @@ TEST_F(CutRows, OfAStepAreRecognisedAsTheSameGeometry) {
   ConvertOptions options = optionsFor("steps.splats", source);
   options.surfaces = false;
   options.planes = {};
-  convertTo(source, options);
+  converted(source, options);
   AddStepOptions adding;
   adding.cache = options.output;
   adding.slab_bytes = bytesFor(1500, 2);
@@ -256,12 +222,7 @@ TEST_F(CutRows, OfASourceThatReadsWholeOnesAreRefusedWithASufficientSize) {
   const FunctionGridSource rows(blocks, 1, none);
   ConvertOptions options = optionsFor("refused.splats", rows);
   options.memory_bytes = 256 * kMiB;
-  std::string error;
-  try {
-    convertTo(rows, options);
-  } catch (const Error& thrown) {
-    error = thrown.what();
-  }
+  const std::string error = errorOf([&] { converted(rows, options); });
   const std::string before =
       "a row of 3000000 nodes along i does not fit, and this format is read by whole rows; give at least ";
   ASSERT_NE(error.find(before), std::string::npos) << error;

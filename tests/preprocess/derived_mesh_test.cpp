@@ -1,5 +1,5 @@
 // Derived quantities of unstructured grids against formulas written down by hand.
-#include "preprocess/formats/derived/derived_mesh.h"
+#include "preprocess/formats/derived/derived_source.h"
 
 #include <gtest/gtest.h>
 

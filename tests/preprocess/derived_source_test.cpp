@@ -15,9 +15,9 @@
 #include "preprocess/grid/slabs.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
-#include "tests/reference/cell_grid.h"
 #include "tests/reference/function_grid.h"
-#include "tests/support/parts_of_rows.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/grid_nodes.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -391,7 +391,7 @@ TEST(DerivedSource, AFileVariablesNumberComesFirst) {
   EXPECT_EQ(scalarsNamed(source.description(), {"110"}), std::vector<uint32_t>{2});
   const auto notes = notesOnNumbers(source.description(), {"110", "113", "109", "pressure"});
   ASSERT_EQ(notes.size(), 1u);
-  EXPECT_NE(notes[0].find("for PLOT3D's function 110 use pressure"), std::string::npos) << notes[0];
+  expectSays(notes[0], "for PLOT3D's function 110 use pressure");
   EXPECT_EQ(source.description().scalars[scalarsNamed(source.description(), {"113"})[0]].name, "sound_speed");
 }
 

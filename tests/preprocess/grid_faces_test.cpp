@@ -15,6 +15,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/faces_file.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -243,7 +244,7 @@ TEST_F(GridFacesTest, ADamagedFileIsRefused) {
       for (uint32_t n = 0; n < faces->patches().size(); ++n) faces->read(n);
       return false;
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find("faces.bin"), std::string::npos) << error.what();
+      expectSays(error.what(), "faces.bin");
       return true;
     }
   };

@@ -1,4 +1,4 @@
-#include "preprocess/splats/merge.h"
+#include "preprocess/shape/merge.h"
 
 #include <gtest/gtest.h>
 

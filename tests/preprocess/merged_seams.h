@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "preprocess/splats/seams.h"
+#include "preprocess/seams/seams.h"
 #include "tests/reference/mapped_block.h"
 #include "tests/support/temporary_folder.h"
 

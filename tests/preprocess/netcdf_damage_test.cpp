@@ -1,15 +1,22 @@
 // Damaged NetCDF files: an Error of one line or changed values, never a crash, a hang or an allocation of
-// what the file has no room for.
+// what the file has no room for. NetCDF-4 files whose attributes for libnetcdf and for dimension scales are
+// not what these write: an Error that names the object.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <stdexcept>
 
 #include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/support/damaged_files.h"
 #include "tests/support/earth_files.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
+#include "tests/support/hdf5_editor.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -33,12 +40,7 @@ class NetcdfDamage : public testing::TestWithParam<NetcdfFileType> {
 std::string refusalOf(const std::filesystem::path& path) {
   OpenGridOptions options;
   options.grid = path;
-  try {
-    openGrid(options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return curvisplat::errorOf([&] { openGrid(options); });
 }
 
 TEST_P(NetcdfDamage, TruncatedFilesAreRefused) {
@@ -97,6 +99,178 @@ INSTANTIATE_TEST_SUITE_P(Types, NetcdfDamage,
                          [](const auto& type) {
                            return type.param == NetcdfFileType::kClassic ? "Classic" : "Compressed";
                          });
+
+class NetcdfHostileAttributes : public ::testing::Test {
+ protected:
+  NetcdfHostileAttributes() { roms::write(path_, NetcdfFileType::kNetcdf4, "ocean_s_coordinate_g2"); }
+
+  /// A fresh copy of the valid file. A new inode each time: libnetcdf may leave a file open that it refuses,
+  /// and HDF5 does not open that inode for writing then.
+  std::filesystem::path copy() const {
+    const std::filesystem::path to = folder_ / "copy.nc";
+    std::filesystem::remove(to);
+    std::filesystem::copy_file(path_, to);
+    return to;
+  }
+
+  /// Opens the file and reads a box; returns the Error.
+  static std::string errorOf(const std::filesystem::path& path) {
+    return curvisplat::errorOf([&] {
+      OpenGridOptions options;
+      options.grid = path;
+      const auto source = openGrid(options);
+      NodeArrays nodes;
+      source->read(0, {0, 2, 0, 2}, {}, nodes);
+    });
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "grid.nc";
+};
+
+TEST_F(NetcdfHostileAttributes, NamesThatAreTooLongAreRefused) {
+  const std::filesystem::path file = copy();
+  Hdf5Editor(file).group("/" + std::string(300, 'n'));
+  EXPECT_EQ(errorOf(file),
+            file.string() + ": / has an object with a name of 300 bytes; NetCDF allows 256: rename it");
+}
+
+TEST_F(NetcdfHostileAttributes, AttributesThatLibrariesTrustAreChecked) {
+  struct Case {
+    const char *object, *attribute;
+    std::vector<HostileAttribute> valid;  // kinds that are what they should be
+  };
+  using enum HostileAttribute;
+  const Case cases[] = {
+      {"/temp", "DIMENSION_LIST", {}},
+      {"/lon_rho", "DIMENSION_LIST", {}},
+      {"/temp", "_Netcdf4Coordinates", {}},
+      {"/s_rho", "_Netcdf4Dimid", {kInteger}},
+      {"/xi_rho", "_Netcdf4Dimid", {kInteger}},
+      {"/s_rho", "NAME", {}},
+      {"/xi_rho", "NAME", {}},
+      {"/", "_NCProperties", {kStringOf34, kLongString, kHugeString, kVariableString}},
+  };
+  for (const Case& one : cases)
+    for (int kind = 1; kind < kHostileAttributes; ++kind) {
+      const auto hostile = static_cast<HostileAttribute>(kind);
+      SCOPED_TRACE(fmt::format("{} {} {}", one.object, one.attribute, kind));
+      const std::filesystem::path file = copy();
+      Hdf5Editor(file).replaceAttribute(one.object, one.attribute, hostile);
+      const std::string error = errorOf(file);
+      if (std::find(one.valid.begin(), one.valid.end(), hostile) != one.valid.end()) continue;
+      const std::string words =
+          fmt::format("{}: {} has an attribute '{}' of ", file.string(), one.object, one.attribute);
+      EXPECT_TRUE(error.starts_with(words)) << error;
+      expectSays(error, "; expected ");
+      EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    }
+}
+
+TEST_F(NetcdfHostileAttributes, NoAttributeOfAnyObjectEndsTheProgram) {
+  int refused = 0, read = 0, unwritten = 0;
+  // 18 kinds: a stride of 7 comes by each.
+  int64_t place = 0, next = 0;
+  for (const char* object : {"/", "/xi_rho", "/s_rho", "/temp", "/hc"})
+    for (const char* attribute : {"_NCProperties", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict",
+                                  "CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS",
+                                  "_FillValue", "units", "coordinates", "scale_factor"})
+      for (int kind = 0; kind < kHostileAttributes; ++kind) {
+        if (place++ < next) continue;
+        next = faults::nextInSweep(next, 7);
+        SCOPED_TRACE(fmt::format("{} {} {}", object, attribute, kind));
+        const std::filesystem::path file = copy();
+        try {
+          Hdf5Editor(file).replaceAttribute(object, attribute, static_cast<HostileAttribute>(kind));
+        } catch (const std::runtime_error&) {
+          ++unwritten;  // HDF5 itself refuses
+          continue;
+        }
+        const std::string error = errorOf(file);
+        EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+        ++(error.empty() ? read : refused);
+      }
+  const int tried = read + refused + unwritten;
+  EXPECT_GT(tried, faults::isWholeSweep() ? 1000 : 150);
+  EXPECT_GT(read, tried / 12);
+  EXPECT_GT(refused, tried / 12);
+  EXPECT_LT(unwritten, tried / 10);
+}
+
+TEST_F(NetcdfHostileAttributes, NamesOfDimensionsMustEnd) {
+  const std::filesystem::path file = copy();
+  Hdf5Editor(file).writeText("/xi_rho", "NAME", "xi_rho", 7);
+  EXPECT_EQ(errorOf(file), "");
+  Hdf5Editor(file).writeText("/xi_rho", "NAME", std::string(64, 'x'), 64);
+  expectSays(errorOf(file),
+             "/xi_rho has an attribute 'NAME' of 1 strings of 64 bytes; expected one "
+             "terminated string");
+}
+
+TEST_F(NetcdfHostileAttributes, GroupsInCirclesAreRefused) {
+  const std::filesystem::path file = copy();
+  {
+    Hdf5Editor editor(file);
+    editor.group("/group");
+    editor.hardLink("/", "/group/root");
+  }
+  expectSays(errorOf(file), "nested more than 100 deep");
+  copy();
+  {
+    // 2^40 paths to the last group.
+    Hdf5Editor editor(file);
+    std::string path;
+    for (int n = 0; n < 40; ++n) {
+      editor.group(path + "/a");
+      editor.softLink(path + "/a", path + "/b");
+      path += "/a";
+    }
+  }
+  expectSays(errorOf(file), "more than the file can hold");
+}
+
+// HDF5 1.10 frees memory that it has not set where it sorts such a list.
+TEST_F(NetcdfHostileAttributes, ListsThatAreDamagedAreRefused) {
+  const std::string whole = readTextFile(path_);
+  int lists = 0;
+  for (size_t at = whole.find("BTLF"); at != std::string::npos; at = whole.find("BTLF", at + 1)) {
+    std::string damaged = whole;
+    damaged[at + 12] = static_cast<char>(~damaged[at + 12]);
+    const std::filesystem::path file = copy();
+    writeFileAtomically(file, damaged);
+    const std::string error = errorOf(file);
+    lists +=
+        error.find("its list of ") != std::string::npos || error.find("HDF5 crashes") != std::string::npos;
+  }
+  EXPECT_GT(lists, 0);
+}
+
+// Structures that say something else than was written, with the right checksum: what HDF5 1.10 does not survive is
+// found by the process of a trial.
+TEST_F(NetcdfHostileAttributes, StructuresThatCrashHdf5AreRefused) {
+  const std::string whole = readTextFile(path_);
+  // A B-tree's header: its depth. A heap's header: the length of its identifiers, the size of its blocks.
+  struct Field {
+    const char* structure;
+    size_t at;
+  };
+  int crashed = 0, tried = 0;
+  for (const Field& field : {Field{"BTHD", 12}, Field{"BTHD", 10}, Field{"FRHP", 5}, Field{"FRHP", 113}})
+    for (size_t begin = whole.find(field.structure); begin != std::string::npos;
+         begin = whole.find(field.structure, begin + 1)) {
+      std::string damaged = whole;
+      damaged[begin + field.at] = static_cast<char>(damaged[begin + field.at] + 1);
+      if (!renewChecksum(whole, begin, damaged)) continue;
+      ++tried;
+      const std::filesystem::path file = copy();
+      writeFileAtomically(file, damaged);
+      const std::string error = errorOf(file);
+      EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+      crashed += error.find("HDF5 crashes on its structures") != std::string::npos;
+    }
+  EXPECT_GT(tried, 0);
+  EXPECT_GT(crashed, 0) << "of " << tried;
+}
 
 }  // namespace
 }  // namespace curvisplat

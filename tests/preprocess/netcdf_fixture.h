@@ -12,8 +12,9 @@
 
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/grid_nodes.h"
 #include "tests/support/netcdf_writer.h"
-#include "tests/support/parts_of_rows.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -46,12 +47,7 @@ class NetcdfFixture : public testing::TestWithParam<NetcdfFileType> {
   }
 
   std::string errorOf(const std::vector<std::string>& scalars = {}, uint32_t step = 0) const {
-    try {
-      open(scalars, step);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return curvisplat::errorOf([&] { open(scalars, step); });
   }
 
   void expectBox(const GridSource& source, uint32_t scalar, const NodeBox& box,

@@ -8,6 +8,7 @@
 #include "preprocess/convert/scan.h"
 #include "tests/preprocess/netcdf_fixture.h"
 #include "tests/support/earth_files.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
@@ -174,14 +175,8 @@ TEST_P(Netcdf, AGridWithoutAnyValueIsExplained) {
   const auto source = open();
   const NodeReader reader(*source, {0}, std::nullopt);
   Progress progress;
-  try {
-    surveyGrid(reader, 1 << 20, {}, progress);
-    FAIL();
-  } catch (const Error& error) {
-    const std::string words = error.what();
-    EXPECT_NE(words.find("all 24 samples are blanked"), std::string::npos) << words;
-    EXPECT_NE(words.find("t is missing where it is below valid_min 200"), std::string::npos) << words;
-  }
+  expectError([&] { surveyGrid(reader, 1 << 20, {}, progress); },
+              {"all 24 samples are blanked", "t is missing where it is below valid_min 200"});
 }
 
 TEST_P(Netcdf, LengthsAreFlat) {
@@ -202,7 +197,7 @@ TEST_P(Netcdf, LengthsAreFlat) {
   EXPECT_EQ(nodes.y, (std::vector<double>{3, 3, 3, 3}));
   EXPECT_EQ(nodes.z, (std::vector<double>{-0.25, -0.25, -0.25, -0.25}));
   options_.globe.shape = GlobeOptions::Shape::kSphere;
-  EXPECT_NE(errorOf().find("x and y are lengths; --sphere needs degrees"), std::string::npos) << errorOf();
+  expectSays(errorOf(), "x and y are lengths; --sphere needs degrees");
 }
 
 TEST_P(Netcdf, AVariableThatIsNotAGridIsExplained) {
@@ -211,7 +206,7 @@ TEST_P(Netcdf, AVariableThatIsNotAGridIsExplained) {
     addAxes(file, 4, 3, 2);
     file.variable("surface", kSingle, {"lat", "lon"}, {}, [](const Index&) { return 1.0; });
   }
-  EXPECT_NE(errorOf().find("no variable has three dimensions in space"), std::string::npos) << errorOf();
+  expectSays(errorOf(), "no variable has three dimensions in space");
   {
     NetcdfWriter file(path_, GetParam());
     addAxes(file, 4, 3, 2);
@@ -220,9 +215,7 @@ TEST_P(Netcdf, AVariableThatIsNotAGridIsExplained) {
                   [](const Index& n) { return 1e5 - 1e4 * static_cast<double>(n[0]); });
     file.variable("air", kSingle, {"plev", "lat", "lon"}, {}, [](const Index&) { return 1.0; });
   }
-  EXPECT_NE(errorOf().find("air: plev has the unit 'kg m-3'; expected a length or a pressure"),
-            std::string::npos)
-      << errorOf();
+  expectSays(errorOf(), "air: plev has the unit 'kg m-3'; expected a length or a pressure");
   {
     NetcdfWriter file(path_, GetParam());
     file.dimension("a", 4);
@@ -231,9 +224,7 @@ TEST_P(Netcdf, AVariableThatIsNotAGridIsExplained) {
     file.variable("c", kSingle, {"c"}, {{"units", "1"}}, [](const Index&) { return 1.0; });
     file.variable("bare", kSingle, {"a", "b", "c"}, {}, [](const Index&) { return 1.0; });
   }
-  EXPECT_NE(errorOf().find("no longitude and latitude, or x and y, on its dimensions a, b, c"),
-            std::string::npos)
-      << errorOf();
+  expectSays(errorOf(), "no longitude and latitude, or x and y, on its dimensions a, b, c");
   {
     NetcdfWriter file(path_, GetParam());
     addAxes(file, 4, 3, 2);
@@ -246,18 +237,15 @@ TEST_P(Netcdf, AVariableThatIsNotAGridIsExplained) {
     file.variable("cells", kSingle, {"alt", "more", "cell"}, {{"coordinates", "clon clat"}},
                   [](const Index&) { return 1.0; });
   }
-  EXPECT_NE(errorOf().find("do not vary along exactly two of its dimensions alt, more, cell"),
-            std::string::npos)
-      << errorOf();
+  expectSays(errorOf(), "do not vary along exactly two of its dimensions alt, more, cell");
 }
 
 TEST_P(Netcdf, WrongStepsAndMoreFilesAreRefused) {
   nemo::write(path_, GetParam(), false);
-  EXPECT_NE(errorOf({}, 3).find("has 3 time steps; --time-step 3 is out of range"), std::string::npos)
-      << errorOf({}, 3);
+  expectSays(errorOf({}, 3), "has 3 time steps; --time-step 3 is out of range");
   std::ofstream(folder_ / "more.q") << "no NetCDF, but longer than a signature";
   options_.solutions = {folder_ / "more.q"};
-  EXPECT_NE(errorOf().find("is not a NetCDF file; expected one"), std::string::npos) << errorOf();
+  expectSays(errorOf(), "is not a NetCDF file; expected one");
 }
 
 TEST_P(Netcdf, ThreadsMayReadAtOnce) {

@@ -8,11 +8,11 @@
 #include <glm/matrix.hpp>
 #include <vector>
 
+#include "preprocess/shape/shape.h"
+#include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/node_splats.h"
-#include "preprocess/splats/several_layers.h"
-#include "preprocess/splats/shape.h"
+#include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
-#include "stream/model/layers_code.h"
 #include "tests/reference/mapped_block.h"
 
 namespace curvisplat {

@@ -9,11 +9,9 @@
 #include <glm/matrix.hpp>
 #include <random>
 
-#include "preprocess/splats/shape.h"
+#include "preprocess/shape/shape.h"
 #include "stream/model/border_code.h"
-#include "stream/model/layers_code.h"
 #include "tests/reference/mapped_block.h"
-#include "tests/reference/part_of_nodes.h"
 
 namespace curvisplat {
 namespace {

@@ -7,6 +7,7 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
@@ -57,12 +58,7 @@ OpenGridOptions optionsFor(const TestFolder& folder, const std::string& grid,
 }
 
 std::string errorOf(const OpenGridOptions& options) {
-  try {
-    openGrid(options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return curvisplat::errorOf([&] { openGrid(options); });
 }
 
 /// Scalars by their numbers in the source, and what was written.
@@ -179,7 +175,7 @@ TEST(Plot3dLayouts, ForcingAnythingElseIsRefusedAndTheLayoutNamed) {
     const std::string error = errorOf(options);
     EXPECT_NE(error, "");
     if (force.ascii) continue;
-    EXPECT_NE(error.find(describe(layout)), std::string::npos) << error;
+    expectSays(error, describe(layout));
   }
 }
 
@@ -218,7 +214,7 @@ TEST(Plot3dLayouts, AreNeverMistakenForOneAnother) {
       EXPECT_EQ(source->description().format, "PLOT3D grid a.xyz: " + describe(layout));
     } catch (const Error& error) {
       ++ambiguous;
-      EXPECT_NE(std::string(error.what()).find("equally well"), std::string::npos) << error.what();
+      expectSays(error.what(), "equally well");
     }
   }
   EXPECT_GT(detected, 590) << ambiguous;
@@ -236,7 +232,7 @@ TEST(Plot3dLayouts, TwoThatFitEquallyWellAreNamedWithTheOptionsThatDecide) {
   const std::string error = errorOf(options);
   for (const char* part : {"a.xyz: fits 2 layouts equally well", "1 block of 1x1x1", "1 block of 1x1x2",
                            "--precision, --blocks, --iblank"})
-    EXPECT_NE(error.find(part), std::string::npos) << error;
+    expectSays(error, part);
   options.force.multi_block = true;
   EXPECT_EQ(openGrid(options)->description().blocks[0].nk, 2u);
   options.force = {};

@@ -1,5 +1,5 @@
 // .p3d descriptions and OVERFLOW solutions: what they say, and what becomes of damaged ones.
-#include "preprocess/formats/plot3d/plot3d_meta.h"
+#include "preprocess/formats/plot3d/plot3d_source.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +8,7 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
@@ -35,12 +36,7 @@ class Plot3dMeta : public testing::Test {
     return openGrid(options);
   }
   std::string errorOf(const std::string& text) const {
-    try {
-      open(text);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return curvisplat::errorOf([&] { open(text); });
   }
 
   const TestFolder folder_{"meta"};
@@ -87,8 +83,7 @@ TEST_F(Plot3dMeta, RefusesWhatIsWrongByItsKey) {
   for (const char* text : {"{}", R"({"filenames": []})", R"({"filenames": [1]})", R"({"filenames": [{}]})",
                            R"({"filenames": [{"xyz": ""}]})", "{", "{]", R"({"filenames": [{"xyz": 7}]})"})
     EXPECT_NE(errorOf(text), "") << text;
-  EXPECT_NE(errorOf(R"({"filenames": [{"xyz": "none.xyz"}]})").find("which does not exist"),
-            std::string::npos);
+  expectSays(errorOf(R"({"filenames": [{"xyz": "none.xyz"}]})"), "which does not exist");
 }
 
 TEST_F(Plot3dMeta, OfAnyDamageIsAnErrorOrReadsTheSameNodes) {

@@ -11,6 +11,7 @@
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -151,14 +152,11 @@ TEST(WritePlot3d, LeavesWhatWasThereWhenTheDiskIsFull) {
   Progress progress;
   FullDisk disk(300);
   const ScopedSystemCalls scope(disk);
-  try {
-    writePlot3d(SceneGridSource(makeScene("wake"), {5, 4, 3}), folder / "scene", progress);
-    FAIL();
-  } catch (const Error& error) {
-    const std::string what = error.what();
-    EXPECT_NE(what.find("scene.xyz"), std::string::npos) << what;
-    EXPECT_NE(what.find("No space left"), std::string::npos) << what;
-  }
+  expectError(
+      [&] {
+        writePlot3d(SceneGridSource(makeScene("wake"), {5, 4, 3}), folder / "scene", progress);
+      },
+      {"scene.xyz", "No space left"});
   EXPECT_EQ(readTextFile(folder / "scene.xyz"), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
 }

@@ -1,4 +1,4 @@
-#include "preprocess/splats/record_sorter.h"
+#include "preprocess/coincidence/record_sorter.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -1,18 +1,23 @@
-// Conversion of refined grids: what is drawn is what the grid itself has.
+// Conversion of refined grids: what is drawn is what the grid itself has. What conversion takes on disk, as
+// the check of a small disk estimates it, and what it then takes.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 #include <numbers>
+#include <string>
 
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/convert/convert.h"
-#include "preprocess/grid/refined_source.h"
+#include "preprocess/grid/grid_views.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/function_grid.h"
-#include "tests/support/folder_files.h"
+#include "tests/support/fault_sweep.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -22,13 +27,16 @@ constexpr uint64_t kMemory = uint64_t{512} << 20;
 
 class RefinedConvert : public testing::Test {
  protected:
-  ConvertReport convertTo(const std::string& name, const GridSource& source, ConvertOptions options = {}) {
+  ConvertOptions optionsFor(const std::string& name, ConvertOptions options = {}) const {
     options.output = folder_ / name;
     options.memory_bytes = kMemory;
     options.title = "a grid";
     if (options.scalars.empty()) options.scalars = {0};
-    Progress progress;
-    return convert(source, options, progress);
+    return options;
+  }
+  ConvertReport convertTo(const std::string& name, const GridSource& source,
+                          const ConvertOptions& options = {}) const {
+    return converted(source, optionsFor(name, options));
   }
   Files files(const std::string& name) const { return filesOf(folder_ / name); }
 
@@ -87,15 +95,11 @@ TEST_F(RefinedConvert, MergesTheNewNodesOfJoints) {
 
 TEST_F(RefinedConvert, HasTheSameBytesForAnyThreadsAndMemory) {
   for (const Centring centring : {Centring::kNode, Centring::kCell}) {
-    ConvertOptions options;
+    ConvertOptions options = optionsFor("one");
     options.threads = 1;
     options.overwrite = true;
-    convertTo("one", *refined(pipe(centring), 4), options);
-    options.threads = 2;
-    options.bucket_splats = 500;
-    options.slab_bytes = 40'000;
-    convertTo("two", *refined(pipe(centring), 4), options);
-    EXPECT_TRUE(files("one") == files("two"));
+    expectSameCaches(*refined(pipe(centring), 4), options,
+                     {{.threads = 2, .bucket_splats = 500, .slab_bytes = 40'000}});
   }
 }
 
@@ -120,6 +124,86 @@ TEST_F(RefinedConvert, TakesFurtherScalars) {
       EXPECT_TRUE(files("added").at(name) == files("both").at(name)) << name << cells;
     EXPECT_EQ(CacheReader(folder_ / "added").manifest().refined, 3u);
   }
+}
+
+/// A scene whose nodes are blanked from one plane on.
+class HalfBlanked : public GridSource {
+ public:
+  explicit HalfBlanked(const GridSource& grid) : grid_(grid), description_(grid.description()) {
+    for (GridBlock& block : description_.blocks) block.has_blanking = true;
+  }
+  const GridDescription& description() const override { return description_; }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    grid_.read(block, box, scalars, out);
+    const uint64_t row = description_.blocks[block].ni;
+    for (size_t n = 0; n < out.blank.size(); ++n)
+      if (n % row >= row / 2) out.blank[n] = 1;
+  }
+
+ private:
+  const GridSource& grid_;
+  GridDescription description_;
+};
+
+/// The larger of both over the smaller.
+double factor(uint64_t a, uint64_t b) {
+  const double ratio = static_cast<double>(a) / static_cast<double>(b);
+  return std::max(ratio, 1 / ratio);
+}
+
+void expectWithin(double most, const GridSource& grid, uint64_t sampled_nodes, const std::string& name) {
+  SCOPED_TRACE(name);
+  const TemporaryFolder folder;
+  ConvertOptions options;
+  options.output = folder / "a.splats";
+  options.scalars = {0};
+  Progress progress;
+  const DiskNeeds sampled = sampledNeeds(grid, options, folder / "sample", progress, sampled_nodes);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  const ConvertReport report = convert(grid, options, progress);
+  uint64_t bytes = 0;
+  for (const FileReport& file : report.files) bytes += file.bytes;
+  const DiskNeeds upper = diskNeeds(report.nodes, 1);
+  fmt::print("{}: cache {} bytes, estimated {}, at most {}; temporary {}, estimated {}, at most {}\n", name,
+             bytes, sampled.cache_bytes, upper.cache_bytes, report.temporary_bytes, sampled.temporary_bytes,
+             upper.temporary_bytes);
+  EXPECT_LT(factor(sampled.cache_bytes, bytes), most);
+  EXPECT_LT(factor(sampled.temporary_bytes, report.temporary_bytes), most);
+  EXPECT_LE(bytes, upper.cache_bytes);
+  EXPECT_GT(factor(upper.cache_bytes, bytes), most);  // what makes the sample worth its time
+}
+
+// A third of the grid, as eight million nodes are of one of 24 million.
+TEST(SampledNeeds, AreWithinAFactorOfOneAndAHalf) {
+  constexpr SceneGridSize kSize{160, 128, 128};
+  for (const char* const name : {"o-grid", "wake"})
+    expectWithin(1.5, SceneGridSource(makeScene(name), kSize), 800'000, name);
+  const SceneGridSource annulus(makeScene("half-annulus"), kSize);
+  expectWithin(1.5, HalfBlanked(annulus), 800'000, "half-annulus, half blanked");
+}
+
+TEST(SampledNeeds, OfLargeGridsAreWithinAFactorOfOneAndAHalf) {
+  if (!faults::isWholeSweep())
+    GTEST_SKIP() << "five minutes of processor time; see tests/support/fault_sweep.h";
+  for (const char* const name : {"spectral", "sheared-waves"})
+    expectWithin(1.5, SceneGridSource(makeScene(name), {300, 300, 300}), kSampledNodes, name);
+}
+
+TEST(SampledNeeds, OfAGridThatIsConvertedWholeAreExact) {
+  expectWithin(1.01, SceneGridSource(makeScene("wake"), {40, 30, 20}), kSampledNodes, "small");
+}
+
+TEST(SampledNeeds, CanBeInterrupted) {
+  const TemporaryFolder folder;
+  const SceneGridSource grid(makeScene("wake"), {40, 30, 20});
+  ConvertOptions options;
+  options.output = folder / "a.splats";
+  options.scalars = {0};
+  Progress progress;
+  progress.stop(2);
+  EXPECT_THROW(sampledNeeds(grid, options, folder / "sample", progress), Interrupted);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "preprocess/grid/refined_source.h"
+#include "preprocess/grid/grid_views.h"
 
 #include <gtest/gtest.h>
 
@@ -14,8 +14,7 @@
 
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
-#include "tests/support/all_nodes.h"
-#include "tests/support/parts_of_rows.h"
+#include "tests/support/grid_nodes.h"
 
 namespace curvisplat {
 namespace {

@@ -15,24 +15,15 @@
 #include "preprocess/splats/node_splats.h"
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/faulty_system_calls.h"
-#include "tests/support/sweep.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using Files = std::map<std::string, std::string>;
-
-Files filesOf(const fs::path& folder) {
-  Files files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::ifstream file(entry.path(), std::ios::binary);
-    files[entry.path().filename().string()] = {std::istreambuf_iterator<char>(file), {}};
-  }
-  return files;
-}
 
 /// Stops the job at a write. Nothing is synced, which would take most of the time.
 class StoppingSystemCalls : public SystemCalls {
@@ -112,13 +103,13 @@ class ResumeScatter : public ::testing::Test {
     StoppingSystemCalls calls(progress, -1);
     const ScopedSystemCalls scope(calls);
     whole_ = convert(source, options(false), progress);
-    expected_ = filesOf(output_);
+    expected_ = allFilesOf(output_);
     fs::remove_all(output_);
     return calls.writes;
   }
 
   void expectWhole() const {
-    const Files files = filesOf(output_);
+    const Files files = allFilesOf(output_);
     EXPECT_EQ(files.size(), expected_.size());
     for (const auto& [name, bytes] : expected_)
       EXPECT_TRUE(files.contains(name) && files.at(name) == bytes) << name;
@@ -195,7 +186,7 @@ TEST_F(ResumeScatter, BeginsAnewAndSaysSoWithLessMemory) {
   slab_bytes_ /= 2;
   const ConvertReport report = finish(source);
   ASSERT_EQ(report.notes.size(), 1u);
-  EXPECT_NE(report.notes[0].find("less --memory than before"), std::string::npos) << report.notes[0];
+  expectSays(report.notes[0], "less --memory than before");
   expectWhole();
 }
 

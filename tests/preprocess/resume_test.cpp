@@ -15,35 +15,19 @@
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
-#include "stream/cache/brick_log.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/partial_folder.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/run_program.h"
-#include "tests/support/sweep.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using Files = std::map<std::string, std::string>;
-
-std::string bytesOf(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-void overwrite(const fs::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
-}
-
-Files filesOf(const fs::path& folder) {
-  Files files;
-  for (const auto& entry : fs::directory_iterator(folder))
-    files[entry.path().filename().string()] = bytesOf(entry.path());
-  return files;
-}
 
 /// No test pulls the plug, and syncing takes most of the time.
 class UnsyncedSystemCalls : public SystemCalls {
@@ -88,7 +72,7 @@ class Resume : public ::testing::Test {
     fs::create_directory(work_);
     output_ = work_ / "a.splats";
     convertNow({});
-    expected_ = filesOf(output_);
+    expected_ = allFilesOf(output_);
     fs::remove_all(output_);
   }
 
@@ -147,7 +131,7 @@ class Resume : public ::testing::Test {
   /// What is there now is the cache, as if nothing had happened, and nothing else.
   void expectWhole() const {
     for (const auto& entry : fs::directory_iterator(work_)) EXPECT_EQ(entry.path(), output_);
-    const Files files = filesOf(output_);
+    const Files files = allFilesOf(output_);
     EXPECT_EQ(files.size(), expected_.size());
     for (const auto& [name, bytes] : expected_)
       EXPECT_TRUE(files.contains(name) && files.at(name) == bytes) << name;
@@ -160,20 +144,16 @@ class Resume : public ::testing::Test {
     } catch (const Error&) {
       return;
     }
-    const Files files = filesOf(path);
+    const Files files = allFilesOf(path);
     for (const auto& [name, bytes] : expected_)
       EXPECT_TRUE(files.contains(name) && files.at(name) == bytes) << path << ": " << name;
   }
 
   void expectRefused(const Words& words, const std::string& saying) const {
-    const Files before = filesOf(partial());
-    try {
-      convertNow(words);
-      ADD_FAILURE() << "no error that says " << saying;
-    } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find(saying), std::string::npos) << error.what();
-    }
-    EXPECT_TRUE(filesOf(partial()) == before);
+    const Files before = allFilesOf(partial());
+    SCOPED_TRACE(saying);
+    expectError([&] { convertNow(words); }, {saying});
+    EXPECT_TRUE(allFilesOf(partial()) == before);
   }
 
   UnsyncedSystemCalls calls_;
@@ -267,7 +247,7 @@ TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
 TEST_F(Resume, WritesFacesAnew) {
   surfaces_ = true;
   const uint64_t bricks = convertNow({false, false, std::nullopt}).bricks;
-  expected_ = filesOf(output_);
+  expected_ = allFilesOf(output_);
   EXPECT_TRUE(expected_.contains("faces.bin"));
   fs::remove_all(output_);
   const int64_t calls = callsOfAll({"writes"});
@@ -307,9 +287,9 @@ TEST_F(Resume, CompletesAfterBeingKilledAgainAndAgain) {
 TEST_F(Resume, RebuildsWhatTheDiskHasLost) {
   const auto cut = [](const fs::path& path, uint64_t left) { fs::resize_file(path, left); };
   const auto flip = [](const fs::path& path, size_t byte) {
-    std::string bytes = bytesOf(path);
+    std::string bytes = bytesOfFile(path);
     bytes.at(byte) ^= 0x10;
-    overwrite(path, bytes);
+    overwriteFile(path, bytes);
   };
   const std::pair<const char*, std::function<void()>> losses[] = {
       {"the end of the splats", [&] { cut(scratch() / "splats.bin", 100000); }},
@@ -321,7 +301,7 @@ TEST_F(Resume, RebuildsWhatTheDiskHasLost) {
       {"every page of the splats",
        [&] {
          const auto size = fs::file_size(scratch() / "splats.bin");
-         overwrite(scratch() / "splats.bin", std::string(size, '\0'));
+         overwriteFile(scratch() / "splats.bin", std::string(size, '\0'));
        }},
       {"the end of the geometry", [&] { cut(partial() / "geometry.bin", 5000); }},
       {"all of the geometry", [&] { fs::remove(partial() / "geometry.bin"); }},
@@ -390,13 +370,7 @@ TEST_F(Resume, BeginsAnewIfOverwritingIsAllowed) {
 
 TEST_F(Resume, ReportsThatTheCacheIsComplete) {
   convertNow({});
-  try {
-    convertNow({true, false, std::nullopt});
-    ADD_FAILURE() << "no error";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("there is nothing to resume"), std::string::npos)
-        << error.what();
-  }
+  expectError([&] { convertNow({true, false, std::nullopt}); }, {"there is nothing to resume"});
   expectWhole();
 }
 
@@ -442,13 +416,7 @@ TEST_F(Resume, KeepsWhatIsDoneOnAFullDiskIfAskedTo) {
   full.fail_write_at = 10;
   {
     const ScopedSystemCalls scope(full);
-    try {
-      convertNow({true, false, kBucketSplats});
-      ADD_FAILURE();
-    } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos) << error.what();
-      EXPECT_NE(std::string(error.what()).find("--resume"), std::string::npos) << error.what();
-    }
+    expectError([&] { convertNow({true, false, kBucketSplats}); }, {"No space left", "--resume"});
   }
   EXPECT_TRUE(convertNow({true, false, std::nullopt}).resumed);
   expectWhole();

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "stream/base/error.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
@@ -202,8 +203,7 @@ TEST(MakeScene, RefusesUnknownScenesAndOptions) {
     makeScene("pipe");
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("half-annulus, half-annulus-constant, shell, "),
-              std::string::npos);
+    expectSays(error.what(), "half-annulus, half-annulus-constant, shell, ");
   }
   EXPECT_THROW(makeScene("wake", 0), UsageError);
   EXPECT_THROW(makeScene("sheared-waves", 2), UsageError);

@@ -1,4 +1,4 @@
-#include "preprocess/splats/shape.h"
+#include "preprocess/shape/shape.h"
 
 #include <gtest/gtest.h>
 

@@ -12,10 +12,11 @@
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_update.h"
 #include "tests/reference/function_grid.h"
-#include "tests/support/folder_files.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
 
@@ -63,63 +64,31 @@ class SharedAddition : public testing::Test {
     return options;
   }
 
-  AddScalarReport addBy(unsigned count, const GridSource& source, const AddScalarOptions& options) const {
-    AddScalarReport report;
-    runRanks(count, [&](Ranks& ranks) {
-      AddScalarOptions of_rank = options;
-      of_rank.ranks = &ranks;
-      Progress progress;
-      AddScalarReport added = addScalars(source, of_rank, progress);
-      if (ranks.isFirst()) report = std::move(added);
-    });
-    return report;
-  }
-
   void expectSameBytes(const GridSource& source, std::initializer_list<unsigned> counts,
                        std::optional<uint64_t> bucket_splats = {},
                        std::optional<uint32_t> most_buckets = {}) {
     convertFirst(source);
-    AddScalarOptions adding = options();
-    fs::copy(folder_ / "first.splats", adding.cache);
-    Progress progress;
-    const AddScalarReport one = addScalars(source, adding, progress);
-    const Files expected = filesOf(adding.cache);
-    ASSERT_EQ(expected.size(), filesOf(folder_ / "first.splats").size() + 3) << "two scalars and their faces";
-    adding.bucket_splats = bucket_splats;
-    adding.most_buckets = most_buckets;
-    for (const unsigned count : counts) {
-      SCOPED_TRACE(count);
-      fs::remove_all(adding.cache);
-      fs::copy(folder_ / "first.splats", adding.cache);
-      const AddScalarReport shared = addBy(count, source, adding);
-      const Files found = filesOf(adding.cache);
-      ASSERT_EQ(found.size(), expected.size());
-      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
-      EXPECT_EQ(shared.scalars, one.scalars);
-      EXPECT_EQ(shared.splats, one.splats);
-      EXPECT_EQ(shared.files.size(), one.files.size());
-      EXPECT_GT(shared.temporary_bytes, 0u);
-      EXPECT_EQ(entries(), 2u) << "something is left";
-    }
+    std::vector<Variation> by_ranks;
+    for (const unsigned count : counts)
+      by_ranks.push_back({.bucket_splats = bucket_splats, .most_buckets = most_buckets, .ranks = count});
+    expectSameAdditions(source, folder_ / "first.splats", options(), by_ranks);
+    EXPECT_EQ(allFilesOf(options().cache).size(), allFilesOf(folder_ / "first.splats").size() + 3)
+        << "two scalars and their faces";
+    EXPECT_EQ(entriesOf(folder_.path()), 2u) << "something is left";
   }
 
   /// That a job fails with these words, and leaves the cache as it was.
   void expectFails(unsigned count, const std::function<void(Ranks& ranks)>& job, const std::string& words) {
     SCOPED_TRACE(words);
-    const Files before = filesOf(options().cache);
+    const Files before = allFilesOf(options().cache);
     try {
       runRanks(count, job);
       ADD_FAILURE() << "added";
     } catch (const std::exception& error) {
-      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+      expectSays(error.what(), words);
     }
-    EXPECT_TRUE(filesOf(options().cache) == before);
-    EXPECT_EQ(entries(), 2u) << "something is left";
-  }
-
-  size_t entries() const {
-    const fs::directory_iterator all(folder_.path());
-    return static_cast<size_t>(std::distance(begin(all), end(all)));
+    EXPECT_TRUE(allFilesOf(options().cache) == before);
+    EXPECT_EQ(entriesOf(folder_.path()), 2u) << "something is left";
   }
 
   TemporaryFolder folder_;
@@ -191,7 +160,7 @@ TEST_F(SharedAddition, HasTheBytesWhereRanksHaveNothingToDo) {
 TEST_F(SharedAddition, TakesTheSmallestMemoryOfItsRanks) {
   const FunctionGridSource source = abuttingBlocks();
   expectSameBytes(source, {});
-  const Files expected = filesOf(options().cache);
+  const Files expected = allFilesOf(options().cache);
   fs::remove_all(options().cache);
   fs::copy(folder_ / "first.splats", options().cache);
   runRanks(3, [&](Ranks& ranks) {
@@ -202,7 +171,7 @@ TEST_F(SharedAddition, TakesTheSmallestMemoryOfItsRanks) {
     Progress progress;
     addScalars(source, of_rank, progress);
   });
-  EXPECT_TRUE(filesOf(options().cache) == expected);
+  EXPECT_TRUE(allFilesOf(options().cache) == expected);
 }
 
 TEST_F(SharedAddition, LeavesTheCacheWhereARankIsStoppedInAnyPass) {

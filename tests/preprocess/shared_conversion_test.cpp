@@ -10,11 +10,12 @@
 #include <memory>
 
 #include "preprocess/convert/convert.h"
-#include "preprocess/convert/shared_build.h"
+#include "preprocess/convert/shared_passes.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
-#include "tests/support/folder_files.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
 
@@ -34,48 +35,15 @@ class SharedConversion : public testing::Test {
     return options;
   }
 
-  ConvertReport convertBy(unsigned count, const GridSource& source, ConvertOptions options) const {
-    ConvertReport report;
-    runRanks(count, [&](Ranks& ranks) {
-      ConvertOptions of_rank = options;
-      if (count > 1) of_rank.ranks = &ranks;
-      Progress progress;
-      ConvertReport made = convert(source, of_rank, progress);
-      if (ranks.isFirst()) report = std::move(made);
-    });
-    return report;
-  }
-
   void expectSameBytes(const GridSource& source, std::initializer_list<unsigned> counts,
                        std::optional<uint64_t> bucket_splats = {}) const {
     ConvertOptions options = optionsFor(source, "one.splats");
     options.overwrite = true;
     options.title = "a grid";
-    const ConvertReport one = convertBy(1, source, options);
-    const Files expected = filesOf(options.output);
-    options.bucket_splats = bucket_splats;
-    options.output = folder_ / "shared.splats";
-    for (const unsigned count : counts) {
-      SCOPED_TRACE(count);
-      const ConvertReport shared = convertBy(count, source, options);
-      const Files found = filesOf(options.output);
-      ASSERT_EQ(found.size(), expected.size());
-      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
-      EXPECT_EQ(shared.nodes, one.nodes);
-      EXPECT_EQ(shared.splats, one.splats);
-      EXPECT_EQ(shared.bricks, one.bricks);
-      EXPECT_EQ(shared.blanked.total(), one.blanked.total());
-      EXPECT_EQ(shared.degenerate, one.degenerate);
-      EXPECT_EQ(shared.inverted, one.inverted);
-      EXPECT_EQ(shared.merged_nodes, one.merged_nodes);
-      EXPECT_EQ(shared.volume, one.volume);
-      EXPECT_EQ(entries(), 2u) << "something is left";
-    }
-  }
-
-  size_t entries() const {
-    const fs::directory_iterator all(folder_.path());
-    return static_cast<size_t>(std::distance(begin(all), end(all)));
+    std::vector<Variation> by_ranks;
+    for (const unsigned count : counts) by_ranks.push_back({.bucket_splats = bucket_splats, .ranks = count});
+    expectSameCaches(source, options, by_ranks);
+    EXPECT_EQ(entriesOf(folder_.path()), 1u) << "something is left";
   }
 
   TemporaryFolder folder_;
@@ -140,8 +108,8 @@ TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
   const SceneGridSource source(makeScene("half-annulus"), {96, 96, 64});
   ConvertOptions options = optionsFor(source, "one.splats");
   options.title = "a grid";
-  convertBy(1, source, options);
-  const Files expected = filesOf(options.output);
+  converted(source, options);
+  const Files expected = allFilesOf(options.output);
   fs::remove_all(options.output);
   for (const auto& [first, second] : {std::pair{3u, 1u}, {3u, 2u}, {1u, 3u}, {2u, 4u}}) {
     SCOPED_TRACE(fmt::format("{}, then {}", first, second));
@@ -170,12 +138,11 @@ TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
     EXPECT_THROW(runRanks(first, interrupted), Interrupted);
     ASSERT_TRUE(fs::exists(folder_ / "again.splats.partial"));
     options.resume = true;
-    const ConvertReport report = convertBy(second, source, options);
+    const ConvertReport report =
+        second > 1 ? convertedByRanks(second, source, options) : converted(source, options);
     EXPECT_TRUE(report.resumed);
-    const Files found = filesOf(options.output);
-    ASSERT_EQ(found.size(), expected.size());
-    for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
-    EXPECT_EQ(entries(), 1u) << "something is left";
+    expectSameFiles(allFilesOf(options.output), expected);
+    EXPECT_EQ(entriesOf(folder_.path()), 1u) << "something is left";
     fs::remove_all(options.output);
   }
 }
@@ -183,24 +150,23 @@ TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
 TEST_F(SharedConversion, NeedsAFileSystemThatAllRanksSee) {
   const SceneGridSource source(makeScene("half-annulus"), {16, 16, 16});
   ConvertOptions options = optionsFor(source, "one.splats");
-  try {
-    runRanks(2, [&](Ranks& ranks) {
-      ConvertOptions of_rank = options;
-      of_rank.ranks = &ranks;
-      // As if what rank 0 makes were not seen by rank 1.
-      Progress progress;
-      if (ranks.isFirst()) {
-        convert(source, of_rank, progress);
-      } else {
-        ranks.broadcast({});
-        throw Error("rank 1 sees no such folder");
-      }
-    });
-    FAIL() << "converted";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("rank 1 sees"), std::string::npos);
-  }
-  EXPECT_EQ(entries(), 0u) << "something is left";
+  expectError(
+      [&] {
+        runRanks(2, [&](Ranks& ranks) {
+          ConvertOptions of_rank = options;
+          of_rank.ranks = &ranks;
+          // As if what rank 0 makes were not seen by rank 1.
+          Progress progress;
+          if (ranks.isFirst()) {
+            convert(source, of_rank, progress);
+          } else {
+            ranks.broadcast({});
+            throw Error("rank 1 sees no such folder");
+          }
+        });
+      },
+      {"rank 1 sees"});
+  EXPECT_EQ(entriesOf(folder_.path()), 0u) << "something is left";
 }
 
 // ------------------------------------------------------------------------------------------------ buckets

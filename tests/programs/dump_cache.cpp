@@ -29,7 +29,7 @@
 #include "stream/cache/faces_file.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
-#include "tests/support/random_cache.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {

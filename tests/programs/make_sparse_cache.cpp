@@ -1,12 +1,13 @@
-// make_sparse_cache OUT.splats BRICKS: makes a cache of that many bricks, of which only the coarsest have data
-// (sparse_cache.h), to measure with: `make_sparse_cache a.splats 1000000 && curvisplat render a.splats ...`
+// make_sparse_cache OUT.splats BRICKS: makes a cache of that many bricks, of which only the coarsest have
+// data (test_caches.h), to measure with: `make_sparse_cache a.splats 1000000 && curvisplat render a.splats
+// ...`
 #include <fmt/format.h>
 
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 
-#include "tests/support/sparse_cache.h"
+#include "tests/support/test_caches.h"
 
 int main(int count, char** words) {
   if (count != 3) {

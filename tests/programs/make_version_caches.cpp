@@ -23,7 +23,6 @@
 #include "preprocess/convert/convert.h"
 #include "render/image/image_file.h"
 #include "stream/base/durable_file.h"
-#include "tests/reference/cell_grid.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/cache_summary.h"
 

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <random>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -11,13 +11,12 @@
 #include <tuple>
 #include <vector>
 
-#include "preprocess/splats/merge.h"
-#include "preprocess/splats/seams.h"
+#include "preprocess/seams/seams.h"
+#include "preprocess/shape/merge.h"
 #include "render/cpu/cpu_painter.h"
 #include "render/project/projection.h"
 #include "render/surface/scene_layers.h"
-#include "tests/reference/painted_splats.h"
-#include "tests/reference/splat_arrays.h"
+#include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {
 namespace {

@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
-#include "preprocess/splats/joint_nodes.h"
+#include "preprocess/seams/joint_nodes.h"
 #include "preprocess/splats/node_splats.h"
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/image/image.h"
-#include "render/project/clip_planes.h"
 #include "render/project/light.h"
+#include "render/project/plane_cuts.h"
 #include "render/project/screen_view.h"
 #include "render/surface/iso_splats.h"
 #include "render/surface/slice_sampler.h"

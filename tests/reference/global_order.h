@@ -4,8 +4,8 @@
 
 #include <vector>
 
+#include "render/backend/backend.h"
 #include "render/colour/transfer_function.h"
-#include "render/frame/backend.h"
 #include "render/frame/frame_options.h"
 #include "render/image/image.h"
 #include "render/project/projection.h"

@@ -1,12 +1,15 @@
-// Grids whose picture is known: the reference's words (functions, cameras) in the renderer's, and a grid's
-// way through the real conversion and the real renderer, inside this process.
+// Grids whose picture is known: the reference's words (functions, cameras) in the renderer's, a grid's way
+// through the real conversion and the real renderer inside this process, and the arguments of `render` for
+// the half-annulus.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "preprocess/grid/grid_source.h"
+#include "render/camera/camera.h"
 #include "render/frame/frame.h"
 #include "tests/reference/reference_march.h"
 
@@ -36,5 +39,11 @@ FrameOptions knownFrame(ImageSize size);
 /// Draws the only variable of a cache. `splats` gets how many were drawn.
 Image drawCache(const std::filesystem::path& cache, const TransferFunction& function, const Camera& camera,
                 const FrameOptions& options, uint64_t* splats = nullptr, Backend backend = Backend::kCpu);
+
+/// The arguments of `render` for the picture of the half-annulus in DESIGN.md, "Fidelity": the test data's
+/// function half_annulus_<function>.json, every pixel classified, over white.
+std::vector<std::string> halfAnnulusWords(const std::string& cache, const std::string& output,
+                                          const std::string& function, ImageSize size,
+                                          const std::string& lod_pixels);
 
 }  // namespace curvisplat

@@ -1,7 +1,8 @@
 #include "tests/reference/mapped_block.h"
 
-#include <cmath>
 #include <glm/geometric.hpp>
+
+#include <cmath>
 
 namespace curvisplat {
 

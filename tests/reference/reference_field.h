@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "preprocess/scenes/scenes.h"
-#include "render/project/clip_planes.h"
+#include "render/project/plane_cuts.h"
 
 namespace curvisplat {
 

@@ -1,4 +1,4 @@
-#include "render/annotate/axis_ticks.h"
+#include "render/annotate/annotated_scene.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "render/project/border_parts.h"
+#include "render/project/splat_pieces.h"
 
 #include <gtest/gtest.h>
 
@@ -12,10 +12,8 @@
 #include "render/colour/transfer_function.h"
 #include "render/project/projection.h"
 #include "stream/model/border_code.h"
-#include "stream/model/border_pairs.h"
 #include "stream/model/kernel.h"
-#include "stream/model/layers_code.h"
-#include "tests/reference/splat_arrays.h"
+#include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {
 namespace {

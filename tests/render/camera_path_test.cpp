@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "stream/base/error.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -165,16 +166,9 @@ class CameraPathFile : public testing::Test {
     return CameraPath::fromFile(folder_ / "path.json");
   }
   void expectRefused(const std::string& text, const std::string& word) {
-    try {
-      read(text);
-      ADD_FAILURE() << "accepted: " << text.substr(0, 200);
-    } catch (const Error& error) {
-      const std::string said = error.what();
-      EXPECT_NE(said.find(word), std::string::npos) << said << "\nlacks " << word;
-      EXPECT_NE(said.find("path.json"), std::string::npos) << said;
-      EXPECT_EQ(said.find('\n'), std::string::npos) << said;
-      EXPECT_LT(said.size(), 500u);
-    }
+    SCOPED_TRACE(text.substr(0, 200));
+    expectError([&] { read(text); }, {word, "path.json"});
+    EXPECT_LT(errorOf([&] { read(text); }).size(), 500u);
   }
 
   TemporaryFolder folder_;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "render/colour/colour_map.h"
+#include "render/colour/control_points.h"
 #include "render/colour/transfer_function.h"
 #include "tests/render/expected_colour.h"
 

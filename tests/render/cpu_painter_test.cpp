@@ -10,10 +10,8 @@
 #include <vector>
 
 #include "render/cpu/tile.h"
-#include "render/project/footprint_skew.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 #include "render/project/tile_set.h"
-#include "tests/reference/painted_splats.h"
 #include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <glm/vec3.hpp>
 
-#include "render/colour/colour_map.h"
+#include "render/colour/control_points.h"
 
 namespace curvisplat {
 

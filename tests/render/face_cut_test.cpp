@@ -1,4 +1,4 @@
-#include "render/project/face_cut.h"
+#include "render/project/plane_cuts.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <glm/glm.hpp>
 #include <random>
 
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 
 namespace curvisplat {
 namespace {

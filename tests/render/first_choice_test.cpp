@@ -8,10 +8,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
-#include "render/automatic/rounded.h"
-#include "render/automatic/seen_area.h"
-#include "render/image/contrast.h"
+#include "render/colour/function_parts.h"
+#include "render/image/image.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

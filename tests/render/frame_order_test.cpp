@@ -14,8 +14,8 @@
 #include "stream/base/error.h"
 #include "tests/reference/global_order.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "render/export/gaussian_files.h"
-#include "render/export/gaussian_picture.h"
 #include "stream/base/error.h"
 #include "stream/model/kernel.h"
 #include "tests/support/temporary_folder.h"
@@ -109,8 +108,7 @@ TEST(GaussianFiles, OfPlyHaveTheirNumbersInTheirPlaces) {
   splat.colour = {0.5f, 1, 0};
   splat.opacity = 0.5f;
   writeGaussians(std::span(&splat, 1), folder / "one.ply");
-  std::ifstream file(folder / "one.ply", std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string text = bytesOfFile(folder / "one.ply");
   const size_t at = text.find("end_header\n") + 11;
   ASSERT_EQ(text.size(), at + 17 * sizeof(float));
   std::array<float, 17> numbers;
@@ -181,8 +179,7 @@ TEST(GaussianFiles, OfGlbHaveTheExtensionsAttributesAndZUpwards) {
   splats[1].position = {-1, 5, 0};
   splats[2].position = {0, 0, 7};
   writeGaussians(splats, folder / "some.glb");
-  std::ifstream file(folder / "some.glb", std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string text = bytesOfFile(folder / "some.glb");
   std::array<uint32_t, 5> head;
   std::memcpy(head.data(), text.data(), sizeof head);
   EXPECT_EQ(text.substr(0, 4), "glTF");

@@ -1,4 +1,4 @@
-#include "render/frame/hidden_bricks.h"
+#include "render/sweep/hidden_bricks.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -8,11 +8,10 @@
 #include "render/cpu/cpu_painter.h"
 #include "render/frame/frame.h"
 #include "render/frame/frame_workers.h"
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 #include "stream/base/file.h"
-#include "tests/support/lattice_cache.h"
-#include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {

@@ -12,9 +12,9 @@
 #include <limits>
 #include <random>
 
-#include "render/image/image_formats.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -220,12 +220,7 @@ TEST(Exr, RefusesAChunkThatIsTooShort) {
   const size_t size_at = bytes.size() - width * 12 - 4;
   ASSERT_EQ(bytes[size_at], std::byte{width * 12});
   bytes[size_at] = std::byte{width * 12 - 4};
-  try {
-    decodeExr(bytes, "short");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("chunk 2"), std::string::npos) << error.what();
-  }
+  expectError([&] { decodeExr(bytes, "short"); }, {"chunk 2"});
 }
 
 TEST(Exr, RefusesWhatItDoesNotCheck) {

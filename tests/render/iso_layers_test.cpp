@@ -17,7 +17,8 @@
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/reference/splat_arrays.h"
+#include "tests/reference/splat_compositor.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
@@ -243,7 +244,7 @@ TEST_F(IsoLayersTest, BitsDependNeitherOnThreadsNorOnRangesNorOnMemory) {
     drawn(values, ranges, 4);
     ADD_FAILURE() << "no limit";
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("give more --memory"), std::string::npos) << error.what();
+    expectSays(error.what(), "give more --memory");
   }
 }
 

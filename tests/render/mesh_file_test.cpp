@@ -1,5 +1,5 @@
 // Surfaces from files: what is read, and what is refused.
-#include "render/mesh/mesh_file.h"
+#include "render/mesh/triangle_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +10,7 @@
 #include <string>
 
 #include "stream/base/error.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
@@ -19,12 +20,7 @@ RawMesh parse(const std::string& text, const std::string& name) {
 }
 
 std::string refusalOf(const std::string& text, const std::string& name) {
-  try {
-    parse(text, name);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return curvisplat::errorOf([&] { parse(text, name); });
 }
 
 template <typename T>

@@ -1,6 +1,4 @@
-// What every painter must do, with each backend that there is.
-#include "render/project/painter.h"
-
+// What every painter must do, with each backend that there is; and what those by OpenGL must do beside it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,10 +7,14 @@
 #include <random>
 #include <vector>
 
-#include "render/frame/backend.h"
-#include "render/project/kernel.h"
-#include "tests/reference/painted_splats.h"
+#include "render/backend/backend.h"
+#include "render/gl/gl_context.h"
+#include "render/gl/gl_painter.h"
+#include "render/project/footprint.h"
+#include "render/project/painter.h"
+#include "stream/base/error.h"
 #include "tests/reference/splat_compositor.h"
+#include "tests/support/expect_error.h"
 
 namespace curvisplat {
 namespace {
@@ -284,6 +286,62 @@ TEST_P(PainterTest, ForgetsAFrameThatWasNotEnded) {
     painter.begin(size, kWhite, table, {});
     EXPECT_EQ(painter.end().rgba, empty.rgba);
   });
+}
+
+TEST(GlPainter, RefusesAnImageBeyondTheLimitAndGoesOn) {
+  const auto table = lively();
+  GlThread gl(GlLibrary::kOsmesa);
+  gl.run([&](const GlContext& context) {
+    GlPainter painter(context);
+    expectError([&] { painter.begin({1 << 20, 8}, glm::vec4(1), table, {}); }, {"1048576x8"});
+    painter.begin({8, 8}, glm::vec4(1), table, {});
+    EXPECT_EQ(painter.end().pixel(4, 4)[0], 1.0f);
+  });
+}
+
+TEST(GlPainter, DrawsFromMappedMemoryWithoutCopying) {
+  const ImageSize size{160, 120};
+  auto splats = cutSome(randomSplats(3000, 8, size), 6);
+  splats.resize(4000);
+  ASSERT_TRUE(isRecord(splats.back()) || !hasCut(splats.back()));
+  const auto table = lively();
+  GlThread gl(GlLibrary::kOsmesa);
+  gl.run([&](const GlContext& context) {
+    GlPainter painter(context);
+    painter.begin(size, glm::vec4(1), table, {});
+    painter.draw(splats);
+    const Image copied = painter.end();
+    for (int repetition = 0; repetition < 2; ++repetition) {
+      const std::span<ScreenSplat> mapped = painter.mapSplats(splats.size() + 7);
+      ASSERT_EQ(mapped.size(), splats.size() + 7) << painter.drawsUnderWay();
+      std::copy(splats.begin(), splats.end(), mapped.begin() + 5);
+      painter.begin(size, glm::vec4(1), table, {});
+      for (size_t begin = 0; begin < splats.size(); begin += 500) {
+        painter.draw(mapped.subspan(5 + begin, 500));
+        EXPECT_LE(painter.drawsUnderWay(), begin / 500 + 1);
+        EXPECT_LT(painter.drawsUnderWay(), 4u);
+      }
+      EXPECT_EQ(painter.end().rgba, copied.rgba);
+      EXPECT_EQ(painter.uploadSeconds(), 0);
+      EXPECT_GT(painter.glSeconds(), 0);
+      painter.finishDraws();
+      EXPECT_EQ(painter.drawsUnderWay(), 0u);
+      // What lies elsewhere is copied all the same.
+      painter.begin(size, glm::vec4(1), table, {});
+      painter.draw(splats);
+      EXPECT_EQ(painter.end().rgba, copied.rgba);
+      EXPECT_GT(painter.uploadSeconds(), 0);
+    }
+  });
+}
+
+TEST(GlThread, HandsErrorsToTheCaller) {
+  GlThread gl(GlLibrary::kOsmesa);
+  expectSays(gl.contextName(), "OpenGL");
+  EXPECT_THROW(gl.run([](const GlContext&) { throw Error("no"); }), Error);
+  bool ran = false;
+  gl.run([&](const GlContext&) { ran = true; });
+  EXPECT_TRUE(ran);
 }
 
 }  // namespace

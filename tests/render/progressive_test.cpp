@@ -1,4 +1,5 @@
-// Frames of a converted scene: coarse ones first, and limited ones.
+// Frames of a converted scene: coarse ones first, and limited ones; and regions of a picture whose cut has
+// larger layers than the sweep can hold.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -6,13 +7,17 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <random>
 #include <vector>
 
 #include "preprocess/scenes/scenes.h"
 #include "render/frame/frame.h"
+#include "render/frame/frame_memory.h"
+#include "render/sweep/hidden_bricks.h"
 #include "stream/base/error.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/reference/reference_march.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -160,8 +165,131 @@ TEST_F(ProgressiveTest, ReportsHowManySplatsTheCoarsestPictureTakes) {
     ADD_FAILURE() << "ten splats were enough";
   } catch (const UsageError& error) {
     const std::string root = fmt::format("{}", cache_->bricks()[0].splats);
-    EXPECT_NE(std::string(error.what()).find(root), std::string::npos) << error.what();
+    expectSays(error.what(), root);
   }
+}
+
+/// What the sweep holds when a part has entered: its splats, and of the earlier parts those behind its first key.
+double layerByDefinition(const std::vector<PartInRegion>& parts) {
+  double largest = 0;
+  for (size_t n = 0; n < parts.size(); ++n) {
+    double held = 0;
+    for (size_t earlier = 0; earlier <= n; ++earlier) {
+      const double first = parts[earlier].keys.first, end = parts[earlier].keys.last + 1.0;
+      held += parts[earlier].splats * std::clamp((end - parts[n].keys.first) / (end - first), 0.0, 1.0);
+    }
+    largest = std::max(largest, held);
+  }
+  return largest;
+}
+
+TEST(FrameRegions, TheLargestLayerIsThatOfEveryPartsEntry) {
+  std::mt19937 random(3);
+  for (const uint32_t longest : {1u, 1000u, 4'000'000'000u}) {
+    std::vector<PartInRegion> parts;
+    for (int n = 0; n < 300; ++n) {
+      const auto first = static_cast<uint32_t>(random());
+      const auto last = static_cast<uint32_t>(std::min<uint64_t>(first + random() % longest, UINT32_MAX));
+      parts.push_back({{first, last}, static_cast<double>(random() % 1000), 0});
+    }
+    std::sort(parts.begin(), parts.end(),
+              [](const PartInRegion& a, const PartInRegion& b) { return a.keys.first < b.keys.first; });
+    const double expected = layerByDefinition(parts);
+    EXPECT_NEAR(largestLayer(parts), expected, 1e-6 * expected) << longest;
+  }
+  EXPECT_EQ(largestLayer({}), 0);
+}
+
+class FrameRegionsTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {160, 64, 64}), *folder_ / "scene.splats");
+    cache_ = std::make_unique<CacheReader>(*folder_ / "scene.splats");
+  }
+  static void TearDownTestSuite() {
+    cache_.reset();
+    folder_.reset();
+  }
+
+  static FramePlan plan(const ImageSize& size) {
+    const VariableInfo& info = cache_->manifest().variables[0];
+    const FramePlanner planner(*cache_,
+                               DrawnScalars(0, TransferFunction::preset("cool-warm", info.min, info.max, 1)));
+    FrameOptions options;
+    options.size = size;
+    options.lod_pixels = 0;
+    const Camera camera = Camera::named("iso", cache_->manifest().lower, cache_->manifest().upper, size,
+                                        Projection::kOrthographic);
+    return planner.plan(camera, options, DrawingOrder::kFrontToBack);
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+  static std::unique_ptr<CacheReader> cache_;
+};
+
+std::unique_ptr<TemporaryFolder> FrameRegionsTest::folder_;
+std::unique_ptr<CacheReader> FrameRegionsTest::cache_;
+
+TEST_F(FrameRegionsTest, ThereIsOneWhereALayerFits) {
+  const FramePlan whole = plan({400, 300});
+  for (const size_t splats : {size_t{2} * whole.cut.splats, size_t{whole.cut.splats}}) {
+    const auto regions = frameRegions(whole, *cache_, 0, splats);
+    ASSERT_EQ(regions.size(), 1u) << splats;
+    EXPECT_EQ(regions[0].tiles, nullptr);
+    EXPECT_TRUE(regions[0].left_out.empty());
+  }
+}
+
+TEST_F(FrameRegionsTest, TheyHaveEveryTileOnceAndEveryPartThatTouchesThem) {
+  for (const ImageSize size : {ImageSize{400, 300}, ImageSize{1000, 40}, ImageSize{300, 300}}) {
+    FramePlan whole = plan(size);
+    std::vector<uint32_t> owners(TileSet::tilesOf(size, kSharedTileSide), 1);
+    for (const bool of_a_rank : {false, true}) {
+      if (of_a_rank) {
+        for (size_t tile = 0; tile < owners.size(); ++tile)
+          owners[tile] = tile % static_cast<size_t>(TileSet::tilesAlong(size.width, kSharedTileSide)) > 0;
+        whole.tiles = std::make_shared<TileSet>(size, owners, 1);
+      }
+      const auto regions = frameRegions(whole, *cache_, 0, whole.cut.splats / 20);
+      ASSERT_GT(regions.size(), 1u);
+      std::vector<uint32_t> times(owners.size());
+      for (const FrameRegion& region : regions) {
+        ASSERT_TRUE(region.tiles);
+        size_t tiles = 0;
+        for (size_t tile = 0; tile < owners.size(); ++tile) tiles += region.tiles->has(tile);
+        EXPECT_EQ(tiles, region.tiles->box().tiles());  // the painters rely on it
+        for (size_t tile = 0; tile < owners.size(); ++tile) times[tile] += region.tiles->has(tile);
+        ASSERT_EQ(region.left_out.size(), whole.parts.size());
+        for (size_t n = 0; n < whole.parts.size(); ++n)
+          EXPECT_EQ(region.left_out[n] == 0,
+                    region.tiles->touches(
+                        screenBoxOf(cache_->bricks()[whole.parts[n].part.brick], whole.settings.view)));
+      }
+      EXPECT_EQ(times, owners);
+    }
+  }
+}
+
+// A brick at a border between regions is prepared for each; one in several slabs for each slab.
+TEST_F(FrameRegionsTest, FewBricksArePreparedAgain) {
+  const VariableInfo& info = cache_->manifest().variables[0];
+  FrameRenderer renderer(*cache_, 0, TransferFunction::preset("grey", info.min, info.max, 1), Backend::kCpu);
+  FrameOptions options;
+  options.size = {400, 400};
+  options.lod_pixels = 0;
+  options.threads = 1;
+  const Camera camera = Camera::named("iso", cache_->manifest().lower, cache_->manifest().upper, options.size,
+                                      Projection::kOrthographic);
+  FrameStatistics statistics;
+  options.memory_bytes = uint64_t{1} << 30;
+  const Image expected = renderer.render(camera, options, statistics);
+  EXPECT_EQ(statistics.regions, 1u);
+  EXPECT_EQ(statistics.bricks_again, 0u);
+  options.memory_bytes = uint64_t{44} << 20;
+  EXPECT_EQ(renderer.render(camera, options, statistics).rgba, expected.rgba);
+  EXPECT_GT(statistics.regions, 1u);
+  EXPECT_LT(statistics.bricks_again, 2 * statistics.bricks_drawn);
 }
 
 }  // namespace

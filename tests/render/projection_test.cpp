@@ -6,7 +6,7 @@
 #include <glm/glm.hpp>
 #include <random>
 
-#include "render/project/kernel.h"
+#include "render/project/footprint.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -9,15 +9,13 @@
 
 #include "preprocess/scenes/scenes.h"
 #include "preprocess/splats/node_splats.h"
+#include "render/gl/gl_context.h"
 #include "render/gl/gl_painter.h"
-#include "render/gl/gl_thread.h"
-#include "render/gl/offscreen_context.h"
 #include "render/image/image.h"
 #include "render/project/projection.h"
 #include "stream/codec/brick_codec.h"
-#include "tests/reference/painted_splats.h"
 #include "tests/reference/reference_march.h"
-#include "tests/reference/splat_arrays.h"
+#include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {
 namespace {

@@ -12,12 +12,12 @@
 
 #include "preprocess/scenes/scenes.h"
 #include "render/frame/frame.h"
-#include "render/frame/picture_shares.h"
 #include "render/project/tile_set.h"
+#include "render/ranks/picture_shares.h"
 #include "stream/base/error.h"
 #include "tests/reference/known_pictures.h"
-#include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
 #include "tests/support/thread_ranks.h"
 
 namespace curvisplat {

@@ -1,5 +1,5 @@
 // The exchange of projected splats among ranks holds no more than its buffers.
-#include "render/frame/splat_exchange.h"
+#include "render/ranks/splat_exchange.h"
 
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -9,8 +9,8 @@
 #include <numeric>
 #include <vector>
 
-#include "render/frame/picture_shares.h"
-#include "stream/base/freed_memory.h"
+#include "render/ranks/picture_shares.h"
+#include "stream/base/memory.h"
 #include "tests/support/thread_ranks.h"
 
 namespace curvisplat {

@@ -17,6 +17,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "tests/series/step_series.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
 
@@ -127,12 +128,7 @@ TEST(ConvertSeries, AStepThatWasConvertedAloneHasItsTime) {
 
 /// What converting throws, as text.
 std::string refusal(const std::vector<StepKind>& kinds, const SeriesOptions& options) {
-  try {
-    convertQuietly(inputOf(kinds), options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return curvisplat::errorOf([&] { convertQuietly(inputOf(kinds), options); });
 }
 
 TEST(ConvertSeries, StepsThatDoNotFitAreNamedOrLeftOut) {
@@ -145,8 +141,8 @@ TEST(ConvertSeries, StepsThatDoNotFitAreNamedOrLeftOut) {
     const std::vector<StepKind> kinds{{0}, each.kind, {2}};
     const TemporaryFolder folder;
     const std::string message = refusal(kinds, optionsFor(folder / "a.splats"));
-    EXPECT_NE(message.find("step 1 (file 1)"), std::string::npos) << message;
-    EXPECT_NE(message.find(each.words), std::string::npos) << message;
+    expectSays(message, "step 1 (file 1)");
+    expectSays(message, each.words);
     EXPECT_EQ(CacheReader(folder / "a.splats").series().steps.size(), 1u);
 
     SeriesOptions options = optionsFor(folder / "b.splats");
@@ -166,7 +162,7 @@ TEST(ConvertSeries, AddedStepsAreCountedFromThoseOfTheCache) {
   options.add = true;
   const auto expectStep = [&](const std::vector<StepKind>& kinds, const char* words) {
     const std::string message = refusal(kinds, options);
-    EXPECT_NE(message.find(words), std::string::npos) << message;
+    expectSays(message, words);
   };
   expectStep({{2}, {3, 0, true}}, "step 3 (file 1)");
   options.convert.resume = true;  // step 2 is there
@@ -182,16 +178,16 @@ TEST(ConvertSeries, FailuresOfTheOutputLeaveNothingOut) {
     options.keep_going = keep_going;
     options.add = false;
     const std::string exists = refusal({{0}, {1}}, options);
-    EXPECT_NE(exists.find("step 0 (file 0)"), std::string::npos) << exists;
-    EXPECT_NE(exists.find("exists already"), std::string::npos) << exists;
+    expectSays(exists, "step 0 (file 0)");
+    expectSays(exists, "exists already");
     options.add = true;
     for (const StepKind& added : {StepKind{2}, StepKind{2, 0.5}}) {
       faults::FaultySystemCalls disk;
       disk.fail_write_at = 3;
       const ScopedSystemCalls in_place(disk);
       const std::string message = refusal({added, {3}}, options);
-      EXPECT_NE(message.find("step 2 (file 0)"), std::string::npos) << message;
-      EXPECT_NE(message.find("No space left"), std::string::npos) << message;
+      expectSays(message, "step 2 (file 0)");
+      expectSays(message, "No space left");
       EXPECT_EQ(message.find("--keep-going"), std::string::npos) << message;
     }
   }
@@ -255,7 +251,7 @@ TEST(ConvertSeries, ResumingDoesNotMixSeries) {
   convertQuietly(inputOf({{0}, {1}}), optionsFor(folder / "a.splats"));
   SeriesOptions options = optionsFor(folder / "a.splats");
   options.convert.resume = true;
-  EXPECT_NE(refusal({{0}, {1.5}, {2}}, options).find("was not made from"), std::string::npos);
+  expectSays(refusal({{0}, {1.5}, {2}}, options), "was not made from");
 }
 
 TEST(ConvertSeries, LeftoversOfAKilledAdditionDoNotMatter) {
@@ -287,12 +283,7 @@ TEST(ConvertSeries, ASeriesRefusesFurtherScalars) {
   options.cache = folder / "a.splats";
   options.scalars = {0};
   Progress progress;
-  try {
-    addScalars(StepSource({0}), options, progress);
-    ADD_FAILURE() << "added";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("series of 2 steps"), std::string::npos) << error.what();
-  }
+  expectError([&] { addScalars(StepSource({0}), options, progress); }, {"series of 2 steps"});
 }
 
 TEST(ConvertSeries, DamagedStepsAreRefused) {

@@ -1,4 +1,5 @@
-// Times between two steps: values are blends of the steps' values, and pictures those of such values.
+// Times between two steps: values are blends of the steps' values, and pictures those of such values. Going
+// from step to step with one renderer draws what a renderer of each step alone draws, bit for bit.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,11 +10,10 @@
 #include <vector>
 
 #include "preprocess/addition/convert_series.h"
-#include "render/frame/step_player.h"
+#include "render/frame/frame.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/function_grid.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
@@ -36,14 +36,12 @@ std::unique_ptr<GridSource> fieldAt(double time) {
       });
 }
 
-class Interpolation : public testing::Test {
+class Interpolation : public ProgramSuite<Interpolation> {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
+  static void prepare() {
     convertSteps("series.splats", kSteps, [](uint64_t step) { return static_cast<double>(step); });
     convertSteps("between.splats", 1, [](uint64_t) { return 1.25; });
   }
-  static void TearDownTestSuite() { folder_.reset(); }
 
   static void convertSteps(const char* name, uint64_t count, double (*time)(uint64_t)) {
     SeriesInput input;
@@ -69,8 +67,6 @@ class Interpolation : public testing::Test {
                            options, statistics);
   }
   static TransferFunction function() { return TransferFunction::preset("viridis", -3, 3, 3); }
-
-  static inline std::unique_ptr<TemporaryFolder> folder_;
 };
 
 TEST_F(Interpolation, FindsTimesBetweenSteps) {
@@ -143,55 +139,41 @@ TEST_F(Interpolation, DrawsTheSameWhateverWasDrawnBefore) {
   }
 }
 
-class InterpolationCommand : public testing::Test {
+class InterpolationCommand : public ProgramTest {
  protected:
-  std::string file(const std::string& name) const { return (folder / name).string(); }
-  void run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
+  Words render(const std::string& output, const Words& more) const {
+    return Words{"render", file("w.splats"), "-o",  file(output),     "--size",
+                 "60x50",  "--range",        "0,1", "--opacity-unit", "0.5"} +
+           more;
   }
-  ProgramResult render(const std::string& output, std::vector<std::string> more) {
-    more.insert(more.begin(), {"render", file("w.splats"), "-o", file(output), "--size", "60x50", "--range",
-                               "0,1", "--opacity-unit", "0.5"});
-    return runProgram(more);
-  }
-  std::string bytesOf(const std::string& name) const {
-    std::ifstream in(folder / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
-
-  const TemporaryFolder folder;
 };
 
 TEST_F(InterpolationCommand, DrawsTimesBetweenSteps) {
   run({"generate", "wake", "--size", "40x30x16", "--steps", "3", "-o", file("w")});
   run({"convert", file("w.xyz"), file("w_%04d.fun"), "-o", file("w.splats")});
-  const std::vector<std::string> view{"--view", "+z"};
-  const auto draw = [&](const std::string& output, std::vector<std::string> more) {
+  const Words view{"--view", "+z"};
+  const auto draw = [&](const std::string& output, Words more) {
     more.insert(more.end(), view.begin(), view.end());
-    const ProgramResult result = render(output, more);
-    EXPECT_EQ(result.status, 0) << result.err;
+    run(render(output, more));
   };
   draw("s0.pfm", {"--step", "0"});
   draw("s1.pfm", {"--step", "1"});
   draw("s2.pfm", {"--step", "2"});
   draw("t1.pfm", {"--time", "1", "--interpolate"});
   draw("half.pfm", {"--time", "0.5", "--interpolate"});
-  EXPECT_TRUE(bytesOf("t1.pfm") == bytesOf("s1.pfm"));
-  EXPECT_FALSE(bytesOf("half.pfm") == bytesOf("s0.pfm"));
-  EXPECT_FALSE(bytesOf("half.pfm") == bytesOf("s1.pfm"));
+  EXPECT_TRUE(bytesOfFile(file("t1.pfm")) == bytesOfFile(file("s1.pfm")));
+  EXPECT_FALSE(bytesOfFile(file("half.pfm")) == bytesOfFile(file("s0.pfm")));
+  EXPECT_FALSE(bytesOfFile(file("half.pfm")) == bytesOfFile(file("s1.pfm")));
 
-  const ProgramResult late = render("late.pfm", {"--time", "7", "--view", "+z"});
-  EXPECT_TRUE(bytesOf("late.pfm") == bytesOf("s2.pfm"));
-  EXPECT_NE(late.err.find("note: --time 7: the series has times from 0 to 2; step 2 is taken"),
-            std::string::npos)
-      << late.err;
+  const ProgramResult late = runProgram(render("late.pfm", {"--time", "7", "--view", "+z"}));
+  EXPECT_TRUE(bytesOfFile(file("late.pfm")) == bytesOfFile(file("s2.pfm")));
+  expectSays(late.err, "note: --time 7: the series has times from 0 to 2; step 2 is taken");
 
   draw("f%d.pfm", {"--steps", "all", "--interpolate", "--frames", "5"});
-  EXPECT_TRUE(bytesOf("f0.pfm") == bytesOf("s0.pfm"));
-  EXPECT_TRUE(bytesOf("f1.pfm") == bytesOf("half.pfm"));
-  EXPECT_TRUE(bytesOf("f2.pfm") == bytesOf("s1.pfm"));
-  EXPECT_TRUE(bytesOf("f4.pfm") == bytesOf("s2.pfm"));
+  EXPECT_TRUE(bytesOfFile(file("f0.pfm")) == bytesOfFile(file("s0.pfm")));
+  EXPECT_TRUE(bytesOfFile(file("f1.pfm")) == bytesOfFile(file("half.pfm")));
+  EXPECT_TRUE(bytesOfFile(file("f2.pfm")) == bytesOfFile(file("s1.pfm")));
+  EXPECT_TRUE(bytesOfFile(file("f4.pfm")) == bytesOfFile(file("s2.pfm")));
   EXPECT_FALSE(fs::exists(file("f5.pfm")));
 }
 
@@ -205,31 +187,142 @@ TEST_F(InterpolationCommand, FollowsTheTimesOfAPath) {
                                      << R"(}, {"time": 4, )" << camera << second << "}]}";
   };
   write(R"(, "series_time": 0)", R"(, "series_time": 2)");
-  ASSERT_EQ(render("p%d.pfm", {"--path", file("path.json"), "--frames", "5", "--interpolate"}).status, 0);
-  ASSERT_EQ(render("n%d.pfm", {"--path", file("path.json"), "--frames", "5"}).status, 0);
-  EXPECT_TRUE(bytesOf("p2.pfm") == bytesOf("n2.pfm"));  // at step 1
-  EXPECT_FALSE(bytesOf("p1.pfm") == bytesOf("p0.pfm"));
-  EXPECT_FALSE(bytesOf("p1.pfm") == bytesOf("p2.pfm"));
-  EXPECT_TRUE(bytesOf("n1.pfm") == bytesOf("n0.pfm"));  // the nearest; of two equally near the earlier
+  run(render("p%d.pfm", {"--path", file("path.json"), "--frames", "5", "--interpolate"}));
+  run(render("n%d.pfm", {"--path", file("path.json"), "--frames", "5"}));
+  EXPECT_TRUE(bytesOfFile(file("p2.pfm")) == bytesOfFile(file("n2.pfm")));  // at step 1
+  EXPECT_FALSE(bytesOfFile(file("p1.pfm")) == bytesOfFile(file("p0.pfm")));
+  EXPECT_FALSE(bytesOfFile(file("p1.pfm")) == bytesOfFile(file("p2.pfm")));
+  EXPECT_TRUE(bytesOfFile(file("n1.pfm")) ==
+              bytesOfFile(file("n0.pfm")));  // the nearest; of two equally near the earlier
 
-  const ProgramResult both = render("q%d.pfm", {"--path", file("path.json"), "--steps", "all"});
+  const ProgramResult both = runProgram(render("q%d.pfm", {"--path", file("path.json"), "--steps", "all"}));
   EXPECT_EQ(both.status, 2);
-  EXPECT_NE(both.err.find("leave out --step, --time and --steps"), std::string::npos) << both.err;
+  expectSays(both.err, "leave out --step, --time and --steps");
   write(R"(, "series_time": 0)", "");
-  const ProgramResult half = render("q%d.pfm", {"--path", file("path.json")});
+  const ProgramResult half = runProgram(render("q%d.pfm", {"--path", file("path.json")}));
   EXPECT_EQ(half.status, 1);
-  EXPECT_NE(half.err.find("key frame 1 has no series_time"), std::string::npos) << half.err;
+  expectSays(half.err, "key frame 1 has no series_time");
 }
 
 TEST_F(InterpolationCommand, NeedsOneGridAndATime) {
   run({"generate", "wake", "--size", "40x30x16", "--steps", "2", "--moving", "-o", file("w")});
   run({"convert", file("w_%04d.xyz"), file("w_%04d.fun"), "-o", file("w.splats")});
-  const ProgramResult moving = render("a.pfm", {"--time", "0.5", "--interpolate"});
+  const ProgramResult moving = runProgram(render("a.pfm", {"--time", "0.5", "--interpolate"}));
   EXPECT_EQ(moving.status, 1);
-  EXPECT_NE(moving.err.find("steps 0 and 1 have different grids"), std::string::npos) << moving.err;
+  expectSays(moving.err, "steps 0 and 1 have different grids");
   EXPECT_EQ(lineCount(moving.err), 1) << moving.err;
-  EXPECT_EQ(render("a.pfm", {"--interpolate"}).status, 2);
-  EXPECT_EQ(render("a%d.pfm", {"--steps", "all", "--frames", "3"}).status, 2);  // nothing to spread
+  EXPECT_EQ(runProgram(render("a.pfm", {"--interpolate"})).status, 2);
+  EXPECT_EQ(runProgram(render("a%d.pfm", {"--steps", "all", "--frames", "3"})).status,
+            2);  // nothing to spread
+}
+
+/// A block whose scalar moves along i; from step 4 on the grid is another.
+std::unique_ptr<GridSource> stepOf(uint64_t step) {
+  return std::make_unique<FunctionGridSource>(
+      std::vector{gridBlock(40, 30, 30)}, 1, [step](const GridNode& node) {
+        const auto i = static_cast<double>(node.i), j = static_cast<double>(node.j),
+                   k = static_cast<double>(node.k);
+        NodeValues values;
+        values.position = {i + 0.1 * std::sin(j) + (step >= 4 ? 0.05 * k : 0), j, k};
+        const double t = static_cast<double>(step);
+        // A different range at each step, as simulations have.
+        values.scalars = {
+            static_cast<float>((1 + 0.1 * t) * std::sin(0.2 * i - 0.3 * t) * std::cos(0.1 * j))};
+        return values;
+      });
+}
+
+class StepPlayerTest : public ProgramSuite<StepPlayerTest> {
+ protected:
+  static constexpr uint64_t kSteps = 6;
+
+  static void prepare() {
+    SeriesInput input;
+    input.count = kSteps;
+    input.name = [](uint64_t step) { return std::to_string(step); };
+    input.open = stepOf;
+    input.scalars = [](const GridDescription&) { return std::vector<uint32_t>{0}; };
+    SeriesOptions options;
+    options.convert.output = cache();
+    options.convert.memory_bytes = uint64_t{1} << 30;
+    Progress progress;
+    convertSeries(input, options, progress, [](const SeriesEvent&) {});
+  }
+
+  static std::filesystem::path cache() { return *folder_ / "a.splats"; }
+  static TransferFunction function() { return TransferFunction::preset("viridis", -1, 1, 3); }
+  static FrameOptions options(uint64_t memory_bytes) {
+    FrameOptions options;
+    options.size = {80, 60};
+    options.memory_bytes = memory_bytes;
+    options.threads = 2;
+    return options;
+  }
+  static Camera camera(const CacheReader& reader) {
+    return Camera::named("iso", reader.manifest().lower, reader.manifest().upper, {80, 60},
+                         Projection::kOrthographic);
+  }
+  /// By a reader and a renderer of that step alone.
+  static Image alone(uint64_t step) {
+    const CacheReader reader(cache(), step);
+    FrameRenderer renderer(reader, 0, function(), Backend::kCpu);
+    FrameStatistics statistics;
+    return renderer.render(camera(CacheReader(cache())), options(512 << 20), statistics);
+  }
+};
+
+TEST_F(StepPlayerTest, DrawsEachStepAsAlone) {
+  std::vector<Image> wanted;
+  for (uint64_t step = 0; step < kSteps; ++step) wanted.push_back(alone(step));
+  EXPECT_NE(wanted[0].rgba, wanted[1].rgba);
+  ASSERT_EQ(CacheReader(cache()).series().geometries(), 2u);
+  // Enough memory to keep all bricks, and so little that most are read again.
+  for (const uint64_t memory : {uint64_t{512} << 20, uint64_t{64} << 20})
+    for (const bool ahead : {false, true}) {
+      CacheReader reader(cache());
+      const Camera view = camera(reader);
+      StepPlayer player(reader, {0, function()}, Backend::kCpu);
+      for (const uint64_t step : std::vector<uint64_t>{0, 1, 2, 3, 2, 0, 3, 4, 5, 4, 1, 1, 5}) {
+        player.goTo({step});
+        if (ahead) player.renderer().prefetch(view, options(memory));
+        FrameStatistics statistics;
+        EXPECT_EQ(player.renderer().render(view, options(memory), statistics).rgba, wanted[step].rgba)
+            << "step " << step << ", memory " << memory << ", ahead " << ahead;
+        EXPECT_EQ(reader.step(), step);
+      }
+    }
+}
+
+TEST_F(StepPlayerTest, KeepsDecodedGeometry) {
+  CacheReader reader(cache());
+  const Camera view = camera(reader);
+  StepPlayer player(reader, {0, function()}, Backend::kCpu);
+  FrameStatistics first, second;
+  player.renderer().render(view, options(512 << 20), first);
+  player.goTo({1});
+  player.renderer().render(view, options(512 << 20), second);
+  EXPECT_GT(first.bricks_read, 0u);
+  EXPECT_EQ(second.bricks_read, 0u);  // whole bricks: values alone are read
+  EXPECT_EQ(second.bricks_cached, first.bricks_read);
+}
+
+TEST_F(StepPlayerTest, DecodesValuesThatOthersArePredictedFromOnce) {
+  const CacheReader first(cache());
+  const uint32_t bricks = static_cast<uint32_t>(first.bricks().size());
+  KeptValues kept(64 << 20);
+  // Backwards: steps 0 and 1 are decoded for step 2.
+  for (const uint64_t step : std::vector<uint64_t>{2, 1, 0}) {
+    const CacheReader reader = first.atStep(step);
+    for (uint32_t brick = 0; brick < bricks; ++brick) {
+      SplatVariable with, without;
+      reader.readVariable(brick, 0, with, nullptr, &kept);
+      reader.readVariable(brick, 0, without);
+      EXPECT_EQ(with.mean, without.mean);
+      EXPECT_EQ(with.slope2, without.slope2);
+      EXPECT_EQ(with.variance, without.variance);
+    }
+  }
+  EXPECT_GE(kept.statistics().hits, 2u * bricks);
 }
 
 }  // namespace

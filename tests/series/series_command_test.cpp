@@ -1,61 +1,45 @@
-// Series of time steps, as a person converts, lists and draws them.
+// Series of time steps, as a person converts, lists and draws them. convert --follow notices what a
+// simulation writes without polling; kill_series.py and full_disk.sh have its ends.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
-#include "tests/support/folder_files.h"
-#include "tests/support/folder_watch.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string bytesOfFile(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-class SeriesCommand : public testing::Test {
+class SeriesCommand : public ProgramTest {
  protected:
-  ProgramResult run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    EXPECT_EQ(result.status, 0) << result.err;
-    return result;
-  }
-  std::string file(const std::string& name) const { return (folder / name).string(); }
-
-  void generate(const std::string& prefix, int steps, std::vector<std::string> more = {}) {
-    more.insert(more.begin(), {"generate", "wake", "--size", "40x30x16", "--steps", std::to_string(steps),
-                               "-o", file(prefix)});
-    run(more);
+  void generate(const std::string& prefix, int steps, const Words& more = {}) const {
+    run(Words{"generate", "wake", "--size", "40x30x16", "--steps", std::to_string(steps), "-o",
+              file(prefix)} +
+        more);
   }
   /// A picture in the view and the function that all tests use.
-  std::string draw(const std::string& cache, const std::string& picture, std::vector<std::string> more = {}) {
-    more.insert(more.begin(), {"render", file(cache), "-o", file(picture), "--size", "80x60", "--view", "+z",
-                               "--range", "0,1", "--opacity-unit", "0.5"});
-    run(more);
+  std::string draw(const std::string& cache, const std::string& picture, const Words& more = {}) const {
+    run(Words{"render", file(cache), "-o", file(picture), "--size", "80x60", "--view", "+z", "--range", "0,1",
+              "--opacity-unit", "0.5"} +
+        more);
     return bytesOfFile(file(picture));
   }
-
-  const TemporaryFolder folder;
 };
 
 TEST_F(SeriesCommand, EachStepDrawsAsACacheOfThatStepAlone) {
   for (const bool moving : {false, true}) {
     SCOPED_TRACE(moving);
     const std::string name = moving ? "m" : "f";
-    std::vector<std::string> more;
+    Words more;
     if (moving) more = {"--moving"};
     generate(name, 5, more);
     const std::string grid = moving ? file(name + "_%04d.xyz") : file(name + ".xyz");
@@ -122,17 +106,17 @@ TEST_F(SeriesCommand, SelectsAddsAndLists) {
   const ProgramResult added =
       run({"convert", "--add-steps", file("f.xyz"), file("f_0002.fun"), file("f_0003.fun"),
            file("f_0004.fun"), file("f_0005.fun"), file("f_0006.fun"), "--to", file("added.splats")});
-  EXPECT_NE(added.out.find("7 steps, 5 of them converted now"), std::string::npos) << added.out;
+  expectSays(added.out, "7 steps, 5 of them converted now");
   for (const char* name : {"steps.bin", "var.0.bin", "var.0.6.bin", "geometry.bin"})
     EXPECT_TRUE(bytesOfFile(file(std::string("added.splats/") + name)) ==
                 bytesOfFile(file(std::string("all.splats/") + name)))
         << name;
 
   const ProgramResult info = run({"info", file("all.splats")});
-  EXPECT_NE(info.out.find("steps      7, times 0 to 6, 1 geometry"), std::string::npos) << info.out;
+  expectSays(info.out, "steps      7, times 0 to 6, 1 geometry");
   const std::string at_step = run({"info", file("all.splats"), "--step", "2"}).out;
   for (const char* own : {"faces.bin ", "faces.step2.bin ", "this step ", "all steps "})
-    EXPECT_NE(at_step.find(std::string("\n") + own), std::string::npos) << at_step;
+    expectSays(at_step, std::string("\n") + own);
   EXPECT_EQ(at_step.find("faces.step3.bin"), std::string::npos) << at_step;
   const auto json = nlohmann::json::parse(run({"info", file("all.splats"), "--json", "--step", "2"}).out);
   ASSERT_EQ(json["steps"].size(), 7u);
@@ -148,27 +132,26 @@ TEST_F(SeriesCommand, PatternsLeaveOutCaches) {
   generate("f", 3);
   for (const char* step : {"0", "1", "2"})
     fs::rename(file(std::string("f_000") + step + ".fun"), file(std::string("q.") + step));
-  const std::vector<std::string> words{"convert", file("f.xyz"), file("q.*"), "-o", file("q.splats")};
+  const Words words{"convert", file("f.xyz"), file("q.*"), "-o", file("q.splats")};
   run(words);
   for (const char* again : {"--resume", "--overwrite"}) {
-    std::vector<std::string> more = words;
+    Words more = words;
     more.push_back(again);
-    EXPECT_NE(run(more).out.find("3 steps"), std::string::npos);
+    expectSays(run(more).out, "3 steps");
   }
 }
 
 TEST_F(SeriesCommand, AnInterruptedAdditionGoesOnWhereItStood) {
   generate("f", 5);
-  const std::vector<std::string> addition{"convert",          "--add-steps",      file("f.xyz"),
-                                          file("f_0002.fun"), file("f_0003.fun"), file("f_0004.fun"),
-                                          "--resume"};
+  const Words addition{"convert",          "--add-steps",      file("f.xyz"), file("f_0002.fun"),
+                       file("f_0003.fun"), file("f_0004.fun"), "--resume"};
   const auto resumed = [&](int added_before) {
     const std::string cache = file("to.splats");
     run({"convert", file("f.xyz"), file("f_0000.fun"), file("f_0001.fun"), "-o", cache, "--overwrite"});
     // What an addition that was stopped after some of its steps leaves behind.
     for (int n = 0; n < added_before; ++n)
       run({"convert", "--add-steps", file("f.xyz"), file(fmt::format("f_{:04}.fun", 2 + n)), "--to", cache});
-    std::vector<std::string> words = addition;
+    Words words = addition;
     words.insert(words.end(), {"--to", cache});
     run(words);
     return filesOf(cache);
@@ -197,7 +180,7 @@ TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {
   std::ofstream(file("run/f_0000.fun"), std::ios::binary) << first.substr(0, 1000);
   std::ofstream(file("run/f_0000.fun"), std::ios::binary) << first;
   {
-    FolderWatch watch(folder.path());
+    FolderWatch watch(folder_.path());
     watch.waitUntil([&] { return fs::exists(file("a.splats")); });
   }
   for (const char* step : {"0001", "0002"})
@@ -206,7 +189,7 @@ TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {
                     file(std::string("run/f_") + step + ending));
   const ProgramResult result = following.wait();
   EXPECT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.out.find("2 steps"), std::string::npos) << result.out;
+  expectSays(result.out, "2 steps");
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
 
   // Ended by a signal, and continued. The cache is whole in between.
@@ -218,8 +201,7 @@ TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {
   }
   interrupted.signal(SIGTERM);
   const ProgramResult ended = interrupted.wait();
-  EXPECT_EQ(ended.status, 128 + SIGTERM);
-  EXPECT_EQ(lineCount(ended.err), 1) << ended.err;
+  expectRefused(ended, 128 + SIGTERM, {});
   for (const char* name : {"steps.bin", "var.0.bin", "var.0.1.bin", "var.0.2.bin", "geometry.bin"})
     EXPECT_TRUE(bytesOfFile(file(std::string("a.splats/") + name)) ==
                 bytesOfFile(file(std::string("all.splats/") + name)))
@@ -238,9 +220,9 @@ TEST_F(SeriesCommand, RangesAreOfTheSeriesOrOfAStep) {
   const VariableInfo series = first.seriesManifest().variables[0];
   const VariableInfo step = first.atStep(1).manifest().variables[0];
   ASSERT_LT(step.max, series.max);
-  const auto rangeOf = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"render", file("a.splats"), "-o", file("r_%d.png"), "--size",
-                                       "40x30",  "--view",         "+z", "--stats",        file("r.json")};
+  const auto rangeOf = [&](const Words& more) {
+    Words arguments{"render", file("a.splats"), "-o", file("r_%d.png"), "--size",
+                    "40x30",  "--view",         "+z", "--stats",        file("r.json")};
     arguments.insert(arguments.end(), more.begin(), more.end());
     run(arguments);
     const auto json = nlohmann::json::parse(bytesOfFile(file("r.json")));
@@ -272,7 +254,7 @@ TEST_F(SeriesCommand, FileSeriesOfParaView) {
   EXPECT_EQ(cache.series().geometries(), 1u);
   // Without --steps it is one step, and a note says so.
   const ProgramResult one = run({"convert", file("s.p3d.series"), "-o", file("b.splats")});
-  EXPECT_NE(one.err.find("2 time steps"), std::string::npos) << one.err;
+  expectSays(one.err, "2 time steps");
   // So is a .p3d of several steps.
   std::ofstream(file("both.p3d")) << R"({"filenames": [{"time": 1, "xyz": "f.xyz", "function": "f_0000.fun"},
       {"time": 2, "xyz": "f.xyz", "function": "f_0002.fun"}]})";
@@ -282,11 +264,8 @@ TEST_F(SeriesCommand, FileSeriesOfParaView) {
 
 TEST_F(SeriesCommand, RefusesInOneLine) {
   generate("f", 3);
-  const auto refused = [&](const std::vector<std::string>& arguments, int status, const std::string& words) {
-    const ProgramResult result = runProgram(arguments);
-    EXPECT_EQ(result.status, status) << result.err;
-    EXPECT_EQ(lineCount(result.err), 1) << result.err;
-    EXPECT_NE(result.err.find(words), std::string::npos) << result.err;
+  const auto refused = [&](const Words& arguments, int status, const std::string& words) {
+    expectRefused(arguments, status, {words});
   };
   refused({"convert", file("f.xyz"), file("g_*.fun"), "-o", file("a.splats")}, 1, "g_*.fun");
   refused({"convert", file("f.xyz"), file("f_*.fun"), "--steps", "5:9", "-o", file("a.splats")}, 2,
@@ -302,7 +281,6 @@ TEST_F(SeriesCommand, RefusesInOneLine) {
       {"convert", file("f.xyz"), file("f_*.fun"), "-o", file("w.splats"), "--follow", "--stats", file("s")},
       2, "--stats");
   // Options that would have no effect.
-  using Words = std::vector<std::string>;
   for (const Words& option :
        {Words{"--value-precision", "fine"}, {"--overlap", "all"}, {"--surface", "k=3"}, {"--no-surfaces"}})
     for (const char* mode : {"--add-steps", "--add-scalar=f"}) {
@@ -336,13 +314,64 @@ TEST_F(SeriesCommand, RefusesInOneLine) {
   const ProgramResult broken =
       runProgram({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("b.splats")});
   EXPECT_EQ(broken.status, 1);
-  EXPECT_NE(broken.err.find("step 3"), std::string::npos) << broken.err;
-  EXPECT_NE(broken.err.find("f_0003.fun"), std::string::npos) << broken.err;
+  expectSays(broken.err, "step 3");
+  expectSays(broken.err, "f_0003.fun");
   EXPECT_EQ(CacheReader(file("b.splats")).series().steps.size(), 3u);
   const ProgramResult kept =
       run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("c.splats"), "--keep-going"});
-  EXPECT_NE(kept.err.find("left out step 3"), std::string::npos) << kept.err;
+  expectSays(kept.err, "left out step 3");
   EXPECT_EQ(CacheReader(file("c.splats")).series().steps.size(), 4u);
+}
+
+/// Whether the process holds a queue of inotify with watches.
+bool hasWatches(pid_t process) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator("/proc/" + std::to_string(process) + "/fdinfo", error)) {
+    if (bytesOfFile(entry.path()).find("inotify wd:") != std::string::npos) return true;
+  }
+  return false;
+}
+
+class Follow : public ProgramTest {
+ protected:
+  /// w.xyz and w_0000.fun, ..., which have been there for a while.
+  void generate(int steps) {
+    run({"generate", "wake", "--size", "24x20x16", "--steps", std::to_string(steps), "-o", file("w")});
+    settle();
+  }
+  void settle() const {
+    for (const auto& entry : fs::directory_iterator(folder_.path()))
+      if (entry.is_regular_file())
+        fs::last_write_time(entry.path(), fs::file_time_type::clock::now() - std::chrono::hours(1));
+  }
+};
+
+TEST_F(Follow, NoticesChanges) {
+  generate(2);
+  fs::rename(file("w_0001.fun"), file("later"));
+  RunningProgram following(
+      {"convert", file("w.xyz"), file("w_*.fun"), "--follow", "--until", "2", "-o", file("a.splats")});
+  {
+    FolderWatch watch(folder_.path());
+    watch.waitUntil([&] { return fs::exists(file("a.splats")); });
+  }
+  EXPECT_TRUE(hasWatches(following.process()));
+  fs::rename(file("later"), file("w_0001.fun"));
+  const ProgramResult result = following.wait();
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
+}
+
+TEST_F(Follow, WaitsForAFolder) {
+  generate(1);
+  RunningProgram following({"convert", file("run/w.xyz"), file("run/w_*.fun"), "--follow", "--until", "1",
+                            "-o", file("a.splats")});
+  fs::create_directories(file("run"));
+  for (const char* name : {"w.xyz", "w_0000.nam", "w_0000.fun"})
+    fs::rename(file(name), file(std::string("run/") + name));
+  const ProgramResult result = following.wait();
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 1u);
 }
 
 }  // namespace

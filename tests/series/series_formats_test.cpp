@@ -12,8 +12,7 @@
 #include "tests/support/cgns_writer.h"
 #include "tests/support/earth_files.h"
 #include "tests/support/netcdf_writer.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/program_test.h"
 #include "tests/support/vts_writer.h"
 
 namespace curvisplat {
@@ -21,32 +20,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class SeriesFormats : public testing::Test {
+class SeriesFormats : public ProgramTest {
  protected:
-  void run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
-  }
-  std::string file(const std::string& name) const { return (folder / name).string(); }
-
   /// Converts `series` to a.splats with --steps all and compares step n with what `alone(n)` names.
   template <typename Alone>
   void expectEachAsAlone(const std::string& series, const std::vector<uint32_t>& geometries,
-                         const Alone& alone, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> words{"convert", series,           "--steps",    "all",
-                                   "-o",      file("a.splats"), "--overwrite"};
-    words.insert(words.end(), more.begin(), more.end());
-    run(words);
+                         const Alone& alone, const Words& more = {}) {
+    run(Words{"convert", series, "--steps", "all", "-o", file("a.splats"), "--overwrite"} + more);
     const CacheReader cache(file("a.splats"));
     ASSERT_EQ(cache.series().steps.size(), geometries.size());
     for (size_t step = 0; step < geometries.size(); ++step) {
       SCOPED_TRACE(step);
       EXPECT_EQ(cache.series().steps[step].geometry, geometries[step]);
-      words = alone(step);
-      words.insert(words.begin(), "convert");
-      words.insert(words.end(), {"-o", file("b.splats"), "--overwrite"});
-      words.insert(words.end(), more.begin(), more.end());
-      run(words);
+      run(Words{"convert"} + alone(step) + Words{"-o", file("b.splats"), "--overwrite"} + more);
       const CacheReader found = cache.atStep(step), wanted(file("b.splats"));
       for (const std::string& finding : verifyCache(found).findings) ADD_FAILURE() << finding;
       expectSame(found, wanted);
@@ -73,20 +59,18 @@ class SeriesFormats : public testing::Test {
       }
     }
   }
-
-  const TemporaryFolder folder;
 };
 
 TEST_F(SeriesFormats, TimeDimensionOfNetcdf) {
   nemo::write(file("nemo.nc"), NetcdfFileType::kNetcdf4, false);
   expectEachAsAlone(file("nemo.nc"), {0, 0, 0}, [&](size_t step) {
-    return std::vector<std::string>{file("nemo.nc"), "--time-step", std::to_string(step)};
+    return Words{file("nemo.nc"), "--time-step", std::to_string(step)};
   });
   // Levels that follow the surface move with it.
   roms::write(file("roms.nc"), NetcdfFileType::kClassic, "ocean_s_coordinate_g2");
   expectEachAsAlone(file("roms.nc"), {0, 1},
                     [&](size_t step) {
-                      return std::vector<std::string>{file("roms.nc"), "--time-step", std::to_string(step)};
+                      return Words{file("roms.nc"), "--time-step", std::to_string(step)};
                     },
                     {"--scalar", "temp"});
 }
@@ -133,23 +117,19 @@ TEST_F(SeriesFormats, NetcdfGridWithHistoryFilesOneAfterTheOther) {
   writeGrid(file("grid.nc"));
   writeHistory(file("his_0001.nc"), {0, 1});
   writeHistory(file("his_0002.nc"), {2, 3.5});
-  expectEachAsAlone(file("his_*.nc"), {0, 0, 0, 0},
-                    [&](size_t step) {
-                      return std::vector<std::string>{file(step < 2 ? "his_0001.nc" : "his_0002.nc"),
-                                                      "--time-step", std::to_string(step % 2)};
-                    },
-                    {file("grid.nc")});
+  expectEachAsAlone(
+      file("his_*.nc"), {0, 0, 0, 0},
+      [&](size_t step) {
+        return Words{file(step < 2 ? "his_0001.nc" : "his_0002.nc"), "--time-step", std::to_string(step % 2)};
+      },
+      {file("grid.nc")});
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps[3].time, 3.5);
 
   // A restart that went back: the file and its step are named.
   writeHistory(file("his_0003.nc"), {4, 3});
-  const ProgramResult back = runProgram({"convert", file("grid.nc"), file("his_0001.nc"), file("his_0002.nc"),
-                                         file("his_0003.nc"), "--steps", "all", "-o", file("c.splats")});
-  EXPECT_EQ(back.status, 1);
-  EXPECT_EQ(lineCount(back.err), 1) << back.err;
-  EXPECT_NE(back.err.find("step 5"), std::string::npos) << back.err;
-  EXPECT_NE(back.err.find("his_0003.nc, time step 1"), std::string::npos) << back.err;
-  EXPECT_NE(back.err.find("its time 3 is not after 4"), std::string::npos) << back.err;
+  expectRefused({"convert", file("grid.nc"), file("his_0001.nc"), file("his_0002.nc"), file("his_0003.nc"),
+                 "--steps", "all", "-o", file("c.splats")},
+                1, {"step 5", "his_0003.nc, time step 1", "its time 3 is not after 4"});
   EXPECT_EQ(CacheReader(file("c.splats")).series().steps.size(), 5u);
 }
 
@@ -169,7 +149,7 @@ TEST_F(SeriesFormats, FilesThatCountTheirTimesFromOtherDates) {
   EXPECT_EQ(timesOf(file("a.splats")), (std::vector<double>{0, 1, 2, 3.5}));
   EXPECT_EQ(CacheReader(file("a.splats")).seriesManifest().time_unit, "days since 2000-01-01");
   const ProgramResult info = runProgram({"info", file("a.splats")});
-  EXPECT_NE(info.out.find("3.5  2000-01-04 12:00:00         0"), std::string::npos) << info.out;
+  expectSays(info.out, "3.5  2000-01-04 12:00:00         0");
   // Added later, resumed, and in parts.
   run({"convert", file("his_0001.nc"), file("grid.nc"), "--steps", "all", "-o", file("b.splats")});
   run({"convert", file("his_0002.nc"), file("grid.nc"), "--add-steps", "--to", file("b.splats")});
@@ -181,15 +161,10 @@ TEST_F(SeriesFormats, FilesThatCountTheirTimesFromOtherDates) {
   EXPECT_EQ(timesOf(file("c.splats")), timesOf(file("a.splats")));
 
   writeHistory(file("his_0003.nc"), {5, 6}, "months since 2000-01-01");
-  const ProgramResult result =
-      runProgram({"convert", file("his_0003.nc"), file("grid.nc"), "--add-steps", "--to", file("a.splats")});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("step 4"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("its times are in 'months since 2000-01-01', which cannot be converted to 'days "
-                            "since 2000-01-01', the unit of the steps before it"),
-            std::string::npos)
-      << result.err;
+  expectRefused({"convert", file("his_0003.nc"), file("grid.nc"), "--add-steps", "--to", file("a.splats")}, 1,
+                {"step 4",
+                 "its times are in 'months since 2000-01-01', which cannot be converted to 'days "
+                 "since 2000-01-01', the unit of the steps before it"});
 }
 
 TEST_F(SeriesFormats, TimesAreThoseOfTheDataNotOfAGridFile) {
@@ -198,8 +173,8 @@ TEST_F(SeriesFormats, TimesAreThoseOfTheDataNotOfAGridFile) {
   for (const std::vector<double>& times : {std::vector<double>{7}, {7, 8}, {7, 8, 9}}) {
     writeGrid(file("grid.nc"), times);
     for (const bool grid_first : {true, false}) {
-      const std::vector<std::string> files = grid_first ? std::vector{file("grid.nc"), file("his_*.nc")}
-                                                        : std::vector{file("his_*.nc"), file("grid.nc")};
+      const Words files = grid_first ? std::vector{file("grid.nc"), file("his_*.nc")}
+                                     : std::vector{file("his_*.nc"), file("grid.nc")};
       run({"convert", files[0], files[1], "-o", file("a.splats"), "--overwrite"});
       EXPECT_EQ(timesOf(file("a.splats")), (std::vector<double>{1, 2, 4})) << times.size() << grid_first;
       EXPECT_EQ(CacheReader(file("a.splats")).seriesManifest().time_unit, "days since 2000-01-01");
@@ -212,13 +187,13 @@ TEST_F(SeriesFormats, FilesHoldDifferentNumbersOfSteps) {
   writeHistory(file("his_0001.nc"), {0});  // such as the state that a run begins with
   writeHistory(file("his_0002.nc"), {1, 2});
   writeHistory(file("his_0003.nc"), {3, 4, 5});
-  for (const auto& entry : fs::directory_iterator(folder.path()))
+  for (const auto& entry : fs::directory_iterator(folder_.path()))
     fs::last_write_time(entry.path(), fs::file_time_type::clock::now() - std::chrono::hours(1));
   run({"convert", file("his_*.nc"), file("grid.nc"), "-o", file("a.splats")});
   EXPECT_EQ(timesOf(file("a.splats")), (std::vector<double>{0, 1, 2, 3, 4, 5}));
   // Followed, stopped within a file, and followed again.
-  std::vector<std::string> follow{"convert", file("his_*.nc"), file("grid.nc"), "--follow", "--until", "2",
-                                  "-o",      file("b.splats")};
+  Words follow{"convert", file("his_*.nc"), file("grid.nc"), "--follow", "--until", "2",
+               "-o",      file("b.splats")};
   run(follow);
   EXPECT_EQ(timesOf(file("b.splats")), (std::vector<double>{0, 1}));
   follow[5] = "6";
@@ -228,10 +203,10 @@ TEST_F(SeriesFormats, FilesHoldDifferentNumbersOfSteps) {
 
   // One that cannot be opened is left out like any other step.
   fs::resize_file(file("his_0002.nc"), 100);
-  const std::vector<std::string> broken{"convert", file("his_*.nc"), file("grid.nc"), "-o", file("c.splats")};
+  const Words broken{"convert", file("his_*.nc"), file("grid.nc"), "-o", file("c.splats")};
   const ProgramResult stopped = runProgram(broken);
   EXPECT_EQ(stopped.status, 1);
-  EXPECT_NE(stopped.err.find("step 1 (" + file("his_0002.nc") + ")"), std::string::npos) << stopped.err;
+  expectSays(stopped.err, "step 1 (" + file("his_0002.nc") + ")");
   run({"convert", file("his_*.nc"), file("grid.nc"), "-o", file("d.splats"), "--keep-going"});
   EXPECT_EQ(timesOf(file("d.splats")), (std::vector<double>{0, 3, 4, 5}));
 }
@@ -258,13 +233,13 @@ TEST_F(SeriesFormats, BaseIterativeDataOfCgns) {
     writer.zoneSteps({"step0", "step1", "step2"}, {"GridCoordinates", "GridCoordinates", "Moved"});
   }
   expectEachAsAlone(file("a.cgns"), {0, 0, 1}, [&](size_t step) {
-    return std::vector<std::string>{file("a.cgns"), "--time-step", std::to_string(step)};
+    return Words{file("a.cgns"), "--time-step", std::to_string(step)};
   });
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps[2].time, 1.5);
 }
 
 TEST_F(SeriesFormats, ZonesOfCgnsThatChangeAreNamedOrLeftOut) {
-  const auto write = [&](const std::vector<std::vector<std::string>>& zones) {
+  const auto write = [&](const std::vector<Words>& zones) {
     CgnsWriter writer(file("a.cgns"), CgnsFileType::kHdf5);
     const auto field = [](const char* name, double i, double j, double k) {
       return CgnsWriterField{name, [=](int64_t at_i, int64_t at_j, int64_t at_k) {
@@ -281,13 +256,13 @@ TEST_F(SeriesFormats, ZonesOfCgnsThatChangeAreNamedOrLeftOut) {
       writer.solution("Only", "Vertex", {field("Density", 1, 2, 3)});
     }
   };
-  const std::vector<std::string> words{"convert",        file("a.cgns"), "--steps",  "all",    "-o",
-                                       file("a.splats"), "--overwrite",  "--scalar", "Density"};
+  const Words words{"convert",        file("a.cgns"), "--steps",  "all",    "-o",
+                    file("a.splats"), "--overwrite",  "--scalar", "Density"};
   const std::string other =
       "a cache holds steps of the same blocks: convert the others to a cache of their own";
-  const std::vector<std::string> always{"Always", "Null"}, both{"Always", "Later"};
+  const Words always{"Always", "Null"}, both{"Always", "Later"};
   struct Case {
-    std::vector<std::vector<std::string>> zones;
+    std::vector<Words> zones;
     std::string told;
   };
   for (const auto& [zones, told] :
@@ -297,19 +272,14 @@ TEST_F(SeriesFormats, ZonesOfCgnsThatChangeAreNamedOrLeftOut) {
              "its block 1 (Other) has 6x5x3 nodes; in the steps before it 6x5x4; "}}) {
     SCOPED_TRACE(told);
     write(zones);
-    const ProgramResult refused = runProgram(words);
-    EXPECT_EQ(refused.status, 1);
-    EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
-    for (const std::string& part :
-         {std::string("step 2 (") + file("a.cgns") + ", time step 2) cannot be converted: ", told, other,
-          std::string("; the cache has 2 steps; --keep-going leaves out such steps")})
-      EXPECT_NE(refused.err.find(part), std::string::npos) << refused.err;
+    expectRefused(words, 1,
+                  {std::string("step 2 (") + file("a.cgns") + ", time step 2) cannot be converted: ", told,
+                   other, std::string("; the cache has 2 steps; --keep-going leaves out such steps")});
     EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
 
-    std::vector<std::string> kept = words;
+    Words kept = words;
     kept.emplace_back("--keep-going");
-    const ProgramResult result = runProgram(kept);
-    EXPECT_EQ(result.status, 0) << result.err;
+    const ProgramResult result = run(kept);
     EXPECT_NE((result.out + result.err).find("step 2"), std::string::npos) << result.out << result.err;
     EXPECT_NE((result.out + result.err).find(told), std::string::npos) << result.out << result.err;
     const CacheReader cache(file("a.splats"));
@@ -320,7 +290,7 @@ TEST_F(SeriesFormats, ZonesOfCgnsThatChangeAreNamedOrLeftOut) {
 }
 
 /// Two zones of the same size: 1 + x and 1 + x + 100, and the second lies 10 further along x.
-void writeTwoZones(const std::string& path, const std::vector<std::string>& names, double time) {
+void writeTwoZones(const std::string& path, const Words& names, double time) {
   CgnsWriter writer(path, CgnsFileType::kHdf5);
   writer.base("base");
   writer.baseSteps({time});
@@ -356,16 +326,14 @@ TEST_F(SeriesFormats, ZonesOfOtherNamesAreTakenInOrderAndSaid) {
   // The number of a file's step is no other name.
   writeTwoZones(file("n_1.cgns"), {"a1", "b1"}, 1);
   writeTwoZones(file("n_2.cgns"), {"a2", "b2"}, 2);
-  const std::vector<std::string> words{"convert",  file("n_*.cgns"), "-o",         file("n.splats"),
-                                       "--scalar", "Density",        "--overwrite"};
-  ProgramResult result = runProgram(words);
-  EXPECT_EQ(result.status, 0);
+  const Words words{"convert",  file("n_*.cgns"), "-o",         file("n.splats"),
+                    "--scalar", "Density",        "--overwrite"};
+  ProgramResult result = run(words);
   EXPECT_EQ(result.err.find("names do not tell"), std::string::npos) << result.err;
 
   writeTwoZones(file("n_2.cgns"), {"left", "right"}, 2);
   writeTwoZones(file("n_3.cgns"), {"left", "right"}, 3);
-  result = runProgram(words);
-  EXPECT_EQ(result.status, 0);
+  result = run(words);
   const size_t said =
       result.err.find("block 1 is called left, in the first step a1; since names do not tell");
   ASSERT_NE(said, std::string::npos) << result.err;
@@ -388,10 +356,8 @@ TEST_F(SeriesFormats, CellCentredFilesAndTheirCollections) {
   }
   std::ofstream(file("c.pvd")) << pvd << "</Collection></VTKFile>";
   std::ofstream(file("c.vts.series")) << series << "]}";
-  const std::vector<std::string> cells{"--scalar", "T"};
-  const auto alone = [&](size_t step) {
-    return std::vector<std::string>{file("c_" + std::to_string(step) + ".vts")};
-  };
+  const Words cells{"--scalar", "T"};
+  const auto alone = [&](size_t step) { return Words{file("c_" + std::to_string(step) + ".vts")}; };
   expectEachAsAlone(file("c_*.vts"), {0, 0, 0}, alone, cells);
   EXPECT_TRUE(CacheReader(file("a.splats")).manifest().cells);
   expectEachAsAlone(file("c.pvd"), {0, 0, 0}, alone, cells);

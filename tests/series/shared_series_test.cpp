@@ -13,13 +13,14 @@
 #include <utility>
 
 #include "preprocess/addition/join_series.h"
-#include "preprocess/addition/series_part.h"
+#include "preprocess/addition/series_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_update.h"
 #include "stream/cache/cache_verify.h"
 #include "tests/series/step_series.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/fault_sweep.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
@@ -38,11 +39,6 @@ Conversion convertBy(unsigned count, const SeriesInput& input, const SeriesOptio
     if (ranks.isFirst()) first = run;
   });
   return first;
-}
-
-size_t entriesOf(const fs::path& folder) {
-  const fs::directory_iterator all(folder);
-  return static_cast<size_t>(std::distance(begin(all), end(all)));
 }
 
 /// A grid that stays, one that moves at each step, one that moves now and then and comes back, and one that leaves for a
@@ -134,12 +130,8 @@ TEST(SharedSeries, LeavesOutWhatDoesNotFitOrNamesIt) {
     EXPECT_EQ(shared.left_out[n].substr(0, 30), one.left_out[n].substr(0, 30));
   EXPECT_TRUE(allFilesOf(folder / "shared.splats") == allFilesOf(folder / "one.splats"));
 
-  try {
-    convertBy(3, inputOf(kinds), optionsFor(folder / "refused.splats"));
-    ADD_FAILURE() << "converted";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("step 5 (file 5)"), std::string::npos) << error.what();
-  }
+  expectError([&] { convertBy(3, inputOf(kinds), optionsFor(folder / "refused.splats")); },
+              {"step 5 (file 5)"});
   EXPECT_EQ(CacheReader(folder / "refused.splats").series().steps.size(), 5u);
   EXPECT_EQ(entriesOf(folder.path()), 3u) << "something is left";
 }
@@ -207,20 +199,17 @@ void expectGivenFoldersOnFullDisks(const fs::path& given, int64_t stride, const 
     faults::FaultySystemCalls full;
     full.is_unsynced = true;
     full.fail_write_at = at;
-    try {
+    const std::string message = errorOf([&] {
       const ScopedSystemCalls faulty(full);
       work();
-    } catch (const Error& error) {
-      // A rank may also find the common folder removed before it hears that another one has failed.
-      const std::string message = error.what();
-      if (message.find("No space left on device") == std::string::npos) continue;
-      ++failures;
-      EXPECT_FALSE(faults::namesTemporaryFile(message)) << message;
-      EXPECT_NE(message.find(given.string()), std::string::npos) << message;
-      EXPECT_NE(message.find(": no room for "), std::string::npos) << message;
-      continue;
-    }
-    break;
+    });
+    if (message.empty()) break;
+    // A rank may also find the common folder removed before it hears that another one has failed.
+    if (message.find("No space left on device") == std::string::npos) continue;
+    ++failures;
+    EXPECT_FALSE(faults::namesTemporaryFile(message)) << message;
+    expectSays(message, given.string());
+    expectSays(message, ": no room for ");
   }
   EXPECT_GE(failures, 3);
 }
@@ -314,24 +303,19 @@ TEST(SeriesParts, ThatCannotBeJoinedAreRefused) {
   const fs::path output = folder / "a.splats";
   Progress progress;
   const auto refusal = [&] {
-    try {
-      joinParts({partsFolder(output), output, false}, progress);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string("joined");
+    return errorOf([&] { joinParts({partsFolder(output), output, false}, progress); });
   };
   convertPart(output, kNowAndThen, {0, 3});
   convertPart(output, kNowAndThen, {2, 3});
-  EXPECT_NE(refusal().find("part 2 of 3 is missing"), std::string::npos) << refusal();
+  expectSays(refusal(), "part 2 of 3 is missing");
   convertPart(output, kNowAndThen, {1, 3});
-  EXPECT_NE(refusal().find("cannot be joined"), std::string::npos) << refusal();
+  expectSays(refusal(), "cannot be joined");
   EXPECT_FALSE(fs::exists(output));
   fs::remove_all(partsFolder(output));
   for (const uint64_t index : {0u, 1u}) convertPart(output, kOnceAway, {index, 2});
-  EXPECT_NE(refusal().find("step 6 cannot be joined"), std::string::npos) << refusal();
+  expectSays(refusal(), "step 6 cannot be joined");
   convertPart(output, kOnceAway, {0, 3});
-  EXPECT_NE(refusal().find("parts of 2 and parts of 3"), std::string::npos) << refusal();
+  expectSays(refusal(), "parts of 2 and parts of 3");
   EXPECT_EQ(entriesOf(folder.path()), 1u) << "something is left";
 }
 
@@ -361,15 +345,13 @@ TEST(SeriesParts, OfOtherOptionsAreRefused) {
   for (const auto& [change, words] : cases) {
     fs::remove_all(partCache(partsFolder(output), {1, 2}));
     convertPart(output, kSteady, {1, 2}, change);
-    try {
-      Progress progress;
-      joinParts({partsFolder(output), output, true}, progress);
-      ADD_FAILURE() << "joined: " << words;
-    } catch (const Error& error) {
-      const std::string message = error.what();
-      EXPECT_NE(message.find("part 2 was not converted as part 1 was"), std::string::npos) << message;
-      EXPECT_NE(message.find(words), std::string::npos) << message;
-    }
+    SCOPED_TRACE(words);
+    expectError(
+        [&] {
+          Progress progress;
+          joinParts({partsFolder(output), output, true}, progress);
+        },
+        {"part 2 was not converted as part 1 was", words});
     EXPECT_FALSE(fs::exists(output));
   }
 }
@@ -397,14 +379,11 @@ TEST(SeriesParts, AreWholeInTheCacheWhicheverSyncFails) {
       fs::copy(partCache(parts, {0, 2}), output, fs::copy_options::recursive);
       WithoutExchange calls;
       calls.fail_sync_at = at;
-      std::string failure;
-      try {
+      const std::string failure = errorOf([&] {
         const ScopedSystemCalls faulty(calls);
         const CacheLock lock(output);
         EXPECT_TRUE(takeStep(lock, {part, 1, {}, true}, Progress()));
-      } catch (const Error& error) {
-        failure = error.what();
-      }
+      });
       const bool is_added = failure.empty() || failure.find("power loss") != std::string::npos;
       not_synced |= is_added && !failure.empty();
       const CacheReader cache(output);
@@ -430,13 +409,9 @@ TEST(SeriesParts, NameTheFolderOfTheOutputIfTheDiskIsFull) {
 TEST(SeriesParts, CopiesOfFilesCanBeInterrupted) {
   const TemporaryFolder folder;
   const fs::path program = "/proc/self/exe";  // of another file system: no second name
-  const auto bytesOf = [](const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(file), {});
-  };
   Progress progress;
   linkOrCopy(program, folder / "copy", progress);
-  EXPECT_TRUE(bytesOf(folder / "copy") == bytesOf(program));
+  EXPECT_TRUE(bytesOfFile(folder / "copy") == bytesOfFile(program));
   progress.stop(SIGINT);
   EXPECT_THROW(linkOrCopy(program, folder / "copy", progress), Interrupted);
   EXPECT_FALSE(fs::exists(folder / "copy"));

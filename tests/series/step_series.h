@@ -16,18 +16,6 @@ namespace curvisplat {
 
 namespace fs = std::filesystem;
 
-/// Every file below `folder`, by its path.
-inline std::map<std::string, std::string> allFilesOf(const fs::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file()) continue;
-    std::ifstream file(entry.path(), std::ios::binary);
-    files[fs::relative(entry.path(), folder).string()] =
-        std::string(std::istreambuf_iterator<char>(file), {});
-  }
-  return files;
-}
-
 /// What a step of the test series is made of.
 struct StepKind {
   double time = 0;

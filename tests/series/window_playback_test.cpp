@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tests/end_to_end/window_fixture.h"
-#include "tools/viewer/playback.h"
+#include "tools/view/playback.h"
 
 namespace curvisplat {
 namespace {

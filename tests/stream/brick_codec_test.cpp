@@ -13,7 +13,7 @@
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
-#include "tests/stream/test_bricks.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {

@@ -11,9 +11,10 @@
 #include <thread>
 
 #include "stream/base/error.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
-#include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {
@@ -179,14 +180,7 @@ TEST_F(BrickSourceTest, AFailingDiskSurfacesOnceAndNamesABrick) {
     faulty.fail_read_at = at;
     faulty.error = EIO;
     FetchStatistics statistics;
-    try {
-      takeAll(source, order_, 3, statistics);
-      ADD_FAILURE() << "nothing was thrown";
-    } catch (const Error& error) {
-      const std::string message = error.what();
-      EXPECT_NE(message.find("brick "), std::string::npos) << message;
-      EXPECT_NE(message.find("Input/output error"), std::string::npos) << message;
-    }
+    expectError([&] { takeAll(source, order_, 3, statistics); }, {"brick ", "Input/output error"});
     faulty.fail_read_at = -1;
     EXPECT_EQ(takeAll(source, order_, 3, statistics), order_.size());
   }
@@ -232,13 +226,8 @@ TEST_F(BrickSourceTest, DamageIsFoundAndReplacedByAnAncestor) {
               inner ? cache_->brickVariables(0)[damaged].values.offset : bricks[damaged].geometry.offset);
     BrickSource source(*cache_, 0, pagerOptions(), decoded_bytes_);
     FetchStatistics statistics;
-    try {
-      takeAll(source, {damaged}, 1, statistics);
-      ADD_FAILURE() << "a damaged brick was decoded";
-    } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find("brick " + std::to_string(damaged) + " "), std::string::npos)
-          << error.what();
-    }
+    expectError([&] { takeAll(source, {damaged}, 1, statistics); },
+                {"brick " + std::to_string(damaged) + " "});
     EXPECT_EQ(source.cached().statistics().bricks, 0u);
 
     BrickSource::Scratch scratch;

@@ -9,24 +9,14 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
-#include "tests/stream/test_bricks.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The message of the Error that `work` throws.
-template <typename Work>
-std::string errorOf(Work work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 bool says(const std::string& message, const std::string& words) {
   return message.find(words) != std::string::npos;

@@ -1,18 +1,51 @@
-#include "stream/base/file.h"
-
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/temporary_files.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
 namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Paths, LinksLeadToWhatIsThereOrToBe) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(linkTarget(folder / "none"), folder / "none");
+  fs::create_symlink("none", folder / "link");
+  fs::create_symlink(folder / "link", folder / "further");
+  EXPECT_EQ(linkTarget(folder / "further"), folder / "none");
+  EXPECT_EQ(writableTarget(folder / "further"), folder / "none");
+  EXPECT_FALSE(isRegularFile(folder / "further"));
+  writeFileAtomically(folder / "none", std::string("some"));
+  EXPECT_TRUE(isRegularFile(folder / "further"));
+  EXPECT_FALSE(isRegularFile(folder.path() / std::string(5000, 'x')));
+
+  fs::create_symlink("round", folder / "about");
+  fs::create_symlink("about", folder / "round");
+  EXPECT_THROW(linkTarget(folder / "round"), Error);
+  fs::create_directory(folder / "folder");
+  EXPECT_THROW(writableTarget(folder / "folder"), Error);
+}
+
+TEST(Paths, ExtensionsAreInSmallLetters) {
+  EXPECT_EQ(extensionOf("a/b.PnG"), ".png");
+  EXPECT_EQ(extensionOf("a.tar.GZ"), ".gz");
+  EXPECT_EQ(extensionOf("a.b/name"), "");
+}
 
 using faults::FaultySystemCalls;
 
@@ -31,14 +64,6 @@ class FileTest : public ::testing::Test {
     std::vector<std::byte> bytes(count);
     for (size_t n = 0; n < count; ++n) bytes[n] = static_cast<std::byte>(n * 7 + n / 256);
     return bytes;
-  }
-  static std::string messageOf(const std::function<void()>& work) {
-    try {
-      work();
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
   }
 
   std::filesystem::path folder;
@@ -90,16 +115,16 @@ TEST_F(FileTest, FailuresNameThePathThePlaceAndTheReason) {
   faulty.fail_write_at = 2;
   const ScopedSystemCalls scope(faulty);
   OutputFile out(folder / "full");
-  const std::string full = messageOf([&] { out.append(std::span(bytes)); });
-  EXPECT_NE(full.find((folder / "full").string()), std::string::npos) << full;
-  EXPECT_NE(full.find("no room for 20 more bytes"), std::string::npos) << full;
-  EXPECT_NE(full.find("No space left"), std::string::npos) << full;
+  const std::string full = errorOf([&] { out.append(std::span(bytes)); });
+  expectSays(full, (folder / "full").string());
+  expectSays(full, "no room for 20 more bytes");
+  expectSays(full, "No space left");
 
   faulty.fail_sync_at = 0;
   faulty.error = EIO;
-  const std::string broken = messageOf([&] { out.append(std::span(bytes)); });
-  EXPECT_NE(broken.find("offset 0: Input/output error"), std::string::npos) << broken;
-  EXPECT_NE(messageOf([&] { out.close(); }).find("Input/output error"), std::string::npos);
+  const std::string broken = errorOf([&] { out.append(std::span(bytes)); });
+  expectSays(broken, "offset 0: Input/output error");
+  expectSays(errorOf([&] { out.close(); }), "Input/output error");
 }
 
 TEST_F(FileTest, ReadingPastTheEndSaysWhereTheFileEnds) {
@@ -108,8 +133,8 @@ TEST_F(FileTest, ReadingPastTheEndSaysWhereTheFileEnds) {
   out.close();
   const InputFile in(folder / "short");
   std::vector<std::byte> to(20);
-  const std::string message = messageOf([&] { in.readAt(4, std::span(to)); });
-  EXPECT_NE(message.find("ends at byte 10"), std::string::npos) << message;
+  const std::string message = errorOf([&] { in.readAt(4, std::span(to)); });
+  expectSays(message, "ends at byte 10");
 }
 
 TEST_F(FileTest, MissingFilesAndFoldersAreRefused) {
@@ -165,6 +190,103 @@ TEST_F(FileTest, ATextFileIsBounded) {
   EXPECT_EQ(readTextFile(folder / "file").size(), 16u << 20);
   std::filesystem::resize_file(folder / "file", (16 << 20) + 1);
   EXPECT_THROW(readTextFile(folder / "file"), Error);
+}
+
+TEST(NamelessFile, IsReadWhileItsFolderStaysEmpty) {
+  const TemporaryFolder folder;
+  NamelessFile first(folder.path()), second(folder.path());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+
+  const std::vector<double> numbers{1, 2, 3};
+  first.out().append(std::span<const double>(numbers));
+  second.out().append(std::span<const double>(numbers).first(1));
+  std::vector<double> read(3);
+  first.in().readAt(0, std::span(read));
+  EXPECT_EQ(read, numbers);
+  EXPECT_EQ(second.out().size(), sizeof(double)) << "the two share their bytes";
+}
+
+TEST(NamelessFile, OpensNothingThatWasThere) {
+  const TemporaryFolder folder;
+  const std::filesystem::path victim = folder.path() / "victim", link = folder.path() / "link",
+                              other = folder.path() / "other";
+  OutputFile(victim).append(std::span<const char>("kept", 4));
+  std::filesystem::create_symlink(victim, link);
+  std::filesystem::create_symlink(folder.path() / "nothing", other);
+  const std::filesystem::path names[] = {victim, link, other, folder.path() / "free"};
+  size_t asked = 0;
+  const NewFile file = createNewFile([&](uint32_t) { return names[asked++]; }, 0600);
+  EXPECT_GE(file.fd, 0);
+  SystemCalls::current().close(file.fd);
+  EXPECT_EQ(file.path, names[3]);
+  EXPECT_EQ(asked, 4u);
+  EXPECT_EQ(readTextFile(victim), "kept");
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "nothing"));
+  EXPECT_EQ(std::filesystem::status(names[3]).permissions(),
+            std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+}
+
+TEST(NamelessFile, NamesTheFolderInWhichNoneCanBeMade) {
+  const TemporaryFolder folder;
+  const std::filesystem::path missing = folder.path() / "missing";
+  const std::string error = errorOf([&] { const NamelessFile file(missing); });
+  EXPECT_TRUE(error.starts_with(missing.string())) << error;
+}
+
+constexpr const char* kEnding = ".unpacked";
+
+TEST(TemporarySubfolder, IsRemovedWithWhatIsInIt) {
+  const TemporaryFolder dir;
+  {
+    TemporarySubfolder folder(dir.path(), kEnding);
+    std::ofstream(folder.path() / "file") << "text";
+    EXPECT_EQ(fs::status(folder.path()).permissions(), fs::perms::owner_all);
+    EXPECT_TRUE(folder.path().filename().string().ends_with(kEnding));
+  }
+  EXPECT_EQ(entriesOf(dir.path()), 0u);
+  TemporarySubfolder folder(dir.path(), kEnding);
+  folder.remove();
+  folder.remove();  // is none any more
+  EXPECT_EQ(entriesOf(dir.path()), 0u);
+}
+
+TEST(TemporarySubfolder, RemovesWhatAKilledProcessHasLeft) {
+  const TemporaryFolder dir;
+  const pid_t child = ::fork();
+  if (child == 0) {
+    TemporarySubfolder folder(dir.path(), kEnding);
+    std::ofstream(folder.path() / "file") << "text";
+    ::_exit(0);  // no destructor is called
+  }
+  int status = 1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  ASSERT_EQ(entriesOf(dir.path()), 1u);
+  { const TemporarySubfolder other_kind(dir.path(), ".other"); }
+  EXPECT_EQ(entriesOf(dir.path()), 1u);
+  const TemporarySubfolder folder(dir.path(), kEnding);
+  EXPECT_EQ(entriesOf(dir.path()), 1u);
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(TemporarySubfolder, LeavesOthersAlone) {
+  const TemporaryFolder dir;
+  const TemporaryNames names{"curvisplat.", kEnding};
+  const TemporarySubfolder in_use(dir.path(), kEnding);
+  fs::create_directory(dir.path() / "curvisplat.0000000000000000.unpacked");  // of another machine
+  fs::create_directory(dir.path() / "mine");
+  std::ofstream(dir.path() / "mine" / "precious") << "text";
+  fs::create_directory_symlink("mine", dir.path() / names.of(1));
+  std::ofstream(dir.path() / names.of(2)) << "a file";
+  { const TemporarySubfolder next(dir.path(), kEnding); }
+  EXPECT_TRUE(fs::exists(in_use.path()));
+  EXPECT_TRUE(fs::exists(dir.path() / "mine" / "precious"));
+  EXPECT_EQ(entriesOf(dir.path()), 5u);
+}
+
+TEST(TemporarySubfolder, ErrorsNameTheFolder) {
+  const std::string error = errorOf([] { const TemporarySubfolder folder("/no/such/place", kEnding); });
+  EXPECT_TRUE(error.starts_with("/no/such/place/curvisplat.")) << error;
 }
 
 }  // namespace

@@ -28,9 +28,11 @@ FOLDERS = {
 PROGRAM_ROOMS = {
     "tools/output": set(),
     "tools/mpi": set(),
+    "tools/vdb": set(),
     "tools/options": {"tools/output"},
-    "tools/commands": {"tools/output", "tools/options", "tools/serve", "tools/throughput", "tools/viewer"},
-    "tools/python": {"tools/output", "tools/options", "tools/viewer"},
+    "tools/commands": {"tools/output", "tools/options", "tools/serve", "tools/throughput", "tools/viewer",
+                       "tools/window"},
+    "tools/python": {"tools/output", "tools/options", "tools/view"},
     "tools": {"tools/output", "tools/options", "tools/commands"},
 }
 

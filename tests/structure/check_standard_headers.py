@@ -35,11 +35,12 @@ NAMES = {
     "thread": r"std::(thread|jthread|this_thread)\b",
     "unordered_map": r"std::unordered_map\s*<",
     "vector": r"std::vector\s*<",
-    "fmt/format.h": r"fmt::(format|join)\s*\(",
+    "fmt/core.h": r"fmt::format\s*\(",
+    "fmt/format.h": r"fmt::join\s*\(",
 }
 # What brings a header along, on any compiler.
-BRINGS = {"string": ("string_view",), "fmt/format.h": ("string",), "fstream": ("string",), "filesystem": ("string",),
-          "sstream": ("string",), "thread": ("stop_token",), "gtest/gtest.h": ("memory", "string", "vector", "map", "set")}
+BRINGS = {"string": ("string_view",), "fmt/core.h": ("string",), "fmt/format.h": ("fmt/core.h", "string"),
+          "fstream": ("string",), "filesystem": ("string",), "sstream": ("string",), "thread": ("stop_token",), "gtest/gtest.h": ("memory", "string", "vector", "map", "set")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*(?:"([^"]+)"|<([^>]+)>)', re.M)
 COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.S)
 

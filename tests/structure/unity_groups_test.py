@@ -64,7 +64,7 @@ class UnityGroups(unittest.TestCase):
 
     def test_a_source_with_a_type_of_a_name_that_an_included_header_has_is_apart(self):
         self.assertEqual(unity_groups.types("struct Brick {\nclass Forward;\ninline int size() {\n"), {"Brick"})
-        includes = '#include "stream/cache/cache_reader.h"\n'  # which includes stream/model/brick.h
+        includes = '#include "stream/cache/cache_reader.h"\n'  # which includes stream/model/octree.h
         self.assertTrue({"CacheReader", "Brick"} <= unity_groups.included(includes))
         self.assertNotIn("readTextFile", unity_groups.included('#include "stream/base/file.h"\n'))  # a function
         for name in ("CacheReader", "Brick"):

@@ -19,7 +19,6 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "tests/support/memory_limit.h"
-#include "tests/support/sanitizers.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -134,7 +134,7 @@ def built(folder):
 
 
 def places(stride=5):
-    """Which calls to let fail, without an end: the first twelve and then some; all with CURVISPLAT_WHOLE_SWEEPS (support/sweep.h)."""
+    """Which calls to let fail, without an end: the first twelve and then some; all with CURVISPLAT_WHOLE_SWEEPS (support/fault_sweep.h)."""
     place = 1
     while True:
         yield place

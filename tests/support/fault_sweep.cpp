@@ -9,7 +9,6 @@
 #include <regex>
 
 #include "stream/base/error.h"
-#include "tests/support/sweep.h"
 
 namespace curvisplat::faults {
 namespace {

@@ -1,13 +1,29 @@
-// Does a job again and again, and each time something else goes wrong with the disk: the first call fails,
-// the second one, ... until the job ends before it comes to that (sweep.h says which are tried).
+// Tests that try every place where something may go wrong: each call, each byte, each attribute. All of them
+// take minutes, so that usually only some are tried (nextInSweep); tools/test.sh --whole tries all.
+// FaultSweep does so with a disk: it does a job again and again, and the first call fails, the second one,
+// ... until the job ends before it comes to the call that would fail.
 #pragma once
 
+#include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <string>
 
 #include "tests/support/faulty_system_calls.h"
 
 namespace curvisplat::faults {
+
+/// Whether all places are to be tried: CURVISPLAT_WHOLE_SWEEPS is set, as tools/test.sh --whole does.
+inline bool isWholeSweep() {
+  return std::getenv("CURVISPLAT_WHOLE_SWEEPS") != nullptr;
+}
+
+/// The place to try after this one. The first ones, where files are opened and made, are all tried; of the others
+/// usually one in `stride`, which should have no divisor in common with what repeats in the job.
+inline int64_t nextInSweep(int64_t place, int64_t stride) {
+  constexpr int64_t kFirstOnes = 12;
+  return place + (place < kFirstOnes || isWholeSweep() ? 1 : stride);
+}
 
 /// What goes wrong at the n-th call of a kind.
 struct Fault {

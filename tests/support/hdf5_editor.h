@@ -1,12 +1,22 @@
-// Changes HDF5 files into ones that no CGNS library writes: attributes of other types and sizes, links in
-// circles.
+// HDF5 files that no CGNS library writes. Hdf5Editor changes a file into one with attributes of other types
+// and sizes, and links in circles; renewChecksum() lets a byte be changed in a structure that carries a
+// checksum.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace curvisplat {
+
+/// The checksum of HDF5's structures of version 2: Bob Jenkins' lookup3, of the bytes before it.
+uint32_t hdf5Checksum(std::string_view bytes);
+
+/// Where the structure that begins there in `whole` has its checksum at its end, puts that of the same place in
+/// `changed` right, and returns true.
+bool renewChecksum(std::string_view whole, size_t begin, std::string& changed);
 
 /// What stands where a short fixed text should.
 enum class HostileAttribute {

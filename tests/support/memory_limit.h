@@ -1,4 +1,6 @@
-// How much address space this process has, and a limit on how much more it may take.
+// What a test may judge of memory: how much address space this process has, a limit on how much more it may
+// take, and whether this is a build with sanitizers, of GCC or Clang. What these need of memory is not the
+// program's, so tests that limit or measure memory leave that out.
 #pragma once
 
 #include <sys/resource.h>
@@ -7,8 +9,34 @@
 #include <cstdint>
 #include <fstream>
 
+namespace curvisplat {
+
+constexpr bool kHasAddressSanitizer =
+#if defined(__has_feature)
+    __has_feature(address_sanitizer);
+#elif defined(__SANITIZE_ADDRESS__)
+    true;
+#else
+    false;
+#endif
+
+/// The thread sanitizer does not work in a process that a process with threads has forked.
+constexpr bool kHasThreadSanitizer =
+#if defined(__has_feature)
+    __has_feature(thread_sanitizer);
+#elif defined(__SANITIZE_THREAD__)
+    true;
+#else
+    false;
+#endif
+
+constexpr bool kIsSanitized = kHasAddressSanitizer || kHasThreadSanitizer;
+
+}  // namespace curvisplat
+
 namespace curvisplat::test {
 
+/// The address space that this process has.
 inline uint64_t mappedBytes() {
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;

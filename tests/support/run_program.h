@@ -1,4 +1,5 @@
-// Runs the real curvisplat program, as a person at a terminal would, and keeps what it said.
+// Runs the real curvisplat program, as a person at a terminal would, and keeps what it printed: to its end,
+// on its way, or as several ranks that mpirun starts.
 #pragma once
 
 #include <sys/types.h>
@@ -40,5 +41,12 @@ class RunningProgram {
 
 /// The number of lines in `text`; an unfinished last line counts.
 int lineCount(const std::string& text);
+
+/// "", or why the program cannot be started as several ranks here: tests skip with it.
+std::string whyNoRanks();
+
+/// Runs CURVISPLAT_PROGRAM as `count` ranks and waits for them. mpirun's own explanations are left out.
+ProgramResult runAsRanks(unsigned count, const std::vector<std::string>& arguments,
+                         const std::string& program = CURVISPLAT_PROGRAM);
 
 }  // namespace curvisplat

@@ -1,13 +1,18 @@
-#include "tools/throughput/frame_throughput.h"
-
 #include <gtest/gtest.h>
-
-#include <array>
+#include <signal.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <array>
+#include <random>
+
 #include "render/camera/camera_path.h"
-#include "tests/support/lattice_cache.h"
+#include "stream/base/error.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
+#include "tools/throughput/conversion_throughput.h"
+#include "tools/throughput/frame_throughput.h"
 #include "tools/throughput/stage_throughput.h"
 #include "tools/throughput/throughput_report.h"
 
@@ -104,7 +109,7 @@ TEST_F(ThroughputOfACache, FramesThatDoNotFitAreLeftOutWithTheReason) {
   Progress progress;
   EXPECT_TRUE(measureFrames(scene(), configurations, {}, measurements, progress).empty());
   ASSERT_EQ(measurements.leftOut().size(), 1u);
-  EXPECT_NE(measurements.leftOut()[0].reason.find("--memory"), std::string::npos);
+  expectSays(measurements.leftOut()[0].reason, "--memory");
 
   Measurements late;
   const FrameConfiguration one[] = {{0, 2, 256 * kMiB}};
@@ -141,7 +146,125 @@ TEST_F(ThroughputOfACache, AnEmptyPictureIsReported) {
   Progress progress;
   measureStages(scene(), 1, {.sample_s = 0, .samples = 1}, measurements, progress);
   EXPECT_TRUE(measurements.all().empty());
-  EXPECT_NE(leftOutTable(measurements).find("transparent"), std::string::npos) << leftOutTable(measurements);
+  expectSays(leftOutTable(measurements), "transparent");
+}
+
+struct Bricks {
+  explicit Bricks(size_t count, uint32_t least, uint32_t most) {
+    std::mt19937 random(1);
+    for (size_t n = 0; n < count; ++n) {
+      bricks.emplace_back().splats = least + static_cast<uint32_t>(random() % (most - least + 1));
+      parts.push_back({static_cast<uint32_t>(n)});
+      splats += bricks.back().splats;
+    }
+  }
+  std::vector<Brick> bricks;
+  std::vector<BrickPart> parts;
+  uint64_t splats = 0;
+};
+
+TEST(BrickSample, IsAllOfASmallFrame) {
+  const Bricks frame(10, 5, 9);
+  const BrickSample sample = sampleOf(frame.parts, frame.bricks, frame.splats);
+  EXPECT_EQ(sample.parts, frame.parts);
+  EXPECT_EQ(sample.splats, frame.splats);
+  EXPECT_TRUE(sampleOf({}, {}, 100).parts.empty());
+}
+
+TEST(BrickSample, IsAFewRunsSpreadOverALargeOne) {
+  const Bricks frame(5000, 500, 1500);
+  constexpr uint64_t kWanted = 400'000;
+  const BrickSample sample = sampleOf(frame.parts, frame.bricks, kWanted, 8);
+  uint64_t splats = 0;
+  size_t runs = 0;
+  for (size_t n = 0; n < sample.parts.size(); ++n) {
+    splats += frame.bricks[sample.parts[n].brick].splats;
+    if (n == 0 || sample.parts[n].brick != sample.parts[n - 1].brick + 1) ++runs;
+    if (n > 0) {
+      EXPECT_GT(sample.parts[n].brick, sample.parts[n - 1].brick);
+    }
+  }
+  EXPECT_EQ(sample.splats, splats);
+  EXPECT_EQ(runs, 8u);
+  // Each run may go over its share by one brick.
+  EXPECT_GE(splats, kWanted);
+  EXPECT_LE(splats, kWanted + 8 * 1500);
+  // One run an eighth of the frame.
+  for (size_t eighth = 0; eighth < 8; ++eighth)
+    EXPECT_TRUE(std::any_of(sample.parts.begin(), sample.parts.end(), [&](const BrickPart& part) {
+      return part.brick >= eighth * 600 && part.brick < (eighth + 1) * 640;
+    })) << eighth;
+}
+
+TEST(BrickSample, HasOnePartAtLeast) {
+  const Bricks frame(3, 1000, 1000);
+  const BrickSample sample = sampleOf(frame.parts, frame.bricks, 10);
+  ASSERT_GE(sample.parts.size(), 1u);
+  EXPECT_EQ(sample.parts.front().brick, 0u);
+}
+
+TEST(BrickSample, CountsTheOctantsThatAreDrawn) {
+  Bricks frame(1, 80, 80);
+  frame.bricks[0].octant_splats.fill(10);
+  frame.parts[0].octants = 0b101;
+  EXPECT_EQ(sampleOf(frame.parts, frame.bricks, 1000).splats, 20u);
+}
+
+TEST(ConversionThroughput, GridsHaveAboutAsManyNodesAsAskedFor) {
+  for (const uint64_t nodes : {1000ull, 5000ull, 200'000ull, 8'000'000ull, 100'000'000'000ull}) {
+    const SceneGridSize size = sizeOfGrid(nodes);
+    EXPECT_NEAR(static_cast<double>(size.ni * size.nj * size.nk) / static_cast<double>(nodes), 1, 0.05)
+        << nodes;
+    EXPECT_EQ(size.ni, size.nj);
+  }
+  EXPECT_EQ(sizeOfGrid(1).nk, 8u);
+}
+
+TEST(ConversionThroughput, MeasuresEveryPhaseAndLeavesNothing) {
+  const TemporaryFolder folder;
+  Measurements measurements;
+  Progress progress;
+  const ConversionEffort effort{
+      .nodes = 20'000, .threads = 2, .temporary_folder = folder.path(), .repeat_s = 1e9, .max_runs = 2};
+  const ConversionReport report = measureConversion(effort, measurements, progress);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  EXPECT_EQ(report.last.nodes, report.nodes());
+  const std::string prefix = report.cold ? "conversion/cold/" : "conversion/warm/";
+  ASSERT_NE(measurements.find(prefix + "rate"), nullptr);
+  EXPECT_EQ(measurements.find(prefix + "rate")->samples.size(), 2u);
+  for (const char* phase : {"scan", "scatter", "build"})
+    EXPECT_NE(measurements.find(prefix + "phase/" + phase), nullptr) << phase;
+  ASSERT_FALSE(report.phases.empty());
+  const std::string table = conversionTable(report);
+  for (const Progress::Phase& phase : report.phases) expectSays(table, "\n" + phase.name);
+  expectSays(conversionSummary(report, measurements), "nodes/s, median of 2 runs");
+  EXPECT_EQ(toJson(report)["phases"].size(), report.phases.size());
+  EXPECT_EQ(conversionPlots(report).count("conversion.png"), 1u);
+}
+
+TEST(ConversionThroughput, LeavesNothingWhenItIsStopped) {
+  const TemporaryFolder folder;
+  Measurements measurements;
+  Progress progress;
+  progress.stop(SIGINT);
+  EXPECT_THROW(
+      measureConversion({.nodes = 20'000, .temporary_folder = folder.path()}, measurements, progress),
+      Interrupted);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(ConversionThroughput, ChecksFreeSpaceBeforeAnyWork) {
+  const TemporaryFolder folder;
+  Measurements measurements;
+  Progress progress;
+  expectError(
+      [&] {
+        measureConversion({.nodes = uint64_t{1} << 50, .temporary_folder = folder.path()}, measurements,
+                          progress);
+      },
+      {"MiB free", "--nodes"});
+  EXPECT_TRUE(progress.phases().empty());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Work beside the window: on threads of low priority, which are its own.
-#include "tools/viewer/background_job.h"
+#include "tools/view/background_jobs.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -13,10 +13,9 @@
 #include <stdexcept>
 #include <thread>
 
-#include "stream/base/interrupted.h"
-#include "tests/support/sanitizers.h"
+#include "stream/base/progress.h"
+#include "tests/support/memory_limit.h"
 #include "tests/support/virtual_display.h"
-#include "tools/viewer/opening.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/viewer/camera_controls.h"
+#include "tools/viewer/navigation.h"
 
 #include <gtest/gtest.h>
 

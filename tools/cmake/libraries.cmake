@@ -3,7 +3,7 @@
 #   curvisplat_find(PACKAGE ...)       as find_package
 #   curvisplat_find_pkg(NAME MODULE)   as pkg_check_modules, with the target PkgConfig::NAME
 # and has CURVISPLAT_ANNOTATIONS set.
-list(APPEND CMAKE_MODULE_PATH "${CMAKE_CURRENT_LIST_DIR}" "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB")
+list(APPEND CMAKE_MODULE_PATH "${CMAKE_CURRENT_LIST_DIR}")
 curvisplat_find(Threads)
 curvisplat_find(TBB)
 curvisplat_find(glm)
@@ -14,7 +14,6 @@ curvisplat_find(tinyexr)
 curvisplat_find(hwy)
 curvisplat_find(pugixml)
 curvisplat_find(ZLIB)
-curvisplat_find(OpenVDB)
 curvisplat_find(CGNS)
 # The serial one, which libcgns and libnetcdf stand on: one process must not have two.
 curvisplat_find(HDF5 COMPONENTS C)

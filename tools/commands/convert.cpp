@@ -1,49 +1,100 @@
-// `curvisplat convert`: converts a grid to a splat cache.
+// `curvisplat convert`: converts a grid to a splat cache, or with --add-scalar NAME --to CACHE adds scalars
+// to an existing cache. Conversions of several time steps are in convert_series.cpp.
 #include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
 #include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "preprocess/addition/add_scalar.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/node_reader.h"
-#include "preprocess/grid/time_steps.h"
-#include "stream/base/count_text.h"
 #include "stream/base/error.h"
-#include "stream/base/freed_memory.h"
-#include "stream/base/message.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
+#include "stream/base/memory.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/partial_folder.h"
-#include "stream/cache/stored_precision.h"
-#include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/conversion_report.h"
 #include "tools/commands/convert_series.h"
-#include "tools/commands/dry_run.h"
-#include "tools/commands/written_precision.h"
 #include "tools/options/convert_arguments.h"
-#include "tools/options/grid_options.h"
 #include "tools/options/option_parsers.h"
+#include "tools/output/command_run.h"
 #include "tools/output/launched_ranks.h"
-#include "tools/output/output_paths.h"
-#include "tools/output/print_line.h"
-#include "tools/output/progress_bar.h"
-#include "tools/output/required_threads.h"
-#include "tools/output/run_statistics.h"
-#include "tools/output/stop_signals.h"
-#include "tools/output/trace_of_run.h"
+#include "tools/output/results.h"
+#include "tools/output/start_checks.h"
 
 namespace curvisplat {
 namespace {
+
+/// Throws UsageError if options contradict --add-scalar.
+void checkArguments(const ConvertArguments& arguments) {
+  if (arguments.to.empty()) throw UsageError("--add-scalar needs --to CACHE, the cache to add to");
+  if (arguments.added_scalars.empty()) throw UsageError("--to needs --add-scalar NAME, the scalar to add");
+  const auto refuse = [](bool given, const char* option) {
+    if (given)
+      throw UsageError("{} cannot be combined with --add-scalar, which changes an existing cache", option);
+  };
+  refuse(!arguments.output.empty(), "--output");
+  refuse(!arguments.scalars.empty(), "--scalar");
+  refuse(arguments.overwrite, "--overwrite");
+  refuse(arguments.resume, "--resume");
+}
+
+void printAddition(const ConvertArguments& arguments, const AddScalarReport& report, double seconds) {
+  const auto samples = static_cast<double>(report.nodes);
+  std::string names;
+  for (const std::string& name : report.scalars) names += (names.empty() ? "" : ", ") + name;
+  fmt::print("{}: added {} for {} splats\n", arguments.to.string(), names, report.splats);
+  fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample{}\n", seconds,
+             1e-6 * samples / seconds, mebibytes(totalBytes(report.files)),
+             static_cast<double>(totalBytes(report.files)) / samples, peakMemoryText());
+}
+
+nlohmann::json statisticsOfAddition(const AddScalarReport& report, const Progress& progress) {
+  nlohmann::json json = commonStatistics(report, progress);
+  json["scalars"] = report.scalars;
+  json["samples"] = report.nodes;
+  return json;
+}
+
+/// Adds the scalars and prints a summary. Throws UsageError if options contradict each other, and Error.
+void runAddScalar(ConvertArguments arguments) {
+  checkArguments(arguments);
+  Ranks& ranks = launchedRanks();
+  if (!arguments.to.has_filename()) arguments.to = arguments.to.parent_path();  // "NAME.splats/"
+  AddScalarOptions options;
+  options.cache = arguments.to;
+  options.ranks = &ranks;
+  applyCommonOptions(arguments, options);
+
+  const std::unique_ptr<DataSource> source = openSource(arguments, arguments.to);
+  options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
+  requireThreads(arguments.threads);
+  Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
+  const StopOnSignals stopping(progress);
+  const StopRanksWith stopping_ranks(ranks, progress);
+  const AddScalarReport report = addScalars(*source, options, progress);
+  if (!ranks.isFirst()) return;
+  nlohmann::json numbers = statisticsOfAddition(report, progress);
+  numbers["ranks"] = ranks.count();
+  for (const std::string& warning : source->description().warnings) printMessage("warning: {}", warning);
+  if (const auto note = timeStepNote(source->description(), arguments.grid.time_step))
+    printMessage("note: {}", *note);
+  printAddition(arguments, report, secondsOf(progress));
+  if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
+}
 
 void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds) {
   const auto samples = static_cast<double>(report.nodes);
@@ -99,6 +150,7 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   return json;
 }
 
+/// Converts the grid to a new cache and prints a summary. Throws UsageError and Error.
 void runConvert(ConvertArguments arguments) {
   Ranks& ranks = launchedRanks();
   if (arguments.output.empty()) throw UsageError("--output is required, or --add-scalar with --to");
@@ -137,8 +189,8 @@ void runConvert(ConvertArguments arguments) {
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 
-/// Throws UsageError if one of the command's options was given that would have no effect: one for which `hasNoEffect`
-/// is true.
+/// Throws UsageError if an option was given that has no effect in this mode: one for which `hasNoEffect` is
+/// true.
 void refuseGiven(const CLI::App& command, const char* mode, const char* reason,
                  const std::function<bool(const std::string& name)>& hasNoEffect) {
   for (const CLI::Option* option : command.get_options())

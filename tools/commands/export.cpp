@@ -13,24 +13,19 @@
 #include <vector>
 
 #include "render/export/gaussian_files.h"
-#include "render/export/gaussian_picture.h"
+#include "render/export/gaussian_splats.h"
 #include "render/export/vdb_file.h"
 #include "render/frame/frame.h"
 #include "stream/base/error.h"
-#include "stream/base/interrupted.h"
-#include "stream/base/message.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
+#include "tools/options/frame_sequence.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
-#include "tools/options/scalar_arguments.h"
-#include "tools/options/step_arguments.h"
-#include "tools/output/output_paths.h"
-#include "tools/output/print_line.h"
-#include "tools/output/progress_bar.h"
-#include "tools/output/required_threads.h"
-#include "tools/output/stop_signals.h"
+#include "tools/output/command_run.h"
+#include "tools/output/results.h"
+#include "tools/output/start_checks.h"
 
 namespace curvisplat {
 namespace {

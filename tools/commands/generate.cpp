@@ -13,12 +13,11 @@
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
 #include "tools/commands/commands.h"
-#include "tools/output/output_paths.h"
-#include "tools/output/print_line.h"
-#include "tools/output/progress_bar.h"
-#include "tools/output/stop_signals.h"
+#include "tools/output/command_run.h"
+#include "tools/output/results.h"
+#include "tools/output/start_checks.h"
 
 namespace curvisplat {
 namespace {

@@ -1,41 +1,65 @@
-// `curvisplat info`: prints the contents of a cache or a grid.
+// `curvisplat info`: prints the contents of a cache or a grid, or what this machine can draw with
+// (--system).
 #include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
-#include "stream/base/count_text.h"
+#include "render/backend/backend.h"
 #include "stream/base/error.h"
-#include "stream/base/message.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/probe.h"
-#include "stream/cache/series_histogram.h"
-#include "stream/cache/stored_precision.h"
+#include "stream/cache/value_histogram.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
 #include "tools/commands/info_steps.h"
-#include "tools/commands/info_system.h"
-#include "tools/options/grid_options.h"
-#include "tools/options/step_arguments.h"
-#include "tools/output/print_line.h"
-#include "tools/output/progress_bar.h"
-#include "tools/output/range_text.h"
+#include "tools/options/convert_arguments.h"
+#include "tools/options/frame_sequence.h"
+#include "tools/output/command_run.h"
+#include "tools/output/results.h"
+#include "tools/window/window.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+/// Prints the drawing back ends and the window system of this machine, for --system.
+void printSystem(bool json) {
+  const SystemReport report = examineBackends();
+  const WindowReport window = examineWindow();
+  const unsigned cores = std::thread::hardware_concurrency();
+  if (json) {
+    Json out = {{"cores", cores}, {"auto", report.automatic}};
+    out["backends"] = Json::array();
+    for (const BackendReport& backend : report.backends)
+      out["backends"].push_back({{"name", backend.word}, {"works", backend.works}, {"found", backend.found}});
+    out["window"] = {
+        {"opens", window.opens}, {"display", window.display}, {"glfw", window.glfw}, {"found", window.found}};
+    fmt::print("{}\n", out.dump(2));
+    return;
+  }
+  fmt::print("cores      {}\n", cores);
+  for (const BackendReport& backend : report.backends)
+    fmt::print("{:<10} {}{}\n", backend.word, backend.works ? "" : "not available: ", backend.found);
+  fmt::print("auto       {}\n", report.automatic);
+  fmt::print("display    {}\n", window.display);
+  fmt::print("GLFW       {}\n", window.glfw);
+  fmt::print("window     {}{}\n", window.opens ? "OpenGL " : "not available: ", window.found);
+}
 
 struct InfoOptions {
   GasModel gas;

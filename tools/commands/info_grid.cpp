@@ -11,14 +11,12 @@
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
 #include "stream/base/calendar.h"
-#include "stream/base/count_text.h"
 #include "stream/base/progress.h"
-#include "tools/commands/info_estimate.h"
+#include "stream/base/text.h"
 #include "tools/commands/info_mesh.h"
-#include "tools/options/grid_options.h"
-#include "tools/output/print_line.h"
-#include "tools/output/progress_bar.h"
-#include "tools/output/range_text.h"
+#include "tools/options/convert_arguments.h"
+#include "tools/output/command_run.h"
+#include "tools/output/results.h"
 
 namespace curvisplat {
 namespace {

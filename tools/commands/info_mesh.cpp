@@ -1,25 +1,45 @@
 #include "tools/commands/info_mesh.h"
 
 #include <fmt/format.h>
+#include <tbb/info.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "preprocess/convert/memory_plan.h"
-#include "preprocess/convert/mesh_survey.h"
+#include "preprocess/convert/mesh_origin.h"
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/grid/node_reader.h"
-#include "stream/base/count_text.h"
-#include "tools/commands/info_estimate.h"
-#include "tools/output/print_line.h"
-#include "tools/output/progress_bar.h"
-#include "tools/output/range_text.h"
+#include "stream/base/text.h"
+#include "tools/output/command_run.h"
+#include "tools/output/results.h"
 
 namespace curvisplat {
+
+InfoEstimate::InfoEstimate(uint64_t splats, SplatsOf what)
+    : splats_(splats),
+      threads_(static_cast<unsigned>(tbb::info::default_concurrency())),
+      needs_(estimateConversion(splats, threads_, what)) {}
+
+nlohmann::ordered_json InfoEstimate::toJson() const {
+  return {{"splats", splats_},
+          {"cache_bytes", needs_.cache_bytes},
+          {"cache_bytes_per_further_scalar", needs_.bytes_per_further_scalar},
+          {"seconds", needs_.seconds},
+          {"threads", threads_}};
+}
+
+std::string InfoEstimate::toText() const {
+  return fmt::format(
+      "a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {}",
+      byteText(needs_.cache_bytes), byteText(needs_.bytes_per_further_scalar), needs_.seconds,
+      countText(threads_, "thread"));
+}
+
 namespace {
 
 constexpr uint64_t kChunk = 65536;

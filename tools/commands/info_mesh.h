@@ -1,9 +1,33 @@
-// `curvisplat info` of an unstructured grid.
+// `curvisplat info` of an unstructured grid, and the estimate of a conversion to come, which `info` of a
+// structured grid prints as well. The estimate is a formula; printMeshInfo() reads the whole mesh. For the
+// main thread.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
+#include <cstdint>
+#include <string>
+
+#include "preprocess/convert/preflight.h"
 #include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
+
+/// Cache size and time of a conversion on all cores, estimated from the number of splats.
+class InfoEstimate {
+ public:
+  InfoEstimate() = default;
+  explicit InfoEstimate(uint64_t splats, SplatsOf what);
+
+  nlohmann::ordered_json toJson() const;
+  /// "a cache of about 2.1 MiB with one scalar, ..."
+  std::string toText() const;
+
+ private:
+  uint64_t splats_ = 0;
+  unsigned threads_ = 1;
+  ConversionEstimate needs_;
+};
 
 /// Reads the mesh and prints what is in it. Throws Error if its files are damaged.
 void printMeshInfo(const MeshSource& source, bool json);

@@ -10,7 +10,7 @@
 #include "stream/base/calendar.h"
 #include "stream/base/error.h"
 #include "stream/cache/faces_file.h"
-#include "tools/output/print_line.h"
+#include "tools/output/results.h"
 
 namespace curvisplat {
 namespace {

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <variant>
 
-#include "tools/output/run_statistics.h"
+#include "tools/output/results.h"
 
 namespace curvisplat {
 namespace {

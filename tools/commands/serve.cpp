@@ -11,16 +11,15 @@
 #include <string>
 #include <vector>
 
-#include "stream/base/count_text.h"
 #include "stream/base/error.h"
-#include "stream/base/freed_memory.h"
-#include "stream/base/message.h"
+#include "stream/base/memory.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
-#include "tools/output/required_threads.h"
-#include "tools/output/stop_signals.h"
-#include "tools/serve/access.h"
+#include "tools/output/command_run.h"
+#include "tools/output/start_checks.h"
+#include "tools/serve/client_requests.h"
 #include "tools/serve/server.h"
 
 namespace curvisplat {

@@ -1,7 +1,9 @@
-// `curvisplat view`: opens a window that shows a cache.
+// `curvisplat view`: opens a window that shows a cache, or a grid, which is converted in the background
+// meanwhile.
 #include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
+
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <functional>
@@ -15,22 +17,52 @@
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
+#include "tools/options/convert_arguments.h"
+#include "tools/options/frame_sequence.h"
 #include "tools/options/further_scalars.h"
-#include "tools/options/grid_first.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/option_parsers.h"
-#include "tools/options/step_arguments.h"
-#include "tools/options/surface_arguments.h"
-#include "tools/options/value_precision.h"
+#include "tools/options/scene_arguments.h"
+#include "tools/output/command_run.h"
 #include "tools/output/frame_output.h"
-#include "tools/output/progress_bar.h"
-#include "tools/output/required_threads.h"
-#include "tools/output/stop_signals.h"
+#include "tools/output/start_checks.h"
 #include "tools/viewer/viewer.h"
 
 namespace curvisplat {
 namespace {
+
+constexpr size_t kMaxFiles = 8;  // whose order gridFirst() tries
+
+/// Whether the first file opens as a grid with the rest as its solutions.
+bool opens(const std::vector<std::filesystem::path>& files) {
+  ConvertArguments arguments;
+  arguments.grid.grid = files.front();
+  arguments.grid.solutions.assign(files.begin() + 1, files.end());
+  try {
+    openSource(arguments, keptFolder().value_or(std::filesystem::temp_directory_path()) / "any.splats");
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+/// Files of a grid that were chosen in a dialog or dropped come in any order. Returns `files` with another
+/// one first that opens as a grid with the rest as its solutions. nullopt if there is none, if there are
+/// more than eight files, or if they open as given: then their order is not what is wrong. Opens files,
+/// which can take long; throws Interrupted once `progress` is stopped.
+std::optional<std::vector<std::filesystem::path>> gridFirst(std::vector<std::filesystem::path> files,
+                                                            const Progress& progress) {
+  if (files.size() < 2 || files.size() > kMaxFiles || opens(files)) return std::nullopt;
+  for (size_t n = 1; n < files.size(); ++n) {
+    progress.throwIfStopped();
+    std::rotate(files.begin(), files.begin() + static_cast<std::ptrdiff_t>(n),
+                files.begin() + static_cast<std::ptrdiff_t>(n) + 1);
+    if (opens(files)) return files;
+    std::rotate(files.begin(), files.begin() + 1, files.begin() + static_cast<std::ptrdiff_t>(n) + 1);
+  }
+  return std::nullopt;
+}
 
 struct ViewArguments {
   std::vector<std::filesystem::path>

@@ -1,4 +1,6 @@
-// The files of a running simulation: which steps have been written and are not converted.
+// Follows the files of a running simulation (`convert --follow`): WrittenFiles finds the steps that have
+// been written and are not converted yet, and FolderEvents waits until files appear or change. Each look
+// lists the folders. One thread at a time may use an object.
 #pragma once
 
 #include <chrono>
@@ -9,23 +11,24 @@
 #include <vector>
 
 #include "preprocess/formats/open/series_files.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 
 /// The folders that the grid, the solutions and their patterns are in, each once.
 std::vector<std::filesystem::path> foldersOf(const OpenGridOptions& options);
 
+/// The steps of a simulation that are complete on disk: none of a step's files has changed for two seconds.
 class WrittenFiles {
  public:
   /// `options`, whose patterns are expanded at each look, outlive it.
   explicit WrittenFiles(const OpenGridOptions& options) : options_(options) {}
 
-  /// Steps of these files are not returned. With `but_the_last` the last step is: its file may hold several, and be done in
-  /// part.
+  /// next() does not return steps of these files. With `but_the_last` it returns the last one again: its
+  /// file may hold several steps, of which only some are done.
   void markDone(const std::vector<std::string>& files, bool but_the_last);
 
-  /// The next step whose files are all written: none has changed for two seconds. nullopt if there is none yet.
-  /// Steps come in their order.
+  /// The next step, in order, whose files are all written; nullopt if there is none yet.
   std::optional<StepFiles> next();
   /// After nullopt: how long to wait at most before looking again, unless a file changes.
   std::chrono::milliseconds untilNext() const { return until_next_; }
@@ -35,6 +38,28 @@ class WrittenFiles {
   std::set<std::string> done_;   // names of steps
   bool begins_at_last_ = false;  // of those that are done
   std::chrono::milliseconds until_next_{0};
+};
+
+/// Waits for files to appear or change in folders, by inotify. Where the system does not report changes
+/// (network file systems, too few watches, a folder that does not exist yet), wait() returns after a quarter
+/// of a second.
+class FolderEvents {
+ public:
+  explicit FolderEvents(std::vector<std::filesystem::path> folders);
+  ~FolderEvents();
+  FolderEvents(const FolderEvents&) = delete;
+  FolderEvents& operator=(const FolderEvents&) = delete;
+
+  /// Waits for a change that no earlier call has seen, or for `longest`. It may return without a change.
+  /// Throws Interrupted after progress.stop().
+  void wait(std::chrono::milliseconds longest, const Progress& progress);
+
+ private:
+  void watch();
+  void close();
+
+  const std::vector<std::filesystem::path> folders_;
+  int queue_ = -1;  // of inotify; -1: look from time to time
 };
 
 }  // namespace curvisplat

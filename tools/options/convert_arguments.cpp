@@ -1,24 +1,119 @@
 #include "tools/options/convert_arguments.h"
 
+#include <CLI/CLI.hpp>
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
+#include <map>
 #include <set>
+#include <string>
 #include <system_error>
 
-#include "preprocess/grid/refined_source.h"
+#include "preprocess/formats/derived/derived_source.h"
+#include "preprocess/gradients/gradient_mesh.h"
+#include "preprocess/grid/grid_views.h"
+#include "preprocess/mesh/mesh_source.h"
 #include "stream/base/error.h"
-#include "stream/base/message.h"
-#include "stream/base/process_usage.h"
-#include "stream/cache/geometry_folder.h"
-#include "tools/options/choices.h"
-#include "tools/options/face_names.h"
-#include "tools/options/grid_options.h"
-#include "tools/options/value_precision.h"
-#include "tools/output/output_paths.h"
+#include "stream/base/progress.h"
+#include "stream/cache/series.h"
+#include "tools/options/grid_surfaces.h"
+#include "tools/options/option_parsers.h"
+#include "tools/output/start_checks.h"
 
 namespace curvisplat {
+namespace {
+
+constexpr const char* kGroup = "PLOT3D layout (default: detected)";
+constexpr const char* kGlobeGroup = "Longitude-latitude grids (NetCDF), in kilometres";
+
+/// Adds an option that accepts the keys of `values` and sets `target` to the value of the given key.
+template <typename Value>
+void addChoice(CLI::App& app, const char* name, const char* help, const std::map<std::string, Value>& values,
+               std::optional<Value>& target) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : values) keys.push_back(key);
+  app.add_option_function<std::string>(
+         name, [values, &target](const std::string& key) { target = values.at(key); }, help)
+      ->check(CLI::IsMember(keys))
+      ->group(kGroup);
+}
+
+void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
+  // A flag with an optional value: an option would take the next argument, the grid file, as its value.
+  const std::string sphere_help = "Project to a sphere (default); --sphere=KM sets its radius";
+  CLI::Option* const sphere =
+      app.add_flag("--sphere{6371}", sphere_help)
+          ->each([&globe](const std::string& radius) {
+            globe.shape = GlobeOptions::Shape::kSphere;
+            const char* const end = radius.data() + radius.size();
+            const auto [parsed, error] = std::from_chars(radius.data(), end, globe.radius_km);
+            if (error != std::errc{} || parsed != end || !(globe.radius_km > 0) ||
+                !std::isfinite(globe.radius_km))
+              throw CLI::ValidationError(radius +
+                                         " is not a radius; expected kilometres above zero, such as 6371");
+          })
+          ->group(kGlobeGroup);
+  app.add_flag_callback(
+         "--flat", [&globe] { globe.shape = GlobeOptions::Shape::kFlat; },
+         "Project to a flat map (equirectangular)")
+      ->group(kGlobeGroup)
+      ->excludes(sphere);
+  app.add_option("--vertical-scale", globe.vertical_scale, "Vertical exaggeration factor (default 1)")
+      ->check(CLI::Number)
+      ->group(kGlobeGroup);
+}
+
+}  // namespace
+
+void addGridOptions(CLI::App& app, OpenGridOptions& options) {
+  app.add_option("--time-step", options.time_step,
+                 "Time step to read from the grid's files, counted from 0 (default 0)");
+  addGlobeOptions(app, options.globe);
+  Plot3dForce& force = options.force;
+  addChoice<ByteOrder>(app, "--byte-order", "Byte order of binary files",
+                       {{"little", ByteOrder::kLittle}, {"big", ByteOrder::kBig}}, force.byte_order);
+  addChoice<RecordMarkers>(
+      app, "--records", "Size of Fortran record markers in bytes; none: C binary",
+      {{"none", RecordMarkers::kNone}, {"4", RecordMarkers::kBytes4}, {"8", RecordMarkers::kBytes8}},
+      force.records);
+  addChoice<int>(app, "--precision", "Floating-point precision", {{"single", 4}, {"double", 8}},
+                 force.precision_bytes);
+  addChoice<bool>(app, "--blocks", "multi: the file begins with a block count",
+                  {{"single", false}, {"multi", true}}, force.multi_block);
+  addChoice<bool>(app, "--iblank", "Whether the grid file has an iblank array",
+                  {{"no", false}, {"yes", true}}, force.blanking);
+  CLI::Option* const ascii = app.add_flag_callback(
+                                    "--ascii", [&force] { force.ascii = true; }, "Read as ASCII")
+                                 ->group(kGroup);
+  app.add_flag_callback(
+         "--binary", [&force] { force.ascii = false; }, "Read as binary")
+      ->group(kGroup)
+      ->excludes(ascii);
+}
+
+void addGasOptions(CLI::App& app, GasModel& gas) {
+  constexpr const char* kGasGroup = "Gas model of derived scalars";
+  app.add_option("--gamma", gas.gamma, "Ratio of specific heats (default: from the files, else 1.4)")
+      ->group(kGasGroup);
+  app.add_option("--gas-constant", gas.constant, "Specific gas constant R (default: from the files, else 1)")
+      ->group(kGasGroup);
+}
+
+std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived) {
+  std::unique_ptr<DataSource> source = openData(grid);
+  if (auto* const mesh = dynamic_cast<MeshSource*>(source.get())) {
+    source.release();
+    return std::make_unique<GradientMesh>(
+        std::make_unique<DerivedMeshSource>(std::unique_ptr<MeshSource>(mesh), derived), derived,
+        grid.temporary_folder.empty() ? std::filesystem::temp_directory_path() : grid.temporary_folder);
+  }
+  return std::make_unique<DerivedSource>(requireGrid(std::move(source), ""), derived);
+}
+
 namespace {
 
 constexpr size_t kMaxDefaultScalars = 16;
@@ -78,7 +173,8 @@ std::vector<uint32_t> storedScalars(const GridDescription& description) {
   return positions;
 }
 
-/// What --refine says, or how the cache is refined that is added to or continued. Throws UsageError if these differ.
+/// The refinement that --refine asks for, or that the cache has which is added to or continued. Throws
+/// UsageError if these differ.
 uint32_t partsFor(const ConvertArguments& arguments, const std::filesystem::path& cache) {
   const bool adds = arguments.adds_steps || !arguments.added_scalars.empty();
   const bool continues = arguments.resume && !arguments.overwrite;
@@ -224,6 +320,30 @@ double mebibytes(uint64_t bytes) {
 std::string peakMemoryText() {
   const uint64_t bytes = ProcessUsage::now().peak_memory_bytes;
   return bytes > 0 ? fmt::format(", peak memory {:.0f} MiB", mebibytes(bytes)) : "";
+}
+
+std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std::string& option) {
+  const std::vector<StepFiles> all = stepsOf(arguments.grid);
+  StepSelection selection = parseSteps(option, arguments.steps.value_or("all"));
+  if (arguments.every) selection.stride *= *arguments.every;
+  std::vector<StepFiles> chosen;
+  for (const uint64_t step : selectedSteps(option, selection, all.size())) chosen.push_back(all[step]);
+  return chosen;
+}
+
+SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
+  SeriesInput input;
+  input.count = steps.size();
+  input.name = [&](uint64_t step) { return steps[step].name; };
+  input.open = [&](uint64_t step) {
+    ConvertArguments of_step = arguments;
+    of_step.grid = steps[step].options;
+    return openSource(of_step, arguments.adds_steps ? arguments.to : arguments.output);
+  };
+  input.scalars = [&](const GridDescription& description) {
+    return chooseScalars(arguments, arguments.scalars, description);
+  };
+  return input;
 }
 
 }  // namespace curvisplat

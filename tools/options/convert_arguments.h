@@ -1,25 +1,46 @@
-// The options of `curvisplat convert`, and what its two modes share: writing a new cache, and adding scalars
-// to an existing one.
+// The options of subcommands that read grids: how the files are read (addGridOptions(), addGasOptions()),
+// what both modes of `convert` share (writing a new cache, adding scalars to one), and the time steps of a
+// series.
+//
+// ConvertArguments holds values as given; the functions here parse and check them, and throw UsageError with
+// the option, the value found and the form expected. They keep no state: any thread may call them.
 #pragma once
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
+#include "preprocess/formats/derived/derived_source.h"
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/open/series_files.h"
 #include "stream/base/progress.h"
 #include "tools/options/option_parsers.h"
-#include "tools/output/run_statistics.h"
+#include "tools/output/results.h"
 
 namespace curvisplat {
 
-/// Of --refine: a cell becomes 4096.
+/// Adds to `app` the options that set the given fields of `options`, which must outlive parsing:
+///   options.time_step   --time-step
+///   options.force       --byte-order, --records, --precision, --blocks, --iblank, --ascii, --binary
+///   options.globe       --sphere, --flat, --vertical-scale
+void addGridOptions(CLI::App& app, OpenGridOptions& options);
+
+/// Adds --gamma and --gas-constant.
+void addGasOptions(CLI::App& app, GasModel& gas);
+
+/// Opens the grid and adds the scalars that can be derived from its own.
+std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived);
+
+/// Limit of --refine: a cell becomes 4096 cells.
 inline constexpr uint32_t kMaxRefinement = 16;
 
 /// Command-line arguments as given; checked and parsed later.
@@ -45,24 +66,26 @@ struct ConvertArguments {
   std::optional<uint64_t> until;    // steps of a cache that follows a simulation
 };
 
-/// Opens the grid, refined as --refine says, or as the cache is that is added to or continued. Temporary files go to --tmp, or beside
-/// `cache` without it.
+/// Opens the grid, refined as --refine says, or like the cache that is added to or continued. Temporary
+/// files go to --tmp, or without it beside `cache`.
 std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
 
-/// With each cell cut into parts x parts x parts. Throws Error for an unstructured grid, unless `parts` is 1.
+/// The source with each cell cut into parts x parts x parts. Throws Error for an unstructured grid, unless
+/// `parts` is 1.
 std::unique_ptr<DataSource> refinedBy(uint32_t parts, std::unique_ptr<DataSource> source,
                                       std::optional<double> blank_value);
 
-/// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names all that
-/// the files store, at most 16 of one centring; a note says what is left out. Prints a note for each number
-/// that could mean two scalars. Throws Error, not UsageError, for a scalar that the files lack: the files decide, not the usage.
+/// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names it
+/// chooses all that the files store, at most 16 of one centring, and a note says what is left out. Prints a
+/// note for each number that could mean two scalars. Throws Error, not UsageError, for a scalar that the
+/// files lack: the files decide, not the usage.
 std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
                                     const GridDescription& description);
 
-/// Moves words that are no files from the solutions to the scalars: the second of "--scalar a b".
+/// Moves words that are not files from the solutions to the scalars: the `b` of "--scalar a b".
 void takeScalarsFromSolutions(ConvertArguments& arguments);
 
-/// Of --surface, --no-surfaces, --overlap and --value-precision. Throws UsageError.
+/// Sets the options of --surface, --no-surfaces, --overlap and --value-precision. Throws UsageError.
 void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options);
 
 /// The sum over all phases.
@@ -70,7 +93,7 @@ double secondsOf(const Progress& progress);
 
 uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
-/// ", peak memory 123 MiB", of this process so far; empty where the system does not tell.
+/// ", peak memory 123 MiB": the peak of this process so far; empty where the system does not report it.
 std::string peakMemoryText();
 
 /// The files of the grid, and the caches: what --stats and --trace must not overwrite.
@@ -105,5 +128,13 @@ nlohmann::json commonStatistics(const Report& report, const Progress& progress) 
   for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
   return json;
 }
+
+/// The time steps of the files that --steps and --every select. `option`: the name of --steps in messages.
+/// Throws UsageError, and Error if the files cannot be read.
+std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std::string& option = "--steps");
+
+/// A series for convertSeries(): opens each step as `arguments` say, and chooses the scalars from the first.
+/// `arguments` and `steps` must outlive the result.
+SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps);
 
 }  // namespace curvisplat

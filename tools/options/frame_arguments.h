@@ -1,11 +1,16 @@
-// How a frame looks and what it may use, as options state it: shared by `render` and the Python package.
+// How a frame looks, what it may use, and which values an EXR picture has beside its colours, as options
+// state it. Shared by `render` and the Python package. The functions keep no state and need no cache: any
+// thread may call them.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "render/backend/pixel_values.h"
 #include "render/frame/frame_options.h"
+#include "render/image/image.h"
 
 namespace curvisplat {
 
@@ -24,5 +29,22 @@ struct FrameArguments {
 
 /// Throws UsageError with the option, what was found and what was expected.
 FrameOptions frameOptions(const FrameArguments& arguments);
+
+/// The values that an EXR picture has beside its colours (--channels).
+struct ValueChannels {
+  bool depth = false, normal = false, scalar = false;
+
+  bool any() const { return depth || normal || scalar; }
+  /// How many numbers each pixel has.
+  size_t count() const { return (depth ? 1u : 0u) + (normal ? 3u : 0u) + (scalar ? 1u : 0u); }
+};
+
+/// The channels that --channels names; without it, the depth for an .exr file and none for others. Throws
+/// UsageError.
+ValueChannels valueChannels(const std::optional<std::string>& text, const std::filesystem::path& output);
+
+/// The values as channels of a picture, whose left part they cover.
+std::vector<ImageChannel> imageChannels(const ValueChannels& wanted, const PixelValues& values,
+                                        ImageSize picture);
 
 }  // namespace curvisplat

@@ -24,8 +24,8 @@ std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std
 std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
                                             const std::vector<std::filesystem::path>& files);
 
-/// Adds the scalar to the cache; a series is converted again for that (series_scalar.h). Throws Error as furtherScalarsOf() and addScalars() do, Interrupted once `progress` is
-/// stopped; then the cache is as it was.
+/// Adds the scalar to the cache; a series is converted again for that. Throws Error as furtherScalarsOf() and addScalars()
+/// do, Interrupted once `progress` is stopped; then the cache is as it was.
 void addFurtherScalar(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
                       const std::string& name, Progress& progress);
 

@@ -25,8 +25,7 @@
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/paths.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 #include "tools/options/further_scalars.h"
 #include "tools/options/option_parsers.h"
 

@@ -1,23 +1,76 @@
 #include "tools/options/kept_conversion.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <memory>
 #include <optional>
 #include <system_error>
+#include <vector>
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/series_files.h"
 #include "preprocess/gather/mesh_lattice.h"
-#include "preprocess/grid/thinned_source.h"
+#include "preprocess/grid/grid_views.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tools/options/convert_arguments.h"
-#include "tools/options/series_input.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kLock = "lock";
+
+fs::path newPath(const fs::path& place, const std::string& name) {
+  static std::atomic<unsigned> made = 0;
+  return place / fmt::format("{}.{}.{}", name, ::getpid(), made++);
+}
+
+bool isHeld(const fs::path& folder) {
+  const int fd = ::open((folder / kLock).c_str(), O_RDWR | O_CLOEXEC);
+  if (fd < 0) return errno != ENOENT;
+  const bool held = ::flock(fd, LOCK_EX | LOCK_NB) != 0;
+  ::close(fd);
+  return held;
+}
+
+}  // namespace
+
+PreviewFolder::PreviewFolder(const fs::path& place, const std::string& name) : path_(newPath(place, name)) {
+  removeAll(path_);  // of a process of the same number that was killed
+  makeFolder(path_);
+  lock_ = ::open((path_ / kLock).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (lock_ < 0) {
+    const std::string reason = std::generic_category().message(errno);
+    removeAll(path_);
+    throw Error("{}: cannot be created: {}", (path_ / kLock).string(), reason);
+  }
+  ::flock(lock_, LOCK_EX | LOCK_NB);  // a file system without locks has no left ones removed, either
+}
+
+PreviewFolder::~PreviewFolder() {
+  if (!keep_) removeAll(path_);
+  ::close(lock_);
+}
+
+void PreviewFolder::removeLeftOnes(const fs::path& place, const std::string& name) {
+  std::vector<fs::path> left;
+  std::error_code error;
+  for (fs::directory_iterator at(place, error), end; !error && at != end; at.increment(error))
+    if (at->path().filename().string().starts_with(name + ".") && !isHeld(at->path()))
+      left.push_back(at->path());
+  for (const fs::path& folder : left) removeAll(folder);
+}
+
+namespace {
 
 constexpr const char *kPreview = "preview", *kSeries = "series";  // names of folders
 constexpr uint64_t kBytesForPreview = uint64_t{1} << 30;          // for the points of a mesh
@@ -70,8 +123,9 @@ CoarseSource coarseMesh(const MeshSource& mesh, const std::vector<uint32_t>& sca
   return coarse;
 }
 
-/// A cache of a coarse sample, if the grid is large. A grid that cannot be sampled, or a preview that fails, has none: the
-/// conversion of the whole says what is wrong. `whole`: as the whole is converted.
+/// Makes a cache of a coarse sample, if the grid is large. There is none of a grid that cannot be sampled,
+/// or if the preview fails: the conversion of the whole reports what is wrong. `whole`: options of the whole
+/// conversion.
 void makePreview(const DataSource& source, const ConvertOptions& whole, bool first_step, Progress& progress,
                  const KeptCacheEvents& events) {
   if (!events.preview) return;
@@ -115,8 +169,8 @@ void makePreviewOfFirstStep(const SeriesInput& input, const ConvertOptions& whol
   }
 }
 
-/// A series is made beside its place, since a cache of its first steps looks complete. It is not moved when it is, since
-/// a view may read it: a link takes the place.
+/// Makes a series beside its place, since a cache of its first steps looks complete. It is not moved when it
+/// is complete, since a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
                 const KeptCacheEvents& events, ValuePrecision precision) {
   const auto folder = std::make_shared<PreviewFolder>(output.parent_path(), kSeries);

@@ -1,5 +1,10 @@
-// The conversion behind a kept cache: with all default options of `convert` but the precision; and before that of a large grid, one of a
-// coarse sample of it, which can be shown within a second.
+// The conversion behind a kept cache (kept_caches.h): with all default options of `convert` but the
+// precision. Before it converts a large grid, it converts a coarse sample, which can be shown within a
+// second.
+//
+// A preview's folder exists as long as someone holds it: the conversion, or a view, which opens the cache's
+// files by their paths. makeKeptCache() runs on the caller's thread and on TBB's; the folder may be released
+// on any thread.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +16,31 @@
 
 #include "stream/base/progress.h"
 #include "stream/codec/values_codec.h"
-#include "tools/options/preview_folder.h"
 
 namespace curvisplat {
+
+/// The folder of a cache that is shown before the whole one is complete.
+class PreviewFolder {
+ public:
+  /// Makes `place`/`name`.<process number>.<n>, which no other has, and locks it. Throws Error if it cannot.
+  PreviewFolder(const std::filesystem::path& place, const std::string& name);
+  /// Removes the folder with everything in it, unless keep() was called.
+  ~PreviewFolder();
+  PreviewFolder(const PreviewFolder&) = delete;
+  PreviewFolder& operator=(const PreviewFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  void keep() { keep_ = true; }
+
+  /// Removes the folders of `name` in `place` whose process has ended. Do not call it while another process
+  /// makes one there.
+  static void removeLeftOnes(const std::filesystem::path& place, const std::string& name);
+
+ private:
+  const std::filesystem::path path_;
+  bool keep_ = false;
+  int lock_ = -1;
+};
 
 /// Something to show before the cache is complete.
 struct KeptPreview {
@@ -24,20 +51,21 @@ struct KeptPreview {
   std::shared_ptr<const PreviewFolder> folder;  // of `cache`, which is there while this is held
 };
 
-/// Who is told of a conversion. Called from the thread that converts.
+/// Callbacks of a conversion, called on the thread that converts.
 struct KeptCacheEvents {
   std::function<void(const std::string&)> say = [](const std::string&) {};  // warnings and notes
   std::function<void(const KeptPreview&)> preview = {};                     // empty: none is made
 };
 
-/// Grids with more nodes or cells than this get a preview, of about a quarter of it: a second of conversion at most.
+/// Grids with more nodes or cells than this get a preview of about a quarter of this number, which takes a
+/// second at most.
 inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
 
-/// Converts the grid or the series of time steps in `files` to `output`, which is complete or does not exist. Previews
-/// and scratch files are in the same folder, and go with it; a preview stays while it is held. A series stays in the
-/// folder of its preview, and `output` links to it. Previews of a series are of its first step: a coarse one, if it is
-/// large, then the step as converted. Throws Error as opening and converting do, Interrupted once
-/// `progress` is stopped.
+/// Converts the grid or the series of time steps in `files` to `output`, which is complete or does not
+/// exist. Previews and scratch files are in the same folder; a preview stays while it is held. A series
+/// stays in the folder of its preview, and `output` links to it. Previews of a series show its first step: a
+/// coarse one if the step is large, then the step as converted. Throws Error as opening and converting do,
+/// Interrupted once `progress` is stopped.
 void makeKeptCache(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output,
                    Progress& progress, const KeptCacheEvents& events,
                    ValuePrecision precision = ValuePrecision::kNormal);

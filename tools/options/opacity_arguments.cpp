@@ -1,5 +1,7 @@
 #include "tools/options/opacity_arguments.h"
 
+#include <CLI/CLI.hpp>
+
 #include <utility>
 
 #include "stream/base/error.h"

@@ -4,10 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "render/frame/drawn_scalars.h"
+#include "render/frame/frame_options.h"
 #include "tools/options/picture_choice.h"
-#include "tools/options/scalar_arguments.h"
-#include "tools/options/surface_arguments.h"
+#include "tools/options/scene_arguments.h"
 
 namespace curvisplat {
 

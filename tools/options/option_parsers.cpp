@@ -9,10 +9,8 @@
 #include <optional>
 
 #include "preprocess/convert/memory_plan.h"
-#include "stream/base/count_text.h"
 #include "stream/base/error.h"
-#include "stream/base/suggestion.h"
-#include "tools/options/choices.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -160,6 +158,15 @@ Backend parseBackend(std::string_view text) {
   if (text == "cpu") return Backend::kCpu;
   requireChoice("--backend", text, {"auto", "osmesa", "egl", "cpu"});
   return Backend::kAutomatic;
+}
+
+void requireChoice(std::string_view option, std::string_view text, const std::vector<std::string>& choices) {
+  std::string listed;
+  for (size_t n = 0; n < choices.size(); ++n) {
+    if (choices[n] == text) return;
+    listed += (n == 0 ? "" : n + 1 == choices.size() ? " or " : ", ") + choices[n];
+  }
+  throw UsageError("{} {}: expected {}{}", option, text, listed, didYouMean(text, choices));
 }
 
 }  // namespace curvisplat

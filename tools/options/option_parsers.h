@@ -1,16 +1,19 @@
-// Parsers of option values that several subcommands share: sizes, lists of numbers, memory. Each function
-// takes the option's name for its message, parses the whole text, and throws UsageError with the text found
-// and the form expected.
+// Parsers of option values that several subcommands share: sizes, lists of numbers, memory, and choices of a
+// few words. Each function takes the option's name for its message, parses the whole text, and throws
+// UsageError with the text found and the form expected. Any thread may call them.
 #pragma once
 
-#include <cstdint>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+
+#include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "render/backend/backend.h"
 #include "render/camera/camera.h"
-#include "render/frame/backend.h"
+#include "stream/codec/values_codec.h"
 
 namespace curvisplat {
 
@@ -39,5 +42,15 @@ glm::vec4 parseBackground(std::string_view option, std::string_view text);
 
 /// The value of --backend: "auto", "osmesa", "egl" or "cpu".
 Backend parseBackend(std::string_view text);
+
+/// Throws UsageError unless `text` is one of the choices: "--volume of: expected on or off (did you mean
+/// off?)".
+void requireChoice(std::string_view option, std::string_view text, const std::vector<std::string>& choices);
+
+/// The value of --value-precision: "normal" or "fine".
+inline ValuePrecision parseValuePrecision(std::string_view option, std::string_view text) {
+  requireChoice(option, text, {"normal", "fine"});
+  return text == "fine" ? ValuePrecision::kFine : ValuePrecision::kNormal;
+}
 
 }  // namespace curvisplat

@@ -1,30 +1,58 @@
-// The transfer function and the camera of a picture: from options, and what they leave out from the data
-// (render/automatic). Everything chosen is collected as options that draw the same picture.
+// Options that choose a scalar and its transfer function, shared by the subcommands that draw, and
+// PictureChoice, which takes from the data what they and the options of the camera leave out
+// (render/automatic). Everything that was chosen is collected as options that draw the same picture. Looking
+// at the data reads the cache, once for each PictureChoice, which one thread at a time may use.
 #pragma once
 
-#include <cstddef>
+#include <CLI/CLI.hpp>
 #include <glm/vec3.hpp>
+
+#include <cstddef>
 #include <optional>
 #include <string>
 
 #include "render/automatic/first_choice.h"
+#include "render/colour/transfer_function.h"
 #include "stream/cache/cache_reader.h"
-#include "tools/options/camera_motion.h"
-#include "tools/options/scalar_arguments.h"
+#include "tools/options/frame_sequence.h"
 
 namespace curvisplat {
 
+/// Command-line arguments as given; checked and parsed later.
+struct ScalarArguments {
+  std::string scalar;
+  std::optional<std::string> transfer_function, range, opacity, asinh, opacity_unit;
+};
+
+/// Adds --scalar.
+void addScalarOption(CLI::App& command, ScalarArguments& arguments);
+/// Adds --tf, --range, --opacity, --asinh and --opacity-unit under the heading `group`.
+void addFunctionOptions(CLI::App& command, ScalarArguments& arguments, const std::string& group);
+
+/// The names of the options among those of addFunctionOptions() that were given: "--tf and --range".
+std::string givenFunctionOptions(const ScalarArguments& arguments);
+
+/// Position of the chosen scalar in the manifest; without a name, the first that varies. Throws Error, not
+/// UsageError, for a scalar that the cache lacks: the cache decides, not the usage.
+size_t chooseVariable(const CacheReader& cache, const ScalarArguments& arguments);
+
+/// Throws UsageError if options contradict each other; needs no cache.
+void checkFunctionArguments(const ScalarArguments& arguments);
+
+/// Chooses the transfer function and the camera of a picture, and collects what it has chosen.
 class PictureChoice {
  public:
-  /// `cache` must outlive this; `scale` as in FrameOptions; `what` is drawn with one function. Reads nothing.
+  /// `cache` must outlive this; `scale` as in FrameOptions; `what` is drawn with one function. Reads
+  /// nothing.
   PictureChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
                 ChosenFor what = ChosenFor::kStep)
       : cache_(cache), variable_(variable), scale_(scale), what_(what) {}
 
-  /// Fills in the options that are not given. Throws UsageError, or Error if reading fails or a file does not
-  /// hold a transfer function.
+  /// Fills in the options that are not given. Throws UsageError, or Error if reading fails or a file does
+  /// not hold a transfer function.
   TransferFunction function(const ScalarArguments& arguments);
-  /// The same, for pictures of two scalars: of the scalar that gives the colours, or the opacities alone.
+  /// The functions of a picture of two scalars: of the one that gives the colours, and of the one that gives
+  /// the opacities.
   TransferFunction colours(const ScalarArguments& arguments);
   TransferFunction opacities(const ScalarArguments& arguments);
   /// The arguments, with a view if they have no camera at all. `function`: that of the picture.
@@ -57,8 +85,5 @@ class PictureChoice {
   std::optional<FirstChoice> data_;
   std::string chosen_;
 };
-
-/// Throws UsageError if options contradict each other; needs no cache.
-void checkFunctionArguments(const ScalarArguments& arguments);
 
 }  // namespace curvisplat

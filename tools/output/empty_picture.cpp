@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "render/image/contrast.h"
+#include "render/image/image.h"
 
 namespace curvisplat {
 namespace {

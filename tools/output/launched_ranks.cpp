@@ -13,7 +13,7 @@
 #include <thread>
 
 #include "stream/base/error.h"
-#include "stream/base/message.h"
+#include "stream/base/plugin.h"
 
 namespace curvisplat {
 namespace {
@@ -41,32 +41,18 @@ unsigned long launchedCount() {
 
 constexpr const char* kPlugIn = "curvisplat-mpi.so";
 
-/// Beside the program in a build, and where packages put it.
-void* openPlugIn(std::string& why_not) {
-  std::error_code error;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
-  for (const fs::path& candidate : {folder / kPlugIn, folder / CURVISPLAT_PLUGINS / kPlugIn}) {
-    if (!fs::exists(candidate, error)) continue;
-    // MPI's own plug-ins look for its symbols among those of the whole process.
-    if (void* const library = ::dlopen(candidate.c_str(), RTLD_NOW | RTLD_GLOBAL)) return library;
-    why_not = ::dlerror();
-    return nullptr;
-  }
-  why_not = std::string(kPlugIn) + " is not installed";
-  return nullptr;
-}
-
 std::unique_ptr<RankTransport> startMpi(unsigned long count) {
   std::string why_not;
-  void* const library = openPlugIn(why_not);
+  // MPI's own plug-ins look for its symbols among those of the whole process.
+  void* const library = openPlugin(kPlugIn, RTLD_NOW | RTLD_GLOBAL, why_not);
   using Start = RankTransport* (*)(const char*);
   const auto start = library ? reinterpret_cast<Start>(::dlsym(library, "curvisplatStartMpi")) : nullptr;
   RankTransport* const transport = start ? start(CURVISPLAT_VERSION) : nullptr;
   if (transport) return std::unique_ptr<RankTransport>(transport);
-  if (library) why_not = "curvisplat-mpi.so is of another version";
+  if (library) why_not = "it is of another version than the program";
   throw Error(
-      "started as one of {} processes, but without MPI: {}; build with CURVISPLAT_MPI=ON, or start one",
-      count, why_not);
+      "started as one of {} processes, but without MPI: {}: {}; build with CURVISPLAT_MPI=ON, or start one",
+      count, kPlugIn, why_not);
 }
 
 std::string hostName() {

@@ -21,6 +21,7 @@ install(FILES
   DESTINATION ${package_dir} COMPONENT development)
 
 install(TARGETS curvisplat RUNTIME COMPONENT program)
+install(TARGETS curvisplat_vdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/curvisplat COMPONENT program)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/tools/manual/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program
   FILES_MATCHING PATTERN *.1)
 install(FILES ${PROJECT_BINARY_DIR}/tools/manual/curvisplat.bash RENAME curvisplat
@@ -56,9 +57,11 @@ set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION "Static libraries, headers and the CMak
 convert grids from arrays of their own and draw them.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libcurvisplat-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+# Its module for OpenVDB.
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS curvisplat)
 set(development_packages
-  libboost-iostreams-dev libcgns-dev libfmt-dev libgl-dev libglm-dev libhdf5-dev libhwy-dev liblz4-dev liblzma-dev libnetcdf-dev
-  libopenvdb-dev libpng-dev libproj-dev libpugixml-dev libtbb-dev libtinyexr-dev liburing-dev libxxhash-dev libzstd-dev
+  libcgns-dev libfmt-dev libgl-dev libglm-dev libhdf5-dev libhwy-dev liblz4-dev liblzma-dev libnetcdf-dev
+  libpng-dev libproj-dev libpugixml-dev libtbb-dev libtinyexr-dev liburing-dev libxxhash-dev libzstd-dev
   nlohmann-json3-dev pkg-config zlib1g-dev)
 if(CURVISPLAT_ANNOTATIONS)
   list(APPEND development_packages libcairo2-dev)

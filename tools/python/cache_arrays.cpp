@@ -13,7 +13,7 @@
 
 #include "render/export/field_sampler.h"
 #include "stream/base/error.h"
-#include "tools/output/required_threads.h"
+#include "tools/output/start_checks.h"
 #include "tools/python/interruptible.h"
 
 namespace py = pybind11;

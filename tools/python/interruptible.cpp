@@ -14,7 +14,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
-#include "tools/output/required_threads.h"
+#include "tools/output/start_checks.h"
 
 namespace py = pybind11;
 

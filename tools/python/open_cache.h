@@ -1,4 +1,9 @@
-// An open cache as Python sees it: what it holds, and pictures of it.
+// An open cache as Python sees it, and pictures of it. PictureArguments are what the package's render()
+// passes, as the arguments of `curvisplat render`: values come as text, so that the two read them alike.
+//
+// One call at a time uses an OpenCache; its threads and decoded bricks are kept from one picture of a scalar
+// to the next. Functions with arguments of Python need the interpreter's lock; drawing goes on without it
+// (interruptible.h).
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -6,16 +11,43 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "render/frame/step_player.h"
+#include "render/frame/frame.h"
 #include "stream/cache/cache_reader.h"
-#include "tools/python/picture_arguments.h"
+#include "tools/options/frame_arguments.h"
+#include "tools/options/frame_sequence.h"
+#include "tools/options/opacity_arguments.h"
+#include "tools/options/picture_choice.h"
+#include "tools/options/scene_arguments.h"
 
 namespace curvisplat::python {
+
+/// The text of each option.
+using Options = std::map<std::string, std::string>;
+
+/// Everything a picture is drawn with. What the function and the camera leave out is chosen from the data.
+struct PictureArguments {
+  ScalarArguments scalar;
+  OpacityArguments opacity;
+  CameraArguments camera;
+  FrameOptions frame;
+  SurfaceArguments surfaces;
+  AnnotationArguments annotations;
+  StepArguments steps;  // of one step
+  ValueChannels channels;
+  Backend backend = Backend::kAutomatic;
+};
+
+CameraArguments cameraArguments(const Options& camera);
+
+/// `others`: lists, flags and numbers. Throws UsageError as the command does.
+PictureArguments pictureArguments(const Options& function, const Options& camera, const Options& frame,
+                                  const pybind11::dict& others);
 
 struct DrawnPicture {
   pybind11::array_t<float> rgba;  // (height, width, 4), premultiplied
@@ -33,8 +65,8 @@ struct HistogramArguments {
   size_t bins = 0;
 };
 
-/// One call at a time: a second thread gets a UsageError, as does a process that was forked, which lacks the threads. Threads and decoded bricks are kept from one picture of a
-/// scalar to the next.
+/// While one thread uses the cache, another one gets a UsageError, as does a process that was forked, which
+/// lacks the threads.
 class OpenCache {
  public:
   /// Throws Error.
@@ -45,7 +77,7 @@ class OpenCache {
 
   const CacheReader& reader() const { return reader_; }
   const std::filesystem::path& path() const { return path_; }
-  /// The cache is busy as long as the result lives. With the interpreter's lock. Throws UsageError if it is.
+  /// Keeps the cache busy during its lifetime.
   class Use {
    public:
     explicit Use(bool& busy) : busy_(busy) {}
@@ -56,10 +88,12 @@ class OpenCache {
    private:
     bool& busy_;
   };
+  /// Call with the interpreter's lock. Throws UsageError if the cache is busy.
   Use use();
   /// Throws UsageError and Error as `curvisplat render` does, and what stops runInterruptibly().
   DrawnPicture render(const PictureArguments& arguments, const pybind11::object& progress);
-  /// Of the step that was drawn last. Throws UsageError for a range that is empty, or not above zero where `log`.
+  /// Of the step that was drawn last. Throws UsageError for a range that is empty, or not above zero where
+  /// `log`.
   std::vector<double> histogram(const HistogramArguments& arguments) const;
   /// Ends threads and gives back their memory; the next picture starts them again.
   void release();

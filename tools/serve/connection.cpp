@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "stream/base/error.h"
-#include "tools/serve/access.h"
+#include "tools/serve/client_requests.h"
 #include "tools/serve/page.h"
 
 namespace curvisplat {

@@ -17,9 +17,8 @@
 #include <optional>
 #include <string>
 
-#include "tools/serve/message_rate.h"
+#include "tools/serve/client_requests.h"
 #include "tools/serve/remote_viewer.h"
-#include "tools/serve/server_options.h"
 
 namespace curvisplat {
 

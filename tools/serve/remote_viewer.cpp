@@ -9,13 +9,10 @@
 #include "render/annotate/annotations.h"
 #include "render/frame/frame_plan.h"
 #include "stream/base/error.h"
-#include "stream/base/message.h"
-#include "stream/base/thread_name.h"
-#include "tools/serve/line_quality.h"
+#include "stream/base/threads.h"
 #include "tools/serve/picture_message.h"
-#include "tools/viewer/frame_loop.h"
-#include "tools/viewer/picture_layout.h"
-#include "tools/viewer/picture_values.h"
+#include "tools/view/frame_loop.h"
+#include "tools/view/picture_layout.h"
 
 namespace curvisplat {
 namespace {

@@ -5,12 +5,13 @@
 //       +--------send()----------+        +----------- wake ------------+
 //                 encoded
 //
-// Of each kind of request only the newest is kept, so that no page can make this grow. While the camera moves, the next
-// picture is asked for as soon as fewer than three are on their way to the page: neither the drawing
-// nor the line gets ahead of what the page shows. At rest, pictures become finer, and the last one is lossless: the
-// same as `curvisplat render` writes.
+// Of each kind of request only the newest is kept, so that no page can make this grow. While the camera
+// moves, the next picture is asked for as soon as fewer than three are on their way to the page: neither the
+// drawing nor the line gets ahead of what the page shows. At rest, pictures become finer, and the last one
+// is lossless: the same as `curvisplat render` writes.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -19,17 +20,28 @@
 #include <thread>
 #include <vector>
 
-#include "render/frame/backend.h"
+#include "render/backend/backend.h"
 #include "stream/base/mutex.h"
-#include "tools/serve/client_message.h"
+#include "tools/serve/client_requests.h"
 #include "tools/serve/served_caches.h"
 
 namespace curvisplat {
 
+/// What the server allows each viewer.
 struct ViewerLimits {
   uint64_t memory_bytes = 512 << 20;  // for drawing
   double target_s = 0.04;             // to draw a picture while the camera moves
   Backend backend = Backend::kAutomatic;
+};
+
+/// Where a server listens, and what it allows.
+struct ServerOptions {
+  std::string address = "127.0.0.1";
+  uint16_t port = 8642;  // 0: one that is free
+  std::string token;
+  std::vector<std::string> host_names;  // under which browsers may reach it, beside localhost and addresses
+  size_t viewers = 8;                   // at a time
+  ViewerLimits each;
 };
 
 class RemoteViewer {

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "render/colour/published_maps.h"
+#include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
 #include "stream/cache/probe.h"
-#include "tools/viewer/first_view.h"
-#include "tools/viewer/histogram.h"
+#include "tools/view/edited_function.h"
+#include "tools/view/first_view.h"
 
 namespace curvisplat {
 namespace {

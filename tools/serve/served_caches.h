@@ -9,8 +9,8 @@
 
 #include "stream/base/mutex.h"
 #include "stream/cache/cache_reader.h"
-#include "tools/serve/client_message.h"
-#include "tools/viewer/view_state.h"
+#include "tools/serve/client_requests.h"
+#include "tools/view/view_state.h"
 
 namespace curvisplat {
 

@@ -13,9 +13,8 @@
 #include <utility>
 
 #include "stream/base/error.h"
-#include "stream/base/message.h"
 #include "stream/base/mutex.h"
-#include "stream/base/thread_name.h"
+#include "stream/base/threads.h"
 #include "tools/serve/connection.h"
 
 namespace curvisplat {

@@ -12,8 +12,8 @@
 #include <string>
 
 #include "stream/base/progress.h"
+#include "tools/serve/remote_viewer.h"
 #include "tools/serve/served_caches.h"
-#include "tools/serve/server_options.h"
 
 namespace curvisplat {
 

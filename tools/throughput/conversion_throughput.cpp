@@ -14,9 +14,9 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "stream/base/error.h"
-#include "stream/base/process_usage.h"
-#include "tools/throughput/page_cache.h"
-#include "tools/throughput/text_table.h"
+#include "stream/base/progress.h"
+#include "tools/throughput/machine.h"
+#include "tools/throughput/measurements.h"
 
 namespace curvisplat {
 namespace {

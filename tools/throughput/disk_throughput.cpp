@@ -9,13 +9,11 @@
 #include <optional>
 #include <random>
 
-#include "stream/base/direct_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_format.h"
 #include "stream/paging/async_reads.h"
 #include "tools/throughput/machine.h"
-#include "tools/throughput/page_cache.h"
 
 namespace curvisplat {
 namespace {

@@ -1,6 +1,6 @@
 // Measures how fast a cache's files can be read, without processing the bytes: direct and buffered, cold and
 // warm, over the size of a read and the number of reads in flight (depth). Uses the pager's own reads
-// (direct_file.h, async_reads.h) at shuffled offsets, so that read-ahead does not distort the result.
+// (stream/paging/async_reads.h) at shuffled offsets, so that read-ahead does not distort the result.
 //
 //   disk/direct/256KiB/depth:8           bypasses the page cache: always cold
 //   disk/buffered-cold/256KiB/depth:8    evicted from the page cache before each sample, checked with mincore

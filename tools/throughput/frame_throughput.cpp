@@ -6,7 +6,7 @@
 
 #include "render/frame/frame_plan.h"
 #include "stream/base/error.h"
-#include "tools/throughput/page_cache.h"
+#include "tools/throughput/machine.h"
 
 namespace curvisplat {
 namespace {

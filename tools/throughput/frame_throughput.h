@@ -1,24 +1,43 @@
-// Measures whole frames, as `render` draws them, on an orbit around the data. The first frame reads from the
-// disk; later ones also use bricks that earlier frames left in memory. Varies error, threads and memory one
-// at a time.
+// Measures whole frames of a scene, as `render` draws them, on an orbit around the data. The first frame
+// reads from the disk; later ones also use bricks that earlier frames left in memory. Varies error, threads
+// and memory one at a time.
 //
 //   frames/lod:1/threads:2/memory:512MiB        s per frame, after the first
 //   frames/lod:1/threads:2/memory:512MiB/cold   s of the first frame, files not in the page cache
+//
+// measureFrames() is for the main thread; drawing starts threads of its own.
 #pragma once
 
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "render/backend/backend.h"
+#include "render/camera/camera.h"
+#include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
 #include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
 #include "tools/throughput/measurements.h"
-#include "tools/throughput/throughput_scene.h"
 
 namespace curvisplat {
+
+/// What `curvisplat bench` draws: a cache, a scalar, a transfer function, and cameras around the data. It
+/// refers to objects of the subcommand.
+struct ThroughputScene {
+  const CacheReader& cache;
+  size_t variable;
+  const TransferFunction& transfer_function;
+  FrameOptions options;  // of every frame, before one of them is varied
+  Backend backend;
+  /// `frames` cameras spread evenly over one orbit around the data.
+  std::function<std::vector<Camera>(unsigned frames)> orbit;
+};
 
 struct FrameEffort {
   double configuration_s = 4;  // approximate time for the frames of one configuration (at least two)
@@ -48,8 +67,8 @@ struct FramesOfConfiguration {
 std::vector<FrameConfiguration> frameConfigurations(std::span<const double> lod_pixels, unsigned threads,
                                                     uint64_t memory_bytes, uint64_t available_bytes);
 
-/// Adds the measurements to `to` and returns the statistics of the drawn frames. Throws Interrupted, and what
-/// FrameRenderer throws.
+/// Adds the measurements to `to` and returns the statistics of the drawn frames. Throws Interrupted, and
+/// what FrameRenderer throws.
 std::vector<FramesOfConfiguration> measureFrames(const ThroughputScene& scene,
                                                  std::span<const FrameConfiguration> configurations,
                                                  const FrameEffort& effort, Measurements& to,

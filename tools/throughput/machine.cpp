@@ -1,13 +1,23 @@
 #include "tools/throughput/machine.h"
 
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/statfs.h>
 #include <sys/utsname.h>
+#include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <thread>
+#include <utility>
+#include <vector>
 
-#include "tools/throughput/page_cache.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/paging/async_reads.h"
 
 namespace curvisplat {
 namespace {
@@ -52,6 +62,88 @@ nlohmann::ordered_json Machine::toJson() const {
 
 uint64_t availableMemory() {
   return kibibytesIn("MemAvailable");
+}
+
+namespace {
+
+// Values of statfs.f_type, from linux/magic.h and the sources of the file systems.
+constexpr std::pair<uint64_t, const char*> kFileSystems[] = {
+    {0xEF53, "ext4"},       {0x58465342, "xfs"},     {0x9123683E, "btrfs"}, {0x01021994, "tmpfs"},
+    {0x858458F6, "ramfs"},  {0x794C7630, "overlay"}, {0x6969, "nfs"},       {0x65735546, "fuse"},
+    {0x0BD00BD0, "lustre"}, {0x2FC12FC1, "zfs"},     {0x47504653, "gpfs"},  {0xFF534D42, "cifs"},
+    {0xFE534D42, "smb2"},   {0xF2F52010, "f2fs"},    {0x01021997, "9p"},    {0x00C36400, "ceph"}};
+
+/// Maps a part of a file without touching its pages.
+class Mapping {
+ public:
+  Mapping(const DirectFile& file, uint64_t offset, uint64_t bytes) : bytes_(bytes) {
+    at_ = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file.bufferedFd(), static_cast<off_t>(offset));
+    if (at_ == MAP_FAILED)
+      throw Error("{}: cannot map {} bytes at offset {}: {}", file.path().string(), bytes, offset,
+                  std::strerror(errno));
+  }
+  ~Mapping() { ::munmap(at_, bytes_); }
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+
+  void* at() const { return at_; }
+
+ private:
+  void* at_ = nullptr;
+  const uint64_t bytes_;
+};
+
+}  // namespace
+
+PageResidence residenceOf(const std::filesystem::path& path, uint64_t offset, uint64_t bytes) {
+  if (bytes == 0) return {};
+  const auto page = static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+  CURVISPLAT_CHECK_OP(offset % page, ==, 0u);
+  const DirectFile file(path, false);
+  const Mapping mapping(file, offset, bytes);
+  std::vector<unsigned char> resident((bytes + page - 1) / page);
+  if (::mincore(mapping.at(), bytes, resident.data()) != 0)
+    throw Error("{}: mincore failed: {}", path.string(), std::strerror(errno));
+  const auto in_memory =
+      std::count_if(resident.begin(), resident.end(), [](unsigned char flags) { return flags & 1; });
+  return {resident.size(), static_cast<uint64_t>(in_memory)};
+}
+
+PageResidence residenceOf(const std::filesystem::path& path) {
+  return residenceOf(path, 0, std::filesystem::file_size(path));
+}
+
+std::optional<std::string> dropPages(std::span<const std::filesystem::path> files) {
+  for (const std::filesystem::path& path : files) {
+    {
+      const DirectFile file(path, false);
+      // Unwritten pages cannot be evicted, hence the sync. mincore shows below whether both calls worked.
+      SystemCalls::current().fsync(file.bufferedFd());
+      ::posix_fadvise(file.bufferedFd(), 0, 0, POSIX_FADV_DONTNEED);
+    }
+    const PageResidence left = residenceOf(path);
+    if (left.resident == 0) continue;
+    const std::string file_system = fileSystemOf(path);
+    return fmt::format("{} of {} pages of {} stay in memory ({}): {}", left.resident, left.pages,
+                       path.filename().string(), file_system,
+                       isInMemory(file_system) ? "this file system keeps its files in memory"
+                                               : "another program uses them, or another user owns the file");
+  }
+  return std::nullopt;
+}
+
+std::string fileSystemOf(const std::filesystem::path& path) {
+  struct statfs status {};
+  if (::statfs(path.c_str(), &status) != 0)
+    throw Error("{}: cannot determine its file system: {}", path.string(), std::strerror(errno));
+  const auto magic = static_cast<uint64_t>(status.f_type) & 0xFFFFFFFF;
+  for (const auto& [number, name] : kFileSystems)
+    if (number == magic) return name;
+  return fmt::format("file system {:#x}", magic);
+}
+
+bool isInMemory(const std::string& file_system) {
+  return file_system == "tmpfs" || file_system == "ramfs";
 }
 
 }  // namespace curvisplat

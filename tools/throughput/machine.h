@@ -1,9 +1,14 @@
-// Describes the machine that was measured.
+// The machine that is measured: its description, and its page cache. The pages of a file can be evicted from
+// it and checked, so that reads are verifiably cold. Any thread may call these functions; they concern the
+// whole machine.
 #pragma once
+
+#include <nlohmann/json_fwd.hpp>
 
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
 #include <string>
 
 namespace curvisplat {
@@ -21,5 +26,29 @@ struct Machine {
 
 /// MemAvailable of /proc/meminfo in bytes; 0 if unknown.
 uint64_t availableMemory();
+
+/// How many of a file's pages are in the page cache.
+struct PageResidence {
+  uint64_t pages = 0;
+  uint64_t resident = 0;  // of these, in the page cache
+  bool operator==(const PageResidence&) const = default;
+};
+
+/// Residence of `bytes` bytes of the file from `offset`, a multiple of the page size; uses mincore. The
+/// kernel reports all pages of a file as resident if the caller neither owns it nor may write it. Throws
+/// Error.
+PageResidence residenceOf(const std::filesystem::path& path, uint64_t offset, uint64_t bytes);
+/// Residence of the whole file.
+PageResidence residenceOf(const std::filesystem::path& path);
+
+/// Writes back and evicts the pages of `files`, then checks with mincore. Returns nullopt if all are
+/// evicted, else the reason: a file system in memory keeps its pages, and so does another process that maps
+/// them. Throws Error if a file cannot be opened.
+std::optional<std::string> dropPages(std::span<const std::filesystem::path> files);
+
+/// The file system that holds `path`: "ext4", "tmpfs", ...
+std::string fileSystemOf(const std::filesystem::path& path);
+/// Whether the file system keeps its files in memory.
+bool isInMemory(const std::string& file_system);
 
 }  // namespace curvisplat

@@ -1,11 +1,13 @@
-// The results of `bench`: measurements with a name that is stable across versions, a unit, and one number per
-// sample.
+// The results of `bench`: measurements with a name that is stable across versions, a unit, and one number
+// per sample; and tables of them for a terminal.
 //
-// A name is a path that ends with named parameters: "disk/direct/256KiB/depth:8", "stages/project/threads:2".
-// Measurements that could not be made are kept with the reason, so that none is missing without explanation.
+// A name is a path that ends with named parameters: "disk/direct/256KiB/depth:8",
+// "stages/project/threads:2". Measurements that could not be made are kept with the reason, so that none is
+// missing without explanation. One thread at a time may use an object.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+
 #include <optional>
 #include <string>
 #include <string_view>
@@ -53,5 +55,28 @@ class Measurements {
   std::vector<Measurement> all_;
   std::vector<LeftOut> left_out_;
 };
+
+/// A table for a terminal. The first column is aligned to the left, the others to the right.
+class TextTable {
+ public:
+  explicit TextTable(std::vector<std::string> heads) : rows_{std::move(heads)} {}
+
+  /// At most as many cells as there are heads.
+  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+  bool empty() const { return rows_.size() == 1; }
+
+  /// One line per row, without trailing blanks.
+  std::string text() const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+/// About three significant digits: "17.3 M", "940 k", "12".
+std::string shortCount(double value);
+/// Units of powers of 1000: "1.80 GB" for 1.8e9.
+std::string shortBytes(double bytes);
+/// "12.3 ms", "0.42 s", "17 s".
+std::string shortSeconds(double seconds);
 
 }  // namespace curvisplat

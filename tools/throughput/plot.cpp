@@ -7,9 +7,8 @@
 #include <cmath>
 #include <set>
 
-#include "render/annotate/axis_ticks.h"
-#include "render/annotate/cairo_surface.h"
-#include "stream/base/check.h"
+#include "render/annotate/annotated_scene.h"
+#include "render/annotate/canvas.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

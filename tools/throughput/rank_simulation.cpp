@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "render/frame/frame_plan.h"
-#include "render/frame/picture_shares.h"
 #include "render/project/screen_splat.h"
-#include "tools/throughput/text_table.h"
+#include "render/ranks/picture_shares.h"
+#include "tools/throughput/measurements.h"
 
 namespace curvisplat {
 namespace {

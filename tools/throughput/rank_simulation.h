@@ -1,5 +1,5 @@
 // What a picture would take of 1, 2, ... 1024 processes: simulated from a cache's index and a view, shared out
-// by the function that shares out real pictures (render/frame/picture_shares.h). Nothing is read but the index. Pure.
+// by the function that shares out real pictures (render/ranks/picture_shares.h). Nothing is read but the index. Pure.
 #pragma once
 
 #include <cstdint>

@@ -2,21 +2,173 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <set>
+#include <vector>
 
 #include "render/frame/frame_plan.h"
+#include "stream/base/checksum.h"
 #include "stream/base/error.h"
-#include "stream/base/worker_team.h"
+#include "stream/base/file.h"
+#include "stream/base/threads.h"
+#include "stream/codec/brick_codec.h"
 #include "stream/paging/pager.h"
-#include "tools/throughput/page_cache.h"
-#include "tools/throughput/prepared_sample.h"
-#include "tools/throughput/repeated.h"
+#include "tools/throughput/machine.h"
 
 namespace curvisplat {
+
+BrickSample sampleOf(std::span<const BrickPart> parts, std::span<const Brick> bricks, uint64_t max_splats,
+                     uint32_t runs) {
+  const auto splatsOf = [&](const BrickPart& part) {
+    return uint64_t{SplatRanges(bricks[part.brick], part.octants).splats()};
+  };
+  uint64_t all = 0;
+  for (const BrickPart& part : parts) all += splatsOf(part);
+  BrickSample sample;
+  if (all <= max_splats) {
+    sample.parts.assign(parts.begin(), parts.end());
+    sample.splats = all;
+    return sample;
+  }
+  // Run r begins after a fraction r / runs of all splats, and holds 1 / runs of the sample.
+  uint64_t behind = 0;
+  uint32_t run = 0;
+  uint64_t wanted = 0;
+  for (const BrickPart& part : parts) {
+    const uint64_t splats = splatsOf(part);
+    while (run < runs && static_cast<double>(behind) >= static_cast<double>(all) / runs * run) {
+      ++run;
+      wanted = max_splats / runs * run;
+    }
+    if (sample.splats < wanted || sample.parts.empty()) {
+      sample.parts.push_back(part);
+      sample.splats += splats;
+    }
+    behind += splats;
+  }
+  return sample;
+}
+
 namespace {
+
+void sortInto(DepthSorter& sorter, const std::vector<uint32_t>& keys, const std::vector<ScreenSplat>& splats,
+              std::vector<ScreenSplat>& sorted) {
+  const auto order = sorter.sort(keys, DrawingOrder::kFrontToBack);
+  sorted.resize(std::max(sorted.size(), splats.size()));
+  for (size_t n = 0; n < order.size(); ++n) sorted[n] = splats[order[n].splat];
+}
+
+}  // namespace
+
+PreparedSample::PreparedSample(const CacheReader& cache, size_t variable, const FramePlanner& planner,
+                               const FramePlan& plan, const BrickSample& sample)
+    : cache_(cache), variable_(variable), planner_(planner), plan_(plan), splats_(sample.splats) {
+  const InputFile geometry(cache.geometryPath()), values(cache.valuesPath(variable));
+  Scratch scratch;
+  for (const BrickPart& part : sample.parts) {
+    const Brick& brick = cache.bricks()[part.brick];
+    const Extent& of_values = cache.brickVariables(variable)[part.brick].values;
+    SampledBrick& read = bricks_.emplace_back();
+    read.part = part;
+    read.geometry_bytes.resize(brick.geometry.length);
+    read.values_bytes.resize(of_values.length);
+    geometry.readAt(brick.geometry.offset, std::span(read.geometry_bytes));
+    values.readAt(of_values.offset, std::span(read.values_bytes));
+    bytes_ += brick.geometry.length + of_values.length;
+    decoded_ += brick.splats;
+
+    verifyAndDecode(bricks_.size() - 1, scratch);
+    read.geometry = scratch.geometry;
+    read.values = scratch.values;
+    project(read, read.geometry, read.values, scratch.projector);
+    read.projected = scratch.projector.splats();
+    read.keys = keysOf(read, scratch);
+    sortInto(scratch.sorter, read.keys, read.projected, scratch.sorted);
+    const auto count = static_cast<ptrdiff_t>(read.projected.size());
+    to_draw_.insert(to_draw_.end(), scratch.sorted.begin(), scratch.sorted.begin() + count);
+    segments_.push_back(static_cast<uint32_t>(count));
+    on_screen_ += read.projected.size();
+  }
+}
+
+void PreparedSample::project(const SampledBrick& brick, const SplatGeometry& geometry,
+                             const SplatVariable& values, BrickProjector& projector) const {
+  const Brick& of_index = cache_.bricks()[brick.part.brick];
+  const SplatRanges ranges(of_index, brick.part.octants);
+  projector.project(plan_.settings, planner_.table(), cache_.manifest().root.cellMin(of_index.cell),
+                    arraysOf(geometry), arraysOf(values), std::span(ranges.begin(), ranges.size()));
+}
+
+const std::vector<uint32_t>& PreparedSample::keysOf(const SampledBrick& brick, Scratch& scratch) const {
+  const Brick& of_index = cache_.bricks()[brick.part.brick];
+  scratch.keys.resize(scratch.projector.depths().size());
+  plan_.keys.keysOf(scratch.projector.depths(), cache_.manifest().root.cellMin(of_index.cell),
+                    plan_.keys.rangeOf(of_index), scratch.keys);
+  return scratch.keys;
+}
+
+void PreparedSample::verify(size_t n) const {
+  const SampledBrick& brick = bricks_[n];
+  const uint64_t expected = cache_.bricks()[brick.part.brick].geometry.checksum ^
+                            cache_.brickVariables(variable_)[brick.part.brick].values.checksum;
+  CURVISPLAT_CHECK_OP(checksumOf(brick.geometry_bytes) ^ checksumOf(brick.values_bytes), ==, expected);
+}
+
+void PreparedSample::decode(size_t n, Scratch& scratch) const {
+  const SampledBrick& brick = bricks_[n];
+  const Brick& of_index = cache_.bricks()[brick.part.brick];
+  decodeGeometry(cache_.manifest().root, of_index, brick.geometry_bytes, scratch.geometry);
+  decodeVariable(of_index, cache_.brickVariables(variable_)[brick.part.brick], brick.values_bytes,
+                 scratch.values);
+}
+
+void PreparedSample::verifyAndDecode(size_t n, Scratch& scratch) const {
+  const SampledBrick& brick = bricks_[n];
+  const uint32_t splats = cache_.bricks()[brick.part.brick].splats;
+  scratch.geometry.resize(splats);
+  scratch.values.resize(splats);
+  cache_.decode(brick.part.brick, brick.geometry_bytes, arraysOf(scratch.geometry), scratch.times);
+  cache_.decode(brick.part.brick, variable_, brick.values_bytes, arraysOf(scratch.values), scratch.times);
+}
+
+void PreparedSample::project(size_t n, Scratch& scratch) const {
+  project(bricks_[n], bricks_[n].geometry, bricks_[n].values, scratch.projector);
+}
+
+void PreparedSample::sort(size_t n, Scratch& scratch) const {
+  sortInto(scratch.sorter, bricks_[n].keys, bricks_[n].projected, scratch.sorted);
+}
+
+void PreparedSample::prepare(size_t n, Scratch& scratch) const {
+  verifyAndDecode(n, scratch);
+  project(bricks_[n], scratch.geometry, scratch.values, scratch.projector);
+  sortInto(scratch.sorter, keysOf(bricks_[n], scratch), scratch.projector.splats(), scratch.sorted);
+}
+
+namespace {
+
+/// Seconds per run of `job`, one number per sample. A sample repeats the job until `sample_s` seconds have
+/// passed, so that its time can be measured reliably, but at least once. A first run, which warms caches and
+/// allocates memory, is not counted.
+std::vector<double> secondsOfRuns(double sample_s, unsigned samples, const std::function<void()>& job) {
+  job();
+  std::vector<double> seconds;
+  for (unsigned sample = 0; sample < samples; ++sample) {
+    const auto start = std::chrono::steady_clock::now();
+    double passed = 0;
+    unsigned runs = 0;
+    do {
+      job();
+      ++runs;
+      passed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    } while (passed < sample_s);
+    seconds.push_back(passed / runs);
+  }
+  return seconds;
+}
 
 constexpr uint64_t kPagerBufferBytes = 32 << 20;  // what a frame gives the pager at most
 

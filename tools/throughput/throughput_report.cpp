@@ -7,8 +7,8 @@
 #include <map>
 
 #include "tools/throughput/disk_throughput.h"
+#include "tools/throughput/measurements.h"
 #include "tools/throughput/stage_throughput.h"
-#include "tools/throughput/text_table.h"
 
 namespace curvisplat {
 namespace {

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -1,6 +1,5 @@
 #include "tools/viewer/cache_view.h"
 
-#define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <fmt/format.h>
 #include <imgui.h>
@@ -11,10 +10,9 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/message.h"
-#include "tools/viewer/first_view.h"
-#include "tools/viewer/picture_layout.h"
-#include "tools/viewer/state_files.h"
+#include "tools/view/first_view.h"
+#include "tools/view/picture_layout.h"
+#include "tools/view/saved_views.h"
 
 namespace curvisplat {
 namespace {

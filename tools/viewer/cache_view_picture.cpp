@@ -8,25 +8,22 @@
 #include <future>
 #include <utility>
 
-#define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
 #include "render/image/image_file.h"
-#include "render/mesh/mesh_file.h"
+#include "render/mesh/triangle_mesh.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/thread_name.h"
+#include "stream/base/threads.h"
 #include "stream/codec/values_codec.h"
+#include "tools/panels/picture_signs.h"
+#include "tools/view/first_view.h"
+#include "tools/view/picture_layout.h"
+#include "tools/view/saved_views.h"
 #include "tools/viewer/cache_view.h"
-#include "tools/viewer/camera_controls.h"
-#include "tools/viewer/first_view.h"
-#include "tools/viewer/marker_panel.h"
-#include "tools/viewer/picture_layout.h"
-#include "tools/viewer/picture_values.h"
-#include "tools/viewer/render_command.h"
-#include "tools/viewer/state_files.h"
-#include "tools/viewer/widget_places.h"
+#include "tools/viewer/navigation.h"
+#include "tools/window/widgets.h"
 
 namespace curvisplat {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "render/annotate/annotations.h"
 #include "render/camera/camera_path.h"
-#include "render/frame/step_player.h"
+#include "render/frame/frame.h"
 #include "render/image/image_file.h"
-#include "tools/viewer/picture_layout.h"
+#include "tools/view/picture_layout.h"
 
 namespace curvisplat {
 namespace {

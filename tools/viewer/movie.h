@@ -8,12 +8,12 @@
 #include <memory>
 #include <optional>
 
-#include "render/frame/backend.h"
+#include "render/backend/backend.h"
 #include "render/image/image.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
-#include "tools/viewer/frame_loop.h"
-#include "tools/viewer/view_state.h"
+#include "tools/view/frame_loop.h"
+#include "tools/view/view_state.h"
 
 namespace curvisplat {
 

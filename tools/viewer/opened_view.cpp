@@ -1,16 +1,42 @@
 #include "tools/viewer/opened_view.h"
 
 #include <fmt/format.h>
+#include <imgui.h>
 
 #include <exception>
 #include <utility>
 
 #include "stream/base/error.h"
-#include "stream/base/thread_name.h"
-#include "tools/viewer/further_scalar_list.h"
-#include "tools/viewer/reports.h"
+#include "stream/base/threads.h"
+#include "tools/view/background_jobs.h"
+#include "tools/window/reports.h"
+#include "tools/window/widgets.h"
 
 namespace curvisplat {
+
+bool JobDisplay::draw(const BackgroundJob& job, const std::string& name, const std::string& note) {
+  const float unit = ImGui::GetFontSize();
+  ImGui::SetNextWindowPos(
+      {static_cast<float>(picture_.x) + unit, static_cast<float>(picture_.y) + unit + below_});
+  ImGui::SetNextWindowSize({26 * unit, 0});
+  ImGui::Begin(name.c_str(), nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                   ImGuiWindowFlags_AlwaysAutoResize);
+  window_.coverCurrent();
+  ImGui::TextUnformatted(job.title().c_str());
+  if (!note.empty()) ImGui::TextDisabled("%s", note.c_str());
+  // Dear ImGui's yellow leaves white letters unread.
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
+  ImGui::ProgressBar(job.part(), {-1, 0}, job.phase().c_str());
+  ImGui::PopStyleColor();
+  nameWidget(name);
+  const bool stops = ImGui::Button("stop");
+  nameWidget("stop " + name);
+  below_ += ImGui::GetWindowSize().y + 0.5f * unit;
+  ImGui::End();
+  return stops;
+}
+
 namespace {
 
 namespace fs = std::filesystem;

@@ -1,5 +1,9 @@
-// What is open in the window: the view of it, and how another takes its place. Opens caches at once and converts grids in
-// the background, shows previews meanwhile, adds scalars to the cache that is shown.
+// What is open in the window: the view of it, and how another takes its place. OpenedView opens caches at
+// once and converts grids in the background, shows previews meanwhile, and adds scalars to the cache that is
+// shown. JobDisplay shows such jobs.
+//
+// For the main thread. A view that is replaced ends on a thread of its own, and the new one draws when its
+// memory is free.
 #pragma once
 
 #include <filesystem>
@@ -11,14 +15,29 @@
 #include <vector>
 
 #include "stream/cache/cache_reader.h"
+#include "tools/view/background_jobs.h"
+#include "tools/view/saved_views.h"
 #include "tools/viewer/cache_view.h"
-#include "tools/viewer/job_display.h"
-#include "tools/viewer/opening.h"
 #include "tools/viewer/prepared_view.h"
-#include "tools/viewer/state_files.h"
-#include "tools/viewer/viewer_options.h"
+#include "tools/window/window.h"
 
 namespace curvisplat {
+
+/// Jobs in the background, in the corner of the picture, where they hide nothing that is looked at: what is
+/// done, how far it is, and a button that stops it.
+class JobDisplay {
+ public:
+  JobDisplay(const Rectangle& picture, Window& window) : picture_(picture), window_(window) {}
+
+  /// Draws a job below those before. `name` is the name of its widgets: "opening", "stop opening". `note`
+  /// may be empty. Returns whether the user stops the job.
+  bool draw(const BackgroundJob& job, const std::string& name, const std::string& note = {});
+
+ private:
+  const Rectangle picture_;
+  Window& window_;
+  float below_ = 0;  // of those before
+};
 
 /// What a view is shown in and reports to.
 struct ViewSurroundings {
@@ -42,7 +61,8 @@ class OpenedView {
   void show(CacheReader cache);
   /// Opens what was chosen in a dialog or a menu, or dropped: a cache at once, a grid when it is converted.
   void open(const std::vector<std::filesystem::path>& files);
-  /// Shows what has been opened since the last call, and begins to add a scalar that the view wants. Between the window's frames.
+  /// Shows what has been opened since the last call, and begins to add a scalar that the view wants. Call it
+  /// between the window's frames.
   void update();
   /// Draws what is being opened, and stops it if the user says so.
   void drawOpening(JobDisplay& display);

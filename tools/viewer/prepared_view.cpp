@@ -4,9 +4,8 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/message.h"
-#include "tools/viewer/first_view.h"
-#include "tools/viewer/state_files.h"
+#include "tools/view/first_view.h"
+#include "tools/view/saved_views.h"
 
 namespace curvisplat {
 namespace {

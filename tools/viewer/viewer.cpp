@@ -1,6 +1,5 @@
 #include "tools/viewer/viewer.h"
 
-#define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <fmt/format.h>
 #include <imgui.h>
@@ -13,15 +12,14 @@
 #include <utility>
 
 #include "stream/base/error.h"
-#include "stream/base/message.h"
+#include "tools/view/saved_views.h"
 #include "tools/viewer/cache_view.h"
-#include "tools/viewer/menus.h"
 #include "tools/viewer/movie.h"
 #include "tools/viewer/opened_view.h"
-#include "tools/viewer/reports.h"
-#include "tools/viewer/state_files.h"
-#include "tools/viewer/widget_places.h"
-#include "tools/viewer/window.h"
+#include "tools/window/reports.h"
+#include "tools/window/widgets.h"
+#include "tools/window/window.h"
+#include "tools/window/window_commands.h"
 
 namespace curvisplat {
 namespace {

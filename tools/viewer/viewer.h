@@ -5,7 +5,7 @@
 
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
-#include "tools/viewer/viewer_options.h"
+#include "tools/viewer/prepared_view.h"
 
 namespace curvisplat {
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "preprocess/formats/common/spooled_numbers.h"
+#include "preprocess/formats/common/spool_file.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -19,7 +19,7 @@
 
 #include "preprocess/formats/cgns/cgns_file.h"
 #include "preprocess/formats/common/spool_file.h"
-#include "preprocess/mesh/mesh_cells.h"
+#include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
 

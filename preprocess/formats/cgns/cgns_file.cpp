@@ -7,11 +7,14 @@
 #include <cstring>
 #include <limits>
 #include <span>
+#include <string>
+#include <string_view>
 
 #include "preprocess/formats/cgns/cgns_hdf5.h"
-#include "preprocess/formats/common/data_library_lock.h"
-#include "stream/base/check.h"
+#include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {
@@ -80,9 +83,9 @@ bool isHdf5(const InputFile& file) {
   return beginOf(file).starts_with(kHdf5Mark);
 }
 
-/// Throws Error if an ADF file is shorter than its header says: libcgns reads text without an end from blocks that are
-/// not there. The header's bytes 146 to 157 are the position of the file's last byte: a block of 4,096 bytes in eight
-/// hexadecimal digits, and the byte in it in four.
+/// Throws Error if an ADF file is shorter than its header says: libcgns reads text without an end from
+/// blocks that are not there. The header's bytes 146 to 157 are the position of the file's last byte: a
+/// block of 4,096 bytes in eight hexadecimal digits, and the byte in it in four.
 void requireAllOfAdf(const InputFile& file) {
   constexpr size_t kHeader = 186, kEnd = 146, kBlockDigits = 8, kDigits = 12;
   std::string header(kHeader, '\0');
@@ -349,6 +352,57 @@ void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox&
 
 void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, float* to) const {
   hdf5_ ? hdf5_->read(node, box, to) : readAdf(node, shape, box, to);
+}
+
+namespace {
+
+constexpr int kMaxDepth = 16;
+constexpr size_t kMaxNodes = 20'000;
+constexpr uint64_t kSmall = 4096;  // values that are read as a whole
+
+/// The first and the last value, or all.
+void readValues(const CgnsFile& file, const CgnsNode& node, const CgnsShape& shape) {
+  if (shape.type == "C1") {
+    file.texts(node);
+  } else if (shape.number() && shape.count() <= kSmall) {
+    file.numbers(node);
+  } else if (shape.number()) {
+    CgnsBox box{{}, {1, 1, 1}, {1, 1}};
+    double value = 0;
+    for (const bool last : {false, true}) {
+      for (size_t axis = 0; last && axis < std::min<size_t>(3, shape.dims.size()); ++axis)
+        box.first[axis] = shape.dims[axis] - 1;
+      file.read(node, shape, box, &value);
+    }
+  }
+}
+
+/// Errors end the visit of a node, not of those beside it.
+void visit(const CgnsFile& file, const CgnsNode& node, int depth, size_t& visited) {
+  if (depth > kMaxDepth || ++visited > kMaxNodes) return;
+  try {
+    if (depth > 0) readValues(file, node, file.shape(node));
+  } catch (const Error&) {
+    // The reader finds the same, if it needs the node.
+  }
+  try {
+    for (const CgnsNode& child : file.children(node)) visit(file, child, depth + 1, visited);
+  } catch (const Error&) {
+  }
+}
+
+}  // namespace
+
+void tryAdf(const std::filesystem::path& path) {
+  std::string begin(32, '\0');
+  if (const InputFile file(path); file.size() >= begin.size())
+    file.readAt(0, std::span(begin.data(), begin.size()));
+  if (!std::string_view(begin).substr(4).starts_with("ADF")) return;
+  tryLibrary("libcgns", path, [&] {
+    const CgnsFile file(path);
+    size_t visited = 0;
+    visit(file, file.root(), 0, visited);
+  });
 }
 
 }  // namespace curvisplat

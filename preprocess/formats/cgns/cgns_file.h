@@ -2,10 +2,11 @@
 // cgns_tree.h interprets the nodes.
 //
 // HDF5 files are read with HDF5 itself (cgns_hdf5.h), never with libcgns. ADF files are read with the node
-// layer of libcgns (cgns_io.h), not with its mid-level library (cgnslib.h): cgnslib reads the whole tree when
-// a file is opened, rejects files because of boundary conditions that nobody asked for, and trusts the sizes
-// in a damaged file. This class reads only the nodes that are requested, and checks every size before it
-// allocates: dimensions against the size of the file, types against the destination.
+// layer of libcgns (cgns_io.h), not with its mid-level library (cgnslib.h): cgnslib reads the whole tree
+// when a file is opened, rejects files because of boundary conditions that nobody asked for, and trusts the
+// sizes in a damaged file. CgnsFile reads only the nodes that are requested, and checks every size before it
+// allocates: dimensions against the size of the file, types against the destination. Since libcgns also
+// trusts the structures of ADF files, tryAdf() lets it visit them in a child process first.
 //
 // Neither library is thread-safe: every call holds dataLibraryMutex(). Any number of threads may use a
 // CgnsFile; their calls run one after the other. Links to other files are followed.
@@ -25,6 +26,7 @@ namespace curvisplat {
 
 class CgnsHdf5;
 
+/// An open CGNS file of either format.
 class CgnsFile {
  public:
   /// This and every member function throws Error with the file, the node and the library's message.
@@ -69,5 +71,10 @@ class CgnsFile {
   int file_ = 0;                    // libcgns' id of an ADF file
   double root_ = 0;                 // libcgns' id of its root node
 };
+
+/// Visits the nodes of an ADF file, 20,000 at most, with their first and last values, in a child process
+/// (library_trial.h), and throws Error if libcgns crashes there: in a damaged file, it reads memory that
+/// does not exist. Files of other formats are left alone. Must not be called with dataLibraryMutex() held.
+void tryAdf(const std::filesystem::path& path);
 
 }  // namespace curvisplat

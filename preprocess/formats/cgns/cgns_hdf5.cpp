@@ -5,10 +5,8 @@
 #include <exception>
 #include <optional>
 
-#include "preprocess/formats/common/hdf5_attribute.h"
-#include "preprocess/formats/common/hdf5_lists.h"
-#include "preprocess/formats/common/hdf5_trial.h"
-#include "stream/base/check.h"
+#include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

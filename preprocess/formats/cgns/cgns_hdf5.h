@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "preprocess/formats/cgns/cgns_node.h"
-#include "preprocess/formats/common/hdf5_handle.h"
+#include "preprocess/formats/common/hdf5_objects.h"
 
 namespace curvisplat {
 

@@ -9,12 +9,11 @@
 #include <set>
 #include <utility>
 
-#include "preprocess/formats/cgns/cgns_boundary.h"
-#include "preprocess/formats/cgns/cgns_steps.h"
-#include "preprocess/formats/cgns/cgns_units.h"
-#include "preprocess/grid/time_steps.h"
-#include "stream/base/count_text.h"
+#include "preprocess/formats/cgns/cgns_patches.h"
+#include "preprocess/formats/cgns/cgns_solutions.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "preprocess/formats/cgns/cgns_file.h"
-#include "preprocess/formats/cgns/cgns_holes.h"
+#include "preprocess/formats/cgns/cgns_patches.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {

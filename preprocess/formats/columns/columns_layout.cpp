@@ -6,8 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "preprocess/formats/netcdf/cf_roles.h"
-#include "preprocess/formats/netcdf/standard_atmosphere.h"
+#include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -8,12 +8,11 @@
 #include <limits>
 #include <numbers>
 
+#include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/cf_grid.h"
-#include "preprocess/formats/netcdf/cf_roles.h"
-#include "preprocess/grid/scalar_names.h"
-#include "preprocess/grid/time_steps.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "preprocess/formats/columns/columns_layout.h"
 #include "preprocess/formats/common/open_grid_options.h"
-#include "preprocess/formats/common/spooled_numbers.h"
-#include "preprocess/formats/netcdf/globe.h"
+#include "preprocess/formats/common/spool_file.h"
+#include "preprocess/formats/netcdf/map_projection.h"
 #include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {

@@ -1,11 +1,41 @@
 #include "preprocess/formats/common/byte_source.h"
 
 #include <algorithm>
+#include <string>
+#include <system_error>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 
 namespace curvisplat {
+
+std::shared_ptr<const InputFile> OpenFiles::at(const std::filesystem::path& path) {
+  const MutexLock lock(mutex_);
+  const auto found =
+      std::find_if(files_.begin(), files_.end(), [&](const auto& file) { return file->path() == path; });
+  if (found != files_.end()) {
+    files_.splice(files_.begin(), files_, found);
+  } else {
+    if (files_.size() == most_) files_.pop_back();
+    files_.push_front(std::make_shared<const InputFile>(path));
+  }
+  return files_.front();
+}
+
+PooledFile::PooledFile(std::shared_ptr<OpenFiles> pool, std::filesystem::path path)
+    : pool_(std::move(pool)), path_(std::move(path)), size_(pool_->at(path_)->size()) {}
+
+const std::filesystem::path& existingFile(std::string_view who, const std::filesystem::path& path) {
+  if (isRegularFile(path)) return path;
+  std::error_code ignored;
+  if (std::filesystem::exists(path, ignored))
+    throw Error("{} names {}, which is not a regular file", who, path.string());
+  for (const char* const ending : {".gz", ".xz", ".zst"})
+    if (const std::filesystem::path packed = path.string() + ending; isRegularFile(packed))
+      throw Error("{} names {}, which does not exist; decompress {}", who, path.string(),
+                  packed.filename().string());
+  throw Error("{} names {}, which does not exist", who, path.string());
+}
 
 FileBytes::FileBytes(std::shared_ptr<const PooledFile> file, uint64_t begin, uint64_t end)
     : file_(std::move(file)),

@@ -1,17 +1,119 @@
-// Bytes that are read by position, independent of how a file stores them: raw, in base64, in compressed
-// blocks, or as numbers in text.
+// Bytes of files that are read by position, and the numbers in them.
+//
+// Readers never hold a whole file. A ByteSource hides how the bytes are stored: raw, in base64, in
+// compressed blocks, or as text that has been spooled; a reader asks it for ranges. OpenFiles bounds how
+// many files are open at once, since a partitioned data set may have more pieces than a process may have
+// open files. loadStored() and convertStored() load numbers of either byte order, 1 to 8 bytes, unaligned.
+// existingFile() checks a file that another one names.
+//
+// Any number of threads may read from a source, a file or a pool. Reading beyond the end of a file is an
+// Error with its name.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <list>
 #include <memory>
 #include <span>
+#include <string_view>
+#include <type_traits>
 
-#include "preprocess/formats/common/open_files.h"
+#include "stream/base/file.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
-/// Any number of threads may read at once.
+/// The byte order of the numbers in a file.
+enum class ByteOrder { kLittle, kBig };
+
+inline constexpr ByteOrder kMachineByteOrder =
+    std::endian::native == std::endian::big ? ByteOrder::kBig : ByteOrder::kLittle;
+
+inline uint8_t byteSwapped(uint8_t bits) {
+  return bits;
+}
+inline uint16_t byteSwapped(uint16_t bits) {
+  return __builtin_bswap16(bits);
+}
+inline uint32_t byteSwapped(uint32_t bits) {
+  return __builtin_bswap32(bits);
+}
+inline uint64_t byteSwapped(uint64_t bits) {
+  return __builtin_bswap64(bits);
+}
+
+template <size_t kBytes>
+using UnsignedOfBytes = std::conditional_t<
+    kBytes == 8, uint64_t,
+    std::conditional_t<kBytes == 4, uint32_t, std::conditional_t<kBytes == 2, uint16_t, uint8_t>>>;
+
+/// Loads the number at `from`. Stored: an arithmetic type of 1, 2, 4 or 8 bytes.
+template <typename Stored>
+Stored loadStored(const std::byte* from, bool swap) {
+  using Bits = UnsignedOfBytes<sizeof(Stored)>;
+  static_assert(sizeof(Stored) == sizeof(Bits));
+  Bits bits;
+  std::memcpy(&bits, from, sizeof bits);
+  return std::bit_cast<Stored>(swap ? byteSwapped(bits) : bits);
+}
+
+/// Converts `count` numbers from `from` to `to`. A double that is too large for a float becomes infinite,
+/// which blanks its sample.
+template <typename Stored, typename Value>
+void convertStored(const std::byte* from, size_t count, bool swap, Value* to) {
+  if (swap)
+    for (size_t n = 0; n < count; ++n)
+      to[n] = static_cast<Value>(loadStored<Stored>(from + n * sizeof(Stored), true));
+  else
+    for (size_t n = 0; n < count; ++n)
+      to[n] = static_cast<Value>(loadStored<Stored>(from + n * sizeof(Stored), false));
+}
+
+/// A bounded pool of open input files, most recently used first. Thread-safe.
+class OpenFiles {
+ public:
+  explicit OpenFiles(size_t most = 64) : most_(most) {}
+
+  /// Opens `path` unless it is open. It stays open while anybody holds the result. Throws Error as InputFile
+  /// does.
+  std::shared_ptr<const InputFile> at(const std::filesystem::path& path);
+
+ private:
+  const size_t most_;
+  Mutex mutex_;
+  std::list<std::shared_ptr<const InputFile>> files_ GUARDED_BY(mutex_);
+};
+
+/// A file of a pool. Any number of threads may read concurrently.
+class PooledFile {
+ public:
+  /// Throws Error if it cannot be opened.
+  PooledFile(std::shared_ptr<OpenFiles> pool, std::filesystem::path path);
+
+  const std::filesystem::path& path() const { return path_; }
+  /// For error messages.
+  std::string name() const { return path_.string(); }
+  /// Its size in bytes when it was first opened.
+  uint64_t size() const { return size_; }
+  /// Fills `to` with the bytes at `offset`. Throws Error if the file ends before that, or if reading fails.
+  void readAt(uint64_t offset, std::span<std::byte> to) const { pool_->at(path_)->readAt(offset, to); }
+
+ private:
+  std::shared_ptr<OpenFiles> pool_;
+  std::filesystem::path path_;
+  uint64_t size_ = 0;
+};
+
+/// Checks a file that another one names: a case, a collection or a series. Returns `path` if it is a regular
+/// file; otherwise throws Error, "WHO names PATH, which does not exist". `who` is like "a.vtm:". If only a
+/// compressed file of that name exists, the message says so.
+const std::filesystem::path& existingFile(std::string_view who, const std::filesystem::path& path);
+
+/// Bytes that are read by position, however the file stores them. Any number of threads may read at once.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;

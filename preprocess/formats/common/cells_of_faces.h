@@ -9,8 +9,8 @@
 #include <span>
 #include <string>
 
-#include "preprocess/formats/common/spooled_numbers.h"
-#include "preprocess/mesh/mesh_cells.h"
+#include "preprocess/formats/common/spool_file.h"
+#include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
 

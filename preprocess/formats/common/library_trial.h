@@ -1,14 +1,31 @@
-// Work of a library on a file that may be damaged, tried in a process of its own, which may crash (hdf5_trial.h).
+// Checks of a file that may be damaged, before a data library opens it: is the file complete, and does the
+// library survive it?
+//
+// HDF5 (1.10) and libcgns trust the structures of a file. If these are damaged, the libraries read and free
+// memory that does not exist, or never return. Their work is therefore tried in a child process first, which
+// may crash without harm. A trial costs a fork and the time of opening the file. A file is tried once, and
+// again only if it changes. If no process can be started (ulimit -u), nothing is tried. Any thread may call
+// these functions, but not while it holds dataLibraryMutex().
 #pragma once
 
 #include <filesystem>
 #include <functional>
 
+#include "stream/base/file.h"
+
 namespace curvisplat {
 
-/// Throws Error if `work` crashes or takes too long; what it throws does not matter. Each file is tried once as long as
-/// it stays as it is, nothing if no process can be had. `library`, for the message, needs a literal. Must not be called
-/// with dataLibraryMutex() held.
+/// Throws TruncatedFile if `file` begins as HDF5 and ends before the address that its superblock (versions 0
+/// to 3) states: HDF5 reports a truncated file as an unknown error.
+void requireWholeHdf5(const InputFile& file);
+
+/// Runs `work` on the file in a trial. Throws Error if it crashes or takes too long; exceptions of `work`
+/// are ignored, since the caller meets the same ones. `library` names it in the message.
 void tryLibrary(const char* library, const std::filesystem::path& path, const std::function<void()>& work);
+
+/// Tries what HDF5 does with the file: the trial walks all objects, links, attributes and indices, and reads
+/// small chunks, but not all values. `more`, if given, runs in the same trial; its exceptions are ignored.
+/// Throws Error if HDF5 crashes or takes too long.
+void tryHdf5(const std::filesystem::path& path, const std::function<void()>& more = nullptr);
 
 }  // namespace curvisplat

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/formats/common/byte_order.h"
+#include "preprocess/formats/common/byte_source.h"
 
 namespace curvisplat {
 

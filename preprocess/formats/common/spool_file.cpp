@@ -1,6 +1,6 @@
 #include "preprocess/formats/common/spool_file.h"
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 

@@ -1,20 +1,28 @@
 // A temporary file for data that must be unpacked before it can be read by position: numbers in text, and
 // compressed blocks that are too large for memory.
+//
+// SpoolFile is the file; SpooledBytes is a ByteSource that fills it at the first read; NumberSpool writes a
+// list of numbers of 8 bytes, which SpooledNumbers reads. The file is nameless, so that it vanishes with the
+// process. Any number of threads may read what has been appended.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
 #include "stream/base/mutex.h"
-#include "stream/base/nameless_file.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 
-/// Created when the first bytes are appended. Thread-safe.
+/// The temporary file. It is created when the first bytes are appended. Thread-safe.
 class SpoolFile {
  public:
   explicit SpoolFile(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -46,8 +54,8 @@ class SpooledBytes final : public ByteSource {
   uint64_t size() const override { return size_; }
   void readAt(uint64_t offset, std::span<std::byte> to) const override;
 
-  /// Produces the bytes now unless that has been done, and returns their offset in the spool file. Throws what
-  /// `make` throws.
+  /// Produces the bytes now unless that has been done, and returns their offset in the spool file. Throws
+  /// what `make` throws.
   uint64_t fill() const;
 
  private:
@@ -57,6 +65,64 @@ class SpooledBytes final : public ByteSource {
   // Reset after its call, to free its captures.
   mutable std::function<void(const SpoolFile::Sink&)> make_ GUARDED_BY(mutex_);
   mutable std::optional<uint64_t> begin_ GUARDED_BY(mutex_);
+};
+
+/// A list of numbers of 8 bytes in a spool file.
+struct SpooledNumbers {
+  std::shared_ptr<SpoolFile> spool;
+  uint64_t offset = 0, count = 0;  // of numbers
+
+  /// Any number of threads. The list must hold numbers of the type that is read.
+  void read(uint64_t first, std::span<double> to) const {
+    if (!to.empty()) spool->readAt(offset + 8 * first, std::as_writable_bytes(to));
+  }
+  void read(uint64_t first, std::span<uint64_t> to) const {
+    if (!to.empty()) spool->readAt(offset + 8 * first, std::as_writable_bytes(to));
+  }
+  void read(uint64_t first, std::span<int64_t> to) const {
+    if (!to.empty()) spool->readAt(offset + 8 * first, std::as_writable_bytes(to));
+  }
+};
+
+/// Writes numbers to a spool file of its own, some at a time. For one thread.
+template <typename Value>
+class NumberSpool {
+ public:
+  static_assert(sizeof(Value) == 8);
+  explicit NumberSpool(const std::filesystem::path& folder) {
+    numbers_.spool = std::make_shared<SpoolFile>(folder);
+  }
+  void add(Value value) {
+    pending_.push_back(value);
+    ++added_;
+    if (pending_.size() == kPending) flush();
+  }
+  uint64_t size() const { return added_; }
+  /// What has been added; more may follow.
+  SpooledNumbers soFar() {
+    flush();
+    return numbers_;
+  }
+  SpooledNumbers finish() {
+    flush();
+    return std::move(numbers_);
+  }
+
+ private:
+  static constexpr size_t kPending = 65536;
+
+  void flush() {
+    if (pending_.empty()) return;
+    const uint64_t at = numbers_.spool->append(
+        [&](const SpoolFile::Sink& sink) { sink(std::as_bytes(std::span(pending_))); });
+    if (numbers_.count == 0) numbers_.offset = at;
+    numbers_.count += pending_.size();
+    pending_.clear();
+  }
+
+  SpooledNumbers numbers_;
+  std::vector<Value> pending_;
+  uint64_t added_ = 0;
 };
 
 }  // namespace curvisplat

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stream/base/disk_full.h"
+#include "stream/base/disk_space.h"
 
 namespace curvisplat {
 namespace {

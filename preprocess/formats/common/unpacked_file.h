@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "stream/base/file.h"
-#include "stream/base/temporary_subfolder.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 

@@ -1,22 +1,24 @@
-// Scalars that no file holds: computed from density, momentum and energy (or velocity and pressure), or from
-// the grid alone. Decorates any source; derived scalars follow its own.
-//
-//    source ──box + halo, in pieces──> flow at each sample ──gradients by the grid's Jacobian──> quantity
-//
-// Differences are central, and one-sided at the ends of a block and next to blanked samples. Memory: one
-// piece of about 48,000 nodes for each reading thread, whatever the size of the request.
+// Scalars that no file holds (flow_quantities.h): computed from density, momentum and energy (or velocity
+// and pressure), or from the grid alone. Both classes decorate a source; derived scalars follow its own. Any
+// number of threads may read.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "preprocess/formats/derived/flow_inputs.h"
 #include "preprocess/formats/derived/flow_window.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
 
+/// Derived scalars of a structured grid.
+///
+///    source ──box + halo, in pieces──> flow at each sample ──gradients by the grid's Jacobian──> quantity
+///
+/// Differences are central, and one-sided at the ends of a block and next to blanked samples. Needs memory
+/// for one piece of about 48,000 nodes for each reading thread, whatever the size of the request.
 class DerivedSource final : public GridSource {
  public:
   /// Throws UsageError if gamma or the gas constant is out of range.
@@ -33,7 +35,7 @@ class DerivedSource final : public GridSource {
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override;
 
  private:
-  /// Of the source, what the scalars are read or computed from.
+  /// The scalars of the source that `scalars` are read or computed from.
   std::vector<uint32_t> inputsOf(std::span<const uint32_t> scalars) const;
   void describe();
   bool offers(const QuantityInfo& quantity) const;
@@ -44,6 +46,39 @@ class DerivedSource final : public GridSource {
   std::optional<float> blank_value_;
   FlowInputs inputs_;
   std::vector<double> freestream_mach_;   // [block]; 0: unknown
+  std::vector<QuantityInfo> quantities_;  // of the derived scalars, in order
+};
+
+/// Derived scalars of an unstructured grid: those that a sample's own density, velocity and pressure give.
+/// Scalars of gradients need the neighbours of a cell: preprocess/gradients/gradient_mesh.h. The Jacobian
+/// and the volume of structured grids are not offered.
+class DerivedMeshSource final : public MeshSource {
+ public:
+  /// Throws UsageError if gamma or the gas constant is out of range.
+  DerivedMeshSource(std::unique_ptr<MeshSource> source, const DerivedOptions& options);
+
+  const GridDescription& description() const override { return description_; }
+  void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                  MeshPoints& out) const override;
+  void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                 MeshCells& out) const override;
+  void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
+               const Progress& progress) const override {
+    source_->prepare(neededFor(scalars), memory_bytes, progress);
+  }
+
+ private:
+  /// The source's scalars that these are made of, each once.
+  std::vector<uint32_t> neededFor(std::span<const uint32_t> scalars) const;
+  /// The values of `scalars` from those of the source's scalars `read`, which they replace.
+  void derive(std::span<const uint32_t> scalars, const std::vector<uint32_t>& read,
+              std::vector<std::vector<float>>& values) const;
+
+  std::unique_ptr<MeshSource> source_;
+  GridDescription description_;
+  PerfectGas gas_;
+  std::optional<float> blank_value_;
+  FlowInputs inputs_;
   std::vector<QuantityInfo> quantities_;  // of the derived scalars, in order
 };
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,7 @@
-// The flow and its gradients at the samples of a few rows, computed from a source's scalars.
+// What derived scalars are computed from: the scalars of a source that give the flow (FlowInputs), and the
+// gas; and FlowWindow, the flow and its gradients at the samples of a few rows of a structured grid.
+// FlowWindow needs memory for its rows and their halo alone. Each thread has a FlowWindow of its own; any
+// thread may call the functions.
 #pragma once
 
 #include <array>
@@ -40,11 +43,34 @@ FlowState flowFrom(const FlowInputs& inputs, const PerfectGas& gas, const Input&
   return flow;
 }
 
-/// Processes a block piece by piece, in one thread. Its buffers keep their capacity.
+/// What the user says about derived scalars.
+struct DerivedOptions {
+  GasModel gas;                       // overrides the files' values; the defaults are 1.4 and 1
+  std::optional<double> blank_value;  // samples with this value are blanked
+};
+
+/// The scalars of density, velocity, ... by their names: those at nodes, if there are enough, or those in
+/// cells.
+FlowInputs findFlowInputs(const GridDescription& description);
+
+/// The gas by the options and the files; appended to description.format if it is not the usual one. Throws
+/// UsageError if gamma or the gas constant is out of range.
+PerfectGas gasOf(const DerivedOptions& options, GridDescription& description);
+
+/// Whether the inputs have what the quantity needs, but for the freestream.
+bool offers(const FlowInputs& inputs, const QuantityInfo& quantity);
+
+/// Adds the quantity to description.scalars, of which the first `stored` are the files'. If these hold a
+/// scalar of its name, it is not computed, and PLOT3D's number refers to it: returns false.
+bool addQuantity(const QuantityInfo& quantity, Centring centring, size_t stored,
+                 GridDescription& description);
+
+/// The flow and its gradients at the samples of a block, which is processed piece by piece, in one thread.
+/// The buffers keep their capacity.
 class FlowWindow {
  public:
-  /// `needs`: union of the needs (QuantityNeeds) of all quantities that will be computed. The references must
-  /// outlive the window.
+  /// `needs`: union of the needs (QuantityNeeds) of all quantities that will be computed. The references
+  /// must outlive the window.
   FlowWindow(const GridSource& source, const FlowInputs& inputs, const PerfectGas& gas,
              std::optional<float> blank_value, unsigned needs);
 
@@ -55,6 +81,7 @@ class FlowWindow {
   /// be called before computeFlow().
   void copyStored(const NodeBox& whole, std::span<const size_t> to, NodeArrays& out) const;
 
+  /// Computes the flow at each sample of the window, on which gradients depend.
   void computeFlow();
 
   /// Computes the box's values to its place in `whole`; NaN at blanked samples and where the flow is

@@ -8,12 +8,11 @@
 #include <sstream>
 #include <string_view>
 
-#include "preprocess/formats/common/ascii_spool.h"
-#include "preprocess/formats/common/named_file.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
-#include "preprocess/grid/time_steps.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

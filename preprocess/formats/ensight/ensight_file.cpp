@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 
-#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "stream/base/error.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

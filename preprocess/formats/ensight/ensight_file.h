@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/formats/common/open_files.h"
-#include "preprocess/formats/common/spooled_numbers.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
 
 namespace curvisplat {

@@ -7,8 +7,8 @@
 #include <limits>
 #include <set>
 
-#include "stream/base/count_text.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

@@ -6,8 +6,7 @@
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/ensight/ensight_case.h"
-#include "preprocess/formats/ensight/ensight_geometry.h"
-#include "preprocess/formats/ensight/ensight_values.h"
+#include "preprocess/formats/ensight/ensight_parts.h"
 #include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {

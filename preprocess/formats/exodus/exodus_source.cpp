@@ -7,9 +7,9 @@
 #include <charconv>
 #include <limits>
 
-#include "preprocess/grid/time_steps.h"
-#include "stream/base/count_text.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

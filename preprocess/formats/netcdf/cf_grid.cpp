@@ -9,12 +9,11 @@
 #include <sstream>
 #include <utility>
 
-#include "preprocess/formats/netcdf/cf_roles.h"
-#include "preprocess/formats/netcdf/foreign_netcdf.h"
-#include "preprocess/formats/netcdf/supergrid.h"
-#include "preprocess/formats/netcdf/tile_number.h"
+#include "preprocess/formats/netcdf/cf_coordinates.h"
+#include "preprocess/formats/netcdf/fms_mosaic.h"
+#include "preprocess/formats/netcdf/netcdf_files.h"
 #include "stream/base/calendar.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

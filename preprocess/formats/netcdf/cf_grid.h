@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/formats/netcdf/cf_mask.h"
 #include "preprocess/formats/netcdf/cf_term.h"
 #include "preprocess/formats/netcdf/cf_vertical.h"
 #include "preprocess/formats/netcdf/map_projection.h"

@@ -3,8 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/cf_vertical.h"
-#include "preprocess/formats/netcdf/standard_atmosphere.h"
 
 namespace curvisplat {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <glm/trigonometric.hpp>
 
-#include "preprocess/formats/netcdf/cf_roles.h"
-#include "stream/base/check.h"
+#include "preprocess/formats/netcdf/cf_coordinates.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "preprocess/formats/netcdf/cf_grid.h"
-#include "preprocess/formats/netcdf/globe.h"
+#include "preprocess/formats/netcdf/map_projection.h"
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/grid/grid_source.h"
 

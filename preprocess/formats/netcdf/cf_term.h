@@ -1,10 +1,17 @@
-// A NetCDF variable as a function on the nodes of a block: the axes of the block along which it varies, and
-// its values at the nodes. A variable on staggered points is interpolated to the nodes half-way between them.
+// NetCDF variables as functions on the nodes of a block. A CfTerm knows along which axes of the block its
+// variable varies, and reads its values at a range of nodes; a variable on staggered points is interpolated
+// to the nodes half-way between them. A CfMask is a term that tells which nodes are water, or hold values at
+// all.
+//
+// Reading needs memory for the values of the range alone. Any number of threads may read; calls into
+// libnetcdf run one after the other.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "preprocess/formats/netcdf/netcdf_files.h"
@@ -34,6 +41,7 @@ struct CfDimensions {
   size_t time_step = 0;
 };
 
+/// A variable as a function on the nodes of a block.
 class CfTerm {
  public:
   /// Matches the variable's dimensions with the block's. A dimension that is not one of the block's is
@@ -41,16 +49,16 @@ class CfTerm {
   ///
   ///   equal length   its points are the block's nodes
   ///   one longer     the block's nodes are half-way between its points
-  ///   one shorter    its points are half-way between the block's nodes; the outermost nodes are extrapolated
+  ///   one shorter    its points are half-way between the block's nodes; the outer nodes are extrapolated
   ///   1              ignored
   ///
   /// nullopt if a dimension does not match.
   static std::optional<CfTerm> of(const NetcdfFiles& file, const NetcdfVariable& variable,
                                   const CfDimensions& block);
 
-  /// Of a supergrid (supergrid.h): a variable of two dimensions with 2n + 1 points along j and i, of which the nodes of a block
-  /// of n are every second one from the second (centres of cells), or 2n - 1, of which they are every second one from the first
-  /// (corners). nullopt if it has other lengths.
+  /// A variable of a supergrid (fms_mosaic.h), which has two dimensions. With 2n + 1 points along an axis,
+  /// the n nodes of the block are every second point from the second on (centres of cells); with 2n - 1
+  /// points, every second one from the first on (corners). nullopt if it has other lengths.
   static std::optional<CfTerm> ofSupergrid(const NetcdfFiles& file, const NetcdfVariable& variable,
                                            const CfDimensions& block);
 
@@ -72,7 +80,8 @@ class CfTerm {
   }
   /// Whether the nodes are half-way between its points along `axis`.
   bool surrounds(size_t axis) const { return longer_[axis] > 0; }
-  /// Whether it differs between the faces of the grid. read() takes the values of one, at first of the first.
+  /// Whether it differs between the faces of the grid. read() takes the values of one, at first of the
+  /// first.
   bool ofFaces() const { return face_.has_value(); }
   void setFace(uint64_t face) {
     if (face_) start_[*face_] = face;
@@ -96,6 +105,48 @@ class CfTerm {
   std::optional<size_t> face_;  // its dimension of the faces
   std::vector<size_t>
       start_;  // [dimension]: the time step for that of time, the face for that of faces, else 0
+};
+
+/// The variable that tells which nodes of a grid are water, or hold values at all: land masks and flag
+/// variables by the names and attributes that models give them.
+class CfMask {
+ public:
+  /// The mask of the nodes of `block`; nullopt if the files have none. `levels`: the axis of its levels.
+  /// `ocean`: the nodes lie below the surface, where land has no values; above it, it does not count.
+  ///
+  ///   mask_rho, mask_u, ..., tmask, umask, ..., maskC, maskW, ..., wet, sea_binary_mask   0 is land
+  ///   hFacC, hFacW, hFacS      the part of the cell that is water; 0 is land
+  ///   KMT, KMU                 the number of levels that are water
+  ///   land_binary_mask         other than 0 is land
+  ///   flag_values, flag_meanings    a meaning of land, hole, blanked, solid, masked, outside, missing
+  ///
+  /// Its dimensions are the block's, or have their lengths. A mask of a single level counts at all of them.
+  static std::optional<CfMask> of(const NetcdfFiles& files, const NetcdfVariable& variable,
+                                  const CfDimensions& block, size_t levels, bool ocean);
+
+  /// Whether `variable` is a mask by its name or attributes: it is seldom the scalar of interest.
+  static bool isMask(const NetcdfVariable& variable);
+
+  /// "mask_rho is 0", for messages.
+  const std::string& description() const { return description_; }
+
+  /// For a grid of several faces: the face whose nodes apply() masks.
+  void setFace(uint64_t face) { term_.setFace(face); }
+
+  /// Sets the marks of nodes that the mask hides to 1. `blank`: the nodes of `range`, i fastest.
+  void apply(const NetcdfFiles& files, const CfRange& range, std::span<uint8_t> blank) const;
+
+ private:
+  enum class Rule { kZero, kNotZero, kLevels, kFlags };
+
+  static std::optional<Rule> ruleOf(const NetcdfVariable& variable, bool ocean);
+  bool hides(double value, uint64_t level) const;
+
+  CfTerm term_;
+  Rule rule_ = Rule::kZero;
+  std::vector<double> hidden_;  // kFlags
+  size_t levels_ = 2;
+  std::string description_;
 };
 
 }  // namespace curvisplat

@@ -7,9 +7,8 @@
 #include <map>
 #include <sstream>
 
-#include "preprocess/formats/netcdf/cf_roles.h"
-#include "preprocess/formats/netcdf/standard_atmosphere.h"
-#include "stream/base/words.h"
+#include "preprocess/formats/netcdf/cf_coordinates.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

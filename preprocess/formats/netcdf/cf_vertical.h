@@ -2,11 +2,11 @@
 // pressures, from the thickness of layers, or from the formula of a terrain-following coordinate. Always
 // converted to kilometres, positive upwards.
 //
-//   pressure                  the height of that pressure in the standard atmosphere (standard_atmosphere.h)
+//   pressure                  the height of that pressure in the standard atmosphere (cf_coordinates.h)
 //   formulas of a pressure    atmosphere_sigma_, atmosphere_ln_pressure_, atmosphere_hybrid_sigma_pressure_
 //                             coordinate: that pressure's height
 //   formulas of a height      atmosphere_hybrid_height_, atmosphere_sleve_, ocean_sigma_, ocean_sigma_z_,
-//                             ocean_double_sigma_coordinate, ocean_s_coordinate and its generic forms 1 and 2
+//                             ocean_double_sigma_coordinate, ocean_s_coordinate and generic forms 1 and 2
 #pragma once
 
 #include <map>
@@ -23,11 +23,12 @@ namespace curvisplat {
 
 class CfVertical {
  public:
-  /// The vertical coordinate of `variable`, whose block has its levels along `axis`; or nullopt and a reason.
+  /// The vertical coordinate of `variable`, whose block has its levels along `axis`; or nullopt and a
+  /// reason.
   ///
   /// Tried in this order: the geopotential of every node; a formula of the coordinate along the axis; the
-  /// height or pressure of every node; WRF's geopotential (PH and PHB); the height of the layers' interfaces;
-  /// the height or pressure of every level; the thickness of the layers.
+  /// height or pressure of every node; WRF's geopotential (PH and PHB); the height of the layers'
+  /// interfaces; the height or pressure of every level; the thickness of the layers.
   static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFiles& file,
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& block, size_t axis);

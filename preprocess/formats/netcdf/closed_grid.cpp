@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "preprocess/grid/slabs.h"
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

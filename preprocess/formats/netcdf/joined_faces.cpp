@@ -1,18 +1,186 @@
+// Two parts: jointsOf() finds which edges of the faces lie beside one another, by the positions of the nodes
+// alone, so that no model's table of contacts is needed; JoinedFaces reads the blocks in the gaps.
+//
+//            +--------+    The last nodes of a face and the first ones of the next are a step apart:
+//            |  face  |    a joint. Where joints meet, they leave a hole between three corners of faces
+//            |   3    |    (at a cube's corner) or four.
+//   +--------+--------+
+//   |  face  |  face  |    Edges whose nodes coincide need no joint. Edges that no other lies beside are
+//   |   1    |   2    |    open: MITgcm's faces end at Antarctica.
+//   +--------+--------+
 #include "preprocess/formats/netcdf/joined_faces.h"
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 #include <algorithm>
 #include <array>
-#include <glm/geometric.hpp>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include "preprocess/formats/netcdf/face_joints.h"
-#include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
+
+/// The nodes of a face with the first or last i or j. They are numbered along the edge: by j at the ends of
+/// i, and by i at the ends of j.
+struct FaceEdge {
+  enum class Side : uint8_t { kFirstI, kLastI, kFirstJ, kLastJ };
+  uint32_t face = 0;
+  Side side = Side::kFirstI;
+  bool alongJ() const { return side == Side::kFirstI || side == Side::kLastI; }
+  bool last() const { return side == Side::kLastI || side == Side::kLastJ; }
+};
+
+/// Two edges of the same number of nodes, a step apart. Node n of `a` is beside node n of `b`, or the n-th
+/// from its end.
+struct FaceJoint {
+  FaceEdge a, b;
+  bool reversed = false;
+};
+
+/// A node that ends two edges of a face.
+struct FaceCorner {
+  uint32_t face = 0;
+  bool last_i = false, last_j = false;
+};
+
+struct FaceJoints {
+  std::vector<FaceJoint> joints;
+  std::vector<std::vector<FaceCorner>> holes;  // three or four corners, in order around the hole
+};
+
+/// Faces of the same dimensions.
+struct FaceShape {
+  uint32_t faces = 0;
+  uint64_t ni = 0, nj = 0;
+};
+
+/// The points of an edge on the unit sphere, or those `inwards` rows from it. Not finite where there are
+/// none.
+using EdgePoints = std::function<std::vector<glm::dvec3>(const FaceEdge& edge, uint64_t inwards)>;
+
+using Side = FaceEdge::Side;
+using Row = std::vector<glm::dvec3>;
+
+constexpr std::array<Side, 4> kSides{Side::kFirstI, Side::kLastI, Side::kFirstJ, Side::kLastJ};
+// Nodes of two edges are a step apart if their distance is this many of the face's own steps. At the corners
+// of a cube, steps differ from their neighbours'.
+constexpr double kMinStep = 0.3, kMaxSteps = 2;
+// Share of an edge's nodes that may lie elsewhere, since land may have no coordinates.
+constexpr double kMayMiss = 0.1;
+// Edges of one face are a step or two apart if it has fewer nodes across. They are neighbours only if it
+// runs around the Earth.
+constexpr size_t kMinNodesAround = 5;
+
+struct Edge {
+  FaceEdge edge;
+  Row row;
+  std::vector<double> steps;  // to the next row inwards
+};
+
+/// The mean distance in steps, if the nodes of the edges are a step apart.
+std::optional<double> apart(const Edge& a, const Edge& b, bool reversed) {
+  const size_t n = a.row.size();
+  if (b.row.size() != n) return std::nullopt;
+  const auto may_miss = static_cast<size_t>(kMayMiss * static_cast<double>(n));
+  size_t missed = 0;
+  double sum = 0;
+  for (size_t m = 0; m < n; ++m) {
+    const double steps = glm::distance(a.row[m], b.row[reversed ? n - 1 - m : m]) / a.steps[m];
+    if (steps > kMinStep && steps < kMaxSteps)
+      sum += steps;
+    else if (++missed > may_miss)
+      return std::nullopt;
+  }
+  return sum / static_cast<double>(n - missed);
+}
+
+/// Joints by increasing distance, each edge in one at most.
+std::vector<FaceJoint> nearestJoints(const std::vector<Edge>& edges, const FaceShape& shape) {
+  const bool joins_itself = std::min(shape.ni, shape.nj) >= kMinNodesAround;
+  struct Candidate {
+    double distance;
+    size_t a, b;
+    bool reversed;
+  };
+  std::vector<Candidate> candidates;
+  for (size_t a = 0; a < edges.size(); ++a)
+    for (size_t b = a + 1; b < edges.size(); ++b) {
+      if (edges[a].edge.face == edges[b].edge.face && !joins_itself) continue;
+      for (const bool reversed : {false, true})
+        if (const auto distance = apart(edges[a], edges[b], reversed))
+          candidates.push_back({*distance, a, b, reversed});
+    }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& one, const Candidate& two) { return one.distance < two.distance; });
+  std::vector<FaceJoint> joints;
+  std::vector<uint8_t> taken(edges.size());
+  for (const Candidate& candidate : candidates) {
+    if (taken[candidate.a] || taken[candidate.b]) continue;
+    taken[candidate.a] = taken[candidate.b] = 1;
+    joints.push_back({edges[candidate.a].edge, edges[candidate.b].edge, candidate.reversed});
+  }
+  return joints;
+}
+
+/// The number of a corner among all: four for each face.
+size_t numberOf(const FaceEdge& edge, bool at_end) {
+  const bool last_i = edge.alongJ() ? edge.last() : at_end, last_j = edge.alongJ() ? at_end : edge.last();
+  return 4 * size_t{edge.face} + (last_i ? 1 : 0) + (last_j ? 2 : 0);
+}
+
+/// Corners of faces that joints link to rings.
+std::vector<std::vector<FaceCorner>> holesBetween(const std::vector<FaceJoint>& joints, uint32_t faces) {
+  std::vector<std::vector<size_t>> links(4 * size_t{faces});
+  for (const FaceJoint& joint : joints)
+    for (const bool at_end : {false, true}) {
+      const size_t a = numberOf(joint.a, at_end), b = numberOf(joint.b, at_end != joint.reversed);
+      links[a].push_back(b);
+      links[b].push_back(a);
+    }
+  std::vector<std::vector<FaceCorner>> holes;
+  std::vector<uint8_t> seen(links.size());
+  for (size_t first = 0; first < links.size(); ++first) {
+    if (seen[first] || links[first].size() != 2) continue;
+    std::vector<FaceCorner> ring;
+    size_t before = links[first][1], at = first;
+    do {
+      seen[at] = 1;
+      ring.push_back({static_cast<uint32_t>(at / 4), at % 2 == 1, at / 2 % 2 == 1});
+      if (links[at].size() != 2) break;
+      const size_t next = links[at][0] == before ? links[at][1] : links[at][0];
+      before = at;
+      at = next;
+    } while (at != first && ring.size() <= 4);
+    if (at == first && (ring.size() == 3 || ring.size() == 4)) holes.push_back(std::move(ring));
+  }
+  return holes;
+}
+
+/// The joints and holes of the faces. Keeps the points of two rows of every edge. Throws what `points`
+/// throws.
+FaceJoints jointsOf(const FaceShape& shape, const EdgePoints& points) {
+  std::vector<Edge> edges;
+  for (uint32_t face = 0; face < shape.faces; ++face)
+    for (const Side side : kSides) {
+      Edge edge{{face, side}, points({face, side}, 0), {}};
+      const Row inner = points({face, side}, 1);
+      for (size_t n = 0; n < edge.row.size(); ++n)
+        edge.steps.push_back(glm::distance(edge.row[n], inner.at(n)));
+      edges.push_back(std::move(edge));
+    }
+  FaceJoints found;
+  found.joints = nearestJoints(edges, shape);
+  found.holes = holesBetween(found.joints, shape.faces);
+  return found;
+}
 
 // Nodes of an edge are read for this many at a time, which bounds the buffers.
 constexpr uint64_t kNodesAtATime = 1 << 16;
@@ -149,7 +317,8 @@ class JoinedFaces final : public GridSource {
     for (size_t s = 0; s < scalars.size(); ++s) copy(part.scalars[s], out.scalars[s]);
   }
 
-  /// Across, the block goes the way that i or j goes on the face of `a`; along, so that it has the face's handedness.
+  /// Across, the block goes the way that i or j goes on the face of `a`; along, so that it has the face's
+  /// handedness.
   void readJoint(const FaceJoint& joint, const NodeBox& box, std::span<const uint32_t> scalars,
                  NodeArrays& out) const {
     const uint64_t length = lengthOf(joint.a), rows = box.j1 - box.j0;

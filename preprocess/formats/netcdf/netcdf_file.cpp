@@ -10,12 +10,9 @@
 #include <mutex>
 #include <numeric>
 
-#include "preprocess/formats/common/hdf5_end.h"
-#include "preprocess/formats/common/hdf5_handle.h"
-#include "preprocess/formats/common/hdf5_trial.h"
-#include "preprocess/formats/netcdf/netcdf4_structure.h"
-#include "preprocess/formats/netcdf/netcdf_classic.h"
-#include "stream/base/check.h"
+#include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/common/library_trial.h"
+#include "preprocess/formats/netcdf/netcdf_structure.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

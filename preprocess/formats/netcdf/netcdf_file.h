@@ -15,7 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/formats/netcdf/netcdf_packing.h"
 #include "preprocess/formats/netcdf/netcdf_variable.h"
 #include "stream/base/file.h"
 

@@ -1,5 +1,7 @@
-// One or more NetCDF files that describe one grid: coordinates and masks in one, fields in others. Their
-// variables and dimensions are offered as those of one file. Any number of threads may use a NetcdfFiles.
+// One or more NetCDF files that describe one grid: coordinates and masks in one, fields in others.
+// NetcdfFiles offers their variables and dimensions as those of one file. foreignNetcdf() names files that
+// hold no structured grid by design. Any number of threads may use a NetcdfFiles; calls into libnetcdf run
+// one after the other.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +19,9 @@ namespace curvisplat {
 
 class NetcdfFiles {
  public:
-  /// Dimensions of the same name and length are one dimension. Of variables with the same name the first
-  /// file's is taken, but of times since a date each file's; duplicates() lists the others. Throws Error as NetcdfFile does, and for a file that is
-  /// not NetCDF.
+  /// Dimensions of the same name and length are one dimension. If several files have a variable of the same
+  /// name, the first file's is taken and duplicates() lists the others; but each file keeps its times since
+  /// a date. Throws Error as NetcdfFile does, and for a file that is not NetCDF.
   explicit NetcdfFiles(const std::vector<std::filesystem::path>& paths);
 
   /// Of the first file.
@@ -59,5 +61,9 @@ class NetcdfFiles {
   std::vector<NetcdfVariable> variables_;
   std::vector<std::string> duplicates_;
 };
+
+/// What the files hold if it is no structured grid by design, an unstructured mesh or plain HDF5: "an
+/// unstructured mesh (UGRID)", "an HDF5 file, but neither NetCDF-4 nor CGNS". nullopt for any other file.
+std::optional<std::string> foreignNetcdf(const NetcdfFiles& file);
 
 }  // namespace curvisplat

@@ -6,12 +6,10 @@
 #include <cmath>
 #include <map>
 
-#include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/closed_grid.h"
-#include "preprocess/formats/netcdf/foreign_netcdf.h"
-#include "preprocess/grid/scalar_names.h"
-#include "preprocess/grid/time_steps.h"
-#include "stream/base/check.h"
+#include "preprocess/formats/netcdf/netcdf_files.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -17,8 +17,8 @@
 #include "preprocess/formats/netcdf/cf_grid.h"
 #include "preprocess/formats/netcdf/cf_nodes.h"
 #include "preprocess/formats/netcdf/closed_grid.h"
-#include "preprocess/formats/netcdf/face_source.h"
-#include "preprocess/formats/netcdf/globe.h"
+#include "preprocess/formats/netcdf/joined_faces.h"
+#include "preprocess/formats/netcdf/map_projection.h"
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/grid/grid_source.h"
 

@@ -1,9 +1,13 @@
-// What a NetCDF file says of its dimensions, variables and attributes.
+// The metadata of a NetCDF file: dimensions, variables and attributes; and NetcdfPacking, which turns the
+// stored numbers of a variable into values. Nothing here reads the file or calls libnetcdf, so any thread
+// may use it without a lock.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,5 +45,34 @@ struct NetcdfVariable {
 
 /// The size of a stored number of an nc_type; 0 of text and user-defined types.
 size_t netcdfBytes(int type);
+
+/// How the stored numbers of a variable become values: they are unpacked, and missing ones become NaN.
+/// Immutable; any thread may use it.
+/// Source: NetCDF User's Guide, appendix A, attribute conventions.
+class NetcdfPacking {
+ public:
+  explicit NetcdfPacking(const NetcdfVariable& variable);
+
+  /// Turns stored numbers into values in place: times scale_factor, plus add_offset. A number becomes NaN if
+  /// it is _FillValue (or NetCDF's default fill value), missing_value, or outside the valid range.
+  void unpack(std::span<float> values) const;
+  void unpack(std::span<double> values) const;
+  /// Which stored numbers become NaN, in words; empty if none.
+  std::string missingValues() const;
+
+ private:
+  void setWrap(const NetcdfVariable& variable);
+  void addRange(const NetcdfVariable& variable);
+  double wrapped(double value) const;
+  template <typename Value>
+  void unpackAll(std::span<Value> values) const;
+
+  double scale_ = 1, offset_ = 0;
+  /// Integers from this one on stand for others (`_Unsigned`): the classic format has none without a sign.
+  double wraps_at_ = 0, wraps_by_ = 0;
+  std::vector<double> missing_;         // as stored, wrapped
+  std::optional<double> least_, most_;  // as stored, wrapped
+  std::string range_;                   // the same in words
+};
 
 }  // namespace curvisplat

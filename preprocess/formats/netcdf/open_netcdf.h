@@ -1,4 +1,6 @@
-// Opens a curvilinear grid by the CF conventions, without the gaps that models leave in grids around the Earth.
+// Opens a curvilinear grid by the CF conventions, without the gaps that models leave in grids around the
+// Earth. The faces of a cubed sphere may be in one file, or in a file for each: FV3 and FMS write
+// NAME.tile1.nc to NAME.tile6.nc.
 #pragma once
 
 #include <memory>
@@ -8,7 +10,8 @@
 
 namespace curvisplat {
 
-/// Opens the files, and closes a grid that runs around the Earth (closed_grid.h, joined_faces.h). Throws Error.
+/// Opens the files, and closes a grid that runs around the Earth (closed_grid.h, joined_faces.h). Throws
+/// Error.
 std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options);
 
 }  // namespace curvisplat

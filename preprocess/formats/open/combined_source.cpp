@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <map>
 
-#include "stream/base/check.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

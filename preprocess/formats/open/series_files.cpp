@@ -8,11 +8,11 @@
 #include <charconv>
 #include <map>
 
-#include "preprocess/formats/netcdf/tile_number.h"
+#include "preprocess/formats/netcdf/fms_mosaic.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/su2/su2_source.h"
 #include "stream/base/error.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {

@@ -7,11 +7,10 @@
 #include <cstring>
 #include <functional>
 
-#include "preprocess/formats/common/ascii_spool.h"
-#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
-#include "stream/base/paths.h"
+#include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "preprocess/formats/common/spooled_numbers.h"
+#include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/unpacked_file.h"
 
 namespace curvisplat {

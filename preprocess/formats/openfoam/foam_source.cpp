@@ -6,8 +6,8 @@
 #include <cmath>
 #include <set>
 
-#include "preprocess/formats/common/ascii_spool.h"
-#include "preprocess/grid/time_steps.h"
+#include "preprocess/formats/common/text_reader.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

@@ -1,6 +1,6 @@
-// Detects the layout of a PLOT3D file. Tries every layout; prefers exact sizes to trailing bytes; then judges
-// the remaining ones by their values. Never guesses: a file that fits no layout, or two equally well, is an
-// Error that reports what was found and how to set the layout.
+// Detects the layout of a PLOT3D file. Tries every layout; prefers exact sizes to trailing bytes; then
+// judges the remaining ones by their values. Never guesses: a file that fits no layout, or two equally well,
+// is an Error that reports what was found and how to set the layout.
 #pragma once
 
 #include <filesystem>

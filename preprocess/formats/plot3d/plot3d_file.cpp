@@ -4,8 +4,8 @@
 #include <cmath>
 #include <type_traits>
 
-#include "preprocess/formats/common/stored_values.h"
-#include "stream/base/check.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "preprocess/formats/common/stored_values.h"
-#include "preprocess/formats/plot3d/plot3d_header.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/plot3d/plot3d_layout.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

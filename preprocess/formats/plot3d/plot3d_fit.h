@@ -7,8 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/formats/plot3d/payload_file.h"
-#include "preprocess/formats/plot3d/plot3d_header.h"
 #include "preprocess/formats/plot3d/plot3d_layout.h"
 #include "stream/base/file.h"
 

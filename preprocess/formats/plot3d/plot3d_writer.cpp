@@ -11,11 +11,10 @@
 #include <optional>
 #include <string>
 
+#include "stream/base/disk_space.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/free_space.h"
-#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "preprocess/formats/tecplot/tecplot_binary.h"
+#include "preprocess/formats/tecplot/tecplot_data.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
 

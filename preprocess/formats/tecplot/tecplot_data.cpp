@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
 

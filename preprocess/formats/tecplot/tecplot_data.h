@@ -1,9 +1,12 @@
-// What a Tecplot file contains: variables, and zones with the position of each variable's values. The result of both
-// readers, of text (tecplot_text.h) and of binary files (tecplot_binary.h), and the input of TecplotSource.
+// What a Tecplot file contains: variables, and zones with the position of each variable's values. It is the
+// result of both readers, of text (tecplot_text.cpp) and of binary files (tecplot_binary.cpp), and the input
+// of TecplotSource. Memory grows with the number of zones and variables, which are limited. One thread reads
+// a file; any number may then read values.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
@@ -33,8 +36,8 @@ struct TecplotValues {
            columns = 0;  // values: from one row of i to the next, and rows from one plane to the next
 };
 
-/// Reads the values [first, first + to.size()), in the order of the file. Any number of threads. Needs a buffer of
-/// 256 KiB per thread. Throws Error as the bytes do.
+/// Reads the values [first, first + to.size()), in the order of the file. Any number of threads. Needs a
+/// buffer of 256 KiB per thread. Throws Error as the bytes do.
 template <typename Value>
 void readTecplotValues(const TecplotValues& values, uint64_t first, std::span<Value> to);
 
@@ -59,12 +62,12 @@ struct TecplotData {
   std::vector<TecplotZone> zones;
 };
 
-/// Lets zone `to` use the values that zone `from` has of a variable. Throws Error unless `from` precedes it and has its
-/// dimensions. `file`: for messages.
+/// Lets zone `to` use the values that zone `from` has of a variable. Throws Error unless `from` precedes it
+/// and has its dimensions. `file`: for messages.
 void shareTecplotValues(const std::string& file, TecplotData& data, size_t from, size_t to, size_t variable);
 
-/// Throws Error if there are more variables than 65,536, or more than four million in all zones together: each has a
-/// place in memory, whatever a damaged file says.
+/// Throws Error if there are more variables than 65,536, or more than four million in all zones together:
+/// each has a place in memory, whatever a damaged file says.
 void checkTecplotCounts(const std::string& file, size_t zones, uint64_t variables);
 
 /// Throws Error if the zone's dimensions are not positive, or if it has more than `most` nodes.
@@ -73,5 +76,43 @@ void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t n
 /// Refuses a zone of finite elements by its name.
 [[noreturn]] void refuseTecplotZone(const std::string& file, const TecplotZone& zone, size_t number,
                                     const std::string& type);
+
+/// Whether the file is a text that begins with a record of Tecplot.
+bool isTecplotText(const InputFile& file);
+
+/// Reads a text file (.dat, .tec): its headers are parsed at once; its numbers are counted at once, and
+/// spooled to `folder` when a zone is first read. Throws Error with the byte.
+///
+///   TITLE = "jet"
+///   VARIABLES = "X" "Y" "Z" "p"
+///   ZONE T="inlet", I=3, J=4, K=5, DATAPACKING=BLOCK, VARLOCATION=([4]=CELLCENTERED), SOLUTIONTIME=0.5
+///   numbers, separated by white space or commas: 3*1.5 is 1.5 three times
+///
+/// A zone's values are in blocks (all values of a variable, then those of the next), or by points (all
+/// variables of a node). If the header does not say which, they are by points, as in the first Tecplot, or
+/// in blocks if some values belong to cells.
+TecplotData readTecplotText(const std::shared_ptr<const PooledFile>& file,
+                            const std::filesystem::path& folder);
+
+/// Whether the file begins with the signature of a binary file.
+bool isTecplotBinary(const InputFile& file);
+
+/// Reads the headers of a binary file (.plt), versions 104 to 113, in either byte order; values are read by
+/// position later. Throws Error.
+///
+///   header                                         numbers: 32 bits; texts: 32 bits a character, ended by 0
+///     "#!TDV112", 1 (byte order), file type (from 111), title, variables, their names
+///     299.0  a zone: name, parent (from 107), strand, time (64 bits), colour, type, packing (before 112),
+///            centring, face neighbours, dimensions, auxiliary data
+///     399.0  a geometry; 499.0 a text; 599.0 labels; 699.0 user record; 799.0, 899.0 auxiliary data
+///     357.0  its end
+///   data, for each zone
+///     299.0, types, passive variables, shared variables, connectivity; minimum and maximum of each stored
+///     variable; values of each variable (block) or of each node (point); face neighbours
+///
+/// Values of cells have the rows and columns of the nodes, but not their last plane. Some writers keep that
+/// plane, too, and some write the packing in version 112: the variant that fits the file counts.
+/// Sources: Tecplot's Data Format Guide, and VisIt's reader for the versions before 112.
+TecplotData readTecplotBinary(const std::shared_ptr<const PooledFile>& file);
 
 }  // namespace curvisplat

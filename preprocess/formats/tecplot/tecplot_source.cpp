@@ -6,10 +6,8 @@
 #include <limits>
 #include <set>
 
-#include "preprocess/formats/tecplot/tecplot_binary.h"
-#include "preprocess/formats/tecplot/tecplot_text.h"
-#include "preprocess/grid/scalar_names.h"
-#include "preprocess/grid/time_steps.h"
+#include "preprocess/formats/tecplot/tecplot_data.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

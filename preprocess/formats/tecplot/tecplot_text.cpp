@@ -1,4 +1,4 @@
-#include "preprocess/formats/tecplot/tecplot_text.h"
+#include "preprocess/formats/tecplot/tecplot_data.h"
 
 #include <fmt/format.h>
 
@@ -6,12 +6,11 @@
 #include <charconv>
 #include <cstring>
 
-#include "preprocess/formats/common/ascii_spool.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/tecplot/tecplot_header.h"
+#include "stream/base/disk_space.h"
 #include "stream/base/error.h"
-#include "stream/base/free_space.h"
 
 namespace curvisplat {
 namespace {

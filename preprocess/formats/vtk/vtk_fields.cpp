@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "preprocess/grid/scalar_names.h"
+#include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
 namespace {

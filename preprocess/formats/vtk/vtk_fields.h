@@ -6,10 +6,15 @@
 //
 // If points and cells have arrays of the same name, that of the cells is NAME:cell. A file's active arrays
 // come first. An array that is missing in some pieces is NaN there, which blanks their samples.
+//
+// VtkFields is immutable once it has described them, and any number of threads may use it. describeFiles()
+// describes what the grids and the meshes of VTK files have in common besides.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/formats/vtk/vtk_grid.h"
@@ -17,6 +22,7 @@
 
 namespace curvisplat {
 
+/// The scalars, and the arrays that they are read from.
 class VtkFields {
  public:
   /// An array that occurs in one or more pieces.
@@ -27,8 +33,8 @@ class VtkFields {
     std::vector<int32_t> array_of_piece;  // [piece]: index in the piece's data; -1: missing
   };
 
-  /// Adds the scalars to the description, and a warning for each field that some blocks lack; `blocks`: the piece
-  /// of each.
+  /// Adds the scalars to the description, and a warning for each field that some blocks lack; `blocks`: the
+  /// piece of each.
   void describe(const std::vector<VtkPiece>& pieces, std::span<const size_t> blocks,
                 GridDescription& description);
 
@@ -67,5 +73,19 @@ class VtkFields {
   std::vector<Field> fields_;
   std::vector<Scalar> scalars_;  // [description.scalars]
 };
+
+/// Adds the format, files, times and warnings of a VtkGrid or a VtkMesh to the description. Moves the
+/// warnings out of `data`; one that many pieces give is added once.
+template <typename Data>
+void describeFiles(Data& data, GridDescription& description) {
+  description.format = data.format;
+  description.files = data.files;
+  description.times = data.times;
+  description.time_step = data.time_step;
+  for (std::string& warning : data.warnings)
+    if (std::find(description.warnings.begin(), description.warnings.end(), warning) ==
+        description.warnings.end())
+      description.warnings.push_back(std::move(warning));
+}
 
 }  // namespace curvisplat

@@ -1,24 +1,120 @@
-// The result of all readers of VTK files, and the input of VtkSource: pieces, each with its nodes and arrays,
-// and the blocks into which they are divided.
+// What the readers of VTK files give, and VtkSource takes: a VtkGrid of pieces, each with its nodes and
+// arrays, and the blocks into which the pieces are divided.
+//
+// A piece has an extent, a box of node indices. Where the extents of pieces overlap (by ghost levels),
+// ownedParts() gives each cell to one piece; where patches of an AMR set overlap, refinedCellsOf() finds the
+// cells that finer patches cover. A VtkArray describes numbers of any type and encoding without holding
+// them: readTuples() fetches a range of tuples.
+//
+// Memory grows with the number of pieces and arrays, not with their numbers. Any number of threads may read
+// arrays, each with a buffer of 256 KiB.
 #pragma once
-
-#include <array>
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <string>
-#include <variant>
-#include <vector>
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "preprocess/formats/common/open_files.h"
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/spool_file.h"
-#include "preprocess/formats/vtk/vtk_array.h"
-#include "preprocess/formats/vtk/vtk_extent.h"
+#include "preprocess/formats/common/text_reader.h"
 
 namespace curvisplat {
+
+/// Node indices i0 i1 j0 j1 k0 k1, both ends inclusive.
+struct VtkExtent {
+  std::array<int64_t, 3> lower{}, upper{};
+
+  uint64_t nodesAlong(size_t axis) const { return static_cast<uint64_t>(upper[axis] - lower[axis] + 1); }
+  uint64_t nodes() const { return nodesAlong(0) * nodesAlong(1) * nodesAlong(2); }
+  /// Number of cells by VTK's rule: a flat extent has one layer of cells.
+  uint64_t cells() const;
+  bool isFlat() const;
+  std::string describe() const;  // "33x33x16"
+  bool operator==(const VtkExtent&) const = default;
+};
+
+/// Cuts pieces that may overlap (by ghost levels) into parts that cover each cell once: a cell in several
+/// pieces belongs to the first of them. Returns [piece] -> its parts, none if other pieces own all its
+/// cells. Throws Error if a piece would be cut into unreasonably many parts.
+std::vector<std::vector<VtkExtent>> ownedParts(const std::vector<VtkExtent>& pieces);
+
+/// A patch of an AMR set (.vth, .vthb): a box of cells of its level's lattice. Finer patches cover coarser
+/// ones.
+struct AmrPatch {
+  size_t level = 0;
+  VtkExtent cells;  // in the lattice of its level, both ends inclusive
+};
+
+/// Returns for each patch the cells that patches of the next level cover, with indices from the patch's
+/// first cell. `ratios[level]` is the number of cells of the next level along a cell. A cell that is covered
+/// in part is not hidden.
+std::vector<std::vector<VtkExtent>> refinedCellsOf(const std::vector<AmrPatch>& patches,
+                                                   const std::vector<std::array<int64_t, 3>>& ratios);
+
+/// The type of an array's numbers.
+enum class VtkType : uint8_t {
+  kInt8,
+  kUint8,
+  kInt16,
+  kUint16,
+  kInt32,
+  kUint32,
+  kInt64,
+  kUint64,
+  kFloat32,
+  kFloat64
+};
+
+size_t bytesOf(VtkType type);
+
+/// An array of a VTK file: tuples of numbers, of any type and encoding.
+struct VtkArray {
+  std::string name;
+  VtkType type = VtkType::kFloat32;
+  uint32_t components = 1;
+  uint64_t tuples = 0;
+  ByteOrder order = ByteOrder::kLittle;
+  std::shared_ptr<const ByteSource> bytes;
+  std::vector<std::string> component_names;  // empty, or one for each component
+
+  uint64_t tupleBytes() const { return components * bytesOf(type); }
+};
+
+/// Limit that keeps a tuple within the buffer of a reading thread.
+inline constexpr uint32_t kMaxComponents = 4096;
+
+/// A component, or the magnitude, of an array's tuples, and its destination.
+template <typename Value>
+struct WantedComponent {
+  static constexpr int kMagnitude = -1;
+  int component = 0;  // or kMagnitude: the Euclidean norm of the tuple
+  Value* to = nullptr;
+};
+
+/// Reads tuples [first, first + count), each wanted component to its to[0 .. count). Value: double or float.
+/// Throws Error as the array's bytes do. Needs a buffer of 256 KiB per thread.
+template <typename Value>
+void readTuples(const VtkArray& array, uint64_t first, uint64_t count,
+                std::span<const WantedComponent<Value>> wanted);
+
+extern template void readTuples(const VtkArray&, uint64_t, uint64_t,
+                                std::span<const WantedComponent<double>>);
+extern template void readTuples(const VtkArray&, uint64_t, uint64_t, std::span<const WantedComponent<float>>);
+
+/// Parses the `count` numbers of the array `name` and passes them to `sink` as `type` in the machine's byte
+/// order. Throws Error if there are fewer, or if one is not a number of that type.
+void packNumbers(TextReader& text, const std::string& name, uint64_t count, VtkType type,
+                 const SpoolFile::Sink& sink);
 
 /// The nodes of a uniform grid: origin + direction (spacing * index).
 struct VtkUniformNodes {
@@ -48,6 +144,7 @@ struct VtkBlock {
   VtkExtent extent;
 };
 
+/// The result of all readers of structured VTK files, and the input of VtkSource.
 struct VtkGrid {
   std::string format;
   std::vector<std::string> files;
@@ -67,8 +164,8 @@ struct VtkFiles {
   std::shared_ptr<SpoolFile> spool;
 };
 
-/// Adds an array to the piece: vtkGhostType becomes its ghosts, obsolete ghost levels are dropped, all others
-/// become data. A second array of the same name is ignored with a warning.
+/// Adds an array to the piece: vtkGhostType becomes its ghosts, obsolete ghost levels are dropped, all
+/// others become data. A second array of the same name is ignored with a warning.
 void addDataArray(VtkPiece& piece, bool of_cells, VtkArray array, std::vector<std::string>& warnings);
 
 }  // namespace curvisplat

@@ -6,12 +6,12 @@
 #include <array>
 #include <cmath>
 
-#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/vtk/vtk_legacy_file.h"
 #include "preprocess/formats/vtk/vtk_mesh_source.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "stream/base/error.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

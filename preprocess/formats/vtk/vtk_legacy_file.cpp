@@ -5,8 +5,8 @@
 #include <charconv>
 #include <sstream>
 
-#include "preprocess/formats/common/stored_values.h"
-#include "stream/base/words.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "preprocess/formats/common/text_reader.h"
-#include "preprocess/formats/vtk/vtk_array.h"
+#include "preprocess/formats/vtk/vtk_grid.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "stream/base/error.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 

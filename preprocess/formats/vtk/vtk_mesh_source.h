@@ -35,8 +35,8 @@ struct VtkMesh {
   std::vector<std::string> warnings;
 };
 
-/// Scalars: vtk_fields.h. A cell is left out if vtkGhostType says that it is a duplicate, refined or hidden, and a
-/// point's cells if it says that the point is hidden.
+/// Scalars: vtk_fields.h. A cell is left out if vtkGhostType says that it is a duplicate, refined or hidden,
+/// and a point's cells if it says that the point is hidden.
 class VtkMeshSource final : public MeshSource {
  public:
   /// Looks at the types of all cells. Throws Error if none is solid, or if one is of an unknown type.
@@ -61,7 +61,8 @@ class VtkMeshSource final : public MeshSource {
 /// The integers of an array; negative ones and those that are none become the largest.
 void readIntegers(const VtkArray& array, uint64_t first, uint64_t count, std::vector<uint64_t>& out);
 
-/// The largest value of an array, negative ones left out: how long the array that it counts through has to be.
+/// The largest value of an array, negative ones left out: how long the array that it counts through has to
+/// be.
 uint64_t largestOf(const VtkArray& array);
 
 }  // namespace curvisplat

@@ -1,4 +1,5 @@
-// VTK's XML formats: .vts, .vtr, .vti and .vtu, their parallel forms .pvts, .pvtr, .pvti and .pvtu, collections (.vtm, .vtpd, .vtpc), AMR sets (.vth, .vthb) and time series of any of these (.pvd).
+// VTK's XML formats: .vts, .vtr, .vti and .vtu, their parallel forms .pvts, .pvtr, .pvti and .pvtu,
+// collections (.vtm, .vtpd, .vtpc), AMR sets (.vth, .vthb) and time series of any of these (.pvd).
 #pragma once
 
 #include <memory>

@@ -1,11 +1,13 @@
-// The markup of a VTK XML file, and the arrays that it describes.
+// The markup of a VTK XML file, and the arrays that it describes. Opening a file scans it once for its tags,
+// through a buffer; the data between them are not kept: the markup, 16 MiB at most, has their positions. One
+// thread reads the markup; any number may read the arrays.
 #pragma once
 
 #include <optional>
 #include <pugixml.hpp>
 #include <string>
 
-#include "preprocess/formats/vtk/compressed_bytes.h"
+#include "preprocess/formats/vtk/encoded_bytes.h"
 #include "preprocess/formats/vtk/vtk_grid.h"
 
 namespace curvisplat {
@@ -33,8 +35,8 @@ class VtkXmlFile {
 
   /// The numbers in an attribute. Throws Error unless there are `count`.
   std::vector<double> numbers(const pugi::xml_node& node, const char* attribute, size_t count) const;
-  /// The six integers of an extent; nullopt for "0 -1 0 -1 0 -1", that of an empty piece. Throws Error if the
-  /// attribute is not a valid extent, or too large.
+  /// The six integers of an extent; nullopt for "0 -1 0 -1 0 -1", that of an empty piece. Throws Error if
+  /// the attribute is not a valid extent, or too large.
   std::optional<VtkExtent> extent(const pugi::xml_node& node, const char* attribute) const;
 
   [[noreturn]] void fail(const std::string& what) const;

@@ -5,13 +5,13 @@
 #include <map>
 #include <set>
 
-#include "preprocess/formats/common/named_file.h"
-#include "preprocess/formats/vtk/amr_boxes.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/vtk/vtk_grid.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
-#include "preprocess/grid/time_steps.h"
-#include "stream/base/count_text.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,6 @@
-// The XML of an XDMF file: parsed as a whole, with the references between its elements, and the numbers in its text.
+// The XML of an XDMF file: parsed as a whole, with the entities that it defines for itself, the references
+// between its elements, and the numbers in its text. Depth, counts and the growth by entities are limited,
+// since the file is untrusted. For one thread.
 #pragma once
 
 #include <cstdint>

@@ -11,9 +11,9 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/xdmf/xdmf_document.h"
 #include "preprocess/formats/xdmf/xdmf_items.h"
-#include "preprocess/grid/time_steps.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
-#include "stream/base/words.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {

@@ -1,19 +1,52 @@
-// The arrays that an XDMF file names: data items in its XML, in HDF5 or in binary files, and HyperSlabs of others.
+// The arrays that an XDMF file names: data items in its XML, in HDF5 or in binary files, and HyperSlabs and
+// joins of others.
+//
+// XdmfItems gives an XdmfValues for each item; numbers are read later, by position. A file of many grids
+// names thousands of HDF5 data sets, and an open one costs a chunk cache of 1 MiB and often a file
+// descriptor, so that XdmfHdf5Sets keeps only the last 16 open. XdmfItems is for one thread; any number of
+// threads may read the arrays, and reads from HDF5 wait for one another.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "preprocess/formats/common/open_files.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/xdmf/xdmf_document.h"
-#include "preprocess/formats/xdmf/xdmf_hdf5.h"
 #include "preprocess/formats/xdmf/xdmf_values.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
+
+/// The open data sets, most recently used first. Guarded by dataLibraryMutex(), closing included.
+class XdmfHdf5Sets {
+ public:
+  XdmfHdf5Sets() = default;
+  ~XdmfHdf5Sets();
+  XdmfHdf5Sets(const XdmfHdf5Sets&) = delete;
+  XdmfHdf5Sets& operator=(const XdmfHdf5Sets&) = delete;
+
+  /// Calls use(identifier) with the mutex held; opens the data set unless it is open. Throws Error.
+  void with(const std::filesystem::path& path, const std::string& name,
+            const std::function<void(hid_t)>& use);
+
+ private:
+  struct Open {
+    std::filesystem::path path;
+    std::string name;
+    Hdf5File file;
+    Hdf5DataSet set;
+  };
+  bool moveToFront(const std::filesystem::path& path, const std::string& name);
+
+  std::list<Open> open_;
+};
 
 /// An item whose numbers would have to be computed.
 class XdmfComputedItem : public Error {
@@ -21,16 +54,18 @@ class XdmfComputedItem : public Error {
   using Error::Error;
 };
 
+/// The arrays of a document's data items.
 class XdmfItems {
  public:
-  /// `folder`: of the files that the document names. `document` must outlive the object, but not the arrays.
+  /// `folder` is the folder of the files that the document names. `document` must outlive the object, but
+  /// not the arrays.
   XdmfItems(const XdmfDocument& document, std::filesystem::path folder);
 
-  /// The array of a DataItem. One that many elements refer to is kept once. Throws Error with the element; XdmfComputedItem for
-  /// functions other than JOIN.
+  /// The array of a DataItem. One that many elements refer to is kept once. Throws Error with the element;
+  /// XdmfComputedItem for functions other than JOIN.
   std::shared_ptr<const XdmfValues> read(const pugi::xml_node& item) { return readItem(item, 0); }
 
-  /// Of the arrays that were read: each once.
+  /// The files of the arrays that were read, each once.
   const std::vector<std::string>& files() const { return files_; }
 
  private:

@@ -5,7 +5,7 @@
 #include <functional>
 #include <numeric>
 
-#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

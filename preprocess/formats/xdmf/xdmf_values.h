@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
-#include "preprocess/formats/common/open_files.h"
 
 namespace curvisplat {
 

@@ -1,0 +1,150 @@
+#include "preprocess/formats/netcdf/cf_coordinates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <iterator>
+#include <limits>
+#include <string_view>
+
+#include "stream/base/text.h"
+
+namespace curvisplat {
+namespace {
+
+bool isOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
+  return std::find(words.begin(), words.end(), text) != words.end();
+}
+
+bool beginsWithOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
+  return std::any_of(words.begin(), words.end(),
+                     [&](std::string_view word) { return text.starts_with(word); });
+}
+
+bool isVerticalName(std::string_view standard_name) {
+  return isOneOf(standard_name, {"depth", "height", "altitude", "geopotential_height", "model_level_number",
+                                 "depth_below_geoid", "air_pressure", "hybrid_sigma_pressure",
+                                 "mid_layer_heights", "mid_level_pressure"}) ||
+         beginsWithOneOf(standard_name, {"height_above_", "ocean_s", "ocean_double_sigma", "atmosphere_"});
+}
+
+/// Customary variable names of programs that write no attributes.
+CfRole roleByName(const std::string& name, bool length) {
+  if (beginsWithOneOf(name, {"lon", "nav_lon", "xlong", "glam"})) return CfRole::kLongitude;
+  if (beginsWithOneOf(name, {"lat", "nav_lat", "xlat", "gphi"})) return CfRole::kLatitude;
+  if (isOneOf(name, {"time", "ocean_time", "time_counter"})) return CfRole::kTime;
+  if (!length) return CfRole::kNone;
+  if (name == "x" || name.starts_with("x_")) return CfRole::kX;
+  if (name == "y" || name.starts_with("y_")) return CfRole::kY;
+  if (beginsWithOneOf(name, {"depth", "gdep", "height", "altitude", "z_rho", "z_w", "z_r", "lev"}) ||
+      name == "z")
+    return CfRole::kVertical;
+  return CfRole::kNone;
+}
+
+}  // namespace
+
+CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
+  if (!variable.numeric) return CfRole::kNone;
+  const std::string standard_name = lowerCase(variable.text("standard_name")),
+                    units = lowerCase(variable.text("units"));
+  const std::string axis = lowerCase(variable.text("axis"));
+  if (standard_name == "grid_longitude") return CfRole::kGridLongitude;
+  if (standard_name == "grid_latitude") return CfRole::kGridLatitude;
+  if (isOneOf(units, {"degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese"}) ||
+      isOneOf(standard_name, {"longitude", "geographic_longitude"}))
+    return CfRole::kLongitude;
+  if (isOneOf(units, {"degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn"}) ||
+      isOneOf(standard_name, {"latitude", "geographic_latitude"}))
+    return CfRole::kLatitude;
+  if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::kTime;
+
+  const bool length = kilometresOf(units).has_value(), pressure = pascalsOf(units).has_value();
+  // A variable with the name of its dimension is a coordinate variable, and may have an `axis`.
+  const bool coordinate = variable.dims.size() == 1 && file.dimension(variable, 0).name == variable.name;
+  if (isVerticalName(standard_name) || !variable.text("formula_terms").empty() ||
+      (coordinate && (axis == "z" || pressure || !variable.text("positive").empty())))
+    return CfRole::kVertical;
+  if (isOneOf(standard_name, {"projection_x_coordinate", "plane_x_coordinate"}) || (axis == "x" && length))
+    return CfRole::kX;
+  if (isOneOf(standard_name, {"projection_y_coordinate", "plane_y_coordinate"}) || (axis == "y" && length))
+    return CfRole::kY;
+  if (coordinate && axis == "t") return CfRole::kTime;
+  if (!standard_name.empty()) return CfRole::kNone;
+  if (length && !variable.text("positive").empty()) return CfRole::kVertical;
+  return roleByName(lowerCase(variable.name), length || units.empty());
+}
+
+std::optional<double> kilometresOf(const std::string& unit) {
+  const std::string word = lowerCase(unit);
+  if (isOneOf(word, {"m", "meter", "meters", "metre", "metres", "gpm"})) return 1e-3;
+  if (isOneOf(word, {"km", "kilometer", "kilometers", "kilometre", "kilometres"})) return 1;
+  if (isOneOf(word, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"})) return 1e-5;
+  if (isOneOf(word, {"ft", "foot", "feet"})) return 0.3048e-3;
+  return std::nullopt;
+}
+
+std::optional<double> pascalsOf(const std::string& unit) {
+  const std::string word = lowerCase(unit);
+  if (isOneOf(word, {"pa", "pascal", "pascals"})) return 1;
+  if (isOneOf(word, {"hpa", "mb", "mbar", "millibar", "millibars", "hectopascal", "hectopascals"}))
+    return 100;
+  if (isOneOf(word, {"kpa", "cb", "centibar"})) return 1000;
+  if (isOneOf(word, {"bar", "bars"})) return 1e5;
+  return std::nullopt;
+}
+
+bool growsDownwards(const NetcdfVariable& variable) {
+  const std::string positive = lowerCase(variable.text("positive"));
+  if (!positive.empty()) return positive == "down";
+  const std::string standard_name = lowerCase(variable.text("standard_name")),
+                    name = lowerCase(variable.name);
+  return standard_name.starts_with("depth") ||
+         (standard_name.empty() && beginsWithOneOf(name, {"dep", "gdep"}));
+}
+
+namespace {
+
+constexpr double kGravity = 9.80665, kGasConstant = 287.05287;  // of dry air, J/(kg K)
+constexpr double kGeopotentialRadius = 6356766;                 // metres
+
+/// A layer from `height` (geopotential metres) up, with the temperature at its foot and its lapse in K/m.
+struct Layer {
+  double height, temperature, lapse;
+};
+constexpr Layer kLayers[] = {
+    {0, 288.15, -0.0065}, {11000, 216.65, 0},       {20000, 216.65, 0.001},  {32000, 228.65, 0.0028},
+    {47000, 270.65, 0},   {51000, 270.65, -0.0028}, {71000, 214.65, -0.002},
+};
+constexpr double kSeaLevelPressure = 101325;
+
+double pressureAbove(const Layer& layer, double foot, double height) {
+  const double rise = height - layer.height;
+  if (layer.lapse == 0) return foot * std::exp(-kGravity * rise / (kGasConstant * layer.temperature));
+  return foot *
+         std::pow(1 + layer.lapse * rise / layer.temperature, -kGravity / (kGasConstant * layer.lapse));
+}
+
+double heightOf(const Layer& layer, double foot, double pascals) {
+  if (layer.lapse == 0)
+    return layer.height - kGasConstant * layer.temperature / kGravity * std::log(pascals / foot);
+  const double ratio = std::pow(pascals / foot, -kGasConstant * layer.lapse / kGravity);
+  return layer.height + layer.temperature / layer.lapse * (ratio - 1);
+}
+
+}  // namespace
+
+double standardAltitude(double pascals) {
+  if (!(pascals > 0)) return std::numeric_limits<double>::quiet_NaN();
+  double foot = kSeaLevelPressure;
+  const Layer* layer = kLayers;
+  for (; layer + 1 != std::end(kLayers); ++layer) {
+    const double next = pressureAbove(*layer, foot, (layer + 1)->height);
+    if (pascals > next) break;
+    foot = next;
+  }
+  const double geopotential = heightOf(*layer, foot, pascals);
+  return kGeopotentialRadius * geopotential / (kGeopotentialRadius - geopotential);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,47 @@
+// What a coordinate variable means by the CF conventions: its role (longitude, latitude, depth, time, or
+// none), the length or pressure of its unit, its direction, and the height of a pressure level that has no
+// geopotential. All functions look at attributes and numbers alone, read no file, and may be called by any
+// thread.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "preprocess/formats/netcdf/netcdf_files.h"
+
+namespace curvisplat {
+
+enum class CfRole {
+  kNone,
+  kLongitude,  // degrees
+  kLatitude,
+  kGridLongitude,  // degrees from a rotated pole
+  kGridLatitude,
+  kX,  // projection coordinate, a length
+  kY,
+  kVertical,  // depth, height or level: see CfVertical
+  kTime,
+};
+
+/// The role of a variable, decided by standard_name, units, axis and formula_terms; if all of these are
+/// missing, by customary names.
+/// Source: CF conventions 1.10, chapter 4.
+CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable);
+
+/// The length of a unit in kilometres; nullopt if it is not a unit of length.
+std::optional<double> kilometresOf(const std::string& unit);
+
+/// A unit of pressure in pascals; nullopt if it is not a unit of pressure.
+std::optional<double> pascalsOf(const std::string& unit);
+
+/// Whether the values of a vertical coordinate increase downwards: by its attribute `positive`, else by its
+/// name.
+bool growsDownwards(const NetcdfVariable& variable);
+
+/// The height of a pressure in the standard atmosphere, in metres above mean sea level; negative for more
+/// than 101,325 Pa. NaN unless `pascals` is above 0. Above 71 km the lapse rate of the topmost layer
+/// continues.
+/// Source: hydrostatic equation in the layers of the International Standard Atmosphere (ISO 2533:1975).
+double standardAltitude(double pascals);
+
+}  // namespace curvisplat

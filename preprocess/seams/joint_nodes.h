@@ -1,0 +1,199 @@
+// The nodes of block faces that coincide at one point, and what becomes of them. Two halves give back the
+// whole cell, which is stretched and skewed by what both blocks have there (joint_sides.h); so are the
+// splats one away from the face. Where one half is more than 2.5 times as thick as the other, they stay
+// apart, each cut at the face between them: one splat for both would reach too far on the thin side and not
+// far enough on the thick one.
+//
+//    block A      |  block B                          alike                     unlike
+//    o     o     o|o     o     o                  o--[  o  ]--o              o----[o|o]-o-o
+//                half cells                        one splat           two splats, cut at the face
+//
+// JointNodes does this for one point after another; OpenBorders and BendOfParts give the merged splat its
+// borders and means. Nothing here is for several threads at once. Sums depend on the order of adding.
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "preprocess/seams/joint_sides.h"
+#include "preprocess/shape/merge.h"
+#include "preprocess/splats/face_layers.h"
+#include "preprocess/splats/node_splats.h"
+#include "stream/model/border_code.h"
+#include "stream/model/splats.h"
+
+namespace curvisplat {
+
+/// Whether the border that `splat` lies behind is one of those of the splat `face` that are faces to be cut
+/// at.
+bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind);
+
+/// Which borders of a node's cell are still open once the parts that coincide there are merged: two halves
+/// of two blocks close the border between them, while a face that both of them end at stays one.
+class OpenBorders {
+ public:
+  void clear() {
+    inward_.clear();
+    parts_ = 0;
+  }
+  void add(const Splat& part, uint32_t border_code);
+  /// The half cell of `merged`, the parts' splat. A direction inwards is closed by another part's opposite
+  /// one, and several parts' similar ones are one, with a face to be cut at if all have; angles are measured
+  /// in the merged cell's own frame, where thin cells are round.
+  uint32_t of(const Splat& merged) const { return of(merged, {}).code; }
+
+  /// A face that one of the parts lies in the layer behind of.
+  struct Layer {
+    glm::dvec3 inward{0.0};  // world units, as long as the cell
+    glm::dvec3 face{0.0};    // a point of it
+    uint8_t axis = 0;        // LayerAxis'
+  };
+  /// The same with such faces, but for those across directions in which any of the parts ends.
+  LayeredBorder of(const Splat& merged, std::span<const Layer> layers) const;
+
+ private:
+  struct Inward {
+    glm::dvec3 along;  // world units, as long as the part's cell
+    size_t part;
+    bool face;
+  };
+  std::vector<Inward> inward_;
+  size_t parts_ = 0;
+};
+
+/// Corrects the means of a cell that is merged of its parts for how the scalars bend from one part to
+/// another. A half cell knows no second difference along its short axis (node_splats.h), and its parts'
+/// means make an eighth of it where a tenth is right; the rest is taken off, and so is the variance that is
+/// this bend's alone. The node is then as if its block had never been cut.
+class BendOfParts {
+ public:
+  explicit BendOfParts(size_t variables) : sums_(variables) {}
+
+  void clear() {
+    weight_ = 0;
+    middle_ = glm::dvec3(0.0);
+    std::fill(sums_.begin(), sums_.end(), Sums());
+  }
+  /// `offset`: of the part's middle, from any point that is common to all.
+  void add(const Splat& splat, const glm::dvec3& offset, std::span<const SplatScalar> values);
+  void correct(std::span<SplatScalar> merged) const;
+
+ private:
+  struct Sums {
+    double along = 0;
+    glm::dvec3 gradient{0.0};
+  };
+  double weight_ = 0;
+  glm::dvec3 middle_{0.0};
+  std::vector<Sums> sums_;
+};
+
+/// What is done with coincident halves of unlike thickness.
+enum class UnlikeHalves {
+  kApart,
+  kMerged,  // caches of version 1
+};
+
+/// Halves are unlike if one is more than this many times as thick as the other.
+inline constexpr double kMaxJointRatio = 2.5;
+/// The same where grid lines have a kink at the joint: one splat of two such halves bulges out of both.
+inline constexpr double kMaxKinkedRatio = 1.3;
+
+/// A splat with its values.
+struct SplatWithValues {
+  NodeSplat splat;
+  std::vector<SplatScalar> values;
+};
+
+/// Splats and their values, in two arrays.
+class SplatList {
+ public:
+  explicit SplatList(size_t variables) : variables_(variables) {}
+
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values) {
+    splats_.push_back(splat);
+    values_.insert(values_.end(), values.begin(), values.end());
+  }
+  /// Keeps its memory.
+  void clear() {
+    splats_.clear();
+    values_.clear();
+  }
+  size_t size() const { return splats_.size(); }
+  NodeSplat& splat(size_t n) { return splats_[n]; }
+  std::span<const NodeSplat> splats() const { return splats_; }
+  std::span<SplatScalar> values(size_t n) { return std::span(values_).subspan(n * variables_, variables_); }
+
+ private:
+  size_t variables_;
+  std::vector<NodeSplat> splats_;
+  std::vector<SplatScalar> values_;  // [splat][variable]
+};
+
+/// Some of the nodes at one point as one splat. Made once and used for many points, since its sums allocate.
+class MergedParts {
+ public:
+  explicit MergedParts(size_t variables) : merger_(variables), bend_(variables) {}
+
+  /// Forgets what it had. `sides`: those of the part.
+  void begin(const NodeSplat& first, std::span<const SplatScalar> values, std::span<const JointSide> sides);
+  void add(const NodeSplat& part, std::span<const SplatScalar> values, std::span<const JointSide> sides);
+  /// Its node (and node_position) is the lowest of the parts; regular is false unless there is only one,
+  /// which comes out as it went in.
+  SplatWithValues finish() const;
+  /// The nodes in it, in the order of adding.
+  const std::vector<uint64_t>& nodes() const { return nodes_; }
+
+ private:
+  std::vector<OpenBorders::Layer> layersOfLowest() const;
+
+  glm::dvec3 origin_{0.0};
+  SplatWithValues lowest_;
+  SplatMerger merger_;
+  BendOfParts bend_;
+  OpenBorders borders_;
+  std::vector<JointSide> sides_;  // of the lowest
+  std::vector<uint64_t> nodes_;
+  std::vector<SplatScalar> values_of_half_;
+};
+
+/// Merges the nodes at one point after another.
+class JointNodes {
+ public:
+  JointNodes(UnlikeHalves unlike, size_t variables)
+      : variables_(variables), unlike_(unlike), parts_(variables), behind_(variables) {}
+
+  /// A node at the point, or one of the layer behind a face there, which loses its border code if that face
+  /// is closed.
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values);
+
+  /// Gets a splat and the nodes that it is merged of; none of the layer behind.
+  using Sink =
+      std::function<void(const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes)>;
+  /// Then forgets the nodes.
+  void finish(const Sink& sink);
+
+ private:
+  void mergeAll();
+  MergedParts& nextGroup();
+  void mergeGroups(std::span<const size_t> group, std::span<const JointSide> sides);
+  void finishSeveral(const Sink& sink);
+  void finishBehind(std::span<const NodeSplat* const> parts, std::span<const JointSide> sides,
+                    const Sink& sink);
+
+  size_t variables_;
+  UnlikeHalves unlike_;
+  SplatList parts_;
+  bool all_merged_ = false;          // in the first group, in place of parts_, if there are many
+  std::vector<MergedParts> groups_;  // the first group_count_ of them are in use
+  size_t group_count_ = 0;
+  SplatList behind_;
+  std::vector<NodeSplat> faces_;  // what the parts have become
+};
+
+}  // namespace curvisplat

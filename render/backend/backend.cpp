@@ -1,0 +1,116 @@
+#include "render/backend/backend.h"
+
+#include <utility>
+
+#include "render/cpu/cpu_painter.h"
+#include "render/gl/gl_context.h"
+#include "render/gl/gl_painter.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+class GlBackend final : public PaintingBackend {
+ public:
+  explicit GlBackend(GlLibrary library) : gl_(library) {
+    gl_.run([this](const GlContext& context) { painter_ = std::make_unique<GlPainter>(context); });
+  }
+  ~GlBackend() override {
+    gl_.run([this](const GlContext&) { painter_.reset(); });
+  }
+  void run(const Job& job) override {
+    gl_.run([&](const GlContext&) { job(*painter_); });
+  }
+  DrawingOrder order() const override { return painter_->order(); }
+  const std::string& name() const override { return gl_.contextName(); }
+  bool isSoftware() const override { return gl_.isSoftware(); }
+  std::span<ScreenSplat> splatMemory(size_t count) override {
+    std::span<ScreenSplat> mapped;
+    gl_.run([&](const GlContext&) { mapped = painter_->mapSplats(count); });
+    return mapped.empty() ? PaintingBackend::splatMemory(count) : mapped;
+  }
+  uint64_t bytes(ImageSize size, const PaintResources&) const override {
+    return 4 * sizeof(float) * size.pixels();  // the framebuffer
+  }
+
+ private:
+  GlThread gl_;
+  std::unique_ptr<GlPainter> painter_;  // made, used and destroyed on the GL thread
+};
+
+/// Paints on the caller's thread and on TBB's threads.
+class CpuBackend final : public PaintingBackend {
+ public:
+  void run(const Job& job) override { job(painter_); }
+  DrawingOrder order() const override { return painter_.order(); }
+  const std::string& name() const override { return name_; }
+  bool isSoftware() const override { return true; }
+  uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
+    return CpuPainter::frameBytes(size) + CpuPainter::batchBytes(size, resources);
+  }
+
+ private:
+  CpuPainter painter_;
+  const std::string name_ = CpuPainter::name();
+};
+
+/// EGL if it draws on a graphics card. Otherwise returns null and sets `why_not`.
+std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
+  try {
+    if (!eglMayHaveCard()) {
+      why_not = "EGL finds no graphics card";
+      return nullptr;
+    }
+    auto card = std::make_unique<GlBackend>(GlLibrary::kEgl);
+    if (!card->isSoftware()) return card;
+    why_not = card->name() + " is software";
+  } catch (const Error& error) {
+    why_not = error.what();
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::span<ScreenSplat> PaintingBackend::splatMemory(size_t count) {
+  splats_.reset();
+  splats_ = std::make_unique_for_overwrite<ScreenSplat[]>(count);
+  return {splats_.get(), count};
+}
+
+std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
+  switch (backend) {
+    case Backend::kOsmesa:
+      return std::make_unique<GlBackend>(GlLibrary::kOsmesa);
+    case Backend::kEgl:
+      return std::make_unique<GlBackend>(GlLibrary::kEgl);
+    case Backend::kCpu:
+      return std::make_unique<CpuBackend>();
+    case Backend::kAutomatic:
+      break;
+  }
+  std::string why_not;
+  if (auto card = makeCardBackend(why_not)) return card;
+  return std::make_unique<CpuBackend>();
+}
+
+SystemReport examineBackends() {
+  SystemReport report;
+  const std::pair<const char*, Backend> backends[] = {
+      {"egl", Backend::kEgl}, {"osmesa", Backend::kOsmesa}, {"cpu", Backend::kCpu}};
+  for (const auto& [word, backend] : backends) {
+    BackendReport& found = report.backends.emplace_back();
+    found.word = word;
+    try {
+      found.found = makeBackend(backend)->name();
+      found.works = true;
+    } catch (const Error& error) {
+      found.found = error.what();
+    }
+  }
+  std::string why_not;
+  report.automatic = makeCardBackend(why_not) ? "egl: a graphics card draws" : "cpu: " + why_not;
+  return report;
+}
+
+}  // namespace curvisplat

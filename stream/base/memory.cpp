@@ -1,0 +1,38 @@
+#include "stream/base/memory.h"
+
+#include <malloc.h>
+#include <sys/mman.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <new>
+
+namespace curvisplat {
+
+void preferHugePages(void* begin, size_t bytes) {
+  constexpr uintptr_t kHugePage = 2 << 20;
+  const auto from = reinterpret_cast<uintptr_t>(begin);
+  const uintptr_t first = (from + kHugePage - 1) / kHugePage * kHugePage,
+                  end = (from + bytes) / kHugePage * kHugePage;
+  if (first >= end) return;
+  madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
+}
+
+void returnFreedMemory(size_t large) {
+  mallopt(M_MMAP_THRESHOLD, static_cast<int>(large));
+  malloc_trim(0);
+}
+
+void limitHeaps(int most) {
+  mallopt(M_ARENA_MAX, most);
+}
+
+void requireSpareMemory() {
+  constexpr size_t kSpareBytes = size_t{32} << 20;
+  void* const memory = ::mmap(nullptr, kSpareBytes, PROT_READ | PROT_WRITE,
+                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc();
+  ::munmap(memory, kSpareBytes);
+}
+
+}  // namespace curvisplat

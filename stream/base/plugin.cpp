@@ -1,0 +1,39 @@
+#include "stream/base/plugin.h"
+
+#include <dlfcn.h>
+
+#include <filesystem>
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The file that contains this function.
+fs::path thisFile() {
+  Dl_info info{};
+  std::error_code error;
+  if (::dladdr(reinterpret_cast<const void*>(&openPlugin), &info) == 0 || !info.dli_fname) return {};
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  // Of a program, dladdr() gives the name that it was called by.
+  const fs::path file = fs::canonical(info.dli_fname, error);
+  return file.extension() == ".so" ? file : program;
+}
+
+}  // namespace
+
+void* openPlugin(const char* name, int flags, std::string& why_not) {
+  std::error_code error;
+  const fs::path folder = thisFile().parent_path();
+  for (const fs::path& candidate : {folder / name, folder / CURVISPLAT_PLUGINS / name}) {
+    if (!fs::exists(candidate, error)) continue;
+    if (void* const module = ::dlopen(candidate.c_str(), flags)) return module;
+    why_not = ::dlerror();
+    return nullptr;
+  }
+  if (void* const module = ::dlopen(name, flags)) return module;
+  why_not = ::dlerror();
+  return nullptr;
+}
+
+}  // namespace curvisplat

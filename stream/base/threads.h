@@ -1,0 +1,57 @@
+// Threads: how many an option asks for, their names in debuggers and in top, and a team of them that runs
+// one job after another.
+//
+// A WorkerTeam owns its threads: it starts them when it is made and joins them when it is destroyed. One
+// thread owns the team and starts its jobs; any thread may call the functions.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <thread>
+#include <vector>
+
+#include "stream/base/mutex.h"
+
+namespace curvisplat {
+
+/// `threads`, or the number of cores if it is 0.
+inline unsigned threadsOrCores(unsigned threads) {
+  return threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+/// Names the calling thread. `name`: at most 15 characters.
+void nameThisThread(const char* name);
+
+/// A team of threads that run one job after another together. Each thread's own state (scratch memory, zstd
+/// contexts) stays warm from one job to the next.
+class WorkerTeam {
+ public:
+  /// Starts `count` threads, all named `name` (at most 15 characters).
+  WorkerTeam(unsigned count, const char* name);
+  /// Waits for the current job and ends the threads.
+  ~WorkerTeam();
+  WorkerTeam(const WorkerTeam&) = delete;
+  WorkerTeam& operator=(const WorkerTeam&) = delete;
+
+  unsigned size() const { return static_cast<unsigned>(threads_.size()); }
+  /// Every thread calls job(number) with its own number, counted from 0. The job must not throw. One job at
+  /// a time: call wait() before the next start().
+  void start(std::function<void(unsigned)> job);
+  /// Returns when all threads have ended the job; immediately if no job is running.
+  void wait();
+
+ private:
+  void loop(unsigned number, const char* name);
+  void end();
+
+  Mutex mutex_;
+  std::function<void(unsigned)> job_;        // set only while no thread is working
+  uint64_t jobs_ GUARDED_BY(mutex_) = 0;     // started so far
+  unsigned working_ GUARDED_BY(mutex_) = 0;  // threads still running the job
+  bool ending_ GUARDED_BY(mutex_) = false;
+  ConditionVariable started_, done_;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,274 @@
+#include "stream/paging/async_reads.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <liburing.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/mutex.h"
+#include "stream/base/threads.h"
+#include "stream/base/trace.h"
+
+namespace curvisplat {
+
+DirectFile::DirectFile(std::filesystem::path path, bool direct) : path_(std::move(path)) {
+  buffered_fd_ = openRetrying(path_, O_RDONLY);
+  if (buffered_fd_ < 0)
+    throw Error("{}: cannot be opened for reading: {}", path_.string(), std::strerror(errno));
+  ::posix_fadvise(buffered_fd_, 0, 0, POSIX_FADV_RANDOM);  // only a hint: failure does no harm
+  if (direct) direct_fd_ = openRetrying(path_, O_RDONLY | O_DIRECT);
+}
+
+DirectFile::~DirectFile() {
+  if (direct_fd_ >= 0) SystemCalls::current().close(direct_fd_);
+  SystemCalls::current().close(buffered_fd_);
+}
+
+namespace {
+
+constexpr uint64_t kWakeTag = ~uint64_t{0};
+
+// The kernel answers EAGAIN or EBUSY if it has no memory. After so many answers in a row, reading has
+// failed.
+constexpr unsigned kMaxPutOff = 1000;
+
+/// Two connected sockets that do not block.
+using Sockets = std::array<int, 2>;
+
+/// Reads by io_uring. A poll of a socket is always under way beside the reads: writing to the other socket
+/// wakes the owner. (An event counter would do as well, but if writing to it failed, nothing could wake the
+/// owner. Shutting down the connection can.)
+class UringReads : public AsyncReads {
+ public:
+  /// Takes over `ring` and `sockets`.
+  UringReads(const io_uring& ring, const Sockets& sockets) : ring_(ring), sockets_(sockets) { listen(); }
+
+  ~UringReads() override {
+    // The kernel writes to the reads' memory until they end. Those that it was never told of have not begun.
+    // The poll ends with the connection.
+    disconnect();
+    for (unsigned in_kernel = under_way_ + (listening_ ? 1 : 0) - io_uring_sq_ready(&ring_); in_kernel > 0;) {
+      io_uring_cqe* end = nullptr;
+      if (io_uring_wait_cqe(&ring_, &end) != 0) continue;  // interrupted
+      io_uring_cqe_seen(&ring_, end);
+      --in_kernel;
+    }
+    io_uring_queue_exit(&ring_);
+    for (const int socket : sockets_) ::close(socket);
+  }
+
+  const char* name() const override { return "io_uring"; }
+
+  void submit(const AsyncRead& read) override {
+    put(read);
+    ++under_way_;
+  }
+
+  std::optional<AsyncReadEnd> wait() override {
+    io_uring_cqe* end = nullptr;
+    for (unsigned put_off = 0; io_uring_peek_cqe(&ring_, &end) != 0;) {
+      const int result = io_uring_submit_and_wait(&ring_, 1);
+      const bool is_put_off = result == -EAGAIN || result == -EBUSY;
+      if (result < 0 && result != -EINTR && !(is_put_off && ++put_off < kMaxPutOff))
+        throw Error("reading with io_uring failed: {}", std::strerror(-result));
+    }
+    const AsyncReadEnd ended{io_uring_cqe_get_data64(end), end->res};
+    io_uring_cqe_seen(&ring_, end);
+    if (ended.tag == kWakeTag) {
+      listening_ = false;
+      if (!drain()) throw Error("reading with io_uring failed: its thread can no longer be woken");
+      listen();
+      return {};
+    }
+    --under_way_;
+    return ended;
+  }
+
+  void wake() override {
+    const char any = 0;
+    ssize_t written;
+    do {
+      written = ::send(sockets_[1], &any, 1, MSG_NOSIGNAL);
+    } while (written < 0 && errno == EINTR);
+    // A full socket (EAGAIN) wakes anyway.
+    if (written < 0 && errno != EAGAIN) disconnect();
+  }
+
+ private:
+  void listen() {
+    io_uring_sqe* entry = nextEntry();
+    io_uring_prep_poll_add(entry, sockets_[0], POLLIN);
+    io_uring_sqe_set_data64(entry, kWakeTag);
+    listening_ = true;
+  }
+
+  /// Reads what has woken. Returns false after disconnect().
+  bool drain() {
+    std::array<char, 256> ignored;
+    ssize_t got;
+    do {
+      got = ::read(sockets_[0], ignored.data(), ignored.size());
+    } while (got > 0 || (got < 0 && errno == EINTR));
+    return got < 0;
+  }
+
+  void disconnect() { ::shutdown(sockets_[1], SHUT_RDWR); }
+
+  io_uring_sqe* nextEntry() {
+    io_uring_sqe* entry = io_uring_get_sqe(&ring_);
+    CURVISPLAT_CHECK(entry && "no more reads at once than the depth");
+    return entry;
+  }
+
+  /// Queues a read. The next wait() submits it to the kernel.
+  void put(const AsyncRead& read) {
+    io_uring_sqe* entry = nextEntry();
+    io_uring_prep_read(entry, read.fd, read.to, static_cast<unsigned>(read.count), read.offset);
+    io_uring_sqe_set_data64(entry, read.tag);
+  }
+
+  io_uring ring_;
+  const Sockets sockets_;  // the poll's, wake()'s
+  bool listening_ = false;
+  unsigned under_way_ = 0;
+};
+
+/// Whether the kernel takes what is submitted. A container may allow io_uring_setup but not io_uring_enter.
+bool canSubmit(io_uring& ring) {
+  io_uring_prep_nop(io_uring_get_sqe(&ring));
+  int result;
+  do {
+    result = io_uring_submit_and_wait(&ring, 1);
+  } while (result == -EINTR);
+  io_uring_cqe* end = nullptr;
+  if (result < 0 || io_uring_peek_cqe(&ring, &end) != 0) return false;
+  io_uring_cqe_seen(&ring, end);
+  return true;
+}
+
+}  // namespace
+
+std::unique_ptr<AsyncReads> makeUringReads(unsigned depth) {
+  io_uring ring;
+  if (io_uring_queue_init(depth + 1, &ring, 0) != 0) return nullptr;
+  // Kernels before 5.6 have io_uring without plain reads.
+  io_uring_probe* probe = io_uring_get_probe_ring(&ring);
+  const bool reads = probe && io_uring_opcode_supported(probe, IORING_OP_READ);
+  if (probe) io_uring_free_probe(probe);
+  Sockets sockets{-1, -1};
+  if (!reads || !canSubmit(ring) ||
+      ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, sockets.data()) < 0) {
+    io_uring_queue_exit(&ring);
+    return nullptr;
+  }
+  return std::make_unique<UringReads>(ring, sockets);
+}
+
+namespace {
+
+/// Reads by threads that each wait in pread.
+class ThreadReads : public AsyncReads {
+ public:
+  explicit ThreadReads(unsigned depth) : name_(fmt::format("pread on {} threads", depth)) {
+    try {
+      for (unsigned n = 0; n < depth; ++n) threads_.emplace_back([this] { loop(); });
+    } catch (...) {
+      stop();
+      throw;
+    }
+  }
+
+  ~ThreadReads() override { stop(); }
+
+  const char* name() const override { return name_.c_str(); }
+
+  void submit(const AsyncRead& read) override {
+    {
+      const MutexLock lock(mutex_);
+      waiting_.push_back(read);
+    }
+    submitted_.notify_one();
+  }
+
+  std::optional<AsyncReadEnd> wait() override {
+    MutexLock lock(mutex_);
+    while (!woken_ && ended_.empty()) changed_.wait(lock);
+    if (ended_.empty()) {
+      woken_ = false;
+      return {};
+    }
+    const AsyncReadEnd end = ended_.front();
+    ended_.pop_front();
+    return end;
+  }
+
+  void wake() override {
+    {
+      const MutexLock lock(mutex_);
+      woken_ = true;
+    }
+    changed_.notify_one();
+  }
+
+ private:
+  void loop() {
+    nameThisThread("read");
+    MutexLock lock(mutex_);
+    while (true) {
+      while (!stopping_ && waiting_.empty()) submitted_.wait(lock);
+      if (waiting_.empty()) return;
+      const AsyncRead read = waiting_.front();
+      waiting_.pop_front();
+      lock.unlock();
+      ssize_t got;
+      int error;
+      {
+        const TraceScope trace("read");
+        got = SystemCalls::current().pread(read.fd, read.to, read.count, static_cast<int64_t>(read.offset));
+        error = errno;
+      }
+      lock.lock();
+      ended_.push_back({read.tag, got < 0 ? -error : got});
+      changed_.notify_one();
+    }
+  }
+
+  void stop() {
+    {
+      const MutexLock lock(mutex_);
+      stopping_ = true;
+    }
+    submitted_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+  }
+
+  const std::string name_;
+  Mutex mutex_;
+  std::deque<AsyncRead> waiting_ GUARDED_BY(mutex_);
+  std::deque<AsyncReadEnd> ended_ GUARDED_BY(mutex_);
+  bool woken_ GUARDED_BY(mutex_) = false, stopping_ GUARDED_BY(mutex_) = false;
+  ConditionVariable submitted_;  // a read waits for a thread, or all are to stop
+  ConditionVariable changed_;    // a read has ended, or the owner is to wake
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace
+
+std::unique_ptr<AsyncReads> makeThreadReads(unsigned depth) {
+  return std::make_unique<ThreadReads>(depth);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,54 @@
+#include "stream/vdb/vdb_library.h"
+
+#include <dlfcn.h>
+
+#include <string>
+
+#include "stream/base/error.h"
+#include "stream/base/plugin.h"
+
+namespace curvisplat {
+namespace {
+
+const VdbFunctions& loadFunctions() {
+  constexpr const char* kName = "curvisplat-vdb.so";
+  std::string why_not;
+  void* const module = openPlugin(kName, RTLD_NOW | RTLD_LOCAL, why_not);
+  using Entry = const VdbFunctions* (*)(const char*);
+  const auto entry = module ? reinterpret_cast<Entry>(::dlsym(module, "curvisplatVdb")) : nullptr;
+  const VdbFunctions* const functions = entry ? entry(CURVISPLAT_VERSION) : nullptr;
+  if (module && !functions) why_not = "it is of another version than the program";
+  if (!functions)
+    throw Error("OpenVDB is needed and cannot be loaded: {}: {}; install curvisplat again", kName, why_not);
+  return *functions;
+}
+
+const VdbFunctions& functions() {
+  static const VdbFunctions& loaded = loadFunctions();
+  return loaded;
+}
+
+}  // namespace
+
+std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks) {
+  return functions().brick_grids_file(root, bricks);
+}
+
+uint64_t brickGridsMemory(std::span<const Brick> bricks) {
+  return functions().brick_grids_memory(bricks);
+}
+
+BrickGridsComparison compareBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
+                                       std::span<const Brick> bricks, uint64_t most_memory) {
+  return functions().compare_brick_grids(bytes, root, bricks, most_memory);
+}
+
+std::unique_ptr<CountingGrid> makeCountingGrid(uint32_t level, uint64_t memory_bytes) {
+  return functions().make_counting_grid(level, memory_bytes);
+}
+
+std::unique_ptr<FogVolume> makeFogVolume(const glm::dvec3& origin, double side) {
+  return functions().make_fog_volume(origin, side);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,335 @@
+#include "tools/commands/render_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/compute_permits.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "tools/options/frame_arguments.h"
+#include "tools/options/frame_sequence.h"
+#include "tools/options/opacity_arguments.h"
+#include "tools/options/option_parsers.h"
+#include "tools/options/picture_choice.h"
+#include "tools/options/scene_arguments.h"
+#include "tools/output/empty_picture.h"
+#include "tools/output/frame_output.h"
+#include "tools/output/launched_ranks.h"
+#include "tools/output/results.h"
+#include "tools/output/start_checks.h"
+
+namespace curvisplat {
+
+ValueChannels channelsOf(const RenderArguments& arguments) {
+  // A first picture has none, so they have to be asked for.
+  if (!arguments.channels && !arguments.first_image.empty()) return {};
+  return valueChannels(arguments.channels, arguments.output);
+}
+
+bool severalFrames(const RenderArguments& arguments) {
+  return arguments.camera.moves() || arguments.steps.severalSteps();
+}
+
+namespace {
+
+void checkPartArguments(const RenderArguments& arguments) {
+  if (!arguments.part) return;
+  parsePart(*arguments.part);
+  if (!severalFrames(arguments))
+    throw UsageError(
+        "--part {}: shares out several frames, but there is only one; give --orbit, --path or --steps",
+        *arguments.part);
+  if (isMovieName(arguments.output))
+    throw UsageError(
+        "--part {}: a part of a movie cannot be joined with others; write numbered pictures, -o "
+        "frame_%04d.png, and join them with ffmpeg",
+        *arguments.part);
+  if (!arguments.first_image.empty())
+    throw UsageError("--part {}: cannot be combined with --first-image, which is of frame 0 alone",
+                     *arguments.part);
+}
+
+}  // namespace
+
+void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
+  checkMotionArguments(arguments.camera, arguments.steps);
+  checkFunctionArguments(arguments.scalar);
+  checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
+  checkSurfaceArguments(arguments.surfaces, !arguments.opacity.by.scalar.empty());
+  checkAnnotationArguments(arguments.annotations);
+  checkOutputName(arguments.output, severalFrames(arguments), size);
+  checkPartArguments(arguments);
+  if (!arguments.first_image.empty() && !launchedRanks().alone())
+    throw UsageError("--first-image {}: one process draws it; start curvisplat without mpirun",
+                     arguments.first_image.string());
+  if (arguments.frame_rate && !isMovieName(arguments.output))
+    throw UsageError("--frame-rate needs a movie: -o NAME.mp4 or NAME.gif");
+  if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
+      arguments.output.extension() != ".exr")
+    throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",
+                     arguments.output.extension().string());
+  parseBackend(arguments.backend);
+  if (channelsOf(arguments).any() && !arguments.first_image.empty())
+    throw UsageError("--first-image {}: a first picture has no channels of values; leave out --channels",
+                     arguments.first_image.string());
+  std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
+                                            arguments.scalar.transfer_function.value_or("")};
+  checkOutputFile("-o", arguments.output, others);
+  if (severalFrames(arguments) && !isMovieName(arguments.output)) {
+    const FrameNames names(arguments.output);
+    checkOutputFolder("-o", names.of(std::max<uint64_t>(arguments.camera.frames.value_or(1), 1) - 1));
+    const uint64_t most = arguments.steps.severalSteps() ? kMaxFrames : arguments.camera.frameCount();
+    const auto check_other = [&](const char* option, const std::filesystem::path& other) {
+      if (names.include(linkTarget(other), most))
+        throw Error("{} {}: a frame of -o would overwrite it; choose another name", option, other.string());
+    };
+    check_other("--first-image", arguments.first_image);
+    check_other("--stats", arguments.statistics);
+  }
+  if (!arguments.first_image.empty()) {
+    checkImageName(arguments.first_image);
+    checkOutputFile("--first-image", arguments.first_image, others);
+  }
+  others.insert(others.end(), {arguments.output, arguments.first_image});
+  if (!arguments.statistics.empty()) checkOutputFile("--stats", arguments.statistics, others);
+}
+
+void requireSameCache(const CacheReader& cache, Ranks& ranks) {
+  if (ranks.alone()) return;
+  const std::string own = cache.seriesManifest().toJson();
+  const auto sent = fromBytes<char>(ranks.broadcast(toBytes(std::vector<char>(own.begin(), own.end()))));
+  if (!std::equal(own.begin(), own.end(), sent.begin(), sent.end()))
+    throw Error("{}: is another cache here than at rank 0, or another version of it; give all ranks the same",
+                cache.path().string());
+}
+
+namespace {
+
+/// See drawFrames().
+class FrameRun {
+ public:
+  FrameRun(const FrameJob& job, Progress& progress)
+      : arguments_(job.arguments),
+        manifest_(job.manifest),
+        player_(job.player),
+        output_(job.output),
+        report_(job.report),
+        step_changed_(job.step_changed),
+        progress_(progress),
+        ranks_(launchedRanks()),
+        channels_(channelsOf(job.arguments)) {}
+
+  void draw(const MotionInTime& motion, const std::vector<uint64_t>& numbers) {
+    const bool moves = severalFrames(arguments_);
+    const bool dealt = !ranks_.alone() && !report_.options.ranks;
+    const std::vector<uint64_t> own = dealt ? ownOf(numbers) : numbers;
+    const size_t rounds = dealt ? (numbers.size() + ranks_.count() - 1) / ranks_.count() : numbers.size();
+    if (moves) progress_.begin("drawing", own.size(), "frames");
+    for (size_t n = 0; n < rounds; ++n) {
+      picture_ = Image();
+      if (n < own.size()) drawNext(motion, own, n);
+      if (dealt && isMovieName(arguments_.output)) writeRound(numbers, n);
+    }
+    if (dealt) gatherReports(motion);
+    if (output_) output_->finish();
+    progress_.end();
+  }
+
+ private:
+  std::vector<uint64_t> ownOf(const std::vector<uint64_t>& numbers) const {
+    std::vector<uint64_t> own;
+    for (size_t n = ranks_.rank(); n < numbers.size(); n += ranks_.count()) own.push_back(numbers[n]);
+    return own;
+  }
+
+  /// The pictures that the ranks have drawn, into the movie at rank 0.
+  void writeRound(const std::vector<uint64_t>& numbers, size_t round) {
+    for (unsigned rank = 0; rank < ranks_.count(); ++rank) {
+      const size_t at = round * ranks_.count() + rank;
+      if (at >= numbers.size()) return;
+      const bool own = rank == ranks_.rank();
+      std::vector<Ranks::Bytes> sent = ranks_.gather(own ? toBytes(picture_.rgba) : Ranks::Bytes{});
+      if (!ranks_.isFirst()) continue;
+      Image picture;
+      picture.size = report_.picture;
+      picture.rgba = fromBytes<float>(sent[rank]);
+      output_->write(numbers[at], picture);
+    }
+  }
+
+  void gatherReports(const MotionInTime& motion) {
+    const std::vector<Ranks::Bytes> sent = ranks_.gather(packStatistics(report_.frames));
+    if (!ranks_.isFirst()) return;
+    report_.frames.clear();
+    for (const Ranks::Bytes& bytes : sent)
+      for (FrameReport& frame : unpackStatistics(bytes)) {
+        frame.camera = motion.camera(frame.number);
+        report_.frames.push_back(std::move(frame));
+      }
+    std::sort(report_.frames.begin(), report_.frames.end(),
+              [](const FrameReport& a, const FrameReport& b) { return a.number < b.number; });
+  }
+
+  void drawNext(const MotionInTime& motion, const std::vector<uint64_t>& numbers, size_t n) {
+    const bool moves = severalFrames(arguments_);
+    const uint64_t number = numbers[n];
+    const uint64_t* const next = n + 1 < numbers.size() ? &numbers[n + 1] : nullptr;
+    Progress of_frame;
+    of_frame.stopWith(progress_);
+    try {
+      draw(number, next, motion, moves ? of_frame : progress_);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const UsageError& error) {
+      if (moves) throw UsageError("frame {}: {}", number, error.what());
+      throw;
+    } catch (const Error& error) {
+      if (moves) throw Error("frame {}: {}", number, error.what());
+      throw;
+    }
+    if (moves) progress_.advance(1);
+  }
+
+  void goTo(const StepPosition& position) {
+    player_.goTo(position);
+    if (step_ == position.step) return;
+    step_changed_();
+    step_ = position.step;
+  }
+
+  void draw(uint64_t number, const uint64_t* next, const MotionInTime& motion, Progress& progress) {
+    goTo(motion.position(number));
+    const double time = player_.time();
+    const Camera camera = motion.camera(number);
+    FrameStatistics statistics;
+    if (channels_.any()) {
+      const Image image =
+          player_.renderer().renderWithValues(camera, report_.options, statistics, values_, &progress);
+      finish({number, time, camera, statistics}, image);
+      return;
+    }
+    if (number > 0 || arguments_.first_image.empty()) {
+      const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
+      if (next && !report_.options.ranks) prefetch(motion, *next);
+      finish({number, time, camera, statistics}, image);
+      return;
+    }
+    const auto show = [&](const Image& image, bool is_final) {
+      if (!report_.first_image) {
+        annotate(image, camera, [&](const Image& picture) { writeImage(picture, arguments_.first_image); });
+        report_.time_to_first_image_s = secondsSinceStart();
+        report_.first_image = statistics;
+      }
+      if (is_final) finish({number, time, camera, statistics}, image);
+    };
+    player_.renderer().renderProgressively(camera, report_.options, statistics, show, &progress);
+  }
+
+  /// Reads the next frame's bricks, and goes to its time step, while this frame's picture is written.
+  void prefetch(const MotionInTime& motion, uint64_t number) {
+    goTo(motion.position(number));
+    try {
+      player_.renderer().prefetch(motion.camera(number), report_.options);
+    } catch (const Error&) {
+      // That frame will report its own invalid camera.
+    }
+  }
+
+  void finish(FrameReport frame, const Image& image) {
+    if (report_.options.ranks) {
+      for (const Ranks::Bytes& bytes : ranks_.gather(packStatistics({frame})))
+        frame.of_ranks.push_back(unpackStatistics(bytes).front().statistics);
+      if (!ranks_.isFirst()) return;
+      frame.statistics = combined(frame.of_ranks);
+    }
+    // Bricks of the next picture are prepared meanwhile.
+    const Computing computing(player_.renderer().permits(), Urgency::kUrgent);
+    const uint64_t number = frame.number;
+    const Camera& camera = frame.camera;
+    const FrameStatistics& statistics = frame.statistics;
+    annotate(image, camera, [&](const Image& picture) {
+      if (isMovieName(arguments_.output) && !ranks_.alone() && !report_.options.ranks)
+        picture_ = picture;  // for rank 0
+      else if (channels_.any())
+        output_->writeWith(number, picture, imageChannels(channels_, values_, report_.picture));
+      else
+        output_->write(number, picture);
+    });
+    if (report_.frames.empty() && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
+    report_.frames.push_back(frame);
+    const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
+    reportUnreadable(which, statistics);
+    const RenderedScene scene{manifest_, report_.variable, report_.function(),
+                              camera,    report_.options,  statistics};
+    if (report_.frames.size() == 1) warnOfPoorPicture(image, scene);
+    if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
+    reported_empty_ = true;
+    progress_.end();
+    for (const std::string& reason : whyEmpty(scene))
+      printMessage("warning: the picture{} is empty: {}", which, reason);
+  }
+
+  void warnOfPoorPicture(const Image& image, const RenderedScene& scene) {
+    if (isEmpty(image, report_.options.background)) return;  // said with its reasons
+    const std::string warning = poorPictureWarning(image, scene, givenFunctionOptions(arguments_.scalar));
+    if (warning.empty()) return;
+    progress_.end();
+    printMessage("warning: {}", warning);
+  }
+
+  /// Calls write() with the picture, annotated if annotations were requested.
+  template <typename Write>
+  void annotate(const Image& data, const Camera& camera, const Write& write) const {
+    const Annotations& annotations = arguments_.annotations.shown;
+    if (annotations == Annotations{}) return write(data);
+    const FrameOptions& options = report_.options;
+    write(annotated(
+        data, annotations,
+        {report_.picture, player_.renderer().screenView(camera, options), report_.shown, manifest_.lower,
+         manifest_.upper, report_.background, axisTitles(arguments_.annotations)}));
+  }
+
+  /// Prints one warning for a frame with unreadable bricks that no earlier frame reported; it names the
+  /// first.
+  void reportUnreadable(const std::string& which, const FrameStatistics& statistics) {
+    const BrickFailure* first = nullptr;
+    for (const BrickFailure& failure : statistics.bricks_unreadable)
+      if (reported_unreadable_.insert(failure.brick).second && !first) first = &failure;
+    if (!first) return;
+    progress_.end();
+    printMessage("warning: {} of {} bricks{} cannot be read; they are drawn coarser or left out: {}",
+                 statistics.bricks_unreadable.size(), statistics.bricks_drawn, which, first->reason);
+  }
+
+  const RenderArguments& arguments_;
+  const Manifest& manifest_;
+  StepPlayer& player_;
+  FrameOutput* output_;  // null at ranks that write nothing
+  RenderReport& report_;
+  const std::function<void()> step_changed_;
+  std::optional<uint64_t> step_;
+  Progress& progress_;
+  Ranks& ranks_;
+  const ValueChannels channels_;
+  PixelValues values_;  // of the frame
+  Image picture_;       // of a movie's round
+  bool reported_empty_ = false;
+  std::set<uint32_t> reported_unreadable_;  // bricks
+};
+
+}  // namespace
+
+void drawFrames(const FrameJob& job, const MotionInTime& motion, const std::vector<uint64_t>& numbers,
+                Progress& progress) {
+  FrameRun(job, progress).draw(motion, numbers);
+}
+
+}  // namespace curvisplat

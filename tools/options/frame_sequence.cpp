@@ -1,0 +1,243 @@
+#include "tools/options/frame_sequence.h"
+
+#include <CLI/CLI.hpp>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "preprocess/formats/open/series_files.h"
+#include "render/camera/camera_path.h"
+#include "stream/base/error.h"
+#include "tools/options/option_parsers.h"
+
+namespace curvisplat {
+namespace {
+
+Camera placedCamera(const CameraArguments& arguments, const glm::dvec3& lower, const glm::dvec3& upper,
+                    ImageSize size) {
+  const auto projection = arguments.view_angle ? Projection::kPerspective : Projection::kOrthographic;
+  const double angle = arguments.view_angle ? parsePositive("--view-angle", *arguments.view_angle) : 30;
+  if (angle >= 180)
+    throw UsageError("--view-angle {}: expected fewer than 180 degrees", *arguments.view_angle);
+
+  Camera camera;
+  if (arguments.position) {
+    camera.position = parsePoint("--position", *arguments.position);
+    camera.focal_point =
+        arguments.focal_point ? parsePoint("--focal-point", *arguments.focal_point) : 0.5 * (lower + upper);
+    camera.view_up = arguments.view_up ? parsePoint("--view-up", *arguments.view_up) : glm::dvec3(0, 0, 1);
+    if (glm::length(camera.view_up) == 0)
+      throw UsageError("--view-up {}: expected a direction other than 0,0,0", *arguments.view_up);
+    camera.projection = projection;
+    camera.view_angle_deg = angle;
+    camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
+  } else {
+    camera = Camera::named(arguments.view.value_or("iso"), lower, upper, size, projection, angle);
+    if (arguments.focal_point) {
+      const glm::dvec3 moved = parsePoint("--focal-point", *arguments.focal_point) - camera.focal_point;
+      camera.position += moved;
+      camera.focal_point += moved;
+    }
+  }
+  if (arguments.parallel_scale)
+    camera.parallel_scale = parsePositive("--parallel-scale", *arguments.parallel_scale);
+  return camera;
+}
+
+}  // namespace
+
+void checkCameraArguments(const CameraArguments& arguments) {
+  if (arguments.view && (arguments.position || arguments.view_up))
+    throw UsageError("--view cannot be combined with --position or --view-up");
+  if (!arguments.position && arguments.view_up) throw UsageError("--view-up needs --position");
+  if (!arguments.position && !arguments.view && arguments.focal_point)
+    throw UsageError("--focal-point needs --position or --view");
+  if (arguments.parallel_scale && arguments.view_angle)
+    throw UsageError("--parallel-scale (orthographic) cannot be combined with --view-angle (perspective)");
+  if (arguments.orbit && !arguments.path.empty())
+    throw UsageError("--orbit cannot be combined with --path; both move the camera");
+  if (!arguments.path.empty() &&
+      (arguments.view || arguments.position || arguments.parallel_scale || arguments.view_angle))
+    throw UsageError(
+        "--path {}: its key frames place the camera; remove --view, --position, --parallel-scale and "
+        "--view-angle",
+        arguments.path.string());
+  if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
+}
+
+CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
+                                const glm::dvec3& upper, ImageSize size) {
+  const uint64_t frames = arguments.frameCount();
+  if (!arguments.path.empty()) {
+    const auto path = std::make_shared<CameraPath>(CameraPath::fromFile(arguments.path));
+    const double step = frames > 1 ? (path->end() - path->begin()) / static_cast<double>(frames - 1) : 0;
+    const auto time = [=](uint64_t frame) {
+      return frame + 1 == frames && frames > 1 ? path->end()
+                                               : path->begin() + step * static_cast<double>(frame);
+    };
+    CameraMotion motion{frames, [=](uint64_t frame) { return path->at(time(frame)); }, {}};
+    if (path->hasSeriesTimes())
+      motion.series_time = [=](uint64_t frame) { return path->seriesTimeAt(time(frame)); };
+    return motion;
+  }
+  Camera first = placedCamera(arguments, lower, upper, size);
+  if (!arguments.orbit) return {1, [=](uint64_t) { return first; }, {}};
+  const double degrees = parseNumber("--orbit", *arguments.orbit);
+  const auto turn = [=](uint64_t frame) {
+    return degrees * static_cast<double>(frame) / static_cast<double>(frames);
+  };
+  if (!arguments.parallel_scale && first.projection == Projection::kOrthographic)
+    for (uint64_t frame = 0; frame < frames; ++frame)  // one scale that fits the data into every frame
+      first.parallel_scale =
+          std::max(first.parallel_scale, orbited(first, turn(frame)).parallelScaleFor(lower, upper, size));
+  return {frames, [=](uint64_t frame) { return orbited(first, turn(frame)); }, {}};
+}
+
+namespace {
+
+/// That a time lies outside of the series: perhaps it is in another unit.
+void noteTimeOutside(const std::string& time, const Series& series, const StepPosition& position) {
+  const double number = parseNumber("--time", time), first = series.steps.front().time,
+               last = series.steps.back().time;
+  if (number < first || number > last)
+    printMessage("note: --time {}: the series has times from {:g} to {:g}; step {} is taken", time, first,
+                 last, position.step);
+}
+
+}  // namespace
+
+void addStepOptions(CLI::App& command, StepArguments& arguments, const std::string& group) {
+  CLI::Option* const step =
+      command.add_option("--step", arguments.step, "Time step of the cache, counted from 0 (default 0)")
+          ->group(group);
+  command.add_option("--time", arguments.time, "Choose the time step nearest to this time")
+      ->group(group)
+      ->excludes(step);
+}
+
+void addStepsOption(CLI::App& command, StepArguments& arguments, const std::string& group) {
+  command
+      .add_option("--steps", arguments.steps,
+                  "Draw a frame of each time step: all, FIRST:LAST or FIRST:LAST:STRIDE, counted from 0")
+      ->group(group);
+}
+
+void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std::string& group) {
+  command
+      .add_flag(
+          "--interpolate", arguments.interpolates,
+          "Draw times between two steps of one grid by linear interpolation of their values, instead of "
+          "the nearest step")
+      ->group(group);
+}
+
+std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const CacheReader& cache) {
+  if (arguments.steps && (arguments.step || arguments.time))
+    throw UsageError("--steps cannot be combined with --step or --time, which choose one");
+  const Series& series = cache.series();
+  if (arguments.steps) {
+    std::vector<StepPosition> positions;
+    for (const uint64_t step :
+         selectedSteps("--steps", parseSteps("--steps", *arguments.steps), series.steps.size()))
+      positions.push_back({step});
+    return positions;
+  }
+  if (arguments.time) {
+    const double time = parseNumber("--time", *arguments.time);
+    return {arguments.interpolates ? series.between(time) : StepPosition{series.nearest(time)}};
+  }
+  const uint64_t step = arguments.step.value_or(0);
+  if (step >= series.steps.size())
+    throw UsageError(
+        "--step {}: is out of range; {} has {}", step, cache.cachePath().string(),
+        series.steps.size() == 1 ? "one time step" : fmt::format("steps 0 to {}", series.steps.size() - 1));
+  return {{step}};
+}
+
+CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments) {
+  CacheReader cache(path);
+  const StepPosition position = chosenSteps(arguments, cache).front();
+  if (arguments.time) noteTimeOutside(*arguments.time, cache.series(), position);
+  return position == cache.position() ? std::move(cache) : cache.at(position);
+}
+
+void checkMotionArguments(const CameraArguments& camera, const StepArguments& steps) {
+  if (steps.interpolates && !steps.time && !steps.steps && camera.path.empty())
+    throw UsageError("--interpolate needs --time, --steps or a --path whose key frames have times");
+  CameraArguments without_time = camera;
+  if (steps.interpolates && steps.steps) without_time.frames.reset();
+  checkCameraArguments(without_time);
+}
+
+CameraArguments framesOf(const CameraArguments& arguments, const std::vector<StepPosition>& steps) {
+  CameraArguments with_frames = arguments;
+  if (arguments.moves() && !arguments.frames && steps.size() > 1) with_frames.frames = steps.size();
+  return with_frames;
+}
+
+MotionInTime inTime(const CameraMotion& motion, const Series& series, const StepArguments& arguments,
+                    const std::vector<StepPosition>& chosen, std::optional<uint64_t> frames) {
+  const auto at = [&series, interpolates = arguments.interpolates](double time) {
+    return interpolates ? series.between(time) : StepPosition{series.nearest(time)};
+  };
+  MotionInTime timed{motion.frames, motion.camera, {}};
+  if (motion.series_time) {
+    if (arguments.step || arguments.time || arguments.steps)
+      throw UsageError(
+          "--path: its key frames have times of the series; leave out --step, --time and --steps");
+    timed.position = [at, time = motion.series_time](uint64_t frame) { return at(time(frame)); };
+    return timed;
+  }
+  if (timed.frames == 1 && chosen.size() > 1) {
+    timed.frames = arguments.interpolates ? frames.value_or(chosen.size()) : chosen.size();
+    timed.camera = [camera = motion.camera(0)](uint64_t) { return camera; };
+  }
+  const uint64_t count = timed.frames;
+  if (arguments.interpolates && chosen.size() > 1 && count > 1) {
+    const double first = series.timeAt(chosen.front()), last = series.timeAt(chosen.back());
+    timed.position = [=, end = chosen.back()](uint64_t frame) {
+      const double part = static_cast<double>(frame) / static_cast<double>(count - 1);
+      return frame + 1 == count ? end : at(first + part * (last - first));
+    };
+    return timed;
+  }
+  timed.position = [chosen, count](uint64_t frame) { return chosen[frame * chosen.size() / count]; };
+  return timed;
+}
+
+namespace {
+
+/// 0 where the text is not a whole number.
+uint64_t wholeNumber(const char* begin, const char* end) {
+  uint64_t number = 0;
+  const auto [stop, error] = std::from_chars(begin, end, number);
+  return error == std::errc{} && stop == end ? number : 0;
+}
+
+}  // namespace
+
+std::vector<uint64_t> FramePart::of(uint64_t frames) const {
+  std::vector<uint64_t> numbers;
+  for (uint64_t number = index; number < frames; number += count) numbers.push_back(number);
+  return numbers;
+}
+
+FramePart parsePart(const std::string& text) {
+  const size_t slash = text.find('/');
+  uint64_t part = 0, parts = 0;
+  if (slash != std::string::npos) {
+    part = wholeNumber(text.data(), text.data() + slash);
+    parts = wholeNumber(text.data() + slash + 1, text.data() + text.size());
+  }
+  if (part < 1 || part > parts || parts > kMaxFrames)
+    throw UsageError("--part {}: expected i/n with i from 1 to n and n up to {}, such as 3/8", text,
+                     kMaxFrames);
+  return {part - 1, parts};
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,115 @@
+// The frames of a command: the camera and the time step of each, and which of them one process draws. Shared
+// by the subcommands and the Python package.
+//
+//   CameraArguments   --view or --position, --orbit, --path   --> CameraMotion --+
+//   StepArguments     --step, --time, --steps, --interpolate  --> chosenSteps() -+-> inTime(): MotionInTime
+//   FramePart         --part, or ranks                        --> the frames that this process draws
+//
+// The arguments hold values as given; they are checked before a cache is opened. Motions keep no state: any
+// thread may ask for any frame.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/camera/camera.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/series.h"
+
+namespace curvisplat {
+
+inline constexpr unsigned kMaxFrames = 100'000;  // limit of --frames
+inline constexpr unsigned kDefaultFrames = 90;   // of an orbit or a path
+
+/// Options that choose cameras, as given; checked and parsed later.
+struct CameraArguments {
+  std::optional<std::string> view, position, focal_point, view_up, parallel_scale, view_angle, orbit;
+  std::optional<uint64_t> frames;
+  std::filesystem::path path;
+
+  bool moves() const { return orbit || !path.empty(); }
+  uint64_t frameCount() const { return frames.value_or(moves() ? kDefaultFrames : 1); }
+};
+
+/// Throws UsageError if options contradict each other; needs no cache.
+void checkCameraArguments(const CameraArguments& arguments);
+
+/// One camera per frame.
+struct CameraMotion {
+  uint64_t frames = 1;
+  std::function<Camera(uint64_t frame)> camera;
+  /// The series' time of a frame, of a path whose key frames have times; empty otherwise.
+  std::function<double(uint64_t frame)> series_time;
+};
+
+/// Requires that checkCameraArguments() accepted the arguments. [lower, upper] is the data's bounding box
+/// after --scale. An orbit of 360 degrees is a loop: its last frame is one step before the first. A path's
+/// last frame is at its last key frame. Throws UsageError, or Error if the path file is invalid.
+CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
+                                const glm::dvec3& upper, ImageSize size);
+
+/// Options that choose time steps of a cache, as given; checked and parsed later.
+struct StepArguments {
+  std::optional<uint64_t> step;
+  std::optional<std::string> time, steps;
+  bool interpolates = false;
+
+  bool severalSteps() const { return steps.has_value(); }
+};
+
+/// Adds --step and --time under the heading `group`.
+void addStepOptions(CLI::App& command, StepArguments& arguments, const std::string& group);
+/// Adds --steps, whose steps are drawn as frames.
+void addStepsOption(CLI::App& command, StepArguments& arguments, const std::string& group);
+/// Adds --interpolate.
+void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std::string& group);
+
+/// The steps to draw, in order: one, unless --steps was given. Throws UsageError if options contradict each
+/// other or the cache has no such step.
+std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const CacheReader& cache);
+
+/// The cache at the first of its chosen steps. Throws Error as CacheReader.
+CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments);
+
+/// Checks the options of a command that draws series, in place of checkCameraArguments(). Also throws
+/// UsageError if --interpolate has nothing to interpolate, or --frames nothing to spread.
+void checkMotionArguments(const CameraArguments& camera, const StepArguments& steps);
+
+/// A camera and a time per frame.
+struct MotionInTime {
+  uint64_t frames = 1;
+  std::function<Camera(uint64_t frame)> camera;
+  std::function<StepPosition(uint64_t frame)> position;
+};
+
+/// The arguments with a frame for each of several time steps, unless --frames says how many.
+CameraArguments framesOf(const CameraArguments& arguments, const std::vector<StepPosition>& steps);
+
+/// The motion through a series, which must outlive it. A path whose key frames have times follows these.
+/// Otherwise the chosen steps are spread evenly over the frames, or with --interpolate the time from the
+/// first to the last of them. A camera that does not move gets a frame for each step, or as many as --frames
+/// says. Throws UsageError if a path's times contradict options.
+MotionInTime inTime(const CameraMotion& motion, const Series& series, const StepArguments& arguments,
+                    const std::vector<StepPosition>& chosen, std::optional<uint64_t> frames);
+
+/// The frames that one of `count` processes draws. They are dealt out in turn, since neighbours take about
+/// the same time.
+struct FramePart {
+  uint64_t index = 0;  // from 0
+  uint64_t count = 1;
+
+  /// The frames index, index + count, index + 2 count, ... of 0 .. frames - 1.
+  std::vector<uint64_t> of(uint64_t frames) const;
+};
+
+/// Parses "i/n" with i from 1 to n. Throws UsageError.
+FramePart parsePart(const std::string& text);
+
+}  // namespace curvisplat

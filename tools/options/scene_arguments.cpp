@@ -1,0 +1,385 @@
+#include "tools/options/scene_arguments.h"
+
+#include <CLI/CLI.hpp>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "preprocess/formats/vtk/vtk_surface.h"
+#include "render/mesh/triangle_mesh.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/text.h"
+#include "tools/options/grid_surfaces.h"
+#include "tools/options/option_parsers.h"
+
+namespace curvisplat {
+namespace {
+
+std::vector<ClipPlane> parseSlices(const std::vector<std::string>& texts) {
+  if (texts.size() > kMaxSlices)
+    throw UsageError("--slice: given {} times; a picture has at most {} slices", texts.size(), kMaxSlices);
+  std::vector<ClipPlane> planes;
+  for (const std::string& text : texts) {
+    const auto n = parseNumbers("--slice", text, "px,py,pz,nx,ny,nz");
+    const ClipPlane plane{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+    if (!isUsable(plane))
+      throw UsageError("--slice {}: the normal nx,ny,nz has no direction; give one that is not 0,0,0", text);
+    planes.push_back(plane);
+  }
+  return planes;
+}
+
+/// A number, or "function", perhaps with a factor: function, 0.5 or function*0.5.
+SheetOpacity parseSheetOpacity(const std::string& option, const std::string& text) {
+  constexpr std::string_view kFunction = "function";
+  SheetOpacity opacity;
+  opacity.by_function = text.starts_with(kFunction);
+  std::string factor = opacity.by_function ? text.substr(kFunction.size()) : text;
+  if (opacity.by_function && factor.empty()) return opacity;
+  if (opacity.by_function && factor.front() == '*') factor.erase(0, 1);
+  opacity.factor = parseNumber(option, factor);
+  if (!(opacity.factor > 0 && opacity.factor <= 1))
+    throw UsageError("{} {}: expected a number above 0 and at most 1, or function, or function*NUMBER",
+                     option, text);
+  return opacity;
+}
+
+/// Of surface number n.
+SheetOpacity surfaceOpacity(const SurfaceArguments& arguments, size_t n) {
+  const auto& texts = arguments.surface_opacities;
+  return texts.empty() ? SheetOpacity()
+                       : parseSheetOpacity("--surface-opacity", texts.size() == 1 ? texts[0] : texts.at(n));
+}
+
+void checkSurfaceOpacities(const SurfaceArguments& arguments, bool has_opacities) {
+  const auto& texts = arguments.surface_opacities;
+  for (const std::string& text : texts)
+    if (parseSheetOpacity("--surface-opacity", text).by_function && arguments.surface_by.empty() &&
+        !has_opacities)
+      throw UsageError("--surface-opacity {}: needs the scalar of the function; add --surface-by NAME", text);
+  if (texts.size() > 1 && texts.size() != arguments.surfaces.size())
+    throw UsageError(
+        "--surface-opacity: given {} times for {} surfaces; give it once, or once for each --surface",
+        texts.size(), arguments.surfaces.size());
+  if (!texts.empty() && arguments.surfaces.empty())
+    throw UsageError("--surface-opacity needs a surface: --surface FILE");
+  for (size_t n = 0; n < arguments.surfaces.size(); ++n)
+    if (surfaceOpacity(arguments, n).by_function && isSurfaceFile(arguments.surfaces[n]))
+      throw UsageError(
+          "--surface-opacity: {} is a file and has no scalar for a function; give a number for it, and an "
+          "opacity for "
+          "each --surface in their order",
+          arguments.surfaces[n]);
+}
+
+std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
+  std::vector<double> values;
+  for (const std::string& text : texts)
+    for (size_t begin = 0; begin <= text.size();) {
+      const size_t end = std::min(text.find(',', begin), text.size());
+      values.push_back(parseNumber("--iso", text.substr(begin, end - begin)));
+      begin = end + 1;
+    }
+  return values;
+}
+
+glm::vec3 parseColour(const std::string& text) {
+  if (text == "transparent")
+    throw UsageError("--surface-colour transparent: give #rrggbb, and --surface-opacity");
+  return glm::vec3(parseBackground("--surface-colour", text));
+}
+
+TriangleMesh meshFromFile(const std::filesystem::path& path) {
+  if (!isVtp(path)) return readMeshFile(path);
+  VtkSurface surface = readVtkSurface(path);
+  return meshOf({std::move(surface.points), std::move(surface.triangles)});
+}
+
+void requireIsovalues(const SurfaceScene& scene, const CacheReader& cache, const SceneScalars& scalars) {
+  const auto& variable = scalars.iso_of_colours ? scalars.colours : scalars.opacities;
+  if (!variable) return;
+  const VariableInfo& info = cache.manifest().variables[*variable];
+  for (const double value : scene.isovalues)
+    if (!(value >= info.min && value <= info.max))
+      throw Error("--iso {}: no isosurface: the values of {} go from {:.6g} to {:.6g}", value, info.name,
+                  info.min, info.max);
+}
+
+}  // namespace
+
+void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std::string& group) {
+  command
+      .add_option(
+          "--surface", arguments.surfaces,
+          "Opaque surface in the volume, lit: faces of the grid (imin, imax, ... kmax, \"block 3:k=min\", "
+          "all, "
+          "walls, or a boundary condition's name; several with commas), or an STL, PLY, OBJ or VTP file in "
+          "coordinates before --scale; repeatable")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
+      .add_option("--surface-colour", arguments.colours,
+                  "Colour #rrggbb of the surfaces, or one for each in their order (default #b3b3b3)")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
+      .add_option("--surface-by", arguments.surface_by,
+                  "Colour the grid's faces by this scalar, by the transfer function if it is the scalar "
+                  "drawn, otherwise by colours chosen from its data")
+      ->group(group);
+  command
+      .add_option(
+          "--surface-opacity", arguments.surface_opacities,
+          "Opacity of the surfaces, above 0 and at most 1, or one for each in their order (default "
+          "1); function: by the transfer function of the --surface-by scalar, or with --opacity-by that of "
+          "its scalar; function*NUMBER: NUMBER times that")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
+      .add_option("--slice", arguments.slices,
+                  "Slice px,py,pz,nx,ny,nz through the point p, at right angles to n, with the transfer "
+                  "function's colours. In coordinates before --scale; repeatable, up to 8")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
+      .add_option("--slice-opacity", arguments.slice_opacity,
+                  "Opacity of the slices, above 0 and at most 1; function: by the transfer function (that of "
+                  "--opacity-by, if given); function*NUMBER: NUMBER times that")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option(
+          "--iso", arguments.isovalues,
+          "Isosurfaces of the scalar at VALUE,VALUE,..., lit, in the transfer function's colours; repeatable")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
+      .add_option(
+          "--iso-opacity", arguments.iso_opacity,
+          "Opacity of the isosurfaces, above 0 and at most 1; function: by the transfer function (that of "
+          "--opacity-by, if given); function*NUMBER: NUMBER times that")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--volume", arguments.volume,
+                  "Draw the volume: on, or off for surfaces, slices and isosurfaces alone")
+      ->capture_default_str()
+      ->group(group);
+}
+
+void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities) {
+  parseSlices(arguments.slices);
+  parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
+  checkSurfaceOpacities(arguments, has_opacities);
+  for (const std::string& colour : arguments.colours) parseColour(colour);
+  if (arguments.colours.size() > 1 && arguments.colours.size() != arguments.surfaces.size())
+    throw UsageError(
+        "--surface-colour: given {} times for {} surfaces; give it once, or once for each --surface",
+        arguments.colours.size(), arguments.surfaces.size());
+  if (!arguments.colours.empty() && arguments.surfaces.empty())
+    throw UsageError("--surface-colour needs a surface: --surface FILE");
+  if (!arguments.surface_by.empty() &&
+      std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile))
+    throw UsageError("--surface-by {} needs faces of the grid, such as --surface kmin", arguments.surface_by);
+  requireChoice("--volume", arguments.volume, {"on", "off"});
+  parseIsovalues(arguments.isovalues);
+  const SheetOpacity of_isosurfaces = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
+  if (!of_isosurfaces.opaque() && arguments.isovalues.empty())
+    throw UsageError("--iso-opacity needs an isosurface: --iso VALUE");
+  if (arguments.volume == "off" && arguments.surfaces.empty() && arguments.slices.empty() &&
+      arguments.isovalues.empty())
+    throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface or an --iso");
+}
+
+bool isVtp(const std::filesystem::path& path) {
+  return extensionOf(path) == ".vtp";
+}
+
+bool isSurfaceFile(const std::string& text) {
+  std::error_code ignored;
+  if (std::filesystem::exists(text, ignored)) return true;
+  const std::string extension = extensionOf(text);
+  return text.find('/') != std::string::npos || extension == ".stl" || extension == ".ply" ||
+         extension == ".obj" || extension == ".vtp";
+}
+
+bool hasFaces(const SurfaceArguments& arguments) {
+  return !std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile);
+}
+
+std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                 const std::vector<GridSurface>& first) {
+  const bool moves = cache.series().geometries() > 1;
+  const bool has_values = !arguments.surface_by.empty() && cache.series().steps.size() > 1;
+  const bool has_opacities = std::any_of(
+      first.begin(), first.end(), [](const GridSurface& surface) { return !surface.opacity_name.empty(); });
+  if (first.empty() || (!moves && !has_values && !has_opacities)) return first;
+  std::vector<GridSurface> surfaces = first;
+  const auto faces = facesWith(arguments.surface_by, cache);
+  size_t of_grid = 0;
+  for (const std::string& text : arguments.surfaces) {
+    if (isSurfaceFile(text)) continue;
+    GridSurface& surface = surfaces.at(of_grid++);
+    surface.faces = faces;
+    surface.parts = gridSurfaceNamed(text, cache, faces).parts;
+    if (surface.scalar) surface.scalar = scalarOfFaces(*faces, arguments.surface_by, cache);
+    if (!surface.opacity_name.empty()) takeOpacities(surface, surface.opacity_name, cache);
+  }
+  return surfaces;
+}
+
+std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            const std::shared_ptr<const SurfaceScene>& first) {
+  if (!first || first->grid_surfaces.empty()) return first;
+  auto scene = std::make_shared<SurfaceScene>(*first);
+  scene->grid_surfaces = facesAt(arguments, cache, first->grid_surfaces);
+  return scene;
+}
+
+std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            const SceneScalars& scalars) {
+  if (!arguments.given()) return nullptr;
+  auto scene = std::make_shared<SurfaceScene>();
+  const auto faces = hasFaces(arguments) ? facesWith(arguments.surface_by, cache) : nullptr;
+  for (size_t n = 0; n < arguments.surfaces.size(); ++n) {
+    const glm::vec3 colour =
+        arguments.colours.empty()
+            ? Surface().colour
+            : parseColour(arguments.colours.size() == 1 ? arguments.colours[0] : arguments.colours.at(n));
+    if (isSurfaceFile(arguments.surfaces[n])) {
+      Surface& surface = scene->surfaces.emplace_back();
+      surface.mesh = std::make_shared<TriangleMesh>(meshFromFile(arguments.surfaces[n]));
+      surface.colour = colour;
+      surface.opacity = surfaceOpacity(arguments, n);
+      continue;
+    }
+    GridSurface& surface =
+        scene->grid_surfaces.emplace_back(gridSurfaceNamed(arguments.surfaces[n], cache, faces));
+    surface.colour = colour;
+    surface.opacity = surfaceOpacity(arguments, n);
+    if (!arguments.surface_by.empty()) colourByScalar(surface, arguments.surface_by, cache, scalars.colours);
+    if (surface.opacity.by_function && scalars.opacity_by && scalars.areTwo())
+      takeOpacities(surface, cache.manifest().variables[*scalars.opacities].name, cache);
+  }
+  scene->slices = parseSlices(arguments.slices);
+  const SheetOpacity of_slices = parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
+  scene->slice_opacity = of_slices.factor;
+  scene->slices_by_function = of_slices.by_function;
+  scene->isovalues = parseIsovalues(arguments.isovalues);
+  scene->iso_opacity = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
+  scene->iso_of_colours = scalars.iso_of_colours;
+  scene->volume = arguments.volume == "on";
+  requireIsovalues(*scene, cache, scalars);
+  return scene;
+}
+
+std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const glm::dvec3& lower,
+                                        const glm::dvec3& upper) {
+  std::vector<std::string> misses;
+  const std::vector<ClipPlane> slices = parseSlices(arguments.slices);
+  for (size_t n = 0; n < slices.size(); ++n) {
+    const double middle = glm::dot(slices[n].normal, 0.5 * (lower + upper) - slices[n].point);
+    const double reach = glm::dot(glm::abs(slices[n].normal), 0.5 * (upper - lower));
+    if (std::abs(middle) > reach)
+      misses.push_back(
+          fmt::format("--slice {} misses the data, which lies in x {:.6g} to {:.6g}, y {:.6g} to {:.6g}, z "
+                      "{:.6g} to {:.6g}",
+                      arguments.slices[n], lower.x, upper.x, lower.y, upper.y, lower.z, upper.z));
+  }
+  return misses;
+}
+
+void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group) {
+  command
+      .add_flag("--scalar-bar", arguments.shown.scalar_bar,
+                "Draw scalar bars beside the data, one for each function that is shown")
+      ->group(group);
+  command
+      .add_option("--scalar-bar-title", arguments.bar_titles,
+                  "Title of the scalar bar (default: name and unit of the scalar); repeatable, for the bars "
+                  "from left to right; implies --scalar-bar")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command.add_flag("--axes", arguments.shown.axes, "Draw the directions of x, y and z")->group(group);
+  command
+      .add_flag("--axes-grid", arguments.shown.axes_grid,
+                "Draw a grid behind the data, with coordinates (before --scale) along its edges")
+      ->group(group);
+  command
+      .add_option(
+          "--axes-titles", arguments.axis_titles,
+          "Titles of the axes grid, X,Y,Z, such as \"x [m],y [m],depth [m]\" (default x,y,z); implies "
+          "--axes-grid")
+      ->group(group);
+  command.add_flag("--outline", arguments.shown.outline, "Draw the bounding box of the data")->group(group);
+}
+
+void checkAnnotationArguments(const AnnotationArguments& arguments) {
+  axisTitles(arguments);
+}
+
+std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments) {
+  std::array<std::string, 3> titles{"x", "y", "z"};
+  if (!arguments.axis_titles) return titles;
+  const std::string& text = *arguments.axis_titles;
+  if (std::count(text.begin(), text.end(), ',') != 2)
+    throw UsageError("--axes-titles {}: expected three titles, X,Y,Z", text);
+  size_t begin = 0;
+  for (std::string& title : titles) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    title = text.substr(begin, end - begin);
+    begin = end + 1;
+  }
+  return titles;
+}
+
+ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const Annotations& annotations) {
+  constexpr double kAxesRoom = 0.17;  // of the box
+  const glm::dvec3 lower = manifest.lower * scale, upper = manifest.upper * scale;
+  const glm::dvec3 room = (annotations.axes_grid ? kAxesRoom : 0.0) * (upper - lower);
+  return {lower - room, upper + room};
+}
+
+std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, const DrawnScalars& scalars,
+                                          const Manifest& manifest, const SurfaceScene* scene,
+                                          const std::string& surface_by) {
+  std::vector<ShownFunction> shown;
+  const DrawnScalar& coloured = scalars.colour ? *scalars.colour : scalars.opacity;
+  const auto titleOf = [&](size_t variable) {
+    const VariableInfo& info = manifest.variables[variable];
+    return scalarTitle(info.name, info.unit);
+  };
+  shown.push_back({&coloured.function, titleOf(coloured.variable)});
+  const bool volume = !scene || scene->volume;
+  if (scalars.colour && volume)
+    shown.push_back({&scalars.opacity.function, titleOf(scalars.opacity.variable) + " (opacity)", true});
+  if (scene)
+    for (const GridSurface& surface : scene->grid_surfaces) {
+      if (!surface.function) continue;
+      const auto info = std::find_if(manifest.variables.begin(), manifest.variables.end(),
+                                     [&](const VariableInfo& of) { return of.name == surface_by; });
+      shown.push_back({surface.function.get(),
+                       info == manifest.variables.end() ? surface_by : scalarTitle(info->name, info->unit)});
+      break;
+    }
+  if (arguments.bar_titles.size() > shown.size())
+    throw UsageError("--scalar-bar-title: given {} times; the picture shows {}", arguments.bar_titles.size(),
+                     countText(shown.size(), "function"));
+  for (size_t n = 0; n < arguments.bar_titles.size(); ++n) shown[n].title = arguments.bar_titles[n];
+  return shown;
+}
+
+}  // namespace curvisplat

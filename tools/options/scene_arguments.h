@@ -1,0 +1,113 @@
+// Options of what a picture shows beside the volume: surfaces, slices and isosurfaces in it
+// (SurfaceArguments), and scalar bars, axes, outline and the axes grid over it (AnnotationArguments). Shared
+// by the subcommands that draw.
+//
+// Arguments hold values as given and are checked without a cache; sceneOf(), facesAt() and sceneAt() read
+// surfaces and the cache's faces, and can take long. The functions keep no state: any thread may call them.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <glm/vec3.hpp>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/annotate/annotations.h"
+#include "render/frame/frame_options.h"
+#include "render/surface/surface_scene.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/manifest.h"
+
+namespace curvisplat {
+
+/// Options of surfaces, slices and isosurfaces, as given; checked and parsed later.
+struct SurfaceArguments {
+  std::vector<std::string> surfaces, colours, slices;
+  std::vector<std::string> surface_opacities;
+  std::string slice_opacity = "1", volume = "on";
+  std::string surface_by;
+  std::vector<std::string> isovalues;
+  std::string iso_opacity = "1";
+
+  bool given() const { return !surfaces.empty() || !slices.empty() || !isovalues.empty() || volume != "on"; }
+};
+
+/// Adds --surface, --surface-colour, --surface-by, --slice, --slice-opacity and --volume under the heading
+/// `group`.
+void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std::string& group);
+
+/// Throws UsageError if options are invalid or contradict each other; reads no file. `has_opacities`: the
+/// picture has a scalar of its opacities, which surfaces may have as well.
+void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities = false);
+
+/// Whether it is a .vtp file, by its extension.
+bool isVtp(const std::filesystem::path& path);
+
+/// Whether --surface names a file: one that exists, or one by its extension.
+bool isSurfaceFile(const std::string& text);
+
+/// Whether any of the surfaces is a face of the grid.
+bool hasFaces(const SurfaceArguments& arguments);
+
+/// The variables of a picture.
+struct SceneScalars {
+  std::optional<size_t> colours, opacities;  // none: of a window, which may show any
+  bool iso_of_colours = false;               // of two: isosurfaces are those of the colours
+  bool opacity_by = false;  // whether the opacities are those of --opacity-by, also for faces
+
+  bool areTwo() const { return colours && opacities && colours != opacities; }
+};
+
+/// Reads the surfaces, and finds those of the cache's grid. Null where none of the options is given. Throws
+/// Error for a file that is not a surface, and for a face that the cache does not have.
+std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            const SceneScalars& scalars);
+
+/// The grid's faces at another step of the cache: those of its geometry, with their values there, in the
+/// colours of `first`. Throws Error as sceneOf().
+std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                 const std::vector<GridSurface>& first);
+/// The scene with the faces of facesAt(); null if `first` is null.
+std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            const std::shared_ptr<const SurfaceScene>& first);
+
+/// One line for each slice that does not meet the data's box.
+std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const glm::dvec3& lower,
+                                        const glm::dvec3& upper);
+
+/// Options of what is drawn over a picture, as given; checked and parsed later.
+struct AnnotationArguments {
+  Annotations shown;
+  std::vector<std::string> bar_titles;
+  std::optional<std::string> axis_titles;
+};
+
+/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles and --outline under the heading
+/// `group`.
+void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group);
+
+/// Throws UsageError if options contradict each other.
+void checkAnnotationArguments(const AnnotationArguments& arguments);
+
+/// The titles of the axes grid: "x", "y" and "z" unless --axes-titles says otherwise.
+std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments);
+
+/// The box that a picture has to show, after `scale`: the data's, and space for the coordinates of the axes
+/// grid around it.
+struct ShownBox {
+  glm::dvec3 lower{0.0}, upper{0.0};
+};
+ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const Annotations& annotations);
+
+/// The functions that a picture shows, each once: of its colours, of its opacities if these are another
+/// scalar's, and of surfaces that are coloured by a scalar of their own, `surface_by`. They are borrowed
+/// from `scalars` and `scene`, which may be null. Throws UsageError for more titles than that.
+std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, const DrawnScalars& scalars,
+                                          const Manifest& manifest, const SurfaceScene* scene,
+                                          const std::string& surface_by);
+
+}  // namespace curvisplat

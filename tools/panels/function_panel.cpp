@@ -1,0 +1,451 @@
+#include "tools/panels/function_panel.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
+
+#include "render/colour/transfer_function.h"
+#include "stream/base/error.h"
+#include "tools/panels/labels.h"
+#include "tools/view/edited_function.h"
+#include "tools/window/widgets.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kBins = 128;
+constexpr float kGrabRadius = 0.6f;  // around a point, in lines of text
+constexpr float kPointRadius = 0.38f;
+constexpr float kCurveLines = 9;  // height in lines of text
+
+ImU32 toImGui(const glm::dvec3& rgb) {
+  return ImGui::ColorConvertFloat4ToU32(
+      {static_cast<float>(rgb.x), static_cast<float>(rgb.y), static_cast<float>(rgb.z), 1});
+}
+
+// Most opacities are small, so the curve shows the square root of the opacity.
+float heightOf(double opacity) {
+  return static_cast<float>(std::sqrt(opacity));
+}
+double opacityAt(float height) {
+  return static_cast<double>(height) * static_cast<double>(height);
+}
+
+/// The definitions of the colour maps, each made once.
+const TransferFunctionDefinition& definitionOf(const std::string& map) {
+  static std::map<std::string, TransferFunctionDefinition> made;
+  const auto found = made.find(map);
+  return found != made.end() ? found->second : made.emplace(map, presetDefinition(map)).first->second;
+}
+
+/// The rectangle of the curve.
+struct Canvas {
+  ImVec2 lower, size;  // upper left corner
+
+  ImVec2 at(double x, float height) const {
+    return {lower.x + static_cast<float>(x) * size.x, lower.y + (1 - height) * size.y};
+  }
+  double xOf(const ImVec2& mouse) const { return std::clamp((mouse.x - lower.x) / size.x, 0.0f, 1.0f); }
+  float heightAt(const ImVec2& mouse) const {
+    return std::clamp(1 - (mouse.y - lower.y) / size.y, 0.0f, 1.0f);
+  }
+};
+
+std::optional<size_t> pointNear(const EditedFunction& function, const Canvas& canvas, const ImVec2& mouse) {
+  std::optional<size_t> nearest;
+  float least = kGrabRadius * ImGui::GetFontSize();
+  for (size_t n = 0; n < function.points().size(); ++n) {
+    const ImVec2 at = canvas.at(function.points()[n].x, heightOf(function.points()[n].opacity));
+    const float distance = std::hypot(at.x - mouse.x, at.y - mouse.y);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = n;
+  }
+  return nearest;
+}
+
+void paintCurve(const EditedFunction& function, const std::vector<double>& histogram, const Canvas& canvas) {
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const ImVec2 end(canvas.lower.x + canvas.size.x, canvas.lower.y + canvas.size.y);
+  list->AddRectFilled(canvas.lower, end, IM_COL32(30, 30, 34, 255));
+  const double most = histogram.empty() ? 0 : *std::max_element(histogram.begin(), histogram.end());
+  for (size_t n = 0; most > 0 && n < histogram.size(); ++n) {
+    // Logarithmic over four decades, so that thin layers stay visible beside the far field.
+    const double part = std::clamp(1 + std::log10(std::max(histogram[n] / most, 1e-9)) / 4, 0.0, 1.0);
+    const double x = static_cast<double>(n) / static_cast<double>(histogram.size());
+    list->AddRectFilled(canvas.at(x, static_cast<float>(part)),
+                        canvas.at(x + 1.0 / static_cast<double>(histogram.size()), 0),
+                        IM_COL32(96, 104, 120, 255));
+  }
+  const float unit = ImGui::GetFontSize();
+  const OpacityCurve curve(function.points());
+  ImVec2 before = canvas.at(0, heightOf(curve.at(0)));
+  for (float x = 1; x <= canvas.size.x; ++x) {
+    const double part = x / canvas.size.x;
+    const ImVec2 now = canvas.at(part, heightOf(curve.at(part)));
+    list->AddLine(before, now, IM_COL32(250, 250, 250, 255), 0.11f * unit);
+    before = now;
+  }
+  for (const OpacityPoint& point : function.points()) {
+    const ImVec2 at = canvas.at(point.x, heightOf(point.opacity));
+    list->AddCircleFilled(at, kPointRadius * unit, toImGui(function.colourAt(point.x)));
+    list->AddCircle(at, kPointRadius * unit, IM_COL32(255, 255, 255, 255), 0, 0.08f * unit);
+  }
+}
+
+/// A strip of colours: `at` gives that of each part, 0..1.
+template <typename At>
+void paintStrip(const ImVec2& lower, const ImVec2& size, const At& at) {
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  for (float x = 0; x < size.x; x += 2)
+    list->AddRectFilled({lower.x + x, lower.y},
+                        {std::min(lower.x + x + 2, lower.x + size.x), lower.y + size.y},
+                        toImGui(at(static_cast<double>(x / size.x))));
+}
+
+/// The width of curve, colours and numbers: half a point of the curve's end lies beside it.
+float availableWidth() {
+  return ImGui::GetContentRegionAvail().x - kPointRadius * ImGui::GetFontSize();
+}
+
+void paintColours(const EditedFunction& function) {
+  const ImVec2 size(availableWidth(), ImGui::GetTextLineHeight());
+  paintStrip(ImGui::GetCursorScreenPos(), size, [&](double x) { return function.colourAt(x); });
+  ImGui::Dummy(size);
+}
+
+/// Five scalars under the curve or the colours, each below its place.
+void paintNumbers(const EditedFunction& function) {
+  const ImVec2 lower = ImGui::GetCursorScreenPos();
+  const float width = availableWidth();
+  constexpr int kNumbers = 4;
+  const auto scalar = [&](int n) { return function.scalarAt(static_cast<double>(n) / kNumbers); };
+  // As many digits as tell neighbours apart: 0.999, 1.001 and not 0.999, 1.
+  double closest = std::abs(scalar(1) - scalar(0)), largest = 0;
+  for (int n = 0; n <= kNumbers; ++n) {
+    largest = std::max(largest, std::abs(scalar(n)));
+    if (n > 0) closest = std::min(closest, std::abs(scalar(n) - scalar(n - 1)));
+  }
+  const double ratio = closest > 0 ? std::min(largest / closest, 1e6) : 1;
+  const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(ratio))) + 1, 3, 5);
+  for (int n = 0; n <= kNumbers; ++n) {
+    const float part = static_cast<float>(n) / kNumbers;
+    const std::string text = fmt::format("{:.{}g}", scalar(n), digits);
+    const float own = ImGui::CalcTextSize(text.c_str()).x;
+    ImGui::GetWindowDrawList()->AddText({lower.x + part * (width - own), lower.y},
+                                        ImGui::GetColorU32(ImGuiCol_Text), text.c_str());
+  }
+  ImGui::Dummy({width, ImGui::GetTextLineHeight()});
+}
+
+constexpr double kHeights[] = {0.05, 0.25, 0.5, 1};  // opacities at the left of the curve
+
+/// Of the numbers beside the curve and of half a point at its end.
+float widthOfHeights() {
+  float width = 0;
+  for (const double opacity : kHeights)
+    width = std::max(width, ImGui::CalcTextSize(fmt::format("{:g}", opacity).c_str()).x);
+  return width + 2 * kPointRadius * ImGui::GetFontSize();
+}
+
+/// Each beside its height, where no point of the curve lies over it.
+void paintHeights(const Canvas& canvas) {
+  const float down = 0.5f * ImGui::GetFontSize(), away = 1.5f * kPointRadius * ImGui::GetFontSize();
+  for (const double opacity : kHeights) {
+    const ImVec2 at = canvas.at(0, heightOf(opacity));
+    ImDrawList* const list = ImGui::GetWindowDrawList();
+    list->AddLine(at, {at.x + canvas.size.x, at.y}, IM_COL32(255, 255, 255, 28));
+    const std::string text = fmt::format("{:g}", opacity);
+    const float y = std::clamp(at.y - down, canvas.lower.y, canvas.lower.y + canvas.size.y - 2 * down);
+    list->AddText({at.x - away - ImGui::CalcTextSize(text.c_str()).x, y},
+                  ImGui::GetColorU32(ImGuiCol_Text, 0.7f), text.c_str());
+  }
+}
+
+}  // namespace
+
+std::string FunctionPanel::updateHistogram(const EditedFunction& function, size_t variable) {
+  std::string failure;
+  if (pending_histogram_.valid()) {
+    if (pending_histogram_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return failure;
+    try {
+      histogram_ = pending_histogram_.get();
+    } catch (const Error& error) {
+      failure = error.what();
+    }
+  }
+  const HistogramOf of{variable, function.range(), function.logScale(), function.asinhScale()};
+  if (histogram_of_ == of) return failure;
+  histogram_of_ = of;
+  pending_histogram_ = std::async(std::launch::async, [&cache = cache_, variable, function] {
+    return histogramOf(cache, variable, function, kBins);
+  });
+  return failure;
+}
+
+FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t variable, Shows shows,
+                                          uint64_t step) {
+  Result result;
+  ImGui::PushID(this);
+  result.error = updateHistogram(function, variable);
+  const float left = shows == Shows::kColours ? 0 : widthOfHeights();
+  if (left > 0) ImGui::Indent(left);
+  if (shows != Shows::kColours) result.changed |= drawCurve(function);
+  if (shows != Shows::kOpacities) paintColours(function);
+  paintNumbers(function);
+  if (left > 0) ImGui::Unindent(left);
+  if (shows != Shows::kOpacities) result.changed |= drawMaps(function, result);
+  drawRange(function, variable, step, result);
+  if (shows != Shows::kColours) result.changed |= drawUnit(function);
+  if (shows != Shows::kColours && ImGui::TreeNode("opacity points")) {
+    nameWidget("opacity points");
+    result.changed |= drawPoints(function);
+    ImGui::TreePop();
+  } else if (shows != Shows::kColours) {
+    nameWidget("opacity points");
+  }
+  if (shows != Shows::kOpacities && ImGui::TreeNode("colour points")) {
+    nameWidget("colour points");
+    result.changed |= drawColours(function);
+    ImGui::TreePop();
+  } else if (shows != Shows::kOpacities) {
+    nameWidget("colour points");
+  }
+  if (shows != Shows::kOpacities) {
+    result.load = ImGui::Button("load from file...");
+    nameWidget("load");
+    hint("colours and opacities from a ParaView preset, .json");
+    ImGui::SameLine();
+    result.save = ImGui::Button("save to file...");
+    nameWidget("save");
+    hint("as a ParaView preset, which render --tf draws with");
+  }
+  result.dragging = dragged_.has_value();
+  ImGui::PopID();
+  return result;
+}
+
+bool FunctionPanel::drawCurve(EditedFunction& function) {
+  const Canvas canvas{ImGui::GetCursorScreenPos(),
+                      {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
+  ImGui::InvisibleButton("curve", canvas.size,
+                         ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  nameWidget("curve");
+  const ImVec2 mouse = ImGui::GetIO().MousePos;
+  const bool over = ImGui::IsItemHovered();
+  const std::optional<size_t> near = over ? pointNear(function, canvas, mouse) : std::nullopt;
+  bool changed = false;
+  if (over && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
+    if (!near) changed = true;
+    dragged_ = near ? *near : function.addPoint(canvas.xOf(mouse), opacityAt(canvas.heightAt(mouse)));
+  }
+  if (over && near && ImGui::IsMouseClicked(ImGuiMouseButton_Right)) {
+    function.removePoint(*near);
+    dragged_.reset();
+    changed = true;
+  }
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragged_.reset();
+  const bool mouse_moved = ImGui::GetIO().MouseDelta.x != 0 || ImGui::GetIO().MouseDelta.y != 0;
+  if (dragged_ && mouse_moved) {
+    function.movePoint(*dragged_, canvas.xOf(mouse), opacityAt(canvas.heightAt(mouse)));
+    changed = true;
+  }
+  paintCurve(function, histogram_, canvas);
+  paintHeights(canvas);
+  if (const auto shown = dragged_ ? dragged_ : near) {
+    const OpacityPoint& point = function.points()[*shown];
+    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove", function.scalarAt(point.x), point.opacity);
+  } else if (over) {
+    const double x = static_cast<double>(canvas.xOf(mouse));
+    const auto bin = static_cast<size_t>(x * static_cast<double>(histogram_.size()));
+    const double share = histogram_.empty() ? 0 : histogram_[std::min(bin, histogram_.size() - 1)];
+    ImGui::SetTooltip("%.6g: opacity %.4g, %.3g %% of the volume\nclick to add a point", function.scalarAt(x),
+                      OpacityCurve(function.points()).at(x), 100 * share);
+  }
+  return changed;
+}
+
+bool FunctionPanel::drawPoints(EditedFunction& function) {
+  bool changed = false;
+  size_t removed = 0;
+  const float half = 0.38f * ImGui::GetContentRegionAvail().x;
+  for (size_t n = 0; n < function.points().size(); ++n) {
+    const OpacityPoint point = function.points()[n];
+    const bool end = n == 0 || n + 1 == function.points().size();
+    ImGui::PushID(static_cast<int>(n));
+    const double scalar = function.scalarAt(point.x), opacity = point.opacity;
+    ImGui::SetNextItemWidth(half);
+    ImGui::BeginDisabled(end);
+    const auto typed_scalar = typed_.draw("##x", {&scalar, 1}, "%.5g");
+    nameWidget(fmt::format("point {} scalar", n + 1));
+    ImGui::EndDisabled();
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(half);
+    const auto typed_opacity = typed_.draw("##opacity", {&opacity, 1}, "%.4g");
+    nameWidget(fmt::format("point {} opacity", n + 1));
+    if (typed_scalar || typed_opacity) {
+      function.movePoint(n, typed_scalar && !end ? function.coordinateOf(typed_scalar->front()) : point.x,
+                         typed_opacity ? typed_opacity->front() : opacity);
+      changed = true;
+    }
+    ImGui::SameLine();
+    ImGui::BeginDisabled(end);
+    if (ImGui::Button("x")) removed = n;
+    ImGui::EndDisabled();
+    ImGui::PopID();
+  }
+  if (removed == 0) return changed;
+  function.removePoint(removed);
+  return true;
+}
+
+bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
+  bool changed = false;
+  label("colours");
+  const std::string& map = function.map();
+  const std::string shown =
+      map.empty() ? "(edited)"
+                  : map + (function.isAutomatic() ? fmt::format(" ({})", EditedFunction::kAutomatic) : "");
+  const bool open = ImGui::BeginCombo("##colours", shown.c_str(), ImGuiComboFlags_HeightLarge);
+  if (!open) {
+    nameWidget("colours");
+    return false;
+  }
+  if (ImGui::Selectable("chosen from the data")) result.automatic = true;
+  nameWidget("colours chosen from the data");
+  for (const auto& [category, title] : {std::pair(MapCategory::kSequential, "sequential"),
+                                        {MapCategory::kDiverging, "diverging"},
+                                        {MapCategory::kCyclic, "cyclic"}}) {
+    ImGui::TextDisabled("%s", title);
+    for (const PublishedMap& one : builtInMaps()) {
+      if (one.category != category) continue;
+      const std::string name(one.name);
+      const ImVec2 at = ImGui::GetCursorScreenPos();
+      const float swatch = 7 * ImGui::GetFontSize();
+      const bool chosen = ImGui::Selectable(("##" + name).c_str(), name == map);
+      nameWidget("colours " + name);
+      const TransferFunctionDefinition& preset = definitionOf(name);
+      const ColourMap colours(preset.colours, preset.colour_space);
+      paintStrip({at.x, at.y + 1}, {swatch, ImGui::GetTextLineHeight() - 2},
+                 [&](double x) { return colours.at(x); });
+      ImGui::GetWindowDrawList()->AddText({at.x + swatch + 8, at.y}, ImGui::GetColorU32(ImGuiCol_Text),
+                                          name.c_str());
+      if (!chosen) continue;
+      if (!function.isPreset())
+        function.setColours(name);  // keep the edited opacities
+      else
+        function =
+            EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
+      changed = true;
+    }
+  }
+  ImGui::EndCombo();
+  return changed;
+}
+
+bool FunctionPanel::drawColours(EditedFunction& function) {
+  constexpr size_t kMany = 12;
+  if (function.colours().size() > kMany) {
+    const bool thins = ImGui::Button("edit these colours");
+    nameWidget("edit these colours");
+    hint("nine points in place of the colour map");
+    if (thins) function.thinColours();
+    return thins;
+  }
+  bool changed = false;
+  size_t removed = 0;
+  for (size_t n = 0; n < function.colours().size(); ++n) {
+    const ColourPoint point = function.colours()[n];
+    const bool end = n == 0 || n + 1 == function.colours().size();
+    ImGui::PushID(static_cast<int>(n));
+    float rgb[3] = {static_cast<float>(point.rgb.x), static_cast<float>(point.rgb.y),
+                    static_cast<float>(point.rgb.z)};
+    if (ImGui::ColorEdit3("##colour", rgb, ImGuiColorEditFlags_NoInputs)) {
+      function.setColour(n, {double{rgb[0]}, double{rgb[1]}, double{rgb[2]}});
+      changed = true;
+    }
+    nameWidget(fmt::format("colour {}", n + 1));
+    ImGui::SameLine();
+    const double scalar = function.scalarAt(point.x);
+    ImGui::SetNextItemWidth(0.4f * ImGui::GetContentRegionAvail().x);
+    ImGui::BeginDisabled(end);
+    if (const auto typed = typed_.draw("##colour's x", {&scalar, 1}, "%.5g")) {
+      function.moveColour(n, function.coordinateOf(typed->front()));
+      changed = true;
+    }
+    ImGui::SameLine();
+    if (ImGui::Button("x")) removed = n;
+    ImGui::EndDisabled();
+    if (!end || n == 0) {
+      ImGui::SameLine();
+      if (ImGui::Button("+")) {
+        function.addColour(0.5 * (point.x + function.colours()[n + 1].x));
+        changed = true;
+      }
+      hint("a colour between this one and the next");
+    }
+    ImGui::PopID();
+  }
+  if (removed > 0) {
+    function.removeColour(removed);
+    changed = true;
+  }
+  return changed;
+}
+
+void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_t step, Result& result) {
+  const std::array ends{function.range().first, function.range().second};
+  const auto set = [&](double low, double high) {
+    if (function.setRange(low, high))
+      result.changed = true;
+    else
+      result.error = fmt::format("range {:.6g} to {:.6g}: expected a lower end below the upper one{}", low,
+                                 high, function.logScale() ? ", and above zero on a logarithmic scale" : "");
+  };
+  label("range");
+  if (const auto typed = typed_.draw("##range", ends, "%.6g")) set((*typed)[0], (*typed)[1]);
+  nameWidget("range");
+  bool log_scale = function.logScale();
+  if (option("log scale", log_scale)) {
+    if (function.setLogScale(log_scale))
+      result.changed = true;
+    else
+      result.error = fmt::format("log scale: the range begins at {:.6g}; expected above zero", ends[0]);
+  }
+  const VariableInfo& all = cache_.seriesManifest().variables[variable];
+  const std::vector<SeriesStep>& steps = cache_.series().steps;
+  ImGui::SameLine();
+  if (ImGui::Button("full range")) set(all.min, all.max);
+  nameWidget("full range");
+  ImGui::SameLine();
+  if (steps.size() > 1) {
+    const StepValues& of = steps[step].values[variable];
+    if (ImGui::Button("range of this step")) set(of.min, of.max);
+    nameWidget("range of this step");
+  }
+  const bool resets = ImGui::Button("reset points");
+  nameWidget("reset points");
+  hint("the colour map with its own opacities");
+  if (resets) {
+    const std::string name = function.map().empty() ? "viridis" : function.map();
+    function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
+    result.changed = true;
+  }
+}
+
+bool FunctionPanel::drawUnit(EditedFunction& function) {
+  const double unit = function.opacityUnit();
+  label("opacity unit");
+  const auto typed = typed_.draw("##opacity unit", {&unit, 1}, "%.4g");
+  if (typed) function.setOpacityUnit(typed->front());
+  nameWidget("opacity unit");
+  hint("the length over which the opacity accumulates: smaller is more opaque");
+  return typed.has_value();
+}
+
+}  // namespace curvisplat

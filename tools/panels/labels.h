@@ -1,0 +1,54 @@
+// What all panels share: PanelActions, into which they write what the user did during a frame, and widgets
+// with their labels before them, where they are read. For the window's thread, within a frame of Dear ImGui.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stream/cache/series.h"
+#include "tools/window/window_commands.h"
+
+namespace curvisplat {
+
+/// What the user did in the panels and menus during a frame.
+struct PanelActions {
+  bool changed = false;           // the picture must be drawn again
+  bool function_changed = false;  // implies `changed`
+  bool dragging = false;          // a control is being dragged: a coarse picture suffices
+  std::vector<Command> commands;
+  std::optional<StepPosition> time;                   // to go to
+  std::optional<bool> interpolates;                   // between steps
+  std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
+  std::optional<std::string> add_faces;               // of the grid, by name
+  std::optional<std::string> colour_faces;            // by a scalar; the empty name: each has its own colour
+  bool automatic_function = false;                    // colours and opacities chosen from the data
+  bool load_function = false, save_function = false;
+  std::optional<std::string> load_view, save_view, remove_view;  // by name
+  bool looks_for_scalars = false;         // for what the sources have and the cache lacks
+  std::optional<std::string> add_scalar;  // of those
+  std::string error;                      // of what the user asked for
+
+  void run(Command command) { commands.push_back(command); }
+};
+
+/// Writes a label, and makes the next widget fill the rest of the line; that widget's own label begins with ##.
+void label(const char* text);
+/// A button of a command, with its key. It is named as the command's label.
+void commandButton(Command command, PanelActions& actions, const char* text = nullptr);
+/// A checkbox of a command that switches something; `on` is how it is now. Named as the command's label.
+void commandOption(Command command, PanelActions& actions, const char* text, bool on);
+/// A checkbox; named by its label. Returns whether it changed.
+bool option(const char* text, bool& value);
+/// A heading that folds what is below. Named by its text. Returns whether it is unfolded.
+bool section(const char* text, bool open_at_first);
+/// A heading of a list, which is folded at first. It unfolds if the list has grown, by the menu or by a
+/// saved view, and is then scrolled to if it would lie below the window's end. `seen`: how many entries
+/// there were in the frame before; nullopt before the first frame.
+bool sectionOf(const char* text, std::optional<size_t>& seen, size_t number);
+/// Shows a line under the widget that the mouse is over, after a moment.
+void hint(const char* text);
+
+}  // namespace curvisplat

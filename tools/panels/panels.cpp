@@ -1,0 +1,326 @@
+#include "tools/panels/panels.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stream/base/calendar.h"
+#include "stream/base/progress.h"
+#include "tools/panels/labels.h"
+#include "tools/panels/picture_signs.h"
+#include "tools/window/widgets.h"
+
+namespace curvisplat {
+
+PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
+  PanelActions actions;
+  ImGui::SetNextWindowPos({static_cast<float>(facts.place.x), static_cast<float>(facts.place.y)});
+  ImGui::SetNextWindowSize({static_cast<float>(facts.place.width), static_cast<float>(facts.place.height)});
+  // The scroll bar is always there, so that widgets keep their width.
+  constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
+                                      ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoSavedSettings |
+                                      ImGuiWindowFlags_NoBringToFrontOnFocus |
+                                      ImGuiWindowFlags_AlwaysVerticalScrollbar;
+  ImGui::Begin("panels", nullptr, kFixed);
+  if (facts.playback && facts.playback->steps() > 1 && section("Time", true))
+    drawTime(actions, *facts.playback);
+  if (section("Scalar", true)) drawScalars(state, facts.further, actions);
+  if (section("Colours and opacities", true))
+    drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
+  actions.changed |= actions.function_changed;
+  if (section("Picture", true)) drawPicture(state, actions);
+  if (section("View", true)) drawView(state, actions, facts);
+  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
+  cuts_.draw(state, actions);
+  if (section("Markers", false)) drawMarkers(state, actions);
+  if (section("Detail and memory", false)) drawDetail(state, actions);
+  if (section("Statistics", false)) drawStatistics(state, facts.shown);
+  ImGui::End();
+  return actions;
+}
+
+void Panels::drawTime(PanelActions& actions, Playback& playback) {
+  const StepPosition at = playback.position();
+  const double time = cache_.series().timeAt(at);
+  label("step");
+  if (playback.interpolates()) {
+    double place = static_cast<double>(at.step) + at.part;
+    const double first = 0, last = static_cast<double>(playback.steps() - 1);
+    if (ImGui::SliderScalar("##step", ImGuiDataType_Double, &place, &first, &last, "%.2f")) {
+      const double whole = std::floor(std::clamp(place, first, last));
+      actions.time = StepPosition{static_cast<uint64_t>(whole), std::clamp(place, first, last) - whole};
+    }
+  } else {
+    int step = static_cast<int>(at.step);
+    if (ImGui::SliderInt("##step", &step, 0, static_cast<int>(playback.steps() - 1)))
+      actions.time = StepPosition{static_cast<uint64_t>(std::max(0, step))};
+  }
+  nameWidget("step");
+  actions.dragging |= ImGui::IsItemActive();
+  label("time");
+  const Manifest& series = cache_.seriesManifest();
+  const auto date = dateOf(time, {series.time_unit, series.calendar});
+  ImGui::Text("%g %s", time, series.time_unit.c_str());
+  if (date) label("date");
+  if (date) ImGui::TextUnformatted(date->c_str());
+  label("steps per second");
+  float speed = static_cast<float>(playback.stepsPerSecond());
+  if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f")) playback.setStepsPerSecond(speed);
+  commandButton(Command::kPlay, actions, playback.isPlaying() ? "Stop" : "Play");
+  ImGui::SameLine(8.5f * ImGui::GetFontSize());
+  bool loops = playback.loops();
+  if (option("loop", loops)) playback.setLoop(loops);
+  bool backwards = playback.isBackwards();
+  if (option("backwards", backwards)) playback.setBackwards(backwards);
+  bool interpolates = playback.interpolates();
+  if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
+  commandButton(Command::kSaveStepsMovie, actions, "save movie of all steps...");
+}
+
+namespace {
+
+/// What the sources have besides, at the end of the list of scalars.
+void drawFurther(const FurtherScalars& further, PanelActions& actions) {
+  if (further.from.empty()) {
+    if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());
+    if (!further.note.empty()) nameWidget("note " + further.note);
+    return;
+  }
+  actions.looks_for_scalars = true;
+  ImGui::Separator();
+  ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
+                            : further.is_busy  ? "one is being added"
+                                               : "more, added when chosen:");
+  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
+  ImGui::BeginDisabled(further.is_busy);
+  for (const SourceScalar& one : further.scalars) {
+    if (ImGui::Selectable(
+            fmt::format("{}{}", scalarTitle(one.name, one.unit), one.derived ? "  (computed)" : "").c_str()))
+      actions.add_scalar = one.name;
+    nameWidget("further scalar " + one.name);
+  }
+  ImGui::EndDisabled();
+}
+
+}  // namespace
+
+void Panels::drawScalars(const ViewState& state, const FurtherScalars* further, PanelActions& actions) {
+  const auto& variables = cache_.manifest().variables;
+  label("scalar");
+  if (ImGui::BeginCombo("##scalar", state.variable.c_str(), ImGuiComboFlags_HeightLargest)) {
+    for (const VariableInfo& one : variables) {
+      const bool chosen = one.name == state.variable;
+      const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen);
+      nameWidget("scalar " + one.name);
+      if (chooses) actions.scalar = one.name;
+    }
+    if (further) drawFurther(*further, actions);
+    ImGui::EndCombo();
+  } else {
+    nameWidget("scalar");
+  }
+  label("opacity by");
+  ImGui::BeginDisabled(variables.size() < 2);
+  constexpr const char* kSame = "the same scalar";
+  if (ImGui::BeginCombo("##opacity by", state.opacity_by ? state.opacity_by->variable.c_str() : kSame,
+                        ImGuiComboFlags_HeightLarge)) {
+    if (ImGui::Selectable(kSame, !state.opacity_by)) actions.opacity_scalar = "";
+    nameWidget("opacity by the same scalar");
+    for (const VariableInfo& one : variables) {
+      if (one.name == state.variable) continue;
+      const bool chosen = state.opacity_by && state.opacity_by->variable == one.name;
+      const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen);
+      nameWidget("opacity by " + one.name);
+      if (chooses) actions.opacity_scalar = one.name;
+    }
+    ImGui::EndCombo();
+  } else {
+    nameWidget("opacity by");
+  }
+  ImGui::EndDisabled();
+}
+
+void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t step) {
+  using Shows = FunctionPanel::Shows;
+  const auto draw = [&](FunctionPanel& panel, EditedFunction& function, const std::string& variable,
+                        Shows shows) {
+    const FunctionPanel::Result result = panel.draw(function, cache_.variableNamed(variable), shows, step);
+    actions.function_changed |= result.changed;
+    actions.dragging |= result.dragging;
+    actions.automatic_function |= result.automatic;
+    actions.load_function |= result.load;
+    if (!result.error.empty()) actions.error = result.error;
+    actions.save_function |= result.save;
+  };
+  if (state.opacity_by) {
+    draw(function_, state.function, state.variable, Shows::kColours);
+    ImGui::Separator();
+    ImGui::Text("opacities of %s", state.opacity_by->variable.c_str());
+    draw(opacity_function_, state.opacity_by->function, state.opacity_by->variable, Shows::kOpacities);
+  } else {
+    draw(function_, state.function, state.variable, Shows::kAll);
+  }
+}
+
+void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts) {
+  const bool perspective = state.camera.projection == Projection::kPerspective;
+  commandButton(Command::kFit, actions, "fit");
+  ImGui::SameLine();
+  commandOption(Command::kOtherProjection, actions, "perspective", perspective);
+  ImGui::SameLine();
+  commandOption(Command::kFly, actions, "fly", facts.flies);
+  constexpr std::pair<Command, const char*> kSides[]{
+      {Command::kLookPlusX, "+x"},  {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
+      {Command::kLookMinusY, "-y"}, {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"}};
+  label("look from");
+  for (const auto& [command, text] : kSides) {
+    commandButton(command, actions, text);
+    if (command != Command::kLookMinusZ) ImGui::SameLine();
+  }
+  float angle = static_cast<float>(state.camera.view_angle_deg);
+  label("view angle");
+  ImGui::BeginDisabled(!perspective);
+  if (ImGui::SliderFloat("##view angle", &angle, 10, 120, "%.0f°")) {
+    state.camera.view_angle_deg = static_cast<double>(angle);
+    actions.changed = true;
+  }
+  ImGui::EndDisabled();
+  drawSavedViews(actions, facts.views);
+}
+
+void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string>& views) {
+  label("save view as");
+  const float button = ImGui::CalcTextSize("save").x + 3 * ImGui::GetStyle().FramePadding.x;
+  ImGui::SetNextItemWidth(-button - ImGui::GetStyle().ItemSpacing.x);
+  bool saves =
+      ImGui::InputTextWithHint("##view name", "name", &view_name_, ImGuiInputTextFlags_EnterReturnsTrue);
+  nameWidget("view name");
+  ImGui::SameLine();
+  ImGui::BeginDisabled(view_name_.empty());
+  saves |= ImGui::Button("save##view");
+  nameWidget("save view");
+  ImGui::EndDisabled();
+  if (saves && !view_name_.empty()) actions.save_view = std::exchange(view_name_, {});
+  for (const std::string& view : views) {
+    ImGui::PushID(view.c_str());
+    if (ImGui::Button("x")) actions.remove_view = view;
+    nameWidget("remove view " + view);
+    hint("forget this view");
+    ImGui::SameLine();
+    if (ImGui::Selectable(view.c_str())) actions.load_view = view;
+    nameWidget("view " + view);
+    ImGui::PopID();
+  }
+}
+
+void Panels::drawPicture(ViewState& state, PanelActions& actions) {
+  const float column = 0.5f * ImGui::GetContentRegionAvail().x;
+  // Not "light" beside "dark", which reads as a choice of two.
+  actions.changed |= ImGui::Checkbox("lighting", &state.lit);
+  nameWidget("light");
+  ImGui::SameLine(column);
+  actions.changed |= ImGui::Checkbox("dark background", &state.dark);
+  nameWidget("dark");
+  actions.changed |= option("scalar bar", state.annotations.scalar_bar);
+  ImGui::SameLine(column);
+  actions.changed |= option("outline", state.annotations.outline);
+  actions.changed |= option("axes", state.annotations.axes);
+  hint("arrows that show the directions of x, y and z");
+  ImGui::SameLine(column);
+  actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
+  nameWidget("axes grid");
+  ImGui::BeginDisabled(!state.hasSheets());  // there would be nothing to see
+  actions.changed |= option("volume", state.volume);
+  ImGui::EndDisabled();
+  commandButton(Command::kSavePicture, actions, "save picture");
+  ImGui::SameLine(column);
+  commandButton(Command::kSaveTurnMovie, actions, "movie once around...");
+  commandButton(Command::kCopyCommand, actions, "copy command");
+}
+
+void Panels::drawDetail(ViewState& state, PanelActions& actions) {
+  float lod = static_cast<float>(state.lod_pixels);
+  label("error, pixels");
+  if (ImGui::SliderFloat("##error", &lod, 0, 16, "%.2f", ImGuiSliderFlags_Logarithmic)) {
+    state.lod_pixels = static_cast<double>(lod);
+    actions.changed = true;
+  }
+  nameWidget("error, pixels");
+  hint("of what is drawn coarser than the data; 0 draws all of it");
+  actions.dragging |= ImGui::IsItemActive();
+  int mebibytes = static_cast<int>(std::min<uint64_t>(state.memory_bytes >> 20, 1 << 30));
+  label("memory, MiB");
+  if (ImGui::SliderInt("##memory", &mebibytes, 64, 65536, "%d", ImGuiSliderFlags_Logarithmic))
+    state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
+  actions.changed |= ImGui::IsItemDeactivatedAfterEdit();
+  bool per_pixel = state.classification == Classification::kPixel;
+  if (option("classify every pixel", per_pixel)) {
+    state.classification = per_pixel ? Classification::kPixel : Classification::kFlat;
+    actions.changed = true;
+  }
+}
+
+namespace {
+
+void row(const char* name, const std::string& value) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(name);
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(value.c_str());
+}
+
+std::string milliseconds(double seconds) {
+  return fmt::format("{:.1f} ms", 1000 * seconds);
+}
+
+std::string count(uint64_t number) {
+  if (number < 10'000) return fmt::format("{}", number);
+  if (number < 1'000'000) return fmt::format("{:.1f} k", static_cast<double>(number) / 1e3);
+  return fmt::format("{:.2f} M", static_cast<double>(number) / 1e6);
+}
+
+double mebibytes(uint64_t bytes) {
+  return static_cast<double>(bytes) / (1 << 20);
+}
+
+}  // namespace
+
+const char* stateOfPicture(const ShownStatistics& shown) {
+  if (!shown.statistics) return "not yet drawn";
+  return shown.is_final ? "final" : shown.busy ? "refining" : "coarse";
+}
+
+void drawStatistics(const ViewState& state, const ShownStatistics& shown) {
+  if (!ImGui::BeginTable("statistics", 2, ImGuiTableFlags_SizingFixedFit)) return;
+  row("picture", stateOfPicture(shown));
+  if (const FrameStatistics* s = shown.statistics) {
+    row("frame", milliseconds(s->total_s));
+    row("plan", milliseconds(s->plan_s));
+    row("read, decode",
+        fmt::format("{}, {}", milliseconds(s->read_s), milliseconds(s->verify_s + s->decode_s)));
+    row("project, sort", fmt::format("{}, {}", milliseconds(s->project_s), milliseconds(s->sort_s)));
+    row("upload, draw", fmt::format("{}, {}", milliseconds(s->upload_s), milliseconds(s->draw_s)));
+    if (s->gl_draw_s > 0) row("OpenGL", milliseconds(s->gl_draw_s));
+    row("splats", fmt::format("{} drawn of {}", count(s->splats_drawn), count(s->splats_read)));
+    row("error", fmt::format("{:.2f} pixels", s->largest_error_px));
+    row("bricks", fmt::format("{} resident", count(s->bricks_resident)));
+    row("  needed",
+        fmt::format("{}, {} of them resident", count(s->bricks_cached + s->bricks_read + s->bricks_left_out),
+                    count(s->bricks_cached)));
+    row("read", fmt::format("{:.1f} MiB, {:.0f} MiB/s", mebibytes(s->bytes_read),
+                            s->read_s > 0 ? mebibytes(s->bytes_read) / s->read_s : 0));
+    row("memory", fmt::format("{:.0f} of {:.0f} MiB limit", mebibytes(s->memory_used_bytes),
+                              mebibytes(state.memory_bytes)));
+  }
+  const ProcessUsage usage = ProcessUsage::now();
+  row("process", fmt::format("{:.0f} MiB, peak {:.0f} MiB", mebibytes(usage.memory_bytes),
+                             mebibytes(usage.peak_memory_bytes)));
+  row("drawn by", shown.backend);
+  ImGui::EndTable();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,73 @@
+// The panels beside the picture: time, scalars and their functions, picture, cuts, views, markers,
+// statistics. Nothing in them changes its size while it is used: what does not apply is greyed out. They
+// edit a ViewState, and report everything else as PanelActions. For the window's thread, within a frame;
+// histograms are read on another one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "render/frame/frame_statistics.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/panels/function_panel.h"
+#include "tools/panels/labels.h"
+#include "tools/panels/scene_panels.h"
+#include "tools/view/background_jobs.h"
+#include "tools/view/playback.h"
+#include "tools/view/view_state.h"
+
+namespace curvisplat {
+
+/// What the shown picture took: times, splats, bytes.
+struct ShownStatistics {
+  const FrameStatistics* statistics = nullptr;  // of the shown picture; null if there is none
+  bool is_final = false;
+  bool busy = false;
+  std::string backend;
+};
+
+/// "final", "refining", "coarse" or "not yet drawn".
+const char* stateOfPicture(const ShownStatistics& shown);
+
+/// Draws a table of the statistics into the current Dear ImGui window.
+void drawStatistics(const ViewState& state, const ShownStatistics& shown);
+
+/// What the panels display but cannot change.
+struct PanelFacts {
+  ShownStatistics shown;
+  bool flies = false;
+  Playback* playback = nullptr;    // of a series; the panels set its speed and loop
+  std::vector<std::string> views;  // saved ones, by name
+  Rectangle place;                 // of the panels in the window
+  const FurtherScalars* further = nullptr;
+  const std::vector<std::string>* faces = nullptr;  // that can be added as surfaces
+};
+
+class Panels {
+ public:
+  explicit Panels(const CacheReader& cache)
+      : cache_(cache), cuts_(cache), surfaces_(cache), function_(cache), opacity_function_(cache) {}
+
+  /// Width of the panels in Dear ImGui units, for text of this height.
+  static float width(float text_height) { return 26 * text_height; }
+
+  /// Draws the panels into the current Dear ImGui frame and applies edits to `state`.
+  PanelActions draw(ViewState& state, const PanelFacts& facts);
+
+ private:
+  void drawTime(PanelActions& actions, Playback& playback);
+  void drawScalars(const ViewState& state, const FurtherScalars* further, PanelActions& actions);
+  void drawFunctions(ViewState& state, PanelActions& actions, uint64_t step);
+  void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
+  void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);
+  void drawPicture(ViewState& state, PanelActions& actions);
+  void drawDetail(ViewState& state, PanelActions& actions);
+
+  const CacheReader& cache_;
+  CutPanel cuts_;
+  SurfacePanel surfaces_;
+  FunctionPanel function_, opacity_function_;
+  std::string view_name_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,209 @@
+#include "tools/panels/picture_signs.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+#include <imgui_stdlib.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "tools/panels/labels.h"
+#include "tools/window/widgets.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImU32 kColour = IM_COL32(235, 140, 30, 255);
+
+ImVec2 toImGui(const glm::dvec2& point) {
+  return {static_cast<float>(point.x), static_cast<float>(point.y)};
+}
+
+/// The plane's point nearest to the middle of the data, its normal at unit length, and two directions in it.
+struct Frame {
+  glm::dvec3 middle, normal, across, up;
+};
+
+Frame frameOf(const ClipPlane& plane, const Manifest& manifest) {
+  const glm::dvec3 centre = 0.5 * (manifest.lower + manifest.upper);
+  const glm::dvec3 normal = glm::normalize(plane.normal);
+  const glm::dvec3 middle = centre + glm::dot(normal, plane.point - centre) * normal;
+  const glm::dvec3 other = std::abs(normal.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
+  const glm::dvec3 across = glm::normalize(glm::cross(other, normal));
+  return {middle, normal, across, glm::cross(normal, across)};
+}
+
+/// Half the extent of the data along a direction.
+double reachAlong(const glm::dvec3& direction, const Manifest& manifest) {
+  return glm::dot(0.5 * (manifest.upper - manifest.lower), glm::abs(direction));
+}
+
+}  // namespace
+
+double shiftAlong(const glm::dvec2& from, const glm::dvec2& to, const glm::dvec2& movement) {
+  const glm::dvec2 along = to - from;
+  const double length2 = glm::dot(along, along);
+  return length2 < 1 ? 0 : glm::dot(movement, along) / length2;
+}
+
+namespace {
+
+/// The edges of the clip box: what is clipped may be clear, so that the picture alone does not show where it
+/// ends.
+void drawBox(const WorldBox& box, const PlaceInWindow& place) {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const auto corner = [&](unsigned n) {
+    return place({n & 1 ? box.upper.x : box.lower.x, n & 2 ? box.upper.y : box.lower.y,
+                  n & 4 ? box.upper.z : box.lower.z});
+  };
+  for (unsigned from = 0; from < 8; ++from)
+    for (const unsigned axis : {1u, 2u, 4u}) {
+      if (from & axis) continue;
+      const auto begin = corner(from), end = corner(from | axis);
+      if (begin && end) list->AddLine(toImGui(*begin), toImGui(*end), kColour, 0.11f * ImGui::GetFontSize());
+    }
+}
+
+}  // namespace
+
+bool PlaneHandles::draw(ViewState& state, const Manifest& manifest, const PlaceInWindow& place,
+                        Window& window) {
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragged_.reset();
+  if (state.clip_box) drawBox(*state.clip_box, place);
+  bool moved = false;
+  size_t number = 0;
+  for (auto* planes : {&state.clip_planes, &state.slices})
+    for (ClipPlane& plane : *planes) {
+      moved |= drawOne(plane, number, manifest, place, window);
+      ++number;
+    }
+  return moved;
+}
+
+bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Manifest& manifest,
+                           const PlaceInWindow& place, Window& window) {
+  const Frame frame = frameOf(plane, manifest);
+  const double reach = reachAlong(frame.normal, manifest);
+  const double wide = reachAlong(frame.across, manifest), high = reachAlong(frame.up, manifest);
+  const auto handle = place(frame.middle);
+  // A plane that faces the viewer is moved by dragging upwards.
+  const auto end = place(frame.middle + reach * frame.normal);
+  if (!handle || !end) return false;
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const bool dragged = dragged_ == number;
+  const ImU32 colour = dragged ? IM_COL32(255, 200, 60, 255) : kColour;
+  std::array<ImVec2, 4> corners;
+  bool seen = true;
+  for (size_t n = 0; n < 4; ++n) {
+    const double x = n == 0 || n == 3 ? -wide : wide, y = n < 2 ? -high : high;
+    const auto corner = place(frame.middle + x * frame.across + y * frame.up);
+    seen &= corner.has_value();
+    if (corner) corners[n] = toImGui(*corner);
+  }
+  if (seen) list->AddPolyline(corners.data(), 4, colour, ImDrawFlags_Closed, 0.11f * ImGui::GetFontSize());
+  const double size = 0.45 * static_cast<double>(ImGui::GetFontSize());
+  list->AddLine(toImGui(*handle), toImGui(*handle + 0.3 * (*end - *handle)), colour,
+                0.15f * ImGui::GetFontSize());
+  list->AddCircleFilled(toImGui(*handle), static_cast<float>(size), colour);
+  list->AddCircle(toImGui(*handle), static_cast<float>(size), IM_COL32(0, 0, 0, 255));
+  const Rectangle grip{handle->x - size, handle->y - size, 2 * size, 2 * size};
+  window.cover(grip);
+  nameArea(fmt::format("handle {}", number + 1), grip.x, grip.y, grip.width, grip.height);
+
+  const ImGuiIO& io = ImGui::GetIO();
+  const glm::dvec2 mouse(static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
+  if (ImGui::IsMouseClicked(ImGuiMouseButton_Left) && grip.contains(mouse) && !dragged_) dragged_ = number;
+  if (dragged_ != number) return false;
+  const glm::dvec2 movement = mouse - *handle;
+  const bool faces = glm::length(*end - *handle) < 8;
+  const double share =
+      faces ? -static_cast<double>(io.MouseDelta.y) / 200 : shiftAlong(*handle, *end, movement);
+  const double now = glm::dot(frame.normal, plane.point - 0.5 * (manifest.lower + manifest.upper));
+  const double then = std::clamp(now + share * reach, -reach, reach);
+  if (then == now || (!faces && glm::length(movement) < 0.5)) return false;
+  plane.point += (then - now) * frame.normal;
+  return true;
+}
+
+void drawMarkers(ViewState& state, PanelActions& actions) {
+  if (state.markers.empty()) ImGui::TextDisabled("Click into the picture to keep a value.");
+  size_t removed = state.markers.size();
+  for (size_t n = 0; n < state.markers.size(); ++n) {
+    Marker& marker = state.markers[n];
+    ImGui::PushID(static_cast<int>(n));
+    if (ImGui::Button("x")) removed = n;
+    nameWidget(fmt::format("remove marker {}", n + 1));
+    hint("remove this marker");
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(6 * ImGui::GetFontSize());
+    actions.changed |= ImGui::InputText("##name", &marker.name);
+    nameWidget(fmt::format("marker {}", n + 1));
+    if (ImGui::IsItemActive()) nameWidget(fmt::format("editing marker {}", n + 1));
+    ImGui::SameLine();
+    ImGui::TextWrapped("%s", fmt::format("{} {:.5g}{}{}\n{:.5g}, {:.5g}, {:.5g}", marker.scalar, marker.value,
+                                         marker.unit.empty() ? "" : " ", marker.unit, marker.point.x,
+                                         marker.point.y, marker.point.z)
+                                 .c_str());
+    hint(fmt::format("block {}, i {}, j {}, k {}", marker.block + 1, marker.i, marker.j, marker.k).c_str());
+    ImGui::PopID();
+  }
+  if (removed == state.markers.size()) return;
+  state.markers.erase(state.markers.begin() + static_cast<ptrdiff_t>(removed));
+  actions.changed = true;
+}
+
+void drawMarkerSigns(const ViewState& state, const PlaceInWindow& place) {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const ImU32 line = IM_COL32(255, 255, 255, 255), edge = IM_COL32(0, 0, 0, 255);
+  const float radius = 0.3f * ImGui::GetFontSize();
+  for (size_t n = 0; n < state.markers.size(); ++n) {
+    const Marker& marker = state.markers[n];
+    const auto at = place(marker.point);
+    if (!at) continue;
+    const ImVec2 centre(static_cast<float>(at->x), static_cast<float>(at->y));
+    list->AddCircleFilled(centre, radius, edge);
+    list->AddCircleFilled(centre, 0.7f * radius, line);
+    // Beside another scalar than the one that is shown stands its name.
+    const std::string text =
+        fmt::format("{}: {}{}{:.4g} {}", marker.name, marker.scalar == state.variable ? "" : marker.scalar,
+                    marker.scalar == state.variable ? "" : " ", marker.value, marker.unit);
+    const ImVec2 size = ImGui::CalcTextSize(text.c_str());
+    const ImVec2 lower(centre.x + 1.5f * radius, centre.y - 0.5f * size.y);
+    list->AddRectFilled({lower.x - 3, lower.y - 1}, {lower.x + size.x + 3, lower.y + size.y + 1},
+                        IM_COL32(0, 0, 0, 170), 3);
+    list->AddText(lower, line, text.c_str());
+    nameArea(fmt::format("sign of marker {}", n + 1), at->x - 4, at->y - 4, 8, 8);
+  }
+}
+
+Marker markerOf(const ViewState& state, const VariableInfo& variable, const glm::dvec3& point,
+                const ProbeResult& found) {
+  const auto taken = [&](const std::string& name) {
+    return std::any_of(state.markers.begin(), state.markers.end(),
+                       [&](const Marker& marker) { return marker.name == name; });
+  };
+  int number = 1;
+  while (taken(std::to_string(number))) ++number;
+  return {std::to_string(number),
+          point,
+          variable.name,
+          variable.unit,
+          static_cast<double>(found.variables.at(0).value),
+          found.block,
+          found.i,
+          found.j,
+          found.k};
+}
+
+std::string textOf(const Marker& marker, size_t blocks, bool cells) {
+  const std::string unit = marker.unit.empty() ? "" : " " + marker.unit;
+  const std::string block = blocks > 1 ? fmt::format("block {}, ", marker.block + 1) : "";
+  return fmt::format("{} {:.5g}{} at {:.5g}, {:.5g}, {:.5g}; {} {}i {}, j {}, k {}", marker.scalar,
+                     marker.value, unit, marker.point.x, marker.point.y, marker.point.z,
+                     cells ? "cell" : "node", block, marker.i, marker.j, marker.k);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,57 @@
+// What is drawn over the picture at places of the data: clip planes and slices, which are dragged by a
+// handle, the edges of the clip box, and markers, with their list. For the window's thread, within a frame;
+// nothing here reads the cache.
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "stream/cache/manifest.h"
+#include "stream/cache/probe.h"
+#include "tools/panels/labels.h"
+#include "tools/view/view_state.h"
+#include "tools/window/window.h"
+
+namespace curvisplat {
+
+/// Where a point of the data is in the window, in Dear ImGui units; nullopt if it is behind the viewer.
+using PlaceInWindow = std::function<std::optional<glm::dvec2>(const glm::dvec3&)>;
+
+/// Clip planes and slices in the picture: a frame in the data with a handle in its middle, which is dragged
+/// along the plane's normal. The clip box has its edges there.
+class PlaneHandles {
+ public:
+  /// Draws the planes over the picture and moves the one that is dragged. Returns whether one was moved.
+  bool draw(ViewState& state, const Manifest& manifest, const PlaceInWindow& place, Window& window);
+  bool isDragging() const { return dragged_.has_value(); }
+
+ private:
+  bool drawOne(ClipPlane& plane, size_t number, const Manifest& manifest, const PlaceInWindow& place,
+               Window& window);
+  std::optional<size_t> dragged_;  // clip planes first, then slices
+};
+
+/// How far a plane moves along its normal (in lengths of the normal) for a movement of the mouse: to the
+/// point of the normal that is seen under the mouse. `from`, `to`: where the plane's point and the point at
+/// the normal's end are seen. 0 where the normal points at the viewer.
+double shiftAlong(const glm::dvec2& from, const glm::dvec2& to, const glm::dvec2& movement);
+
+/// Draws the list of markers, the places in the data that were clicked: names to edit, values, and buttons
+/// that remove one.
+void drawMarkers(ViewState& state, PanelActions& actions);
+
+/// Draws the markers over the picture.
+void drawMarkerSigns(const ViewState& state, const PlaceInWindow& place);
+
+/// A marker named "1", "2", ... that no other has.
+Marker markerOf(const ViewState& state, const VariableInfo& variable, const glm::dvec3& point,
+                const ProbeResult& found);
+
+/// "density 1.25 kg/m3 at 0.1, 0.2, 0.3; block 2, i 3, j 4, k 5". `blocks`: how many there are.
+std::string textOf(const Marker& marker, size_t blocks, bool cells);
+
+}  // namespace curvisplat

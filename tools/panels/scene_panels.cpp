@@ -1,0 +1,333 @@
+#include "tools/panels/scene_panels.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "render/annotate/annotations.h"
+#include "tools/panels/labels.h"
+#include "tools/window/widgets.h"
+
+namespace curvisplat {
+namespace {
+
+/// The direction in which a plane's place is counted, of unit length, and its name.
+struct PlaneScale {
+  glm::dvec3 along;
+  const char* name;
+};
+
+/// A plane across an axis is at a coordinate, whichever of its sides is kept.
+PlaneScale planeScaleOf(const glm::dvec3& normal) {
+  const glm::dvec3 along = glm::normalize(normal);
+  constexpr std::array<const char*, 3> kNames{"x of plane", "y of plane", "z of plane"};
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dvec3 unit(0.0);
+    unit[axis] = 1;
+    if (std::abs(along[axis]) > 1 - 1e-12) return {unit, kNames[static_cast<size_t>(axis)]};
+  }
+  return {along, "place of plane"};
+}
+
+/// How a coordinate of data between two ends is written: to a few thousandths of their distance, and 0 for a
+/// rounding error.
+std::string coordinateFormat(double coordinate, double lowest, double highest) {
+  const double extent = highest - lowest;
+  if (std::abs(coordinate) < 1e-6 * extent) return "0";
+  const double largest = std::max(std::abs(lowest), std::abs(highest));
+  const double further = extent > 0 ? std::ceil(std::log10(largest / extent)) : 0;
+  return fmt::format("%.{}g", 4 + std::clamp(static_cast<int>(further), 0, 4));
+}
+
+}  // namespace
+
+void CutPanel::draw(ViewState& state, PanelActions& actions) {
+  if (section("Clip box", false)) drawClipBox(state, actions);
+  if (sectionOf("Clip planes", planes_seen_, state.clip_planes.size()))
+    drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
+  if (sectionOf("Slices", slices_seen_, state.slices.size())) drawSlices(state, actions);
+}
+
+/// A plane's normal in data coordinates is its normal after --scale, times the scale.
+ClipPlane planeBeforeViewer(const Manifest& manifest, const ViewState& state) {
+  return {0.5 * (manifest.lower + manifest.upper),
+          glm::normalize((state.camera.focal_point - state.camera.position) * state.scale)};
+}
+
+void CutPanel::drawClipBox(ViewState& state, PanelActions& actions) {
+  const Manifest& manifest = cache_.manifest();
+  bool on = state.clip_box.has_value();
+  if (option("clip", on)) {
+    if (on)
+      state.clip_box = WorldBox{manifest.lower, manifest.upper};
+    else
+      state.clip_box.reset();
+    actions.changed = true;
+  }
+  // The lines are always there: nothing moves when the box is switched on.
+  const WorldBox whole{manifest.lower, manifest.upper};
+  ImGui::BeginDisabled(!on);
+  for (int axis = 0; axis < 3; ++axis) {
+    constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+    const float lowest = static_cast<float>(manifest.lower[axis]);
+    const float highest = static_cast<float>(manifest.upper[axis]);
+    const WorldBox& box = state.clip_box ? *state.clip_box : whole;
+    float lower = static_cast<float>(box.lower[axis]), upper = static_cast<float>(box.upper[axis]);
+    const char* const name = kNames[static_cast<size_t>(axis)];
+    const auto format = [&](float end) {
+      return coordinateFormat(static_cast<double>(end), manifest.lower[axis], manifest.upper[axis]);
+    };
+    label(name);
+    if (ImGui::DragFloatRange2(fmt::format("##{}", name).c_str(), &lower, &upper, (highest - lowest) / 500,
+                               lowest, highest, format(lower).c_str(), format(upper).c_str(),
+                               ImGuiSliderFlags_AlwaysClamp)) {
+      state.clip_box->lower[axis] = static_cast<double>(lower);
+      state.clip_box->upper[axis] = static_cast<double>(std::max(lower, upper));
+      actions.changed = true;
+    }
+    actions.dragging |= ImGui::IsItemActive();
+    nameWidget(fmt::format("clip {}", name));
+    hint("drag to change; Ctrl + click to type a number");
+  }
+  ImGui::EndDisabled();
+}
+
+/// Each plane has a direction and a place along it, which can also be dragged in the picture.
+void CutPanel::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state,
+                          PanelActions& actions) {
+  const Manifest& manifest = cache_.manifest();
+  const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
+  const glm::dvec3 half = 0.5 * (manifest.upper - manifest.lower);
+  const bool clips = &planes == &state.clip_planes;
+  ImGui::PushID(&planes);
+  ImGui::BeginDisabled(planes.size() >= most);
+  commandButton(clips ? Command::kAddClipPlane : Command::kAddSlice, actions);
+  ImGui::EndDisabled();
+  size_t removed = planes.size();
+  for (size_t n = 0; n < planes.size(); ++n) {
+    ClipPlane& plane = planes[n];
+    ImGui::PushID(static_cast<int>(n));
+    ImGui::Separator();
+    const std::string name = fmt::format("{} {}", clips ? "clip plane" : "slice", n + 1);
+    const auto turn = [&](const char* label, const glm::dvec3& normal) {
+      const bool turns = ImGui::Button(label);
+      nameWidget(fmt::format("{} {}", label, name));
+      if (!turns) return;
+      plane.normal = normal;
+      actions.changed = true;
+    };
+    turn("x", {1, 0, 0});
+    ImGui::SameLine();
+    turn("y", {0, 1, 0});
+    ImGui::SameLine();
+    turn("z", {0, 0, 1});
+    ImGui::SameLine();
+    turn("view", planeBeforeViewer(manifest, state).normal);
+    hint("facing you");
+    ImGui::SameLine();
+    if (clips) {
+      turn("flip", -plane.normal);
+      hint("keep the other side");
+      ImGui::SameLine();
+    }
+    if (ImGui::Button("remove")) removed = n;
+    nameWidget("remove " + name);
+    // From the data's one end along the normal to the other; a plane across an axis has its coordinate
+    // there.
+    const PlaneScale scale = planeScaleOf(plane.normal);
+    const double centre = glm::dot(scale.along, middle), reach = glm::dot(half, glm::abs(scale.along));
+    const double lowest = centre - reach, highest = centre + reach;
+    double place = glm::dot(scale.along, plane.point);
+    label(fmt::format("{} {}", scale.name, n + 1).c_str());
+    if (ImGui::SliderScalar("##place", ImGuiDataType_Double, &place, &lowest, &highest,
+                            coordinateFormat(place, lowest, highest).c_str())) {
+      plane.point = middle + (place - centre) * scale.along;
+      actions.changed = true;
+    }
+    actions.dragging |= ImGui::IsItemActive();
+    nameWidget(name);
+    nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
+    hint("Ctrl + click to type a number");
+    ImGui::PopID();
+  }
+  ImGui::PopID();
+  if (removed == planes.size()) return;
+  planes.erase(planes.begin() + static_cast<ptrdiff_t>(removed));
+  actions.changed = true;
+}
+
+void CutPanel::drawSlices(ViewState& state, PanelActions& actions) {
+  auto opacity = static_cast<float>(state.slice_opacity.factor);
+  label("opacity");
+  if (ImGui::SliderFloat("##opacity", &opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+    state.slice_opacity.factor = static_cast<double>(opacity);
+    actions.changed = true;
+  }
+  actions.dragging |= ImGui::IsItemActive();
+  actions.changed |= ImGui::Checkbox("times the function's", &state.slice_opacity.by_function);
+  nameWidget("slices by function");
+  drawPlanes(state.slices, kMaxSlices, state, actions);
+}
+
+namespace {
+
+/// `name`: of the widget.
+void opacitySlider(const char* text, const std::string& name, double& opacity, PanelActions& actions) {
+  auto value = static_cast<float>(opacity);
+  label(text);
+  if (ImGui::SliderFloat(fmt::format("##{}", name).c_str(), &value, 0.05f, 1, "%.2f",
+                         ImGuiSliderFlags_AlwaysClamp)) {
+    opacity = static_cast<double>(value);
+    actions.changed = true;
+  }
+  actions.dragging |= ImGui::IsItemActive();
+  nameWidget(name);
+}
+
+/// Title, colour and a button that removes it, in a line; whether it was pressed.
+bool drawHead(const std::string& title, glm::vec3* colour, const std::string& name, PanelActions& actions) {
+  ImGui::Separator();
+  if (colour) {
+    actions.changed |= ImGui::ColorEdit3("##colour", glm::value_ptr(*colour), ImGuiColorEditFlags_NoInputs);
+    actions.dragging |= ImGui::IsItemActive();
+    nameWidget("colour of " + name);
+    ImGui::SameLine();
+  }
+  ImGui::AlignTextToFramePadding();
+  const float button = ImGui::CalcTextSize("remove").x + 2 * ImGui::GetStyle().FramePadding.x;
+  const float right = ImGui::GetContentRegionMax().x - button;
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  // A long name ends before the button.
+  ImGui::PushClipRect(from,
+                      {ImGui::GetWindowPos().x + right - ImGui::GetStyle().ItemSpacing.x,
+                       from.y + 2 * ImGui::GetFrameHeight()},
+                      true);
+  ImGui::TextUnformatted(title.c_str());
+  ImGui::PopClipRect();
+  hint(title.c_str());
+  ImGui::SameLine(right);
+  const bool removes = ImGui::Button("remove");
+  nameWidget("remove " + name);
+  return removes;
+}
+
+template <typename List>
+void removeAt(List& list, size_t at, PanelActions& actions) {
+  if (at >= list.size()) return;
+  list.erase(list.begin() + static_cast<ptrdiff_t>(at));
+  actions.changed = true;
+}
+
+}  // namespace
+
+void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions) {
+  if (sectionOf("Surfaces", surfaces_seen_, state.surfaces.size() + state.faces.size()))
+    drawSurfaces(state, faces, actions);
+  if (sectionOf("Isosurfaces", isovalues_seen_, state.isovalues.size())) drawIsosurfaces(state, actions);
+}
+
+void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>& faces,
+                                PanelActions& actions) {
+  const bool is_full = state.surfaces.size() + state.faces.size() >= kMaxSurfaces;
+  label("add grid face");
+  ImGui::BeginDisabled(faces.empty() || is_full);
+  if (ImGui::BeginCombo("##add surface", faces.empty() ? "the cache has none" : "choose ...",
+                        ImGuiComboFlags_HeightLarge)) {
+    for (const std::string& name : faces) {
+      if (ImGui::Selectable(name.c_str())) actions.add_faces = name;
+      nameWidget("add surface " + name);
+    }
+    ImGui::EndCombo();
+  } else {
+    nameWidget("add surface");
+  }
+  ImGui::EndDisabled();
+  ImGui::BeginDisabled(is_full);
+  commandButton(Command::kAddSurfaceFile, actions, "add from a file...");
+  ImGui::EndDisabled();
+  hint("STL, PLY or OBJ");
+  drawColouring(state, actions);
+
+  size_t removed = state.faces.size();
+  for (size_t n = 0; n < state.faces.size(); ++n) {
+    NamedFaces& named = state.faces[n];
+    ImGui::PushID(static_cast<int>(n));
+    // With a scalar its colour is not seen.
+    const std::string name = fmt::format("surface {}", n + 1);
+    if (drawHead(named.name, state.faces_by ? nullptr : &named.colour, name, actions)) removed = n;
+    opacitySlider("opacity", "opacity of " + name, named.opacity.factor, actions);
+    ImGui::BeginDisabled(!state.faces_by && !state.opacity_by);
+    actions.changed |= ImGui::Checkbox("times the function's", &named.opacity.by_function);
+    nameWidget(name + " by function");
+    ImGui::EndDisabled();
+    ImGui::PopID();
+  }
+  removeAt(state.faces, removed, actions);
+  removed = state.surfaces.size();
+  for (size_t n = 0; n < state.surfaces.size(); ++n) {
+    SurfaceFile& surface = state.surfaces[n];
+    ImGui::PushID(surface.path.c_str());
+    ImGui::PushID(static_cast<int>(n));
+    const std::string name = fmt::format("surface file {}", n + 1);
+    if (drawHead(surface.path.filename().string(), &surface.colour, name, actions)) removed = n;
+    opacitySlider("opacity", "opacity of " + name, surface.opacity, actions);
+    ImGui::PopID();
+    ImGui::PopID();
+  }
+  removeAt(state.surfaces, removed, actions);
+}
+
+/// Of the faces of the grid; a file's have no scalar.
+void SurfacePanel::drawColouring(const ViewState& state, PanelActions& actions) {
+  constexpr const char* kOwn = "a colour of its own";
+  label("faces coloured by");
+  ImGui::BeginDisabled(state.faces.empty());
+  if (ImGui::BeginCombo("##surfaces by", state.faces_by ? state.faces_by->variable.c_str() : kOwn,
+                        ImGuiComboFlags_HeightLarge)) {
+    if (ImGui::Selectable(kOwn, !state.faces_by)) actions.colour_faces = "";
+    nameWidget("surfaces by no scalar");
+    for (const VariableInfo& one : cache_.manifest().variables) {
+      const bool chosen = state.faces_by && state.faces_by->variable == one.name;
+      if (ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen)) actions.colour_faces = one.name;
+      nameWidget("surfaces by " + one.name);
+    }
+    ImGui::EndCombo();
+  } else {
+    nameWidget("surfaces by");
+  }
+  ImGui::EndDisabled();
+}
+
+void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
+  const VariableInfo& info = cache_.manifest().variables[cache_.variableNamed(state.isoScalar())];
+  commandButton(Command::kAddIsosurface, actions);
+  ImGui::BeginDisabled(state.isovalues.empty());
+  opacitySlider("opacity", "opacity of isosurfaces", state.iso_opacity.factor, actions);
+  actions.changed |= ImGui::Checkbox("times the function's", &state.iso_opacity.by_function);
+  nameWidget("isosurfaces by function");
+  ImGui::EndDisabled();
+  size_t removed = state.isovalues.size();
+  for (size_t n = 0; n < state.isovalues.size(); ++n) {
+    ImGui::PushID(static_cast<int>(n));
+    const std::string name = fmt::format("isosurface {}", n + 1);
+    const std::string title = fmt::format("{} at", scalarTitle(info.name, info.unit));
+    if (drawHead(title, nullptr, name, actions)) removed = n;
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::SliderScalar("##value", ImGuiDataType_Double, &state.isovalues[n], &info.min, &info.max,
+                            "%.5g", ImGuiSliderFlags_AlwaysClamp))
+      actions.changed = true;
+    actions.dragging |= ImGui::IsItemActive();
+    nameWidget(name);
+    hint("Ctrl + click to type a number");
+    ImGui::PopID();
+  }
+  removeAt(state.isovalues, removed, actions);
+}
+
+}  // namespace curvisplat

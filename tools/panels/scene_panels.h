@@ -1,0 +1,51 @@
+// The panels that list what cuts the data (clip box, clip planes, slices) and what is opaque in it or drawn
+// in its place (faces of the grid, surfaces of files, isosurfaces). They edit a ViewState and read no file.
+// For the window's thread, within a frame.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stream/cache/cache_reader.h"
+#include "tools/panels/labels.h"
+#include "tools/view/view_state.h"
+
+namespace curvisplat {
+
+/// Clip box, clip planes and slices.
+class CutPanel {
+ public:
+  explicit CutPanel(const CacheReader& cache) : cache_(cache) {}
+  void draw(ViewState& state, PanelActions& actions);
+
+ private:
+  void drawClipBox(ViewState& state, PanelActions& actions);
+  void drawSlices(ViewState& state, PanelActions& actions);
+  void drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state, PanelActions& actions);
+
+  const CacheReader& cache_;
+  std::optional<size_t> planes_seen_, slices_seen_;  // in the frame before
+};
+
+/// A plane in the middle of the data that faces the viewer.
+ClipPlane planeBeforeViewer(const Manifest& manifest, const ViewState& state);
+
+/// Faces of the grid, surfaces of files and isosurfaces.
+class SurfacePanel {
+ public:
+  explicit SurfacePanel(const CacheReader& cache) : cache_(cache) {}
+  /// `faces`: names of faces that can be added.
+  void draw(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions);
+
+ private:
+  void drawSurfaces(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions);
+  void drawColouring(const ViewState& state, PanelActions& actions);
+  void drawIsosurfaces(ViewState& state, PanelActions& actions);
+
+  const CacheReader& cache_;
+  std::optional<size_t> surfaces_seen_, isovalues_seen_;  // in the frame before
+};
+
+}  // namespace curvisplat

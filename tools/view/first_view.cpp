@@ -1,0 +1,101 @@
+#include "tools/view/first_view.h"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "render/automatic/first_choice.h"
+#include "stream/base/threads.h"
+
+namespace curvisplat {
+namespace {
+
+/// One function for all steps: they are played.
+FirstChoice choiceOf(const CacheReader& cache, const std::string& scalar) {
+  return {cache, cache.variableNamed(scalar), glm::dvec3(1), ChosenFor::kSeries};
+}
+
+}  // namespace
+
+ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, ImageSize picture) {
+  const Manifest& manifest = cache.manifest();
+  ViewState state = firstViewOf(manifest, picture);
+  if (!scalar.empty()) state.variable = scalar;
+  const FirstChoice choice = choiceOf(cache, state.variable);
+  state.function = EditedFunction::automatic(choice.function());
+  const ImageSize size = dataSize(state.annotations, picture, state.function.function());
+  const ViewChoice view = choice.view(state.function.function(), size);
+  state.camera = Camera::named(view.view, manifest.lower, manifest.upper, size, Projection::kOrthographic);
+  // The outline is to be seen whole.
+  if (view.focal_point && !state.annotations.outline) {
+    state.camera.position += *view.focal_point - state.camera.focal_point;
+    state.camera.focal_point = *view.focal_point;
+    state.camera.parallel_scale = view.parallel_scale;
+  }
+  return state;
+}
+
+EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar) {
+  return EditedFunction::automatic(choiceOf(cache, scalar).function());
+}
+
+void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name) {
+  std::optional<EditedFunction> chosen;  // first: where reading fails, the state stays as it was
+  if (state.function.isAutomatic()) chosen = automaticFunction(cache, name);
+  chooseVariable(state, cache.manifest(), name);
+  if (chosen) state.function = *std::move(chosen);
+}
+
+void FunctionChooser::ask(const Question& question) {
+  wanted(question.what) = question.scalar;
+  if (!answering_.valid()) beginNext();
+}
+
+void FunctionChooser::takeQuestionsOf(FunctionChooser& other) {
+  for (size_t what = 0; what < wanted_.size(); ++what)
+    if (const auto scalar = std::exchange(other.wanted_[what], std::nullopt))
+      ask({static_cast<For>(what), *scalar});
+}
+
+void FunctionChooser::drop() {
+  wanted_ = {};
+}
+
+bool FunctionChooser::busy() const {
+  return std::ranges::any_of(wanted_, [](const auto& scalar) { return scalar.has_value(); });
+}
+
+void FunctionChooser::beginNext() {
+  const auto next = std::ranges::find_if(wanted_, [](const auto& scalar) { return scalar.has_value(); });
+  if (next == wanted_.end()) return;
+  question_ = {static_cast<For>(next - wanted_.begin()), **next};
+  try {
+    answering_ = std::async(std::launch::async, [&cache = cache_, wake = wake_, scalar = question_.scalar] {
+      nameThisThread("function");
+      struct Wake {
+        void (*call)();
+        ~Wake() { call(); }
+      } const at_the_end{wake};
+      return automaticFunction(cache, scalar);
+    });
+  } catch (...) {  // there is no thread to be had
+    next->reset();
+    throw;
+  }
+}
+
+std::optional<FunctionChooser::Answer> FunctionChooser::take() {
+  if (answering_.valid() ? answering_.wait_for(std::chrono::seconds(0)) != std::future_status::ready
+                         : !busy())
+    return std::nullopt;
+  std::future<EditedFunction> answered = std::move(answering_);
+  const Question question = question_;
+  const bool is_wanted = answered.valid() && isWanted(question);
+  if (is_wanted) drop(question.what);
+  beginNext();
+  if (!is_wanted) return std::nullopt;
+  return Answer{question, answered.get()};
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,72 @@
+// What is shown before anything is chosen: the function and the view that `render` chooses from the data.
+// Choosing a function reads a coarse level of the cache, for 0.1 to 0.3 s: FunctionChooser does so on
+// another thread, and the other functions on the caller's. They keep no state: any thread may call them. A
+// FunctionChooser is for the window's thread.
+#pragma once
+
+#include <array>
+#include <future>
+#include <optional>
+#include <string>
+
+#include "stream/cache/cache_reader.h"
+#include "tools/view/edited_function.h"
+#include "tools/view/view_state.h"
+
+namespace curvisplat {
+
+/// The initial state of a window with a picture of this size. `scalar`: a name, or empty for the first that
+/// varies. Throws UsageError if there is no such scalar, and Error as reading does.
+ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, ImageSize picture);
+
+/// The function that is chosen from the data for a scalar.
+EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar);
+
+/// Selects another scalar. An automatic function is chosen anew; another keeps its points over the scalar's
+/// range. Throws UsageError that lists the scalars if there is none of this name.
+void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name);
+
+/// Finds automatic functions on another thread. A question for one purpose replaces the one before for the
+/// same purpose; questions for different purposes are all answered.
+class FunctionChooser {
+ public:
+  /// Calls `wake` when an answer has come. `cache` must outlive it.
+  FunctionChooser(const CacheReader& cache, void (*wake)()) : cache_(cache), wake_(wake) {}
+
+  enum class For { kScalar, kOpacities, kSameScalar, kFaces };
+  struct Question {
+    For what = For::kScalar;
+    std::string scalar;
+    bool operator==(const Question&) const = default;
+  };
+  struct Answer {
+    Question question;
+    EditedFunction function;
+  };
+
+  void ask(const Question& question);
+  /// Takes over the questions that `other` has not answered yet; its cache may be another one of the same
+  /// grid.
+  void takeQuestionsOf(FunctionChooser& other);
+  /// Drops all questions, or the one for this purpose.
+  void drop();
+  void drop(For what) { wanted(what).reset(); }
+  /// Each answer, once. Throws what reading throws, which ends this question only. Call it often: it also
+  /// begins the next question.
+  std::optional<Answer> take();
+  bool busy() const;
+
+ private:
+  std::optional<std::string>& wanted(For what) { return wanted_[static_cast<size_t>(what)]; }
+  bool isWanted(const Question& question) { return wanted(question.what) == question.scalar; }
+  void beginNext();
+
+  const CacheReader& cache_;
+  void (*const wake_)();
+  std::array<std::optional<std::string>, 4>
+      wanted_;         // for each purpose, the scalar of the answer that is to come
+  Question question_;  // that is being answered
+  std::future<EditedFunction> answering_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,91 @@
+#include "tools/view/picture_layout.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "render/frame/frame_plan.h"
+
+namespace curvisplat {
+namespace {
+
+std::string titleOf(const Manifest& manifest, const std::string& name) {
+  const auto info = std::find_if(manifest.variables.begin(), manifest.variables.end(),
+                                 [&](const VariableInfo& one) { return one.name == name; });
+  return info == manifest.variables.end() ? name : scalarTitle(info->name, info->unit);
+}
+
+}  // namespace
+
+ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
+    : colours_(state.function.function()), title_(titleOf(manifest, state.variable)) {
+  if (!state.faces.empty() && state.faces_by && state.faces_by->variable != state.variable) {
+    of_faces_ = state.faces_by->function.function();
+    faces_title_ = titleOf(manifest, state.faces_by->variable);
+  }
+  if (!state.opacity_by) return;
+  opacities_ = state.opacity_by->function.function();
+  if (state.volume) opacity_title_ = titleOf(manifest, state.opacity_by->variable) + " (opacity)";
+}
+
+DrawnScalars ShownFunctions::scalars(const CacheReader& cache, const ViewState& state) const {
+  const size_t shown = cache.variableNamed(state.variable);
+  if (!opacities_) return DrawnScalars(shown, colours_);
+  return DrawnScalars(DrawnScalar{cache.variableNamed(state.opacity_by->variable), *opacities_},
+                      DrawnScalar{shown, colours_});
+}
+
+std::vector<ShownFunction> ShownFunctions::bars() const {
+  std::vector<ShownFunction> bars{{&colours_, title_}};
+  if (opacities_ && !opacity_title_.empty()) bars.push_back({&*opacities_, opacity_title_, true});
+  if (of_faces_) bars.push_back({&*of_faces_, faces_title_});
+  return bars;
+}
+
+ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize picture) {
+  const ShownFunctions functions(state, manifest);
+  return dataSize(state.annotations, picture, functions.bars());
+}
+
+AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
+                       ImageSize picture) {
+  return {picture, frame.view, functions.bars(), frame.data.lower, frame.data.upper, state.background()};
+}
+
+std::optional<glm::dvec3> pointSeenAt(const ShownValues& shown, const Manifest& manifest,
+                                      const glm::dvec2& pixel, ImageSize size) {
+  const ImageSize own = shown.values.size;
+  if (own.width <= 0 || size.width <= 0 || size.height <= 0) return std::nullopt;
+  const glm::dvec2 at(pixel.x * own.width / size.width, pixel.y * own.height / size.height);
+  const int column = static_cast<int>(std::floor(at.x)), row = static_cast<int>(std::floor(at.y));
+  if (column < 0 || row < 0 || column >= own.width || row >= own.height) return std::nullopt;
+  const auto index = static_cast<size_t>(row) * static_cast<size_t>(own.width) + static_cast<size_t>(column);
+  const auto depth = static_cast<double>(shown.values.depth[index]);
+  if (!std::isfinite(depth)) return std::nullopt;
+  const ScreenView view = screenViewOf(manifest, shown.camera, shown.options, own);
+  const glm::dvec3 place = placeOf(view, column, row, depth);
+  const glm::dvec3 stretched = view.eye + place.x * view.right + place.y * view.down + place.z * view.forward;
+  return stretched / view.scale;
+}
+
+void PointProbe::ask(const Question& question, bool again) {
+  if (asked_ == question && !again) return;
+  asked_ = next_ = question;
+}
+
+std::optional<PointProbe::Answer> PointProbe::take() {
+  std::optional<Answer> answer;
+  if (answering_.valid() && answering_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
+    answer = answering_.get();
+  if (next_ && !answering_.valid())
+    answering_ = std::async(std::launch::async,
+                            [&cache = cache_, question = *std::exchange(next_, std::nullopt)]() -> Answer {
+                              const CacheReader reader = cache.at(question.at);
+                              const size_t variables[]{question.variable};
+                              return {question, probe(reader, variables, question.point)};
+                            });
+  return answer;
+}
+
+}  // namespace curvisplat

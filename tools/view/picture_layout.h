@@ -1,0 +1,81 @@
+// A picture and its pixels: how it is divided and annotated, as `render` does it, which point of the data is
+// seen at a pixel, and what the data are at that point. Only PointProbe reads the cache, on another thread;
+// it is for the window's thread. The other functions are pure, for any thread.
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <future>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/annotate/annotations.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/manifest.h"
+#include "stream/cache/probe.h"
+#include "tools/view/frame_loop.h"
+#include "tools/view/view_state.h"
+
+namespace curvisplat {
+
+/// A state's functions, ready to be drawn and annotated. It must outlive the results of its members.
+class ShownFunctions {
+ public:
+  ShownFunctions(const ViewState& state, const Manifest& manifest);
+
+  DrawnScalars scalars(const CacheReader& cache, const ViewState& state) const;
+  std::vector<ShownFunction> bars() const;
+
+ private:
+  TransferFunction colours_;
+  std::optional<TransferFunction> opacities_, of_faces_;  // of faces that have a scalar of their own
+  std::string title_, opacity_title_, faces_title_;
+};
+
+/// The part of a picture that shows the data.
+ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize picture);
+
+/// What is annotated in a frame that was drawn for this state.
+AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
+                       ImageSize picture);
+
+/// The point, in data coordinates, where the ray through `pixel` of a picture of `size` has half of its
+/// opacity. nullopt where nothing is seen.
+std::optional<glm::dvec3> pointSeenAt(const ShownValues& shown, const Manifest& manifest,
+                                      const glm::dvec2& pixel, ImageSize size);
+
+/// Finds the values of the data at a point on another thread. It answers the newest question and drops older
+/// ones.
+class PointProbe {
+ public:
+  /// `cache` must outlive it.
+  explicit PointProbe(const CacheReader& cache) : cache_(cache) {}
+
+  struct Question {
+    glm::dvec3 point{0.0};  // data coordinates
+    size_t variable = 0;
+    StepPosition at;
+    bool operator==(const Question&) const = default;
+  };
+  struct Answer {
+    Question question;
+    std::optional<ProbeResult> found;  // nullopt: outside of the data
+  };
+
+  /// Nothing happens if this was the newest question already, unless it is asked `again`.
+  void ask(const Question& question, bool again = false);
+  /// An answer that has come since the last call. Throws what reading throws. Call it often: it also begins
+  /// to answer the next question.
+  std::optional<Answer> take();
+  bool busy() const { return answering_.valid() || next_; }
+
+ private:
+  const CacheReader& cache_;
+  std::optional<Question> asked_, next_;
+  std::future<Answer> answering_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,309 @@
+#include "tools/view/saved_views.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <system_error>
+#include <utility>
+
+#include "render/colour/function_parts.h"
+#include "stream/base/durable_file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/json_document.h"
+#include "stream/base/text.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string hashOf(const std::string& text) {
+  return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size()));
+}
+
+}  // namespace
+
+std::optional<fs::path> configFolder() {
+  const char* const config = std::getenv("XDG_CONFIG_HOME");
+  if (config && *config == '/') return fs::path(config) / "curvisplat";
+  const char* const home = std::getenv("HOME");
+  if (home && *home) return fs::path(home) / ".config" / "curvisplat";
+  return std::nullopt;
+}
+
+std::optional<fs::path> rememberedStateOf(const fs::path& cache) {
+  const auto folder = configFolder();
+  if (!folder) return std::nullopt;
+  std::error_code ignored;
+  fs::path whole = fs::weakly_canonical(cache, ignored);
+  if (whole.filename().empty()) whole = whole.parent_path();
+  return *folder / "views" / fmt::format("{}-{}.json", whole.stem().string(), hashOf(whole.string()));
+}
+
+namespace {
+
+constexpr size_t kMaxRecent = 12;
+
+std::optional<fs::path> settingsFile() {
+  const auto folder = configFolder();
+  return folder ? std::optional(*folder / "window.json") : std::nullopt;
+}
+
+/// File names can be anything but a slash and a leading dot: those and % are written as %2f.
+std::string fileNameOf(const std::string& name) {
+  std::string file;
+  for (const char c : name) {
+    const bool plain =
+        c != '/' && c != '%' && !(c == '.' && file.empty()) && static_cast<unsigned char>(c) >= 32;
+    file += plain ? std::string(1, c) : fmt::format("%{:02x}", static_cast<unsigned char>(c));
+  }
+  return file;
+}
+
+std::string nameOfFile(const std::string& file) {
+  std::string name;
+  for (size_t n = 0; n < file.size(); ++n) {
+    if (file[n] == '%' && n + 2 < file.size()) {
+      name += static_cast<char>(std::strtol(file.substr(n + 1, 2).c_str(), nullptr, 16));
+      n += 2;
+    } else {
+      name += file[n];
+    }
+  }
+  return name;
+}
+
+fs::path viewFolderOf(const fs::path& cache) {
+  const auto state = rememberedStateOf(cache);
+  if (!state) throw Error("cannot find the settings directory: neither XDG_CONFIG_HOME nor HOME is set");
+  return state->parent_path() / "saved" / state->stem();
+}
+
+}  // namespace
+
+void WindowSettings::opened(std::vector<std::string> files) {
+  std::erase(recent, files);
+  recent.insert(recent.begin(), std::move(files));
+  if (recent.size() > kMaxRecent) recent.resize(kMaxRecent);
+}
+
+WindowSettings readSettings() {
+  WindowSettings settings;
+  const auto file = settingsFile();
+  std::error_code ignored;
+  if (!file || !fs::exists(*file, ignored)) return settings;
+  try {
+    const JsonDocument document(readTextFile(*file), file->string(), "the settings of the window");
+    const JsonField fields = document.root();
+    settings.light_theme = fields.at("light_theme").flag();
+    settings.text_scale = fields.at("text_scale").number(0.5, 4);
+    for (const JsonField& files : fields.at("recent").elements(kMaxRecent)) {
+      settings.recent.push_back(files.texts());
+      if (settings.recent.back().empty()) settings.recent.pop_back();
+    }
+  } catch (const Error& error) {
+    printMessage("warning: {}; using the default settings", error.what());
+    return {};
+  }
+  return settings;
+}
+
+void writeSettings(const WindowSettings& settings) {
+  const auto file = settingsFile();
+  if (!file) return;
+  const nlohmann::ordered_json json = {{"light_theme", settings.light_theme},
+                                       {"text_scale", settings.text_scale},
+                                       {"recent", settings.recent}};
+  writeState(*file, json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+std::vector<std::string> savedViewsOf(const fs::path& cache) {
+  std::vector<std::string> names;
+  if (!configFolder()) return names;
+  std::error_code error;
+  for (fs::directory_iterator at(viewFolderOf(cache), error), end; !error && at != end; at.increment(error))
+    if (at->path().extension() == ".json") names.push_back(nameOfFile(at->path().stem().string()));
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path savedViewOf(const fs::path& cache, const std::string& name) {
+  return viewFolderOf(cache) / (fileNameOf(name) + ".json");
+}
+
+void writeState(const fs::path& file, const std::string& text) {
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  if (error) throw Error("{}: cannot create the directory: {}", file.parent_path().string(), error.message());
+  writeFileDurably(file, text);
+}
+
+namespace {
+
+constexpr int kDigits = 6;  // of the picture's height, or of the number itself
+
+std::string numbers(const glm::dvec3& point, double scale) {
+  const auto part = [scale](double x) { return roundedTo(x, scale, kDigits); };
+  return fmt::format("{},{},{}", part(point.x), part(point.y), part(point.z));
+}
+
+std::string number(double value) {
+  return fmt::format("{}", value == 0 ? 0 : roundedTo(value, std::abs(value), kDigits));
+}
+
+class Words {
+ public:
+  explicit Words(std::string begin) : text_(std::move(begin)) {}
+  void add(const std::string& option, const std::string& value) {
+    text_ += ' ';
+    text_ += shellOption(option, value);
+  }
+  void add(const std::string& flag) { text_ += " " + flag; }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+void addFunction(const EditedFunction& function, const std::filesystem::path& file, Words& words) {
+  const auto parts = function.parts(true);
+  if (!parts) return words.add("--tf", file.string());
+  words.add("--tf", parts->map);
+  words.add("--range", fmt::format("{},{}", parts->range.first, parts->range.second));
+  if (parts->asinh) words.add("--asinh", fmt::format("{},{}", parts->asinh->centre, parts->asinh->width));
+}
+
+void addOpacities(const EditedFunction& function, Words& words) {
+  const auto parts = function.parts(true);
+  if (parts && !parts->opacities.empty()) words.add("--opacity", textOf(parts->opacities));
+  words.add("--opacity-unit", number(function.opacityUnit()));
+}
+
+/// Of pictures of two scalars: colours of one, opacities of the other.
+void addFunctions(const ViewState& state, const CommandOptions& options, Words& words) {
+  addFunction(state.function, options.function_file, words);
+  if (!state.opacity_by) return addOpacities(state.function, words);
+  const auto& [variable, function] = *state.opacity_by;
+  words.add("--opacity-by", variable);
+  if (const auto parts = function.parts(true)) {
+    words.add("--opacity-range", fmt::format("{},{}", parts->range.first, parts->range.second));
+    if (parts->asinh)
+      words.add("--opacity-asinh", fmt::format("{},{}", parts->asinh->centre, parts->asinh->width));
+  } else {
+    words.add("--opacity-tf", options.opacity_file.string());
+  }
+  addOpacities(function, words);
+}
+
+void addCamera(const Camera& camera, Words& words) {
+  const bool perspective = camera.projection == Projection::kPerspective;
+  const double half_height = perspective ? glm::length(camera.position - camera.focal_point) *
+                                               std::tan(0.5 * glm::radians(camera.view_angle_deg))
+                                         : camera.parallel_scale;
+  words.add("--position", numbers(camera.position, half_height));
+  words.add("--focal-point", numbers(camera.focal_point, half_height));
+  if (camera.view_up != glm::dvec3(0, 0, 1)) words.add("--view-up", numbers(camera.view_up, 1));
+  if (perspective)
+    words.add("--view-angle", number(camera.view_angle_deg));
+  else
+    words.add("--parallel-scale", number(camera.parallel_scale));
+}
+
+std::string text(const ClipPlane& plane) {
+  const double size = std::max({1e-300, glm::length(plane.point)});
+  return numbers(plane.point, size) + "," + numbers(plane.normal, glm::length(plane.normal));
+}
+
+std::string text(const SheetOpacity& opacity) {
+  if (!opacity.by_function) return number(opacity.factor);
+  return opacity.factor == 1 ? "function" : "function*" + number(opacity.factor);
+}
+
+/// Once for each surface, where any is not opaque.
+void addSurfaceOpacities(const ViewState& state, Words& words) {
+  std::vector<SheetOpacity> opacities;
+  for (const SurfaceFile& surface : state.surfaces) opacities.push_back({surface.opacity});
+  for (const NamedFaces& named : state.faces) opacities.push_back(state.opacityOf(named));
+  if (std::all_of(opacities.begin(), opacities.end(), [](const SheetOpacity& one) { return one.opaque(); }))
+    return;
+  for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
+}
+
+void addSurfaces(const ViewState& state, Words& words) {
+  const auto add_colour = [&](const glm::vec3& colour) {
+    const glm::ivec3 rgb(255.0f * colour + 0.5f);
+    words.add("--surface-colour", fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
+  };
+  for (const SurfaceFile& surface : state.surfaces) words.add("--surface", shortPath(surface.path).string());
+  for (const NamedFaces& named : state.faces) words.add("--surface", named.name);
+  for (const SurfaceFile& surface : state.surfaces) add_colour(surface.colour);
+  for (const NamedFaces& named : state.faces) add_colour(named.colour);
+  addSurfaceOpacities(state, words);
+  if (state.faces_by && !state.faces.empty()) words.add("--surface-by", state.faces_by->variable);
+  for (const ClipPlane& plane : state.slices) words.add("--slice", text(plane));
+  if (!state.slice_opacity.opaque() && !state.slices.empty())
+    words.add("--slice-opacity", text(state.slice_opacity));
+  if (!state.isovalues.empty()) {
+    words.add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
+    if (!state.iso_opacity.opaque()) words.add("--iso-opacity", text(state.iso_opacity));
+  }
+  if (!state.volume && state.hasSheets()) words.add("--volume", "off");
+}
+
+}  // namespace
+
+bool needsFile(const EditedFunction& function) {
+  return !function.parts();
+}
+
+std::filesystem::path shortPath(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(path, ignored);
+  const std::filesystem::path relative =
+      whole.lexically_relative(std::filesystem::weakly_canonical(".", ignored));
+  return relative.empty() || *relative.begin() == ".." ? whole : relative;
+}
+
+std::string renderCommand(const ViewState& state, const CommandOptions& options) {
+  std::string files = shellWord(options.cache.string());
+  for (const std::filesystem::path& file : options.solutions)
+    files += fmt::format(" {}", shellWord(file.string()));
+  Words words(fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
+  if (options.fine_values) words.add("--value-precision", "fine");
+  const int multiple = options.turns ? 2 : 1;  // an .mp4 has an even width and height
+  words.add("--size", fmt::format("{}x{}", options.size.width / multiple * multiple,
+                                  options.size.height / multiple * multiple));
+  words.add("--scalar", state.variable);
+  addFunctions(state, options, words);
+  addCamera(state.camera, words);
+  if (options.turns) words.add("--orbit", "360");
+  if (state.lod_pixels != 1) words.add("--lod-pixels", number(state.lod_pixels));
+  if (state.classification == Classification::kFlat) words.add("--classify", "flat");
+  if (state.scale != glm::dvec3(1.0))
+    words.add("--scale", fmt::format("{},{},{}", state.scale.x, state.scale.y, state.scale.z));
+  if (state.clip_box) {
+    const auto& [lower, upper] = *state.clip_box;
+    const double size = glm::length(upper - lower);
+    const auto part = [size](double x) { return roundedTo(x, size, kDigits); };
+    words.add("--clip-box", fmt::format("{},{},{},{},{},{}", part(lower.x), part(upper.x), part(lower.y),
+                                        part(upper.y), part(lower.z), part(upper.z)));
+  }
+  for (const ClipPlane& plane : state.clip_planes) words.add("--clip-plane", text(plane));
+  if (state.lit) words.add("--shade");
+  addSurfaces(state, words);
+  if (state.dark) words.add("--background", "black");
+  if (state.annotations.scalar_bar) words.add("--scalar-bar");
+  if (state.annotations.axes) words.add("--axes");
+  if (state.annotations.axes_grid) words.add("--axes-grid");
+  if (state.annotations.outline) words.add("--outline");
+  return words.text();
+}
+
+}  // namespace curvisplat

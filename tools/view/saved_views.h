@@ -1,0 +1,65 @@
+// Views that are kept: as files, in $XDG_CONFIG_HOME/curvisplat or ~/.config/curvisplat, and as the
+// `curvisplat render` command that draws what is shown. The command is short: its numbers have no more
+// digits than can be seen.
+//
+// Files are small and written at once. The functions keep no state: any thread may call them.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/view/view_state.h"
+
+namespace curvisplat {
+
+/// The configuration folder; nullopt if neither XDG_CONFIG_HOME nor HOME is set.
+std::optional<std::filesystem::path> configFolder();
+
+/// The state file of this cache, named by the cache's name and a hash of its path; nullopt without a folder.
+std::optional<std::filesystem::path> rememberedStateOf(const std::filesystem::path& cache);
+
+/// What the window remembers of itself, whatever it shows.
+struct WindowSettings {
+  bool light_theme = false;
+  double text_scale = 1;
+  std::vector<std::vector<std::string>>
+      recent;  // what was opened, the newest first: a cache, or a grid's files
+
+  /// Puts these files at the front; of more than 12 entries the oldest are forgotten.
+  void opened(std::vector<std::string> files);
+};
+/// The settings that were written last; the defaults if there are none, or none that can be read.
+WindowSettings readSettings();
+/// Throws Error.
+void writeSettings(const WindowSettings& settings);
+
+/// The views that were saved for this cache, by name.
+std::vector<std::string> savedViewsOf(const std::filesystem::path& cache);
+/// The file of a saved view; any text is a name. Throws Error without a configuration folder.
+std::filesystem::path savedViewOf(const std::filesystem::path& cache, const std::string& name);
+
+/// Writes `text` to `file` and creates the folder if necessary. Throws Error.
+void writeState(const std::filesystem::path& file, const std::string& text);
+
+/// What the command draws besides the state.
+struct CommandOptions {
+  std::filesystem::path cache;
+  ImageSize size;
+  std::filesystem::path function_file, opacity_file;  // those that needsFile() asks for
+  bool turns = false;                                 // a movie: once around the focal point
+  std::vector<std::filesystem::path> solutions = {};  // where `cache` is a grid: its further files
+  bool fine_values = false;                           // of such a grid: --value-precision fine
+};
+
+/// Whether options cannot state the function, so that it has to be in a file (toParaViewPreset()).
+bool needsFile(const EditedFunction& function);
+
+/// The shell command. Options that have their defaults are left out.
+std::string renderCommand(const ViewState& state, const CommandOptions& options);
+
+/// `path` as seen from the current folder if it lies in there, else as it is.
+std::filesystem::path shortPath(const std::filesystem::path& path);
+
+}  // namespace curvisplat

@@ -1,0 +1,406 @@
+#include "tools/view/view_state.h"
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/automatic/first_choice.h"
+#include "render/mesh/triangle_mesh.h"
+#include "stream/base/error.h"
+#include "stream/base/json_document.h"
+
+namespace curvisplat {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kMaxIsovalues = 64, kMaxMarkers = 1000;
+
+double positive(const JsonField& field) {
+  return field.number(1e-300, 1e300);
+}
+
+Json jsonOf(const glm::dvec3& point) {
+  return {point.x, point.y, point.z};
+}
+
+Json jsonOf(const std::vector<ClipPlane>& planes) {
+  Json json = Json::array();
+  for (const ClipPlane& plane : planes)
+    json.push_back({{"point", jsonOf(plane.point)}, {"normal", jsonOf(plane.normal)}});
+  return json;
+}
+
+/// At most `most`; states of earlier versions have none.
+std::vector<ClipPlane> planesFrom(const JsonField& fields, const char* name, size_t most) {
+  std::vector<ClipPlane> planes;
+  const auto list = fields.find(name);
+  if (!list) return planes;
+  for (const JsonField& entry : list->elements(most)) {
+    planes.push_back({entry.at("point").point(), entry.at("normal").point()});
+    if (!isUsable(planes.back())) entry.at("normal").fail("a direction");
+  }
+  return planes;
+}
+
+Json jsonOf(const Camera& camera) {
+  return {{"position", jsonOf(camera.position)},
+          {"focal_point", jsonOf(camera.focal_point)},
+          {"view_up", jsonOf(camera.view_up)},
+          {"perspective", camera.projection == Projection::kPerspective},
+          {"parallel_scale", camera.parallel_scale},
+          {"view_angle", camera.view_angle_deg}};
+}
+
+Camera cameraFrom(const JsonField& fields) {
+  Camera camera;
+  camera.position = fields.at("position").point();
+  camera.focal_point = fields.at("focal_point").point();
+  camera.view_up = fields.at("view_up").point();
+  camera.projection = fields.at("perspective").flag() ? Projection::kPerspective : Projection::kOrthographic;
+  camera.parallel_scale = positive(fields.at("parallel_scale"));
+  camera.view_angle_deg = fields.at("view_angle").number(1e-3, 179);
+  if (camera.position == camera.focal_point) fields.at("position").fail("another point than focal_point");
+  return camera;
+}
+
+/// What options can state of a function; null if they cannot.
+Json partsOf(const EditedFunction& function) {
+  const auto parts = function.parts();
+  if (!parts) return nullptr;
+  Json json = {{"map", parts->map}, {"range", {parts->range.first, parts->range.second}}};
+  if (parts->asinh) json["asinh"] = {parts->asinh->centre, parts->asinh->width};
+  if (!parts->opacities.empty()) json["opacities"] = textOf(parts->opacities);
+  json["opacity_unit"] = parts->opacity_unit;
+  return json;
+}
+
+std::pair<double, double> pairFrom(const JsonField& field) {
+  const std::vector<JsonField> both = field.elements(2);
+  if (both.size() != 2) field.fail("two numbers");
+  return {both[0].number(-1e300, 1e300), both[1].number(-1e300, 1e300)};
+}
+
+FunctionParts partsFrom(const JsonField& fields) {
+  FunctionParts parts{fields.at("map").text(), pairFrom(fields.at("range")), {}, {}, 1};
+  if (!(parts.range.first < parts.range.second)) fields.at("range").fail("an increasing range");
+  if (const auto asinh = fields.find("asinh")) {
+    const auto [centre, width] = pairFrom(*asinh);
+    if (!(width > 0)) asinh->fail("a width above zero");
+    parts.asinh = AsinhScale{centre, width};
+  }
+  if (const auto opacities = fields.find("opacities"))
+    parts.opacities = parseOpacities("opacities", opacities->text());
+  parts.opacity_unit = positive(fields.at("opacity_unit"));
+  return parts;
+}
+
+/// The function of `fields`: preset, parts and points. States of earlier versions have no parts.
+EditedFunction functionFrom(const JsonField& fields, const std::filesystem::path& path, double opacity_unit) {
+  const JsonField preset = fields.at("preset");
+  const bool automatic = preset.text() == EditedFunction::kAutomatic;
+  try {
+    if (const auto parts = fields.find("parts")) {
+      const FunctionParts read = partsFrom(*parts);
+      EditedFunction function(read);
+      if (automatic) function.setAutomatic();
+      // The points are what counts: who changes them may not know of the parts.
+      const Json points = Json::parse(toParaViewPreset(function.definition())).front();
+      if (points == fields.at("function").json() && function.preset() == preset.text()) return function;
+    }
+    EditedFunction function(parseParaViewPreset(fields.at("function").json().dump(), path), opacity_unit);
+    if (automatic)
+      function.setAutomatic();
+    else if (!preset.text().empty())
+      return EditedFunction(preset.text(), function.range().first, function.range().second,
+                            function.opacityUnit());
+    return function;
+  } catch (const UsageError&) {
+    preset.fail("the name of a colour map (curvisplat colormaps lists them)");
+  }
+}
+
+void put(Json& json, const EditedFunction& function) {
+  json["preset"] = function.preset();
+  json["parts"] = partsOf(function);
+  json["function"] = Json::parse(toParaViewPreset(function.definition())).front();
+}
+
+glm::vec3 colourFrom(const JsonField& field) {
+  const glm::dvec3 colour = field.point();
+  for (int c = 0; c < 3; ++c)
+    if (!(colour[c] >= 0 && colour[c] <= 1)) field.fail("three numbers from 0 to 1");
+  return glm::vec3(colour);
+}
+
+void putSurfaces(Json& json, const ViewState& state) {
+  json["surfaces"] = Json::array();
+  for (const SurfaceFile& surface : state.surfaces)
+    json["surfaces"].push_back({{"file", surface.path.string()},
+                                {"colour", jsonOf(glm::dvec3(surface.colour))},
+                                {"opacity", surface.opacity}});
+  json["faces"] = Json::array();
+  for (const NamedFaces& named : state.faces)
+    json["faces"].push_back({{"name", named.name},
+                             {"colour", jsonOf(glm::dvec3(named.colour))},
+                             {"opacity", named.opacity.factor},
+                             {"by_function", named.opacity.by_function}});
+  json["faces_by"] = nullptr;
+  if (state.faces_by) {
+    json["faces_by"] = {{"variable", state.faces_by->variable}};
+    put(json["faces_by"], state.faces_by->function);
+  }
+  json["slices"] = jsonOf(state.slices);
+  json["slice_opacity"] = state.slice_opacity.factor;
+  json["slices_by_function"] = state.slice_opacity.by_function;
+  json["isovalues"] = state.isovalues;
+  json["iso_opacity"] = state.iso_opacity.factor;
+  json["isosurfaces_by_function"] = state.iso_opacity.by_function;
+  json["volume"] = state.volume;
+}
+
+Json jsonOf(const Marker& marker) {
+  return {{"name", marker.name},
+          {"point", jsonOf(marker.point)},
+          {"scalar", marker.scalar},
+          {"unit", marker.unit},
+          {"value", marker.value},
+          {"block", marker.block},
+          {"i", marker.i},
+          {"j", marker.j},
+          {"k", marker.k}};
+}
+
+Marker markerFrom(const JsonField& fields) {
+  const auto index = [&](const char* name) { return static_cast<uint64_t>(fields.at(name).number(0, 1e15)); };
+  return {fields.at("name").text(),
+          fields.at("point").point(),
+          fields.at("scalar").text(),
+          fields.at("unit").text(),
+          fields.at("value").number(-1e300, 1e300),
+          static_cast<uint32_t>(fields.at("block").number(0, 4e9)),
+          index("i"),
+          index("j"),
+          index("k")};
+}
+
+WorldBox boxFrom(const JsonField& fields) {
+  const WorldBox box{fields.at("lower").point(), fields.at("upper").point()};
+  for (int axis = 0; axis < 3; ++axis)
+    if (box.lower[axis] > box.upper[axis]) fields.at("lower").fail("less than upper");
+  return box;
+}
+
+const VariableInfo* find(const Manifest& manifest, const std::string& name) {
+  const auto found = std::find_if(manifest.variables.begin(), manifest.variables.end(),
+                                  [&](const VariableInfo& variable) { return variable.name == name; });
+  return found == manifest.variables.end() ? nullptr : &*found;
+}
+
+double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
+  const double diagonal = glm::length(scale * (manifest.upper - manifest.lower));
+  return diagonal > 0 ? diagonal / 100 : 1;
+}
+
+/// States of earlier versions lack some.
+void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, const Manifest& manifest,
+                  ViewState& state) {
+  if (const auto surfaces = fields.find("surfaces"))
+    for (const JsonField& surface : surfaces->elements(kMaxSurfaces)) {
+      SurfaceFile& file = state.surfaces.emplace_back(
+          SurfaceFile{surface.at("file").text(), colourFrom(surface.at("colour"))});
+      if (const auto opacity = surface.find("opacity")) file.opacity = opacity->number(1e-3, 1);
+    }
+  if (const auto faces = fields.find("faces"))
+    for (const JsonField& named : faces->elements(kMaxSurfaces))
+      state.faces.push_back({named.at("name").text(),
+                             colourFrom(named.at("colour")),
+                             {named.at("opacity").number(1e-3, 1), named.at("by_function").flag()}});
+  if (const auto by = fields.find("faces_by")) {
+    const JsonField variable = by->at("variable");
+    if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+    state.faces_by =
+        FacesScalar{variable.text(), functionFrom(*by, path, defaultOpacityUnit(manifest, state.scale))};
+  }
+  state.slices = planesFrom(fields, "slices", kMaxSlices);
+  if (const auto opacity = fields.find("slice_opacity"))
+    state.slice_opacity.factor = opacity->number(1e-3, 1);
+  if (const auto by = fields.find("slices_by_function")) state.slice_opacity.by_function = by->flag();
+  if (const auto values = fields.find("isovalues"))
+    for (const JsonField& value : values->elements(kMaxIsovalues))
+      state.isovalues.push_back(value.number(-1e300, 1e300));
+  if (const auto opacity = fields.find("iso_opacity")) state.iso_opacity.factor = opacity->number(1e-3, 1);
+  if (const auto by = fields.find("isosurfaces_by_function")) state.iso_opacity.by_function = by->flag();
+  if (const auto volume = fields.find("volume")) state.volume = volume->flag();
+}
+
+}  // namespace
+
+SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
+  return {named.opacity.factor, named.opacity.by_function && (faces_by || opacity_by)};
+}
+
+FaceNames ViewState::faceNames() const {
+  FaceNames names{{}, faces_by ? faces_by->variable : "", ""};
+  for (const NamedFaces& named : faces) {
+    const bool has_opacities = named.opacity.by_function && opacity_by && opacity_by->variable != variable;
+    names.faces.push_back({named.name, has_opacities});
+    if (has_opacities) names.opacity_by = opacity_by->variable;
+  }
+  return names;
+}
+
+FrameOptions ViewState::frameOptions(ImageSize size) const {
+  FrameOptions options;
+  options.size = size;
+  options.classification = classification;
+  options.lod_pixels = lod_pixels;
+  options.scale = scale;
+  options.clip_box = clip_box;
+  options.clip_planes = clip_planes;
+  if (lit) options.light = Light{};
+  if (hasSheets()) {
+    auto scene = std::make_shared<SurfaceScene>();
+    for (const SurfaceFile& surface : surfaces)
+      if (surface.mesh)
+        scene->surfaces.push_back({surface.mesh, surface.colour, false, nullptr, {surface.opacity}});
+    std::shared_ptr<const TransferFunction> of_faces;
+    std::shared_ptr<const ColourTable> colours;  // none: the picture's
+    if (faces_by && faces_by->variable != variable && !faces.empty()) {
+      of_faces = std::make_shared<TransferFunction>(faces_by->function.function());
+      colours = std::make_shared<ColourTable>(*of_faces);
+    }
+    for (const NamedFaces& named : faces) {
+      GridSurface& surface = scene->grid_surfaces.emplace_back();
+      surface.colour = named.colour;
+      surface.opacity = opacityOf(named);
+      surface.function = of_faces;
+      surface.colours = colours;
+    }
+    scene->slices = slices;
+    scene->slice_opacity = slice_opacity.factor;
+    scene->slices_by_function = slice_opacity.by_function;
+    scene->isovalues = isovalues;
+    scene->iso_opacity = iso_opacity;
+    scene->volume = volume;
+    options.scene = std::move(scene);
+  }
+  options.background = background();
+  options.memory_bytes = memory_bytes;
+  return options;
+}
+
+ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
+  if (manifest.variables.empty())
+    throw Error("{}: the cache contains no scalar; convert the grid again with a scalar", manifest.title);
+  const VariableInfo& variable = manifest.variables[firstVaryingVariable(manifest)];
+  ViewState state{
+      variable.name,
+      {},
+      EditedFunction("viridis", variable.min, variable.max, defaultOpacityUnit(manifest, glm::dvec3(1)))};
+  state.camera = Camera::named("iso", manifest.lower, manifest.upper,
+                               dataSize(state.annotations, picture, state.function.function()),
+                               Projection::kOrthographic);
+  return state;
+}
+
+void loadSurfaces(ViewState& state) {
+  for (SurfaceFile& surface : state.surfaces)
+    if (!surface.mesh) surface.mesh = std::make_shared<TriangleMesh>(readMeshFile(surface.path));
+}
+
+void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name) {
+  const VariableInfo* const variable = find(manifest, name);
+  if (!variable) {
+    std::string names;
+    for (const VariableInfo& one : manifest.variables) names += (names.empty() ? "" : ", ") + one.name;
+    throw UsageError("the cache has no scalar {}; expected one of {}", name, names);
+  }
+  state.variable = name;
+  state.function.fitRange(variable->min, variable->max);
+}
+
+std::string toJson(const ViewState& state) {
+  Json json = {{"curvisplat_view", 1}, {"variable", state.variable}, {"camera", jsonOf(state.camera)}};
+  put(json, state.function);
+  json["opacity_by"] = nullptr;
+  if (state.opacity_by) {
+    json["opacity_by"] = {{"variable", state.opacity_by->variable}};
+    put(json["opacity_by"], state.opacity_by->function);
+  }
+  json["lod_pixels"] = state.lod_pixels;
+  json["memory_bytes"] = state.memory_bytes;
+  json["flat"] = state.classification == Classification::kFlat;
+  json["scale"] = jsonOf(state.scale);
+  json["clip_box"] = nullptr;
+  if (state.clip_box)
+    json["clip_box"] = {{"lower", jsonOf(state.clip_box->lower)}, {"upper", jsonOf(state.clip_box->upper)}};
+  json["clip_planes"] = jsonOf(state.clip_planes);
+  putSurfaces(json, state);
+  json["lit"] = state.lit;
+  json["dark"] = state.dark;
+  json["scalar_bar"] = state.annotations.scalar_bar;
+  json["axes"] = state.annotations.axes;
+  json["axes_grid"] = state.annotations.axes_grid;
+  json["outline"] = state.annotations.outline;
+  json["markers"] = Json::array();
+  for (const Marker& marker : state.markers) json["markers"].push_back(jsonOf(marker));
+  return json.dump(1) + "\n";
+}
+
+ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
+                            const Manifest& manifest) {
+  const JsonDocument document(text, path.string(), "the state of a window");
+  const JsonField fields = document.root();
+  if (const JsonField version = fields.at("curvisplat_view"); version.json() != 1)
+    version.fail("1, the only version this program reads");
+  const JsonField variable = fields.at("variable"), scale = fields.at("scale");
+  if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+  const glm::dvec3 factors = scale.point();
+  if (!(std::min({factors.x, factors.y, factors.z}) > 0)) scale.fail("three numbers above zero");
+
+  ViewState state{variable.text(), cameraFrom(fields.at("camera")),
+                  functionFrom(fields, path, defaultOpacityUnit(manifest, factors))};
+  state.lod_pixels = fields.at("lod_pixels").number(0, 1e6);
+  state.memory_bytes = static_cast<uint64_t>(fields.at("memory_bytes").number(1, 1e18));
+  state.classification = fields.at("flat").flag() ? Classification::kFlat : Classification::kPixel;
+  state.scale = factors;
+  if (const auto box = fields.find("clip_box")) state.clip_box = boxFrom(*box);
+  state.clip_planes = planesFrom(fields, "clip_planes", kMaxClipPlanes);
+  takeSurfaces(fields, path, manifest, state);
+  if (const auto lit = fields.find("lit")) state.lit = lit->flag();
+  state.dark = fields.at("dark").flag();
+  state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};
+  if (const auto grid = fields.find("axes_grid")) state.annotations.axes_grid = grid->flag();
+  if (const auto opacity = fields.find("opacity_by")) {
+    const JsonField by = opacity->at("variable");
+    if (!find(manifest, by.text())) by.fail("a scalar of the cache");
+    state.opacity_by =
+        OpacityScalar{by.text(), functionFrom(*opacity, path, defaultOpacityUnit(manifest, factors))};
+  }
+  if (const auto markers = fields.find("markers"))
+    for (const JsonField& marker : markers->elements(kMaxMarkers))
+      state.markers.push_back(markerFrom(marker));
+  return state;
+}
+
+namespace {
+
+constexpr size_t kMaxStates = 200;
+
+}  // namespace
+
+void History::record(const ViewState& state) {
+  // Whether two are the same: what is saved of them says so, and costs less than a millisecond.
+  if (toJson(state) == toJson(states_[at_])) return;
+  states_.resize(at_ + 1, state);
+  states_.push_back(state);
+  if (states_.size() > kMaxStates) states_.erase(states_.begin());
+  at_ = states_.size() - 1;
+}
+
+}  // namespace curvisplat

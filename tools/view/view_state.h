@@ -1,0 +1,138 @@
+// Everything that defines a picture: camera, scalar, transfer function, cuts, surfaces, detail; and the
+// history of such states, for undo and redo. States are saved as JSON between windows, and translated to a
+// `curvisplat render` command (saved_views.h). Value types: one thread at a time may use an object.
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/annotate/annotations.h"
+#include "render/camera/camera.h"
+#include "render/frame/frame.h"
+#include "stream/cache/manifest.h"
+#include "tools/view/edited_function.h"
+#include "tools/view/frame_loop.h"
+
+namespace curvisplat {
+
+inline constexpr size_t kMaxSurfaces = 64;  // of files and of the grid
+
+/// A surface of a file, which loadSurfaces() reads.
+struct SurfaceFile {
+  std::filesystem::path path;
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};
+  std::shared_ptr<const TriangleMesh> mesh = nullptr;
+  double opacity = 1;
+};
+
+/// Faces of the grid, by a name that --surface takes.
+struct NamedFaces {
+  std::string name;
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};
+  SheetOpacity opacity = {};
+};
+
+/// The scalar that colours the grid's faces, and the function that gives them colours where the picture
+/// shows another scalar.
+struct FacesScalar {
+  std::string variable;
+  EditedFunction function;
+};
+
+/// A place in the data that was clicked, and what was found there.
+struct Marker {
+  std::string name;
+  glm::dvec3 point{0.0};  // data coordinates
+  std::string scalar, unit;
+  double value = 0;
+  uint32_t block = 0;  // of the nearest node or cell; block, i, j and k count from 0
+  uint64_t i = 0, j = 0, k = 0;
+};
+
+/// The scalar whose opacities are drawn, where it is not the one that gives the colours.
+struct OpacityScalar {
+  std::string variable;
+  EditedFunction function;
+};
+
+struct ViewState {
+  std::string variable;
+  Camera camera;
+  EditedFunction function;
+  double lod_pixels = 1;
+  uint64_t memory_bytes = 512 << 20;
+  Classification classification = Classification::kPixel;
+  glm::dvec3 scale{1.0};
+  std::optional<WorldBox> clip_box = std::nullopt;
+  std::vector<ClipPlane> clip_planes = {};
+  std::vector<SurfaceFile> surfaces = {};
+  std::vector<NamedFaces> faces = {};
+  std::optional<FacesScalar> faces_by = std::nullopt;  // none: each has its colour
+  std::vector<ClipPlane> slices = {};
+  SheetOpacity slice_opacity = {};
+  std::vector<double> isovalues = {};  // of isoScalar()
+  SheetOpacity iso_opacity = {};
+  bool volume = true;  // with a slice or a surface it may be left out
+  bool lit = false;
+  bool dark = false;  // background
+  Annotations annotations{true, true, true};
+  std::optional<OpacityScalar> opacity_by = std::nullopt;
+  std::vector<Marker> markers = {};
+
+  glm::vec4 background() const { return dark ? glm::vec4(0, 0, 0, 1) : glm::vec4(1); }
+  /// The scalar of isosurfaces and of opacities.
+  const std::string& isoScalar() const { return opacity_by ? opacity_by->variable : variable; }
+  /// Whether there is anything but the volume; without it the volume is drawn, whatever `volume` says.
+  bool hasSheets() const {
+    return !(surfaces.empty() && faces.empty() && slices.empty() && isovalues.empty());
+  }
+  /// As it is drawn: without a scalar there is no function.
+  SheetOpacity opacityOf(const NamedFaces& named) const;
+  FaceNames faceNames() const;
+  /// Its grid surfaces have their look; their faces are found by faceNames().
+  FrameOptions frameOptions(ImageSize size) const;
+};
+
+/// The initial state without a look at the data: the first scalar that varies with a preset, and the data
+/// fitted into the picture beside the scalar bar. Throws Error if the cache has no scalar.
+ViewState firstViewOf(const Manifest& manifest, ImageSize picture);
+
+/// Reads the surfaces that have no mesh yet. Throws Error for one that cannot be read.
+void loadSurfaces(ViewState& state);
+
+/// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the
+/// scalars if there is none of this name.
+void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name);
+
+std::string toJson(const ViewState& state);
+/// `path` names the file in messages. Throws Error with the path and the field that is missing or out of
+/// range, or the scalar that the cache lacks.
+ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
+                            const Manifest& manifest);
+
+/// Undo and redo: the states of a view that were at rest, the newest last.
+class History {
+ public:
+  explicit History(const ViewState& first) : states_{first} {}
+
+  /// Keeps a state at which the user rests: after a drag, not during it. A state equal to the newest is not
+  /// kept; a state after an undo replaces what could be redone. The oldest of more than 200 are forgotten.
+  void record(const ViewState& state);
+  bool canUndo() const { return at_ > 0; }
+  bool canRedo() const { return at_ + 1 < states_.size(); }
+  /// The state before or after; nullptr if there is none. Valid until the next record().
+  const ViewState* undo() { return canUndo() ? &states_[--at_] : nullptr; }
+  const ViewState* redo() { return canRedo() ? &states_[++at_] : nullptr; }
+
+ private:
+  std::vector<ViewState> states_;
+  size_t at_ = 0;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,301 @@
+#include "tools/window/file_dialog.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <iterator>
+#include <sstream>
+#include <system_error>
+
+#include "stream/base/error.h"
+#include "tools/window/widgets.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMaxSide = 16384;     // of a picture, in pixels
+constexpr int kFramesToFocus = 10;  // Dear ImGui takes two
+
+struct Look {
+  const char *title, *button;
+  bool saves = false;
+  std::vector<std::string> endings = {};
+};
+
+Look lookOf(FileDialog::Purpose purpose) {
+  switch (purpose) {
+    case FileDialog::Purpose::kOpenData:
+      return {"Open a cache or a grid", "open"};
+    case FileDialog::Purpose::kLoadFunction:
+      return {"Load colours and opacities", "load", false, {".json"}};
+    case FileDialog::Purpose::kSaveFunction:
+      return {"Save colours and opacities", "save", true, {".json"}};
+    case FileDialog::Purpose::kSavePicture:
+      return {"Save picture", "save", true, {".png", ".exr", ".pfm"}};
+    case FileDialog::Purpose::kOpenSurface:
+      return {"Add a surface", "add", false, {".stl", ".ply", ".obj"}};
+    case FileDialog::Purpose::kSaveMovie:
+      return {"Save movie", "save", true, {".mp4", ".gif", ".png"}};
+  }
+  return {"", ""};
+}
+
+bool isCache(const fs::path& path) {
+  return path.extension() == ".splats";
+}
+
+std::string sizeText(uint64_t bytes) {
+  const auto number = static_cast<double>(bytes);
+  if (number < 1e3) return fmt::format("{} B", bytes);
+  if (number < 1e6) return fmt::format("{:.0f} kB", number / 1e3);
+  return number < 1e9 ? fmt::format("{:.1f} MB", number / 1e6) : fmt::format("{:.2f} GB", number / 1e9);
+}
+
+}  // namespace
+
+std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std::string>& endings) {
+  std::vector<FolderEntry> entries;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (name.starts_with('.')) continue;
+    std::error_code ignored;
+    const bool is_folder = at->is_directory(ignored) && !isCache(name);
+    const bool fits = endings.empty() || std::find(endings.begin(), endings.end(),
+                                                   at->path().extension().string()) != endings.end();
+    if (!is_folder && !fits) continue;
+    const uint64_t bytes = is_folder || isCache(name) ? 0 : at->file_size(ignored);
+    entries.push_back({name, is_folder, ignored ? 0 : bytes});
+  }
+  if (error) throw Error("{}: cannot be read: {}", folder.string(), error.message());
+  std::sort(entries.begin(), entries.end(), [](const FolderEntry& a, const FolderEntry& b) {
+    return a.is_folder != b.is_folder ? a.is_folder : a.name < b.name;
+  });
+  return entries;
+}
+
+void FileDialog::open(Purpose purpose, const std::string& name) {
+  purpose_ = purpose;
+  opens_ = true;
+  frames_to_focus_ = kFramesToFocus;
+  std::error_code ignored;
+  enter(folder_.empty() ? fs::current_path(ignored) : folder_);
+  take({});
+  name_ = name;
+}
+
+void FileDialog::openToSavePicture(const std::string& name, ImageSize size) {
+  open(Purpose::kSavePicture, name);
+  size_ = offered_size_ = size;
+}
+
+void FileDialog::openToSaveMovie(const std::string& name, const std::string& about) {
+  open(Purpose::kSaveMovie, name);
+  about_ = about;
+}
+
+void FileDialog::enter(const fs::path& folder) {
+  error_.clear();
+  overwrites_.clear();
+  if (!lookOf(*purpose_).saves) take({});
+  try {
+    entries_ = entriesOf(folder, lookOf(*purpose_).endings);
+    folder_ = folder;
+  } catch (const Error& error) {
+    error_ = error.what();
+  }
+}
+
+std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
+  if (!purpose_) return std::nullopt;
+  const Look look = lookOf(*purpose_);
+  if (std::exchange(opens_, false)) ImGui::OpenPopup(look.title);
+  const ImVec2 whole = ImGui::GetIO().DisplaySize;
+  const float unit = ImGui::GetFontSize();
+  ImGui::SetNextWindowSize({std::min(46 * unit, whole.x), std::min(32 * unit, whole.y)}, ImGuiCond_Appearing);
+  ImGui::SetNextWindowPos({0.5f * whole.x, 0.5f * whole.y}, ImGuiCond_Appearing, {0.5f, 0.5f});
+  if (!ImGui::BeginPopupModal(look.title)) {
+    purpose_.reset();
+    return std::nullopt;
+  }
+  window.cover({0, 0, static_cast<double>(whole.x), static_cast<double>(whole.y)});
+  bool accepts = false;
+  if (ImGui::Button("up")) enter(folder_.parent_path());
+  nameWidget("file up");
+  ImGui::SameLine();
+  const char* const home = std::getenv("HOME");
+  if (home && ImGui::Button("home")) enter(home);
+  if (home) ImGui::SameLine();
+  ImGui::TextUnformatted(folder_.c_str());
+  drawEntries(accepts);
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
+  accepts |= ImGui::InputTextWithHint("##name", look.saves ? "name" : "name, or a path", &name_,
+                                      ImGuiInputTextFlags_EnterReturnsTrue);
+  nameWidget("file name");
+  // Dear ImGui gives a field no letters in the frame in which it gets the focus.
+  frames_to_focus_ = ImGui::IsItemActive() ? 0 : std::max(0, frames_to_focus_ - 1);
+  if (frames_to_focus_ > 0) window.holdInput();
+  if (*purpose_ == Purpose::kSavePicture) drawSize();
+  if (*purpose_ == Purpose::kSaveMovie) {
+    ImGui::TextUnformatted(about_.c_str());
+    nameWidget("movie of " + about_);
+  }
+  accepts |= ImGui::Button(look.button);
+  nameWidget("file accept");
+  ImGui::SameLine();
+  const bool cancels = ImGui::Button("cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape));
+  nameWidget("file cancel");
+  ImGui::SameLine();
+  if (error_.empty() && *purpose_ == Purpose::kOpenData)
+    ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
+  else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
+    ImGui::TextDisabled(".mp4 or .gif; .png: a numbered picture of each frame");
+  else
+    ImGui::TextUnformatted(error_.c_str());
+  std::optional<Chosen> chosen;
+  if (accepts) chosen = accept();
+  if (cancels || chosen) {
+    ImGui::CloseCurrentPopup();
+    purpose_.reset();
+  }
+  ImGui::EndPopup();
+  return chosen;
+}
+
+/// Width and height in pixels, and buttons for usual ones.
+void FileDialog::drawSize() {
+  const auto number = [](const char* name, int& value) {
+    ImGui::SetNextItemWidth(5 * ImGui::GetFontSize());
+    ImGui::InputInt(fmt::format("##{}", name).c_str(), &value, 0, 0);
+    nameWidget(name);
+    value = std::clamp(value, 1, kMaxSide);
+    ImGui::SameLine();
+  };
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted("size");
+  ImGui::SameLine();
+  number("picture width", size_.width);
+  ImGui::TextUnformatted("x");
+  ImGui::SameLine();
+  number("picture height", size_.height);
+  ImGui::TextUnformatted("pixels");
+  nameWidget(fmt::format("picture of {} x {}", size_.width, size_.height));
+  const auto offer = [this](const char* text, ImageSize size) {
+    ImGui::SameLine();
+    if (ImGui::Button(text)) size_ = size;
+    nameWidget(fmt::format("picture size {}", text));
+  };
+  offer("as shown", offered_size_);
+  offer("twice that",
+        {std::min(kMaxSide, 2 * offered_size_.width), std::min(kMaxSide, 2 * offered_size_.height)});
+  offer("1920 x 1080", {1920, 1080});
+  offer("3840 x 2160", {3840, 2160});
+}
+
+/// A click takes a name, with Control several; a double click opens.
+void FileDialog::drawEntries(bool& accepts) {
+  const float lines = *purpose_ == Purpose::kSavePicture ? 3.6f : 2.6f;
+  const float below = lines * ImGui::GetFrameHeightWithSpacing();
+  ImGui::BeginChild("entries", {0, -below}, true);
+  std::optional<fs::path> entered;
+  if (entries_.empty())
+    ImGui::TextDisabled("%s", lookOf(*purpose_).saves
+                                  ? "There is no such file in this folder yet."
+                                  : "No file in this folder is of a kind that can be chosen here.");
+  for (const FolderEntry& entry : entries_) {
+    const std::string shown = entry.is_folder ? entry.name + "/" : entry.name;
+    const bool chosen =
+        ImGui::Selectable(shown.c_str(), isTaken(entry.name),
+                          ImGuiSelectableFlags_AllowDoubleClick | ImGuiSelectableFlags_DontClosePopups);
+    nameWidget("file " + entry.name);
+    if (!entry.is_folder && entry.bytes > 0) {
+      const std::string size = sizeText(entry.bytes);
+      ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::CalcTextSize(size.c_str()).x);
+      ImGui::TextDisabled("%s", size.c_str());
+    }
+    if (!chosen) continue;
+    const bool twice = ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
+    if (entry.is_folder) {
+      if (twice) entered = folder_ / entry.name;
+      continue;
+    }
+    std::vector<std::string> names{entry.name};
+    if (ImGui::GetIO().KeyCtrl && *purpose_ == Purpose::kOpenData && !twice) {
+      names = taken_;
+      if (std::erase(names, entry.name) == 0) names.push_back(entry.name);
+    }
+    take(std::move(names));
+    accepts |= twice;
+  }
+  ImGui::EndChild();
+  if (entered) enter(*entered);
+}
+
+void FileDialog::take(std::vector<std::string> names) {
+  taken_ = std::move(names);
+  name_.clear();
+  for (const std::string& name : taken_) name_ += (name_.empty() ? "" : " ") + name;
+  taken_text_ = name_;
+}
+
+/// By a click, as long as nothing was typed since, or because it was typed.
+bool FileDialog::isTaken(const std::string& name) const {
+  if (name_ != taken_text_) return name_ == name;
+  return std::find(taken_.begin(), taken_.end(), name) != taken_.end();
+}
+
+std::optional<FileDialog::Chosen> FileDialog::accept() {
+  const Look look = lookOf(*purpose_);
+  std::error_code ignored;
+  const auto whole = [&](const std::string& name) {
+    return fs::path(name).is_absolute() ? fs::path(name) : folder_ / name;
+  };
+  if (name_.empty()) {
+    error_ = look.saves ? "type a name first" : "choose a file first, or type its name";
+    return std::nullopt;
+  }
+  if (const fs::path path = whole(name_); fs::is_directory(path, ignored) && !isCache(path)) {
+    enter(path);
+    name_.clear();
+    return std::nullopt;
+  }
+  Chosen chosen{*purpose_, {}};
+  if (look.saves) {
+    fs::path path = whole(name_);
+    if (path.extension().empty()) path += look.endings.front();
+    // The second time it is meant.
+    if (fs::exists(path, ignored) && overwrites_ != path.string()) {
+      overwrites_ = path.string();
+      error_ = path.filename().string() + " exists; save again to replace it";
+      return std::nullopt;
+    }
+    chosen.files.push_back(path);
+    if (*purpose_ == Purpose::kSavePicture) chosen.size = size_;
+    return chosen;
+  }
+  if (fs::exists(whole(name_), ignored)) {
+    chosen.files.push_back(whole(name_));  // perhaps with spaces in its name
+    return chosen;
+  }
+  std::vector<std::string> names = taken_;  // perhaps with spaces
+  if (name_ != taken_text_) {
+    std::istringstream words(name_);
+    names.assign(std::istream_iterator<std::string>(words), {});
+  }
+  for (const std::string& name : names) {
+    if (!fs::exists(whole(name), ignored)) {
+      error_ = name + " does not exist";
+      return std::nullopt;
+    }
+    chosen.files.push_back(whole(name));
+  }
+  return chosen;
+}
+
+}  // namespace curvisplat

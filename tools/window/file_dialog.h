@@ -1,0 +1,66 @@
+// Chooses files in the window. Our own: Debian has no library for it, and those in the desktop's own style
+// ask programs that a cluster's login node does not have.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/image/image.h"
+#include "tools/window/window.h"
+
+namespace curvisplat {
+
+/// What a folder has to show.
+struct FolderEntry {
+  std::string name;
+  bool is_folder = false;  // to go into; a cache is none
+  uint64_t bytes = 0;
+};
+
+/// Folders first, by name, without those that begin with a dot; files with one of the endings, or all if
+/// there are none. Throws Error if the folder cannot be read.
+std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
+                                   const std::vector<std::string>& endings);
+
+class FileDialog {
+ public:
+  enum class Purpose { kOpenData, kLoadFunction, kSaveFunction, kSavePicture, kSaveMovie, kOpenSurface };
+  struct Chosen {
+    Purpose purpose;
+    std::vector<std::filesystem::path> files;
+    std::optional<ImageSize> size = std::nullopt;  // of a picture
+  };
+
+  /// Opens it with the next draw(), in the folder it was in last. `name`: the one that is offered.
+  void open(Purpose purpose, const std::string& name = "");
+  /// The same, to save a picture; `size` is offered, and can be changed.
+  void openToSavePicture(const std::string& name, ImageSize size);
+  /// The same, to save a movie; `about`: its pictures and how long it plays.
+  void openToSaveMovie(const std::string& name, const std::string& about);
+  bool isOpen() const { return purpose_.has_value(); }
+  /// Draws it, if it is open. Returns what was chosen, once.
+  std::optional<Chosen> draw(Window& window);
+
+ private:
+  void enter(const std::filesystem::path& folder);
+  void drawEntries(bool& accepts);
+  void take(std::vector<std::string> names);
+  bool isTaken(const std::string& name) const;
+  std::optional<Chosen> accept();
+  void drawSize();
+
+  std::optional<Purpose> purpose_;
+  bool opens_ = false;
+  int frames_to_focus_ = 0;  // at most: what is typed waits until the name has the focus
+  std::filesystem::path folder_;
+  std::vector<FolderEntry> entries_;
+  std::vector<std::string> taken_;  // names that were clicked
+  std::string taken_text_;          // them, as they were put into `name_`
+  std::string name_, error_, overwrites_, about_;
+  ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,68 @@
+#include "tools/window/reports.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <new>
+
+#include "stream/base/error.h"
+#include "stream/base/progress.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kShortestSeconds = 4, kPerLetterSeconds = 0.06, kErrorSeconds = 60;
+constexpr size_t kMaxShown = 3, kMaxLog = 100;
+
+}  // namespace
+
+bool Toasts::add(const std::string& text, double now_s, bool is_error) {
+  const double ends_s =
+      now_s +
+      (is_error ? kErrorSeconds : kShortestSeconds + kPerLetterSeconds * static_cast<double>(text.size()));
+  shown(now_s);
+  const auto same =
+      std::find_if(shown_.begin(), shown_.end(), [&](const Toast& toast) { return toast.text == text; });
+  if (same != shown_.end()) {
+    same->ends_s = ends_s;
+    return false;
+  }
+  shown_.push_back({text, is_error, ends_s});
+  if (shown_.size() > kMaxShown) shown_.pop_front();
+  log_.push_back(text);
+  if (log_.size() > kMaxLog) log_.pop_front();
+  return true;
+}
+
+const std::deque<Toast>& Toasts::shown(double now_s) {
+  std::erase_if(shown_, [now_s](const Toast& toast) { return toast.ends_s <= now_s; });
+  return shown_;
+}
+
+void Toasts::remove(size_t n) {
+  if (n < shown_.size()) shown_.erase(shown_.begin() + static_cast<ptrdiff_t>(n));
+}
+
+bool Reports::attempt(const std::function<void()>& act) {
+  try {
+    act();
+    return true;
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception& error) {
+    report(error);
+    return false;
+  }
+}
+
+void Reports::report(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    return report(
+        std::string("out of memory; lower \"memory\" under Detail and memory, or close other programs"));
+  report(oneLine(error.what()));
+}
+
+void Reports::report(const std::string& text) {
+  if (toasts_.add(text, clock_s_(), true)) printMessage("warning: {}", text);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,59 @@
+// What the window says: messages over the picture, which go away by themselves (Toasts), and Reports, the
+// one place that decides what happens to an error, wherever it comes from: it is shown over the picture and
+// printed, and the window goes on with what it has. Only Interrupted passes, which ends the program.
+//
+// A message stays long enough to be read. An error stays until it is clicked away, or for a minute. Nothing
+// here knows the window. For the window's thread.
+#pragma once
+
+#include <deque>
+#include <exception>
+#include <functional>
+#include <string>
+
+namespace curvisplat {
+
+struct Toast {
+  std::string text;
+  bool is_error = false;
+  double ends_s = 0;
+};
+
+/// The messages that are shown, and the last ones, which can be read again. A value type.
+class Toasts {
+ public:
+  /// `now_s` is any clock's. The same text again only stays longer: then it returns false.
+  bool add(const std::string& text, double now_s, bool is_error = false);
+  /// The messages to show at `now_s`, the newest last.
+  const std::deque<Toast>& shown(double now_s);
+  /// Removes one of shown() now.
+  void remove(size_t n);
+  /// Removes all of them.
+  void removeAll() { shown_.clear(); }
+  /// All, the newest last; the oldest of more than 100 are forgotten.
+  const std::deque<std::string>& log() const { return log_; }
+
+ private:
+  std::deque<Toast> shown_;
+  std::deque<std::string> log_;
+};
+
+/// Shows and prints errors and messages.
+class Reports {
+ public:
+  /// `clock_s` tells the time for `toasts`, which must outlive this.
+  Reports(Toasts& toasts, double (*clock_s)()) : toasts_(toasts), clock_s_(clock_s) {}
+
+  void say(const std::string& text) { toasts_.add(text, clock_s_()); }
+  /// Does `act`. Returns false if it threw an error, which is reported.
+  bool attempt(const std::function<void()>& act);
+  /// Shows and prints the error, but not again while it is shown.
+  void report(const std::exception& error);
+  void report(const std::string& text);
+
+ private:
+  Toasts& toasts_;
+  double (*const clock_s_)();
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,139 @@
+#include "tools/window/widgets.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+template <class T>
+void addVector(Checksum& sum, const ImVector<T>& values) {
+  sum.add(std::as_bytes(std::span(values.Data, static_cast<size_t>(values.Size))));
+}
+
+}  // namespace
+
+uint64_t appearanceOf(const ImDrawData& frame) {
+  Checksum sum;
+  const auto add = [&](const auto& value) { sum.add(std::as_bytes(std::span(&value, 1))); };
+  add(frame.DisplayPos);
+  add(frame.DisplaySize);
+  add(frame.FramebufferScale);
+  for (const ImDrawList* list : std::span(frame.CmdLists, static_cast<size_t>(frame.CmdListsCount))) {
+    for (const ImDrawCmd& command : list->CmdBuffer) {
+      add(command.ClipRect);
+      add(command.TextureId);
+      add(command.VtxOffset);
+      add(command.IdxOffset);
+      add(command.ElemCount);
+    }
+    addVector(sum, list->VtxBuffer);
+    addVector(sum, list->IdxBuffer);
+  }
+  return sum.value();
+}
+
+namespace {
+
+// Where distributions put it; the first is where the build found it.
+constexpr std::array kFiles{CURVISPLAT_FONT, "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
+                            "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
+                            "/usr/share/fonts/dejavu/DejaVuSans.ttf", "/usr/share/fonts/TTF/DejaVuSans.ttf"};
+// Latin, Greek, super- and subscripts, arrows, mathematical and geometric signs.
+constexpr ImWchar kLetters[] = {0x20,   0x17f,  0x370,  0x3ff,  0x2010, 0x2027, 0x2030, 0x205e, 0x2070,
+                                0x209f, 0x2190, 0x21ff, 0x2200, 0x22ff, 0x25a0, 0x25ff, 0};
+constexpr float kBuiltInPixels = 13;
+
+}  // namespace
+
+bool loadFont(float pixels, float pixels_per_unit) {
+  ImGuiIO& io = ImGui::GetIO();
+  io.Fonts->Clear();
+  for (const char* file : kFiles) {
+    std::error_code ignored;
+    if (!*file || !std::filesystem::exists(file, ignored)) continue;
+    if (!io.Fonts->AddFontFromFileTTF(file, pixels, nullptr, kLetters)) continue;
+    io.FontGlobalScale = 1 / pixels_per_unit;
+    return true;
+  }
+  io.Fonts->AddFontDefault();
+  io.FontGlobalScale = pixels / kBuiltInPixels / pixels_per_unit;
+  return false;
+}
+
+std::optional<std::array<double, TypedNumbers::kMax>> TypedNumbers::draw(const char* label,
+                                                                         std::span<const double> values,
+                                                                         const char* format) {
+  CURVISPLAT_CHECK_OP(values.size(), <=, kMax);
+  const ImGuiID id = ImGui::GetID(label);
+  std::array<double, kMax> numbers = typed_;
+  if (field_ != id) std::ranges::copy(values, numbers.begin());
+  if (ImGui::InputScalarN(label, ImGuiDataType_Double, numbers.data(), static_cast<int>(values.size()),
+                          nullptr, nullptr, format, ImGuiInputTextFlags_CharsScientific)) {
+    field_ = id;
+    typed_ = numbers;
+  }
+  if (field_ != id) return std::nullopt;
+  if (ImGui::IsItemActive()) return std::nullopt;
+  // Tab leaves one field in a frame, and enters the next in another.
+  if (!std::exchange(tabs_, false) && ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Tab), false)) {
+    tabs_ = true;
+    return std::nullopt;
+  }
+  field_ = 0;
+  if (std::ranges::equal(values, std::span(typed_).first(values.size()))) return std::nullopt;
+  return typed_;
+}
+
+namespace {
+
+struct Places {
+  const char* const file = std::getenv("CURVISPLAT_WIDGETS");
+  std::string now, written;
+};
+
+Places& places() {
+  static Places places;
+  return places;
+}
+
+}  // namespace
+
+void nameWidget(const std::string& name) {
+  // A list that has just opened does not know its size yet, and so not its place.
+  if (!places().file || ImGui::IsWindowAppearing()) return;
+  const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
+  nameArea(name, static_cast<double>(at.x), static_cast<double>(at.y), static_cast<double>(size.x),
+           static_cast<double>(size.y));
+}
+
+void nameArea(const std::string& name, double x, double y, double width, double height) {
+  if (places().file)
+    places().now += fmt::format("{:.0f} {:.0f} {:.0f} {:.0f} {}\n", x, y, width, height, name);
+}
+
+void writeWidgetPlaces() {
+  const char* const file = places().file;
+  const std::string now = std::exchange(places().now, {});
+  if (!file || now == places().written) return;
+  const std::string part = std::string(file) + ".part";
+  std::ofstream(part) << now;
+  std::error_code ignored;
+  std::filesystem::rename(part, file, ignored);
+  places().written = now;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,54 @@
+// What we add to Dear ImGui: a number for what a frame looks like, the window's font, fields for numbers,
+// and the places of widgets for tests. For the window's thread. Only loadFont() reads a file.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+struct ImDrawData;
+
+namespace curvisplat {
+
+/// Two frames that look the same have the same number, and others almost certainly not, as long as no
+/// texture's contents change: of those it knows only which are used.
+uint64_t appearanceOf(const ImDrawData& frame);
+
+/// Replaces Dear ImGui's fonts by DejaVu Sans, or its own bitmap font where that is not installed, `pixels`
+/// high on the screen. `pixels_per_unit`: as Window::pixelScale(). Returns whether DejaVu Sans was found.
+/// Call it before the first frame or between frames; the texture has to be made anew then.
+bool loadFont(float pixels, float pixels_per_unit);
+
+/// Fields for numbers that take effect when they are left: by Return, by Tab or by a click elsewhere. One
+/// object serves any number of fields, of which one at a time is typed into.
+class TypedNumbers {
+ public:
+  static constexpr size_t kMax = 2;
+  /// Draws a field for each of `values`, beside each other. Returns what was typed, once, when all of them
+  /// have been left; Escape takes back what was typed. `label` is Dear ImGui's, `format` is printf's.
+  std::optional<std::array<double, kMax>> draw(const char* label, std::span<const double> values,
+                                               const char* format);
+
+ private:
+  unsigned field_ = 0;  // that is typed into, by Dear ImGui's identifier
+  std::array<double, kMax> typed_{};
+  bool tabs_ = false;  // the last frame: another of its fields may be entered now
+};
+
+// Tests and scripts drive the window by the names of its widgets: if the environment has
+// CURVISPLAT_WIDGETS=FILE, the file has a line "X Y WIDTH HEIGHT NAME" for each named widget of the frame
+// that was drawn last, in the window's coordinates.
+
+/// Names the item that Dear ImGui drew last.
+void nameWidget(const std::string& name);
+
+/// Names a rectangle that is not an item.
+void nameArea(const std::string& name, double x, double y, double width, double height);
+
+/// Call it at the end of a frame. Replaces the file when something has changed; a failure to write it is not
+/// reported.
+void writeWidgetPlaces();
+
+}  // namespace curvisplat
