@@ -18,7 +18,6 @@ import concurrent.futures
 import json
 import os
 import pathlib
-import re
 import shlex
 import subprocess
 import sys
@@ -35,13 +34,6 @@ FLAGS = ["-Wthread-safety", "-Werror", "-Wno-unknown-warning-option", "-Wno-bitw
 AT_A_TIME = 16
 
 
-def sources_of(file):
-    """What a file of the build compiles: itself, or those that it includes (tools/cmake/unity.cmake)."""
-    if file.parent.name != "Unity":
-        return [file]
-    return [pathlib.Path(source) for source in re.findall(r'#include "(.*)"', file.read_text(encoding="utf-8"))]
-
-
 def commands(chosen, named):
     """(file, its compiler's arguments) of each source of ours, or of those chosen. A build must have those that were named."""
     path = BUILD / "compile_commands.json"
@@ -49,9 +41,9 @@ def commands(chosen, named):
         sys.exit("check_clang: build/release is not configured; run tools/build.sh first")
     ours = {}
     for entry in json.loads(path.read_text()):
-        for file in sources_of(pathlib.Path(entry["file"])):
-            if not file.is_relative_to(ROOT / "build") and (not chosen or file in chosen):
-                ours[file] = shlex.split(entry["command"])
+        file = pathlib.Path(entry["file"])
+        if not file.is_relative_to(ROOT / "build") and (not chosen or file in chosen):
+            ours[file] = shlex.split(entry["command"])
     missing = named - ours.keys()
     if missing:
         sys.exit(f"check_clang: {min(missing)}: no target compiles this file; name a .cpp file of the build")
@@ -80,8 +72,6 @@ class Group:
         for argument in rest:
             if argument == "-isystem":
                 argument += next(rest)
-            if argument == "-Wno-shadow" and not self.are_tests:
-                continue  # of builds of sources that are compiled together
             if argument.startswith(("-D", "-I", "-isystem", "-std", "-W")) and argument not in (*self.flags, "-Winvalid-pch"):
                 self.flags.append(argument)
 

@@ -22,7 +22,10 @@ for file in "$@"; do
 done
 
 curvisplat=${CURVISPLAT:-$root/build/release/tools/curvisplat}
-[[ -n ${CURVISPLAT:-} ]] || "$root/tools/build.sh" curvisplat
+if [[ -z ${CURVISPLAT:-} ]]; then
+  [[ -x $curvisplat ]] || echo "demo: building takes about ten minutes on two cores; packages are installed first if any are missing"
+  "$root/tools/build.sh" curvisplat
+fi
 out=${OUT:-$root/out}
 mkdir -p "$out"
 

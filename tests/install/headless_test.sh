@@ -18,7 +18,6 @@ END
 chmod +x "$folder/pkg-config"
 without=(-DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON -DPKG_CONFIG_EXECUTABLE="$folder/pkg-config")
 
-unset CURVISPLAT_UNITY CURVISPLAT_PRECOMPILE  # targets of single sources are built below
 quietly cmake --preset headless -S "$root" -B "$folder/build" "${without[@]}"
 tools=tools/CMakeFiles/curvisplat.dir
 quietly cmake --build "$folder/build" --target \

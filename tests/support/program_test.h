@@ -1,6 +1,7 @@
-// The real program in tests. run() runs it and expects it to succeed; expectRefused() expects one line of error.
-// ProgramTest and ProgramSuite are fixtures with a folder: of each test, or of all tests of a suite, where what they
-// share is made once. The functions may be called anywhere in a test, SetUpTestSuite() included, by one thread.
+// The real program in tests. run() runs it and expects it to succeed; expectRefused() expects one line of
+// error. ProgramTest and ProgramSuite are fixtures with a folder: of each test, or of all tests of a suite,
+// where what they share is made once. The functions may be called anywhere in a test, SetUpTestSuite()
+// included, by one thread.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -30,8 +31,8 @@ inline Words operator+(Words a, const Words& b) {
   return a;
 }
 
-/// Runs the program, which must succeed: otherwise throws std::runtime_error with the words and what the program has
-/// printed, which ends the test or the suite as failed.
+/// Runs the program, which must succeed: otherwise throws std::runtime_error with the words and what the
+/// program has printed, which ends the test or the suite as failed.
 inline ProgramResult run(const Words& words) {
   ProgramResult result = runProgram(words);
   if (result.status != 0)
@@ -89,8 +90,8 @@ class ProgramTest : public testing::Test {
   const TemporaryFolder folder_;
 };
 
-/// One folder for all tests of a suite. `Suite` derives from this and has a static prepare(), which makes in the folder
-/// what the tests share.
+/// One folder for all tests of a suite. `Suite` derives from this and has a static prepare(), which makes in
+/// the folder what the tests share.
 template <typename Suite>
 class ProgramSuite : public testing::Test {
  protected:

@@ -1,5 +1,6 @@
-// Conversions and additions in the test's own process, and what must not change a byte of their caches: threads,
-// memory, the sizes of buckets and slabs, ranks. A failure names the file and the variation, and prints no bytes.
+// Conversions and additions in the test's own process, and what must not change a byte of their caches:
+// threads, memory, the sizes of buckets and slabs, ranks. A failure names the file and the variation, and
+// prints no bytes.
 #pragma once
 
 #include <cstdint>
@@ -38,8 +39,9 @@ struct Variation {
   unsigned ranks = 1;
 };
 
-/// Converts `source` as `options` say, and again with each variation over the same output. Expects the same files, a report of
-/// the same numbers, and nothing else beside the output. Returns the first report; the output is that of the last conversion.
+/// Converts `source` as `options` say, and again with each variation over the same output. Expects the same
+/// files, a report of the same numbers, and nothing else beside the output. Returns the first report; the
+/// output is that of the last conversion.
 ConvertReport expectSameCaches(const DataSource& source, ConvertOptions options,
                                const std::vector<Variation>& variations);
 

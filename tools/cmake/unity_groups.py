@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Which sources can be compiled together, as one that includes them (tools/check_clang.py, unity.cmake).
+"""Which sources can be compiled together, as one that includes them (tools/check_clang.py).
 
     unity_groups.py SIZE FILE ...    prints the number of each file's group, one a line
 
