@@ -9,12 +9,12 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/vdb/brick_grids.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/value_histogram.h"
 #include "stream/model/border_code.h"
 #include "stream/model/splats.h"
+#include "stream/vdb/brick_grids.h"
 
 namespace curvisplat {
 namespace {

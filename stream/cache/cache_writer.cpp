@@ -6,11 +6,11 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/vdb/brick_grids.h"
 #include "stream/cache/cache_format.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/stream_file.h"
+#include "stream/vdb/brick_grids.h"
 
 namespace curvisplat {
 namespace {

@@ -3,14 +3,49 @@
 #include <dlfcn.h>
 
 #include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/mutex.h"
 #include "stream/base/plugin.h"
 
 namespace curvisplat {
 namespace {
 
+/// Throws Error if this process cannot have the threads that libopenvdb's log4cplus starts while it is loaded: one that cannot be
+/// started there ends the process, or leaves it waiting for ever.
+void requireThreadsOfLibrary() {
+  constexpr size_t kThreads = 8;  // it starts 4
+  Mutex mutex;
+  bool ending = false;
+  ConditionVariable changed;
+  std::vector<std::thread> threads;
+  bool all = true;
+  try {
+    while (threads.size() < kThreads)
+      threads.emplace_back([&] {
+        MutexLock lock(mutex);
+        while (!ending) changed.wait(lock);
+      });
+  } catch (const std::system_error&) {
+    all = false;
+  }
+  {
+    const MutexLock lock(mutex);
+    ending = true;
+  }
+  changed.notify_all();
+  for (std::thread& thread : threads) thread.join();
+  if (!all)
+    throw Error(
+        "cannot start a thread: the system has none left; raise the limits of processes and memory (ulimit "
+        "-u, ulimit -v)");
+}
+
 const VdbFunctions& loadFunctions() {
+  requireThreadsOfLibrary();
   constexpr const char* kName = "curvisplat-vdb.so";
   std::string why_not;
   void* const module = openPlugin(kName, RTLD_NOW | RTLD_LOCAL, why_not);
