@@ -5,12 +5,17 @@
 #
 #   tests/kill_conversion.sh [PROGRAM [SIZE [MOMENTS [FOLDER]]]]
 #
-# MOMENTS of each kind. SIZE is the generated grid's (320x250x200: 16 M nodes), or mesh:100 for an unstructured grid of
-# 100^3 hexahedra, which needs numpy. FOLDER has room for 150 bytes a node.
+# MOMENTS of each kind (20). SIZE is the generated grid's, or mesh:100 for an unstructured grid of 100^3 hexahedra, which needs
+# numpy. Without SIZE the grid has 320x250x200 (16 M) nodes, and with `mesh` those cells; both only with CURVISPLAT_WHOLE, else exit
+# status 77. FOLDER has room for 150 bytes a node.
 set -euo pipefail
 
 program=${1:-build/release/tools/curvisplat}
-size=${2:-320x250x200}
+size=${2:-grid}
+if [[ $size == grid || $size == mesh ]]; then
+  [[ -v CURVISPLAT_WHOLE ]] || { echo "skipped: only with tools/test.sh --whole"; exit 77; }
+  if [ "$size" = grid ]; then size=320x250x200; else size=mesh:100; fi
+fi
 moments=${3:-20}
 folder=$(mktemp -d "${4:-/tmp}/kill_conversion.XXXXXX")
 trap 'rm -rf "$folder"' EXIT

@@ -5,7 +5,8 @@
 
 A grid, one of 60 nodes (most ranks have nothing to do), a series of time steps on a grid that stays and on one that moves, the same
 series in as many parts as ranks, pictures with surfaces, cuts and light, an orbit, and a picture of two tiles. The peak memory of
-each rank must be within --memory. Prints a line for each; exit status 1 if anything differs, 77 without mpirun.
+each rank must be within --memory. Prints a line for each; exit status 1 if anything differs, 77 without mpirun. Without --ranks and
+--size it runs only with CURVISPLAT_WHOLE, as tools/test.sh --whole sets it; else exit status 77.
 """
 import argparse
 import hashlib
@@ -131,11 +132,14 @@ class Jobs:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=pathlib.Path)
-    parser.add_argument("--ranks", type=int, nargs="+", default=[2, 3, 4, 7, 16])
-    parser.add_argument("--size", default="160x120x60")
+    parser.add_argument("--ranks", type=int, nargs="+")
+    parser.add_argument("--size")
     parser.add_argument("--steps", default="8")
     parser.add_argument("--folder", default="/tmp")
     arguments = parser.parse_args()
+    if not (arguments.ranks or arguments.size or "CURVISPLAT_WHOLE" in os.environ):
+        print("skipped: only with tools/test.sh --whole")
+        sys.exit(77)
     program = arguments.program.resolve()
     if not shutil.which("mpirun") or not (program.parent / "curvisplat-mpi.so").exists():
         print("skipped: no mpirun (Debian: openmpi-bin), or built without MPI")
@@ -143,7 +147,7 @@ def main():
     with tempfile.TemporaryDirectory(dir=arguments.folder, prefix="many_ranks.") as name:
         folder = pathlib.Path(name)
         jobs = Jobs(program, folder)
-        generated = {"one": ["--size", arguments.size], "tiny": ["--size", "5x4x3"],
+        generated = {"one": ["--size", arguments.size or "160x120x60"], "tiny": ["--size", "5x4x3"],
                      "still": ["--size", "40x32x16", "--steps", arguments.steps],
                      "moving": ["--size", "40x32x16", "--steps", arguments.steps, "--moving"]}
         for grid, words in generated.items():
@@ -156,7 +160,7 @@ def main():
         jobs.run("convert", folder / "one.xyz", folder / "one.fun", "-o", folder / "drawn.splats", *limits)
         draw = ["render", folder / "drawn.splats", "--range", "0,1", *limits]
         looks = ["--shade", "--outline", "--surface", "kmin", "--slice=0,0,0.5,0,0,1", "--size", "300x200"]
-        for count in arguments.ranks:
+        for count in arguments.ranks or (2, 3, 4, 7, 16):
             for grid in ("one", "tiny"):
                 jobs.compare(f"convert {grid}", count, ["convert", folder / f"{grid}.xyz", folder / f"{grid}.fun", *limits], ".splats")
             jobs.compare_addition("add a scalar", count, ["convert", folder / "one.xyz", folder / "one.fun", "--add-scalar", "volume", *limits],

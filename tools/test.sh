@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Runs setup.sh, builds everything and runs the tests. Passes its arguments to ctest, for example -R render.
 #
-#   tools/test.sh [CTEST OPTIONS]                    all tests
-#   tools/test.sh --whole [CTEST OPTIONS]            all tests, and of damage and faults every place, not one in several
+#   tools/test.sh [CTEST OPTIONS]                    all tests but those with the label `whole`
+#   tools/test.sh --whole [CTEST OPTIONS]            all tests, and of damage and faults every place, not one in several; many
+#                                                    kills, and long runs of ten minutes each; takes hours and 20 GB of /tmp
 #   tools/test.sh --sanitize [CTEST OPTIONS]         all tests with the address and undefined-behaviour sanitizers, then
 #                                                    the multithreaded ones with the thread sanitizer; takes hours
 #   tools/test.sh --sanitize=short [CTEST OPTIONS]   only the tests of stream/ with the first two; takes minutes
@@ -10,16 +11,18 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # run PRESET [CTEST OPTIONS]: runs the tests of a build; fails if there are none. Half as many again as there are cores at a time: a third of
-# the time they wait, for the disk, for windows or for servers.
+# the time they wait, for the disk, for windows or for servers. ctest leaves out what matches each -LE, not any: where another one is given,
+# the tests of the label `whole` skip themselves.
 run() {
-  local preset=$1
+  local preset=$1 left_out=(-LE '^whole$')
   shift
-  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j"$(($(nproc) * 3 / 2))" "$@"
+  if [[ -v CURVISPLAT_WHOLE || " $* " =~ \ (-LE|--label-exclude)[\ =] ]]; then left_out=(); fi
+  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j"$(($(nproc) * 3 / 2))" "${left_out[@]}" "$@"
 }
 
 form=plain
 case ${1:-} in
-  --whole) export CURVISPLAT_WHOLE_SWEEPS=1 && shift ;;
+  --whole) export CURVISPLAT_WHOLE=1 && shift ;;
   --sanitize) form=whole && shift ;;
   --sanitize=short) form=short && shift ;;
 esac

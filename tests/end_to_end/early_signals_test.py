@@ -17,6 +17,8 @@ import tempfile
 import time
 import unittest
 
+from sweep import some_of
+
 PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
 MOST_SECONDS = 240  # until the machine counts as stuck
 
@@ -73,30 +75,32 @@ class EarlySignals(unittest.TestCase):
         before = self.files()
         commands = (["convert", "o.xyz", "o.fun", "-o", "new.splats"], ["render", "whole.splats", "-o", "new.png", "--size", "64x48"],
                     ["info", "o.xyz", "o.fun"])
+        moments = [(milliseconds, number)
+                   for milliseconds in (0, 1, 2, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100, 110, 120)
+                   for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)]
         ended_early = 0
-        for command in commands:
-            for milliseconds in (0, 1, 2, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100, 110, 120):
-                for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-                    with self.subTest(" ".join(command), milliseconds=milliseconds, signal=number.name):
-                        program = subprocess.Popen([PROGRAM, *command], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
-                                                   stderr=subprocess.PIPE, text=True)
-                        time.sleep(milliseconds / 1000)
-                        program.send_signal(number)
-                        message = program.communicate(timeout=MOST_SECONDS)[1]
-                        done = program.returncode == 0
-                        if not done:
-                            self.assertIn(program.returncode, (-number, 128 + number), message)
-                            self.assertLessEqual(message.count("curvisplat: "), 1 if program.returncode > 0 else 0, message)
-                            ended_early += 1
-                        resumes = not done and "--resume" in message
-                        if resumes:
-                            self.run_program(*command, "--resume")
-                        if resumes or done and command[0] == "convert":
-                            self.assert_same_caches("whole.splats", "new.splats")
-                            shutil.rmtree(self.folder / "new.splats")
-                        elif done:
-                            (self.folder / "new.png").unlink(missing_ok=True)
-                        self.assertEqual(self.files(), before)
+        for n, command in enumerate(commands):
+            for milliseconds, number in some_of(moments, turn=n):
+                with self.subTest(" ".join(command), milliseconds=milliseconds, signal=number.name):
+                    program = subprocess.Popen([PROGRAM, *command], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
+                                               stderr=subprocess.PIPE, text=True)
+                    time.sleep(milliseconds / 1000)
+                    program.send_signal(number)
+                    message = program.communicate(timeout=MOST_SECONDS)[1]
+                    done = program.returncode == 0
+                    if not done:
+                        self.assertIn(program.returncode, (-number, 128 + number), message)
+                        self.assertLessEqual(message.count("curvisplat: "), 1 if program.returncode > 0 else 0, message)
+                        ended_early += 1
+                    resumes = not done and "--resume" in message
+                    if resumes:
+                        self.run_program(*command, "--resume")
+                    if resumes or done and command[0] == "convert":
+                        self.assert_same_caches("whole.splats", "new.splats")
+                        shutil.rmtree(self.folder / "new.splats")
+                    elif done:
+                        (self.folder / "new.png").unlink(missing_ok=True)
+                    self.assertEqual(self.files(), before)
         print(f"{ended_early} runs ended by a signal", flush=True)
         self.assertGreater(ended_early, 10)
 

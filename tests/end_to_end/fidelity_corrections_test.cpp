@@ -22,8 +22,7 @@ constexpr ImageSize kSize{128, 128};
 
 Image marched(const ReferenceField& field, const KnownFunction& function, const Camera& camera,
               ImageSize size = kSize, const ReferenceLight* light = nullptr) {
-  MarchSteps steps;
-  steps.step = 0.016;
+  MarchSteps steps = stepsFor(field);
   steps.cells = 1;
   return toImage(referenceMarch(field, function.exact, camera, size, steps, {light}));
 }

@@ -47,16 +47,15 @@ class FidelityProperties : public testing::Test {
 
 Image marched(const Scene& scene, const std::string& function, const Camera& camera, ImageSize size,
               double near = 0) {
-  MarchSteps steps;
-  steps.step = 0.016;
+  const SceneField field(scene);
+  MarchSteps steps = stepsFor(field);
   steps.near = near;
-  return toImage(
-      convergedMarch(SceneField(scene), KnownFunction::of(function).exact, camera, size, steps).image);
+  return toImage(referenceMarch(field, KnownFunction::of(function).exact, camera, size, steps));
 }
 
 TEST_F(FidelityProperties, PicturesConvergeWithTheGrid) {
   constexpr ImageSize kSize{256, 256};
-  const Image reference = marched(*makeScene("half-annulus"), "smooth", halfAnnulusCamera(), kSize);
+  const Image& reference = knownReference("smooth", kSize);
   constexpr double kMinGain[] = {7, 5, 2.5};
   double coarser_db = 0;
   for (int step = 0; step < 4; ++step) {

@@ -50,11 +50,9 @@ std::vector<ReferenceLayer> innerWall(const Scene& scene, const glm::dvec3& orig
 /// The mean of 2 x 2 rays a pixel.
 Image marched(const Scene& scene, const KnownFunction& function, const Camera& camera) {
   const SceneField field(scene);
-  MarchSteps steps;
-  steps.step = 0.008;
   const ImageSize size{2 * kSize.width, 2 * kSize.height};
   const Image image =
-      toImage(referenceMarch(field, function.exact, camera, size, steps,
+      toImage(referenceMarch(field, function.exact, camera, size, stepsFor(field),
                              {nullptr, [&](const glm::dvec3& origin, const glm::dvec3& direction) {
                                 return innerWall(scene, origin, direction);
                               }}));

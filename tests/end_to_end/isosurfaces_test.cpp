@@ -24,11 +24,9 @@ class Isosurfaces : public ProgramTest {
   /// Four rays a pixel: outlines are smooth.
   Image marched(const OpticalFunction& exact, const glm::dvec3& colour, double opacity) const {
     const SceneField field(*annulus_);
-    MarchSteps steps;
-    steps.step = 0.012;
     const Image fine =
-        toImage(referenceMarch(field, exact, halfAnnulusCamera(), {2 * kSize.width, 2 * kSize.height}, steps,
-                               {nullptr, isoLayer(*annulus_, kValue, colour, opacity)}));
+        toImage(referenceMarch(field, exact, halfAnnulusCamera(), {2 * kSize.width, 2 * kSize.height},
+                               stepsFor(field), {nullptr, isoLayer(*annulus_, kValue, colour, opacity)}));
     Image image(kSize);
     for (int y = 0; y < kSize.height; ++y)
       for (int x = 0; x < kSize.width; ++x)

@@ -2,7 +2,8 @@
 """mesh_bytes_test.py CURVISPLAT
 
 Unstructured grids of every format, larger than the chunks in which they are read: the caches have the same bytes for any number
-of threads and of ranks, and any memory. Exit status 77 (skipped) without python3-vtk9.
+of threads and of ranks, and any memory. Usually OpenFOAM and UGRID, all with CURVISPLAT_WHOLE (tools/test.sh --whole). Exit status 77
+(skipped) without python3-vtk9.
 """
 import hashlib
 import json
@@ -20,6 +21,7 @@ import mesh_files_test
 import mesh_foam_test
 import mesh_formats_test
 import mesh_su2_test
+from sweep import IS_WHOLE, ONLY_WHOLE
 
 CELLS_OF_A_CHUNK = 16384  # preprocess/gather/mesh_reader.cpp
 SIDE = 26  # 17,576 cubes
@@ -58,6 +60,7 @@ class MeshBytes(MeshFormats):
             case = writer.foam_case(SIDE, parts, binary=True)[0]
             self.expect_same_bytes(case / "case.foam", scalars=("p",))
 
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     @unittest.skipUnless(cg.library(), "no libcgns")
     def test_cgns(self):
         writer = self.writer(mesh_cgns_test.CgnsMeshes)
@@ -67,11 +70,13 @@ class MeshBytes(MeshFormats):
         writer.write_sections(Mesh(20))
         self.expect_same_bytes(writer.path, scalars=("p", "c"))
 
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     def test_ensight(self):
         writer = self.writer(mesh_ensight_test.EnsightCases)
         writer.write(writer.rounded(Mesh(20)), "<")
         self.expect_same_bytes(writer.path, scalars=("p", "c"))
 
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     def test_su2(self):
         writer = self.writer(mesh_su2_test.Su2Meshes)
         mesh = Mesh(20)
@@ -79,6 +84,7 @@ class MeshBytes(MeshFormats):
         writer.write_restart(mesh, "binary")
         self.expect_same_bytes(writer.path, writer.restart, scalars=("p",))
 
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     def test_exodus(self):
         writer = self.writer(mesh_files_test.MeshFiles)
         writer.write_exodus(self.folder / "mesh.e", n=20)
@@ -103,12 +109,14 @@ class MeshBytes(MeshFormats):
             writer.write_ugrid(column_by_column=column_by_column)
             self.expect_same_bytes(writer.path, scalars=("t",))
 
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     @unittest.skipUnless(mesh_formats_test.netCDF4, "no python3-netcdf4")
     def test_icon(self):
         writer = self.columns()
         writer.write_icon()
         self.expect_same_bytes(writer.path, writer.folder / "icon_grid.nc", scalars=("t",))
 
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     @unittest.skipUnless(mesh_formats_test.netCDF4, "no python3-netcdf4")
     def test_mpas(self):
         writer = self.columns()

@@ -1,9 +1,12 @@
-"""Which places a test of damage tries (tests/support/fault_sweep.h)."""
+"""Which places a test tries (tests/support/fault_sweep.h)."""
 import os
 
-IS_WHOLE = "CURVISPLAT_WHOLE_SWEEPS" in os.environ
+IS_WHOLE = "CURVISPLAT_WHOLE" in os.environ
+ONLY_WHOLE = "only with tools/test.sh --whole"  # why a test is skipped
 
 
-def some_of(places, stride=4):
-    """All places of a sweep where CURVISPLAT_WHOLE_SWEEPS is set, else one in `stride`."""
-    return list(places)[:: 1 if IS_WHOLE else stride]
+def some_of(places, stride=4, first=0, turn=0):
+    """All places of a sweep where CURVISPLAT_WHOLE is set, else the `first` ones and one in `stride` of those after them: others with
+    each `turn`, so that sweeps of one kind complete one another."""
+    places = list(places)
+    return places if IS_WHOLE else places[:first] + places[first + turn % stride :: stride]

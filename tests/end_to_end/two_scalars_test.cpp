@@ -55,10 +55,8 @@ class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
 
   Image marched(const OpticalFunction& opacity, const ReferenceField& field,
                 const ReferenceLayers& layers = {}) const {
-    MarchSteps steps;
-    steps.step = 0.008;
     const TwoScalars scalars{opacity, [](const glm::dvec3& at) { return hues().at(hueAt(at)).colour; }};
-    return toImage(referenceMarch(field, scalars, halfAnnulusCamera(), kSize, steps, layers));
+    return toImage(referenceMarch(field, scalars, halfAnnulusCamera(), kSize, stepsFor(field), layers));
   }
   Image drawn(const TransferFunction& opacity, const FrameOptions& options,
               Backend backend = Backend::kCpu) const {
@@ -213,31 +211,10 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
   constexpr double kValue = 0.6;
   const KnownFunction function = KnownFunction::of("smooth");
   const double unit = function.table.opacityUnit();
-  const auto gradientAt = [](const glm::dvec3& at) {
-    glm::dvec3 gradient;
-    for (int axis = 0; axis < 3; ++axis) {
-      glm::dvec3 step(0.0);
-      step[axis] = 1e-5;
-      gradient[axis] = hueAt(at + step) - hueAt(at - step);
-    }
-    return glm::normalize(gradient);
-  };
-  const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
-    std::vector<ReferenceLayer> found;
-    constexpr double kStep = 0.005;
-    for (double t = 0; t < 12; t += kStep) {
-      const glm::dvec3 from = origin + t * direction, to = origin + (t + kStep) * direction;
-      if ((hueAt(from) < kValue) == (hueAt(to) < kValue) || !annulus_->contains(from) ||
-          !annulus_->contains(to))
-        continue;
-      const double part = (kValue - hueAt(from)) / (hueAt(to) - hueAt(from));
-      const glm::dvec3 at = from + part * (to - from);
-      const double opacity = -std::expm1(-function.exact(annulus_->scalar(at)).extinction * unit);
-      const double facing = std::abs(glm::dot(gradientAt(at), direction));
-      found.push_back({t + part * kStep, lit(hues().at(kValue).colour, facing), 0.9 * opacity});
-    }
-    return found;
-  };
+  const ReferenceLayers layers = isoLayer(
+      *annulus_, {hueAt, kValue, hues().at(kValue).colour, [&](const glm::dvec3& at) {
+                    return 0.9 * -std::expm1(-function.exact(annulus_->scalar(at)).extinction * unit);
+                  }});
   const Image reference = marched(function.exact, field_, layers);
   FrameOptions options = knownFrame(kSize);
   auto scene = std::make_shared<SurfaceScene>();

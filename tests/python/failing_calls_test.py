@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """failing_calls_test.py
 
 A disk that fails under the Python package: each call of a conversion from arrays, of a step that is appended and of a picture that

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """hostile_test.py
 
 What hostile scripts do to the Python package: arrays that are not what they seem, functions that raise or answer nonsense, names

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """The Python package: its pictures are those of the command, arrays become the caches that files become, and errors,
 interrupts and memory are as its pages say.
 

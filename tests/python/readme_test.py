@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Runs the examples in Python that README.md and tools/python/README.md show, one after the other, as they stand.
 
     readme_test.py    the package is found by PYTHONPATH

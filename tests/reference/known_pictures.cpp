@@ -4,9 +4,13 @@
 #include <glm/geometric.hpp>
 
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <tuple>
 
 #include "preprocess/convert/convert.h"
+#include "preprocess/scenes/scenes.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/reference_march.h"
@@ -16,7 +20,7 @@ namespace curvisplat {
 KnownFunction KnownFunction::of(const std::string& name, double low, double high, double length) {
   constexpr double kUnit = 0.01;  // of the files' opacities
   const std::pair<double, double> range(low, high);
-  OpticalFunction plain = name == "smooth" ? smoothFunction : name == "band" ? bandFunction : stepFunction;
+  const auto plain = name == "smooth" ? smoothFunction : name == "band" ? bandFunction : stepFunction;
   return {[plain, low, high, length](double scalar) {
             OpticalProperties properties = plain((scalar - low) / (high - low));
             properties.extinction /= length;
@@ -41,6 +45,17 @@ Camera perspectiveCamera(double view_angle_deg) {
   camera.projection = Projection::kPerspective;
   camera.view_angle_deg = view_angle_deg;
   return camera;
+}
+
+const Image& knownReference(const std::string& function, ImageSize size) {
+  static std::mutex mutex;
+  static std::map<std::tuple<std::string, int, int>, Image> marched;
+  const std::lock_guard lock(mutex);
+  const auto [entry, is_new] = marched.try_emplace({function, size.width, size.height});
+  if (is_new)
+    entry->second = toImage(referenceMarch(*makeScene("half-annulus"), KnownFunction::of(function).exact,
+                                           halfAnnulusCamera(), size));
+  return entry->second;
 }
 
 void convertGrid(const GridSource& source, const std::filesystem::path& cache, uint32_t scalar) {

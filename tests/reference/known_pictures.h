@@ -30,6 +30,10 @@ Camera edgeOnCamera();
 /// halfAnnulusCamera() in perspective: the focal plane is seen as large, under `view_angle_deg`.
 Camera perspectiveCamera(double view_angle_deg = 30);
 
+/// The reference of half-annulus with one of the functions, as halfAnnulusCamera() sees it; marched once a
+/// process.
+const Image& knownReference(const std::string& function, ImageSize size);
+
 /// Converts the scalar at `scalar` of the source's description to `cache`, over what is there.
 void convertGrid(const GridSource& source, const std::filesystem::path& cache, uint32_t scalar = 0);
 

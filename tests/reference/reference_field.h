@@ -21,6 +21,8 @@ class FieldProbe {
 
   /// The scalar at a point of the world; nothing outside of the field.
   virtual std::optional<double> at(const glm::dvec3& world) = 0;
+  /// As at(), of a point in the field or just outside of it, which need not be found out.
+  virtual std::optional<double> atInside(const glm::dvec3& world) { return at(world); }
   /// How far one may go along `direction` (of length 1) from the point last asked about, which had a scalar,
   /// until about one cell of the grid is passed. Infinite where the field has no cells.
   virtual double cellLength(const glm::dvec3& /*direction*/) const {
@@ -43,12 +45,15 @@ class ReferenceField {
   }
 };
 
-/// An analytic scene. `scene` outlives it.
+/// An analytic scene. `scene` outlives it. The crossings of half-annulus, half-annulus-constant, shell, o-grid
+/// and axis are known.
 class SceneField : public ReferenceField {
  public:
   explicit SceneField(const Scene& scene) : scene_(scene) {}
   std::unique_ptr<FieldProbe> probe() const override;
   std::pair<glm::dvec3, glm::dvec3> bounds() const override { return scene_.bounds(); }
+  bool crossings(const glm::dvec3& origin, const glm::dvec3& direction,
+                 std::vector<double>& distances) const override;
 
  private:
   const Scene& scene_;
@@ -61,6 +66,8 @@ class ClippedField : public ReferenceField {
       : whole_(whole), planes_(std::move(planes)) {}
   std::unique_ptr<FieldProbe> probe() const override;
   std::pair<glm::dvec3, glm::dvec3> bounds() const override { return whole_.bounds(); }
+  bool crossings(const glm::dvec3& origin, const glm::dvec3& direction,
+                 std::vector<double>& distances) const override;
 
  private:
   const ReferenceField& whole_;

@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "stream/base/error.h"
+
 namespace curvisplat {
 namespace {
 
@@ -179,7 +181,7 @@ class Marcher {
   Sample sample(double t) {
     if (first_) t = std::clamp(t, *first_, last_);
     const glm::dvec3 at = ray_.at(t);
-    const std::optional<double> scalar = probe_->at(at);
+    const std::optional<double> scalar = first_ ? probe_->atInside(at) : probe_->at(at);
     // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty,
     // unless the field said that it is there.
     if (!scalar) return first_ ? held_ : Sample{};
@@ -199,8 +201,10 @@ class Marcher {
     for (int axis = 0; axis < 3; ++axis) {
       glm::dvec3 step(0.0);
       step[axis] = kStep;
-      const std::optional<double> before = gradient_probe_->at(at - step),
-                                  after = gradient_probe_->at(at + step);
+      const auto scalarAt = [&](const glm::dvec3& place) {
+        return first_ ? gradient_probe_->atInside(place) : gradient_probe_->at(place);
+      };
+      const std::optional<double> before = scalarAt(at - step), after = scalarAt(at + step);
       const double length = (before ? kStep : 0) + (after ? kStep : 0);
       result[axis] = length > 0 ? (after.value_or(scalar) - before.value_or(scalar)) / length : 0;
     }
@@ -382,32 +386,65 @@ ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& f
   };
 }
 
-ReferenceLayers isoLayer(const Scene& scene, double value, const glm::dvec3& colour, double opacity) {
-  return [=, &scene](const glm::dvec3& origin, const glm::dvec3& direction) {
-    std::vector<ReferenceLayer> found;
-    const auto [lower, upper] = scene.bounds();
-    const double middle = glm::dot(0.5 * (lower + upper) - origin, direction);
-    const double reach = 0.5 * glm::distance(lower, upper);
-    constexpr double kStep = 0.008;
-    const auto at = [&](double t) { return origin + t * direction; };
-    const auto above = [&](double t) { return scene.scalar(at(t)) - value; };
-    for (double t = middle - reach; t < middle + reach; t += kStep) {
-      if (!scene.contains(at(t)) || !scene.contains(at(t + kStep)) ||
-          (above(t) < 0) == (above(t + kStep) < 0))
-        continue;
-      double low = t, high = t + kStep;
-      for (int n = 0; n < 40; ++n)
-        ((above(0.5 * (low + high)) < 0) == (above(low) < 0) ? low : high) = 0.5 * (low + high);
-      glm::dvec3 gradient;
-      for (int axis = 0; axis < 3; ++axis) {
-        glm::dvec3 step(0.0);
-        step[axis] = 1e-5;
-        gradient[axis] = scene.scalar(at(low) + step) - scene.scalar(at(low) - step);
-      }
-      found.push_back({low, litAtViewer(colour, glm::normalize(gradient), direction), opacity});
+namespace {
+
+/// The parts of a line that lie in a field whose crossings are known.
+std::vector<std::pair<double, double>> partsInside(const ReferenceField& field, const Ray& line) {
+  std::vector<double> ends;
+  CURVISPLAT_CHECK(field.crossings(line.origin, line.direction, ends));
+  std::sort(ends.begin(), ends.end());
+  const auto probe = field.probe();
+  std::vector<std::pair<double, double>> parts;
+  for (size_t n = 0; n + 1 < ends.size(); ++n)
+    if (probe->at(line.at(0.5 * (ends[n] + ends[n + 1])))) parts.emplace_back(ends[n], ends[n + 1]);
+  return parts;
+}
+
+/// Appends where `surface` is between two places.
+void appendMeetings(const ReferenceIsosurface& surface, const Ray& line,
+                    const std::pair<double, double>& part, std::vector<ReferenceLayer>& found) {
+  constexpr double kStep = 0.008;
+  constexpr int kHalvings = 26;
+  const auto isAbove = [&](double t) { return surface.scalar(line.at(t)) >= surface.value; };
+  const double steps = std::ceil((part.second - part.first) / kStep);
+  double begin = part.first;
+  bool was_above = isAbove(begin);
+  for (double n = 1; n <= steps; ++n) {
+    double low = begin, high = std::min(part.second, part.first + n * kStep);
+    begin = high;
+    const bool is_above = isAbove(high);
+    if (is_above == was_above) continue;
+    for (int halving = 0; halving < kHalvings; ++halving) {
+      const double middle = 0.5 * (low + high);
+      (isAbove(middle) == was_above ? low : high) = middle;
     }
+    was_above = is_above;
+    const glm::dvec3 at = line.at(low);
+    glm::dvec3 gradient;
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 step(0.0);
+      step[axis] = 1e-5;
+      gradient[axis] = surface.scalar(at + step) - surface.scalar(at - step);
+    }
+    found.push_back(
+        {low, litAtViewer(surface.colour, glm::normalize(gradient), line.direction), surface.opacity(at)});
+  }
+}
+
+}  // namespace
+
+ReferenceLayers isoLayer(const Scene& scene, const ReferenceIsosurface& surface) {
+  return [field = SceneField(scene), surface](const glm::dvec3& origin, const glm::dvec3& direction) {
+    const Ray line{origin, direction};
+    std::vector<ReferenceLayer> found;
+    for (const auto& part : partsInside(field, line)) appendMeetings(surface, line, part, found);
     return found;
   };
+}
+
+ReferenceLayers isoLayer(const Scene& scene, double value, const glm::dvec3& colour, double opacity) {
+  return isoLayer(scene, {[&scene](const glm::dvec3& at) { return scene.scalar(at); }, value, colour,
+                          [opacity](const glm::dvec3&) { return opacity; }});
 }
 
 OpticalProperties smoothFunction(double scalar) {
@@ -437,11 +474,22 @@ ReferenceImage referenceMarch(const ReferenceField& field, const TwoScalars& sca
   return image;
 }
 
-ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
-                              ImageSize size, double step) {
+MarchSteps stepsFor(const ReferenceField& field) {
   MarchSteps steps;
-  steps.step = step;
-  return referenceMarch(SceneField(scene), function, camera, size, steps);
+  std::vector<double> none;
+  if (field.crossings(glm::dvec3(0.0), glm::dvec3(1, 0, 0), none)) {
+    steps.step = 0.016;  // in 0.032, rays of the step function miss thin parts: 69 dB at 256 x 256
+    steps.tolerance = 5e-5;
+  }
+  return steps;
+}
+
+ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
+                              ImageSize size, std::optional<double> step) {
+  const SceneField field(scene);
+  MarchSteps steps = step ? MarchSteps() : stepsFor(field);
+  if (step) steps.step = *step;
+  return referenceMarch(field, function, camera, size, steps);
 }
 
 ConvergedImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,

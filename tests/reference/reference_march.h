@@ -55,6 +55,10 @@ struct MarchSteps {
   double tolerance = 1e-5;
 };
 
+/// For a field of about unit size and the functions of DESIGN.md, "Fidelity". Where it knows its crossings: so
+/// long that pictures are within 100 dB of the truth (reference_march_test); else MarchSteps().
+MarchSteps stepsFor(const ReferenceField& field);
+
 /// Light on the field's level surfaces, by the formulas of render/project/light.h, with the field's own
 /// gradient.
 struct ReferenceLight {
@@ -79,7 +83,15 @@ ReferenceLayers sphereLayer(const glm::dvec3& centre, double radius, const glm::
 /// A slice through the field, in the colours of the function.
 ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& function,
                            const glm::dvec3& point, const glm::dvec3& normal, double opacity = 1);
-/// Where the scene's scalar crosses a value, found by bisection; lit as a sphere is.
+/// Where a scalar crosses a value, lit as a sphere is.
+struct ReferenceIsosurface {
+  std::function<double(const glm::dvec3& world)> scalar;
+  double value = 0;
+  glm::dvec3 colour{0.0};
+  std::function<double(const glm::dvec3& world)> opacity;
+};
+/// An isosurface of any scalar, or of the scene's, in a scene whose crossings are known; found by bisection.
+ReferenceLayers isoLayer(const Scene& scene, const ReferenceIsosurface& surface);
 ReferenceLayers isoLayer(const Scene& scene, double value, const glm::dvec3& colour, double opacity = 1);
 
 /// What a picture has besides the field: light on it, and layers in it.
@@ -94,8 +106,9 @@ struct ReferenceExtras {
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
                               const ReferenceExtras& extras = {});
+/// In steps of `step`, or as stepsFor().
 ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
-                              ImageSize size, double step = 0.004);
+                              ImageSize size, std::optional<double> step = {});
 
 /// Two scalars: `function` has the opacities, by the field's scalar, and `colour` the colours at a point of the world.
 struct TwoScalars {

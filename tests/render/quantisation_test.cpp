@@ -14,7 +14,7 @@
 #include "render/image/image.h"
 #include "render/project/projection.h"
 #include "stream/codec/brick_codec.h"
-#include "tests/reference/reference_march.h"
+#include "tests/reference/known_pictures.h"
 #include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {
@@ -113,17 +113,11 @@ class Quantisation : public testing::Test {
     return image;
   }
 
-  void expectCheap(const std::string& name, const OpticalFunction& exact) {
+  void expectCheap(const std::string& name) {
     RootCube root;
     std::vector<BrickSplats> bricks = halfAnnulusBricks(root);
     const ClassificationTable table = ClassificationTable::of(function(name), 0, 1);
-    const ReferenceImage march =
-        referenceMarch(*makeScene("half-annulus"), exact, halfAnnulusCamera(), kSize);
-    Image reference(kSize);
-    for (size_t n = 0; n < march.pixels.size(); ++n)
-      for (size_t c = 0; c < 4; ++c)
-        reference.rgba[4 * n + c] =
-            c == 3 ? 1.0f : static_cast<float>(march.pixels[n].colour[static_cast<glm::length_t>(c)]);
+    const Image& reference = knownReference(name, kSize);
 
     const double computed_db = compareImages(paint(root, bricks, table), reference).psnr_db;
     uint64_t bytes = 0;
@@ -143,13 +137,13 @@ class Quantisation : public testing::Test {
 };
 
 TEST_F(Quantisation, OfASmoothFunctionCostsLessThanADecibel) {
-  expectCheap("smooth", smoothFunction);
+  expectCheap("smooth");
 }
 TEST_F(Quantisation, OfANarrowBandCostsLessThanADecibel) {
-  expectCheap("band", bandFunction);
+  expectCheap("band");
 }
 TEST_F(Quantisation, OfAStepCostsLessThanADecibel) {
-  expectCheap("step", stepFunction);
+  expectCheap("step");
 }
 
 }  // namespace

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <utility>
+#include <vector>
 
 #include "preprocess/scenes/scenes.h"
 #include "tests/reference/function_grid.h"
@@ -117,21 +119,94 @@ TEST(ReferenceMarch, MeetsAJumpWhereItIs) {
   EXPECT_NEAR(pixel.colour.r, 1, 1e-12);
 }
 
+double decibels(const ReferenceImage& a, const ReferenceImage& b) {
+  double sum = 0;
+  for (size_t n = 0; n < a.pixels.size(); ++n) {
+    const glm::dvec3 d = a.pixels[n].colour - b.pixels[n].colour;
+    sum += glm::dot(d, d) / 3;
+  }
+  return sum > 0 ? -10 * std::log10(sum / static_cast<double>(a.pixels.size())) : 400;
+}
+
 TEST(ReferenceMarch, ConvergesOnTheHalfAnnulus) {
   const auto scene = makeScene("half-annulus");
   const auto difference = [&](const OpticalFunction& function) {
-    const ReferenceImage coarse = referenceMarch(*scene, function, halfAnnulusCamera(), {48, 48}, 0.004);
-    const ReferenceImage fine = referenceMarch(*scene, function, halfAnnulusCamera(), {48, 48}, 0.001);
-    double sum = 0;
-    for (size_t n = 0; n < fine.pixels.size(); ++n) {
-      const glm::dvec3 d = fine.pixels[n].colour - coarse.pixels[n].colour;
-      sum += glm::dot(d, d) / 3;
-    }
-    return -10 * std::log10(sum / static_cast<double>(fine.pixels.size()));
+    return decibels(referenceMarch(*scene, function, halfAnnulusCamera(), {48, 48}, 0.004),
+                    referenceMarch(*scene, function, halfAnnulusCamera(), {48, 48}, 0.001));
   };
   EXPECT_GT(difference(smoothFunction), 90);
   EXPECT_GT(difference(bandFunction), 80);
   EXPECT_GT(difference(stepFunction), 75);
+}
+
+// A field that does not tell its crossings.
+class SilentField : public ReferenceField {
+ public:
+  explicit SilentField(const ReferenceField& field) : field_(field) {}
+  std::unique_ptr<FieldProbe> probe() const override { return field_.probe(); }
+  std::pair<glm::dvec3, glm::dvec3> bounds() const override { return field_.bounds(); }
+
+ private:
+  const ReferenceField& field_;
+};
+
+// Whose rays are oblique, along the z axis, along the y axis, and from inside.
+std::vector<Camera> camerasAroundAPipe() {
+  std::vector<Camera> cameras(4, halfAnnulusCamera());
+  cameras[1].position = cameras[1].focal_point + glm::dvec3(0, 0, 4);
+  cameras[1].view_up = {0, 1, 0};
+  cameras[2].position = cameras[2].focal_point + glm::dvec3(0, 4, 0);
+  cameras[3].projection = Projection::kPerspective;
+  cameras[3].position = {-0.55, 0.1, 0.6};
+  cameras[3].focal_point = {-0.3, -0.7, 0.35};
+  cameras[3].view_angle_deg = 100;
+  return cameras;
+}
+
+TEST(ReferenceMarch, SceneFieldsEndWhereASearchFindsThem) {
+  for (const char* name : {"half-annulus", "o-grid", "axis"}) {
+    const auto scene = makeScene(name);
+    const SceneField whole(*scene);
+    const ClippedField clipped(whole,
+                               {{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}}, {{-0.5, 0.1, 0.4}, {0.1, -0.9, -0.6}}});
+    const auto cameras = camerasAroundAPipe();
+    for (size_t n = 0; n < cameras.size(); ++n)
+      for (const ReferenceField* field :
+           {static_cast<const ReferenceField*>(&whole), static_cast<const ReferenceField*>(&clipped)}) {
+        const auto march = [&](const ReferenceField& of, double step) {
+          MarchSteps steps;
+          steps.step = step;
+          return referenceMarch(of, homogeneous, cameras[n], {24, 24}, steps);
+        };
+        // A uniform medium, which no step is too long for.
+        const double db = decibels(march(*field, 10), march(SilentField(*field), 0.001));
+        EXPECT_GT(db, 120) << name << ", camera " << n << (field == &clipped ? ", clipped" : "");
+      }
+  }
+}
+
+TEST(ReferenceMarch, GoesInStepsThatAreShortEnough) {
+  const auto scene = makeScene("half-annulus");
+  const SceneField field(*scene);
+  const auto cameras = camerasAroundAPipe();
+  // Only among many rays are some that touch what the step function shows.
+  const struct {
+    const char* name;
+    OpticalFunction function;
+    size_t camera;
+    ImageSize size;
+    double fine_step;
+  } pictures[] = {
+      {"smooth", smoothFunction, 0, {32, 32}, 0.001}, {"smooth", smoothFunction, 3, {32, 32}, 0.001},
+      {"band", bandFunction, 0, {32, 32}, 0.001},     {"band", bandFunction, 3, {32, 32}, 0.001},
+      {"step", stepFunction, 0, {256, 256}, 0.004},   {"step", stepFunction, 3, {32, 32}, 0.001}};
+  for (const auto& [name, function, camera, size, fine_step] : pictures) {
+    MarchSteps fine;
+    fine.step = fine_step;
+    const double db = decibels(referenceMarch(field, function, cameras[camera], size, stepsFor(field)),
+                               referenceMarch(SilentField(field), function, cameras[camera], size, fine));
+    EXPECT_GT(db, 100) << name << ", camera " << camera;
+  }
 }
 
 // A quarter of a pipe, twisted; with `inner` = 0 its j = 0 face is a line.

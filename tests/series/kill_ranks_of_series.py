@@ -3,7 +3,7 @@
 
     kill_ranks_of_series.py PROGRAM [KILLS [SIZE [STEPS]]]
 
-KILLS (default 20) of each of: convert and convert --add-steps, on a fixed grid and on one that moves; at moments spread over the
+KILLS (default 1; with CURVISPLAT_WHOLE, as tools/test.sh --whole sets it, 20) of each of: convert and convert --add-steps, on a fixed grid and on one that moves; at moments spread over the
 time that an undisturbed run takes. After each the job must end, the cache, if there is one, must verify, and --resume by 1 to 4 ranks
 must complete it to the files of one process. Prints a line for each; exit status 1 if anything was wrong, 77 without mpirun.
 """
@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-from kill_series import Series, digests
+from kill_series import USUAL_KILLS, Series, digests
 
 MPIRUN = ["mpirun", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-q", "-n"]
 RANKS = 3
@@ -86,7 +86,7 @@ class RanksOfSeries(Series):
                 return True, " (all ranks ended, their launcher did not)"
 
 
-def main(program, kills=20, size="28x24x12", steps=8):
+def main(program, kills=USUAL_KILLS, size="28x24x12", steps=8):
     if not shutil.which("mpirun") or not (pathlib.Path(program).parent / "curvisplat-mpi.so").exists():
         print("skipped: no mpirun (Debian: openmpi-bin), or built without MPI")
         sys.exit(77)

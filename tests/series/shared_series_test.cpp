@@ -50,8 +50,10 @@ const std::vector<StepKind> kSteady = steadyGrid(13), kMoving{{0, 0}, {1, 1}, {2
 
 TEST(SharedSeries, HasTheBytesOfOneProcess) {
   // 16 ranks are more than there are groups.
+  const auto of_steady =
+      faults::isWholeSweep() ? std::vector<unsigned>{2, 7, 16} : std::vector<unsigned>{2, 16};
   const std::pair<std::vector<StepKind>, std::vector<unsigned>> cases[] = {
-      {kSteady, {2, 7, 16}}, {kMoving, {3}}, {kNowAndThen, {2, 4}}, {kOnceAway, {2}}};
+      {kSteady, of_steady}, {kMoving, {3}}, {kNowAndThen, {2, 4}}, {kOnceAway, {2}}};
   for (const auto& [kinds, counts] : cases) {
     const TemporaryFolder folder;
     const Conversion one = convertQuietly(inputOf(kinds), optionsFor(folder / "one.splats"));

@@ -1,7 +1,9 @@
-# What the long runs share; sourced, with the script's own arguments: [--short] [PROGRAM [FOLDER [...]]]
+# What the long runs share; sourced, with the script's own arguments: [--short | --full] [PROGRAM [FOLDER [...]]]
+# In short, unless CURVISPLAT_WHOLE is set, as tools/test.sh --whole does.
 # Sets form (full or short), program, folder (empty, removed in the end), here, rest (further arguments), failed.
-form=full
-[ "${1:-}" != --short ] || { form=short; shift; }
+form=short
+[[ ! -v CURVISPLAT_WHOLE ]] || form=full
+case ${1:-} in --short | --full) form=${1#--} && shift ;; esac
 program=$(realpath "${1:-build/release/tools/curvisplat}")
 folder=$(mktemp -d "$(realpath "${2:-${TMPDIR:-/tmp}}")/soak.XXXXXX")
 rest=("${@:3}")

@@ -2,10 +2,10 @@
 # An orbit of many frames over a cache many times as large as its memory. Prints what the process had along the way:
 # memory, open files, threads; exit status 1 where they grow, or where a frame is not what it was a turn before.
 #
-#   tests/soak/orbit.sh [--short] [PROGRAM [FOLDER [CACHE]]]
+#   tests/soak/orbit.sh [--short | --full] [PROGRAM [FOLDER [CACHE]]]
 #
 # In full: 1,000 frames with 128 MiB over a cache of 3.5 GB; FOLDER has room for 20 GB, and CACHE, if given, is used in
-# place of the one that is otherwise made there (with python3, which makes it hard to compress). --short: 30 frames.
+# place of the one that is otherwise made there (with python3, which makes it hard to compress). In short: 30 frames.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -3,10 +3,10 @@
 # after each round of them: memory, open files, threads; exit status 1 where they grow, or where the first picture of a visit is
 # not what it was.
 #
-#   tests/soak/serve.sh [--short] [PROGRAM [FOLDER [SECONDS]]]
+#   tests/soak/serve.sh [--short | --full] [PROGRAM [FOLDER [SECONDS]]]
 #
 # In full: 10 minutes, or SECONDS, over a cache of 100 MB and a series of 40 steps; FOLDER has room for 2 GB.
-# --short: 12 seconds. Needs python3-websocket; exit status 77 without it.
+# In short: 12 seconds. Needs python3-websocket; exit status 77 without it.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -3,9 +3,9 @@
 # what each process had along the way: memory, open files, threads; exit status 1 where they grow, or where a step's picture
 # depends on what was drawn before.
 #
-#   tests/soak/steps.sh [--short] [PROGRAM [FOLDER]]
+#   tests/soak/steps.sh [--short | --full] [PROGRAM [FOLDER]]
 #
-# In full: 1,000 steps. --short: 60.
+# In full: 1,000 steps. In short: 60.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -2,9 +2,9 @@
 # A window that is turned, zoomed, edited and resized without end. Prints what the process had along the way: memory,
 # open files, threads; exit status 1 where they grow, or where the last picture is not the first.
 #
-#   tests/soak/window.sh [--short] [PROGRAM [FOLDER]]
+#   tests/soak/window.sh [--short | --full] [PROGRAM [FOLDER]]
 #
-# In full: 10 minutes over a cache of 100 MB; FOLDER has room for 2 GB. --short: 10 seconds, in which memory is still
+# In full: 10 minutes over a cache of 100 MB; FOLDER has room for 2 GB. In short: 10 seconds, in which memory is still
 # being filled. Needs Xvfb and xdotool; exit status 77 without them.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"

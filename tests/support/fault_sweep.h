@@ -1,5 +1,6 @@
 // Tests that try every place where something may go wrong: each call, each byte, each attribute. All of them
-// take minutes, so that usually only some are tried (nextInSweep); tools/test.sh --whole tries all.
+// take minutes, so that usually only some are tried (nextInSweep); tools/test.sh --whole tries all. Tests that
+// take long for other reasons ask isWholeSweep(), too.
 // FaultSweep does so with a disk: it does a job again and again, and the first call fails, the second one,
 // ... until the job ends before it comes to the call that would fail.
 #pragma once
@@ -13,9 +14,9 @@
 
 namespace curvisplat::faults {
 
-/// Whether all places are to be tried: CURVISPLAT_WHOLE_SWEEPS is set, as tools/test.sh --whole does.
+/// Whether all places are to be tried: CURVISPLAT_WHOLE is set, as tools/test.sh --whole does.
 inline bool isWholeSweep() {
-  return std::getenv("CURVISPLAT_WHOLE_SWEEPS") != nullptr;
+  return std::getenv("CURVISPLAT_WHOLE") != nullptr;
 }
 
 /// The place to try after this one. The first ones, where files are opened and made, are all tried; of the others
