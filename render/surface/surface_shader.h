@@ -97,8 +97,8 @@ class SurfaceShader {
   struct Mixed;
   /// Barycentric, within the triangle; in perspective of the triangle in space.
   template <bool kPerspective>
-  static void mix(const Corners& corners, size_t count, Mixed& mixed);
-  void gather(std::span<const Spot> spots, Corners& corners) const;
+  static void mix(const Corners& c, size_t count, Mixed& out);
+  void gather(std::span<const Spot> spots, Corners& out) const;
   void shadeBlock(std::span<const Spot> spots, std::span<Point> points) const;
 
   const SceneTriangles& triangles_;

@@ -260,7 +260,7 @@ class ValuesReader {
   std::vector<EnsightValues> run();
 
  private:
-  void readPart(size_t part);
+  void readPart(size_t number);
   /// Where the values under a keyword belong, and how many they are.
   std::pair<size_t, uint64_t> placeOf(const EnsightPart& part, const std::string& keyword) const;
 

@@ -12,6 +12,6 @@ namespace curvisplat {
 
 /// Opens the files, and closes a grid that runs around the Earth (closed_grid.h, joined_faces.h). Throws
 /// Error.
-std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options);
+std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& given);
 
 }  // namespace curvisplat

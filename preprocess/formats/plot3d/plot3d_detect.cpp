@@ -221,7 +221,8 @@ class Detection {
           "{}: {} of {} is followed by {} bytes that look like a truncated iblank; get the complete file, or "
           "read it without iblank (--iblank no)",
           path_, curvisplat::describe(fit.layout), curvisplat::describe(fit.blocks), fit.trailing_bytes);
-    return {std::move(fit), writtenPrecision(fit.layout)};
+    const int precision = writtenPrecision(fit.layout);
+    return {std::move(fit), precision};
   }
 
  private:
