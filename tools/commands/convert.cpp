@@ -350,6 +350,7 @@ void addConvert(CLI::App& app) {
   addGasOptions(*command, arguments->gas);
   command->callback([arguments, command] {
     refuseWithoutEffect(*command, *arguments);
+    requireSameOptions(*command);
     limitHeaps(kHeapsOfConversion);
     if (arguments->joins) {
       runJoinSeries(*arguments);
