@@ -7,6 +7,7 @@ with the arrays, and the volume that `curvisplat convert` writes with VTK's own.
 """
 import gzip
 import json
+import re
 import struct
 import subprocess
 import sys
@@ -35,6 +36,55 @@ class MeshFiles(MeshCase):
                     with self.subTest(mode=mode, raw=raw, compressor=compressor, order=order):
                         write_xml(grid, path, mode, compressor, raw=raw, order=order, header=header)
                         self.check(path, grid)
+
+    def test_base64_of_one_value(self):
+        """VTK's own writer: the types of one cell are 4 bytes of header and one of data, "AQAAAAw="."""
+        points = vtk.vtkPoints()
+        grid = vtk.vtkUnstructuredGrid()
+        for k in range(2):
+            for corner in lattice(1):
+                points.InsertNextPoint(corner + [2 * k, 0, 0])
+            grid.SetPoints(points)
+            insert(grid, vtk.VTK_HEXAHEDRON, hexahedra(1)[0] + 8 * k)
+            with_scalars(grid)
+            for header in ("UInt32", "UInt64"):
+                for compressor in ("None", "ZLib"):
+                    write_xml(grid, self.folder / "one.vtu", "Binary", compressor, header=header)
+                    self.check(self.folder / "one.vtu", grid)
+
+    def test_base64_in_lines(self):
+        grid = cube(3)
+        path = self.folder / "mesh.vtu"
+
+        def lines(text, length, end):
+            return end.join(text[n:n + length] for n in range(0, len(text), length))
+
+        for header in ("UInt32", "UInt64"):
+            for compressor in ("None", "ZLib"):
+                write_xml(grid, path, "Binary", compressor, header=header)
+                text = path.read_text()
+                for length, end in ((76, "\n"), (64, "\r\n"), (76, "\n      "), (1000, "\n")):
+                    # MIME's lines run through; others break the line behind the header, too.
+                    for apart in (False, True):
+                        def broken(found):
+                            head = found[2].index("=") if apart and "=" in found[2][:-4] else -4
+                            head = (head + 4) // 4 * 4
+                            parts = (found[2][:head], found[2][head:]) if head else (found[2],)
+                            return found[1] + "\n" + end.join(lines(part, length, end) for part in parts) + "\n<"
+                        path.write_bytes(re.sub('(format="binary"[^>]*>)\\s*([A-Za-z0-9+/=]+)\\s*<', broken, text).encode())
+                        with self.subTest(header=header, compressor=compressor, length=length, end=end, apart=apart):
+                            self.check(path, grid)
+        path.write_text(re.sub('([A-Za-z0-9+/]{30})([A-Za-z0-9+/]{25})', "\\1\n\\2\n", text))
+        self.assertIn("write it without line breaks", self.run_program("info", path).stderr)
+
+    def test_attributes_that_fortran_padded(self):
+        grid = cube(3)
+        path = self.folder / "mesh.vtu"
+        for mode in ("Ascii", "Appended"):
+            write_xml(grid, path, mode)
+            head, tail = re.split(b"(?=<AppendedData)|$", path.read_bytes(), maxsplit=1)
+            path.write_bytes(re.sub(rb'="([^"]*)"', rb'="  \1   "', head) + tail)
+            self.check(path, grid)
 
     def test_legacy_files(self):
         grid = cube(3)
