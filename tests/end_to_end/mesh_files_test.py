@@ -20,7 +20,7 @@ try:
 
     from sweep import some_of
     from mesh_case import PROGRAM, MeshCase
-    from mesh_cubes import cube, hexahedra, insert, lattice, with_scalars, write_legacy, write_xml
+    from mesh_cubes import RANDOM, cube, hexahedra, insert, lattice, with_scalars, write_legacy, write_xml
 except ModuleNotFoundError as error:
     print(f"skipped: {error}; install python3-vtk9 and python3-numpy")
     sys.exit(77)
@@ -85,6 +85,48 @@ class MeshFiles(MeshCase):
             head, tail = re.split(b"(?=<AppendedData)|$", path.read_bytes(), maxsplit=1)
             path.write_bytes(re.sub(rb'="([^"]*)"', rb'="  \1   "', head) + tail)
             self.check(path, grid)
+
+    def test_equal_times_of_a_collection(self):
+        """Versions of one part (a steady run, or one that was restarted and appended to the file), and parts that do not say so."""
+        def collection(*entries):
+            (self.folder / "a.pvd").write_text('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n' + "".join(
+                f'<DataSet timestep="{time}" group="" part="{part}" file="u{n}.vtu"/>\n' for time, part, n in entries)
+                + "</Collection>\n</VTKFile>\n")
+            return self.info(self.folder / "a.pvd")
+
+        for n in range(6):
+            grid = cube(2, kinds=("hexahedron",))
+            grid.GetPoints().SetData(numpy_to_vtk(np.stack(np.meshgrid(*[np.arange(3.0)] * 3), -1).reshape(-1, 3) + [2 * (n > 3), 0, 0], deep=True))
+            grid.GetPointData().GetArray("p").Fill(n)
+            write_xml(grid, self.folder / f"u{n}.vtu")
+        for entries, cells, value, times in (
+                ([(0, 0, 0), (0, 0, 1), (0, 0, 2)], 8, 2, 1),            # three versions
+                ([(0, 0, 0), (1, 0, 1), (0, 0, 2), (2, 0, 3)], 8, 2, 3),  # a restart
+                ([(0, 0, 0), (1, 0, 1), (0, 0, 4)], 8, 4, 2),             # a restart with another mesh
+                ([(0, 0, 3), (0, 0, 4)], 16, 4, 1),                       # parts that all call themselves 0
+                ([(0, 0, 3), (1, 0, 2), (0, 1, 4), (1, 1, 5)], 16, 4, 2)):  # part after part
+            with self.subTest(entries=entries):
+                info = collection(*entries)
+                self.assertEqual(info["cells"]["count"], cells)
+                self.assertEqual({s["name"]: s["max"] for s in info["scalars"]}["p"], value)
+                self.assertEqual(len(info.get("times", [])) or 1, times)
+                self.assertEqual(any("the last one is read" in w for w in info["warnings"]), cells == 8)
+
+    def test_a_mesh_that_changes(self):
+        """Each step has its own mesh; steps of the same mesh share it."""
+        for step, n in enumerate((2, 2, 3, 4)):
+            RANDOM.bit_generator.state = np.random.default_rng(n).bit_generator.state
+            grid = cube(n)
+            grid.GetPointData().GetArray("p").Fill(step)
+            write_xml(grid, self.folder / f"step_{step}.vtu")
+        cache = self.convert([self.folder / f"step_{n}.vtu" for n in range(4)], "p")
+        volumes = [self.manifest(folder)["volume"] for folder in (cache, cache / "geometry.1", cache / "geometry.2")]
+        np.testing.assert_allclose(volumes, [1, 1, 1], atol=5e-3)
+        self.assertFalse((cache / "geometry.3").exists())
+        result = self.run_program("info", cache, "--verify")
+        self.assertIn("at all 4 time steps", result.stdout, result.stderr)
+        for step in range(4):
+            self.assertEqual(self.run_program("render", cache, "-o", self.folder / "a.png", "--step", step, "--size", "64x64", "--range", "0,4").returncode, 0)
 
     def test_legacy_files(self):
         grid = cube(3)
