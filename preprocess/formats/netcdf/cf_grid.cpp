@@ -268,7 +268,13 @@ class GridFinder {
       grid.latitude = *latitude;
       return true;
     };
-    if (set(CfRole::kLongitude, CfRole::kLatitude)) return !stacksFaces(grid, reason);
+    std::string implausible;
+    bool usable_indices = true;
+    if (set(CfRole::kLongitude, CfRole::kLatitude)) {
+      if (stacksFaces(grid, reason)) return false;
+      implausible = implausibleDegrees(grid, usable_indices);
+      if (implausible.empty()) return true;
+    }
     auto [projection, words] = MapProjection::of(file_, variable);
     if (set(CfRole::kGridLongitude, CfRole::kGridLatitude)) {
       if (projection && projection->degrees()) {
@@ -285,17 +291,67 @@ class GridFinder {
       if (projection && !projection->degrees()) grid.projection = std::move(projection);
       return true;
     }
-    reason = fmt::format("no longitude and latitude, or x and y, on its dimensions {}",
-                         describe(file_, grid.dims));
-    if (!by_index_ || grid.dims.face) return false;
+    reason = implausible.empty()
+                 ? fmt::format("no longitude and latitude, or x and y, on its dimensions {}",
+                               describe(file_, grid.dims))
+                 : implausible +
+                       ": lengths need a unit of length and the standard_name projection_x_coordinate (or y)";
+    if (!by_index_ || grid.dims.face || !usable_indices) return false;
     for (size_t axis = 0; axis < 2; ++axis)
       if (file_.find(file_.dimensions()[grid.dims.axes[axis]].name)) return false;
     grid.degrees = false;
     grid.indices = true;
+    grid.implausible = implausible;
     grid.unused = horizontalOfNodes(grid.dims);
     grid.longitude = CfTerm::ofIndex(0, indexSpacing(file_, 0));
     grid.latitude = CfTerm::ofIndex(1, indexSpacing(file_, 1));
     return true;
+  }
+
+  /// What no place on the Earth has at most of the nodes, or all nodes alike, as idealised runs of WRF write it; empty if there
+  /// is nothing wrong. Looks at five rows. `usable_indices`: false if the numbers are positions in another unit, and the files
+  /// do not state the distance of nodes either.
+  std::string implausibleDegrees(const CfGrid& grid, bool& usable_indices) const {
+    CfRange row{{0, 0, 0}, {1, 1, 1}};
+    std::vector<size_t> varying;
+    for (size_t axis = 0; axis < 3; ++axis)
+      if (grid.longitude.varies(axis) || grid.latitude.varies(axis)) varying.push_back(axis);
+    if (varying.size() != 2) return "";
+    const auto lengthAlong = [&](size_t axis) { return file_.dimensions()[grid.dims.axes[axis]].length; };
+    row.end[varying[0]] = lengthAlong(varying[0]);
+    std::array<std::vector<double>, 2> values;  // longitudes, latitudes
+    uint64_t wrong = 0, all = 0, missing = 0;
+    for (uint64_t part = 0; part < 5; ++part) {
+      row.begin[varying[1]] = part * (lengthAlong(varying[1]) - 1) / 4;
+      row.end[varying[1]] = row.begin[varying[1]] + 1;
+      const CfValues east = grid.longitude.read(file_, row), north = grid.latitude.read(file_, row);
+      for (uint64_t n = 0; n < lengthAlong(varying[0]); ++n) {
+        std::array<uint64_t, 3> at{};
+        at[varying[0]] = n;
+        const double longitude = east.at(at[0], at[1], at[2]), latitude = north.at(at[0], at[1], at[2]);
+        if (!std::isfinite(longitude) || !std::isfinite(latitude)) {
+          ++missing;
+          continue;
+        }
+        values[0].push_back(longitude);
+        values[1].push_back(latitude);
+        wrong += !isOnEarth(longitude, latitude);
+        ++all;
+      }
+    }
+    if (all < 2 || missing > all) return "";
+    const auto describeRange = [&](const CfTerm& term, const std::vector<double>& of) {
+      const auto [least, most] = std::minmax_element(of.begin(), of.end());
+      return fmt::format("{} is {:g} .. {:g}", term.variable().name, *least, *most);
+    };
+    const auto isConstant = [](const std::vector<double>& of) {
+      return std::all_of(of.begin(), of.end(), [&](double value) { return value == of[0]; });
+    };
+    const bool constant = isConstant(values[0]) && isConstant(values[1]);
+    if (!constant && 2 * wrong <= all) return "";
+    usable_indices = constant || file_.number("DX");
+    return fmt::format("{} and {}, which are no longitudes and latitudes of a grid in degrees",
+                       describeRange(grid.longitude, values[0]), describeRange(grid.latitude, values[1]));
   }
 
   /// Names of horizontal coordinates that differ from level to level.

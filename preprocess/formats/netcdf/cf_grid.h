@@ -22,6 +22,7 @@ struct CfGrid {
   std::optional<MapProjection> projection;  // of longitude and latitude, if these are the map's
   bool indices = false;                     // x, y and perhaps z have no coordinates but the nodes' indices
   std::vector<std::string> unused;          // variables of x and y that are not read: of three dimensions
+  std::string implausible;                  // why longitude and latitude are not read, if they are there
   CfVertical vertical;
   size_t levels = 2;  // the axis along which longitude and latitude do not vary
   std::optional<CfMask> mask;

@@ -66,7 +66,7 @@ bool CfVertical::readNodes(const NetcdfFiles& file, const CfRange& range, std::s
   if (kind_ != Kind::kLevels || !terms_[0].ofNodes()) return false;
   const NetcdfBox box = terms_[0].boxOf(range);
   file.read(terms_[0].variable(), box, to);
-  for (double& value : to.first(box.values())) value *= scale_;
+  for (double& value : to.first(box.values())) value = scale_ * value + offset_;
   return true;
 }
 
@@ -79,7 +79,9 @@ CfValues CfVertical::heights(const NetcdfFiles& file, const CfRange& range) cons
       for (size_t v = 0; v < heights.values.size(); ++v) heights.values[v] += more.values[v];
     }
     for (double& value : heights.values)
-      value = kind_ == Kind::kPressure ? 1e-3 * standardAltitude(scale_ * value) : scale_ * value;
+      value = kind_ == Kind::kPressure      ? 1e-3 * standardAltitude(scale_ * value)
+              : kind_ == Kind::kSeaPressure ? -1e-3 * depthOfSeaPressure(scale_ * value)
+                                            : scale_ * value + offset_;
     return heights;
   }
   return formulaHeights(file, range);
