@@ -221,6 +221,17 @@ class Places(ModelFileTest):
             else:
                 self.assertIn("XLONG is 0 .. 22000 and XLAT is 0 .. 21000, which are no longitudes", self.info(fails=True))
 
+    def test_numbers_that_are_text(self):
+        """missing_value = "-999", scale_factor = "0.5": as scripts write that take every attribute for text."""
+        t = RANDOM.integers(0, 100, (3, 8, 12))
+        hole = RANDOM.random(t.shape) < 0.2
+        for attributes in ({"missing_value": "-999"}, {"missing_value": "-999.0f"}, {"valid_range": "0, 100"}, {"valid_min": "0"}):
+            with self.file(lon=12, lat=8, lev=3) as f:
+                lon, lat = self.air(f)
+                f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                f.add("T", "lev lat lon", np.where(hole, -999, t), "i2", scale_factor="0.5", **attributes)
+            self.expect(self.info(), sphere(lon, lat, np.array([0, 1, 3])[:, None, None]), np.where(hole, np.nan, t / 2))
+
     def test_axes_without_units(self):
         for names, attributes in (("x y z", {"units": "1"}), ("x1 x2 x3", {}), ("xh y z", {}), ("xc yc zc", {}), ("a b c", {"units": "-"})):
             with self.file(**{name: n for name, n in zip(names.split(), (12, 8, 4))}) as f:
