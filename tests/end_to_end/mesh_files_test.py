@@ -7,6 +7,7 @@ with the arrays, and the volume that `curvisplat convert` writes with VTK's own.
 """
 import gzip
 import json
+import pathlib
 import re
 import struct
 import subprocess
@@ -127,6 +128,71 @@ class MeshFiles(MeshCase):
         self.assertIn("at all 4 time steps", result.stdout, result.stderr)
         for step in range(4):
             self.assertEqual(self.run_program("render", cache, "-o", self.folder / "a.png", "--step", step, "--size", "64x64", "--range", "0,4").returncode, 0)
+
+    def test_scalars_that_lack_values_at_different_samples(self):
+        """Each has its own range in `info`; without --scalar those that have none where others do get no part in the cache."""
+        def ranges(info):
+            return {s["name"]: (s["min"], s["max"]) for s in info["scalars"]}
+
+        for where in ("points", "cells", "nodes", "mesh cells"):
+            count, side = ((128, 8) if "cells" in where else (225, 9))
+            values = {"c": np.arange(count) % side, "d": np.arange(count) % side * 2.0}
+            for name, part in (("a", lambda v: v > 4), ("b", lambda v: v < 2)):
+                values[name] = np.where(part(values["c"]), np.nan, values["c"])
+            image = vtk.vtkImageData()
+            image.SetDimensions(9, 5, 5)
+            for name in ("a", "c", "b", "d"):
+                array = numpy_to_vtk(values[name].astype("f8"), deep=True)
+                array.SetName(name)
+                (image.GetCellData() if "cells" in where else image.GetPointData()).AddArray(array)
+            path = self.folder / "a.vti"
+            writer = vtk.vtkXMLImageDataWriter()
+            if where in ("nodes", "mesh cells"):
+                shift = vtk.vtkAppendFilter()
+                shift.AddInputData(image)
+                shift.Update()
+                image, path, writer = shift.GetOutput(), self.folder / "a.vtu", vtk.vtkXMLUnstructuredGridWriter()
+            writer.SetFileName(str(path))
+            writer.SetInputData(image)
+            writer.Write()
+            with self.subTest(where=where):
+                top = side - 1
+                self.assertEqual(ranges(self.info(path)), {"a": (0, 4), "b": (2, top), "c": (0, top), "d": (0, 2 * top)})
+                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite")
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertIn("left out: a, b, which have no values at some samples where c does", result.stderr)
+                manifest = self.manifest(self.folder / "n.splats")
+                self.assertEqual([v["name"] for v in manifest["variables"]], ["c", "d"])
+                self.assertAlmostEqual(manifest["volume"], 128, delta=0.3)
+                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite", "--resume")
+                self.assertEqual([v["name"] for v in self.manifest(self.folder / "n.splats")["variables"]], ["c", "d"], result.stderr)
+                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite", "--scalar", "c,a")
+                self.assertIn("of the values of c are left out, since other scalars of the cache have none there", result.stderr)
+                self.assertEqual(self.manifest(self.folder / "n.splats")["variables"][0]["max"], 4)
+
+    def test_ranges_are_of_what_is_drawn(self):
+        """Faces that mesh generators write beside the cells have values, too."""
+        grid = cube(2)
+        for n in range(grid.GetNumberOfCells()):
+            if grid.GetCell(n).GetCellDimension() < 3:
+                grid.GetCellData().GetArray("c").SetValue(n, 1000)
+        write_xml(grid, self.folder / "mesh.vtu")
+        self.assertLess({s["name"]: s["max"] for s in self.info(self.folder / "mesh.vtu")["scalars"]}["c"], 1000)
+
+    def test_names_of_steps_with_decimals(self):
+        grid = cube(1, kinds=("hexahedron",))
+        for names, order in ((("0.001", "0.01", "0.0005", "0.0015"), "0.0005 0.001 0.0015 0.01"), (("0", "0.5", "2", "10", "1e-05"), "0 1e-05 0.5 2 10"),
+                             (("0.75", "0.8", "1.25"), "0.75 0.8 1.25"), (("1.9", "1.10", "1.1"), "1.1 1.9 1.10"), (("9", "10", "0100"), "9 10 0100")):
+            folder = self.folder / names[0]
+            folder.mkdir()
+            for name in names:
+                write_xml(grid, folder / f"Result-{name}.vtu")
+            for command in (("convert", "--scalar", "p", "-o", self.folder / "s.splats", "--overwrite"), ("info", "--json")):
+                result = self.run_program(command[0], folder / "Result-*.vtu", *command[1:])
+                self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(f"{len(names)} steps, {folder}/Result-{order.split()[0]}.vtu .. {folder}/Result-{order.split()[-1]}.vtu;", json.loads(result.stdout)["series"])
+            found = [pathlib.Path(source).stem[7:] for source in self.manifest(self.folder / "s.splats")["sources"]]
+            self.assertEqual(" ".join(found), order)
 
     def test_legacy_files(self):
         grid = cube(3)
