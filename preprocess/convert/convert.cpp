@@ -1,5 +1,7 @@
 #include "preprocess/convert/convert.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
