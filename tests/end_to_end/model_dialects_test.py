@@ -254,5 +254,63 @@ class Places(ModelFileTest):
         self.assertIn("S has 2 (depth, ncells), the cells of an unstructured map: give the grid file that has their faces", line)
 
 
+class Fields(ModelFileTest):
+    """Which variables are taken where none is asked for."""
+
+    def test_a_mesh_file_beside_the_data(self):
+        """NEMO: mesh_mask.nc has more variables of three dimensions than the data, on levels of another name, and masks of them."""
+        t, mask = RANDOM.random((3, 8, 12)).astype("f4"), RANDOM.random((3, 8, 12)) < 0.7
+        mask[0] |= mask[1:].any(0)
+        lon, lat = np.meshgrid(np.linspace(0, 33, 12), np.linspace(10, 31, 8))
+        depths = np.array([5.0, 50, 500])
+        with self.file("data.nc", time_counter=None, deptht=3, y=8, x=12) as f:
+            f.add("nav_lon", "y x", lon, units="degrees_east")
+            f.add("nav_lat", "y x", lat, units="degrees_north")
+            f.add("deptht", "deptht", depths, units="m", positive="down")
+            f.add("votemper", "time_counter deptht y x", t[None], "f4", coordinates="nav_lon nav_lat")
+        with self.file("mesh_mask.nc", t=1, nav_lev=3, y=8, x=12) as f:
+            f.add("nav_lon", "y x", lon, units="degrees_east")
+            f.add("nav_lat", "y x", lat, units="degrees_north")
+            f.add("nav_lev", "nav_lev", depths, units="m")
+            f.add("tmaskutil", "t y x", mask[:1], "i1")
+            for name in ("tmask", "umask", "vmask"):
+                f.add(name, "t nav_lev y x", mask[None], "i1")
+            for name in ("e3t_0", "e3u_0", "e3v_0", "e3w_0", "gdept_0", "gdepw_0"):
+                f.add(name, "t nav_lev y x", np.ones((1, 3, 8, 12)) * depths[:, None, None], units="m")
+        info = self.info("data.nc", "mesh_mask.nc")
+        self.assertEqual(info["scalars"][0]["name"], "votemper")
+        self.assertIn("tmask is 0", info["blanking"])
+        self.expect(info, sphere(lon, lat, -1e-3 * depths[:, None, None]), np.where(mask, t, np.nan))
+
+    def test_what_heights_are_made_of_is_no_field(self):
+        """WRF: PH and PHB are on more points than T."""
+        z = np.linspace(0, 5000, 5)[:, None, None] + np.zeros((8, 12))
+        lon, lat = np.meshgrid(np.linspace(0, 11, 12), np.linspace(40, 47, 8))
+        with self.file(Time=None, bottom_top=4, bottom_top_stag=5, south_north=8, west_east=12) as f:
+            f.add("XLONG", "Time south_north west_east", lon[None], units="degree_east")
+            f.add("XLAT", "Time south_north west_east", lat[None], units="degree_north")
+            for name, part in (("PH", 0.1), ("PHB", 0.9)):
+                f.add(name, "Time bottom_top_stag south_north west_east", 9.81 * part * z[None], "f4", units="m2 s-2")
+            f.add("T", "Time bottom_top south_north west_east", RANDOM.random((1, 4, 8, 12)), "f4", units="K")
+        info = self.info()
+        self.assertEqual([s["name"] for s in info["scalars"]], ["T"])
+
+    def test_months_and_members_are_steps(self):
+        t = RANDOM.random((5, 3, 8, 12)).astype("f4")
+        for name, values, times in (("month", [1, 2, 3, 4, 5], [1, 2, 3, 4, 5]), ("member", None, [0, 1, 2, 3, 4]), ("region", [3, 1, 4, 1, 5], [0, 1, 2, 3, 4])):
+            for time in ("", "time "):
+                with self.file(lon=12, lat=8, lev=3, time=1, **{name: 5}) as f:
+                    lon, lat = self.air(f)
+                    f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                    f.add("time", "time", [0], units="days since 2000-01-01")
+                    if values:
+                        f.add(name, name, values, "i4")
+                    f.add("T", f"{time}{name} lev lat lon", t[None] if time else t, "f4")
+                info = self.info("file.nc", "--time-step", "3")
+                self.assertEqual(info["times"], times)
+                self.assertIn(f"the steps are the 5 values of {name}", info["notes"])
+                self.expect(info, sphere(lon, lat, np.array([0, 1, 3])[:, None, None]), t[3])
+
+
 if __name__ == "__main__":
     unittest.main()

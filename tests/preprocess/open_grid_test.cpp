@@ -235,7 +235,7 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   write("a.geo", head + "coordinates\n       4\n");
   expectNamed("a.geo", "a geometry of EnSight 6");
   write("a.geo", head + "part\n         1\n");
-  expectNamed("a.geo", "give its case file instead");
+  expectNamed("a.geo", "an EnSight geometry file (give its case file instead)");
   write("points", "/*--- a banner ---*/\nFoamFile\n{\n    version 2.0;\n}\n");
   expectNamed("points", "a file of an OpenFOAM case");
   write("a.mat", "MATLAB 5.0 MAT-file Platform: posix" + std::string(128, '\0'));

@@ -263,7 +263,7 @@ void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived
   std::vector<StepFiles> steps;
   if (hasSeveralStepFiles(files)) steps = stepsOf(files);
   std::string series;
-  if (!steps.empty()) {
+  if (steps.size() > 1) {
     files = steps.front().options;
     series = fmt::format("{} steps, {} .. {}; the first is described", steps.size(), steps.front().name,
                          steps.back().name);

@@ -90,6 +90,14 @@ std::optional<CfDimensions> dimensionsOf(const NetcdfFiles& file, const NetcdfVa
     dims.face = *face;
     space.erase(face);
   }
+  // Months or members, which come first: steps of a kind, if there is a single time.
+  if (space.size() == 4 && (!dims.time || file.dimensions()[*dims.time].length == 1)) {
+    const NetcdfVariable* const coordinate = file.find(file.dimensions()[space[0]].name);
+    if (!coordinate || cfRole(file, *coordinate) == CfRole::kNone) {
+      dims.time = space[0];
+      space.erase(space.begin());
+    }
+  }
   if (space.size() != 3 || std::set<size_t>(space.begin(), space.end()).size() != 3) return std::nullopt;
   dims.axes = {space[2], space[1], space[0]};
   return dims;
@@ -234,6 +242,8 @@ class GridFinder {
       }
     CfGrid grid;
     grid.dims = dims;
+    if (dims.time && !isTime(file_, *dims.time, variable.dims.size()) && !isLeadTime(file_, *dims.time))
+      grid.steps_of = file_.dimensions()[*dims.time].name;
     grid.variables.push_back(&variable);
     if (!setHorizontal(grid, variable, reason)) return std::nullopt;
     std::vector<size_t> levels;
@@ -400,8 +410,32 @@ void CfGrid::setFace(uint64_t number) {
   if (mask) mask->setFace(number);
 }
 
+bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const std::vector<CfGrid>& grids) {
+  if (cfRole(file, variable) != CfRole::kNone || CfMask::isMask(variable)) return false;
+  if (std::any_of(grids.begin(), grids.end(),
+                  [&](const CfGrid& grid) { return grid.vertical.uses(variable); }))
+    return false;
+  // NEMO's meshes: sizes and depths of cells at the points t, u, v, w and f.
+  const std::string name = lowerCase(variable.name);
+  const bool of_point = name.size() > 2 && std::string_view("tuvwf").find(name[2]) != std::string_view::npos;
+  if (of_point && (name.starts_with("e1") || name.starts_with("e2") || name.starts_with("e3"))) return false;
+  if (name.starts_with("gdep")) return false;
+  for (const NetcdfVariable& other : file.variables())
+    for (const char* const attribute : {"cell_measures", "formula_terms", "ancillary_variables"}) {
+      std::istringstream words(other.text(attribute));
+      for (std::string word; words >> word;)
+        if (word == variable.name) return false;
+    }
+  return true;
+}
+
 CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step) {
-  return GridFinder(file, time_step).find();
+  CfGrids found = GridFinder(file, time_step).find();
+  for (CfGrid& grid : found.grids)
+    std::stable_partition(grid.variables.begin(), grid.variables.end(), [&](const NetcdfVariable* variable) {
+      return isField(file, *variable, found.grids);
+    });
+  return found;
 }
 
 bool isOcean(const NetcdfFiles& file, const CfGrid& grid) {
@@ -431,7 +465,13 @@ CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
   for (size_t n = 0; n < time.length; ++n) times.values[n] = static_cast<double>(n);
   const NetcdfVariable* const coordinate = file.coordinateOf(*grid.dims.time, *grid.variables.front());
   if (coordinate && coordinate->numeric) {
-    file.read(*coordinate, {{0}, {time.length}}, times.values);
+    std::vector<double> stored(time.length);
+    file.read(*coordinate, {{0}, {time.length}}, stored);
+    // Of members or months the values need not increase; times that do not are refused where they are used.
+    const auto falls = [](double a, double b) { return !(a < b); };
+    if (!grid.steps_of.empty() && std::adjacent_find(stored.begin(), stored.end(), falls) != stored.end())
+      return times;
+    times.values = stored;
     times.unit = coordinate->text("units");
     times.calendar = lowerCase(coordinate->text("calendar"));
     return times;

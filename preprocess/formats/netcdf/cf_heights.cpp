@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <optional>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/cf_vertical.h"
@@ -60,6 +62,14 @@ void CfVertical::setFace(uint64_t face) {
   for (CfTerm& term : terms_) term.setFace(face);
   for (std::optional<CfTerm>* term : {&s_, &c_, &eta_, &depth_, &c2_, &depth2_})
     if (*term) (*term)->setFace(face);
+}
+
+bool CfVertical::uses(const NetcdfVariable& variable) const {
+  const auto is = [&](const CfTerm& term) { return &term.variable() == &variable; };
+  const std::optional<CfTerm>* const terms[] = {&s_, &c_, &eta_, &depth_, &c2_, &depth2_};
+  return std::any_of(terms_.begin(), terms_.end(), is) ||
+         std::any_of(std::begin(terms), std::end(terms),
+                     [&](const auto* term) { return *term && is(**term); });
 }
 
 bool CfVertical::readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const {

@@ -57,6 +57,9 @@ class CfVertical {
   }  // "depth", "ocean_s_coordinate_g2 of s_rho"
   const std::vector<std::string>& warnings() const { return warnings_; }
 
+  /// Whether the heights are made of this variable.
+  bool uses(const NetcdfVariable& variable) const;
+
  private:
   enum class Kind {
     kLevels,

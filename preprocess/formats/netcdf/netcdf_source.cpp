@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/closed_grid.h"
@@ -150,9 +151,19 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     throw Error("{}: has no grid by the CF conventions: {}", file.path().string(), why);
   }
 
+  // The grid of most of the first file's fields, which is that of the data; masks and meshes are in further files.
+  const auto fieldsOf = [&](const CfGrid& grid) {
+    size_t first = 0, all = 0;
+    for (const NetcdfVariable* variable : grid.variables)
+      if (isField(file, *variable, found.grids)) {
+        ++all;
+        first += variable->file == 0;
+      }
+    return std::tuple(first, all, grid.variables.size());
+  };
   size_t chosen = 0;
   for (size_t g = 1; g < found.grids.size(); ++g)
-    if (found.grids[g].variables.size() > found.grids[chosen].variables.size()) chosen = g;
+    if (fieldsOf(found.grids[g]) > fieldsOf(found.grids[chosen])) chosen = g;
   std::string chooser;
   for (const std::string& name : options.scalars) {
     const auto position = positionOf(found.grids, name);
@@ -254,6 +265,9 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
       fmt::format("{}, {}, {}{} {}, vertical {} times {:g}, in km", file_.kind(),
                   grid_.longitude.variable().name, grid_.latitude.variable().name, projection, shape,
                   grid_.vertical.description(), options.globe.vertical_scale);
+  if (!grid_.steps_of.empty())
+    description_.notes.push_back(
+        fmt::format("the steps are the {} values of {}", description_.times.size(), grid_.steps_of));
   if (grid_.dims.time)
     description_.format +=
         fmt::format(", time step {} of {}", description_.time_step, description_.times.size());
