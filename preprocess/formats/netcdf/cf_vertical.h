@@ -93,7 +93,7 @@ class CfVertical {
   static std::optional<CfVertical> byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,
                                              const CfDimensions& block, size_t axis, std::string& reason);
   static std::optional<CfVertical> ofTerms(const NetcdfFiles& file, Kind kind, const Terms& terms,
-                                           const CfDimensions& block, size_t axis, std::string& reason);
+                                           const CfDimensions& block, size_t axis, std::string& lacking);
   static std::optional<CfVertical> byNamesOfTerms(const NetcdfFiles& file, const CfDimensions& block,
                                                   size_t axis);
   static std::optional<CfVertical> byNamesOfFields(const NetcdfFiles& file, const CfDimensions& block,
