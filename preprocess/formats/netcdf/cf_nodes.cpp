@@ -50,18 +50,15 @@ void CfNodes::read(const CfRange& range, std::span<const uint32_t> scalars, Node
   readPlaces(range, out);
   out.blank.assign(nodes, 0);
   out.scalars.resize(scalars.size());
-  bool has_mask = false;
+  const std::vector<float>* mask = nullptr;
   for (size_t n = 0; n < scalars.size(); ++n) {
     CURVISPLAT_CHECK_OP(scalars[n], <, grid_.variables.size());
     out.scalars[n].resize(nodes);
     readScalar(range, scalars[n], out.scalars[n]);
-    has_mask = has_mask || scalars[n] == mask_;
+    if (scalars[n] == mask_) mask = &out.scalars[n];
   }
-  // Where another scalar has a value, the node is there.
-  if (has_mask)
-    for (size_t n = 0; n < nodes; ++n)
-      out.blank[n] = std::all_of(out.scalars.begin(), out.scalars.end(),
-                                 [&](const std::vector<float>& values) { return std::isnan(values[n]); });
+  if (mask)
+    for (size_t n = 0; n < nodes; ++n) out.blank[n] = std::isnan((*mask)[n]);
   else
     readBlank(range, out.blank);
   if (grid_.mask) applyMask(range, out.blank);
