@@ -28,6 +28,10 @@ except ModuleNotFoundError as error:
 
 
 class MeshFiles(MeshCase):
+    def setUp(self):
+        super().setUp()
+        RANDOM.bit_generator.state = np.random.default_rng(1).bit_generator.state  # the same cube in every order of tests
+
     def test_every_encoding_of_xml(self):
         grid = cube(3)
         path = self.folder / "mesh.vtu"
