@@ -20,6 +20,16 @@ class CgnsMeshes(MeshFormats):
         file.solution("Nodes", cg.VERTEX, {"p": mesh.p})
         file.solution("Cells", cg.CELL_CENTER, {"c": mesh.c})
 
+    def write_mixed(self, mesh, faces=0):
+        """All cells, and some faces, in one section. Returns what mixed() does."""
+        words, begins = self.mixed(mesh, faces=faces)
+        with cg.CgnsFile(self.path) as file:
+            file.base()
+            file.zone("Cube", mesh.points, len(mesh.cells))
+            file.section("all", cg.MIXED, words, len(mesh.cells) + faces, begins)
+            self.finish(file, mesh)
+        return words, begins
+
     def write_sections(self, mesh, kind=cg.HDF5, wall=True):
         kinds = {4: cg.TETRA_4, 5: cg.PYRA_5, 6: cg.PENTA_6, 8: cg.HEXA_8}
         with cg.CgnsFile(self.path, kind) as file:
@@ -106,12 +116,7 @@ class CgnsMeshes(MeshFormats):
             for mixed in (False, True):
                 with self.subTest(version=version, mixed=mixed):
                     if mixed:
-                        words, begins = self.mixed(mesh)
-                        with cg.CgnsFile(self.path) as file:
-                            file.base()
-                            file.zone("Cube", mesh.points, len(mesh.cells))
-                            file.section("all", cg.MIXED, words, len(mesh.cells), begins)
-                            self.finish(file, mesh)
+                        words, begins = self.write_mixed(mesh)
                         self.old_layout("all")
                     else:
                         self.write_sections(mesh)
@@ -130,24 +135,14 @@ class CgnsMeshes(MeshFormats):
 
     def test_mixed_sections(self):
         mesh = Mesh()
-        words, begins = self.mixed(mesh)
-        with cg.CgnsFile(self.path) as file:
-            file.base()
-            file.zone("Cube", mesh.points, len(mesh.cells))
-            file.section("all", cg.MIXED, words, len(mesh.cells), begins)
-            self.finish(file, mesh)
+        self.write_mixed(mesh)
         self.expect_same([self.path], mesh.vtk())
         self.old_layout("all")
         self.expect_same([self.path], mesh.vtk())
 
     def test_mixed_sections_with_faces(self):
         mesh = Mesh()
-        words, begins = self.mixed(mesh, faces=3)
-        with cg.CgnsFile(self.path) as file:
-            file.base()
-            file.zone("Cube", mesh.points, len(mesh.cells))
-            file.section("all", cg.MIXED, words, len(mesh.cells) + 3, begins)
-            self.finish(file, mesh)
+        self.write_mixed(mesh, faces=3)
         warnings = self.info(self.path)["warnings"]
         self.assertTrue(any("3 elements are nodes, lines or faces" in w for w in warnings), warnings)
         self.assertTrue(any("cell-centred fields" in w for w in warnings), warnings)
