@@ -132,7 +132,7 @@ DiskNeeds sampledNeeds(const GridSource& grid, const ConvertOptions& options,
 
 namespace {
 
-/// Of scalars that lose values beside each other, a set that loses the same: the largest, of several the one with the most values.
+/// Returns the largest set of scalars that lose the same values beside each other; of several, the one with the most values.
 std::vector<uint32_t> scalarsThatShareBlanks(const std::vector<uint32_t>& scalars,
                                              const std::vector<BlankCounts::Lost>& lost) {
   std::vector<uint32_t> best;

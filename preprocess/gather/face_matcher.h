@@ -124,7 +124,7 @@ class FaceList {
   glm::dvec3 middleOf(const GatheredCells& cells, size_t cell) const;
 
   std::vector<size_t> begins_{0};  // [cell + 1], in corners, with collapsed ones
-  // Of cells of very many corners, in their order: each of their very many faces needs it.
+  // The middles of cells of very many corners, in their order: each of their very many faces needs it.
   std::vector<std::pair<size_t, glm::dvec3>> middles_;
 };
 

@@ -257,7 +257,7 @@ void printAsText(const GridInfo& info) {
 }  // namespace
 
 void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived, bool json) {
-  // As `convert` takes the same files.
+  // `convert` takes the same files in this way.
   OpenGridOptions files = options;
   expandPatterns(files);
   std::vector<StepFiles> steps;

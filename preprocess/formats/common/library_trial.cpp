@@ -74,7 +74,7 @@ constexpr size_t kMaxReadBytes = size_t{1} << 26;  // of all chunks
 using Hdf5Object = Hdf5Handle<H5Oclose>;
 using Hdf5Properties = Hdf5Handle<H5Pclose>;
 
-/// In the process of a trial; leads_out: the walk met something that Hdf5Exits has to look at.
+/// in_trial: this is the process of a trial. leads_out: its walk met something that Hdf5Exits has to look at.
 bool in_trial = false, leads_out = false;
 constexpr int kExitLeadsOut = 3;
 

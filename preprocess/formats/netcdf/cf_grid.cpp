@@ -467,7 +467,7 @@ CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
   if (coordinate && coordinate->numeric) {
     std::vector<double> stored(time.length);
     file.read(*coordinate, {{0}, {time.length}}, stored);
-    // Of members or months the values need not increase; times that do not are refused where they are used.
+    // The values of members or months need not increase; times that do not are refused where they are used.
     const auto falls = [](double a, double b) { return !(a < b); };
     if (!grid.steps_of.empty() && std::adjacent_find(stored.begin(), stored.end(), falls) != stored.end())
       return times;

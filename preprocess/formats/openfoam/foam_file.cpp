@@ -109,7 +109,7 @@ struct FoamFile::Parser {
   void skipSpace() {
     while (isSpace(peek())) take();
   }
-  /// The next token, with the entry's tokens in the place of "$name" and "${name}".
+  /// The next token. "$name" and "${name}" are replaced by the tokens of the entry that they name.
   std::string token() {
     for (;;) {
       std::string word = nextToken();

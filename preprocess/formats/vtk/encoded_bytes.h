@@ -35,7 +35,7 @@ class Base64Bytes final : public ByteSource {
   static constexpr uint64_t kUnbroken = UINT64_MAX / 4;
 
   void findLines();
-  /// Of a group of four characters, in the file.
+  /// Returns where a group of four characters begins in the file.
   uint64_t position(uint64_t four) const;
   /// Reads groups of four characters without the line breaks, `count` or as many as `text` has room for with them.
   size_t readFours(uint64_t four, size_t count, std::span<std::byte> text) const;

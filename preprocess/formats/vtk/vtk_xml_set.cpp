@@ -24,7 +24,7 @@ using Node = pugi::xml_node;
 constexpr size_t kMaxPieces = 100'000, kMaxFiles = 100'000;
 constexpr size_t kMaxPatches = 20'000, kMaxLevels = 64;  // of an AMR set
 
-/// Of the positions of the first and the last points of each piece or block, and of their number.
+/// Returns a checksum of the first and the last points of each piece or block, and of how many there are.
 uint64_t checksumOfFirstAndLast(const DataSource& source) {
   constexpr uint64_t kSome = 4096;
   std::vector<uint64_t> sums;
