@@ -1,8 +1,10 @@
+#include <hwy/aligned_allocator.h>
 #include <hwy/cache_control.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <vector>
 
 #include "render/cpu/tile.h"
 
@@ -93,22 +95,20 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool sev
   return paintPixelByPixel(work, blocks, e, scalar, visits.lit(work, n), footprint);
 }
 
-BlockMask paintTile(const TileWork& work) {
-  const float* footprint = footprintPolynomial();
-  BlockMask open = work.open;
+/// Sixteen splats, prepared.
+struct Prepared {
   Visits visits;
   Fits fits{};
   ColourVisits colours;
-  for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
-    const size_t count = std::min(kLanes, work.order.size() - begin);
+  IntRow numbers;  // of the tile's splats
+  size_t count;
+
+  /// Those of work.order from `begin` on.
+  HWY_INLINE void prepare(const TileWork& work, size_t begin) {
+    count = std::min(kLanes, work.order.size() - begin);
     // The next sixteen come from anywhere in the batch.
     const size_t end = std::min(begin + 2 * kLanes, work.order.size());
-    for (size_t n = begin + count; n < end; ++n) {
-      const ScreenSplat& next = work.splats[work.order[n]];
-      hwy::Prefetch(&next.x);
-      hwy::Prefetch(&next.skew);  // which may lie in another cache line
-    }
-    IntRow numbers;
+    for (size_t n = begin + count; n < end; ++n) hwy::Prefetch(&work.splats[work.order[n]]);
     for (size_t n = 0; n < kLanes; ++n)
       numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);
     setUp(work, numbers, visits);
@@ -117,25 +117,79 @@ BlockMask paintTile(const TileWork& work) {
     else
       fitMeans(work.table, visits.pieces, count, fits);
     if (work.colours)
-      setUpColours(work, numbers, visits, count, colours);
+      setUpColours(work, numbers, visits, fits, count, colours);
     else if (work.shading.lit)
       fits.light(visits.diffuse, visits.specular);
-    for (size_t n = 0; n < count; ++n) {
-      if (fits.fit.at[n] == kNothing) continue;
-      const BlockMask touched = blocksOf(visits, n), blocks = touched & open;
-      if (blocks == 0) continue;
-      if (work.colours) {
-        open &= ~paintColoured(work, blocks, {visits, fits, colours, n}, static_cast<size_t>(numbers.at[n]),
-                               footprint);
-        continue;
-      }
-      const Visit visit{visits, fits, n};
-      open &= ~(visits.cut.at[n] != 0
-                    ? paintCut(work, blocks, visit, static_cast<size_t>(numbers.at[n]), footprint)
-                    : paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint));
+  }
+
+  /// The blocks that splat n may touch; none if it can be left out.
+  HWY_INLINE BlockMask touched(size_t n) const {
+    return fits.fit.at[n] == kNothing ? 0 : blocksOf(visits, n);
+  }
+
+  /// Paints splat n in `blocks`, some of those touched; returns those of them that are saturated then.
+  HWY_INLINE BlockMask paint(const TileWork& work, BlockMask blocks, BlockMask touched, size_t n,
+                             const float* footprint) const {
+    const auto number = static_cast<size_t>(numbers.at[n]);
+    if (work.colours) return paintColoured(work, blocks, {visits, fits, colours, n}, number, footprint);
+    const Visit visit{visits, fits, n};
+    if (visits.cut.at[n] != 0) return paintCut(work, blocks, visit, number, footprint);
+    return paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint);
+  }
+};
+
+BlockMask paintInOrder(const TileWork& work) {
+  const float* footprint = footprintPolynomial();
+  BlockMask open = work.open;
+  Prepared prepared;
+  for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
+    prepared.prepare(work, begin);
+    for (size_t n = 0; n < prepared.count; ++n) {
+      const BlockMask touched = prepared.touched(n), blocks = touched & open;
+      if (blocks != 0) open &= ~prepared.paint(work, blocks, touched, n, footprint);
     }
   }
   return open;
+}
+
+/// The blocks of an order tile.
+BlockMask blocksOfOrderTile(size_t number) {
+  constexpr size_t kBlocksAlong = kOrderSide / kBlockSide;
+  const size_t row = number / kOrderTilesAlong * kBlocksAlong,
+               column = number % kOrderTilesAlong * kBlocksAlong;
+  BlockMask blocks = 0;
+  for (size_t n = 0; n < kBlocksAlong; ++n)
+    blocks |= ((BlockMask{1} << kBlocksAlong) - 1) << ((row + n) * kTileBlocks + column);
+  return blocks;
+}
+
+/// Each order tile in its own order: all splats are prepared first.
+BlockMask paintByLists(const TileWork& work) {
+  const float* footprint = footprintPolynomial();
+  const size_t count = work.order.size();
+  const auto prepared = hwy::MakeUniqueAlignedArray<Prepared>((count + kLanes - 1) / kLanes);
+  std::vector<BlockMask> touched(count);
+  for (size_t begin = 0; begin < count; begin += kLanes) {
+    Prepared& group = prepared[begin / kLanes];
+    group.prepare(work, begin);
+    for (size_t n = 0; n < group.count; ++n) touched[begin + n] = group.touched(n);
+  }
+  BlockMask open = work.open;
+  for (size_t number = 0; number < kOrderTiles; ++number) {
+    const BlockMask of_tile = blocksOfOrderTile(number);
+    for (const uint64_t item : (*work.lists)[number]) {
+      const auto index = static_cast<uint32_t>(item);
+      const BlockMask blocks = touched[index] & open & of_tile;
+      if (blocks != 0)
+        open &= ~prepared[index / kLanes].paint(work, blocks, touched[index], index % kLanes, footprint);
+      if ((open & of_tile) == 0) break;
+    }
+  }
+  return open;
+}
+
+BlockMask paintTile(const TileWork& work) {
+  return work.lists ? paintByLists(work) : paintInOrder(work);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -33,6 +33,8 @@ struct Visits {
   Row x, y, a, b, c;      // Ellipse
   Row tp, tq;             // Scalar's
   Row cut;                // 1 where the splat is cut; its pieces' reach is then that of the cut, too
+  Row along;              // ScreenSplat's, of splats that hide some of themselves; else 0
+  Row cell_depth;         // geometric, of their cells
   Row diffuse, specular;  // Lit, in lit pictures
   Pieces pieces;          // all of the splat that is in the tile
   Row l11, l21, l22;
@@ -68,10 +70,43 @@ HWY_INLINE Range tOver(V by_x, V by_y, V middle_x, V middle_y, V half_x, V half_
           hn::Clamp(hn::Add(middle, half), hn::Neg(one), one)};
 }
 
+/// How many cells of the table a unit of the scalar is, around this one.
+HWY_INLINE V cellsAScalar(const ShadingTable& table, V scalar) {
+  const Floats d;
+  const V scale = hn::Set(d, std::abs(table.scale()));
+  if (!table.logScale()) return scale;
+  return hn::Div(scale, hn::Max(hn::Abs(scalar), hn::Set(d, ClassificationTable::kMinLogarithmic)));
+}
+
+/// What the cells of splats have along the ray: the footprints of neighbours add up to one, so it is the amplitude
+/// without the low-pass.
+HWY_INLINE V cellDepth(const TileWork& work, V amplitude, V l11, V l21, V l22) {
+  const Floats d;
+  const V low_pass = hn::Set(d, work.shading.low_pass_px2);
+  const V s00 = hn::MulSub(l11, l11, low_pass);
+  const V s11 = hn::Sub(hn::MulAdd(l21, l21, hn::Mul(l22, l22)), low_pass);
+  const V s01 = hn::Mul(l11, l21), passed = hn::Mul(l11, l22);
+  const V determinant = hn::NegMulAdd(s01, s01, hn::Mul(s00, s11));
+  const V least = hn::Mul(hn::Set(d, 1e-4f), hn::Mul(passed, passed));
+  return hn::Mul(amplitude, hn::Div(passed, hn::Sqrt(hn::Max(determinant, least))));
+}
+
+/// By how much the scalar that is seen of splats may differ from their mean, since their nearer sides hide the others:
+/// at the most.
+HWY_INLINE V hidesItself(const TileWork& work, V cell_depth, V along) {
+  const Floats d;
+  const V tau = hn::Mul(cell_depth, hn::Set(d, work.table.mostExtinction()));
+  return hn::Mul(hn::Mul(hn::Set(d, kSqrt3), hn::Abs(along)),
+                 hn::Min(hn::Mul(tau, hn::Set(d, 1.0f / 6)), hn::Set(d, 1.0f)));
+}
+
+// In cells of the table: what is seen of splats with less is not worth the work. A 2,000th of the function.
+constexpr float kHidingCells = 2;
+
 /// From the splats with these numbers.
 HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
   constexpr int32_t kFloats = sizeof(ScreenSplat) / sizeof(float);
-  static_assert(kFloats == 11);
+  static_assert(kFloats == 16);
   const Floats d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
   const V support = hn::Set(d, kSupport), last_pixel = hn::Set(d, kTileSide - 1);
@@ -95,7 +130,6 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const V amplitude = gather(work, offsets, 5);
     const auto cut = hn::Lt(amplitude, zero);
     store(hn::Abs(amplitude), out.pieces.amplitude);
-    store(hn::IfThenElseZero(cut, one), out.cut);
 
     // The pixels of the tile that lie in the ellipse's own rectangle.
     const V reach_x = hn::Mul(support, l11);
@@ -127,8 +161,9 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     }
     store(gather(work, offsets, 6), out.pieces.mean);
     if (!work.shading.per_pixel) {
+      store(hn::IfThenElseZero(cut, one), out.cut);
       for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to, &out.tp,
-                       &out.tq, &out.pieces.width_loss})
+                       &out.tq, &out.pieces.width_loss, &out.along, &out.cell_depth})
         store(zero, *row);
       continue;
     }
@@ -145,6 +180,21 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
                     hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x), hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y),
                     hn::Mul(half, hn::Sub(x1, x0)), hn::Mul(half, hn::Sub(y1, y0)));
     V reach = hn::Mul(support, slope), width_loss = zero;
+    const V along = gather(work, offsets, 11),
+            cell_depth = cellDepth(work, hn::Abs(amplitude), l11, l21, l22);
+    const V seen_nearer = hidesItself(work, cell_depth, along);
+    store(cell_depth, out.cell_depth);
+    const auto hides = hn::Gt(hn::Mul(seen_nearer, cellsAScalar(work.table, gather(work, offsets, 6))),
+                              hn::Set(d, kHidingCells));
+    store(hn::IfThenElseZero(hides, along), out.along);
+    store(hn::IfThenElseZero(hn::Or(cut, hides), one), out.cut);
+    if (!hn::AllFalse(d, hides)) {
+      const V along2 = hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along));
+      const V narrowest = hn::Sqrt(hn::Max(hn::MulSub(half_width, half_width, along2), zero));
+      reach = hn::IfThenElse(hides, hn::Add(reach, seen_nearer), reach);
+      width_loss = hn::IfThenElseZero(hides, hn::Sub(half_width, narrowest));
+      t = {hn::IfThenElse(hides, hn::Neg(one), t.from), hn::IfThenElse(hides, one, t.to)};
+    }
     if (!hn::AllFalse(d, cut)) {
       // ScreenCut's correlation: how far the mean moves by what is left along the ray, which is all over the
       // splat, and how much narrower the scalar's distribution becomes.
@@ -158,7 +208,8 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
       const V moved = hn::Mul(hn::Mul(hn::Abs(correlation), half_width), hn::Set(d, kReachOfHalfWidth));
       const V kept = hn::Sqrt(hn::Max(hn::NegMulAdd(correlation, correlation, one), zero));
       reach = hn::IfThenElse(cut, hn::Add(reach, moved), reach);
-      width_loss = hn::IfThenElseZero(cut, hn::Mul(half_width, hn::Sub(one, kept)));
+      width_loss =
+          hn::IfThenElse(cut, hn::Max(width_loss, hn::Mul(half_width, hn::Sub(one, kept))), width_loss);
       t = {hn::IfThenElse(cut, hn::Neg(one), t.from), hn::IfThenElse(cut, one, t.to)};
     }
     store(reach, out.pieces.reach);

@@ -78,9 +78,14 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   return budget;
 }
 
+size_t waitingSplats(uint64_t memory_bytes) {
+  constexpr uint64_t kShare = 16, kLeast = 32768, kMost = 1 << 20;
+  return std::clamp(memory_bytes / kShare / sizeof(ScreenSplat), kLeast, kMost);
+}
+
 namespace {
 
-constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
+constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, kMaxRegions};
 // What a layer may fill of the sweep's memory, by the estimate: pages are not full, and parts are swept ahead.
 constexpr double kLayerShare = 0.7;
 // What a slab has of it, on average, where the layer does not fit.
@@ -179,9 +184,10 @@ double largestLayer(const std::vector<PartInRegion>& parts) {
 }
 
 std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& cache, size_t variable,
-                                      size_t sweep_splats) {
+                                      size_t sweep_splats, uint32_t least_regions) {
   const auto capacity = static_cast<double>(sweep_splats);
-  if (static_cast<double>(plan.cut.splats) <= kLayerShare * capacity) return {{plan.tiles, {}}};
+  if (least_regions == 1 && static_cast<double>(plan.cut.splats) <= kLayerShare * capacity)
+    return {{plan.tiles, {}}};
   const ImageSize size = plan.settings.view.size;
   const std::vector<PartCost> costs =
       partCosts(plan.parts, cache.bricks(), cache.brickVariables(variable), plan.settings.view);
@@ -204,6 +210,7 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
   std::vector<uint32_t> owners;
   uint32_t regions = 1;
   for (const uint32_t number : kNumbers) {
+    if (number < least_regions) continue;
     if (number > std::max<size_t>(1, all.tiles() / (kUnit * kUnit))) break;
     std::vector<uint32_t> dealt = dealTiles(sample, size, {all, kUnit, true}, number);
     double work = 0;

@@ -49,6 +49,9 @@ struct FrameBudget {
   bool operator==(const FrameBudget&) const = default;
 };
 
+/// How many splats may wait in the painter's tiles (PaintResources), where a frame has that memory.
+size_t waitingSplats(uint64_t memory_bytes);
+
 /// A rectangle of the picture that is swept on its own.
 struct FrameRegion {
   std::shared_ptr<const TileSet> tiles;  // null: all of the picture, drawn by one process
@@ -64,9 +67,10 @@ struct FrameRegion {
 ///
 /// The number of regions is the one with the least estimated work. If a layer is larger than estimated, its
 /// region is drawn in slabs. There is one region at least; together they have the plan's tiles, each once.
-/// `sweep_splats`: what the sweep can hold.
+/// `sweep_splats`: what the sweep can hold. `least`: regions, if there are as many tiles.
 std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& cache, size_t variable,
-                                      size_t sweep_splats);
+                                      size_t sweep_splats, uint32_t least = 1);
+inline constexpr uint32_t kMaxRegions = 64;
 
 /// A part of the cut in a region: how many of its splats are there, and their depth keys, which are taken to
 /// lie evenly in between.

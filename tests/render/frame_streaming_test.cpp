@@ -199,8 +199,7 @@ TEST_P(FrameStreamingTest, PartsOfBricksArePagedAndKept) {
         FrameRenderer(*cache_, 0, function(), GetParam()).render(camera("+x"), wanted, statistics);
     EXPECT_NE(expected.rgba, whole.rgba);
     const uint64_t bricks = statistics.bricks_read;
-    const FramePlan plan =
-        FramePlanner(*cache_, {0, function()}).plan(camera("+x"), wanted, DrawingOrder::kFrontToBack);
+    const FramePlan plan = FramePlanner(*cache_, {0, function()}).plan(camera("+x"), wanted);
     in_part |= std::any_of(plan.parts.begin(), plan.parts.end(),
                            [](const SweptPart& part) { return !part.part.whole(); });
     for (const uint64_t memory : {least, uint64_t{4} << 30})

@@ -17,7 +17,7 @@
 
 #include "render/cpu/cpu_painter.h"
 #include "render/cpu/half_depths.h"
-#include "render/cpu/splat_bins.h"
+#include "render/tiles/splat_bins.h"
 #include "render/cpu/tile.h"
 #include "tests/reference/splat_compositor.h"
 
@@ -34,7 +34,7 @@ std::vector<ScreenSplat> someSplats(int count) {
   return splats;
 }
 
-using Lists = std::vector<std::vector<std::array<uint32_t, 11>>>;  // [tile][splat], as bits
+using Lists = std::vector<std::vector<std::array<uint32_t, 16>>>;  // [tile][splat], as bits
 
 void appendLists(const SplatBins& bins, Lists& lists) {
   lists.resize(static_cast<size_t>(bins.columns() * bins.rows()));

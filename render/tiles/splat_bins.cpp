@@ -1,4 +1,4 @@
-#include "render/cpu/splat_bins.h"
+#include "render/tiles/splat_bins.h"
 
 #include <algorithm>
 #include <cmath>
