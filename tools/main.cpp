@@ -261,9 +261,7 @@ int run(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return fail("out of memory; lower --memory or --size, or use a machine with more memory", 1);
   } catch (const std::filesystem::filesystem_error& error) {
-    // Where a directory cannot be read on, its name is not told.
-    const std::string path = error.path1().empty() ? "a directory cannot be read" : error.path1().string();
-    return fail(path + ": " + error.code().message(), 1);
+    return fail(textOf(error), 1);
   } catch (const std::exception& error) {
     if (isForLackOfThreads(error)) return fail(kNoThread, 1);
     // Otherwise main() reports that standard output has failed.

@@ -31,7 +31,7 @@ std::filesystem::path ScratchFolder::newPath(const std::filesystem::path& parent
 ScratchFolder::ScratchFolder(std::filesystem::path path, Folder folder) : path_(std::move(path)) {
   if (folder == Folder::kTakeOver) return;
   try {
-    makeFolder(path_);
+    makeFolder(path_, 0700);  // as those of the system's temporary files: it may be made among them
   } catch (const DiskFull&) {
     throw;
   } catch (const Error& error) {

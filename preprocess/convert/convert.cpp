@@ -57,6 +57,7 @@ void requireSameGrid(const GridDescription& description, const std::vector<uint3
   const auto sent = fromBytes<char>(ranks.broadcast(toBytes(std::vector<char>(own.begin(), own.end()))));
   if (std::equal(own.begin(), own.end(), sent.begin(), sent.end())) return;
   constexpr size_t kShown = 200;
+  if (sent.empty()) throw Error("rank 0 has no grid to compare this one with; give all ranks the same files");
   throw Error("{}: is another grid here than at rank 0: {}; found there {}; give all ranks the same files",
               description.files.empty() ? description.format : description.files.front(),
               own.substr(0, kShown), std::string(sent.begin(), sent.end()).substr(0, kShown));

@@ -92,6 +92,16 @@ uint32_t FaceMatcher::newEntry(const FaceCalls& calls) {
   return entry;
 }
 
+/// Where cells have more faces than was expected, such as polyhedra of thousands.
+void FaceMatcher::growTable() {
+  buckets_.assign(2 * buckets_.size(), kNone);
+  for (uint32_t entry = 0; entry < waiting_.size(); ++entry) {
+    if (waiting_[entry].face == kNone) continue;
+    uint32_t& bucket = buckets_[bucketOf(waiting_[entry].corners)];
+    waiting_[entry].next = std::exchange(bucket, entry);
+  }
+}
+
 void FaceMatcher::add(std::span<const FaceCorners> faces, const FaceCalls& calls) {
   constexpr size_t kAhead = 8;  // faces whose places in the table are fetched before they are looked up
   taken_.clear();
@@ -101,6 +111,7 @@ void FaceMatcher::add(std::span<const FaceCorners> faces, const FaceCalls& calls
       const uint32_t entry = buckets_[bucketOf(faces[n + kAhead])];
       if (entry != kNone) __builtin_prefetch(&waiting_[entry]);
     }
+    if (waiting_.size() > buckets_.size()) growTable();
     const FaceCorners& corners = faces[n];
     const uint64_t bucket = bucketOf(corners);
     uint32_t same = buckets_[bucket];
@@ -194,7 +205,7 @@ void FaceMatcher::finish(const TakePair& pair, const TakeSingle& single, const P
 
 namespace {
 
-constexpr size_t kCellsPerTask = 256;
+constexpr size_t kCellsPerTask = 256, kManyCorners = 64;
 constexpr FaceCorners kCollapsed{UINT64_MAX, UINT64_MAX, UINT64_MAX};
 
 bool areDifferent(std::span<const uint64_t> corners) {
@@ -275,8 +286,13 @@ FaceCorners lowestOf(std::span<const uint64_t> corners, std::span<const uint32_t
 
 void FaceList::assign(const GatheredCells& cells) {
   begins_.resize(cells.size() + 1);
-  for (size_t n = 0; n < cells.size(); ++n)
+  middles_.clear();
+  for (size_t n = 0; n < cells.size(); ++n) {
     begins_[n + 1] = begins_[n] + countOf(cells.shapes[n], cells.facesOfPolyhedron(n));
+    // A forecast has no positions, and measures nothing.
+    if (cells.cornersOfCell(n).size() > kManyCorners && !cells.at.empty())
+      middles_.emplace_back(n, curvisplat::middleOf(cells.view(n, 0).corners));
+  }
   corners.resize(begins_.back());
   places.resize(begins_.back());
   std::atomic<bool> any_collapsed = false;
@@ -316,13 +332,21 @@ void FaceList::leaveOutCollapsed() {
   places.resize(kept);
 }
 
+glm::dvec3 FaceList::middleOf(const GatheredCells& cells, size_t cell) const {
+  const CellView view = cells.view(cell, 0);
+  if (view.corners.size() <= kManyCorners) return curvisplat::middleOf(view.corners);
+  return std::lower_bound(middles_.begin(), middles_.end(), cell,
+                          [](const auto& middle, size_t wanted) { return middle.first < wanted; })
+      ->second;
+}
+
 HalfFace FaceList::face(const GatheredCells& cells, size_t n) const {
   const Place& place = places[n];
   const std::span<const uint32_t> faces = facesOfCell(cells, place.cell);
   const CellView view = cells.view(place.cell, 0);
   HalfFace face{
       place.cell, faces.subspan(place.at + size_t{1}, faces[place.at]), place.of_plain_cell, {}, {}};
-  measure(view.corners, middleOf(view.corners), face);
+  measure(view.corners, middleOf(cells, place.cell), face);
   return face;
 }
 

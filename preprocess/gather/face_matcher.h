@@ -74,6 +74,7 @@ class FaceMatcher {
   };
   void makeRecords(const FaceCalls& calls);
   uint32_t newEntry(const FaceCalls& calls);
+  void growTable();
   void spill(uint32_t entry);
   void unlink(uint32_t entry);
   std::span<std::byte> recordOf(uint32_t entry) {
@@ -120,8 +121,11 @@ class FaceList {
  private:
   bool assignCell(const GatheredCells& cells, size_t n);
   void leaveOutCollapsed();
+  glm::dvec3 middleOf(const GatheredCells& cells, size_t cell) const;
 
   std::vector<size_t> begins_{0};  // [cell + 1], in corners, with collapsed ones
+  // Of cells of very many corners, in their order: each of their very many faces needs it.
+  std::vector<std::pair<size_t, glm::dvec3>> middles_;
 };
 
 }  // namespace curvisplat

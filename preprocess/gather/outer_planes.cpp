@@ -159,7 +159,7 @@ FaceRecord recordOf(const GatheredCells& cells, const HalfFace& face) {
   };
   for (const uint32_t place : face.corners) put(corners[place]);
   record.of_face = record.count;
-  for (const uint64_t corner : corners) put(corner);
+  for (size_t n = 0; n < corners.size() && record.count < kMaxCorners; ++n) put(corners[n]);
   record.inward /= static_cast<double>(record.of_face);
   return record;
 }

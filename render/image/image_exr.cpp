@@ -330,8 +330,9 @@ Image decodeExr(std::span<const std::byte> bytes, const std::string& name) {
   if (*std::min_element(colour.begin(), colour.end()) < 0)
     throw Error("{}: the EXR file has neither the channels R, G and B nor Y", name);
   exr.loadPixels(memory, name);
-  CURVISPLAT_CHECK_OP(exr.image.width, ==, layout.width());
-  CURVISPLAT_CHECK_OP(exr.image.height, ==, layout.height());
+  if (exr.image.width != layout.width() || exr.image.height != layout.height())
+    throw Error("{}: the EXR file has {} x {} pixels; its header says {} x {}", name, exr.image.width,
+                exr.image.height, layout.width(), layout.height());
 
   Image image({exr.image.width, exr.image.height});
   for (size_t n = 0; n < image.rgba.size() / 4; ++n) {

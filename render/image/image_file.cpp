@@ -56,15 +56,29 @@ bool isImageName(const std::filesystem::path& path) {
   return findFormat(extensionOf(path)) != nullptr;
 }
 
+void checkImageSize(uint64_t width, uint64_t height, const std::filesystem::path& path) {
+  constexpr auto kMax = static_cast<uint64_t>(kLargestImageSide);
+  if (width == 0 || height == 0 || width > kMax || height > kMax)
+    throw UsageError("{}: the picture has {} x {} pixels; expected 1 to {} on each side", path.string(),
+                     width, height, kMax);
+}
+
+namespace {
+
+void requireWritable(ImageSize size, const std::filesystem::path& path) {
+  checkImageSize(static_cast<uint64_t>(std::max(0, size.width)),
+                 static_cast<uint64_t>(std::max(0, size.height)), path);
+}
+
+}  // namespace
+
 void writeImage(const Image& image, const std::filesystem::path& path) {
-  CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);
-  CURVISPLAT_CHECK(image.size.height > 0 && image.size.height <= kLargestImageSide);
+  requireWritable(image.size, path);
   writeFileDurably(path, formatByName(path).encode(image));
 }
 
 void writeExr(const Image& image, std::span<const ImageChannel> more, const std::filesystem::path& path) {
-  CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);
-  CURVISPLAT_CHECK(image.size.height > 0 && image.size.height <= kLargestImageSide);
+  requireWritable(image.size, path);
   writeFileDurably(path, encodeExr(image, more));
 }
 

@@ -18,8 +18,8 @@ namespace curvisplat {
 
 /// Writes .png (8 bits a channel), .exr or .pfm (32-bit floats), chosen by the name's extension. PNG and EXR
 /// store alpha if the image is not fully opaque (PNG unassociated, EXR associated); PFM has no alpha. The
-/// file appears whole or not at all. Throws UsageError for any other extension, Error if the file cannot be
-/// written.
+/// file appears whole or not at all. Throws UsageError for any other extension and as checkImageSize(), Error if
+/// the file cannot be written.
 void writeImage(const Image& image, const std::filesystem::path& path);
 /// Writes an EXR file that has further channels beside the colours.
 void writeExr(const Image& image, std::span<const ImageChannel> more, const std::filesystem::path& path);
@@ -31,6 +31,8 @@ std::vector<ImageChannel> readChannels(const std::filesystem::path& path);
 bool isImageName(const std::filesystem::path& path);
 /// Throws UsageError for a name that writeImage() would refuse. For checking before long work.
 void checkImageName(const std::filesystem::path& path);
+/// Throws UsageError unless width and height are in [1, kLargestImageSide]: Python's arrays may have any.
+void checkImageSize(uint64_t width, uint64_t height, const std::filesystem::path& path);
 /// Memory that writeImage() needs for an image of `size`, beside the image itself.
 uint64_t writingBytes(const std::filesystem::path& path, ImageSize size);
 /// Reads PNG (8 and 16 bits a channel), scan-line EXR and PFM files. Throws Error.

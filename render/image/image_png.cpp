@@ -159,7 +159,9 @@ Image decodePng(std::span<const std::byte> bytes, const std::string& name) {
   requirePlausibleSize(width, height, 1, bytes.size(), 8 * kLargestRatio, name);
 
   const size_t row_bytes = png_get_rowbytes(reader.png, reader.info);
-  CURVISPLAT_CHECK_OP(row_bytes, ==, static_cast<size_t>(width) * (wide ? 8 : 4));
+  if (row_bytes != static_cast<size_t>(width) * (wide ? 8 : 4))
+    throw Error("{}: the PNG file's rows have {} bytes; expected {} pixels of {} bytes", name, row_bytes,
+                width, wide ? 8 : 4);
   std::vector<png_byte> pixels(row_bytes * static_cast<size_t>(height));
   auto rows = rowPointers(pixels, static_cast<size_t>(height));
   if (!readPixels(reader, rows.data()))

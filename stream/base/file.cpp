@@ -318,8 +318,20 @@ void syncDirectory(const std::filesystem::path& path) {
   SystemCalls::current().close(fd);
 }
 
-void makeFolder(const std::filesystem::path& path) {
-  if (SystemCalls::current().mkdir(path.c_str(), 0777) == 0) return;
+void makePrivateFolders(const std::filesystem::path& path) {
+  std::error_code error;
+  if (path.empty() || std::filesystem::is_directory(path, error)) return;
+  if (path != path.parent_path()) makePrivateFolders(path.parent_path());
+  try {
+    makeFolder(path, 0700);
+  } catch (const Error&) {
+    // Another program may have made it at the same time.
+    if (!std::filesystem::is_directory(path, error)) throw;
+  }
+}
+
+void makeFolder(const std::filesystem::path& path, unsigned mode) {
+  if (SystemCalls::current().mkdir(path.c_str(), mode) == 0) return;
   const int error = errno;
   if (DiskFull::is(error)) throw DiskFull(path, folderOf(path), "a new directory", error);
   throw OutputError("{}: the directory cannot be created: {}", path.string(), std::strerror(error));

@@ -176,7 +176,10 @@ void writeFileAtomically(const std::filesystem::path& path, const std::string& t
 void syncDirectory(const std::filesystem::path& path);
 
 /// Makes a folder in an existing parent. Throws Error, also if the name exists already.
-void makeFolder(const std::filesystem::path& path);
+void makeFolder(const std::filesystem::path& path, unsigned mode = 0777);
+/// Makes a folder and those above it that are missing, which nobody else can enter: for copies of a user's data in
+/// places that the user did not choose. A folder that exists keeps its rights. Throws Error.
+void makePrivateFolders(const std::filesystem::path& path);
 /// Removes a file or an empty folder. Throws Error, also if the name does not exist.
 void removeFile(const std::filesystem::path& path);
 /// Removes a file, or a folder and everything in it, and continues past failures. Returns the first failure.

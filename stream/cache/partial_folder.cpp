@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <optional>
+#include <regex>
 #include <span>
 #include <string>
 #include <utility>
@@ -55,6 +56,49 @@ std::error_code removeMarked(const fs::path& path) {
 
 void requireRemoved(std::error_code error, const fs::path& path, const char* what) {
   if (error) throw OutputError("{}: the {} cannot be removed: {}", path.string(), what, error.message());
+}
+
+}  // namespace
+
+bool isCacheFile(const fs::directory_entry& entry) {
+  if (fs::is_directory(entry.symlink_status())) return false;
+  static const std::regex own(
+      R"((manifest\.json|bricks\.(bin|vdb|log)|(geometry|steps|faces(\.(var|step)\d+)?|var(\.\d+){1,2})\.bin|lock|journal)(\.part)?)");
+  return std::regex_match(entry.path().filename().string(), own);
+}
+
+namespace {
+
+/// Whether the program gives such a name to a folder in a cache.
+bool isOwnFolder(const std::string& name) {
+  static const std::regex own(R"(geometry\.\d+(\.partial)?)");
+  return std::regex_match(name, own);
+}
+
+void addForeignNames(const fs::path& folder, const fs::path& place, std::vector<fs::path>& names) {
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const fs::path name = entry.path().filename();
+    const bool is_folder = fs::is_directory(entry.symlink_status());
+    if (is_folder && place.empty() && isOwnFolder(name.string()))
+      addForeignNames(entry.path(), name, names);
+    else if (!isCacheFile(entry))
+      names.push_back(place / name);
+  }
+}
+
+/// Moves what a user has put into `old` into `target`, for ever.
+void moveForeign(const fs::path& old, const fs::path& target) {
+  const std::vector<fs::path> names = foreignNames(old);
+  for (const fs::path& name : names) {
+    std::error_code error;
+    const bool has_place = fs::is_directory(target / name.parent_path(), error);
+    const fs::path from = old / name, to = target / (has_place ? name : name.filename());
+    if (fs::exists(fs::symlink_status(to, error)))
+      throw OutputError("{}: is not the cache's and not removed, and {} exists: move it elsewhere",
+                        from.string(), to.string());
+    if (SystemCalls::current().rename(from.c_str(), to.c_str()) < 0) failToRename(errno, from, to);
+  }
+  if (!names.empty()) syncDirectory(target);
 }
 
 /// Text of the lock in `folder`; nullopt if it is missing, no regular file or too long for a mark. Throws
@@ -109,6 +153,13 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
   }
 }
 
+std::vector<fs::path> foreignNames(const fs::path& cache) {
+  std::vector<fs::path> names;
+  addForeignNames(cache, {}, names);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 bool hasUnfinished(const fs::path& target) {
   try {
     return isOurs(partialOf(target), withoutSlash(target));
@@ -151,6 +202,9 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
 
 void PartialFolder::clear() {
   leave_ = false;
+  std::error_code error;
+  if (fs::exists(path_ / "manifest.json", error) && fs::is_directory(target_, error))
+    moveForeign(path_, target_);
   for (const auto& entry : fs::directory_iterator(path_))
     if (entry.path().filename() != kPartialLock)
       requireRemoved(removeAll(entry.path()), entry.path(), "remainder of an unfinished conversion");
@@ -246,7 +300,9 @@ void PartialFolder::putIntoPlace() {
 
 void PartialFolder::removeReplaced() {
   const fs::path old = std::exchange(replaced_, {});
-  if (!old.empty()) requireRemoved(removeMarked(old), old, "old cache, which has been replaced,");
+  if (old.empty()) return;
+  moveForeign(old, target_);
+  requireRemoved(removeMarked(old), old, "old cache, which has been replaced,");
 }
 
 namespace {

@@ -9,7 +9,8 @@
 //                                         keeps its contents to continue the conversion.
 //
 // The lock file contains kPartialMark. Only folders with this mark, or without any files, are taken over and
-// emptied, so that other people's files are never removed.
+// emptied, and what a user has put into a cache outlives the cache's replacement, so that other people's files
+// are never removed.
 //
 // A log in the folder (BrickLog) records the bricks that have been appended to the cache's files, so that an
 // interrupted conversion can continue. Both classes are for one thread at a time.
@@ -33,6 +34,13 @@ inline constexpr std::string_view kPartialMark = "curvisplat: unfinished cache\n
 /// Throws Error if `target` exists, unless it is a cache and `overwrite` is true.
 void checkReplaceable(const std::filesystem::path& target, bool overwrite);
 
+/// Whether it is a file that has one of the names which the program gives to files of caches.
+bool isCacheFile(const std::filesystem::directory_entry& entry);
+
+/// The names in a cache's folder, and in its folders of geometries, that are not the program's: what a user has
+/// put there. Relative to `cache`, sorted.
+std::vector<std::filesystem::path> foreignNames(const std::filesystem::path& cache);
+
 /// Whether a conversion to `target` is running or was interrupted.
 bool hasUnfinished(const std::filesystem::path& target);
 
@@ -55,7 +63,8 @@ class PartialFolder {
   /// The final name of the folder.
   const std::filesystem::path& target() const { return target_; }
 
-  /// Removes the folder's contents, and undoes leave().
+  /// Removes the folder's contents, and undoes leave(). Of an old cache that a killed run has replaced, what
+  /// foreignNames() finds is moved into the new one.
   void clear();
   /// Sets whether the destructor leaves the folder for a later conversion to continue.
   void leave(bool leave = true) { leave_ = leave; }
@@ -67,7 +76,8 @@ class PartialFolder {
   void putIntoPlace();
   /// Whether putIntoPlace() has succeeded.
   bool isInPlace() const { return lock_ < 0; }
-  /// Removes the old cache that putIntoPlace() has replaced, if there was one. Throws Error.
+  /// Removes the old cache that putIntoPlace() has replaced, if there was one; what foreignNames() finds in it
+  /// is moved into the new one. Throws Error.
   void removeReplaced();
 
  private:

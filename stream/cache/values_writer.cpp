@@ -13,6 +13,7 @@
 #include "stream/cache/cache_index.h"
 #include "stream/cache/cache_update.h"
 #include "stream/cache/faces_file.h"
+#include "stream/cache/partial_folder.h"
 #include "stream/cache/stream_file.h"
 
 namespace curvisplat {
@@ -60,8 +61,8 @@ void VariableWriter::removeLeftovers() const {
     const std::string name = entry.path().filename().string();
     const bool is_known = std::any_of(manifest_.files.begin(), manifest_.files.end(),
                                       [&](const FileInfo& file) { return file.name == name; });
-    if (!is_known && (name.starts_with("var.") || isFacesFile(name) || name.ends_with(kPartSuffix)))
-      removeAll(entry.path());
+    const bool was_new = name.starts_with("var.") || isFacesFile(name) || name.ends_with(kPartSuffix);
+    if (!is_known && was_new && isCacheFile(entry)) removeAll(entry.path());
   }
 }
 

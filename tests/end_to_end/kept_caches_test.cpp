@@ -41,6 +41,15 @@ TEST_F(KeptCaches, WhatIsKnownOfAFileMayBeDamaged) {
 }
 
 // The commands that keep caches have neither --tmp nor --no-preflight.
+TEST_F(KeptCaches, CopiesAreTheirOwnersAlone) {
+  fs::create_directory("kept");
+  run(render("a.xyz", "a.fun"));
+  for (const auto& entry : fs::recursive_directory_iterator("kept"))
+    if (entry.is_directory() && entry.path().extension() != ".splats") {
+      EXPECT_EQ(entry.status().permissions(), fs::perms::owner_all) << entry.path();
+    }
+}
+
 TEST_F(KeptCaches, AFullDiskIsRefusedWithWhatHelpsThere) {
   run({"generate", "half-annulus", "--size", "60x50x40", "-o", "large"});
   fs::create_directory("kept");

@@ -5,6 +5,7 @@ What the program prints of small faulty files and of requests that cannot be met
 what helps. And what it prints for copying can be pasted. Exit status 77 (skipped) without python3-numpy.
 """
 import gzip
+import json
 import os
 import shlex
 import subprocess
@@ -133,6 +134,29 @@ class Messages(FormatCase):
             self.expect_error(["info", path], f"{path}: names {self.folder / part}, which does not exist")
         self.pack(self.vti("no.vti", "p"))
         self.expect_error(["info", self.folder / "a.vtm"], "no.vti, which does not exist; decompress no.vti.gz")
+
+    def test_names_that_lead_out_of_the_folder_are_not_followed(self):
+        (self.folder / "in").mkdir()
+        self.vti("secret.vti", "p")
+        item = '<DataItem Dimensions="2 2 2" Format="{}">{}</DataItem>'
+        for name in ("../secret.vti", str(self.folder / "secret.vti"), "below/../../secret.vti", "/proc/self/environ"):
+            for path in (self.write("in/a.pvd", f'<VTKFile type="Collection"><Collection><DataSet timestep="0" file="{name}"/></Collection></VTKFile>'),
+                         self.write("in/a.vtm", f'<VTKFile type="vtkMultiBlockDataSet"><vtkMultiBlockDataSet><DataSet index="0" file="{name}"/>'
+                                                '</vtkMultiBlockDataSet></VTKFile>'),
+                         self.write("in/a.pvti", f'<VTKFile type="PImageData"><PImageData WholeExtent="0 1 0 1 0 1"><Piece Extent="0 1 0 1 0 1" '
+                                                 f'Source="{name}"/></PImageData></VTKFile>'),
+                         self.write("in/a.vti.series", json.dumps({"files": [{"name": name, "time": 0}]})),
+                         self.write("in/a.p3d", json.dumps({"filenames": [{"time": 0, "xyz": name}]})),
+                         self.write("in/a.case", f"FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: {name}\n"),
+                         *(self.write(f"in/a{kind}.xmf", '<Xdmf><Domain><Grid><Topology TopologyType="3DCoRectMesh" Dimensions="2 2 2"/>'
+                                                         '<Geometry GeometryType="ORIGIN_DXDYDZ"><DataItem Dimensions="3">0 0 0</DataItem>'
+                                                         '<DataItem Dimensions="3">1 1 1</DataItem></Geometry>'
+                                                         f'<Attribute Name="p">{item.format(kind, name + end)}</Attribute></Grid></Domain></Xdmf>')
+                           for kind, end in (("Binary", ""), ("HDF", ":/p")))):
+                with self.subTest(path.name, name=name):
+                    self.expect_error(["info", path], f"names {name}, which lies outside its folder; put both into one folder and correct the name")
+        self.vti("in/below.vti", "p")
+        self.info(self.write("in/a.vti.series", json.dumps({"files": [{"name": str(self.folder / "in" / "below.vti"), "time": 0}]})))
 
     def test_unstructured_caches_have_no_faces(self):
         cache = self.convert([self.wedge("a.vtk", "p")], "p")

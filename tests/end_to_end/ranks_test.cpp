@@ -142,6 +142,37 @@ TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
   }
 }
 
+TEST_F(RanksCommand, ThatHaveOtherOptionsAreRefused) {
+  const std::string script = file("one_other.sh");
+  const auto expectOtherRefused = [&](const std::string& command, const std::string& of_one,
+                                      const std::string& told) {
+    writeFileAtomically(script,
+                        fmt::format("#!/bin/sh\ncd \"{}\"\n"
+                                    "[ \"$OMPI_COMM_WORLD_RANK\" = 2 ] && exec \"{}\" {}\n"
+                                    "exec \"{}\" {}\n",
+                                    file(""), CURVISPLAT_PROGRAM, of_one, CURVISPLAT_PROGRAM, command));
+    fs::permissions(script, fs::perms::owner_all);
+    expectRefused(runAsRanks(3, {}, script), 2,
+                  {"rank 2 of 3", told + " at rank 0; start all ranks with the same options"});
+    for (const auto& entry : fs::directory_iterator(file("")))
+      EXPECT_FALSE(entry.path().filename().string().starts_with("mixed")) << entry.path();
+  };
+  const std::string convert = "convert g.xyz g.fun -o mixed.splats";
+  for (const auto& [option, told] :
+       {std::pair{" --value-precision fine", "--value-precision is 'fine' here and not given"},
+        {" --blank 0", "--blank is '0' here and not given"},
+        {" --refine 2", "--refine is '2' here and not given"},
+        {" --memory 512M", "--memory is '512M' here and not given"}})
+    expectOtherRefused(convert, convert + option, told);
+  expectOtherRefused(convert + " --flat", convert, "--flat is not given here and 'true'");
+  const std::string render = "render g.splats -o mixed.png --size 60x40";
+  expectOtherRefused(render, "render g.splats -o mixed.png --size 61x40",
+                     "--size is '61x40' here and '60x40'");
+  const std::string frames = "render g.splats -o mixed%d.png --size 60x40 --orbit 90 --frames ";
+  expectOtherRefused(frames + "6", frames + "3", "--frames is '3' here and '6'");
+  expectOtherRefused(convert, render, "--output is 'mixed.png' here and 'mixed.splats'");
+}
+
 TEST_F(RanksCommand, OfSeveralThatFailOfOneCauseTheLowestReports) {
   // All ranks but the first see no cache; rank 0 fails later than they do, as it hears of it.
   const std::string script = renderScript(0, file("g.splats"), file("missing.splats"));

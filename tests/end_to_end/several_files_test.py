@@ -193,6 +193,12 @@ class SeveralFiles(unittest.TestCase):
                     (self.folder / f"{name}.vtk.{suffix}").write_bytes(packed)
                     self.assertEqual(self.info(f"{name}.vtk.{suffix}")["scalars"], plain)
 
+    @unittest.skipUnless(shutil.which("zstd"), "without zstd")
+    def test_zstd_of_a_large_window_is_not_called_damaged(self):
+        (self.folder / "a").write_bytes(subprocess.run(["zstd", "-q", "-c", "--long=31"], input=b"1 2 3", capture_output=True, check=True).stdout)
+        self.assertEqual(self.run_program("info", "a").stderr, "curvisplat: a: cannot be decompressed as zstd: it needs more than "
+                                                               "128 MiB of memory; compress it again without --long\n")
+
     def test_damaged_compressed_files_are_refused(self):
         data = (self.folder / self.files()[0]).read_bytes()[:3000]
         before = list(pathlib.Path(tempfile.gettempdir()).glob("curvisplat.*.unpacked"))

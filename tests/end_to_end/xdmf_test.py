@@ -4,6 +4,7 @@
 XDMF files of structured grids, with arrays in HDF5 (h5py), in binary files (numpy) and in the XML itself, against VTK's files of
 the same grids. Exit status 77 (skipped) without python3-vtk9 or python3-h5py.
 """
+import os
 import resource
 import subprocess
 import sys
@@ -314,6 +315,63 @@ class Xdmf(StructuredFormats):
         path = self.write(grid(bad, block))
         (self.folder / "a.bin").write_bytes(bad.binary[:-1])
         self.expect_line(path, words="truncated")
+
+    def test_where_hdf5_files_lead(self):
+        block = Block((3, 4, 5))
+        (self.folder / "in").mkdir()
+        writer = Writer(self.folder / "in")
+        text = grid(writer, block)
+        path, data = self.folder / "in" / "a.xmf", self.folder / "in" / "a.h5"
+        path.write_text(f'<Xdmf Version="3.0"><Domain>{text}</Domain></Xdmf>')
+        with h5py.File(data) as file:
+            place = file["group/1"][...]
+        os.mkfifo(self.folder / "in" / "pipe")
+        for name in (self.folder / "out.h5", self.folder / "in" / "b.h5"):
+            with h5py.File(name, "w") as file:
+                file["a"] = place
+                file["link"] = h5py.ExternalLink("pipe", "/a")
+        with h5py.File(self.folder / "in" / "c.h5", "w") as file:
+            file["a"] = place
+
+        def link(to, name="/a"):
+            return lambda file: file.__setitem__("group/1", h5py.ExternalLink(to, name))
+
+        def virtual(*sources):
+            def make(file):
+                layout = h5py.VirtualLayout(place.shape, "f8")
+                for n, (name, dataset) in enumerate(sources):
+                    part = slice(n, None, len(sources))
+                    layout[part] = h5py.VirtualSource(name, dataset, place.shape)[part]
+                file["group"].create_virtual_dataset("1", layout)
+            return make
+
+        def raw(file):
+            c = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+            c.set_external(b"raw", 0, place.nbytes)
+            h5py.h5d.create(file["group"].id, b"1", h5py.h5t.IEEE_F64LE, h5py.h5s.create_simple(place.shape), c)
+
+        def here(file):
+            file["stored"] = place
+            virtual((".", "/stored"), ("c.h5", "a"))(file)
+
+        out, elsewhere = str(self.folder / "out.h5"), "which lies outside the folder of the file"
+        nested = "which is a virtual data set itself"
+        for make, told in ((link("c.h5"), None), (link(str(self.folder / "in" / "c.h5")), None), (virtual(("c.h5", "a")), None), (here, None),
+                           (link("/moved/c.h5"), None), (link("pipe"), "pipe, which is not a regular file"),
+                           (link("b.h5"), "pipe, which is not a regular file"), (virtual(("b.h5", "a")), "pipe, which is not a regular file"),
+                           (link(out), elsewhere), (link("../out.h5"), elsewhere), (virtual((out, "a")), elsewhere),
+                           (virtual(("pipe", "a")), "pipe, which is not a regular file"), (virtual((".", "/group/1")), nested),
+                           (virtual((".", "group/./1")), nested), (virtual(("a.h5", "/group/1")), nested),
+                           (raw, "store them in this one")):
+            with h5py.File(data, "a") as file:
+                for name in ("group/1", "stored"):
+                    if name in file:
+                        del file[name]
+                make(file)
+            if told:
+                self.expect_line(path, words=told)
+            else:
+                self.info(path)
 
     def test_damage(self):
         block = Block((3, 4, 5))

@@ -4,13 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numbers>
 #include <numeric>
 #include <random>
+#include <span>
+#include <vector>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/gather/corner_gather.h"
+#include "preprocess/gather/face_matcher.h"
 #include "preprocess/gather/gather_forecast.h"
 #include "preprocess/scenes/scenes.h"
 #include "tests/reference/array_mesh.h"
@@ -82,6 +88,58 @@ TEST(CornerGather, GivesACellOfManyCornersAlone) {
   CornerGather(reader, numbers, uint64_t{1} << 30, folder.path(), progress)
       .forEach([&](const GatheredCells& cells) { sizes.push_back(cells.size()); });
   EXPECT_EQ(sizes, (std::vector<size_t>{1, 1, 1, 1}));
+}
+
+/// A prism over a regular polygon of very many corners; its faces look inward, and have the area of theirs.
+TEST(FaceList, MeasuresTheFacesOfACellOfManyCorners) {
+  constexpr uint32_t kSides = 500;
+  GatheredCells cells;
+  cells.shapes = {CellKind::kPolyhedron};
+  for (const double z : {0.0, 1.0})
+    for (uint32_t n = 0; n < kSides; ++n) {
+      const double angle = 2 * std::numbers::pi * n / kSides;
+      cells.at.emplace_back(7 + std::cos(angle), 5 + std::sin(angle), z);
+      cells.corners.push_back(cells.corners.size());
+    }
+  for (const uint32_t end : {0u, kSides}) {
+    cells.faces.push_back(kSides);
+    for (uint32_t n = 0; n < kSides; ++n) cells.faces.push_back(end + n);
+  }
+  for (uint32_t n = 0; n < kSides; ++n) {
+    const uint32_t next = (n + 1) % kSides;
+    cells.faces.insert(cells.faces.end(), {4, n, next, next + kSides, n + kSides});
+  }
+  cells.corner_begin.push_back(cells.corners.size());
+  cells.face_begin.push_back(cells.faces.size());
+  FaceList list;
+  list.assign(cells);
+  ASSERT_EQ(list.places.size(), kSides + 2);
+  const double side = 2 * std::sin(std::numbers::pi / kSides);
+  const double end_area = kSides * 0.5 * std::sin(2 * std::numbers::pi / kSides);
+  for (size_t n = 0; n < list.places.size(); ++n) {
+    const HalfFace face = list.face(cells, n);
+    EXPECT_NEAR(glm::length(face.inward), n < 2 ? end_area : side, 1e-12);
+    EXPECT_GT(glm::dot(face.inward, glm::dvec3(7, 5, 0.5) - face.centre), 0);
+  }
+}
+
+/// Far more faces than were expected, each twice.
+TEST(FaceMatcher, FindsThePairsAmongMoreFacesThanExpected) {
+  constexpr uint64_t kFaces = 20'000;
+  std::vector<FaceCorners> faces;
+  for (uint64_t n = 0; n < kFaces; ++n) faces.push_back({n, n + 1, n + 2});
+  const TemporaryFolder folder;
+  FaceMatcher matcher(sizeof(uint64_t), 1, 1 << 20, ScratchFiles(folder.path()));
+  const auto put = [](size_t n, std::span<std::byte> to) { std::memcpy(to.data(), &n, sizeof n); };
+  matcher.add(faces, {put});
+  std::vector<int> paired(kFaces);
+  matcher.add(faces, {put, {}, [&](std::span<const std::byte> first, size_t second) {
+                        uint64_t number = 0;
+                        std::memcpy(&number, first.data(), sizeof number);
+                        EXPECT_EQ(number, second);
+                        ++paired[second];
+                      }});
+  EXPECT_EQ(paired, std::vector<int>(kFaces, 1));
 }
 
 TEST(CornerGather, GivesAllCellsWherePagesAreLeftForStreams) {

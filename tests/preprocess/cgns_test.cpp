@@ -287,6 +287,20 @@ TEST_P(Cgns, ThreadsMayReadAtOnce) {
   for (std::thread& thread : threads) thread.join();
 }
 
+TEST_P(Cgns, LinksThatLeadOutOfTheFolderAreNotFollowed) {
+  std::filesystem::create_directory(folder_ / "in");
+  const std::filesystem::path outer = path_;
+  for (const char* const place : {"grid.cgns", "in/out.cgns"}) {
+    path_ = folder_ / place;
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {2, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    if (path_ != outer) file.link("Flow", "../grid.cgns", "/Base/Zone/GridCoordinates");
+  }
+  expectSays(errorOf(), "../grid.cgns, which lies outside ");
+}
+
 TEST_P(Cgns, AnHdf5FileOfAnyNameIsRecognised) {
   {
     CgnsWriter file = writer();

@@ -124,6 +124,42 @@ class HostileTest(unittest.TestCase):
             curvisplat.open("o.splats").render(size=(8, 8))
             """)
 
+    def test_pictures_of_any_size(self):
+        self.attempt("""
+            convert()
+            p = curvisplat.open("o.splats").render(size=(32, 24))
+            for array in (p[:0], p[:, :0], np.tile(p, (3000, 1, 1))):
+                for ending in ("png", "exr", "pfm"):
+                    expect(curvisplat.UsageError, "expected 1 to 65536 on each side", lambda: array.save("a." + ending))
+                assert array._repr_png_() is None
+            for array in (p[..., 0], p[0, 0], p[..., :3]):
+                expect(curvisplat.UsageError, "a picture is an array of shape", lambda: array.save("a.png"))
+            assert not os.path.exists("a.png")
+            """)
+
+    def test_arguments_of_other_types(self):
+        self.attempt("""
+            convert()
+            cache = curvisplat.open("o.splats")
+            for attempt in (lambda: cache.sample(5), lambda: cache.points(None, level=2), lambda: cache.histogram(5),
+                            lambda: cache.render(5, size=(8, 8)), lambda: cache.sample(step=2**31)):
+                expect(curvisplat.UsageError, "", attempt)
+            """)
+
+    def test_paths_that_are_too_long(self):
+        self.attempt("""
+            x, y, z, s = grid()
+            convert()
+            p = curvisplat.open("o.splats").render(size=(32, 24))
+            long = "x" * 5000
+            for attempt in (lambda: curvisplat.open(long), lambda: curvisplat.convert_arrays(long, Block(x, y, z, {"s": s})),
+                            lambda: curvisplat.convert("o.splats", long), lambda: curvisplat.convert(long, "a.splats"),
+                            lambda: curvisplat.append_arrays(long, Block(x, y, z, {"s": s})), lambda: p.save(long + ".png"),
+                            lambda: curvisplat.convert_callable(long, ((4, 4, 4),), reader(), ("s",)),
+                            lambda: curvisplat.open("o.splats").render(colours=long), lambda: curvisplat.append("o.splats", long)):
+                expect(curvisplat.Error, "", attempt)
+            """)
+
     def test_functions_that_answer_nonsense(self):
         self.attempt("""
             read = reader()

@@ -339,10 +339,9 @@ class Follow : public ProgramTest {
     run({"generate", "wake", "--size", "24x20x16", "--steps", std::to_string(steps), "-o", file("w")});
     settle();
   }
-  void settle() const {
+  void settle(std::chrono::hours ago = std::chrono::hours(1)) const {
     for (const auto& entry : fs::directory_iterator(folder_.path()))
-      if (entry.is_regular_file())
-        fs::last_write_time(entry.path(), fs::file_time_type::clock::now() - std::chrono::hours(1));
+      if (entry.is_regular_file()) fs::last_write_time(entry.path(), fs::file_time_type::clock::now() - ago);
   }
 };
 
@@ -358,6 +357,15 @@ TEST_F(Follow, NoticesChanges) {
   EXPECT_TRUE(hasWatches(following.process()));
   fs::rename(file("later"), file("w_0001.fun"));
   const ProgramResult result = following.wait();
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
+}
+
+TEST_F(Follow, TakesFilesOfAnotherClock) {
+  generate(2);
+  settle(-std::chrono::hours(100));
+  const ProgramResult result = runProgram(
+      {"convert", file("w.xyz"), file("w_*.fun"), "--follow", "--until", "2", "-o", file("a.splats")});
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
 }

@@ -6,6 +6,7 @@
 import json
 import pathlib
 import random
+import resource
 import socket
 import struct
 import subprocess
@@ -326,13 +327,24 @@ def too_many_viewers(server, most):
         viewer.socket.close()
 
 
+def no_descriptors(server):
+    """Connections that say nothing take all descriptors; once they have ended, others are heard again."""
+    open_now = len(list(pathlib.Path(f"/proc/{server.process.pid}/fd").iterdir()))
+    resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, (open_now + 4, open_now + 64))
+    silent = [socket.create_connection((server.name, server.port)) for _ in range(12)]
+    for connection in silent:
+        connection.close()
+    resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, (open_now + 64, open_now + 64))
+    draws(server, "a lack of descriptors")
+
+
 with tempfile.TemporaryDirectory() as folder:
     subprocess.run([program, "generate", "half-annulus", "--size", "40x20x20", "-o", f"{folder}/g"], check=True, capture_output=True)
     subprocess.run([program, "convert", f"{folder}/g.xyz", f"{folder}/g.fun", "-o", f"{folder}/secret place.splats"], check=True, capture_output=True)
     caches = [f"{folder}/secret place.splats"]
     with serving(program, caches, "--viewer-memory", "128M", "--memory", "512M", "--backend", "cpu") as server:
         threads = server.threads()
-        for attack in (strangers, paths, broken_requests, broken_frames, broken_messages, no_paths, floods, slow_readers, many_connections):
+        for attack in (strangers, paths, broken_requests, broken_frames, broken_messages, no_paths, floods, slow_readers, many_connections, no_descriptors):
             attack(server)
             if not server.is_alive():
                 print(f"FAILED: the server ended during {attack.__name__}: {server.messages()}")

@@ -292,6 +292,44 @@ TEST(Cache, OverwritingKeepsTheOldCacheUntilFinish) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
+TEST(Cache, OverwritingKeepsWhatIsNotTheCaches) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.splats";
+  const auto isKept = [&] {
+    return bytesOfFile(path / "notes.txt") == "mine" && bytesOfFile(path / "results/var.0.bin") == "mine" &&
+           bytesOfFile(path / "thesis.part") == "mine" && !CacheReader(path / "b.splats").bricks().empty() &&
+           fs::read_symlink(path / "link") == "notes.txt";
+  };
+  SmallCache().write(path);
+  EXPECT_TRUE(foreignNames(path).empty());
+  for (const char* name : {"results", "var.7.bin"}) fs::create_directory(path / name);
+  for (const char* name : {"notes.txt", "results/var.0.bin", "thesis.part", "var.7.bin/x"})
+    overwriteFile(path / name, "mine");
+  fs::create_symlink("notes.txt", path / "link");
+  SmallCache().write(path / "b.splats");
+  SmallCache().write(path, true, 2);
+  EXPECT_TRUE(isKept());
+  EXPECT_EQ(foreignNames(path),
+            (std::vector<fs::path>{"b.splats", "link", "notes.txt", "results", "thesis.part", "var.7.bin"}));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+
+  // A run that was killed between the exchange of the folders and the removal of the old one.
+  const fs::path old = folder / "a.splats.partial";
+  fs::rename(path, folder / "old");
+  SmallCache().write(path);
+  fs::rename(folder / "old", old);
+  overwriteFile(old / kPartialLock, std::string(kPartialMark));
+  SmallCache().write(path, true);
+  EXPECT_TRUE(isKept());
+
+  // A name in both folders: neither goes.
+  fs::copy(path, old, fs::copy_options::recursive | fs::copy_options::copy_symlinks);
+  overwriteFile(old / kPartialLock, std::string(kPartialMark));
+  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(path, true); }), "is not the cache's and not removed");
+  EXPECT_TRUE(isKept());
+  EXPECT_EQ(bytesOfFile(old / "notes.txt"), "mine");
+}
+
 TEST(Cache, OverwritesNothingButCaches) {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "mine";

@@ -165,6 +165,11 @@ void CgnsWriter::pointers(const std::string& name, const std::vector<std::string
   writeNames(name.c_str(), solutions);
 }
 
+void CgnsWriter::link(const std::string& name, const std::string& file, const std::string& node) {
+  check(cg_goto(file_, base_, "Zone_t", zone_, "end"));
+  check(cg_link_write(name.c_str(), file.c_str(), node.c_str()));
+}
+
 void CgnsWriter::boundary(const std::string& name, bool wall) {
   const std::array<cgsize_t, 6> range{1, 1, 1, nodes_[0], nodes_[1], 1};
   int condition = 0;

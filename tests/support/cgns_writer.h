@@ -57,6 +57,8 @@ class CgnsWriter {
   void zoneSteps(const std::vector<std::string>& solutions, const std::vector<std::string>& grids = {});
   /// A further table of solutions for each step, such as IOSS' CellCenterSolutionPointers; after zoneSteps().
   void pointers(const std::string& name, const std::vector<std::string>& solutions);
+  /// A node of the last zone that is another file's.
+  void link(const std::string& name, const std::string& file, const std::string& node);
   /// A wall or an inflow on the lowest plane of the last zone.
   void boundary(const std::string& name, bool wall);
   /// An overset hole of the last zone, of nodes or of cells: ranges of 6 indices from 1 each, or else points of 3.

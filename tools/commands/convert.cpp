@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -11,6 +12,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "preprocess/addition/add_scalar.h"
@@ -200,6 +202,22 @@ void refuseGiven(const CLI::App& command, const char* mode, const char* reason,
                        reason);
 }
 
+/// Names what --overwrite has kept in the cache's folder.
+void noteForeign(const ConvertArguments& arguments) {
+  std::error_code none;
+  if (!arguments.overwrite || !launchedRanks().isFirst() ||
+      !std::filesystem::is_directory(arguments.output, none))
+    return;
+  const std::vector<std::filesystem::path> names = foreignNames(arguments.output);
+  if (names.empty()) return;
+  constexpr size_t kMaxNamed = 5;
+  std::string text;
+  for (size_t n = 0; n < std::min(kMaxNamed, names.size()); ++n)
+    text += (n > 0 ? ", " : "") + names[n].string();
+  if (names.size() > kMaxNamed) text += fmt::format(" and {} more", names.size() - kMaxNamed);
+  printMessage("note: {}: kept what is not the cache's: {}", arguments.output.string(), text);
+}
+
 void refuseWithoutEffect(const CLI::App& command, const ConvertArguments& arguments) {
   using Names = std::set<std::string>;
   if (arguments.joins)
@@ -332,8 +350,12 @@ void addConvert(CLI::App& app) {
   addGasOptions(*command, arguments->gas);
   command->callback([arguments, command] {
     refuseWithoutEffect(*command, *arguments);
+    requireSameOptions(*command);
     limitHeaps(kHeapsOfConversion);
-    if (arguments->joins) return runJoinSeries(*arguments);
+    if (arguments->joins) {
+      runJoinSeries(*arguments);
+      return noteForeign(*arguments);
+    }
     takeScalarsFromSolutions(*arguments);
     const bool series = isSeries(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
@@ -347,6 +369,7 @@ void addConvert(CLI::App& app) {
       runConvertSeries(*arguments);
     else
       adds ? runAddScalar(*arguments) : runConvert(*arguments);
+    noteForeign(*arguments);
     trace.end();
   });
 }

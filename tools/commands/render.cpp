@@ -388,7 +388,8 @@ void addRender(CLI::App& app) {
                    "Write times, bytes and counts of every frame to this JSON file")
       ->group(how);
   command->add_option("--trace", arguments->trace, kTraceHelp)->group(how);
-  command->callback([arguments] {
+  command->callback([arguments, command] {
+    requireSameOptions(*command);
     TraceOfRun trace(arguments->trace, {arguments->cache, arguments->output, arguments->statistics});
     render(*arguments);
     trace.end();

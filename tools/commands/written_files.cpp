@@ -23,6 +23,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kSettled{2000};
 // If no change is reported for so long, look whether one was missed.
 constexpr milliseconds kLongestWait{30'000};
+constexpr size_t kWatchedAhead = 64;  // steps
 
 std::vector<fs::path> filesOf(const OpenGridOptions& options) {
   std::vector<fs::path> files = options.solutions;
@@ -30,20 +31,22 @@ std::vector<fs::path> filesOf(const OpenGridOptions& options) {
   return files;
 }
 
-/// Until no file of the step has changed for a while; 0 or less where that is so.
-milliseconds untilSettled(const OpenGridOptions& options) {
+}  // namespace
+
+milliseconds WrittenFiles::untilSettled(const StepFiles& step) {
   milliseconds longest{0};
-  for (const fs::path& path : filesOf(options)) {
-    std::error_code error;
+  const auto now = std::chrono::steady_clock::now();
+  for (const fs::path& path : filesOf(step.options)) {
+    std::error_code error, no_size;
     const auto written = fs::last_write_time(path, error);
+    const auto bytes = fs::file_size(path, no_size);
     if (error) return kSettled;
-    const auto age = fs::file_time_type::clock::now() - written;
-    longest = std::max(longest, std::chrono::ceil<milliseconds>(kSettled - age));
+    Seen& seen = seen_.try_emplace(path, Seen{written, bytes, now}).first->second;
+    if (seen.written != written || seen.bytes != bytes) seen = {written, bytes, now};
+    longest = std::max(longest, std::chrono::ceil<milliseconds>(kSettled - (now - seen.since)));
   }
   return longest;
 }
-
-}  // namespace
 
 std::vector<fs::path> foldersOf(const OpenGridOptions& options) {
   std::vector<fs::path> folders;
@@ -75,18 +78,14 @@ std::optional<StepFiles> WrittenFiles::next() {
                                    [&](const StepFiles& step) { return done_.contains(step.name); });
     if (last != steps.rend()) done_.erase(last->name);
   }
-  for (const StepFiles& step : steps) {
-    if (done_.contains(step.name)) continue;
-    const milliseconds until = untilSettled(step.options);
-    if (until.count() > 0) {
-      // A clock that is ahead of the file system's must not make it wait for ever.
-      until_next_ = std::min(until, kSettled);
-      return std::nullopt;
-    }
-    done_.insert(step.name);
-    return step;
-  }
-  return std::nullopt;
+  std::erase_if(steps, [&](const StepFiles& step) { return done_.contains(step.name); });
+  if (steps.empty()) return std::nullopt;
+  until_next_ = untilSettled(steps.front());
+  // Those behind it are watched from now on, and need not be waited for one by one.
+  for (size_t n = 1; n < std::min(kWatchedAhead, steps.size()); ++n) untilSettled(steps[n]);
+  if (until_next_.count() > 0) return std::nullopt;
+  done_.insert(steps.front().name);
+  return steps.front();
 }
 
 namespace {

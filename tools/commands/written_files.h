@@ -4,7 +4,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -18,7 +20,9 @@ namespace curvisplat {
 /// The folders that the grid, the solutions and their patterns are in, each once.
 std::vector<std::filesystem::path> foldersOf(const OpenGridOptions& options);
 
-/// The steps of a simulation that are complete on disk: none of a step's files has changed for two seconds.
+/// The steps of a simulation that are complete on disk: none of a step's files has changed for two seconds of this
+/// machine's clock. Times of files are those of another clock (a file server's, or the one of a copy), and only
+/// compared with one another.
 class WrittenFiles {
  public:
   /// `options`, whose patterns are expanded at each look, outlive it.
@@ -34,7 +38,16 @@ class WrittenFiles {
   std::chrono::milliseconds untilNext() const { return until_next_; }
 
  private:
+  struct Seen {
+    std::filesystem::file_time_type written;
+    uintmax_t bytes;
+    std::chrono::steady_clock::time_point since;
+  };
+  /// Until no file of the step has changed for a while, as far as it was watched; 0 or less where that is so.
+  std::chrono::milliseconds untilSettled(const StepFiles& step);
+
   const OpenGridOptions& options_;
+  std::map<std::filesystem::path, Seen> seen_;
   std::set<std::string> done_;   // names of steps
   bool begins_at_last_ = false;  // of those that are done
   std::chrono::milliseconds until_next_{0};

@@ -330,16 +330,14 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
         given_files.front().string());
   const uint64_t limit = limitOfFolder();
   std::error_code error;
-  fs::create_directories(*folder / "known", error);
-  if (error) throw Error("{}: cannot create the directory: {}", folder->string(), error.message());
+  makePrivateFolders(*folder / "known");  // a grid may be its owner's alone to read
   const std::vector<fs::path> files = wholePaths(given_files);
   const StampedFiles stamped(files, progress);
   const uint64_t contents = contentsOf(files, stamped, *folder / "known", progress);
   const char* const suffix = precision == ValuePrecision::kFine ? "-fine" : "";
   const fs::path place = *folder / fmt::format("{:016x}{}", contents, suffix);
   const fs::path cache = place / (files.front().stem().string() + ".splats");
-  fs::create_directories(place, error);
-  if (error) throw Error("{}: cannot create the directory: {}", place.string(), error.message());
+  makePrivateFolders(place);
   {
     const MakingLock lock(place / "used", progress);
     removeChanged(place, cache);

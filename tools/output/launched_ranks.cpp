@@ -1,16 +1,25 @@
 #include "tools/output/launched_ranks.h"
 
 #include <dlfcn.h>
+#include <fmt/format.h>
 #include <unistd.h>
+
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
+#include <string_view>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "stream/base/error.h"
 #include "stream/base/plugin.h"
@@ -85,6 +94,68 @@ Ranks& launchedRanks() {
     throw Error("/dev/null: cannot be opened");
   if (!started->isFirst()) muteMessages();
   return *started;
+}
+
+namespace {
+
+/// What all ranks have to be told alike, by its name.
+std::map<std::string, std::string> sharedOptions(const CLI::App& command) {
+  static const std::set<std::string> own{"GRID",      "SOLUTION", "CACHE",  "--tmp",
+                                         "--threads", "--stats",  "--trace"};
+  std::map<std::string, std::string> options{{"the command", command.get_name()},
+                                             {"the version", CURVISPLAT_VERSION}};
+  for (const CLI::Option* option : command.get_options())
+    if (option->count() > 0 && !own.contains(option->get_name()))
+      options[option->get_name()] = fmt::format("{}", fmt::join(option->results(), " "));
+  for (char** variable = environ; *variable; ++variable) {
+    const std::string_view text = *variable;
+    const size_t equals = std::min(text.find('='), text.size());
+    if (text.starts_with("CURVISPLAT_"))
+      options[std::string(text.substr(0, equals))] = text.substr(std::min(equals + 1, text.size()));
+  }
+  return options;
+}
+
+/// One text of all of them, and back. Neither names nor values have zeros.
+std::string joined(const std::map<std::string, std::string>& options) {
+  std::string text;
+  for (const auto& [name, value] : options) (((text += name) += '\0') += value) += '\0';
+  return text;
+}
+
+std::map<std::string, std::string> taken(std::string_view text) {
+  std::map<std::string, std::string> options;
+  const auto next = [&] {
+    const std::string word(text.substr(0, text.find('\0')));
+    text.remove_prefix(std::min(word.size() + 1, text.size()));
+    return word;
+  };
+  while (!text.empty()) {
+    std::string name = next();
+    options[std::move(name)] = next();
+  }
+  return options;
+}
+
+}  // namespace
+
+void requireSameOptions(const CLI::App& command) {
+  Ranks& ranks = launchedRanks();
+  if (ranks.alone()) return;
+  const std::map<std::string, std::string> here = sharedOptions(command);
+  const std::string text = joined(here);
+  const auto sent = fromBytes<char>(ranks.broadcast(toBytes(std::vector<char>(text.begin(), text.end()))));
+  const std::map<std::string, std::string> first = taken({sent.data(), sent.size()});
+  const auto in = [](const auto& options, const std::string& name) {
+    const auto found = options.find(name);
+    return found == options.end() ? "not given" : "'" + found->second + "'";
+  };
+  std::map<std::string, std::string> all = here;
+  all.insert(first.begin(), first.end());
+  for (const auto& [name, value] : all)
+    if (in(here, name) != in(first, name))
+      throw UsageError("{} is {:.100} here and {:.100} at rank 0; start all ranks with the same options",
+                       name, in(here, name), in(first, name));
 }
 
 StopRanksWith::StopRanksWith(Ranks& ranks, const Progress& progress) : ranks_(ranks) {

@@ -12,11 +12,20 @@
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"
 
+namespace CLI {
+class App;
+}
+
 namespace curvisplat {
 
 /// Starts them at the first call. Only for commands that share their work; the others are run by each process.
 /// Throws Error if there are several and this build has no MPI.
 Ranks& launchedRanks();
+
+/// Throws UsageError at a rank that was started with another command, other options or other environment variables of
+/// this program than rank 0, or that is another version of it: together they would make what none of them was asked
+/// for. Options for one machine may differ: names of files that are read, --tmp, --threads, --stats and --trace.
+void requireSameOptions(const CLI::App& command);
 
 /// Makes calls of the ranks throw Interrupted after progress.stop(), until the end of the scope.
 class StopRanksWith {

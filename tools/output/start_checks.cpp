@@ -118,4 +118,10 @@ bool isForLackOfThreads(const std::exception& error) {
          std::string_view(error.what()).starts_with("pthread_create");
 }
 
+std::string textOf(const std::filesystem::filesystem_error& error) {
+  // Where a directory cannot be read on, its name is not told.
+  const std::string path = error.path1().empty() ? "a directory cannot be read" : error.path1().string();
+  return path + ": " + error.code().message();
+}
+
 }  // namespace curvisplat

@@ -7,6 +7,7 @@
 
 #include <exception>
 #include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -32,6 +33,9 @@ void requireThreads();
 
 /// Whether `error` says that a thread could not be started: those of the C++ library and of TBB do.
 bool isForLackOfThreads(const std::exception& error);
+
+/// What a call of std::filesystem has failed at, in one line.
+std::string textOf(const std::filesystem::filesystem_error& error);
 
 /// The message where isForLackOfThreads().
 extern const char* const kNoThread;

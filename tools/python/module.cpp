@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -351,6 +352,7 @@ void writePicture(const Floats& rgba, const std::filesystem::path& path,
                   const std::map<std::string, Floats>& more) {
   if (rgba.ndim() != 3 || rgba.shape(2) != 4)
     throw UsageError("{}: a picture is an array of shape (height, width, 4)", path.string());
+  checkImageSize(static_cast<uint64_t>(rgba.shape(1)), static_cast<uint64_t>(rgba.shape(0)), path);
   Image image({static_cast<int>(rgba.shape(1)), static_cast<int>(rgba.shape(0))});
   std::copy_n(rgba.data(), image.rgba.size(), image.rgba.data());
   if (more.empty()) return writeImage(image, path);
@@ -372,6 +374,15 @@ PYBIND11_MODULE(_core, module) {
   const auto error = py::register_exception<Error>(module, "Error", PyExc_RuntimeError);
   const py::tuple usage_bases = py::make_tuple(error, py::reinterpret_borrow<py::object>(PyExc_ValueError));
   py::register_exception<UsageError>(module, "UsageError", usage_bases);
+
+  static const py::handle error_type = error;
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const std::filesystem::filesystem_error& failure) {
+      PyErr_SetString(error_type.ptr(), textOf(failure).c_str());
+    }
+  });
 
   py::class_<DataChoice>(module, "DataChoice")
       .def(py::init([](const std::string& scalar, const std::array<double, 3>& lower,

@@ -164,12 +164,14 @@ std::string ServedCaches::coloursText(const ColoursRequest& request) {
 }
 
 std::string ServedCaches::errorText(std::string text) const {
+  const auto replaceAll = [&](const std::string& from, const std::string& to) {
+    for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+      text.replace(at, from.size(), to);
+  };
+  replaceAll("--memory", "the server's --viewer-memory");
   for (const Served& cache : caches_)
     for (const fs::path& path : {cache.reader.path(), cache.reader.cachePath()})
-      for (size_t at = text.find(path.string()); at != std::string::npos; at = text.find(path.string(), at)) {
-        text.replace(at, path.string().size(), cache.name);
-        at += cache.name.size();
-      }
+      replaceAll(path.string(), cache.name);
   return textOf({{"type", "error"}, {"text", text}});
 }
 

@@ -25,6 +25,7 @@ using asio::ip::tcp;
 using ErrorCode = boost::system::error_code;
 
 constexpr std::chrono::milliseconds kLookForStop{200};
+constexpr std::chrono::milliseconds kPauseAfterError{100};
 constexpr size_t kMaxRequests = 64;  // connections that are not viewers
 
 /// Ends viewers on a thread of its own: each first ends the picture that it draws.
@@ -80,9 +81,13 @@ class ViewerCloser {
 class Server : public ConnectionHost {
  public:
   Server(const ServedCaches& caches, const ServerOptions& options, const Progress& stopped)
-      : caches_(caches), options_(options), stopped_(stopped), acceptor_(io_), timer_(io_), closer_([this] {
-          asio::post(io_, [this] { --viewers_; });
-        }) {
+      : caches_(caches),
+        options_(options),
+        stopped_(stopped),
+        acceptor_(io_),
+        timer_(io_),
+        pause_(io_),
+        closer_([this] { asio::post(io_, [this] { --viewers_; }); }) {
     listen();
   }
 
@@ -93,6 +98,7 @@ class Server : public ConnectionHost {
     ErrorCode ignored;
     acceptor_.close(ignored);
     timer_.cancel();
+    pause_.cancel();
     io_.restart();
     while (io_.poll() > 0) {
     }
@@ -159,7 +165,12 @@ class Server : public ConnectionHost {
         connections_.push_back(connection);
         connection->start();
       }
-      accept();
+      if (!error) return accept();
+      // Such as no descriptor left: it fails again at once, until a connection ends.
+      pause_.expires_after(kPauseAfterError);
+      pause_.async_wait([this](const ErrorCode& stopped) {
+        if (!stopped) accept();
+      });
     });
   }
 
@@ -181,7 +192,7 @@ class Server : public ConnectionHost {
   const Progress& stopped_;
   asio::io_context io_{1};
   tcp::acceptor acceptor_;
-  asio::steady_timer timer_;
+  asio::steady_timer timer_, pause_;
   std::list<std::weak_ptr<Connection>> connections_;
   size_t viewers_ = 0;  // with those that are ending
   ViewerCloser closer_;

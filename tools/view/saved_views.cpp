@@ -139,9 +139,7 @@ fs::path savedViewOf(const fs::path& cache, const std::string& name) {
 }
 
 void writeState(const fs::path& file, const std::string& text) {
-  std::error_code error;
-  fs::create_directories(file.parent_path(), error);
-  if (error) throw Error("{}: cannot create the directory: {}", file.parent_path().string(), error.message());
+  makePrivateFolders(file.parent_path());
   writeFileDurably(file, text);
 }
 

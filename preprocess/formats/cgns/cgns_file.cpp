@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "preprocess/formats/cgns/cgns_hdf5.h"
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
@@ -210,10 +211,11 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   for (const double id : ids) {
     char name[kTextBytes] = {}, label[kTextBytes] = {};
     int link_length = 0;
+    const bool named = cgio_get_name(file_, id, name) == CGIO_ERR_NONE &&
+                       cgio_is_link(file_, id, &link_length) == CGIO_ERR_NONE;
+    if (named && link_length > 0) checkLink(id, node.path + "/" + name);
     // The target of a link may be missing; that is an Error only when its data are read.
-    const bool readable = cgio_get_name(file_, id, name) == CGIO_ERR_NONE &&
-                          cgio_is_link(file_, id, &link_length) == CGIO_ERR_NONE &&
-                          (cgio_get_label(file_, id, label) == CGIO_ERR_NONE || link_length > 0);
+    const bool readable = named && (cgio_get_label(file_, id, label) == CGIO_ERR_NONE || link_length > 0);
     if (!readable && error.empty()) error = lastMessage();
     nodes.push_back({node.path + "/" + name, name, label, node.linked || link_length > 0});
     cgio_release_id(file_, id);
@@ -222,6 +224,19 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   if (found != count) damaged(place, fmt::format("declares {} child nodes, but {} were found", count, found));
   if (!error.empty()) damaged(place, "has a child node that cannot be read: " + error);
   return nodes;
+}
+
+/// Throws Error if the link leads to a file outside the folder of this one. libcgns itself opens regular files
+/// only.
+void CgnsFile::checkLink(double id, const std::string& node_path) const {
+  int file_length = 0, path_length = 0;
+  if (cgio_link_size(file_, id, &file_length, &path_length) != CGIO_ERR_NONE || file_length <= 0 ||
+      path_length < 0)
+    return;
+  std::string file(static_cast<size_t>(file_length) + 1, '\0');
+  std::string path(static_cast<size_t>(path_length) + 1, '\0');
+  if (cgio_get_link(file_, id, file.data(), path.data()) == CGIO_ERR_NONE)
+    namedFile(path_.string() + ": " + node_path, folderOf(path_), file.c_str());
 }
 
 CgnsShape CgnsFile::storedShape(const OpenNode& open, const CgnsNode& node) const {

@@ -59,6 +59,7 @@ class CgnsFile {
   class OpenNode;
   [[noreturn]] void fail(const std::string& node_path) const;
   [[noreturn]] void damaged(const std::string& node_path, std::string_view what) const;
+  void checkLink(double id, const std::string& node_path) const;
   CgnsShape storedShape(const OpenNode& open, const CgnsNode& node) const;
   void checkShape(const CgnsNode& node, const CgnsShape& shape) const;
   void checkSmall(const CgnsNode& node, const CgnsShape& shape, std::string_view type) const;

@@ -25,7 +25,25 @@ std::shared_ptr<const InputFile> OpenFiles::at(const std::filesystem::path& path
 PooledFile::PooledFile(std::shared_ptr<OpenFiles> pool, std::filesystem::path path)
     : pool_(std::move(pool)), path_(std::move(path)), size_(pool_->at(path_)->size()) {}
 
-const std::filesystem::path& existingFile(std::string_view who, const std::filesystem::path& path) {
+bool leadsOut(const std::filesystem::path& folder, const std::filesystem::path& named) {
+  std::error_code no_folder;
+  const std::filesystem::path from =
+      (named.is_absolute() ? std::filesystem::absolute(folder / "", no_folder) : folder).lexically_normal();
+  const std::filesystem::path way = (from / named).lexically_normal().lexically_relative(from);
+  return way.empty() || *way.begin() == "..";
+}
+
+std::filesystem::path namedFile(std::string_view who, const std::filesystem::path& folder,
+                                const std::filesystem::path& named) {
+  if (leadsOut(folder, named))
+    throw Error("{} names {}, which lies outside its folder; put both into one folder and correct the name",
+                who, named.string());
+  return folder / named;
+}
+
+std::filesystem::path existingFile(std::string_view who, const std::filesystem::path& folder,
+                                   const std::filesystem::path& named) {
+  std::filesystem::path path = namedFile(who, folder, named);
   if (isRegularFile(path)) return path;
   std::error_code ignored;
   if (std::filesystem::exists(path, ignored))

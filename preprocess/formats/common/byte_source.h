@@ -4,7 +4,7 @@
 // compressed blocks, or as text that has been spooled; a reader asks it for ranges. OpenFiles bounds how
 // many files are open at once, since a partitioned data set may have more pieces than a process may have
 // open files. loadStored() and convertStored() load numbers of either byte order, 1 to 8 bytes, unaligned.
-// existingFile() checks a file that another one names.
+// existingFile() checks a file that another one names: it has to lie in the folder of that one, or below.
 //
 // Any number of threads may read from a source, a file or a pool. Reading beyond the end of a file is an
 // Error with its name.
@@ -108,10 +108,20 @@ class PooledFile {
   uint64_t size_ = 0;
 };
 
-/// Checks a file that another one names: a case, a collection or a series. Returns `path` if it is a regular
-/// file; otherwise throws Error, "WHO names PATH, which does not exist". `who` is like "a.vtm:". If only a
-/// compressed file of that name exists, the message says so.
-const std::filesystem::path& existingFile(std::string_view who, const std::filesystem::path& path);
+/// Whether the path `named`, which is relative to `folder` unless it is absolute, lies outside of that folder.
+/// Symbolic links are the user's own and not looked at.
+bool leadsOut(const std::filesystem::path& folder, const std::filesystem::path& named);
+
+/// The path of a file that another one names: a case, a collection or a series; `folder` is the folder of
+/// that one. A file that somebody else has written must not reach the user's other files: throws Error,
+/// "WHO names FILE, which lies outside its folder", if the name leads out of it. `who` is like "a.vtm:".
+std::filesystem::path namedFile(std::string_view who, const std::filesystem::path& folder,
+                                const std::filesystem::path& named);
+
+/// namedFile() of a regular file. Throws Error, "WHO names PATH, which does not exist", if it is none. If
+/// only a compressed file of that name exists, the message says so.
+std::filesystem::path existingFile(std::string_view who, const std::filesystem::path& folder,
+                                   const std::filesystem::path& named);
 
 /// Bytes that are read by position, however the file stores them. Any number of threads may read at once.
 class ByteSource {

@@ -14,11 +14,15 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <optional>
 #include <set>
+#include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "stream/base/error.h"
 
@@ -70,8 +74,9 @@ constexpr size_t kMaxReadBytes = size_t{1} << 26;  // of all chunks
 using Hdf5Object = Hdf5Handle<H5Oclose>;
 using Hdf5Properties = Hdf5Handle<H5Pclose>;
 
-/// In the process of a trial.
-bool in_trial = false;
+/// In the process of a trial; leads_out: the walk met something that Hdf5Exits has to look at.
+bool in_trial = false, leads_out = false;
+constexpr int kExitLeadsOut = 3;
 
 /// Size of `points` values of the type in memory; 0: too large, or not known.
 size_t bytesOf(hssize_t points, const Hdf5Type& type, size_t most) {
@@ -95,12 +100,8 @@ herr_t readAttribute(hid_t object, const char* name, const H5A_info_t*, void*) {
 }
 
 /// Size of a chunk, or of the whole of a data set without chunks, if that can be read. 0: leave it alone.
-size_t readableBytes(const Hdf5DataSet& set, const Hdf5Space& space, const Hdf5Type& type) {
-  const Hdf5Properties properties(H5Dget_create_plist(set.id()));
-  if (!properties || H5Pget_external_count(properties.id()) != 0) return 0;
-  const H5D_layout_t layout = H5Pget_layout(properties.id());
-  if (layout == H5D_VIRTUAL) return 0;
-  if (layout != H5D_CHUNKED) return bytesOf(1, type, kMaxChunkBytes);
+size_t readableBytes(const Hdf5Properties& properties, const Hdf5Space& space, const Hdf5Type& type) {
+  if (H5Pget_layout(properties.id()) != H5D_CHUNKED) return bytesOf(1, type, kMaxChunkBytes);
   std::array<hsize_t, H5S_MAX_RANK> chunk{};
   const int rank = H5Pget_chunk(properties.id(), H5S_MAX_RANK, chunk.data());
   hssize_t points = rank > 0 && rank == H5Sget_simple_extent_ndims(space.id()) ? 1 : 0;
@@ -111,15 +112,26 @@ size_t readableBytes(const Hdf5DataSet& set, const Hdf5Space& space, const Hdf5T
   return bytesOf(points, type, kMaxChunkBytes);
 }
 
+bool isVirtual(const Hdf5Properties& properties) {
+  return properties && H5Pget_layout(properties.id()) == H5D_VIRTUAL;
+}
+
 /// Its index, and its first and last value.
 void readDataSet(hid_t object, size_t& read) {
   const Hdf5DataSet set(H5Dopen2(object, ".", H5P_DEFAULT));
   if (!set) return;
+  const Hdf5Properties properties(H5Dget_create_plist(set.id()));
+  if (!properties) return;
+  // Not even its extent is looked at: a virtual data set may have that of its sources.
+  if (isVirtual(properties) || H5Pget_external_count(properties.id()) != 0) {
+    leads_out = true;
+    return;
+  }
   H5Dget_storage_size(set.id());
   const Hdf5Space space(H5Dget_space(set.id()));
   const Hdf5Type type(H5Dget_type(set.id()));
   if (!space || !type) return;
-  const size_t bytes = readableBytes(set, space, type);
+  const size_t bytes = readableBytes(properties, space, type);
   std::array<hsize_t, H5S_MAX_RANK> dims{}, first{}, one{};
   const int rank = H5Sget_simple_extent_dims(space.id(), dims.data(), nullptr);
   if (bytes == 0 || read + 2 * bytes > kMaxReadBytes || rank <= 0 ||
@@ -138,7 +150,8 @@ void readDataSet(hid_t object, size_t& read) {
   }
 }
 
-herr_t visitLink(hid_t, const char*, const H5L_info_t*, void*) {
+herr_t visitLink(hid_t, const char*, const H5L_info_t* link, void*) {
+  leads_out |= link->type == H5L_TYPE_EXTERNAL;
   return 0;
 }
 
@@ -149,8 +162,10 @@ herr_t visit(hid_t root, const char* name, const H5O_info_t* info, void* read) {
   H5Aiterate2(object.id(), H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, readAttribute, nullptr);
   H5Aiterate2(object.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, readAttribute, nullptr);
   if (info->type == H5O_TYPE_GROUP)
-    for (const H5_index_t order : {H5_INDEX_NAME, H5_INDEX_CRT_ORDER})
-      H5Literate(object.id(), order, H5_ITER_INC, nullptr, visitLink, nullptr);
+    for (const H5_index_t order : {H5_INDEX_NAME, H5_INDEX_CRT_ORDER}) {
+      const herr_t whole = H5Literate(object.id(), order, H5_ITER_INC, nullptr, visitLink, nullptr);
+      leads_out |= whole < 0 && order == H5_INDEX_NAME;
+    }
   if (info->type == H5O_TYPE_DATASET) readDataSet(object.id(), *static_cast<size_t*>(read));
   return 0;
 }
@@ -159,7 +174,160 @@ void walk(const std::filesystem::path& path) {
   const QuietHdf5 quiet;
   const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   size_t read = 0;
-  if (file) H5Ovisit2(file.id(), H5_INDEX_NAME, H5_ITER_NATIVE, visit, &read, H5O_INFO_ALL);
+  leads_out |= file && H5Ovisit2(file.id(), H5_INDEX_NAME, H5_ITER_NATIVE, visit, &read, H5O_INFO_ALL) < 0;
+}
+
+/// What leads out of an HDF5 file, found without following it.
+class Hdf5Exits {
+ public:
+  struct VirtualSource {
+    std::filesystem::path file;
+    std::string set;
+  };
+
+  /// None if HDF5 cannot open the file. Throws Error if it leads where it may not.
+  explicit Hdf5Exits(const std::filesystem::path& path) : path_(path) {
+    const QuietHdf5 quiet;
+    const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+    auto root = std::make_shared<const Hdf5Object>(file ? H5Oopen(file.id(), "/", H5P_DEFAULT) : -1);
+    if (!*root) return;
+    std::vector<HardLink> found{{std::move(root), "."}};
+    while (!found.empty()) {
+      const HardLink next = std::move(found.back());
+      found.pop_back();
+      const auto object =
+          std::make_shared<const Hdf5Object>(H5Oopen(next.group->id(), next.name.c_str(), H5P_DEFAULT));
+      H5O_info_t info;
+      // What cannot be opened here cannot be opened by a reader.
+      if (!*object || H5Oget_info2(object->id(), &info, H5O_INFO_BASIC) < 0) continue;
+      if (info.rc > 1 && !several_names_.insert(info.addr).second) continue;
+      if (info.type == H5O_TYPE_DATASET) lookAt(*object);
+      if (info.type != H5O_TYPE_GROUP) continue;
+      for (std::string& name : linksOf(*object)) found.push_back({object, std::move(name)});
+    }
+  }
+
+  /// Those that exist.
+  const std::set<std::filesystem::path>& files() const { return files_; }
+  const std::vector<VirtualSource>& sources() const { return sources_; }
+
+ private:
+  struct HardLink {
+    std::shared_ptr<const Hdf5Object> group;
+    std::string name;
+  };
+  struct Link {
+    std::string name;
+    H5L_type_t type;
+    size_t bytes;
+  };
+
+  [[noreturn]] void fail(const Hdf5Object& object, std::string_view what) const {
+    std::array<char, 1024> name{};
+    H5Iget_name(object.id(), name.data(), name.size());
+    throw Error("{}: {}: {}", path_.string(), name.data(), what);
+  }
+
+  /// Looks at the external links of a group, and returns the names of the hard ones. Soft links stay in the
+  /// file.
+  std::vector<std::string> linksOf(const Hdf5Object& group) {
+    std::vector<Link> links;
+    const auto add = [](hid_t, const char* name, const H5L_info_t* info, void* to) -> herr_t {
+      try {
+        const bool has_value = info->type != H5L_TYPE_HARD;
+        static_cast<std::vector<Link>*>(to)->push_back({name, info->type, has_value ? info->u.val_size : 0});
+        return 0;
+      } catch (const std::exception&) {
+        return -1;
+      }
+    };
+    if (H5Literate(group.id(), H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, add, &links) < 0)
+      fail(group, "its list of objects cannot be read (HDF5: " + hdf5Reason() +
+                      "); the file is damaged: copy or write it again");
+    std::vector<std::string> names;
+    for (Link& link : links) {
+      if (link.type == H5L_TYPE_HARD) names.push_back(std::move(link.name));
+      if (link.type != H5L_TYPE_EXTERNAL) continue;
+      std::vector<char> value(link.bytes);
+      const char *file = nullptr, *object = nullptr;
+      if (H5Lget_val(group.id(), link.name.c_str(), value.data(), value.size(), H5P_DEFAULT) < 0 ||
+          H5Lunpack_elink_val(value.data(), value.size(), nullptr, &file, &object) < 0)
+        fail(group,
+             "its link '" + link.name + "' cannot be read; the file is damaged: copy or write it again");
+      follow(group, file);
+    }
+    return names;
+  }
+
+  void lookAt(const Hdf5Object& set) {
+    const Hdf5Properties properties(H5Dget_create_plist(set.id()));
+    if (!properties) return;
+    if (H5Pget_external_count(properties.id()) > 0)
+      fail(set, "its values are in another file, without a description; store them in this one");
+    size_t count = 0;
+    if (!isVirtual(properties)) return;
+    if (H5Pget_virtual_count(properties.id(), &count) < 0) fail(set, "its sources cannot be read");
+    for (size_t n = 0; n < count; ++n) {
+      const std::string file = textOf(H5Pget_virtual_filename, properties, n),
+                        source = textOf(H5Pget_virtual_dsetname, properties, n);
+      if (file.find('%') != std::string::npos || source.find('%') != std::string::npos)
+        fail(set,
+             "its sources are named by the pattern '" + file + "', which is not followed; name each of them");
+      if (file == ".")
+        sources_.push_back({path_, source});
+      else if (const auto found = follow(set, file))
+        sources_.push_back({*found, source});
+    }
+  }
+
+  template <typename Get>
+  static std::string textOf(const Get& get, const Hdf5Properties& properties, size_t n) {
+    const ssize_t size = get(properties.id(), n, nullptr, 0);
+    std::string text(static_cast<size_t>(std::max<ssize_t>(0, size)) + 1, '\0');
+    get(properties.id(), n, text.data(), text.size());
+    text.pop_back();
+    return text;
+  }
+
+  /// The file that HDF5 finds by this name, if there is one: beside this file, in the working directory or at
+  /// the end of symbolic links. It looks for absolute names of missing files in these places, too.
+  std::optional<std::filesystem::path> follow(const Hdf5Object& from, const std::filesystem::path& named) {
+    const std::filesystem::path folder = folderOf(path_);
+    std::error_code missing;
+    std::filesystem::path name = named;
+    if (named.is_absolute() && !std::filesystem::exists(named, missing)) name = named.filename();
+    for (const auto& place : {folder, std::filesystem::path(), folderOf(linkTarget(path_))}) {
+      const std::filesystem::path file = place / name;
+      if (!std::filesystem::exists(file, missing)) continue;
+      if (leadsOut(folder, name))
+        fail(from,
+             "leads to " + name.string() + ", which lies outside the folder of the file; put both into one");
+      if (!isRegularFile(file)) fail(from, "leads to " + file.string() + ", which is not a regular file");
+      files_.insert(file);
+      return file;
+    }
+    return std::nullopt;
+  }
+
+  const std::filesystem::path path_;
+  std::set<haddr_t> several_names_;  // objects that were met, of those that have more than one
+  std::set<std::filesystem::path> files_;
+  std::vector<VirtualSource> sources_;
+};
+
+/// Throws Error if a source is virtual itself. All files have been looked at: HDF5 may follow their links.
+void requireStored(const std::filesystem::path& path, const std::vector<Hdf5Exits::VirtualSource>& sources) {
+  const QuietHdf5 quiet;
+  for (const auto& source : sources) {
+    const Hdf5File file(H5Fopen(source.file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+    const Hdf5Object set(file ? H5Oopen(file.id(), source.set.c_str(), H5P_DEFAULT) : -1);
+    const Hdf5Properties properties(set ? H5Dget_create_plist(set.id()) : -1);
+    if (properties && isVirtual(properties))
+      throw Error(
+          "{}: takes virtual data from {} in {}, which is a virtual data set itself; store its values in the "
+          "file",
+          path.string(), source.set, source.file.string());
+  }
 }
 
 constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
@@ -185,7 +353,7 @@ constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
     // The caller finds the same.
   }
   H5close();  // as at the end of the caller: it frees what a damaged file has left open
-  ::_exit(0);
+  ::_exit(leads_out ? kExitLeadsOut : 0);
 }
 
 /// The files that have been tried and stayed as they were.
@@ -223,27 +391,30 @@ pid_t forkTrial() {
   return ::fork();
 }
 
-/// Throws Error if the work crashes or takes too long, else notes the file `before`.
-void tryWork(const char* library, const std::filesystem::path& path, const struct stat& before,
-             const std::function<void()>& work, TriedFiles& tried) {
+enum class Trial { kNone, kPassed, kLeadsOut };  // none: no process could be started, or it was stopped
+
+/// Throws Error if the work crashes or takes too long.
+Trial tryWork(const char* library, const std::filesystem::path& path, const struct stat& before,
+              const std::function<void()>& work) {
   const rlim_t most_seconds = kSeconds + static_cast<rlim_t>(before.st_size) / kBytesPerSecond;
   const pid_t parent = ::getpid(), trial = forkTrial();
   if (trial == 0) runTrial(work, most_seconds, parent);
-  if (trial < 0) return;
+  if (trial < 0) return Trial::kNone;
   int status = 0;
   while (::waitpid(trial, &status, 0) < 0)
-    if (errno != EINTR) return;  // somebody else has waited for it
+    if (errno != EINTR) return Trial::kNone;  // somebody else has waited for it
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
     throw Error("{}: {} does not finish reading it within {} s; the file is damaged: copy or write it again",
                 path.string(), library, most_seconds);
   const bool stopped =
       WIFSIGNALED(status) && std::find(kStops.begin(), kStops.end(), WTERMSIG(status)) != kStops.end();
-  if (stopped) return;  // the caller is told, too
+  if (stopped) return Trial::kNone;  // the caller is told, too
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kExitLeadsOut) return Trial::kLeadsOut;
   if (WIFSIGNALED(status) || (WIFEXITED(status) && WEXITSTATUS(status) != 0))
     throw Error("{}: {} crashes on its structures ({}); the file is damaged: copy or write it again",
                 path.string(), library,
                 WIFSIGNALED(status) ? ::strsignal(WTERMSIG(status)) : "an error of memory");
-  tried.add(before);
+  return Trial::kPassed;
 }
 
 }  // namespace
@@ -252,20 +423,44 @@ void tryLibrary(const char* library, const std::filesystem::path& path, const st
   static TriedFiles tried;
   struct stat before {};
   if (in_trial || ::stat(path.c_str(), &before) != 0 || tried.has(before)) return;
-  tryWork(library, path, before, work, tried);
+  if (tryWork(library, path, before, work) != Trial::kNone) tried.add(before);
 }
+
+namespace {
+
+/// Walks a file and all that it leads to, each in a trial before it is looked at here.
+void walkAll(const std::filesystem::path& path, TriedFiles& walked) {
+  constexpr size_t kMaxFiles = 10000;
+  std::vector<std::filesystem::path> files{path};
+  std::set<std::filesystem::path> known{path};
+  std::vector<struct stat> tried;
+  std::vector<Hdf5Exits::VirtualSource> sources;
+  for (size_t n = 0; n < files.size(); ++n) {
+    const std::filesystem::path file = files[n];
+    struct stat before {};
+    if (::stat(file.c_str(), &before) != 0 || walked.has(before)) continue;
+    const Trial trial = tryWork("HDF5", file, before, [&] { walk(file); });
+    if (trial != Trial::kNone) tried.push_back(before);
+    if (trial == Trial::kPassed) continue;
+    const Hdf5Exits exits(file);
+    sources.insert(sources.end(), exits.sources().begin(), exits.sources().end());
+    for (const auto& next : exits.files())
+      if (known.insert(next).second) files.push_back(next);
+    if (files.size() > kMaxFiles) throw Error("{}: leads to more than {} files", path.string(), kMaxFiles);
+  }
+  requireStored(path, sources);
+  for (const struct stat& file : tried) walked.add(file);
+}
+
+}  // namespace
 
 void tryHdf5(const std::filesystem::path& path, const std::function<void()>& more) {
   static TriedFiles walked, with_more;
   TriedFiles& tried = more ? with_more : walked;
   struct stat before {};
   if (in_trial || ::stat(path.c_str(), &before) != 0 || tried.has(before)) return;
-  const bool walks = !walked.has(before);
-  const auto work = [&] {
-    if (walks) walk(path);
-    if (more) more();
-  };
-  tryWork("HDF5", path, before, work, tried);
+  walkAll(path, walked);
+  if (more && tryWork("HDF5", path, before, more) != Trial::kNone) with_more.add(before);
 }
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
-// Checks of a file that may be damaged, before a data library opens it: is the file complete, and does the
-// library survive it?
+// Checks of a file that may be damaged or hostile, before a data library opens it: is the file complete, does
+// the library survive it, and where does it lead?
 //
 // HDF5 (1.10) and libcgns trust the structures of a file. If these are damaged, the libraries read and free
 // memory that does not exist, or never return. Their work is therefore tried in a child process first, which
@@ -24,8 +24,11 @@ void requireWholeHdf5(const InputFile& file);
 void tryLibrary(const char* library, const std::filesystem::path& path, const std::function<void()>& work);
 
 /// Tries what HDF5 does with the file: the trial walks all objects, links, attributes and indices, and reads
-/// small chunks, but not all values. `more`, if given, runs in the same trial; its exceptions are ignored.
-/// Throws Error if HDF5 crashes or takes too long.
+/// small chunks, but not all values. Then does the same with each file that an external link or a virtual
+/// data set leads to. Last, `more`, if given, runs in a trial of its own; its exceptions are ignored.
+/// Throws Error if HDF5 crashes or takes too long, or if the file leads to one that is not regular or lies
+/// outside its folder, keeps values in a raw file (HDF5 looks for that in the working directory), or takes
+/// virtual values from virtual data sets (HDF5 follows a cycle of them until the stack ends).
 void tryHdf5(const std::filesystem::path& path, const std::function<void()>& more = nullptr);
 
 }  // namespace curvisplat

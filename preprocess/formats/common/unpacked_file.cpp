@@ -4,6 +4,7 @@
 #include <lzma.h>
 #include <zlib.h>
 #include <zstd.h>
+#include <zstd_errors.h>
 
 #include <array>
 #include <functional>
@@ -43,6 +44,10 @@ class Input {
   [[noreturn]] void fail(std::string_view format, std::string_view reason) const {
     throw Error("{}: cannot be decompressed as {}: {}; if the file is damaged, copy it again",
                 file_.path().string(), format, reason);
+  }
+  /// The file is whole, but cannot be decompressed here.
+  [[noreturn]] void refuse(std::string_view format, std::string_view reason) const {
+    throw Error("{}: cannot be decompressed as {}: {}", file_.path().string(), format, reason);
   }
 
  private:
@@ -111,11 +116,25 @@ void unpackXz(Input& input, const Sink& sink) {
     xz.stream.avail_out = out.size();
     status = lzma_code(&xz.stream, input.ended() ? LZMA_FINISH : LZMA_RUN);
     if (status == LZMA_MEMLIMIT_ERROR)
-      input.fail("xz", fmt::format("it needs more than {} MiB of memory (xz --lzma2=dict=64MiB needs less)",
-                                   kUnpackingMemory >> 20));
+      input.refuse("xz", fmt::format("it needs more than {} MiB of memory; compress it again with "
+                                     "--lzma2=dict=64MiB or less",
+                                     kUnpackingMemory >> 20));
     if (status == LZMA_BUF_ERROR) input.fail("xz", "it ends early");
     if (status != LZMA_OK && status != LZMA_STREAM_END) input.fail("xz", "its data is wrong");
     sink({out.data(), out.size() - xz.stream.avail_out});
+  }
+}
+
+[[noreturn]] void failAtZstd(const Input& input, size_t code) {
+  switch (ZSTD_getErrorCode(code)) {
+    case ZSTD_error_frameParameter_windowTooLarge:
+      input.refuse("zstd", "it needs more than 128 MiB of memory; compress it again without --long");
+    case ZSTD_error_dictionary_wrong:
+      input.refuse("zstd", "it needs a dictionary; compress it again without one");
+    case ZSTD_error_memory_allocation:
+      input.refuse("zstd", "no memory");
+    default:
+      input.fail("zstd", ZSTD_getErrorName(code));
   }
 }
 
@@ -131,7 +150,7 @@ void unpackZstd(Input& input, const Sink& sink) {
     while (from.pos < from.size || full) {
       ZSTD_outBuffer to{out.data(), out.size(), 0};
       left = ZSTD_decompressStream(zstd.get(), &to, &from);
-      if (ZSTD_isError(left)) input.fail("zstd", ZSTD_getErrorName(left));
+      if (ZSTD_isError(left)) failAtZstd(input, left);
       sink({out.data(), to.pos});
       full = to.pos == to.size &&
              left != 0;  // 0: the frame is complete; a call without input would begin another

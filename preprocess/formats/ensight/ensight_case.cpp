@@ -168,7 +168,7 @@ std::filesystem::path CaseReader::fileOf(const Entry& entry, const std::string& 
     file = file.substr(0, star) + fmt::format("{:0{}}", static_cast<uint64_t>(number), stars) +
            file.substr(star + stars);
   }
-  return existingFile(path_.string() + ':', folder_ / file);
+  return existingFile(path_.string() + ':', folder_, file);
 }
 
 EnsightCase CaseReader::run(std::optional<uint32_t> step) {

@@ -109,13 +109,12 @@ std::unique_ptr<DataSource> openFileSeries(
   const uint32_t step = chosenTimeStep(options.grid.string(), times, options.time_step);
 
   OpenGridOptions of_step = options;
-  of_step.grid = options.namesFolder() / files[step].name;
+  of_step.grid = existingFile(options.grid.string() + ':', options.namesFolder(), files[step].name);
   of_step.names_folder.reset();
   of_step.time_step.reset();
   if (of_step.grid.extension() == ".series")
     throw Error("{}: lists {}, a file series itself; expected grid files", options.grid.string(),
                 files[step].name);
-  existingFile(options.grid.string() + ':', of_step.grid);
   std::unique_ptr<DataSource> source = open(of_step);
   GridDescription description = source->description();
   description.files.push_back(options.grid.string());

@@ -194,7 +194,7 @@ constexpr uint64_t kLargest = 1 << 20;
 
 struct MetaStep {
   double time = 0;
-  std::filesystem::path grid, q, function;  // empty: not named
+  std::filesystem::path grid, q, function;  // as they are named; empty: not named
 };
 
 /// The value of `field`, which must be one of `words`, ignoring case.
@@ -223,21 +223,21 @@ std::vector<std::string> unknownKeys(const JsonField& meta) {
   return unknown;
 }
 
-std::filesystem::path fileIn(const JsonField& entry, const char* name, const std::filesystem::path& folder) {
+std::filesystem::path fileIn(const JsonField& entry, const char* name) {
   const auto field = entry.find(name);
   if (!field) return {};
   const std::string file = field->text();
   if (file.empty() || file.find('\0') != std::string::npos) field->fail("a file name");
-  return folder / file;
+  return file;
 }
 
-std::vector<MetaStep> stepsOf(const JsonField& meta, const std::filesystem::path& folder) {
+std::vector<MetaStep> stepsOf(const JsonField& meta) {
   const JsonField files = meta.at("filenames");
   std::vector<MetaStep> steps;
   for (const JsonField& entry : files.elements()) {
     const auto time = entry.find("time");
-    MetaStep step{time ? time->number() : static_cast<double>(steps.size()), fileIn(entry, "xyz", folder),
-                  fileIn(entry, "q", folder), fileIn(entry, "function", folder)};
+    MetaStep step{time ? time->number() : static_cast<double>(steps.size()), fileIn(entry, "xyz"),
+                  fileIn(entry, "q"), fileIn(entry, "function")};
     // A grid that does not change is named only in the first step.
     if (step.grid.empty() && !steps.empty()) step.grid = steps.back().grid;
     if (step.grid.empty()) entry.fail("the name of a grid file, \"xyz\"");
@@ -287,7 +287,7 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   const JsonDocument document(readTextFile(options.grid, kLargest), options.grid.string(),
                               "a .p3d description, which is JSON");
   const JsonField meta = document.root();
-  const std::vector<MetaStep> steps = stepsOf(meta, options.namesFolder());
+  const std::vector<MetaStep> steps = stepsOf(meta);
   std::vector<double> times;
   for (const MetaStep& each : steps) times.push_back(each.time);
   const uint32_t number = chosenTimeStep(options.grid.string(), times, options.time_step);
@@ -297,16 +297,17 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
     warnings.push_back(fmt::format("{}: unknown key '{}' is ignored", options.grid.string(), key));
 
   OpenGridOptions of_step = options;
-  of_step.grid = step.grid;
+  const std::string who = options.grid.string() + ':';
+  of_step.grid = existingFile(who, options.namesFolder(), step.grid);
   of_step.names_folder.reset();
   of_step.time_step.reset();
   takeLayout(meta, of_step.force);
   if (const auto names = meta.find("function-names"); names && of_step.function_names.empty())
     of_step.function_names = names->texts();
-  existingFile(options.grid.string() + ':', step.grid);
   of_step.solutions.clear();
-  for (const auto& solution : {step.q, step.function}) {
-    if (solution.empty()) continue;
+  for (const auto& named : {step.q, step.function}) {
+    if (named.empty()) continue;
+    const std::filesystem::path solution = namedFile(who, options.namesFolder(), named);
     if (isRegularFile(solution))
       of_step.solutions.push_back(solution);
     else

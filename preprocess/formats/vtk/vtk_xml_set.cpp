@@ -111,7 +111,7 @@ class Gatherer {
     const std::string named = node.attribute(attribute).value();
     if (named.empty()) file.fail(fmt::format("has a <{}> without {}", node.name(), attribute));
     const bool is_first = inside_.size() == 1;
-    return existingFile(file.name() + ':', (is_first ? names_folder_ : file.path().parent_path()) / named);
+    return existingFile(file.name() + ':', is_first ? names_folder_ : file.path().parent_path(), named);
   }
 
   /// Appends pieces, and a block for each part of them.

@@ -214,7 +214,7 @@ void XdmfItems::addFile(const std::filesystem::path& path) {
 }
 
 std::filesystem::path XdmfItems::existing(const pugi::xml_node& item, const std::string& text) const {
-  return existingFile(document_.describe(item), folder_ / text);
+  return existingFile(document_.describe(item), folder_, text);
 }
 
 std::shared_ptr<const XdmfValues> XdmfItems::readHdf5(const pugi::xml_node& item, const std::string& text,

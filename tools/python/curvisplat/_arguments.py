@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 import os
 from typing import Any, Callable, Sequence, Tuple
 
 from . import _core
+
+
+def in_one_line(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, where the module's TypeError, of several lines, is a UsageError of one."""
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        try:
+            return function(*arguments, **named)
+        except TypeError as error:
+            if "incompatible function arguments" not in str(error) and "incompatible constructor arguments" not in str(error):
+                raise
+            raise _core.UsageError(f"{function.__name__}(): an argument has a type that it cannot have; see help(curvisplat)") from None
+
+    return call
 
 
 def whole(name: str, value: Any, least: int = 0) -> int:

@@ -70,14 +70,15 @@ class Picture(np.ndarray):
             if hasattr(other, name):
                 setattr(self, name, getattr(other, name))
 
+    @_arguments.in_one_line
     def save(self, path: Union[str, os.PathLike]) -> None:
         """Writes the picture as .png (8 bits), .exr or .pfm (float32); .exr with the channels."""
         of_exr = self.channels if os.fspath(path).lower().endswith(".exr") else {}
         _core.write_image(np.ascontiguousarray(self, dtype=np.float32), os.fspath(path), of_exr)
 
     def _repr_png_(self) -> Optional[bytes]:
-        """The picture for a notebook; None for an array that is no picture any more, such as one row."""
-        if self.ndim != 3 or self.shape[2] != 4:
+        """The picture for a notebook; None for an array that is no picture any more, such as one row or none."""
+        if self.ndim != 3 or self.shape[2] != 4 or 0 in self.shape or max(self.shape) > 1 << 16:
             return None
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "picture.png"
@@ -211,6 +212,7 @@ class Cache:
         """Of the times, such as "days since 1900-01-01"; "" if unknown."""
         return self._core.time_unit
 
+    @_arguments.in_one_line
     def histogram(self, scalar: str = "", *, bins: int = 128, range: Optional[Tuple[float, float]] = None,
                   log: bool = False) -> Tuple[np.ndarray, np.ndarray]:
         """The share of the data's volume in each of `bins` intervals, and the bins + 1 ends of the intervals.
@@ -230,6 +232,7 @@ class Cache:
         `url` is for a browser on this machine. It ends by `close()` or with the interpreter."""
         return View(self.path, height, program)
 
+    @_arguments.in_one_line
     def probe(self, point: Vector) -> Optional[dict]:
         """The sample that a point (x, y, z) lies in: {"values": {scalar: value}, "block": from 1, "index": (i, j, k) from 0, "position": of
         the sample's splat, the middle of its cell, where it has these values}. None if the point is outside of the grid."""
@@ -243,6 +246,7 @@ class Cache:
             raise _core.UsageError(f"a box of {len(values)} numbers: expected (x0, x1, y0, y1, z0, z1)")
         return values[0::2], values[1::2]
 
+    @_arguments.in_one_line
     def sample(self, scalar: str = "", *, size: Union[int, Tuple[int, int, int]] = 128, box: Optional[Vector] = None,
                level: Optional[int] = None, step: int = 0, progress: Optional[Progress] = None) -> Samples:
         """The scalar on a regular lattice.
@@ -268,6 +272,7 @@ class Cache:
         value, density = self._core.sample(choice, [int(n) for n in size], progress)
         return Samples(value, density, corners[0] + spacing / 2, spacing)
 
+    @_arguments.in_one_line
     def points(self, scalar: str = "", *, level: Optional[int] = None, box: Optional[Vector] = None, step: int = 0,
                progress: Optional[Progress] = None) -> Points:
         """The splats of a level with their centres in a box.
@@ -278,12 +283,14 @@ class Cache:
         lower, upper = self._box(box)
         return Points(*self._core.points(_core.DataChoice(scalar, lower, upper, _level(level), _arguments.whole("step", step)), progress))
 
+    @_arguments.in_one_line
     def camera(self, view: str = "iso", *, size: Tuple[int, int] = (600, 600), scale: Vector = (1, 1, 1),
                view_angle: Optional[float] = None) -> Camera:
         """A camera that has all of the data in a picture of this size: iso, +x, -x, +y, -y, +z or -z; with view_angle (degrees) in
         perspective."""
         return self.orbit(view, frames=1, degrees=0, size=size, scale=scale, view_angle=view_angle)[0]
 
+    @_arguments.in_one_line
     def orbit(self, view: str = "iso", *, frames: int = 90, degrees: float = 360, size: Tuple[int, int] = (600, 600),
               scale: Vector = (1, 1, 1), view_angle: Optional[float] = None) -> Sequence[Camera]:
         """The cameras of `curvisplat render --orbit`, one a frame, which all have all of the data in the picture."""
@@ -293,6 +300,7 @@ class Cache:
         return [Camera(position, focal_point, view_up, None if view_angle else half, view_angle)
                 for position, focal_point, view_up, half in cameras]
 
+    @_arguments.in_one_line
     def render(self, scalar: str = "", *, camera: Optional[Camera] = None, function: Optional[TransferFunction] = None,
                size: Tuple[int, int] = (600, 600), colours: Optional[str] = None, range: Union[str, Tuple[float, float], None] = None,
                opacity: Union[str, Sequence[Tuple[float, float]], None] = None,

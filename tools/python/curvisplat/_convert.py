@@ -38,6 +38,7 @@ def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory
             "memory": "" if memory is None else str(memory), "value_precision": "normal"}
 
 
+@_arguments.in_one_line
 def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, scalars: Union[str, Sequence[str]] = (),
             time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False, vertical_scale: float = 1,
             blank_value: Optional[float] = None, refine: int = 1, overwrite: bool = False, resume: bool = False,
@@ -65,6 +66,7 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
                           vertical_scale=vertical_scale, progress=progress)
 
 
+@_arguments.in_one_line
 def append(cache: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, steps: Optional[str] = None,
            keep_going: bool = False, vertical_scale: float = 1, blank_value: Optional[float] = None,
            memory: Union[str, int, None] = None, threads: int = 0, progress: Optional[Progress] = None) -> Report:
@@ -110,6 +112,7 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
     return tuples, units
 
 
+@_arguments.in_one_line
 def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, refine: int = 1,
                    overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
                    time: Optional[float] = None, value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
@@ -126,6 +129,7 @@ def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = 
     return Report(**_core.convert_arrays(_arguments.path(output), tuples, units, options, progress))
 
 
+@_arguments.in_one_line
 def append_arrays(cache: Path, *blocks: Block, time: Optional[float] = None, blank_value: Optional[float] = None,
                   memory: Union[str, int, None] = None, threads: int = 0, progress: Optional[Progress] = None) -> int:
     """Adds a time step to a cache: blocks of the same shapes, with the cache's scalars. Returns how many steps it has then.
@@ -146,6 +150,7 @@ def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
         return False
 
 
+@_arguments.in_one_line
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
                      scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None, refine: int = 1,
                      overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
