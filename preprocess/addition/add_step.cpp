@@ -113,18 +113,17 @@ class StepAddition {
     if (options.bucket_splats) plan_.limitBuckets(*options.bucket_splats, scalars_.size());
     if (options.slab_bytes) plan_.slab_bytes = *options.slab_bytes;
     report_.step = cache_.series().steps.size();
-    report_.nodes = cache_.manifest().nodes;
     if (grid_) {
+      report_.nodes = cache_.manifest().nodes;
       reader_ = std::make_unique<NodeReader>(*grid_, scalars_, options.blank_value);
     } else {
       makeScratch();
       origin_ = std::make_unique<MeshOrigin>(dynamic_cast<const MeshSource&>(source), scalars_,
                                              options.blank_value, plan_, scratch_->path());
+      for (const GridBlock& block : origin_->blocks()) report_.nodes += block.nodes();
     }
-    if (grid_)
-      checkBlocksOfStep(source_.description().blocks, cache_.seriesManifest());
-    else
-      checkBlocks(origin_->blocks(), cache_);
+    // A mesh that differs from those before it gets a geometry of its own.
+    if (grid_) checkBlocksOfStep(source_.description().blocks, cache_.seriesManifest());
     if ((centring() == Centring::kCell) != cache_.manifest().cells)
       throw Error("its scalars are {}-centred; those of the steps before it are {}-centred",
                   cache_.manifest().cells ? "node" : "cell", cache_.manifest().cells ? "cell" : "node");

@@ -185,10 +185,13 @@ class Conversion {
   void scan() {
     if (makesSplats()) splats_.survey = origin_->survey(progress_);
     if (ranks_ && !shares_splats_) splats_.survey = broadcastSurvey(splats_.survey, *ranks_);
+    const auto& lost = splats_.survey.blanked.lost;
+    if (options_.may_leave_out_scalars && !lost.empty()) throw DifferingBlanks(lost);
     checkRanges(splats_.survey, origin_->description(), options_.scalars);
     openWriter();
     if (!isFirst()) return;
     report_.warnings = origin_->warnings();
+    warnOfLostValues();
     report_.notes = origin_->notes();
     splats_.overlap = origin_->overlap();
   }
@@ -380,6 +383,16 @@ class Conversion {
     if (writer_ || !isFirst()) return;
     writer_ = std::make_unique<CacheWriter>(workspace_->partial(), root_, variables(), progress_);
     report_.resumed_bricks = ranks_ ? 0 : writer_->bricks().size();
+  }
+
+  void warnOfLostValues() {
+    const auto& lost = splats_.survey.blanked.lost;
+    for (size_t n = 0; n < lost.size(); ++n)
+      if (lost[n].samples > 0)
+        report_.warnings.push_back(fmt::format(
+            "{} of the values of {} are left out, since other scalars of the cache have none there; "
+            "convert it to a cache of its own",
+            lost[n].samples, origin_->description().scalars[options_.scalars[n]].name));
   }
 
   void forgetSplats() {

@@ -114,7 +114,7 @@ GridSurvey surveyOf(const JsonField& from) {
   survey.nodes = from.at("nodes").count();
   survey.grid_checksum = from.at("grid_checksum").count();
   const JsonField blanked = from.at("blanked");
-  survey.blanked = {blanked[0].count(), blanked[1].count(), blanked[2].count()};
+  survey.blanked = {blanked[0].count(), blanked[1].count(), blanked[2].count(), {}};
   survey.lower = from.at("lower").point();
   survey.upper = from.at("upper").point();
   for (const JsonField& range : from.at("ranges").elements())

@@ -1,20 +1,26 @@
 #include "preprocess/convert/convert.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/convert/conversion.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
+#include "preprocess/convert/scan.h"
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/faces/grid_faces_pass.h"
+#include "preprocess/gather/mesh_reader.h"
 #include "preprocess/grid/grid_views.h"
 #include "preprocess/grid/parallel.h"
 #include "stream/base/error.h"
@@ -124,7 +130,77 @@ DiskNeeds sampledNeeds(const GridSource& grid, const ConvertOptions& options,
   return {times(report.temporary_bytes, scale.volume), times(scale.bytesOf(report.files), margin), 0};
 }
 
-ConvertReport convert(const DataSource& source, const ConvertOptions& given_options, Progress& progress) {
+namespace {
+
+/// Of scalars that lose values beside each other, a set that loses the same: the largest, of several the one with the most values.
+std::vector<uint32_t> scalarsThatShareBlanks(const std::vector<uint32_t>& scalars,
+                                             const std::vector<BlankCounts::Lost>& lost) {
+  std::vector<uint32_t> best;
+  uint64_t best_lost = 0;
+  for (const BlankCounts::Lost& of_set : lost) {
+    std::vector<uint32_t> set;
+    for (size_t n = 0; n < scalars.size(); ++n)
+      if (lost[n].set == of_set.set) set.push_back(scalars[n]);
+    if (std::pair(set.size(), of_set.samples) <= std::pair(best.size(), best_lost)) continue;
+    best = std::move(set);
+    best_lost = of_set.samples;
+  }
+  return best;
+}
+
+/// Those that a conversion keeps, found without converting.
+std::vector<uint32_t> keptScalars(const DataSource& source, const ConvertOptions& options,
+                                  Progress& progress) {
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  const MemoryPlan plan =
+      MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  for (std::vector<uint32_t> scalars = options.scalars;;) {
+    progress.begin("scan", samplesOf(source.description()), "samples");
+    const GridSurvey survey =
+        grid ? surveyGrid(NodeReader(*grid, scalars, options.blank_value), plan.slab_bytes, {}, progress)
+             : surveyMesh(MeshReader(dynamic_cast<const MeshSource&>(source), scalars, options.blank_value),
+                          progress)
+                   .grid;
+    if (survey.blanked.lost.empty()) return scalars;
+    scalars = scalarsThatShareBlanks(scalars, survey.blanked.lost);
+  }
+}
+
+ConvertReport convertScalars(const DataSource& source, const ConvertOptions& given_options,
+                             Progress& progress);
+
+}  // namespace
+
+ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress) {
+  if (!options.may_leave_out_scalars || options.scalars.size() < 2)
+    return convertScalars(source, options, progress);
+  ConvertOptions of_some = options;
+  // What an interrupted conversion has left is of the scalars that it kept.
+  if (options.resume) of_some.scalars = keptScalars(source, options, progress);
+  for (;;) try {
+      of_some.may_leave_out_scalars = of_some.scalars.size() > 1;
+      ConvertReport report = convertScalars(source, of_some, progress);
+      std::vector<std::string> names;
+      for (const uint32_t scalar : options.scalars)
+        if (std::find(of_some.scalars.begin(), of_some.scalars.end(), scalar) == of_some.scalars.end())
+          names.push_back(source.description().scalars[scalar].name);
+      if (!names.empty())
+        report.warnings.push_back(
+            fmt::format("left out: {}, which {} no values at some samples where {} does; convert {} to a "
+                        "cache of {} own, with --scalar NAME",
+                        fmt::join(names, ", "), names.size() == 1 ? "has" : "have",
+                        source.description().scalars[of_some.scalars.front()].name,
+                        names.size() == 1 ? "it" : "them", names.size() == 1 ? "its" : "their"));
+      return report;
+    } catch (const DifferingBlanks& differing) {
+      of_some.scalars = scalarsThatShareBlanks(of_some.scalars, differing.lost());
+    }
+}
+
+namespace {
+
+ConvertReport convertScalars(const DataSource& source, const ConvertOptions& given_options,
+                             Progress& progress) {
   ConvertOptions options = given_options;
   if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
@@ -172,8 +248,6 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given_opti
   return report;
 }
 
-namespace {
-
 uint64_t nodesOf(const GridDescription& description) {
   uint64_t nodes = 0;
   for (const GridBlock& block : description.blocks) nodes += block.nodes();
@@ -207,6 +281,7 @@ ConvertOptions optionsOfSample(const ConvertOptions& options, const std::filesys
   of_sample.temporary_folder = folder;
   if (of_sample.given_folders.empty()) of_sample.given_folders = {temporaryFolder(options)};
   of_sample.overwrite = of_sample.resume = false;
+  of_sample.may_leave_out_scalars = false;
   of_sample.planes.clear();  // the sample may not have them
   of_sample.ranks = nullptr;
   return of_sample;

@@ -13,6 +13,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/overset/block_owners.h"
 #include "stream/base/calendar.h"
+#include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/ranks.h"
 #include "stream/codec/values_codec.h"
@@ -26,6 +27,7 @@ struct ConvertOptions {
   bool resume = false;                     // continue an interrupted conversion, if there is one
   bool keep_interrupted = true;            // leave finished work to be resumed; otherwise nothing
   std::vector<uint32_t> scalars;           // positions in the source's description; the cache's variables
+  bool may_leave_out_scalars = false;      // those that have no value where others have one
   std::optional<double> blank_value;       // samples with this value of any scalar are blanked
   uint64_t memory_bytes = 0;               // 0: defaultMemory()
   unsigned threads = 0;                    // 0: as many as the machine has
@@ -53,6 +55,19 @@ struct ConvertOptions {
   std::optional<uint64_t> slab_bytes;
   /// For tests: how often scatter notes what is on disk.
   std::chrono::milliseconds note_interval{10'000};
+};
+
+/// Thrown once the grid has been read where scalars may be left out: a cache has the same samples for all of its scalars, so
+/// that each of them would lose values where another has none.
+class DifferingBlanks final : public Error {
+ public:
+  /// `lost`: BlankCounts'.
+  explicit DifferingBlanks(std::vector<BlankCounts::Lost> lost)
+      : Error("scalars have no values at different samples"), lost_(std::move(lost)) {}
+  const std::vector<BlankCounts::Lost>& lost() const { return lost_; }
+
+ private:
+  std::vector<BlankCounts::Lost> lost_;
 };
 
 /// Where temporary files go.

@@ -17,10 +17,13 @@
 namespace curvisplat {
 namespace {
 
-/// Everything as 64 bits: five whole numbers, six of the box, two a scalar.
+/// Everything as 64 bits: six whole numbers, two a scalar that loses values, six of the box, two a scalar.
 Ranks::Bytes pack(const GridSurvey& survey) {
-  std::vector<uint64_t> words{survey.nodes, survey.blanked.by_grid, survey.blanked.by_value,
-                              survey.blanked.not_finite, survey.grid_checksum};
+  std::vector<uint64_t> words{
+      survey.nodes,         survey.blanked.by_grid,    survey.blanked.by_value, survey.blanked.not_finite,
+      survey.grid_checksum, survey.blanked.lost.size()};
+  for (const BlankCounts::Lost& lost : survey.blanked.lost)
+    words.insert(words.end(), {lost.samples, lost.set});
   const auto put = [&](double number) { words.push_back(std::bit_cast<uint64_t>(number)); };
   for (int axis = 0; axis < 3; ++axis) put(survey.lower[axis]);
   for (int axis = 0; axis < 3; ++axis) put(survey.upper[axis]);
@@ -33,11 +36,13 @@ Ranks::Bytes pack(const GridSurvey& survey) {
 
 GridSurvey unpackSurvey(const Ranks::Bytes& bytes) {
   const auto words = fromBytes<uint64_t>(bytes);
-  size_t at = 5;
+  size_t at = 6;
   const auto get = [&] { return std::bit_cast<double>(words[at++]); };
   GridSurvey survey;
   survey.nodes = words[0];
-  survey.blanked = {words[1], words[2], words[3]};
+  survey.blanked = {words[1], words[2], words[3], {}};
+  for (uint64_t scalar = 0; scalar < words[5]; ++scalar, at += 2)
+    survey.blanked.lost.push_back({words[at], words[at + 1]});
   survey.grid_checksum = words[4];
   for (int axis = 0; axis < 3; ++axis) survey.lower[axis] = get();
   for (int axis = 0; axis < 3; ++axis) survey.upper[axis] = get();

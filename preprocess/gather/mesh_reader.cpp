@@ -74,6 +74,8 @@ void MeshReader::load(const MeshRange& range, LoadedPoints& out) const {
       finite = finite && std::isfinite(values[n]);
     }
     if (!points.hidden[n] && !by_value && finite) continue;
+    if (!points.hidden[n] && points.scalars.size() > 1)
+      out.blanked.addLost(points.scalars, n, range.number + n, blank_value_);
     points.x[n] = std::numeric_limits<double>::quiet_NaN();
     ++(points.hidden[n] ? out.blanked.by_grid : by_value ? out.blanked.by_value : out.blanked.not_finite);
   }
@@ -96,6 +98,8 @@ void MeshReader::load(const MeshRange& range, LoadedCells& out) const {
     }
     const bool by_grid = cells.hidden[n] || cells.shapes[n] == CellKind::kNone;
     if (!by_grid && !by_value && finite) continue;
+    if (!by_grid && cells.scalars.size() > 1)
+      out.blanked.addLost(cells.scalars, n, range.number + n, blank_value_);
     cells.shapes[n] = CellKind::kNone;
     ++(by_grid ? out.blanked.by_grid : by_value ? out.blanked.by_value : out.blanked.not_finite);
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -39,6 +40,14 @@ void markNotFinite(std::span<const Value> values, std::span<uint8_t> mark) {
   for (size_t n = 0; n < values.size(); ++n) mark[n] |= !std::isfinite(values[n]);
 }
 
+/// Marks nodes, from number `first` on, at which no scalar is finite.
+void markWithoutAny(const std::vector<std::vector<float>>& scalars, size_t first, std::span<uint8_t> mark) {
+  for (size_t n = 0; n < mark.size() && !scalars.empty(); ++n)
+    mark[n] = std::none_of(scalars.begin(), scalars.end(), [&](const std::vector<float>& values) {
+      return std::isfinite(values[first + n]);
+    });
+}
+
 /// Blanks the nodes that are marked and not yet blanked. Returns their number.
 uint64_t blankMarked(std::span<const uint8_t> mark, std::span<uint8_t> blank) {
   uint64_t blanked = 0;
@@ -63,11 +72,25 @@ Centring centringOf(const GridDescription& description, const std::vector<uint32
   return first.centring;
 }
 
-void markCells(std::optional<double> blank_value, NodeArrays& out) {
+void markCellsWithoutAny(NodeArrays& out) {
+  for (size_t n = 0; n < out.x.size(); ++n) {
+    const auto all = [&](auto is) {
+      return std::all_of(out.scalars.begin(), out.scalars.end(),
+                         [&](const auto& values) { return is(values[n]); });
+    };
+    if (all([](float value) { return std::isnan(value); }))
+      out.blank[n] |= kNoValue;
+    else if (all([](float value) { return !std::isfinite(value); }))
+      out.blank[n] |= kValueNotFinite;
+  }
+}
+
+void markCells(std::optional<double> blank_value, bool of_any_value, NodeArrays& out) {
   for (size_t n = 0; n < out.x.size(); ++n) {
     const bool finite = std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]);
     out.blank[n] = out.blank[n] != 0 || !finite ? kNoNode : 0;
   }
+  if (of_any_value) return markCellsWithoutAny(out);
   const float wanted = static_cast<float>(blank_value.value_or(0));
   for (const std::vector<float>& scalar : out.scalars)
     for (size_t n = 0; n < scalar.size(); ++n) {
@@ -93,7 +116,34 @@ BlankCounts& BlankCounts::operator+=(const BlankCounts& other) {
   by_grid += other.by_grid;
   by_value += other.by_value;
   not_finite += other.not_finite;
+  if (lost.size() < other.lost.size()) lost.resize(other.lost.size());
+  for (size_t n = 0; n < other.lost.size(); ++n) {
+    lost[n].samples += other.lost[n].samples;
+    lost[n].set += other.lost[n].set;
+  }
   return *this;
+}
+
+uint64_t idOfPosition(double x, double y, double z) {
+  uint64_t id = 0;
+  for (const double number : {x, y, z}) id = (id ^ std::bit_cast<uint64_t>(number)) * 0x9e3779b97f4a7c15;
+  return id ^ id >> 32;
+}
+
+void BlankCounts::addLost(const std::vector<std::vector<float>>& scalars, size_t sample, uint64_t id,
+                          std::optional<double> blank_value) {
+  const auto has = [&](const std::vector<float>& values) {
+    return std::isfinite(values[sample]) &&
+           !(blank_value && values[sample] == static_cast<float>(*blank_value));
+  };
+  if (std::all_of(scalars.begin(), scalars.end(), has) || std::none_of(scalars.begin(), scalars.end(), has))
+    return;
+  lost.resize(scalars.size());
+  for (size_t n = 0; n < scalars.size(); ++n) {
+    if (!has(scalars[n])) continue;
+    ++lost[n].samples;
+    lost[n].set += (id + 1) * 0xd6e8feb86659fd93;
+  }
 }
 
 NodeReader::NodeReader(const GridSource& source, std::vector<uint32_t> scalars,
@@ -107,7 +157,7 @@ BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out
   readBox(*source_, block, box, scalars_, out);
   BlankCounts counts;
   if (centring_ == Centring::kCell) {
-    markCells(blank_value_, out);
+    markCells(blank_value_, of_any_value_, out);
     return counts;
   }
   std::array<uint8_t, kPiece> mark_buffer;
@@ -116,6 +166,12 @@ BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out
     const std::span<uint8_t> blank(&out.blank[first], count);
     const std::span<uint8_t> mark = std::span(mark_buffer).first(count);
     counts.by_grid += std::accumulate(blank.begin(), blank.end(), uint64_t{0});
+    const auto add_lost = [&] {  // of the nodes that are marked and not yet blanked
+      for (size_t n = 0; n < count && out.scalars.size() > 1; ++n)
+        if (mark[n] && !blank[n])
+          counts.addLost(out.scalars, first + n,
+                         idOfPosition(out.x[first + n], out.y[first + n], out.z[first + n]), blank_value_);
+    };
 
     if (blank_value_) {
       const auto wanted = static_cast<float>(*blank_value_);
@@ -123,6 +179,7 @@ BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out
         const std::span<const float> values(&scalar[first], count);
         if (!holds(values, wanted)) continue;
         for (size_t n = 0; n < count; ++n) mark[n] = values[n] == wanted;
+        add_lost();
         counts.by_value += blankMarked(mark, blank);
       }
     }
@@ -136,8 +193,14 @@ BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out
     std::fill(mark.begin(), mark.end(), uint8_t{0});
     for (const auto* axis : {&out.x, &out.y, &out.z})
       markNotFinite(std::span<const double>(&(*axis)[first], count), mark);
-    for (const std::vector<float>& scalar : out.scalars)
-      markNotFinite(std::span<const float>(&scalar[first], count), mark);
+    counts.not_finite += blankMarked(mark, blank);
+    std::fill(mark.begin(), mark.end(), uint8_t{0});
+    if (of_any_value_)
+      markWithoutAny(out.scalars, first, mark);
+    else
+      for (const std::vector<float>& scalar : out.scalars)
+        markNotFinite(std::span<const float>(&scalar[first], count), mark);
+    add_lost();
     counts.not_finite += blankMarked(mark, blank);
   }
   return counts;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -14,12 +15,24 @@ namespace curvisplat {
 /// What samples are that BlankCounts::not_finite counts, for messages: coordinates are read in double precision, values in single.
 std::string notFiniteText(const GridDescription& description);
 
+/// Tells samples apart by their positions.
+uint64_t idOfPosition(double x, double y, double z);
+
 struct BlankCounts {
   uint64_t by_grid = 0;     // iblank 0
   uint64_t by_value = 0;    // --blank
   uint64_t not_finite = 0;  // NaN or infinite coordinate, or scalar in single precision; not counted above
+  /// Samples that have a value of a scalar, and are blanked since another scalar has none.
+  struct Lost {
+    uint64_t samples = 0;
+    uint64_t set = 0;  // a sum over the samples: equal for scalars that lose the same
+  };
+  std::vector<Lost> lost;  // [scalar], or empty
   uint64_t total() const { return by_grid + by_value + not_finite; }
   BlankCounts& operator+=(const BlankCounts& other);
+  /// Adds the scalars that have a value at a sample to `lost`, if some do and some do not. `id`: of the sample in the grid.
+  void addLost(const std::vector<std::vector<float>>& scalars, size_t sample, uint64_t id,
+               std::optional<double> blank_value);
 };
 
 /// The bits of NodeArrays::blank as a NodeReader of cell-centred scalars fills it: why the node is blanked,
@@ -37,9 +50,16 @@ class NodeReader {
   /// `scalars`: indices into source.description().scalars. `source` must outlive the reader. Throws Error if
   /// node-centred and cell-centred scalars are mixed.
   NodeReader(const GridSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value);
+  /// Blanks a sample only where none of the scalars has a value; where some have, the others are not finite.
+  static NodeReader ofAnyValue(const GridSource& source, std::vector<uint32_t> scalars) {
+    NodeReader reader(source, std::move(scalars), std::nullopt);
+    reader.of_any_value_ = true;
+    return reader;
+  }
 
   const GridSource& source() const { return *source_; }
   size_t scalars() const { return scalars_.size(); }
+  std::optional<double> blankValue() const { return blank_value_; }
   /// The centring of all its scalars; kNode if there are none.
   Centring centring() const { return centring_; }
 
@@ -52,6 +72,7 @@ class NodeReader {
   const GridSource* source_;
   std::vector<uint32_t> scalars_;
   std::optional<double> blank_value_;
+  bool of_any_value_ = false;
   Centring centring_;
 };
 

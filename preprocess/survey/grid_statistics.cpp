@@ -16,13 +16,20 @@ namespace {
 // Smaller volumes between the unit vectors of the edges at a corner are rounding errors.
 constexpr double kNoVolume = 1e-12;
 
+/// Returns the number of values that are not finite, of nodes that are not blanked.
 template <typename Value>
-void widen(ScalarRange& range, const std::vector<Value>& values, const std::vector<uint8_t>& blank) {
+uint64_t widen(ScalarRange& range, const std::vector<Value>& values, const std::vector<uint8_t>& blank) {
+  uint64_t not_finite = 0;
   for (size_t n = 0; n < values.size(); ++n) {
     if (blank[n]) continue;
+    if (!std::isfinite(values[n])) {
+      ++not_finite;
+      continue;
+    }
     range.min = std::min<double>(range.min, values[n]);
     range.max = std::max<double>(range.max, values[n]);
   }
+  return not_finite;
 }
 
 /// Counts of the cells of some rows. A cell with both right- and left-handed corners counts in both.
@@ -121,6 +128,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
   GridStatistics statistics;
   statistics.blocks.resize(description.blocks.size());
   statistics.scalars.resize(scalars.size());
+  statistics.missing.resize(scalars.size());
 
   std::vector<uint32_t> at_nodes, in_cells;
   std::vector<size_t> of_nodes, of_cells;  // their indices in `scalars`
@@ -130,7 +138,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
     (cell ? of_cells : of_nodes).push_back(n);
   }
 
-  const NodeReader values(source, at_nodes, std::nullopt);
+  const NodeReader values = NodeReader::ofAnyValue(source, at_nodes);
   SlabStream slabs(values, slab_bytes, kNoHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     const NodeArrays& nodes = loaded->nodes;
@@ -138,7 +146,8 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
     const std::vector<double>* const axes[] = {&nodes.x, &nodes.y, &nodes.z};
     for (size_t axis = 0; axis < 3; ++axis) widen(statistics.bounds[axis], *axes[axis], nodes.blank);
     for (size_t n = 0; n < at_nodes.size(); ++n)
-      widen(statistics.scalars[of_nodes[n]], nodes.scalars[n], nodes.blank);
+      statistics.missing[of_nodes[n]] +=
+          widen(statistics.scalars[of_nodes[n]], nodes.scalars[n], nodes.blank);
     progress.advance(nodes.x.size());
   }
 
@@ -159,8 +168,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
   }
 
   if (!in_cells.empty()) {
-    const GridSurvey survey =
-        surveyCells(NodeReader(source, in_cells, std::nullopt), slab_bytes, {}, progress);
+    const GridSurvey survey = surveyCells(NodeReader::ofAnyValue(source, in_cells), slab_bytes, {}, progress);
     statistics.cell_values_not_finite = survey.blanked.not_finite;
     for (size_t n = 0; n < in_cells.size(); ++n) statistics.scalars[of_cells[n]] = survey.ranges[n];
   }

@@ -26,6 +26,7 @@ struct GridStatistics {
   std::vector<BlockStatistics> blocks;
   std::array<ScalarRange, 3> bounds;    // of the nodes that are not blanked, along x, y, z
   std::vector<ScalarRange> scalars;     // [requested scalar]; of the samples that are not blanked
+  std::vector<uint64_t> missing;        // [requested scalar]: nodes without a value, where another has one
   uint64_t cell_values_not_finite = 0;  // cells with an infinite value of a cell-centred scalar
 
   BlankCounts blank() const;
@@ -34,8 +35,8 @@ struct GridStatistics {
   uint64_t inverted() const;
 };
 
-/// Measures the given scalars of the source, node-centred and cell-centred. A node is blanked if it is for
-/// any of the node-centred scalars. Memory: two slabs. Throws Error if the grid cannot be read.
+/// Measures the given scalars of the source, node-centred and cell-centred, each by itself. A sample is blanked if none of
+/// the scalars with its centring has a value. Memory: two slabs. Throws Error if the grid cannot be read.
 GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>& scalars,
                            uint64_t slab_bytes, Progress& progress);
 

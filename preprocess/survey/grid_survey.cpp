@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <span>
@@ -124,10 +125,16 @@ namespace {
 constexpr size_t kNodesPerTask = 16384;
 
 /// Adds a cell to the survey. Returns whether the cell is drawn.
-bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
+bool addCell(const NodeArrays& nodes, size_t at, const WindowStrides& strides,
+             std::optional<double> blank_value, GridSurvey& survey) {
+  const size_t row_stride = strides.row, plane_stride = strides.plane;
   ++survey.nodes;
   const uint8_t own = nodes.blank[at];
-  if ((cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) || (own & kNoValue)) {
+  const bool corners = (cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) == 0;
+  if (own != 0 && corners && nodes.scalars.size() > 1)
+    survey.blanked.addLost(nodes.scalars, at, idOfPosition(nodes.x[at], nodes.y[at], nodes.z[at]),
+                           blank_value);
+  if (!corners || (own & kNoValue)) {
     ++survey.blanked.by_grid;
     return false;
   }
@@ -146,6 +153,7 @@ bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane
   }
   for (size_t scalar = 0; scalar < survey.ranges.size(); ++scalar) {
     const double value = nodes.scalars[scalar][at];
+    if (!std::isfinite(value)) continue;
     survey.ranges[scalar].min = std::min(survey.ranges[scalar].min, value);
     survey.ranges[scalar].max = std::max(survey.ranges[scalar].max, value);
   }
@@ -183,7 +191,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, const Surv
       const bool row_at_end = j == 0 || j + 2 == block.nj || k == 0 || k + 2 == block.nk;
       size_t at = strides.at(slab.box.i0, j, k);
       for (uint64_t i = slab.box.i0; i < slab.box.i1 && i + 1 < block.ni; ++i, ++at) {
-        const bool is_there = addCell(nodes, at, strides.row, strides.plane, to);
+        const bool is_there = addCell(nodes, at, strides, reader.blankValue(), to);
         const bool at_end = row_at_end || i == 0 || i + 2 == block.ni;
         if (faces && is_there && at_end) add_ends({i, j, k}, at, ends);
       }

@@ -96,6 +96,38 @@ class CgnsMeshes(MeshFormats):
                 self.assertTrue(any("Walls" in note for note in info["notes"]), info["notes"])
                 self.expect_same([self.path], mesh.vtk())
 
+    def test_numbers_of_elements_of_every_version(self):
+        """CGNS 3.0 counted PYRA_13 between PYRA_5 and PYRA_14: HEXA_8 was 18, MIXED 21. Polygons of MIXED were 21 or 22 and their nodes."""
+        import h5py
+        mesh = Mesh()
+        for version in (2.4, 2.54, 3.0, 3.0999, 3.11, 3.21, 4.2):
+            def stored(kind):
+                return kind if kind <= cg.PYRA_5 or not 3 <= version < 3.09 else kind + 1
+            for mixed in (False, True):
+                with self.subTest(version=version, mixed=mixed):
+                    if mixed:
+                        words, begins = self.mixed(mesh)
+                        with cg.CgnsFile(self.path) as file:
+                            file.base()
+                            file.zone("Cube", mesh.points, len(mesh.cells))
+                            file.section("all", cg.MIXED, words, len(mesh.cells), begins)
+                            self.finish(file, mesh)
+                        self.old_layout("all")
+                    else:
+                        self.write_sections(mesh)
+                    with h5py.File(self.path, "r+") as file:
+                        file["CGNSLibraryVersion/ data"][:] = np.float32(version)
+                        for name, group in file["Base/Cube"].items():
+                            if isinstance(group, h5py.Group) and "ElementRange" in group:
+                                group[" data"][0] = stored(group[" data"][0])
+                        if mixed:
+                            at = begins[:-1]
+                            words = np.array(words)
+                            words[at] = [stored(kind) for kind in words[at]]
+                            data = file["Base/Cube/all/ElementConnectivity/ data"]
+                            data[:] = words.astype(data.dtype)
+                    self.expect_same([self.path], mesh.vtk())
+
     def test_mixed_sections(self):
         mesh = Mesh()
         words, begins = self.mixed(mesh)

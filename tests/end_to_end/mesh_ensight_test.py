@@ -237,6 +237,18 @@ class EnsightCases(MeshFormats):
                         expected = self.cache([self.folder / "expected.vts"], name)
                         self.assertEqual(found, expected, name)
 
+    def test_names_with_blanks(self):
+        """In quotation marks: of files (ANSYS) and of variables. Keys and sections in capitals, tabs, a comment behind a line."""
+        mesh = self.rounded(Mesh())
+        self.write(mesh)
+        (self.folder / "mesh.geo").rename(self.folder / "the mesh.geo")
+        (self.folder / "p.003").rename(self.folder / "my p.003")
+        for name, shown in (('"static pressure"', "static pressure"), ("p", "p")):
+            self.path.write_text('FORMAT\ntype:\tensight gold\nGEOMETRY\nmodel:\t1\t"the mesh.geo"   change_coords_only\nVARIABLE\n'
+                                 f'scalar per node:\t1\t{name}\t"my p.003" # a comment\n' + self.STEPS)
+            self.assertEqual([s["name"] for s in self.info(self.path)["scalars"]], [shown])
+            self.convert([self.path], shown)
+
     def test_several_parts(self):
         """Two parts of the cube are the cube: nodes that they share coincide."""
         mesh = self.rounded(Mesh(kinds=(8,)))

@@ -7,6 +7,8 @@ with the arrays, and the volume that `curvisplat convert` writes with VTK's own.
 """
 import gzip
 import json
+import pathlib
+import re
 import struct
 import subprocess
 import sys
@@ -19,13 +21,17 @@ try:
 
     from sweep import some_of
     from mesh_case import PROGRAM, MeshCase
-    from mesh_cubes import cube, hexahedra, insert, lattice, with_scalars, write_legacy, write_xml
+    from mesh_cubes import RANDOM, cube, hexahedra, insert, lattice, with_scalars, write_legacy, write_xml
 except ModuleNotFoundError as error:
     print(f"skipped: {error}; install python3-vtk9 and python3-numpy")
     sys.exit(77)
 
 
 class MeshFiles(MeshCase):
+    def setUp(self):
+        super().setUp()
+        RANDOM.bit_generator.state = np.random.default_rng(1).bit_generator.state  # the same cube in every order of tests
+
     def test_every_encoding_of_xml(self):
         grid = cube(3)
         path = self.folder / "mesh.vtu"
@@ -35,6 +41,162 @@ class MeshFiles(MeshCase):
                     with self.subTest(mode=mode, raw=raw, compressor=compressor, order=order):
                         write_xml(grid, path, mode, compressor, raw=raw, order=order, header=header)
                         self.check(path, grid)
+
+    def test_base64_of_one_value(self):
+        """VTK's own writer: the types of one cell are 4 bytes of header and one of data, "AQAAAAw="."""
+        points = vtk.vtkPoints()
+        grid = vtk.vtkUnstructuredGrid()
+        for k in range(2):
+            for corner in lattice(1):
+                points.InsertNextPoint(corner + [2 * k, 0, 0])
+            grid.SetPoints(points)
+            insert(grid, vtk.VTK_HEXAHEDRON, hexahedra(1)[0] + 8 * k)
+            with_scalars(grid)
+            for header in ("UInt32", "UInt64"):
+                for compressor in ("None", "ZLib"):
+                    write_xml(grid, self.folder / "one.vtu", "Binary", compressor, header=header)
+                    self.check(self.folder / "one.vtu", grid)
+
+    def test_base64_in_lines(self):
+        grid = cube(3)
+        path = self.folder / "mesh.vtu"
+
+        def lines(text, length, end):
+            return end.join(text[n:n + length] for n in range(0, len(text), length))
+
+        for header in ("UInt32", "UInt64"):
+            for compressor in ("None", "ZLib"):
+                write_xml(grid, path, "Binary", compressor, header=header)
+                text = path.read_text()
+                for length, end in ((76, "\n"), (64, "\r\n"), (76, "\n      "), (1000, "\n")):
+                    # MIME's lines run through; others break the line behind the header, too.
+                    for apart in (False, True):
+                        def broken(found):
+                            head = found[2].index("=") if apart and "=" in found[2][:-4] else -4
+                            head = (head + 4) // 4 * 4
+                            parts = (found[2][:head], found[2][head:]) if head else (found[2],)
+                            return found[1] + "\n" + end.join(lines(part, length, end) for part in parts) + "\n<"
+                        path.write_bytes(re.sub('(format="binary"[^>]*>)\\s*([A-Za-z0-9+/=]+)\\s*<', broken, text).encode())
+                        with self.subTest(header=header, compressor=compressor, length=length, end=end, apart=apart):
+                            self.check(path, grid)
+        path.write_text(re.sub('([A-Za-z0-9+/]{30})([A-Za-z0-9+/]{25})', "\\1\n\\2\n", text))
+        self.assertIn("write it without line breaks", self.run_program("info", path).stderr)
+
+    def test_attributes_that_fortran_padded(self):
+        grid = cube(3)
+        path = self.folder / "mesh.vtu"
+        for mode in ("Ascii", "Appended"):
+            write_xml(grid, path, mode)
+            head, tail = re.split(b"(?=<AppendedData)|$", path.read_bytes(), maxsplit=1)
+            path.write_bytes(re.sub(rb'="([^"]*)"', rb'="  \1   "', head) + tail)
+            self.check(path, grid)
+
+    def test_equal_times_of_a_collection(self):
+        """Versions of one part (a steady run, or one that was restarted and appended to the file), and parts that do not say so."""
+        def collection(*entries):
+            (self.folder / "a.pvd").write_text('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n' + "".join(
+                f'<DataSet timestep="{time}" group="" part="{part}" file="u{n}.vtu"/>\n' for time, part, n in entries)
+                + "</Collection>\n</VTKFile>\n")
+            return self.info(self.folder / "a.pvd")
+
+        for n in range(6):
+            grid = cube(2, kinds=("hexahedron",))
+            grid.GetPoints().SetData(numpy_to_vtk(np.stack(np.meshgrid(*[np.arange(3.0)] * 3), -1).reshape(-1, 3) + [2 * (n > 3), 0, 0], deep=True))
+            grid.GetPointData().GetArray("p").Fill(n)
+            write_xml(grid, self.folder / f"u{n}.vtu")
+        for entries, cells, value, times in (
+                ([(0, 0, 0), (0, 0, 1), (0, 0, 2)], 8, 2, 1),            # three versions
+                ([(0, 0, 0), (1, 0, 1), (0, 0, 2), (2, 0, 3)], 8, 2, 3),  # a restart
+                ([(0, 0, 0), (1, 0, 1), (0, 0, 4)], 8, 4, 2),             # a restart with another mesh
+                ([(0, 0, 3), (0, 0, 4)], 16, 4, 1),                       # parts that all call themselves 0
+                ([(0, 0, 3), (1, 0, 2), (0, 1, 4), (1, 1, 5)], 16, 4, 2)):  # part after part
+            with self.subTest(entries=entries):
+                info = collection(*entries)
+                self.assertEqual(info["cells"]["count"], cells)
+                self.assertEqual({s["name"]: s["max"] for s in info["scalars"]}["p"], value)
+                self.assertEqual(len(info.get("times", [])) or 1, times)
+                self.assertEqual(any("the last one is read" in w for w in info["warnings"]), cells == 8)
+
+    def test_a_mesh_that_changes(self):
+        """Each step has its own mesh; steps of the same mesh share it."""
+        for step, n in enumerate((2, 2, 3, 4)):
+            RANDOM.bit_generator.state = np.random.default_rng(n).bit_generator.state
+            grid = cube(n)
+            grid.GetPointData().GetArray("p").Fill(step)
+            write_xml(grid, self.folder / f"step_{step}.vtu")
+        cache = self.convert([self.folder / f"step_{n}.vtu" for n in range(4)], "p")
+        volumes = [self.manifest(folder)["volume"] for folder in (cache, cache / "geometry.1", cache / "geometry.2")]
+        np.testing.assert_allclose(volumes, [1, 1, 1], atol=5e-3)
+        self.assertFalse((cache / "geometry.3").exists())
+        result = self.run_program("info", cache, "--verify")
+        self.assertIn("at all 4 time steps", result.stdout, result.stderr)
+        for step in range(4):
+            self.assertEqual(self.run_program("render", cache, "-o", self.folder / "a.png", "--step", step, "--size", "64x64", "--range", "0,4").returncode, 0)
+
+    def test_scalars_that_lack_values_at_different_samples(self):
+        """Each has its own range in `info`; without --scalar those that have none where others do get no part in the cache."""
+        def ranges(info):
+            return {s["name"]: (s["min"], s["max"]) for s in info["scalars"]}
+
+        for where in ("points", "cells", "nodes", "mesh cells"):
+            count, side = ((128, 8) if "cells" in where else (225, 9))
+            values = {"c": np.arange(count) % side, "d": np.arange(count) % side * 2.0}
+            for name, part in (("a", lambda v: v > 4), ("b", lambda v: v < 2)):
+                values[name] = np.where(part(values["c"]), np.nan, values["c"])
+            image = vtk.vtkImageData()
+            image.SetDimensions(9, 5, 5)
+            for name in ("a", "c", "b", "d"):
+                array = numpy_to_vtk(values[name].astype("f8"), deep=True)
+                array.SetName(name)
+                (image.GetCellData() if "cells" in where else image.GetPointData()).AddArray(array)
+            path = self.folder / "a.vti"
+            writer = vtk.vtkXMLImageDataWriter()
+            if where in ("nodes", "mesh cells"):
+                shift = vtk.vtkAppendFilter()
+                shift.AddInputData(image)
+                shift.Update()
+                image, path, writer = shift.GetOutput(), self.folder / "a.vtu", vtk.vtkXMLUnstructuredGridWriter()
+            writer.SetFileName(str(path))
+            writer.SetInputData(image)
+            writer.Write()
+            with self.subTest(where=where):
+                top = side - 1
+                self.assertEqual(ranges(self.info(path)), {"a": (0, 4), "b": (2, top), "c": (0, top), "d": (0, 2 * top)})
+                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite")
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertIn("left out: a, b, which have no values at some samples where c does", result.stderr)
+                manifest = self.manifest(self.folder / "n.splats")
+                self.assertEqual([v["name"] for v in manifest["variables"]], ["c", "d"])
+                self.assertAlmostEqual(manifest["volume"], 128, delta=0.3)
+                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite", "--resume")
+                self.assertEqual([v["name"] for v in self.manifest(self.folder / "n.splats")["variables"]], ["c", "d"], result.stderr)
+                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite", "--scalar", "c,a")
+                self.assertIn("of the values of c are left out, since other scalars of the cache have none there", result.stderr)
+                self.assertEqual(self.manifest(self.folder / "n.splats")["variables"][0]["max"], 4)
+
+    def test_ranges_are_of_what_is_drawn(self):
+        """Faces that mesh generators write beside the cells have values, too."""
+        grid = cube(2)
+        for n in range(grid.GetNumberOfCells()):
+            if grid.GetCell(n).GetCellDimension() < 3:
+                grid.GetCellData().GetArray("c").SetValue(n, 1000)
+        write_xml(grid, self.folder / "mesh.vtu")
+        self.assertLess({s["name"]: s["max"] for s in self.info(self.folder / "mesh.vtu")["scalars"]}["c"], 1000)
+
+    def test_names_of_steps_with_decimals(self):
+        grid = cube(1, kinds=("hexahedron",))
+        for names, order in ((("0.001", "0.01", "0.0005", "0.0015"), "0.0005 0.001 0.0015 0.01"), (("0", "0.5", "2", "10", "1e-05"), "0 1e-05 0.5 2 10"),
+                             (("0.75", "0.8", "1.25"), "0.75 0.8 1.25"), (("1.9", "1.10", "1.1"), "1.1 1.9 1.10"), (("9", "10", "0100"), "9 10 0100")):
+            folder = self.folder / names[0]
+            folder.mkdir()
+            for name in names:
+                write_xml(grid, folder / f"Result-{name}.vtu")
+            for command in (("convert", "--scalar", "p", "-o", self.folder / "s.splats", "--overwrite"), ("info", "--json")):
+                result = self.run_program(command[0], folder / "Result-*.vtu", *command[1:])
+                self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(f"{len(names)} steps, {folder}/Result-{order.split()[0]}.vtu .. {folder}/Result-{order.split()[-1]}.vtu;", json.loads(result.stdout)["series"])
+            found = [pathlib.Path(source).stem[7:] for source in self.manifest(self.folder / "s.splats")["sources"]]
+            self.assertEqual(" ".join(found), order)
 
     def test_legacy_files(self):
         grid = cube(3)

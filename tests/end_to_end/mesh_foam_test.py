@@ -25,13 +25,14 @@ except ModuleNotFoundError as error:
 class FoamCase:
     """A case of hexahedra, as OpenFOAM writes it."""
 
-    def __init__(self, folder, binary=False, packed=False, label_bytes=4):
-        self.folder, self.binary, self.packed, self.label_bytes = folder, binary, packed, label_bytes
+    def __init__(self, folder, binary=False, packed=False, label_bytes=4, scalar_bytes=8, arch=True):
+        self.folder, self.binary, self.packed, self.arch = folder, binary, packed, arch
+        self.label_bytes, self.scalar_bytes = label_bytes, scalar_bytes
 
     def write(self, path, kind, *parts):
-        arch = f'arch "LSB;label={8 * self.label_bytes};scalar=64";'
+        arch = f'arch "LSB;label={8 * self.label_bytes};scalar={8 * self.scalar_bytes}";'
         head = (f"/*--- a comment ---*/\nFoamFile\n{{\n    version 2.0;\n    format {'binary' if self.binary else 'ascii'};\n"
-                f"    {arch if self.binary else ''}\n    class {kind};\n    object {path.name};\n}}\n// * * //\n\n")
+                f"    {arch if self.binary and self.arch else ''}\n    class {kind};\n    object {path.name};\n}}\n// * * //\n\n")
         data = head.encode() + b"".join(part if isinstance(part, bytes) else part.encode() for part in parts) + b"\n"
         path.parent.mkdir(parents=True, exist_ok=True)
         if self.packed:
@@ -42,13 +43,22 @@ class FoamCase:
     def labels(self, values):
         values = np.asarray(values)
         if self.binary:
-            return f"{len(values)}(".encode() + values.astype(f"<i{self.label_bytes}").tobytes() + b")"
+            return f"\n{len(values)}\n".encode() + self.raw(values.astype(f"<i{self.label_bytes}"))
+        if len(values) > 1 and (values == values[0]).all():
+            return f"{len(values)}{{{values[0]}}}"
         return f"{len(values)}\n(\n" + "\n".join(map(str, values)) + "\n)\n"
+
+    def raw(self, values):
+        """As UList::writeList: of an empty list nothing follows the count."""
+        return b"(" + values.tobytes() + b")" if len(values) else b""
 
     def numbers(self, values):
         if self.binary:
-            return f"{len(values)}(".encode() + np.ascontiguousarray(values, "<f8").tobytes() + b")"
+            return f"\n{len(values)}\n".encode() + self.raw(np.ascontiguousarray(values, f"<f{self.scalar_bytes}"))
+        values = np.asarray(values)
         row = lambda v: repr(float(v)) if np.ndim(v) == 0 else "(" + " ".join(repr(float(x)) for x in v) + ")"
+        if len(values) > 1 and (values == values[0]).all():
+            return f"{len(values)}{{{row(values[0])}}}"
         return f"{len(values)}\n(\n" + "\n".join(map(row, values)) + "\n)\n"
 
     def write_mesh(self, where, points, cells):
@@ -85,7 +95,8 @@ class FoamCase:
     def write_field(self, time, name, values):
         kind, of = (("volScalarField", "scalar") if np.ndim(values) < 2 else ("volVectorField", "vector"))
         what = f"uniform {values};" if np.ndim(values) == 0 else None
-        parts = ([what] if what else [f"nonuniform List<{of}>\n", self.numbers(values), ";"])
+        of = f"List<{of}> " if len(np.atleast_1d(values)) else ""
+        parts = ([what] if what else [f"nonuniform {of}", self.numbers(values), ";"])
         self.write(time / name, kind, "dimensions [0 2 -2 0 0 0 0];\n\ninternalField   ", *parts,
                    "\n\nboundaryField\n{\n    walls { type zeroGradient; }\n}\n")
 
@@ -112,7 +123,7 @@ class MeshFoam(MeshCase):
 
     def test_openfoam_cases(self):
         for how in ({}, {"binary": True}, {"binary": True, "label_bytes": 8}, {"packed": True},
-                    {"binary": True, "packed": True}):
+                    {"binary": True, "packed": True}, {"binary": True, "label_bytes": 8, "scalar_bytes": 4, "arch": False}):
             with self.subTest(**how):
                 case, p, u = self.foam_case(**how)
                 for path in (case, case / "case.foam"):
@@ -158,6 +169,71 @@ class MeshFoam(MeshCase):
         info = self.info(case)
         self.assertEqual([piece["name"] for piece in info["pieces"]], ["processor0", "processor1", "processor2"])
         self.assertAlmostEqual(self.volume(case, "p"), expected, delta=1e-6)
+
+    def test_collated_files_hold_all_processors(self):
+        """As decomposedBlockData::writeBlockEntry; the first part has the header of the file that it stands for."""
+        for binary in (False, True):
+            for name in ("processors3", "processors"):
+                RANDOM.bit_generator.state = np.random.default_rng(3).bit_generator.state
+                case, p, _ = self.foam_case(parts=3, binary=binary)
+                expected = self.volume(case, "p")
+                for path in sorted((case / "processor0").rglob("*")):
+                    if not path.is_file() or path.name == "boundary":
+                        continue
+                    inside = path.relative_to(case / "processor0")
+                    parts = [(case / f"processor{n}" / inside).read_bytes() for n in range(3)]
+                    parts[1:] = [part[part.index(b"// * * //") + 9:] for part in parts[1:]]
+                    (case / name / inside).parent.mkdir(parents=True, exist_ok=True)
+                    (case / name / inside).write_bytes(
+                        b"FoamFile\n{\n    version     2.0;\n    format      binary;\n    class       decomposedBlockData;\n"
+                        b'    arch        "LSB;label=32;scalar=64";\n    note        "no meaning";\n    object      x;\n}\n// * //\n'
+                        + b"".join(b"\n// Processor%d\n\n%d\n(" % (n, len(part)) + part + b")\n" for n, part in enumerate(parts)))
+                for n in range(3):
+                    shutil.rmtree(case / f"processor{n}")
+                info = self.info(case)
+                self.assertEqual(len(info["pieces"]), 3)
+                self.assertEqual(info["times"], [0, 0.5])
+                self.assertAlmostEqual({s["name"]: s for s in info["scalars"]}["p"]["max"], p.max(), places=5)
+                self.assertAlmostEqual(self.volume(case, "p"), expected, delta=1e-6)
+                faces = case / name / "constant" / "polyMesh" / "faces"
+                faces.write_bytes(faces.read_bytes()[:-500])
+                self.assertIn("is truncated", self.run_program("info", case).stderr)
+
+    def test_a_case_with_a_mesh_of_its_own_and_processors(self):
+        case, p, _ = self.foam_case()
+        shutil.copytree(case, self.folder / "processor0")
+        shutil.move(self.folder / "processor0", case)
+        self.assertEqual(len(self.info(case)["pieces"]), 1)
+        FoamCase(case).write_field(case / "processor0" / "200", "p", p + 200)
+        info = self.info(case)
+        self.assertEqual(info["times"], [0, 0.5, 200])
+        self.assertIn("those in its own folder end at 0.5", "".join(info["notes"]))
+        shutil.rmtree(case / "0.5")
+        FoamCase(case).write_field(case / "200", "p", p + 200)
+        info = self.info(case)
+        self.assertEqual(info["times"], [0, 200])
+        self.assertIn("its processors have 3", "".join(info["notes"]))
+
+    def test_values_that_other_entries_define(self):
+        """As the tutorials' 0/p: `#include "include/initialConditions"`, `internalField uniform $pressure;`."""
+        case, _, _ = self.foam_case()
+        (case / "0" / "include").mkdir()
+        (case / "0" / "include" / "initialConditions").write_text(
+            "/* */\nflowVelocity         (20 0 0);\npressure             3;\n#inputMode           merge\n\n// ** //\n")
+        head = "dimensions [0 2 -2 0 0 0 0];\n"
+        writer = FoamCase(case)
+        writer.write(case / "0" / "p", "volScalarField", '#include        "include/initialConditions"\n', head, "internalField   uniform $pressure;\n")
+        writer.write(case / "0" / "U", "volVectorField", '#include "include/initialConditions"\n', head, "all uniform ${flowVelocity};\ninternalField   $all;\n")
+        writer.write(case / "0" / "V", "volScalarField::Internal", head, "value nonuniform List<scalar> 64{0.5};\n")
+        for name, value in (("a", "uniform $unknown"), ("b", "#codeStream { code #{ 1 #}; }"), ("loop", "uniform $loop"), ("d", "uniform #calc \"1\"")):
+            writer.write(case / "0" / name, "volScalarField", head, f"loop $loop;\ninternalField {value};\n")
+        info = self.info(case)
+        scalars = {scalar["name"]: scalar for scalar in info["scalars"]}
+        self.assertEqual(sorted(scalars), ["T", "U:mag", "U:x", "U:y", "U:z", "V", "p"])
+        self.assertEqual([scalars[name]["max"] for name in ("p", "U:x", "U:y", "V")], [3, 20, 0, 0.5])
+        for name in ("a", "b", "loop", "d"):
+            self.assertIn(f"{name} is left out", "".join(info["warnings"]))
+        self.assertIn("foamDictionary -expand", "".join(info["warnings"]))
 
     def test_damaged_openfoam_cases_get_one_line(self):
         def expect_line(case, name):

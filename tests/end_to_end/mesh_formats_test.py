@@ -137,6 +137,35 @@ class Columns(MeshFormats):
         self.assertEqual(info["scalars"][0]["max"], self.LAYERS * len(self.nodes) - 1)
         self.assertGreater(self.volume([self.path], "t"), 0)
 
+    def test_ugrid_with_heights_at_its_nodes(self):
+        """SCHISM: zCoordinates(time, node, layer); NCAR's mesh_depth(layer, node) grows downwards."""
+        bottom = 20 + 30 * RANDOM.random(4)
+        heights = -bottom[:, None] * np.array([1.0, 0.6, 0.3, 0])  # [node, level]
+        for name, order, values in (("zCoordinates", "time node layer", heights[None]), ("mesh_depth", "layer node", -heights.T)):
+            with netCDF4.Dataset(self.path, "w") as f:
+                for dim, size in (("node", 4), ("face", 1), ("corner", 4), ("layer", 4), ("time", 1)):
+                    f.createDimension(dim, size)
+                mesh = f.createVariable("mesh", "i4")
+                mesh.setncatts({"cf_role": "mesh_topology", "topology_dimension": np.int32(2), "node_coordinates": "x y", "face_node_connectivity": "corners",
+                                "face_coordinates": "fx fy"})
+                def add(called, dims, what, kind="f8", **attributes):
+                    v = f.createVariable(called, kind, tuple(dims.split()))
+                    v.setncatts(attributes)
+                    v[:] = what
+                add("x", "node", [0, 1000, 1000, 0], units="m", standard_name="projection_x_coordinate")
+                add("y", "node", [0, 0, 1000, 1000], units="m", standard_name="projection_y_coordinate")
+                add("corners", "face corner", [[1, 2, 3, 4]], "i4", start_index=np.int32(1))
+                add("fx_bnd", "face corner", [[0, 1000, 1000, 0]], units="m", mesh="mesh", location="face")
+                add("fx", "face", [500], units="m", bounds="fx_bnd", mesh="mesh", location="face")
+                add(name, order, values, units="m", mesh="mesh", location="node")
+                add("S", order, np.broadcast_to(np.arange(4.0), heights.shape)[None] if order.startswith("time") else np.arange(4.0)[:, None] + np.zeros((4, 4)), "f4",
+                    mesh="mesh", location="node")
+            info = self.info(self.path)
+            self.assertEqual([s["name"] for s in info["scalars"]], ["S"])
+            np.testing.assert_allclose(info["bounds"]["lower"], [0, 0, heights.min() / 1000], atol=1e-9)
+            np.testing.assert_allclose(info["bounds"]["upper"], [1, 1, 0], atol=1e-9)
+            self.assertAlmostEqual(self.volume([self.path], "S"), bottom.mean() / 1000, delta=1e-4)
+
     def test_ugrid_beside_a_structured_grid(self):
         self.write_ugrid()
         values = RANDOM.random((3, 4, 5)).astype("f4")

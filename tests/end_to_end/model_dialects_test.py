@@ -6,7 +6,7 @@ NetCDF files as particular models and archives write them: CESM's POP, COSMO, ME
 """
 import unittest
 
-from model_files import RANDOM, ModelFileTest, np, sphere
+from model_files import RADIUS, RANDOM, ModelFileTest, np, sphere, standard_altitude
 
 
 class ModelDialects(ModelFileTest):
@@ -78,6 +78,238 @@ class ModelDialects(ModelFileTest):
         line = self.info(fails=True)
         self.assertIn("t: 4 dimensions besides time (expver, level, lat, lon); expected 3", line)
         self.assertEqual(line.count("\n"), 1)
+
+
+class Levels(ModelFileTest):
+    """Vertical coordinates as programs write them, on T(lev, lat, lon)."""
+
+    T = RANDOM.random((4, 8, 12)).astype("f4")
+    LON, LAT = np.linspace(0, 33, 12), np.linspace(10, 31, 8)[:, None]
+
+    def levels(self, name, values, more=None, **attributes):
+        with self.file(lon=12, lat=8, time=None, **{name: 4}) as f:
+            self.air(f)
+            if values is not None:
+                f.add(name, name, values, **attributes)
+            f.add("T", f"{name} lat lon", self.T, "f4")
+            if more:
+                more(f)
+
+    def expect_heights(self, kilometres, near=1e-3):
+        info = self.info()
+        self.expect(info, sphere(self.LON, self.LAT, np.broadcast_to(np.asarray(kilometres).reshape(-1, *np.shape(kilometres)[1:] or (1, 1)), (4, 8, 12))),
+                    self.T, near=near)
+        return info
+
+    def test_pressures_of_sea_water(self):
+        """Saunders' formula, at 45 degrees."""
+        p = np.array([5.0, 100, 1000, 4000])
+        for unit, values, attributes in (("dbar", p, {}), ("decibar", p, {}), ("Pa", 1e4 * p, {"standard_name": "sea_water_pressure"})):
+            self.levels("lev", values, units=unit, positive="down", axis="Z", **attributes)
+            self.expect_heights(-1e-3 * ((1 - (5.92 + 2.625) * 1e-3) * p - 2.21e-6 * p**2))
+
+    def test_distances_from_the_centre_of_the_earth(self):
+        self.levels("radius", [5.7e6, 5.9e6, 6.1e6, 6.3e6], units="meters")
+        self.expect_heights(np.array([5700, 5900, 6100, 6300]) - RADIUS)
+
+    def test_lengths_that_nothing_calls_heights(self):
+        for unit in ("m", "meters MSL", "m above sea level"):
+            self.levels("lv_GPML8", [10.0, 500, 2000, 9000], units=unit)
+            self.expect_heights([0.01, 0.5, 2, 9])
+
+    def test_sigma_is_no_length(self):
+        for name, unit, values in (("sigma", None, [0.02, 0.3, 0.7, 0.997]), ("eta", "1", [1, 0.7, 0.3, 0.1]), ("z", None, [-0.9, -0.6, -0.3, 0])):
+            self.levels(name, values, axis="Z", **({"units": unit} if unit else {}))
+            self.assertIn("are no lengths, but those of a sigma or hybrid coordinate", self.info(fails=True))
+
+    def test_negative_depths_that_grow_downwards(self):
+        self.levels("depth", [-4000.0, -1000, -100, -5], units="m", positive="down", standard_name="depth")
+        info = self.expect_heights([-4, -1, -0.1, -0.005])
+        self.assertIn("depth is positive down, but its values are from -4000 to -5", info["warnings"][0])
+
+    def test_depths_that_only_their_names_tell(self):
+        for name, attributes in (("nav_lev", {}), ("st_ocean_depth", {}), ("zlev", {"axis": "Z", "long_name": "Depth of cell centres"})):
+            self.levels(name, [5.0, 100, 1000, 4000], units="m", **attributes)
+            self.expect_heights([-0.005, -0.1, -1, -4])
+
+    def test_a_formula_of_a_coordinate_beside_the_numbers_of_levels(self):
+        """As iris writes the hybrid heights of the Unified Model; the ground may be in another file under another name."""
+        z, sigma, ground = np.array([20.0, 1000, 5000, 20000]), np.array([0.99, 0.8, 0.3, 0]), 2000 * RANDOM.random((8, 12))
+        for name in ("surface_altitude", "orog"):
+            def more(f):
+                f.add("level_height", "model_level_number", z, units="m", positive="up", standard_name="atmosphere_hybrid_height_coordinate",
+                      formula_terms="a: level_height b: sigma orog: surface_altitude")
+                f.add("sigma", "model_level_number", sigma, units="1")
+                f.add(name, "lat lon", ground, units="m", standard_name="surface_altitude")
+                f["T"].coordinates = "level_height sigma surface_altitude"
+            self.levels("model_level_number", np.arange(1, 5), more, units="1", positive="up", axis="Z", standard_name="model_level_number")
+            self.expect_heights(1e-3 * (z[:, None, None] + sigma[:, None, None] * ground))
+        def lacking(f):
+            f["lev"].formula_terms = "a: lev b: sigma orog: ground"
+        self.levels("lev", z, lacking, units="m", positive="up", standard_name="atmosphere_hybrid_height_coordinate")
+        self.assertIn("has no term 'b' on these dimensions; its nominal heights are taken", "".join(self.expect_heights(1e-3 * z)["warnings"]))
+
+    def test_roms_without_attributes(self):
+        """Equations of Vtransform 1 and 2 of ROMS' manual."""
+        h, zeta, hc = 100 + 900 * RANDOM.random((8, 12)), RANDOM.random((8, 12)), 50.0
+        s, c = np.linspace(-0.9, -0.1, 4), np.linspace(-0.95, -0.02, 4) ** 3
+        S, C = s[:, None, None], c[:, None, None]
+        for transform in (1, 2, None):
+            def more(f):
+                f.add("Cs_r", "s_rho", c)
+                f.add("h", "lat lon", h)
+                f.add("zeta", "lat lon", zeta)
+                f.add("hc", "", hc)
+                if transform:
+                    f.add("Vtransform", "", transform, "i4")
+            self.levels("s_rho", s, more)
+            z0 = hc * S + (h - hc) * C
+            heights = zeta + (zeta + h) * (hc * S + h * C) / (hc + h) if transform == 2 else z0 + zeta * (1 + z0 / h)
+            self.expect_heights(1e-3 * heights)
+
+    def test_hybrid_pressures_by_the_names_of_their_terms(self):
+        a, b, ground = np.array([0.02, 0.1, 0.2, 0]), np.array([0, 0.05, 0.3, 1]), 95000 + 6000 * RANDOM.random((8, 12))
+        for unit, names in (("1", ("hyam", "hybm", "PS")), ("Pa", ("ap", "b", "aps"))):
+            def more(f):
+                f.add(names[0], "lev", a * (1e5 if unit == "Pa" else 1), units=unit)
+                f.add(names[1], "lev", b)
+                f.add(names[2], "lat lon", ground, units="Pa")
+            self.levels("lev", [20.0, 100, 500, 1000], more, units="level", positive="down")
+            self.expect_heights(standard_altitude(1e5 * a[:, None, None] + b[:, None, None] * ground))
+
+    def test_heights_and_pressures_of_nodes_beside_numbered_levels(self):
+        """WRF's met_em."""
+        ght = 1000 * RANDOM.random((4, 8, 12)) + np.array([0, 3000, 6000, 9000])[:, None, None]
+        self.levels("num_metgrid_levels", None, lambda f: f.add("GHT", "num_metgrid_levels lat lon", ght, units="meters MSL"))
+        self.expect_heights(1e-3 * ght)
+        self.levels("num_metgrid_levels", None, lambda f: f.add("PRES", "num_metgrid_levels lat lon", 1e5 - 8 * ght, units="Pa"))
+        self.expect_heights(standard_altitude(1e5 - 8 * ght))
+
+
+class Places(ModelFileTest):
+    def test_places_that_are_not_on_the_earth(self):
+        """Fill values that no attribute names; what is left stays where it is."""
+        lon, lat = np.meshgrid(10.0 + 2 * np.arange(16), 60.0 + np.arange(10))
+        hole = (np.arange(16) < 4) & (np.arange(10)[:, None] < 3)
+        for fill in (-999, 1e20, -9999):
+            with self.file(x=16, y=10, lev=3) as f:
+                f.add("lon", "y x", np.where(hole, fill, lon), units="degrees_east")
+                f.add("lat", "y x", np.where(hole, fill, lat), units="degrees_north")
+                f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                f.add("t", "lev y x", RANDOM.random((3, 10, 16)), "f4", coordinates="lon lat")
+            info = self.info()
+            self.assertEqual(info["blanked"]["not_finite"], 36)
+            places = sphere(lon, lat, np.array([0, 1, 3])[:, None, None])[:, ~hole]
+            np.testing.assert_allclose(info["bounds"]["upper"], places.reshape(-1, 3).max(0), atol=1e-3)
+            np.testing.assert_allclose(info["bounds"]["lower"], places.reshape(-1, 3).min(0), atol=1e-3)
+
+    def test_idealised_runs(self):
+        """WRF: XLAT and XLONG are 0, or metres with the unit of degrees; DX and DY are the distances of the nodes."""
+        x, y = np.meshgrid(2000.0 * np.arange(12), 3000.0 * np.arange(8))
+        for east, north, spacing in ((0 * x, 0 * y, True), (x, y, True), (x, y, False)):
+            with self.file(west_east=12, south_north=8, bottom_top=4, Time=None) as f:
+                if spacing:
+                    f.DX, f.DY = 2000.0, 3000.0
+                f.add("XLONG", "Time south_north west_east", east[None], units="degree_east")
+                f.add("XLAT", "Time south_north west_east", north[None], units="degree_north")
+                f.add("Z", "Time bottom_top south_north west_east", (np.arange(4)[:, None, None] * 500 + 0 * x)[None], units="m", positive="up")
+                f.add("T", "Time bottom_top south_north west_east", RANDOM.random((1, 4, 8, 12)), "f4")
+            if spacing:
+                info = self.info()
+                np.testing.assert_allclose(info["bounds"]["upper"], [22, 21, 1.5])
+                self.assertIn("which are no longitudes and latitudes of a grid in degrees", "".join(info["warnings"]))
+            else:
+                self.assertIn("XLONG is 0 .. 22000 and XLAT is 0 .. 21000, which are no longitudes", self.info(fails=True))
+
+    def test_numbers_that_are_text(self):
+        """missing_value = "-999", scale_factor = "0.5": as scripts write that take every attribute for text."""
+        t = RANDOM.integers(0, 100, (3, 8, 12))
+        hole = RANDOM.random(t.shape) < 0.2
+        for attributes in ({"missing_value": "-999"}, {"missing_value": "-999.0f"}, {"valid_range": "0, 100"}, {"valid_min": "0"}):
+            with self.file(lon=12, lat=8, lev=3) as f:
+                lon, lat = self.air(f)
+                f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                f.add("T", "lev lat lon", np.where(hole, -999, t), "i2", scale_factor="0.5", **attributes)
+            self.expect(self.info(), sphere(lon, lat, np.array([0, 1, 3])[:, None, None]), np.where(hole, np.nan, t / 2))
+
+    def test_axes_without_units(self):
+        for names, attributes in (("x y z", {"units": "1"}), ("x1 x2 x3", {}), ("xh y z", {}), ("xc yc zc", {}), ("a b c", {"units": "-"})):
+            with self.file(**{name: n for name, n in zip(names.split(), (12, 8, 4))}) as f:
+                for n, name, axis in zip((12, 8, 4), names.split(), "XYZ"):
+                    f.add(name, name, 500.0 * np.arange(n), **attributes, **({"axis": axis} if attributes or name == "x1" else {}))
+                f.add("rho", " ".join(names.split()[::-1]), RANDOM.random((4, 8, 12)), "f4")
+            info = self.info()
+            np.testing.assert_allclose(info["bounds"]["upper"], [5.5, 3.5, 1.5])
+            self.assertIn("metres are assumed", "".join(info["warnings"]))
+
+    def test_the_nearest_variable_is_named(self):
+        with self.file(ncells=8, nv=3, depth=3, time=1) as f:
+            for name, unit in (("clon", "longitude"), ("clat", "latitude")):
+                f.add(name, "ncells", np.arange(8), units="radian", standard_name=unit, bounds=name + "_vertices")
+                f.add(name + "_vertices", "ncells nv", np.zeros((8, 3)))
+            f.add("depth", "depth", [10, 30, 50], units="m", positive="down")
+            f.add("time", "time", 0, units="days since 2000-01-01")
+            f.add("S", "time depth ncells", np.zeros((1, 3, 8)), "f4", coordinates="clon clat")
+        line = self.info(fails=True)
+        self.assertIn("S has 2 (depth, ncells), the cells of an unstructured map: give the grid file that has their faces", line)
+
+
+class Fields(ModelFileTest):
+    """Which variables are taken where none is asked for."""
+
+    def test_a_mesh_file_beside_the_data(self):
+        """NEMO: mesh_mask.nc has more variables of three dimensions than the data, on levels of another name, and masks of them."""
+        t, mask = RANDOM.random((3, 8, 12)).astype("f4"), RANDOM.random((3, 8, 12)) < 0.7
+        mask[0] |= mask[1:].any(0)
+        lon, lat = np.meshgrid(np.linspace(0, 33, 12), np.linspace(10, 31, 8))
+        depths = np.array([5.0, 50, 500])
+        with self.file("data.nc", time_counter=None, deptht=3, y=8, x=12) as f:
+            f.add("nav_lon", "y x", lon, units="degrees_east")
+            f.add("nav_lat", "y x", lat, units="degrees_north")
+            f.add("deptht", "deptht", depths, units="m", positive="down")
+            f.add("votemper", "time_counter deptht y x", t[None], "f4", coordinates="nav_lon nav_lat")
+        with self.file("mesh_mask.nc", t=1, nav_lev=3, y=8, x=12) as f:
+            f.add("nav_lon", "y x", lon, units="degrees_east")
+            f.add("nav_lat", "y x", lat, units="degrees_north")
+            f.add("nav_lev", "nav_lev", depths, units="m")
+            f.add("tmaskutil", "t y x", mask[:1], "i1")
+            for name in ("tmask", "umask", "vmask"):
+                f.add(name, "t nav_lev y x", mask[None], "i1")
+            for name in ("e3t_0", "e3u_0", "e3v_0", "e3w_0", "gdept_0", "gdepw_0"):
+                f.add(name, "t nav_lev y x", np.ones((1, 3, 8, 12)) * depths[:, None, None], units="m")
+        info = self.info("data.nc", "mesh_mask.nc")
+        self.assertEqual(info["scalars"][0]["name"], "votemper")
+        self.assertIn("tmask is 0", info["blanking"])
+        self.expect(info, sphere(lon, lat, -1e-3 * depths[:, None, None]), np.where(mask, t, np.nan))
+
+    def test_what_heights_are_made_of_is_no_field(self):
+        """WRF: PH and PHB are on more points than T."""
+        z = np.linspace(0, 5000, 5)[:, None, None] + np.zeros((8, 12))
+        lon, lat = np.meshgrid(np.linspace(0, 11, 12), np.linspace(40, 47, 8))
+        with self.file(Time=None, bottom_top=4, bottom_top_stag=5, south_north=8, west_east=12) as f:
+            f.add("XLONG", "Time south_north west_east", lon[None], units="degree_east")
+            f.add("XLAT", "Time south_north west_east", lat[None], units="degree_north")
+            for name, part in (("PH", 0.1), ("PHB", 0.9)):
+                f.add(name, "Time bottom_top_stag south_north west_east", 9.81 * part * z[None], "f4", units="m2 s-2")
+            f.add("T", "Time bottom_top south_north west_east", RANDOM.random((1, 4, 8, 12)), "f4", units="K")
+        info = self.info()
+        self.assertEqual([s["name"] for s in info["scalars"]], ["T"])
+
+    def test_months_and_members_are_steps(self):
+        t = RANDOM.random((5, 3, 8, 12)).astype("f4")
+        for name, values, times in (("month", [1, 2, 3, 4, 5], [1, 2, 3, 4, 5]), ("member", None, [0, 1, 2, 3, 4]), ("region", [3, 1, 4, 1, 5], [0, 1, 2, 3, 4])):
+            for time in ("", "time "):
+                with self.file(lon=12, lat=8, lev=3, time=1, **{name: 5}) as f:
+                    lon, lat = self.air(f)
+                    f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                    f.add("time", "time", [0], units="days since 2000-01-01")
+                    if values:
+                        f.add(name, name, values, "i4")
+                    f.add("T", f"{time}{name} lev lat lon", t[None] if time else t, "f4")
+                info = self.info("file.nc", "--time-step", "3")
+                self.assertEqual(info["times"], times)
+                self.assertIn(f"the steps are the 5 values of {name}", info["notes"])
+                self.expect(info, sphere(lon, lat, np.array([0, 1, 3])[:, None, None]), t[3])
 
 
 if __name__ == "__main__":

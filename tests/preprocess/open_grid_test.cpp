@@ -206,6 +206,38 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("a.xml", "an XML file");
   write("a.grib", "GRIB\0\0\0\2"s);
   expectNamed("a.grib", "a GRIB file");
+  write("b.grib", "\x01\r\r\n123 \r\r\nHTXX01 EDZW\r\r\nGRIB\0\1\0\2....."s);
+  expectNamed("b.grib", "a GRIB file");
+  write("state.h5", "{[( SETTINGS )]}\nN = 3\n" + std::string(512 - 23, '\0') + "\x89HDF\r\n\x1a\n" +
+                        std::string(100, '\0'));
+  expectNamed("state.h5", "an HDF5 file behind 512 bytes");
+  write("utf16.vtu", "\xff\xfe<\0?\0x\0m\0l\0"s);
+  expectNamed("utf16.vtu", "text in UTF-16");
+  for (const char* const kind : {"SERAFIN ", "SERAFIND"}) {
+    write("a.slf", "\0\0\0\x50"s + std::string(72, ' ') + kind + "\0\0\0\x50"s);
+    expectNamed("a.slf", "a SELAFIN file of Telemac");
+  }
+  write("a.EGRID",
+        "\0\0\0\x10"
+        "FILEHEAD\0\0\0\x64INTE\0\0\0\x10"s);
+  expectNamed("a.EGRID", "an ECLIPSE grid (EGRID)");
+  for (const char* const text :
+       {"SPECGRID\n 1 1 1 1 F /\n", "-- made by Petrel\n\nMAPAXES\n0 1 0 0 1 0 /\n"}) {
+    write("a.grdecl", text);
+    expectNamed("a.grdecl", "an ECLIPSE grid (GRDECL)");
+  }
+  for (const char* const text :
+       {"(0 a mesh of a generator)\n(2 3)\n", "(0 \"x\")\n", "(2 3)\n(10 (0 1 8 0 3))\n", "\n(1 x)\n"}) {
+    write("a.msh", text);
+    expectNamed("a.msh", "a Fluent mesh or case");
+  }
+  const std::string head = "a geometry\nof a program\nnode id given\nelement id off\n";
+  write("a.geo", head + "coordinates\n       4\n");
+  expectNamed("a.geo", "a geometry of EnSight 6");
+  write("a.geo", head + "part\n         1\n");
+  expectNamed("a.geo", "an EnSight geometry file (give its case file instead)");
+  write("points", "/*--- a banner ---*/\nFoamFile\n{\n    version 2.0;\n}\n");
+  expectNamed("points", "a file of an OpenFOAM case");
   write("a.mat", "MATLAB 5.0 MAT-file Platform: posix" + std::string(128, '\0'));
   expectNamed("a.mat", "a MATLAB file, which is not read");
   write("b.mat", "MATLAB 7.3 MAT-file, Platform: GLNXA64" + std::string(512, '\0'));

@@ -82,6 +82,7 @@ SeriesOptions seriesOptions(const ConvertArguments& arguments) {
   options.convert.title = titleOf(arguments.grid);
   applyCommonOptions(arguments, options.convert);
   applyGridUse(arguments, options.convert);
+  options.convert.may_leave_out_scalars = arguments.scalars.empty();
   options.keep_going = arguments.keep_going;
   options.add = arguments.adds_steps;
   return options;
@@ -101,7 +102,8 @@ class StepLog {
       return;
     }
     if (event.source && event.converted)
-      for (const std::string& warning : event.source->warnings) printMessage("warning: {}", warning);
+      for (const auto* warnings : {&event.source->warnings, &event.converted->warnings})
+        for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
     const std::vector<FileReport>& files = event.added ? event.added->files : event.converted->files;
     const bool is_new = !event.added || event.added->new_geometry;
     steps_.push_back(

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "preprocess/formats/open/series_files.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
@@ -32,6 +33,7 @@ struct GridInfo {
   std::vector<BlockOverlap> overlaps;
   uint64_t nodes = 0;
   InfoEstimate estimate;  // of a conversion of the first scalar
+  std::string series;     // what the files are steps of; empty: a single one
 
   const GridScalar& scalar(uint32_t position) const { return description->scalars[position]; }
 };
@@ -124,6 +126,7 @@ nlohmann::ordered_json scalarsAsJson(const GridInfo& info) {
     if (of.function > 0) scalar["function"] = of.function;
     if (!of.unit.empty()) scalar["unit"] = of.unit;
     scalar["centring"] = of.centring == Centring::kCell ? "cell" : "node";
+    if (info.statistics.missing[s] > 0) scalar["missing"] = info.statistics.missing[s];
     scalars.push_back(std::move(scalar));
   }
   return scalars;
@@ -158,6 +161,7 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
                             {"alpha", flow.alpha},
                             {"reynolds", flow.reynolds},
                             {"time", flow.time}});
+  if (!info.series.empty()) json["series"] = info.series;
   json["times"] = description.times;
   json["time_step"] = description.time_step;
   if (!description.time_unit.empty()) json["time_unit"] = description.time_unit;
@@ -200,6 +204,11 @@ void printScalars(const GridInfo& info) {
               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
               scalar.centring == Centring::kCell ? ", cell-centred" : "",
               isEmpty(range) ? "no value" : rangeText(range.min, range.max, 6));
+    if (const uint64_t missing = info.statistics.missing[s]; missing > 0)
+      printLine(
+          "          {} more of its values {} not finite or missing; `convert` leaves out the scalars that "
+          "differ so",
+          missing, missing == 1 ? "is" : "are");
   }
   std::string names;
   for (const uint32_t position : info.derived) {
@@ -214,6 +223,7 @@ void printScalars(const GridInfo& info) {
 void printAsText(const GridInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
+  if (!info.series.empty()) printLine("series    {}", info.series);
   for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
   if (!info.overlaps.empty()) printLine("note: {}", overlapNote(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
@@ -247,10 +257,22 @@ void printAsText(const GridInfo& info) {
 }  // namespace
 
 void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived, bool json) {
-  const std::unique_ptr<DataSource> source = openWithDerived(options, derived);
+  // As `convert` takes the same files.
+  OpenGridOptions files = options;
+  expandPatterns(files);
+  std::vector<StepFiles> steps;
+  if (hasSeveralStepFiles(files)) steps = stepsOf(files);
+  std::string series;
+  if (steps.size() > 1) {
+    files = steps.front().options;
+    series = fmt::format("{} steps, {} .. {}; the first is described", steps.size(), steps.front().name,
+                         steps.back().name);
+  }
+  const std::unique_ptr<DataSource> source = openWithDerived(files, derived);
   if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get()))
-    return printMeshInfo(*mesh, json);
-  const GridInfo info = inspect(dynamic_cast<const GridSource&>(*source));
+    return printMeshInfo(*mesh, series, json);
+  GridInfo info = inspect(dynamic_cast<const GridSource&>(*source));
+  info.series = series;
   if (json)
     fmt::print("{}\n", asJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   else

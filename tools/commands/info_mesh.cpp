@@ -56,12 +56,15 @@ struct MeshInfo {
   std::vector<ScalarRange> ranges;   // [scalar]
   std::vector<uint64_t> not_finite;  // [scalar], values
   InfoEstimate estimate;
+  std::string series;
 };
 
-/// Returns how many of the values are not finite.
-uint64_t widen(ScalarRange& range, const std::vector<float>& values) {
+/// Returns how many of the values of drawn samples are not finite.
+uint64_t widen(ScalarRange& range, const std::vector<float>& values, const auto& is_drawn) {
   uint64_t not_finite = 0;
-  for (const float value : values) {
+  for (size_t n = 0; n < values.size(); ++n) {
+    const float value = values[n];
+    if (!is_drawn(n)) continue;
     if (!std::isfinite(value)) {
       ++not_finite;
       continue;
@@ -92,7 +95,11 @@ void measure(const MeshSource& source, Centring centring, MeshInfo& info) {
             : source.readCells(piece, first, count, scalars, cells);
       for (size_t n = 0; n < scalars.size(); ++n)
         info.not_finite[scalars[n]] +=
-            widen(info.ranges[scalars[n]], nodes ? points.scalars[n] : cells.scalars[n]);
+            nodes ? widen(info.ranges[scalars[n]], points.scalars[n],
+                          [&](size_t at) { return !points.hidden[at]; })
+                  : widen(info.ranges[scalars[n]], cells.scalars[n], [&](size_t at) {
+                      return !cells.hidden[at] && cells.shapes[at] != CellKind::kNone;
+                    });
     }
   }
 }
@@ -150,6 +157,7 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
     scalar["centring"] = of.centring == Centring::kCell ? "cell" : "node";
     json["scalars"].push_back(std::move(scalar));
   }
+  if (!info.series.empty()) json["series"] = info.series;
   json["times"] = description.times;
   json["time_step"] = description.time_step;
   json["estimate"] = info.estimate.toJson();
@@ -161,6 +169,7 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
 void printAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
+  if (!info.series.empty()) printLine("series    {}", info.series);
   for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
   printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} at NaN or infinity",
             info.points, countText(description.pieces.size(), "piece"), info.survey.unused_points,
@@ -204,8 +213,9 @@ void printAsText(const MeshInfo& info) {
 
 }  // namespace
 
-void printMeshInfo(const MeshSource& source, bool json) {
-  const MeshInfo info = inspect(source);
+void printMeshInfo(const MeshSource& source, const std::string& series, bool json) {
+  MeshInfo info = inspect(source);
+  info.series = series;
   if (json)
     fmt::print("{}\n", asJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   else

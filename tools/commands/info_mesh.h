@@ -30,6 +30,6 @@ class InfoEstimate {
 };
 
 /// Reads the mesh and prints what is in it. Throws Error if its files are damaged.
-void printMeshInfo(const MeshSource& source, bool json);
+void printMeshInfo(const MeshSource& source, const std::string& series, bool json);
 
 }  // namespace curvisplat

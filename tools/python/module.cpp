@@ -339,6 +339,7 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   runInterruptibly(progress, [&](Progress& of_work) {
     const auto source = openSource(arguments, options.output);
     options.scalars = chooseScalars(arguments, scalars, source->description());
+    options.may_leave_out_scalars = scalars.empty();
     report = convert(*source, options, of_work);
     for (const std::string& warning : source->description().warnings) report.warnings.push_back(warning);
   });

@@ -53,8 +53,8 @@ CgnsCells::CgnsCells(const CgnsFile& file, const CgnsZone& zone, const std::file
       continue;
     }
     countCells(section);
-    const bool solid = section.type == kCgnsMixed || section.type == kCgnsNface ||
-                       cgnsElementKind(section.type).cell != CellKind::kNone;
+    const bool solid =
+        section.type == kCgnsMixed || section.type == kCgnsNface || section.kind().cell != CellKind::kNone;
     if (!solid) continue;
     runs_.push_back({&section, cells_, section.elements});
     cells_ += section.elements;
@@ -72,7 +72,7 @@ std::string CgnsCells::label() const {
 }
 
 void CgnsCells::countCells(const CgnsSection& section) {
-  const CgnsElementKind kind = cgnsElementKind(section.type);
+  const CgnsElementKind kind = section.kind();
   if (section.type == kCgnsNface) counts_.solid += section.elements;
   if (kind.cell != CellKind::kNone) {
     counts_.solid += section.elements;
@@ -91,7 +91,7 @@ void CgnsCells::countCells(const CgnsSection& section) {
     for (size_t n = 0; n < count; ++n) {
       const int64_t length = begins[n + 1] - begins[n];
       const int64_t type = length > 0 ? numbers[static_cast<size_t>(begins[n] - begins.front())] : 0;
-      const CgnsElementKind element = cgnsElementKind(type);
+      const CgnsElementKind element = section.kindOf(type);
       if (element.nodes == 0 || length != element.nodes + 1)
         throw Error("{}: {}: element {} has type {} and {} entries, which do not match; the file is damaged",
                     file_, section.path, section.first + first + n, type, length);
@@ -181,7 +181,7 @@ FaceLists CgnsCells::faceLists() const {
 }
 
 void CgnsCells::readFixed(const CgnsSection& section, uint64_t first, uint64_t count, MeshCells& out) const {
-  const CgnsElementKind kind = cgnsElementKind(section.type);
+  const CgnsElementKind kind = section.kind();
   const std::vector<int64_t> nodes = integersOf(section.connectivity, first * kind.nodes, count * kind.nodes);
   std::array<uint64_t, kMaxNumbers> points{};
   for (uint64_t n = 0; n < count; ++n) {
@@ -198,7 +198,7 @@ void CgnsCells::readMixed(const CgnsSection& section, uint64_t first, uint64_t c
   std::array<uint64_t, kMaxNumbers> points{};
   for (uint64_t n = 0; n < count; ++n) {
     const auto from = static_cast<size_t>(begins[n]) - base;
-    const CgnsElementKind kind = cgnsElementKind(numbers[from]);  // checked when the zone was opened
+    const CgnsElementKind kind = section.kindOf(numbers[from]);  // checked when the zone was opened
     for (size_t node = 0; node < kind.nodes; ++node) points[node] = pointOf(numbers[from + 1 + node]);
     out.append(kind.cell, std::span(points).first(kind.nodes));
   }

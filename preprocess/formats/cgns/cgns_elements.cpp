@@ -16,6 +16,8 @@ namespace {
 constexpr uint64_t kChunk = 65536;
 constexpr int64_t kNone = std::numeric_limits<int64_t>::min();
 constexpr double kLargestInteger = 0x1p53;
+constexpr double kNewest = 4;         // of files that do not tell: the numbers have not changed since
+constexpr int64_t kMaxCorners = 200;  // of a polygon
 
 struct Kind {
   CellKind cell;
@@ -33,6 +35,26 @@ constexpr std::array<Kind, 57> kKinds{
      {kNot, 5},  {kNot, 12}, {kNot, 15}, {kNot, 16}, {kNot, 25}, {kTet, 22}, {kTet, 34}, {kTet, 35},
      {kPyr, 29}, {kPyr, 50}, {kPyr, 55}, {kWed, 33}, {kWed, 66}, {kWed, 75}, {kHex, 44}, {kHex, 98},
      {kHex, 125}}};
+
+CgnsElementKind elementKind(int64_t type) {
+  if (type < 0 || type >= std::ssize(kKinds)) return {};
+  return {kKinds[static_cast<size_t>(type)].cell, kKinds[static_cast<size_t>(type)].nodes};
+}
+
+/// The number that a type has since version 3.1. Source: cgi_read_section() of libcgns.
+int typeNow(int type, double version) {
+  constexpr int kPyra5 = 12, kPyra13 = 21;
+  if (version < 3 || version >= 3.1 || type <= kPyra5 || type >= kCgnsNgon) return type;
+  return type == kPyra5 + 1 ? kPyra13 : type - 1;
+}
+
+/// 3.1 is stored in single precision; steps are of a tenth at the least.
+double versionOf(const CgnsFile& file) {
+  for (const CgnsNode& node : file.children(file.root()))
+    if (node.name == "CGNSLibraryVersion")
+      if (const std::vector<double> numbers = file.numbers(node); !numbers.empty()) return numbers[0] + 1e-4;
+  return kNewest;
+}
 
 /// A column of an array of integers.
 CgnsIntegers storedIntegers(const CgnsFile& file, const CgnsNode& node) {
@@ -72,8 +94,9 @@ CgnsIntegers spooledIntegers(SpooledNumbers numbers) {
 
 class SectionReader {
  public:
-  SectionReader(const CgnsFile& file, const CgnsNode& node, const std::filesystem::path& folder)
-      : file_(file), node_(node), folder_(folder) {}
+  SectionReader(const CgnsFile& file, double version, const CgnsNode& node,
+                const std::filesystem::path& folder)
+      : file_(file), version_(version), node_(node), folder_(folder) {}
 
   CgnsSection read();
 
@@ -88,6 +111,7 @@ class SectionReader {
   void findBegins(CgnsSection& section) const;
 
   const CgnsFile& file_;
+  const double version_;
   const CgnsNode& node_;
   const std::filesystem::path& folder_;
 };
@@ -104,9 +128,11 @@ CgnsSection SectionReader::read() {
   CgnsSection section;
   section.path = node_.path;
   const std::vector<double> type = file_.numbers(node_);
-  section.type = type.empty() || !(type[0] >= 0 && type[0] < 1000) ? -1 : static_cast<int>(type[0]);
+  section.version = version_;
+  section.type =
+      type.empty() || !(type[0] >= 0 && type[0] < 1000) ? -1 : typeNow(static_cast<int>(type[0]), version_);
   const bool listed = section.type == kCgnsMixed || section.type == kCgnsNgon || section.type == kCgnsNface;
-  const CgnsElementKind kind = cgnsElementKind(section.type);
+  const CgnsElementKind kind = elementKind(section.type);
   if (!listed && kind.nodes == 0)
     throw Error("{}: {} is of element type {}; expected one of CGNS's (TETRA_4 is 10, HEXA_8 17, MIXED 20)",
                 file_.path().string(), node_.path, type.empty() ? -1.0 : type[0]);
@@ -175,7 +201,7 @@ void SectionReader::findBegins(CgnsSection& section) const {
         continue;
       }
       if (elements == section.elements) break;
-      const int64_t length = counted ? value : cgnsElementKind(value).nodes;
+      const int64_t length = counted ? value : section.kindOf(value).nodes;
       if (length < 1 || static_cast<uint64_t>(length) > section.connectivity.count)
         damaged("has an element {} with {} {}; expected {}", section.first + elements,
                 counted ? "length" : "type", value, counted ? "its length" : "a type of CGNS");
@@ -194,15 +220,18 @@ void SectionReader::findBegins(CgnsSection& section) const {
 
 }  // namespace
 
-CgnsElementKind cgnsElementKind(int64_t type) {
-  if (type < 0 || type >= std::ssize(kKinds)) return {};
-  return {kKinds[static_cast<size_t>(type)].cell, kKinds[static_cast<size_t>(type)].nodes};
+CgnsElementKind cgnsElementKind(int64_t type, double version) {
+  const int64_t ngon = version < 3 ? kCgnsNgon - 1 : kCgnsNgon;
+  if (version < 3.2 && type > ngon + (version < 3 ? 0 : 1) && type < ngon + kMaxCorners)
+    return {CellKind::kNone, static_cast<uint32_t>(type - ngon)};
+  return elementKind(type < kCgnsNgon ? typeNow(static_cast<int>(type), version) : type);
 }
 
 std::vector<CgnsSection> readCgnsSections(const CgnsFile& file, const std::vector<CgnsNode>& nodes,
                                           const std::filesystem::path& folder) {
   std::vector<CgnsSection> sections;
-  for (const CgnsNode& node : nodes) sections.push_back(SectionReader(file, node, folder).read());
+  const double version = versionOf(file);
+  for (const CgnsNode& node : nodes) sections.push_back(SectionReader(file, version, node, folder).read());
   std::sort(sections.begin(), sections.end(),
             [](const CgnsSection& a, const CgnsSection& b) { return a.first < b.first; });
   for (size_t n = 1; n < sections.size(); ++n)

@@ -36,11 +36,16 @@ struct CgnsElementKind {
   CellKind cell = CellKind::kNone;  // kNone: nodes, lines and faces
   uint32_t nodes = 0;               // 0: of any number, or an unknown type
 };
-CgnsElementKind cgnsElementKind(int64_t type);
+/// `version`: of the library that wrote the file. Version 3.0 counted PYRA_13 between PYRA_5 and PYRA_14, 3.1 moved it behind MIXED;
+/// up to 3.1 a polygon among MIXED elements had the type NGON_n and the number of its nodes in one number.
+CgnsElementKind cgnsElementKind(int64_t type, double version);
 
 struct CgnsSection {
   std::string path;
-  int type = 0;
+  int type = 0;  // as CGNS numbers them since 3.1
+  double version = 0;
+  CgnsElementKind kind() const { return cgnsElementKind(type, 4); }
+  CgnsElementKind kindOf(int64_t of_mixed) const { return cgnsElementKind(of_mixed, version); }
   uint64_t first = 0, elements = 0;  // numbers of elements begin at 1 in their zone
   CgnsIntegers connectivity;
   CgnsIntegers begins;  // of MIXED, NGON_n and NFACE_n: [elements + 1]

@@ -8,6 +8,7 @@
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -146,6 +147,26 @@ const NetcdfVariable* heightsOfFaces(const NetcdfFiles& file, const ColumnsMap& 
   return nullptr;
 }
 
+/// A variable of heights at the nodes and their levels, by its name: SCHISM's zCoordinates.
+const NetcdfVariable* heightsOfNodes(const NetcdfFiles& file, const ColumnsMap& map, size_t level_dim) {
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (!variable.numeric || variable.dims.size() < 2 || !hasDimension(variable, map.node_dim) ||
+        !hasDimension(variable, level_dim) || !kilometresOf(variable.text("units")))
+      continue;
+    const std::string name = lowerCase(variable.name);
+    if (cfRole(file, variable) == CfRole::kVertical || name.starts_with("zcoord") ||
+        name.starts_with("zcor") || name.ends_with("_depth") || name.ends_with("_height"))
+      return &variable;
+  }
+  return nullptr;
+}
+
+/// Whether the variable is the bounds of another: corners of faces, not layers.
+bool isBounds(const NetcdfFiles& file, const NetcdfVariable& variable) {
+  return std::any_of(file.variables().begin(), file.variables().end(),
+                     [&](const NetcdfVariable& other) { return other.text("bounds") == variable.name; });
+}
+
 }  // namespace
 
 std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file) {
@@ -202,6 +223,8 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
       else if (variable.dims[axis] != across && dimension.length != 1)
         others.push_back(variable.dims[axis]);
     }
+    if (isBounds(file, variable)) continue;
+    if (others.size() == 1 && &variable == heightsOfNodes(file, map, others[0])) continue;
     const uint64_t layers = others.size() == 1 ? file.dimensions()[others[0]].length : 0;
     if (layers < 2 || layers > kMaxLevels || &variable == map.nodes_of_face) continue;
     const Centring centring = faces ? Centring::kCell : Centring::kNode;
@@ -254,6 +277,13 @@ ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map
     heights.words = of_faces->name;
     return heights;
   }
+  if (!between) heights.of_nodes = heightsOfNodes(file, map, scalars.layer_dim);
+  if (heights.of_nodes) {
+    heights.scale = kilometresOf(heights.of_nodes->text("units")).value_or(1e-3) *
+                    (growsDownwards(*heights.of_nodes) ? -1 : 1);
+    heights.words = heights.of_nodes->name;
+    return heights;
+  }
   const std::string& name = file.dimensions()[scalars.layer_dim].name;
   for (const NetcdfVariable& variable : file.variables()) {
     if (variable.dims != std::vector{scalars.layer_dim} || !variable.numeric) continue;
@@ -270,10 +300,14 @@ ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map
                                     [](double height) { return std::isfinite(height); });
     if (heights.levels.size() == levels && finite) return heights;
   }
+  const NetcdfVariable* const along = file.find(name);
   throw Error(
-      "{}: the layers of {} ({}) have no heights; expected {}a coordinate {} with a unit of length or "
+      "{}: the layers of {} ({}) have no heights{}; expected {}a coordinate {} with a unit of length or "
       "pressure",
       file.path().string(), map.format, name,
+      !along                         ? ""
+      : along->text("units").empty() ? fmt::format(" ({} has no unit)", name)
+                                     : fmt::format(" ({} has the unit '{}')", name, along->text("units")),
       map.format == "ICON"   ? "z_ifc (give the file that has it, too), or "
       : map.format == "MPAS" ? "zgrid or refBottomDepth (give the file that has it, too), or "
                              : "",

@@ -49,7 +49,8 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
 struct ColumnsHeights {
   std::vector<double> levels;                // everywhere the same; empty:
   const NetcdfVariable* of_faces = nullptr;  // at the levels of each face
-  double scale = 1;                          // of of_faces
+  const NetcdfVariable* of_nodes = nullptr;  // or of each node
+  double scale = 1;                          // of these
   std::string words;                         // "by the variable zgrid"
 };
 

@@ -172,6 +172,7 @@ std::vector<int64_t> ColumnsSource::nodesOf(uint64_t first, uint64_t count) cons
 }
 
 void ColumnsSource::spoolHeights(const std::filesystem::path& folder) {
+  if (heights_.of_nodes) return spoolHeightsOfNodes(folder);
   size_t level_dim = map_.face_dim;
   for (const size_t dim : heights_.of_faces->dims)
     if (dim != map_.face_dim && file_.dimensions()[dim].length == levels()) level_dim = dim;
@@ -191,6 +192,17 @@ void ColumnsSource::spoolHeights(const std::filesystem::path& folder) {
       }
     }
     for (size_t n = 0; n < sums.size(); ++n) spool.add(sums[n] / counts[n] * heights_.scale);
+  }
+  node_heights_ = spool.finish();
+}
+
+void ColumnsSource::spoolHeightsOfNodes(const std::filesystem::path& folder) {
+  const ColumnsReader reader(file_, *heights_.of_nodes, map_.node_dim, scalars_.layer_dim,
+                             description_.time_step);
+  NumberSpool<double> spool(folder);
+  for (uint64_t level = 0; level < levels(); ++level) {
+    const auto heights = reader.read<double>(0, map_.nodes, level, 1);
+    for (uint64_t node = 0; node < map_.nodes; ++node) spool.add(heights.value(node, 0) * heights_.scale);
   }
   node_heights_ = spool.finish();
 }

@@ -41,6 +41,7 @@ class ColumnsSource final : public MeshSource {
   void describe(const OpenGridOptions& options);
   void findTimes(const OpenGridOptions& options);
   void spoolHeights(const std::filesystem::path& folder);
+  void spoolHeightsOfNodes(const std::filesystem::path& folder);
   void readScalars(uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                    std::vector<std::vector<float>>& out) const;
   std::vector<double> readAngles(const NetcdfVariable& variable, uint64_t first, uint64_t count) const;

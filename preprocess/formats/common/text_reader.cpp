@@ -117,9 +117,15 @@ bool isSeparator(char c) {
 }
 
 /// Parses notations that Fortran writes and std::from_chars rejects: "+1.5", "1.5D+00", "1.5-101", and
-/// numbers that overflow or underflow.
+/// numbers that overflow or underflow. So are what Microsoft's library ("-1.#IND") and IBM's ("NaNQ") write.
 bool parseFortranNumber(std::string_view token, double& value) {
   std::string spelling(token);
+  if (const size_t sign = spelling.find("1.#"); sign <= 1) {
+    value = spelling.substr(sign).starts_with("1.#INF") ? HUGE_VAL : std::nan("");
+    if (spelling[0] == '-') value = -value;
+    return true;
+  }
+  if (spelling == "NaNQ" || spelling == "NaNS") spelling.pop_back();
   std::replace_if(
       spelling.begin(), spelling.end(), [](char c) { return c == 'D' || c == 'd'; }, 'e');
   const size_t sign = spelling.find_last_of("+-");

@@ -32,9 +32,21 @@ struct Entry {
   std::vector<std::string> words;
 };
 
+/// Words, of which those in quotation marks may have blanks; the marks are left out.
+std::vector<std::string> unquotedWords(std::string_view text) {
+  std::vector<std::string> words;
+  while (!(text = trimmed(text)).empty()) {
+    const bool quoted = text[0] == '"' && text.find('"', 1) != std::string_view::npos;
+    const size_t end = quoted ? text.find('"', 1) : std::min(text.find_first_of(kWhiteSpace), text.size());
+    words.emplace_back(text.substr(quoted ? 1 : 0, quoted ? end - 1 : end));
+    text.remove_prefix(end + (quoted ? 1 : 0));
+  }
+  return words;
+}
+
 Entry entryOf(std::string_view value, size_t least) {
   Entry entry;
-  const std::vector<std::string_view> words = wordsOf(value);
+  const std::vector<std::string> words = unquotedWords(value);
   // Up to two whole numbers come first.
   size_t numbers = 0;
   for (; numbers < 2 && words.size() > least + numbers; ++numbers) {
@@ -149,7 +161,6 @@ std::filesystem::path CaseReader::fileOf(const Entry& entry, const std::string& 
         "{}: has all steps of {} in one file (file sets), which is not read; write a file for each step",
         path_.string(), printable(name));
   std::string file = name;
-  if (file.size() > 2 && file.front() == '"' && file.back() == '"') file = file.substr(1, file.size() - 2);
   const size_t star = file.find('*');
   if (star != std::string::npos) {
     const size_t stars = std::min(file.find_first_not_of('*', star), file.size()) - star;

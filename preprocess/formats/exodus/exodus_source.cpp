@@ -169,6 +169,9 @@ void ExodusSource::findScalars(const char* names, const char* values, Centring c
 /// Values [first, ...) of the open step; NaN without a variable.
 void ExodusSource::readValues(const NetcdfVariable* variable, uint64_t first, std::span<float> to) const {
   if (!variable) return std::fill(to.begin(), to.end(), kNaN);
+  if (description_.times.empty())
+    throw Error("{}: has no time step: its variables ({}) hold no values yet", file_->path().string(),
+                variable->name);
   if (variable->dims.size() != 2 || file_->dimension(*variable, 0).length <= description_.time_step ||
       first + to.size() > file_->dimension(*variable, 1).length)
     throw Error("{}: {} has other dimensions than time steps and {} values; the file is damaged",

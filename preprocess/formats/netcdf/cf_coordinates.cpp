@@ -28,16 +28,25 @@ bool isVerticalName(std::string_view standard_name) {
          beginsWithOneOf(standard_name, {"height_above_", "ocean_s", "ocean_double_sigma", "atmosphere_"});
 }
 
-/// Customary variable names of programs that write no attributes.
-CfRole roleByName(const std::string& name, bool length) {
+/// The axis of a customary short name: x, xh, xc, x1, ...; x1, x2, x3 are x, y, z. 0: of none.
+char axisOfName(const std::string& name) {
+  if (name.empty() || name.size() > 2) return 0;
+  if (isOneOf(name, {"x1", "x2", "x3"})) return static_cast<char>('x' + (name[1] - '1'));
+  const bool lone = name.size() == 1 || (name[1] >= 'a' && name[1] <= 'z');
+  return lone && name[0] >= 'x' && name[0] <= 'z' ? name[0] : '\0';
+}
+
+/// Customary variable names of programs that write no attributes. `coordinate`: it has the name of its dimension.
+CfRole roleByName(const std::string& name, bool length, bool coordinate) {
   if (beginsWithOneOf(name, {"lon", "nav_lon", "xlong", "glam"})) return CfRole::kLongitude;
   if (beginsWithOneOf(name, {"lat", "nav_lat", "xlat", "gphi"})) return CfRole::kLatitude;
   if (isOneOf(name, {"time", "ocean_time", "time_counter"})) return CfRole::kTime;
   if (!length) return CfRole::kNone;
-  if (name == "x" || name.starts_with("x_")) return CfRole::kX;
-  if (name == "y" || name.starts_with("y_")) return CfRole::kY;
+  const char axis = coordinate || name.size() == 1 ? axisOfName(name) : '\0';
+  if (axis == 'x' || name.starts_with("x_")) return CfRole::kX;
+  if (axis == 'y' || name.starts_with("y_")) return CfRole::kY;
   if (beginsWithOneOf(name, {"depth", "gdep", "height", "altitude", "z_rho", "z_w", "z_r", "lev"}) ||
-      name == "z")
+      axis == 'z')
     return CfRole::kVertical;
   return CfRole::kNone;
 }
@@ -65,18 +74,32 @@ CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
   if (isVerticalName(standard_name) || !variable.text("formula_terms").empty() ||
       (coordinate && (axis == "z" || pressure || !variable.text("positive").empty())))
     return CfRole::kVertical;
-  if (isOneOf(standard_name, {"projection_x_coordinate", "plane_x_coordinate"}) || (axis == "x" && length))
+  const CfRole named = roleByName(lowerCase(variable.name), length || isUnitless(units), coordinate);
+  // Simulations without dimensions have coordinates without a unit.
+  const bool of_plane =
+      length || (isUnitless(units) && named != CfRole::kLongitude && named != CfRole::kLatitude);
+  if (isOneOf(standard_name, {"projection_x_coordinate", "plane_x_coordinate"}) || (axis == "x" && of_plane))
     return CfRole::kX;
-  if (isOneOf(standard_name, {"projection_y_coordinate", "plane_y_coordinate"}) || (axis == "y" && length))
+  if (isOneOf(standard_name, {"projection_y_coordinate", "plane_y_coordinate"}) || (axis == "y" && of_plane))
     return CfRole::kY;
   if (coordinate && axis == "t") return CfRole::kTime;
   if (!standard_name.empty()) return CfRole::kNone;
   if (length && !variable.text("positive").empty()) return CfRole::kVertical;
-  return roleByName(lowerCase(variable.name), length || units.empty());
+  return named;
+}
+
+bool isUnitless(const std::string& unit) {
+  return isOneOf(lowerCase(unit), {"", "1", "-", "none", "unitless", "dimensionless", "nondimensional",
+                                   "non-dimensional", "nondim", "[-]"});
 }
 
 std::optional<double> kilometresOf(const std::string& unit) {
-  const std::string word = lowerCase(unit);
+  std::string word = lowerCase(unit);
+  // "meters MSL", "m above sea level"; but not "m s-1"
+  if (const size_t blank = word.find(' '); blank != std::string::npos)
+    if (beginsWithOneOf(std::string_view(word).substr(blank + 1),
+                        {"msl", "amsl", "asl", "agl", "above ", "below "}))
+      word.resize(blank);
   if (isOneOf(word, {"m", "meter", "meters", "metre", "metres", "gpm"})) return 1e-3;
   if (isOneOf(word, {"km", "kilometer", "kilometers", "kilometre", "kilometres"})) return 1;
   if (isOneOf(word, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"})) return 1e-5;
@@ -90,6 +113,7 @@ std::optional<double> pascalsOf(const std::string& unit) {
   if (isOneOf(word, {"hpa", "mb", "mbar", "millibar", "millibars", "hectopascal", "hectopascals"}))
     return 100;
   if (isOneOf(word, {"kpa", "cb", "centibar"})) return 1000;
+  if (isOneOf(word, {"dbar", "decibar", "decibars"})) return 1e4;
   if (isOneOf(word, {"bar", "bars"})) return 1e5;
   return std::nullopt;
 }
@@ -99,8 +123,14 @@ bool growsDownwards(const NetcdfVariable& variable) {
   if (!positive.empty()) return positive == "down";
   const std::string standard_name = lowerCase(variable.text("standard_name")),
                     name = lowerCase(variable.name);
-  return standard_name.starts_with("depth") ||
-         (standard_name.empty() && beginsWithOneOf(name, {"dep", "gdep"}));
+  if (!standard_name.empty()) return standard_name.starts_with("depth");
+  return beginsWithOneOf(name, {"dep", "gdep", "nav_lev"}) || name.ends_with("_depth") ||
+         lowerCase(variable.text("long_name")).starts_with("depth");
+}
+
+double depthOfSeaPressure(double decibar) {
+  constexpr double kLinear = 8.545e-3, kSquare = 2.21e-6;
+  return (1 - kLinear) * decibar - kSquare * decibar * decibar;
 }
 
 namespace {

@@ -4,6 +4,7 @@
 // thread.
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -28,15 +29,27 @@ enum class CfRole {
 /// Source: CF conventions 1.10, chapter 4.
 CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable);
 
-/// The length of a unit in kilometres; nullopt if it is not a unit of length.
+/// Whether a unit says that there is none: "", "1", "-", "none", ...
+bool isUnitless(const std::string& unit);
+
+/// The length of a unit in kilometres, also of "meters MSL"; nullopt if it is not a unit of length.
 std::optional<double> kilometresOf(const std::string& unit);
 
 /// A unit of pressure in pascals; nullopt if it is not a unit of pressure.
 std::optional<double> pascalsOf(const std::string& unit);
 
+/// Whether a place on the Earth has these degrees, but for rounding. Fill values that no attribute names have none.
+inline bool isOnEarth(double longitude, double latitude) {
+  return std::abs(latitude) <= 91 && std::abs(longitude) <= 1080;
+}
+
 /// Whether the values of a vertical coordinate increase downwards: by its attribute `positive`, else by its
-/// name.
+/// names.
 bool growsDownwards(const NetcdfVariable& variable);
+
+/// The depth in metres at which sea water has a pressure, at 45 degrees of latitude.
+/// Source: P. M. Saunders, Practical Conversion of Pressure to Depth, J. Phys. Oceanogr. 11 (1981), 573-574.
+double depthOfSeaPressure(double decibar);
 
 /// The height of a pressure in the standard atmosphere, in metres above mean sea level; negative for more
 /// than 101,325 Pa. NaN unless `pascals` is above 0. Above 71 km the lapse rate of the topmost layer

@@ -90,6 +90,14 @@ std::optional<CfDimensions> dimensionsOf(const NetcdfFiles& file, const NetcdfVa
     dims.face = *face;
     space.erase(face);
   }
+  // Months or members, which come first: steps of a kind, if there is a single time.
+  if (space.size() == 4 && (!dims.time || file.dimensions()[*dims.time].length == 1)) {
+    const NetcdfVariable* const coordinate = file.find(file.dimensions()[space[0]].name);
+    if (!coordinate || cfRole(file, *coordinate) == CfRole::kNone) {
+      dims.time = space[0];
+      space.erase(space.begin());
+    }
+  }
   if (space.size() != 3 || std::set<size_t>(space.begin(), space.end()).size() != 3) return std::nullopt;
   dims.axes = {space[2], space[1], space[0]};
   return dims;
@@ -234,6 +242,8 @@ class GridFinder {
       }
     CfGrid grid;
     grid.dims = dims;
+    if (dims.time && !isTime(file_, *dims.time, variable.dims.size()) && !isLeadTime(file_, *dims.time))
+      grid.steps_of = file_.dimensions()[*dims.time].name;
     grid.variables.push_back(&variable);
     if (!setHorizontal(grid, variable, reason)) return std::nullopt;
     std::vector<size_t> levels;
@@ -268,7 +278,13 @@ class GridFinder {
       grid.latitude = *latitude;
       return true;
     };
-    if (set(CfRole::kLongitude, CfRole::kLatitude)) return !stacksFaces(grid, reason);
+    std::string implausible;
+    bool usable_indices = true;
+    if (set(CfRole::kLongitude, CfRole::kLatitude)) {
+      if (stacksFaces(grid, reason)) return false;
+      implausible = implausibleDegrees(grid, usable_indices);
+      if (implausible.empty()) return true;
+    }
     auto [projection, words] = MapProjection::of(file_, variable);
     if (set(CfRole::kGridLongitude, CfRole::kGridLatitude)) {
       if (projection && projection->degrees()) {
@@ -285,17 +301,67 @@ class GridFinder {
       if (projection && !projection->degrees()) grid.projection = std::move(projection);
       return true;
     }
-    reason = fmt::format("no longitude and latitude, or x and y, on its dimensions {}",
-                         describe(file_, grid.dims));
-    if (!by_index_ || grid.dims.face) return false;
+    reason = implausible.empty()
+                 ? fmt::format("no longitude and latitude, or x and y, on its dimensions {}",
+                               describe(file_, grid.dims))
+                 : implausible +
+                       ": lengths need a unit of length and the standard_name projection_x_coordinate (or y)";
+    if (!by_index_ || grid.dims.face || !usable_indices) return false;
     for (size_t axis = 0; axis < 2; ++axis)
       if (file_.find(file_.dimensions()[grid.dims.axes[axis]].name)) return false;
     grid.degrees = false;
     grid.indices = true;
+    grid.implausible = implausible;
     grid.unused = horizontalOfNodes(grid.dims);
     grid.longitude = CfTerm::ofIndex(0, indexSpacing(file_, 0));
     grid.latitude = CfTerm::ofIndex(1, indexSpacing(file_, 1));
     return true;
+  }
+
+  /// What no place on the Earth has at most of the nodes, or all nodes alike, as idealised runs of WRF write it; empty if there
+  /// is nothing wrong. Looks at five rows. `usable_indices`: false if the numbers are positions in another unit, and the files
+  /// do not state the distance of nodes either.
+  std::string implausibleDegrees(const CfGrid& grid, bool& usable_indices) const {
+    CfRange row{{0, 0, 0}, {1, 1, 1}};
+    std::vector<size_t> varying;
+    for (size_t axis = 0; axis < 3; ++axis)
+      if (grid.longitude.varies(axis) || grid.latitude.varies(axis)) varying.push_back(axis);
+    if (varying.size() != 2) return "";
+    const auto lengthAlong = [&](size_t axis) { return file_.dimensions()[grid.dims.axes[axis]].length; };
+    row.end[varying[0]] = lengthAlong(varying[0]);
+    std::array<std::vector<double>, 2> values;  // longitudes, latitudes
+    uint64_t wrong = 0, all = 0, missing = 0;
+    for (uint64_t part = 0; part < 5; ++part) {
+      row.begin[varying[1]] = part * (lengthAlong(varying[1]) - 1) / 4;
+      row.end[varying[1]] = row.begin[varying[1]] + 1;
+      const CfValues east = grid.longitude.read(file_, row), north = grid.latitude.read(file_, row);
+      for (uint64_t n = 0; n < lengthAlong(varying[0]); ++n) {
+        std::array<uint64_t, 3> at{};
+        at[varying[0]] = n;
+        const double longitude = east.at(at[0], at[1], at[2]), latitude = north.at(at[0], at[1], at[2]);
+        if (!std::isfinite(longitude) || !std::isfinite(latitude)) {
+          ++missing;
+          continue;
+        }
+        values[0].push_back(longitude);
+        values[1].push_back(latitude);
+        wrong += !isOnEarth(longitude, latitude);
+        ++all;
+      }
+    }
+    if (all < 2 || missing > all) return "";
+    const auto describeRange = [&](const CfTerm& term, const std::vector<double>& of) {
+      const auto [least, most] = std::minmax_element(of.begin(), of.end());
+      return fmt::format("{} is {:g} .. {:g}", term.variable().name, *least, *most);
+    };
+    const auto isConstant = [](const std::vector<double>& of) {
+      return std::all_of(of.begin(), of.end(), [&](double value) { return value == of[0]; });
+    };
+    const bool constant = isConstant(values[0]) && isConstant(values[1]);
+    if (!constant && 2 * wrong <= all) return "";
+    usable_indices = constant || file_.number("DX");
+    return fmt::format("{} and {}, which are no longitudes and latitudes of a grid in degrees",
+                       describeRange(grid.longitude, values[0]), describeRange(grid.latitude, values[1]));
   }
 
   /// Names of horizontal coordinates that differ from level to level.
@@ -344,8 +410,32 @@ void CfGrid::setFace(uint64_t number) {
   if (mask) mask->setFace(number);
 }
 
+bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const std::vector<CfGrid>& grids) {
+  if (cfRole(file, variable) != CfRole::kNone || CfMask::isMask(variable)) return false;
+  if (std::any_of(grids.begin(), grids.end(),
+                  [&](const CfGrid& grid) { return grid.vertical.uses(variable); }))
+    return false;
+  // NEMO's meshes: sizes and depths of cells at the points t, u, v, w and f.
+  const std::string name = lowerCase(variable.name);
+  const bool of_point = name.size() > 2 && std::string_view("tuvwf").find(name[2]) != std::string_view::npos;
+  if (of_point && (name.starts_with("e1") || name.starts_with("e2") || name.starts_with("e3"))) return false;
+  if (name.starts_with("gdep")) return false;
+  for (const NetcdfVariable& other : file.variables())
+    for (const char* const attribute : {"cell_measures", "formula_terms", "ancillary_variables"}) {
+      std::istringstream words(other.text(attribute));
+      for (std::string word; words >> word;)
+        if (word == variable.name) return false;
+    }
+  return true;
+}
+
 CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step) {
-  return GridFinder(file, time_step).find();
+  CfGrids found = GridFinder(file, time_step).find();
+  for (CfGrid& grid : found.grids)
+    std::stable_partition(grid.variables.begin(), grid.variables.end(), [&](const NetcdfVariable* variable) {
+      return isField(file, *variable, found.grids);
+    });
+  return found;
 }
 
 bool isOcean(const NetcdfFiles& file, const CfGrid& grid) {
@@ -375,7 +465,13 @@ CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
   for (size_t n = 0; n < time.length; ++n) times.values[n] = static_cast<double>(n);
   const NetcdfVariable* const coordinate = file.coordinateOf(*grid.dims.time, *grid.variables.front());
   if (coordinate && coordinate->numeric) {
-    file.read(*coordinate, {{0}, {time.length}}, times.values);
+    std::vector<double> stored(time.length);
+    file.read(*coordinate, {{0}, {time.length}}, stored);
+    // Of members or months the values need not increase; times that do not are refused where they are used.
+    const auto falls = [](double a, double b) { return !(a < b); };
+    if (!grid.steps_of.empty() && std::adjacent_find(stored.begin(), stored.end(), falls) != stored.end())
+      return times;
+    times.values = stored;
     times.unit = coordinate->text("units");
     times.calendar = lowerCase(coordinate->text("calendar"));
     return times;

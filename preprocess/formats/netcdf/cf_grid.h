@@ -22,9 +22,11 @@ struct CfGrid {
   std::optional<MapProjection> projection;  // of longitude and latitude, if these are the map's
   bool indices = false;                     // x, y and perhaps z have no coordinates but the nodes' indices
   std::vector<std::string> unused;          // variables of x and y that are not read: of three dimensions
+  std::string implausible;                  // why longitude and latitude are not read, if they are there
   CfVertical vertical;
   size_t levels = 2;  // the axis along which longitude and latitude do not vary
   std::optional<CfMask> mask;
+  std::string steps_of;  // the dimension whose values are the steps, if it is not one of time: "month"
 
   /// Of a grid of several faces (dims.face): whose nodes its terms read, from 0. At first those of the first.
   void setFace(uint64_t number);
@@ -40,6 +42,10 @@ struct CfGrids {
   std::vector<CfGrid> grids;  // in the order of their first variables
   std::vector<CfLeftOut> left_out;
 };
+
+/// Whether a variable is a field: not a coordinate or a mask, nor what heights, cells or maps are made of. `grids`: all of the
+/// files'.
+bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const std::vector<CfGrid>& grids);
 
 /// `time_step`: the step at which time-dependent variables are read; not checked. `file` must outlive the
 /// result.

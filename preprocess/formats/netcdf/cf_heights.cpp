@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <optional>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/cf_vertical.h"
@@ -62,11 +64,19 @@ void CfVertical::setFace(uint64_t face) {
     if (*term) (*term)->setFace(face);
 }
 
+bool CfVertical::uses(const NetcdfVariable& variable) const {
+  const auto is = [&](const CfTerm& term) { return &term.variable() == &variable; };
+  const std::optional<CfTerm>* const terms[] = {&s_, &c_, &eta_, &depth_, &c2_, &depth2_};
+  return std::any_of(terms_.begin(), terms_.end(), is) ||
+         std::any_of(std::begin(terms), std::end(terms),
+                     [&](const auto* term) { return *term && is(**term); });
+}
+
 bool CfVertical::readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const {
   if (kind_ != Kind::kLevels || !terms_[0].ofNodes()) return false;
   const NetcdfBox box = terms_[0].boxOf(range);
   file.read(terms_[0].variable(), box, to);
-  for (double& value : to.first(box.values())) value *= scale_;
+  for (double& value : to.first(box.values())) value = scale_ * value + offset_;
   return true;
 }
 
@@ -79,7 +89,9 @@ CfValues CfVertical::heights(const NetcdfFiles& file, const CfRange& range) cons
       for (size_t v = 0; v < heights.values.size(); ++v) heights.values[v] += more.values[v];
     }
     for (double& value : heights.values)
-      value = kind_ == Kind::kPressure ? 1e-3 * standardAltitude(scale_ * value) : scale_ * value;
+      value = kind_ == Kind::kPressure      ? 1e-3 * standardAltitude(scale_ * value)
+              : kind_ == Kind::kSeaPressure ? -1e-3 * depthOfSeaPressure(scale_ * value)
+                                            : scale_ * value + offset_;
     return heights;
   }
   return formulaHeights(file, range);

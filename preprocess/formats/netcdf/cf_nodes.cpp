@@ -95,8 +95,10 @@ void CfNodes::readColumns(const CfRange& range, std::vector<GlobeColumn>& column
   for (uint64_t k = 0; k < planes; ++k)
     for (uint64_t j = 0; j < lengthOf(range, 1); ++j)
       for (uint64_t i = 0; i < lengthOf(range, 0); ++i) {
-        x.push_back(scale * east.at(i, j, k));
-        y.push_back(scale * north.at(i, j, k));
+        const double longitude = east.at(i, j, k), latitude = north.at(i, j, k);
+        const bool nowhere = grid_.degrees && !grid_.projection && !isOnEarth(longitude, latitude);
+        x.push_back(nowhere ? std::nan("") : scale * longitude);
+        y.push_back(nowhere ? std::nan("") : scale * latitude);
       }
   if (projects()) {
     if (!grid_.degrees)  // PROJ's lengths are metres

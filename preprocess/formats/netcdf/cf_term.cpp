@@ -259,9 +259,9 @@ std::optional<CfMask> CfMask::of(const NetcdfFiles& files, const NetcdfVariable&
     const auto term = CfTerm::of(files, candidate, block);
     if (!term || !term->onNodes() || term->axes() < 2) continue;
     if (rule == Rule::kLevels && term->varies(levels)) continue;
-    // Its own dimensions before dimensions of their lengths; masks of all levels before those of the
-    // surface.
-    const int rank = 1 + (term->exact() ? 2 : 0) + (term->axes() == 3 ? 1 : 0);
+    // Masks of all levels before those of the surface, though NEMO's have levels of another name (nav_lev); then its own
+    // dimensions before dimensions of their lengths.
+    const int rank = 1 + (term->axes() == 3 ? 2 : 0) + (term->exact() ? 1 : 0);
     if (rank <= best_rank) continue;
     best_rank = rank;
     CfMask mask;

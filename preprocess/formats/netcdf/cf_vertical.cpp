@@ -16,6 +16,7 @@ namespace {
 constexpr double kWrfGravity = 9.81;
 constexpr double kStandardGravity = 9.80665;
 constexpr double kSeaLevelPressure = 101325;
+constexpr double kEarthRadius = 6371;  // kilometres
 
 /// "s: s_rho C: Cs_r" as {s: s_rho, C: Cs_r}.
 std::map<std::string, std::string> formulaTerms(const std::string& text) {
@@ -27,12 +28,61 @@ std::map<std::string, std::string> formulaTerms(const std::string& text) {
   return terms;
 }
 
+/// Variables that stand for a term whose own variable is in another file: names differ between files of a model.
+struct TermNames {
+  const char *key, *standard_name;
+  std::initializer_list<const char*> names;
+};
+const TermNames kTermNames[] = {
+    {"ps", "surface_air_pressure", {"PS", "ps", "aps", "PSFC", "sp"}},
+    {"orog", "surface_altitude", {"orog", "surface_altitude", "HSURF", "topo"}},
+    {"depth", "sea_floor_depth_below_geoid", {"h", "bathymetry", "deptho"}},
+    {"eta", "sea_surface_height_above_geoid", {"zeta", "ssh", "zos"}},
+};
+
+const NetcdfVariable* standIn(const NetcdfFiles& file, const std::string& key, const CfDimensions& block) {
+  for (const TermNames& term : kTermNames) {
+    if (key != term.key) continue;
+    const auto of_columns = [&](const NetcdfVariable& variable) {
+      const auto found = variable.numeric ? CfTerm::of(file, variable, block) : std::nullopt;
+      return found && found->axes() == 2;
+    };
+    for (const NetcdfVariable& variable : file.variables())
+      if (variable.text("standard_name") == term.standard_name && of_columns(variable)) return &variable;
+    for (const char* const name : term.names)
+      if (const NetcdfVariable* const variable = file.find(name); variable && of_columns(*variable))
+        return variable;
+  }
+  return nullptr;
+}
+
 std::optional<CfTerm> termNamed(const NetcdfFiles& file, const std::map<std::string, std::string>& terms,
                                 const char* key, const CfDimensions& block) {
   const auto name = terms.find(key);
-  const NetcdfVariable* const variable = name == terms.end() ? nullptr : file.find(name->second);
+  if (name == terms.end()) return std::nullopt;
+  const NetcdfVariable* variable = file.find(name->second);
+  if (!variable) variable = standIn(file, key, block);
   if (!variable || !variable->numeric) return std::nullopt;
   return CfTerm::of(file, *variable, block);
+}
+
+/// Whether any variable is a longitude: then lengths are those of the Earth's.
+bool isGeographic(const NetcdfFiles& file) {
+  return std::any_of(file.variables().begin(), file.variables().end(), [&](const NetcdfVariable& variable) {
+    return cfRole(file, variable) == CfRole::kLongitude;
+  });
+}
+
+/// Terrain-following coordinates by their names: sigma, eta, ZNU, s_rho.
+bool namesSigma(const NetcdfVariable& coordinate) {
+  for (const std::string& words :
+       {coordinate.name, coordinate.text("standard_name"), coordinate.text("long_name")}) {
+    const std::string text = lowerCase(words);
+    for (const char* const word : {"sigma", "eta", "znu", "znw", "s_rho", "s_w", "hybrid"})
+      if (text.starts_with(word) || text.find(std::string(" ") + word) != std::string::npos) return true;
+    if (text.find("sigma") != std::string::npos || text.starts_with("ocean_s_")) return true;
+  }
+  return false;
 }
 
 /// The value of a scalar term.
@@ -57,8 +107,17 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
   if (auto found = byNodeGeopotential(file, block)) return {std::move(found), ""};
   const NetcdfVariable* const along = file.find(levels);
   if (along && !along->text("units").empty()) reason = notALength(*along);
-  if (along && !along->text("formula_terms").empty())
-    if (auto found = byFormula(file, *along, block, axis, reason)) return {std::move(found), ""};
+  // The formula may be that of the dimension's coordinate, or of another one along it (the levels' heights beside their numbers).
+  std::vector<const NetcdfVariable*> formulas;
+  if (along) formulas.push_back(along);
+  for (const NetcdfVariable& other : file.variables()) formulas.push_back(&other);
+  for (const NetcdfVariable* const coordinate : formulas) {
+    if (coordinate->text("formula_terms").empty() || !coordinate->numeric) continue;
+    const auto term = CfTerm::of(file, *coordinate, block);
+    if (coordinate != along && !(term && term->exact() && term->axes() == 1 && term->varies(axis))) continue;
+    if (auto found = byFormula(file, *coordinate, block, axis, reason)) return {std::move(found), ""};
+  }
+  if (auto found = byNamesOfTerms(file, block, axis)) return {std::move(found), ""};
 
   // Variables in its own `coordinates` attribute come first.
   Candidates candidates;
@@ -86,6 +145,10 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
       return {std::move(found), ""};
   }
   if (auto found = byThickness(file, block, axis)) return {std::move(found), ""};
+  if (auto found = byNamesOfFields(file, block, axis)) return {std::move(found), ""};
+  if (along && along->numeric && kilometresOf(along->text("units")))
+    if (const auto term = CfTerm::of(file, *along, block); term && term->axes() == 1)
+      if (auto found = byLevels(file, *along, *term, axis, reason)) return {std::move(found), ""};
   return {std::nullopt, reason};
 }
 
@@ -123,32 +186,124 @@ std::optional<CfVertical> CfVertical::byLevels(const NetcdfFiles& file, const Ne
   vertical.description_ = coordinate.name;
   // The levels of a formula have pressures as nominal values; ROMS' and sigma levels have no unit.
   const bool formula = !coordinate.text("formula_terms").empty();
+  const auto warnOfFormula = [&](const char* nominal) {
+    if (formula) vertical.warnings_.push_back(fmt::format("{}; its nominal {} are taken", reason, nominal));
+  };
   if (pascals) {
-    vertical.kind_ = Kind::kPressure;
-    vertical.scale_ = *pascals;
-    vertical.description_ += " (pressure, at heights of the standard atmosphere)";
-    if (formula) vertical.warnings_.push_back(fmt::format("{}; its nominal pressures are taken", reason));
+    const bool of_sea =
+        *pascals == pascalsOf("dbar") || coordinate.text("standard_name") == "sea_water_pressure";
+    vertical.kind_ = of_sea ? Kind::kSeaPressure : Kind::kPressure;
+    vertical.scale_ = *pascals / (of_sea ? 1e4 : 1);
+    vertical.description_ +=
+        of_sea ? " (pressure of sea water)" : " (pressure, at heights of the standard atmosphere)";
+    warnOfFormula("pressures");
     return vertical;
   }
   const bool vague = lowerCase(coordinate.name).starts_with("lev") ||
                      coordinate.text("standard_name") == "model_level_number";
-  if (!kilometres && (!units.empty() || formula || vague)) {
+  if (!kilometres && (!isUnitless(units) || formula || vague)) {
     reason = notALength(coordinate);
     return std::nullopt;
   }
   vertical.scale_ = kilometres.value_or(1e-3) * (growsDownwards(coordinate) ? -1 : 1);
-  if (vertical.scale_ < 0 && coordinate.text("positive").empty() && term.axes() == 1) {
-    // Depths that fall from 0 are heights, whatever their name.
-    CfRange all;
-    for (size_t along = 0; along < 3; ++along) all.end[along] = 1;
-    all.end[axis] = file.dimension(coordinate, term.dimensionOf(axis)).length;
-    const std::vector<double> values = term.read(file, all).values;
-    if (std::all_of(values.begin(), values.end(), [](double value) { return value <= 0; }))
-      vertical.scale_ = -vertical.scale_;
-  }
+  if (term.axes() == 1)
+    if (std::string wrong = vertical.setPlausible(file, coordinate, axis); !wrong.empty()) {
+      reason = std::move(wrong);
+      return std::nullopt;
+    }
   if (!kilometres)
     vertical.warnings_.push_back(fmt::format("{} has no units; metres are assumed", coordinate.name));
+  warnOfFormula("heights");
   return vertical;
+}
+
+/// Looks at the levels: distances from the Earth's centre become heights, and so do depths that are all negative. Returns
+/// why the values are no lengths, or nothing.
+std::string CfVertical::setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate, size_t axis) {
+  const CfTerm& term = terms_[0];
+  CfRange all{{0, 0, 0}, {1, 1, 1}};
+  all.end[axis] = file.dimension(coordinate, term.dimensionOf(axis)).length;
+  const std::vector<double> values = term.read(file, all).values;
+  const auto [least, most] = std::minmax_element(values.begin(), values.end());
+  const std::string name = lowerCase(coordinate.name);
+  if (!kilometresOf(coordinate.text("units")) &&
+      (namesSigma(coordinate) || (std::abs(*least) <= 1 && std::abs(*most) <= 1 && isGeographic(file))))
+    return fmt::format(
+        "{} has no unit, and its values from {:g} to {:g} are no lengths, but those of a sigma or hybrid "
+        "coordinate; "
+        "expected its formula_terms, or heights of the nodes, in this file or in one given after it",
+        coordinate.name, *least, *most);
+  if (scale_ < 0 && *most <= 0) {
+    // Depths that fall from 0 are heights, whatever their name.
+    scale_ = -scale_;
+    if (!coordinate.text("positive").empty())
+      warnings_.push_back(fmt::format(
+          "{} is positive down, but its values are from {:g} to {:g}; they are taken for heights, "
+          "below the surface",
+          coordinate.name, *least, *most));
+  }
+  if (scale_ > 0 && name.starts_with("rad") && scale_ * *least > 0 && isGeographic(file)) {
+    offset_ = -kEarthRadius;
+    description_ += " (from the Earth's centre)";
+  }
+  return "";
+}
+
+/// Formulas without formula_terms, by the names that models give to their terms.
+std::optional<CfVertical> CfVertical::byNamesOfTerms(const NetcdfFiles& file, const CfDimensions& block,
+                                                     size_t axis) {
+  const auto along = [&](std::initializer_list<const char*> names) -> std::string {
+    for (const char* const name : names) {
+      const NetcdfVariable* const variable = file.find(name);
+      const auto term = variable && variable->numeric ? CfTerm::of(file, *variable, block) : std::nullopt;
+      if (term && term->exact() && term->axes() == 1 && term->varies(axis)) return name;
+    }
+    return "";
+  };
+  const auto named = [](std::optional<CfVertical> found, const std::string& terms) {
+    if (found) found->description_ = fmt::format("formula of {}{}", terms, found->description_);
+    return found;
+  };
+  std::string reason;
+  const std::string s = along({"s_rho", "s_w", "sc_r", "sc_w"}), c = along({"Cs_r", "Cs_w"});
+  if (!s.empty() && !c.empty() && file.find("hc") && standIn(file, "depth", block))
+    return named(
+        ofTerms(file, Kind::kS, {{"s", s}, {"C", c}, {"eta", "zeta"}, {"depth", "h"}, {"depth_c", "hc"}},
+                block, axis, reason),
+        s);
+  const std::string a = along({"hyam", "hyai", "ap", "A", "a"}), b = along({"hybm", "hybi", "b", "B"});
+  if (!a.empty() && !b.empty() && standIn(file, "ps", block))
+    return named(
+        ofTerms(
+            file, Kind::kHybridPressure,
+            {{pascalsOf(file.find(a)->text("units")) ? "ap" : "a", a}, {"b", b}, {"p0", "P0"}, {"ps", "PS"}},
+            block, axis, reason),
+        a + " and " + b);
+  return std::nullopt;
+}
+
+/// Heights and pressures of nodes that only their names tell, beside numbered levels: met_em's GHT and PRES.
+std::optional<CfVertical> CfVertical::byNamesOfFields(const NetcdfFiles& file, const CfDimensions& block,
+                                                      size_t axis) {
+  for (const bool pressure : {false, true})
+    for (const char* const name : {"GHT", "ght", "gh", "zg", "height", "PRES", "pres", "pressure"}) {
+      const NetcdfVariable* const variable = file.find(name);
+      if (!variable || !variable->numeric) continue;
+      const std::string unit = variable->text("units");
+      const auto kilometres = kilometresOf(unit), pascals = pascalsOf(unit);
+      const auto term = CfTerm::of(file, *variable, block);
+      if (!(pressure ? pascals : kilometres) || !term || !term->exact() || term->axes() != 3 ||
+          !term->varies(axis))
+        continue;
+      CfVertical vertical;
+      vertical.terms_.push_back(*term);
+      vertical.kind_ = pressure ? Kind::kPressure : Kind::kLevels;
+      vertical.scale_ = pressure ? *pascals : *kilometres;
+      vertical.description_ = name;
+      if (pressure) vertical.description_ += " (pressure, at heights of the standard atmosphere)";
+      return vertical;
+    }
+  return std::nullopt;
 }
 
 std::optional<CfVertical> CfVertical::byNodeGeopotential(const NetcdfFiles& file, const CfDimensions& block) {
@@ -248,9 +403,20 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFiles& file, const N
                          name.empty() ? "no standard_name" : name);
     return std::nullopt;
   }
-  const Terms terms = formulaTerms(coordinate.text("formula_terms"));
+  std::string lacking;
+  auto found =
+      ofTerms(file, kind->second, formulaTerms(coordinate.text("formula_terms")), block, axis, lacking);
+  if (!found)
+    reason = fmt::format("the formula of {} has no term '{}' on these dimensions", coordinate.name, lacking);
+  else
+    found->description_ = fmt::format("{} of {}{}", name, coordinate.name, found->description_);
+  return found;
+}
+
+std::optional<CfVertical> CfVertical::ofTerms(const NetcdfFiles& file, Kind kind, const Terms& terms,
+                                              const CfDimensions& block, size_t axis, std::string& lacking) {
   CfVertical vertical;
-  vertical.kind_ = kind->second;
+  vertical.kind_ = kind;
   // ROMS and CROCO call theirs ocean_s_coordinate too; the stretching C tells them apart.
   if (vertical.kind_ == Kind::kS && terms.contains("C") && !terms.contains("a")) {
     const NetcdfVariable* const transform = file.find("Vtransform");
@@ -259,13 +425,12 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFiles& file, const N
     vertical.kind_ = second ? Kind::kSG2 : Kind::kSG1;
   }
   const bool air = vertical.kind_ == Kind::kHybridHeight || vertical.ofPressure();
-  vertical.description_ = name + " of " + coordinate.name;
-  if (vertical.ofPressure()) vertical.description_ += " (pressure, at heights of the standard atmosphere)";
-  const char* lacking = "";
-  if (vertical.kind_ == Kind::kSleve ? !vertical.setSleveTerms(file, terms, block, axis, lacking)
-      : air                          ? !vertical.setAirTerms(file, terms, block, axis, lacking)
-                                     : !vertical.setOceanTerms(file, terms, block, axis, lacking)) {
-    reason = fmt::format("the formula of {} has no term '{}' on these dimensions", coordinate.name, lacking);
+  if (vertical.ofPressure()) vertical.description_ = " (pressure, at heights of the standard atmosphere)";
+  const char* lacks = "";
+  if (vertical.kind_ == Kind::kSleve ? !vertical.setSleveTerms(file, terms, block, axis, lacks)
+      : air                          ? !vertical.setAirTerms(file, terms, block, axis, lacks)
+                                     : !vertical.setOceanTerms(file, terms, block, axis, lacks)) {
+    lacking = lacks;
     return std::nullopt;
   }
   return vertical;

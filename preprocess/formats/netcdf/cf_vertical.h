@@ -26,9 +26,10 @@ class CfVertical {
   /// The vertical coordinate of `variable`, whose block has its levels along `axis`; or nullopt and a
   /// reason.
   ///
-  /// Tried in this order: the geopotential of every node; a formula of the coordinate along the axis; the
-  /// height or pressure of every node; WRF's geopotential (PH and PHB); the height of the layers'
-  /// interfaces; the height or pressure of every level; the thickness of the layers.
+  /// Tried in this order: the geopotential of every node; a formula of a coordinate along the axis, or one whose
+  /// terms have the names that models give them; the height or pressure of every node; WRF's geopotential (PH and
+  /// PHB); the height of the layers' interfaces; the height or pressure of every level; the thickness of the layers;
+  /// heights and pressures of nodes by name (met_em's GHT), and lengths of levels that nothing calls heights.
   static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFiles& file,
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& block, size_t axis);
@@ -43,6 +44,11 @@ class CfVertical {
   /// `to` and returns true, without a buffer. Else returns false.
   bool readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const;
 
+  /// The globe's, which is subtracted from levels that are distances from the Earth's centre.
+  void setRadius(double kilometres) {
+    if (offset_ != 0) offset_ = -kilometres;
+  }
+
   /// Of a grid of several faces: whose heights are read.
   void setFace(uint64_t face);
 
@@ -50,6 +56,9 @@ class CfVertical {
     return description_;
   }  // "depth", "ocean_s_coordinate_g2 of s_rho"
   const std::vector<std::string>& warnings() const { return warnings_; }
+
+  /// Whether the heights are made of this variable.
+  bool uses(const NetcdfVariable& variable) const;
 
  private:
   enum class Kind {
@@ -63,6 +72,7 @@ class CfVertical {
     kDoubleSigma,
     kHybridHeight,
     kSleve,
+    kSeaPressure,
     kPressure,
     kLogPressure,
     kSigmaPressure,
@@ -82,6 +92,13 @@ class CfVertical {
                                                 const Wanted& wanted, std::string& reason);
   static std::optional<CfVertical> byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,
                                              const CfDimensions& block, size_t axis, std::string& reason);
+  static std::optional<CfVertical> ofTerms(const NetcdfFiles& file, Kind kind, const Terms& terms,
+                                           const CfDimensions& block, size_t axis, std::string& lacking);
+  static std::optional<CfVertical> byNamesOfTerms(const NetcdfFiles& file, const CfDimensions& block,
+                                                  size_t axis);
+  static std::optional<CfVertical> byNamesOfFields(const NetcdfFiles& file, const CfDimensions& block,
+                                                   size_t axis);
+  std::string setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate, size_t axis);
   static std::optional<CfVertical> byNodeGeopotential(const NetcdfFiles& file, const CfDimensions& block);
   static std::optional<CfVertical> byGeopotential(const NetcdfFiles& file, const CfDimensions& block);
   static std::optional<CfVertical> byInterfaces(const NetcdfFiles& file, const CfDimensions& block,
@@ -110,6 +127,7 @@ class CfVertical {
 
   Kind kind_ = Kind::kLevels;
   double scale_ = 1;                           // converts stored values to kilometres upwards
+  double offset_ = 0;                          // kLevels: kilometres, added then
   std::vector<CfTerm> terms_;                  // height: one; geopotential: base and perturbation
   std::optional<CfTerm> s_, c_, eta_, depth_;  // terms of a formula; of the air: a, b, -, surface
   std::optional<CfTerm> c2_, depth2_;          // kSleve: b2 and zsurf2

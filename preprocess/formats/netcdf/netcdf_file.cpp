@@ -12,11 +12,32 @@
 
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
+#include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/netcdf/netcdf_structure.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
+
+/// Attributes that are numbers by the conventions; some programs write them as text: missing_value = "-999".
+constexpr std::string_view kNumericAttributes[] = {"_FillValue",  "missing_value", "scale_factor",
+                                                   "add_offset",  "valid_min",     "valid_max",
+                                                   "valid_range", "flag_values",   "start_index"};
+
+/// Adds the numbers of a text that consists of numbers alone, separated by blanks or commas.
+void addNumbersOfText(NetcdfAttribute& attribute) {
+  std::string text = attribute.text;
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::vector<double> numbers;
+  for (std::string_view word : wordsOf(text)) {
+    double number = 0;
+    if (word.ends_with('f') || word.ends_with('F')) word.remove_suffix(1);
+    if (!parseNumber(word, number)) return;
+    numbers.push_back(number);
+  }
+  attribute.numbers.insert(attribute.numbers.end(), numbers.begin(), numbers.end());
+}
 
 // For each open variable: the rows of a slab usually lie in a few chunks.
 constexpr size_t kChunkCacheBytes = size_t{2} << 20;
@@ -228,6 +249,9 @@ void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) con
       status = nc_get_att_double(file_, id, name, attribute.numbers.data());
     }
     if (status != NC_NOERR) fail(fmt::format("attribute {} of {}", name, variable.name), status);
+    if (std::find(std::begin(kNumericAttributes), std::end(kNumericAttributes), std::string_view(name)) !=
+        std::end(kNumericAttributes))
+      addNumbersOfText(attribute);
     variable.attributes[name] = std::move(attribute);
   }
 }

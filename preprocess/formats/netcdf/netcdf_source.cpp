@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
+#include <tuple>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/closed_grid.h"
@@ -37,6 +39,7 @@ std::string listDimensions(const NetcdfFiles& file, const CfGrid& grid) {
 
 /// Why the indices of the nodes take the place of coordinates.
 std::string missingCoordinates(const NetcdfFiles& file, const CfGrid& grid) {
+  if (!grid.implausible.empty()) return grid.implausible;
   if (grid.unused.empty())
     return fmt::format("the dimensions {} have no coordinates", listDimensions(file, grid));
   return fmt::format("{} {} three dimensions, expected one or two, and {} not used",
@@ -79,6 +82,7 @@ NetcdfSource::NetcdfSource(const OpenGridOptions& options, const NetcdfSource* b
     : file_(filesOf(options)),
       grid_(chooseGrid(file_, options, description_, mask_)),
       globe_(beside ? beside->globe_ : globeOf(options.globe)) {
+  grid_.vertical.setRadius(options.globe.radius_km);
   const uint64_t faces = grid_.dims.face ? file_.dimensions()[*grid_.dims.face].length : 1;
   for (uint64_t face = 0; face < faces; ++face) {
     CfGrid grid = grid_;
@@ -87,6 +91,42 @@ NetcdfSource::NetcdfSource(const OpenGridOptions& options, const NetcdfSource* b
   }
   describe(options);
 }
+
+namespace {
+
+/// The variable that comes nearest to a grid's, and what it lacks.
+std::string nearestToGrid(const NetcdfFiles& file) {
+  const NetcdfVariable* nearest = nullptr;
+  std::vector<std::string> dims;
+  std::set<std::string> bounds;
+  for (const NetcdfVariable& variable : file.variables()) bounds.insert(variable.text("bounds"));
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (bounds.contains(variable.name) || cfRole(file, variable) != CfRole::kNone) continue;
+    std::vector<std::string> names;
+    for (size_t axis = 0; axis < variable.dims.size(); ++axis) {
+      const NetcdfDimension& dim = file.dimension(variable, axis);
+      const NetcdfVariable* const coordinate = file.find(dim.name);
+      const bool time = coordinate && cfRole(file, *coordinate) == CfRole::kTime;
+      if (dim.length > 1 && !time) names.push_back(dim.name);
+    }
+    if (!variable.numeric || (nearest && names.size() <= dims.size())) continue;
+    nearest = &variable;
+    dims = names;
+  }
+  if (!nearest || dims.empty()) return "no variable has three dimensions in space";
+  std::string text = fmt::format("no variable has three dimensions in space; {} has {} ({})", nearest->name,
+                                 dims.size(), fmt::join(dims, ", "));
+  for (const NetcdfVariable& variable : file.variables())
+    if (dims.size() == 2 && variable.dims.size() == 1 && file.dimension(variable, 0).name == dims.back() &&
+        cfRole(file, variable) == CfRole::kLongitude && variable.name != dims.back())
+      return text +
+             fmt::format(
+                 ", the cells of an unstructured map: give the grid file that has their faces after it "
+                 "(ICON's icon_grid.nc, MPAS' or UGRID's mesh)");
+  return text;
+}
+
+}  // namespace
 
 CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& options,
                                 GridDescription& description, size_t& mask) {
@@ -97,7 +137,7 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
                   file.plainHdf5() ? "describe its arrays in an XDMF file (.xmf), or write NetCDF-4 or CGNS"
                                    : "structured grids are read, and UGRID, ICON and MPAS in files that have "
                                      "their faces and nodes");
-    std::string why = "no variable has three dimensions in space";
+    std::string why = nearestToGrid(file);
     if (!file.groups().empty())
       why = fmt::format(
           "its variables are in groups ({}), which are not read: write a group to a file of its own (ncks -G "
@@ -111,9 +151,19 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     throw Error("{}: has no grid by the CF conventions: {}", file.path().string(), why);
   }
 
+  // The grid of most of the first file's fields, which is that of the data; masks and meshes are in further files.
+  const auto fieldsOf = [&](const CfGrid& grid) {
+    size_t first = 0, all = 0;
+    for (const NetcdfVariable* variable : grid.variables)
+      if (isField(file, *variable, found.grids)) {
+        ++all;
+        first += variable->file == 0;
+      }
+    return std::tuple(first, all, grid.variables.size());
+  };
   size_t chosen = 0;
   for (size_t g = 1; g < found.grids.size(); ++g)
-    if (found.grids[g].variables.size() > found.grids[chosen].variables.size()) chosen = g;
+    if (fieldsOf(found.grids[g]) > fieldsOf(found.grids[chosen])) chosen = g;
   std::string chooser;
   for (const std::string& name : options.scalars) {
     const auto position = positionOf(found.grids, name);
@@ -198,6 +248,10 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
         fmt::format("{}{}", description_.blanking.empty() ? "" : ", or where ", grid_.mask->description());
   for (const auto* warnings : {&grid_.vertical.warnings(), &file_.duplicates()})
     description_.warnings.insert(description_.warnings.end(), warnings->begin(), warnings->end());
+  if (!grid_.degrees && !grid_.indices && isUnitless(grid_.longitude.variable().text("units")))
+    description_.warnings.push_back(fmt::format("{} and {} have no unit of length; metres are assumed",
+                                                grid_.longitude.variable().name,
+                                                grid_.latitude.variable().name));
   if (grid_.indices)
     description_.warnings.push_back(
         fmt::format("{}; the indices of the nodes take their place", missingCoordinates(file_, grid_)));
@@ -211,6 +265,9 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
       fmt::format("{}, {}, {}{} {}, vertical {} times {:g}, in km", file_.kind(),
                   grid_.longitude.variable().name, grid_.latitude.variable().name, projection, shape,
                   grid_.vertical.description(), options.globe.vertical_scale);
+  if (!grid_.steps_of.empty())
+    description_.notes.push_back(
+        fmt::format("the steps are the {} values of {}", description_.times.size(), grid_.steps_of));
   if (grid_.dims.time)
     description_.format +=
         fmt::format(", time step {} of {}", description_.time_step, description_.times.size());

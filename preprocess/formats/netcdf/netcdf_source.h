@@ -2,8 +2,9 @@
 // GridSource of one time step: of one block, or of one for each face of a cubed sphere and the like.
 //
 // If a file has several grids (a staggered mesh), the source uses that of the first scalar that the user
-// requests, else the grid with the most variables; warnings list the others. Nodes where that scalar (else
-// the grid's first) is missing, or that the files' mask hides, are blanked; where another scalar is missing, it is NaN.
+// requests, else the grid with most fields of the first file; warnings list the others. Nodes where that scalar (else
+// the grid's first) is missing, or that the files' mask hides, are blanked; where another scalar is missing, it is NaN. So
+// fields that models fill with zeros on land are not drawn there.
 //
 // NetCDF is not thread-safe: reads by several threads run one after the other.
 #pragma once

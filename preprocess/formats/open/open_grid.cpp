@@ -49,6 +49,8 @@ using namespace std::string_view_literals;
 
 constexpr uint64_t kLooked = 16 << 10;  // more than the comments before a text file's data
 
+constexpr const char* kUtf16 = "text in UTF-16, which is not read (iconv -f UTF-16 -t UTF-8 FILE)";
+
 constexpr Magic kMagics[] = {
     {"# vtk DataFile"sv, "a legacy VTK file"},
     {"<VTKFile"sv, "a VTK XML file"},
@@ -68,9 +70,15 @@ constexpr Magic kMagics[] = {
     {"MATLAB 7.3 MAT-file"sv, "a MATLAB file (HDF5), whose arrays an XDMF file has to describe"},
     {"\x93NUMPY"sv, "a NumPy array without a grid, which is not read (an XDMF file describes arrays)"},
     {"$MeshFormat"sv, "a Gmsh mesh, which is not read (meshio convert FILE mesh.vtu)"},
-    {"(0 \""sv, "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)"},
-    {"(1 \""sv, "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)"},
-    {"GRIB"sv, "a GRIB file, which is not read"},
+    {"\0\0\0\x10"
+     "FILEHEAD"sv,
+     "an ECLIPSE grid (EGRID), which is not read"},
+    {"\0\0\0\x10"
+     "DIMENS  "sv,
+     "an ECLIPSE grid (GRID), which is not read"},
+    {"\xff\xfe"sv, kUtf16},
+    {"\xfe\xff"sv, kUtf16},
+    {"#std "sv, "a field file of Nek5000, which is not read (save it as VTK with VisIt or pymech)"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
     {"{"sv,
      "a JSON file, but no .p3d file that can be read (one is given alone, instead of the grid; it has no "
@@ -148,6 +156,35 @@ bool isAvsUcd(std::string_view begin) {
   return in_turn && seen >= kSufficient && seen <= nodes;
 }
 
+/// A section of Fluent's: a number in parentheses with text, or more numbers, behind it.
+bool isFluent(std::string_view begin) {
+  begin = trimmed(begin);
+  return begin.size() > 3 && begin[0] == '(' && begin[1] >= '0' && begin[1] <= '9' &&
+         (begin[2] == ' ' || (begin[2] >= '0' && begin[2] <= '9'));
+}
+
+/// Two lines of description, then how nodes and elements are numbered. What follows tells EnSight 6 from Gold.
+std::optional<std::string> ensightGeometry(std::string_view begin) {
+  std::array<std::string_view, 6> lines;
+  for (std::string_view& line : lines) {
+    const size_t end = std::min(begin.find('\n'), begin.size());
+    line = trimmed(begin.substr(0, end));
+    begin.remove_prefix(std::min(end + 1, begin.size()));
+  }
+  if (!lines[2].starts_with("node id") || !lines[3].starts_with("element id")) return std::nullopt;
+  if (lines[4] == "coordinates")
+    return "a geometry of EnSight 6, which is not read (save it as EnSight Gold)";
+  return "an EnSight geometry file (give its case file instead)";
+}
+
+/// A section of ECLIPSE's text alone on a line, among the first ones.
+bool isEclipseText(std::string_view begin) {
+  for (std::string_view line = nextLine(begin, '-'); !line.empty(); line = nextLine(begin, '-'))
+    for (const std::string_view section : {"specgrid", "coord", "zcorn", "dimens", "mapaxes", "runspec"})
+      if (line == section) return true;
+  return false;
+}
+
 /// The formats that are text, by the words that they begin with. `begin`: the first bytes of the file.
 std::optional<std::string> foreignText(std::string begin) {
   if (std::any_of(begin.begin(), begin.end(), [](char c) { return c == '\0'; })) return std::nullopt;
@@ -157,6 +194,13 @@ std::optional<std::string> foreignText(std::string begin) {
     return "an Abaqus mesh, which is not read (meshio convert FILE mesh.vtu)";
   if (begin.starts_with("meshversionformatted"))
     return "a Medit mesh, which is not read (meshio convert FILE mesh.vtu)";
+  if (isFluent(begin)) return "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)";
+  if (auto geometry = ensightGeometry(begin)) return geometry;
+  if (isEclipseText(begin)) return "an ECLIPSE grid (GRDECL), which is not read";
+  if (begin.starts_with("foamfile") || begin.find("\nfoamfile\n") != std::string::npos)
+    return "a file of an OpenFOAM case (give the case's folder instead)";
+  if (begin.starts_with("solid ") || begin.starts_with("ply\n"))
+    return "a surface without a volume (render --surface FILE draws it)";
   if (isNastran(begin)) return "a Nastran mesh, which is not read (meshio convert FILE mesh.vtu)";
   if (isAvsUcd(begin)) return "an AVS UCD mesh, which is not read (meshio convert FILE mesh.vtu)";
   return std::nullopt;
@@ -166,8 +210,25 @@ std::optional<std::string> foreignText(std::string begin) {
 std::optional<std::string> foreignFormat(const InputFile& file) {
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
   file.readAt(0, std::span(begin.data(), begin.size()));
+  if (const size_t grib = begin.substr(0, 256).find("GRIB");
+      grib != std::string::npos &&
+      (grib == 0 || (grib + 8 < begin.size() && (begin[grib + 7] == 1 || begin[grib + 7] == 2))))
+    return "a GRIB file, which is not read (cdo -f nc copy FILE OUT.nc, or grib_to_netcdf, makes NetCDF of "
+           "it)";
+  // HDF5 may begin behind 512, 1024, ... bytes of a program's own.
+  for (size_t block = 512; block + 8 <= begin.size(); block *= 2)
+    if (begin.substr(block, 8) == "\x89HDF\r\n\x1a\n"sv)
+      return fmt::format(
+          "an HDF5 file behind {} bytes of a program's own, by no convention that is read (an XDMF file "
+          "describes its "
+          "arrays)",
+          block);
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
+  // A record of Fortran with the title, of either byte order.
+  if ((begin.starts_with("\0\0\0\x50"sv) || begin.starts_with("\x50\0\0\0"sv)) &&
+      begin.substr(4, 80).find("SERAFIN") != std::string::npos)
+    return "a SELAFIN file of Telemac, which is not read (save it as VTK)";
   // The first four bytes of an ADF file differ between versions.
   if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
   return foreignText(std::move(begin));

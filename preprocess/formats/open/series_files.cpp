@@ -7,6 +7,7 @@
 #include <cctype>
 #include <charconv>
 #include <map>
+#include <set>
 
 #include "preprocess/formats/netcdf/fms_mosaic.h"
 #include "preprocess/formats/open/open_grid.h"
@@ -23,14 +24,53 @@ bool isDigit(char c) {
   return std::isdigit(static_cast<unsigned char>(c)) != 0;
 }
 
-/// Natural order: runs of digits by the numbers that they are.
-bool comesBefore(const std::string& a, const std::string& b) {
+/// A number in a name: where it ends, and its value. Decimals: 0.0015, 1e-05.
+struct NumberInName {
+  size_t digits_end = 0;  // of the whole number
+  size_t end = 0;         // with its decimals and its exponent
+  double value = 0;
+  std::string_view fraction;  // digits behind the point
+  bool has_exponent = false;
+};
+
+/// The number that begins at `at`.
+NumberInName numberAt(std::string_view text, size_t at) {
+  NumberInName number;
+  const auto skip_digits = [&](size_t from) {
+    while (from < text.size() && isDigit(text[from])) ++from;
+    return from;
+  };
+  number.digits_end = number.end = skip_digits(at);
+  if (const size_t fraction = number.end + 1; number.end < text.size() && text[number.end] == '.') {
+    const size_t end = skip_digits(fraction);
+    if (end > fraction &&
+        (end == text.size() || !std::isalpha(static_cast<unsigned char>(text[end])) || text[end] == 'e')) {
+      number.fraction = text.substr(fraction, end - fraction);
+      number.end = end;
+    }
+  }
+  if (number.end + 1 < text.size() && text[number.end] == 'e' &&
+      (text[number.end + 1] == '-' || text[number.end + 1] == '+')) {
+    const size_t end = skip_digits(number.end + 2);
+    number.has_exponent = end > number.end + 2;
+    if (number.has_exponent) number.end = end;
+  }
+  std::from_chars(text.data() + at, text.data() + number.end, number.value);
+  return number;
+}
+
+/// Natural order: runs of digits by the numbers that they are; with `decimals`, numbers with a point or an exponent, too.
+bool comesBefore(const std::string& a, const std::string& b, bool decimals) {
   size_t i = 0, j = 0;
   while (i < a.size() && j < b.size()) {
-    if (isDigit(a[i]) && isDigit(b[j])) {
+    if (decimals && isDigit(a[i]) && isDigit(b[j])) {
+      const NumberInName of_a = numberAt(a, i), of_b = numberAt(b, j);
+      if (of_a.value != of_b.value) return of_a.value < of_b.value;
+      i = of_a.end;
+      j = of_b.end;
+    } else if (isDigit(a[i]) && isDigit(b[j])) {
       const auto number = [](const std::string& text, size_t& at) {
-        size_t end = at;
-        while (end < text.size() && isDigit(text[end])) ++end;
+        const size_t end = numberAt(text, at).digits_end;
         const size_t first = std::min(text.find_first_not_of('0', at), end);
         at = end;
         return text.substr(first, end - first);
@@ -48,9 +88,36 @@ bool comesBefore(const std::string& a, const std::string& b) {
   return a < b;
 }
 
+/// Whether points in the names are those of decimal numbers (0.0005, 0.001, 0.0015), and not between two numbers (run1.9, run1.10):
+/// there are exponents, or whole parts that differ, or fractions of several lengths of which one begins with a 0.
+bool haveDecimals(const std::vector<fs::path>& paths) {
+  std::set<size_t> lengths;
+  std::set<std::string> wholes;
+  bool zero = false, exponent = false;
+  for (const fs::path& path : paths) {
+    const std::string name = path.filename().string();
+    for (size_t n = 0; n < name.size(); ++n) {
+      if (!isDigit(name[n])) continue;
+      const NumberInName number = numberAt(name, n);
+      exponent = exponent || number.has_exponent;
+      zero = zero || number.fraction.starts_with('0');
+      // A whole number before the extension is a decimal without a fraction: Result-2.vtu.
+      if (!number.fraction.empty() || number.end == name.rfind('.')) {
+        lengths.insert(number.fraction.size());
+        wholes.insert(name.substr(n, number.digits_end - n));
+      }
+      n = number.end - 1;
+    }
+  }
+  const bool fractions = !lengths.empty() && *lengths.rbegin() > 0;
+  return exponent || (fractions && (wholes.size() > 1 || (zero && lengths.size() > 1)));
+}
+
 void sortNaturally(std::vector<fs::path>& paths) {
-  std::sort(paths.begin(), paths.end(),
-            [](const fs::path& a, const fs::path& b) { return comesBefore(a.string(), b.string()); });
+  const bool decimals = haveDecimals(paths);
+  std::sort(paths.begin(), paths.end(), [&](const fs::path& a, const fs::path& b) {
+    return comesBefore(a.string(), b.string(), decimals);
+  });
   paths.erase(std::unique(paths.begin(), paths.end()), paths.end());
 }
 
@@ -61,16 +128,15 @@ bool isCalledNetcdf(fs::path path) {
   return path.extension() == ".nc" || path.extension() == ".nc4";
 }
 
-/// The path with '#' for each number in its file name: equal for the files of a series. The number of a tile stays: the
+/// The path with '#' for each number in its file name, decimals included: equal for the files of a series. The number of a tile stays: the
 /// tiles of a cubed sphere are parts of one step.
 std::string shapeOf(const fs::path& path) {
   const std::string name = path.filename().string();
   std::string shape = path.parent_path().string() + "/";
-  for (size_t n = 0; n < name.size(); ++n)
-    if (!isDigit(name[n]))
-      shape += name[n];
-    else if (n == 0 || !isDigit(name[n - 1]))
-      shape += '#';
+  for (size_t n = 0; n < name.size(); ++n) {
+    shape += isDigit(name[n]) ? '#' : name[n];
+    if (isDigit(name[n])) n = numberAt(name, n).end - 1;
+  }
   if (const auto tile = tileNumber(path); tile && isCalledNetcdf(path)) shape += fmt::format("/{}", *tile);
   return shape;
 }

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cstring>
+#include <deque>
 #include <functional>
+#include <map>
 
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
@@ -16,8 +18,12 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBufferBytes = size_t{256} << 10;
+constexpr size_t kFirstRead = 4096;
 constexpr size_t kChunk = 32768;  // numbers
 constexpr uint64_t kMaxNumbers = 100'000'000'000'000;
+constexpr int kMaxExpansions = 100;
+constexpr size_t kMaxEntryTokens = 100;  // longer ones are lists of values, which no field uses
+constexpr int kMaxIncludes = 8;          // in one another
 
 /// A list goes to its sink in chunks.
 template <typename Number>
@@ -43,15 +49,20 @@ class Chunks {
 /// Tokens of the file: words, numbers, quoted text, and punctuation, one character each. Comments are left out.
 struct FoamFile::Parser {
   Parser(const std::filesystem::path& path, std::string shown)
-      : file(path), name(std::move(shown)), buffer(kBufferBytes) {}
+      : file(path), name(std::move(shown)), end(file.size()), buffer(kBufferBytes) {}
 
   InputFile file;
   std::string name;
+  uint64_t end = 0;  // of the text: of the file, or of a processor's part of it
   std::vector<char> buffer;
   uint64_t buffer_offset = 0;
   size_t at = 0, filled = 0;
+  size_t refill = kFirstRead;  // bytes to read next: few, in case it goes on elsewhere
   size_t label_bytes = 4, scalar_bytes = 8;
-  bool swap = false;
+  bool swap = false, has_arch = false;
+  std::map<std::string, std::vector<std::string>> entries;  // what "$name" stands for
+  std::deque<std::string> expanded;                         // tokens of such entries, which come next
+  int expansions = 0;
 
   uint64_t offset() const { return buffer_offset + at; }
   [[noreturn]] void fail(const std::string& what) const {
@@ -61,7 +72,8 @@ struct FoamFile::Parser {
     if (at == filled) {
       buffer_offset += filled;
       at = 0;
-      filled = static_cast<size_t>(std::min<uint64_t>(buffer.size(), file.size() - buffer_offset));
+      filled = static_cast<size_t>(std::min<uint64_t>(refill, end - buffer_offset));
+      refill = std::min(2 * refill, buffer.size());
       file.readAt(buffer_offset, std::span(buffer.data(), filled));
       if (filled == 0) return -1;
     }
@@ -81,9 +93,45 @@ struct FoamFile::Parser {
     word += static_cast<char>(c);
     if (word.size() > 1000) fail("has a word of more than 1000 characters; the file is damaged");
   }
+  void seek(uint64_t offset) {
+    buffer_offset = offset;
+    at = filled = 0;
+    refill = kFirstRead;
+  }
+  /// Goes to the next part of a collated file, `// Processor3 NEWLINE bytes NEWLINE ( ... )`. Returns its end.
+  uint64_t enterPart() {
+    const uint64_t bytes = label();
+    expect("(");
+    if (bytes >= end - offset())
+      fail(fmt::format("needs {} bytes, but {} are left; the file is truncated", bytes, end - offset()));
+    return offset() + bytes;
+  }
+  void skipSpace() {
+    while (isSpace(peek())) take();
+  }
+  /// The next token, with the entry's tokens in the place of "$name" and "${name}".
   std::string token() {
     for (;;) {
-      while (isSpace(peek())) take();
+      std::string word = nextToken();
+      if (word.empty() || word[0] != '$') return word;
+      if (word == "$" && peek() == '{')
+        for (int next = 0; next != '}' && peek() >= 0; add(word, next)) next = take();
+      std::string key = word.substr(1);
+      if (key.size() > 2 && key.front() == '{') key = key.substr(1, key.size() - 2);
+      const auto entry = entries.find(key);
+      // Entries may name one another in a circle.
+      if (entry == entries.end() || ++expansions > kMaxExpansions) return word;
+      expanded.insert(expanded.begin(), entry->second.begin(), entry->second.end());
+    }
+  }
+  std::string nextToken() {
+    if (!expanded.empty()) {
+      std::string word = std::move(expanded.front());
+      expanded.pop_front();
+      return word;
+    }
+    for (;;) {
+      skipSpace();
       const int c = take();
       if (c < 0) return "";
       if (c == '/' && peek() == '/') {
@@ -115,45 +163,154 @@ struct FoamFile::Parser {
       fail(fmt::format("found \"{}\"; expected \"{}\"; the file is truncated or damaged", found.substr(0, 30),
                        wanted));
   }
+  [[noreturn]] void failValue(const std::string& word, const char* wanted) const {
+    if (!word.empty() && (word[0] == '$' || word[0] == '#'))
+      fail(fmt::format(
+          "has \"{}\" in the place of {}, which only OpenFOAM can evaluate: write the values with "
+          "foamDictionary -expand FILE",
+          word.substr(0, 30), wanted));
+    fail(fmt::format("found \"{}\"; expected {}; the file is truncated or damaged", word.substr(0, 30),
+                     wanted));
+  }
   double number() {
     double value = 0;
     const std::string word = token();
-    if (!parseNumber(word, value))
-      fail(fmt::format("found \"{}\"; expected a number; the file is truncated or damaged",
-                       word.substr(0, 30)));
+    if (!parseNumber(word, value)) failValue(word, "a number");
     return value;
   }
   uint64_t label() {
     const std::string word = token();
     uint64_t value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc{} || end != word.data() + word.size() || value > kMaxNumbers)
-      fail(fmt::format("found \"{}\"; expected a number of 0 or more; the file is truncated or damaged",
-                       word.substr(0, 30)));
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc{} || stop != word.data() + word.size() || value > kMaxNumbers)
+      failValue(word, "a number of 0 or more");
     return value;
   }
 
-  /// Calls use(bytes) for the numbers of a binary list, some at a time.
-  void binary(uint64_t count, size_t bytes, const std::function<void(std::span<const std::byte>)>& use) {
-    if (count == 0) return;
+  /// Whether the closing parenthesis of a binary list is where it would be with numbers of this size.
+  bool closesAfter(uint64_t begin, uint64_t count, size_t bytes) const {
+    char last = 0;
+    if (begin >= end || count > (end - begin - 1) / bytes) return false;
+    file.readAt(begin + count * bytes, std::span(&last, 1));
+    return last == ')';
+  }
+
+  /// Calls use(bytes, width) for the numbers of a binary list, some at a time. OpenFOAM ends the line after the
+  /// count. Versions before 2.2 do not state the width of numbers (`arch`), which the closing parenthesis then shows.
+  void binary(uint64_t count, size_t width,
+              const std::function<void(std::span<const std::byte>, size_t)>& use) {
+    skipSpace();
+    if (count == 0 && peek() != '(') return;
     if (take() != '(') fail("has no opening parenthesis before its numbers; the file is damaged");
     const uint64_t begin = offset();
-    if (count > (file.size() - begin) / bytes)
-      fail(fmt::format("needs {} bytes, but {} are left; the file is truncated", count * bytes,
-                       file.size() - begin));
+    if (!has_arch && !closesAfter(begin, count, width) && closesAfter(begin, count, 12 - width))
+      width = 12 - width;
+    if (count > (end - begin) / width)
+      fail(fmt::format("needs {} bytes, but {} are left; the file is truncated", count * width, end - begin));
     std::vector<std::byte> some;
     for (uint64_t done = 0; done < count;) {
       const uint64_t numbers = std::min<uint64_t>(kChunk, count - done);
-      some.resize(numbers * bytes);
-      file.readAt(begin + done * bytes, std::span(some));
-      use(some);
+      some.resize(numbers * width);
+      file.readAt(begin + done * width, std::span(some));
+      use(some, width);
       done += numbers;
     }
-    buffer_offset = begin + count * bytes;
-    at = filled = 0;
+    seek(begin + count * width);
     expect(")");
   }
+
+  /// The opening of a list in text: true for `3{7}`, which has one element that counts three times.
+  bool opensRepeated() {
+    const std::string opening = token();
+    if (opening != "(" && opening != "{")
+      fail(fmt::format("found \"{}\"; expected \"(\"; the file is truncated or damaged",
+                       opening.substr(0, 30)));
+    return opening == "{";
+  }
+
+  bool atEnd() {
+    const uint64_t begin = offset();
+    const bool ended = token().empty();
+    seek(begin);
+    return ended;
+  }
+  std::vector<double> tuple(size_t components) {
+    std::vector<double> values;
+    if (components > 1) expect("(");
+    for (size_t c = 0; c < components; ++c) values.push_back(number());
+    if (components > 1) expect(")");
+    return values;
+  }
+  void addTuples(uint64_t count, size_t components, Chunks<double>& to) {
+    skipSpace();
+    if (count == 0 && peek() != '(') return;
+    const bool repeated = opensRepeated();
+    std::vector<double> last;
+    for (uint64_t n = 0; n < count; ++n) {
+      if (!repeated || n == 0) last = tuple(components);
+      for (const double value : last) to.add(value);
+    }
+    expect(repeated ? "}" : ")");
+  }
+  void addLabels(uint64_t count, bool is_binary, Chunks<uint64_t>& to) {
+    if (is_binary)
+      return binary(count, label_bytes, [&](std::span<const std::byte> bytes, size_t width) {
+        for (size_t n = 0; n < bytes.size(); n += width)
+          to.add(width == 8 ? loadStored<uint64_t>(bytes.data() + n, swap)
+                            : loadStored<uint32_t>(bytes.data() + n, swap));
+      });
+    skipSpace();
+    if (count == 0 && peek() != '(') return;
+    const bool repeated = opensRepeated();
+    uint64_t last = 0;
+    for (uint64_t n = 0; n < count; ++n) to.add(last = repeated && n > 0 ? last : label());
+    expect(repeated ? "}" : ")");
+  }
+
+  /// Reads entries of a dictionary up to the one called `wanted`, or to the end of the text. Returns whether it was
+  /// found. Those before it are kept, since values may refer to them; so are those of files that are included.
+  bool findEntry(const std::string& wanted, int depth = 0);
+  void include(const std::filesystem::path& path, int depth);
+  /// The tokens of an entry, up to its semicolon or the end of its dictionary.
+  std::vector<std::string> entryTokens();
 };
+
+std::vector<std::string> FoamFile::Parser::entryTokens() {
+  std::vector<std::string> tokens;
+  int braces = 0;
+  for (std::string word = token(); !word.empty(); word = token()) {
+    if (word == ";" && braces == 0) break;
+    braces += word == "{" ? 1 : word == "}" ? -1 : 0;
+    if (tokens.size() <= kMaxEntryTokens) tokens.push_back(word);
+    if (word == "}" && braces <= 0) break;
+  }
+  return tokens;
+}
+
+void FoamFile::Parser::include(const std::filesystem::path& path, int depth) {
+  const std::filesystem::path included = std::filesystem::path(name).parent_path() / path;
+  if (depth >= kMaxIncludes || !isRegularFile(included))
+    return;  // what it defines is missed where it is used
+  Parser other(included, included.string());
+  other.findEntry("", depth + 1);
+  entries.merge(other.entries);
+}
+
+bool FoamFile::Parser::findEntry(const std::string& wanted, int depth) {
+  for (std::string key = token(); !key.empty(); key = token()) {
+    if (key == wanted) return true;
+    if (key.starts_with("#include")) {
+      const std::string path = token();
+      if (path.starts_with('"')) include(path.substr(1), depth);
+    } else if (key == "#inputMode" || key == "#remove") {
+      token();
+    } else if (key != ";" && key != "}") {
+      std::vector<std::string> tokens = entryTokens();
+      if (tokens.size() <= kMaxEntryTokens) entries[key] = std::move(tokens);
+    }
+  }
+  return false;
+}
 
 bool FoamFile::exists(const std::filesystem::path& path) {
   std::error_code error;
@@ -163,7 +320,7 @@ bool FoamFile::exists(const std::filesystem::path& path) {
 }
 
 FoamFile::FoamFile(const std::filesystem::path& path, std::shared_ptr<SpoolFile> spool,
-                   const std::filesystem::path& temporary_folder)
+                   const std::filesystem::path& temporary_folder, uint32_t processor)
     : original_(path), spool_(std::move(spool)), temporary_folder_(temporary_folder) {
   if (!isRegularFile(path) && isRegularFile(path.string() + ".gz")) original_ += ".gz";
   std::filesystem::path plain = original_;
@@ -173,23 +330,60 @@ FoamFile::FoamFile(const std::filesystem::path& path, std::shared_ptr<SpoolFile>
   }
   parser_ = std::make_unique<Parser>(plain, original_.string());
   if (unpacked_) unpacked_->removeName();
+  readHeader();
+  if (type_ == "decomposedBlockData") enterProcessor(processor);
+}
+
+/// The first processor's part has the header of all; others may have one of their own.
+void FoamFile::enterProcessor(uint32_t processor) {
+  Parser& in = *parser_;
+  for (uint32_t part = 0; part <= processor; ++part) {
+    const uint64_t end = in.enterPart(), begin = in.offset();
+    const bool has_header = (part == 0 || part == processor) && in.token() == "FoamFile";
+    in.seek(begin);
+    if (has_header) readHeader();
+    if (part == processor) {
+      in.end = end;
+      in.seek(in.offset());  // the buffer then holds nothing of the next part
+    } else {
+      in.seek(end);
+      in.expect(")");
+    }
+  }
+}
+
+uint32_t FoamFile::processorsIn(const std::filesystem::path& path) {
+  FoamFile file(path, nullptr, {});
+  Parser& in = *file.parser_;
+  if (in.end == in.file.size()) return 1;
+  uint32_t count = 0;
+  for (in.seek(in.end), in.end = in.file.size();; in.seek(in.enterPart())) {
+    in.expect(")");
+    ++count;
+    if (in.atEnd()) return count;
+  }
+}
+
+void FoamFile::readHeader() {
   Parser& in = *parser_;
   if (in.token() != "FoamFile") in.fail("does not begin with FoamFile; expected a file of OpenFOAM");
   in.expect("{");
   for (std::string key = in.token(); key != "}"; key = in.token()) {
     if (key.empty()) in.fail("ends in its header; the file is truncated");
-    const std::string value = in.token();
+    const std::vector<std::string> tokens = in.entryTokens();
+    const std::string value = tokens.empty() ? "" : tokens.front();
     if (key == "format") binary_ = value == "binary";
     if (key == "class") type_ = value;
     if (key == "arch") {
+      in.has_arch = true;
       in.swap = (value.find("MSB") != std::string::npos) != (kMachineByteOrder == ByteOrder::kBig);
       if (value.find("label=64") != std::string::npos) in.label_bytes = 8;
       if (value.find("scalar=32") != std::string::npos) in.scalar_bytes = 4;
     }
-    for (std::string rest = value; rest != ";" && !rest.empty();) rest = in.token();
   }
 }
 
+FoamFile::FoamFile(FoamFile&&) noexcept = default;
 FoamFile::~FoamFile() = default;
 
 FoamList FoamFile::numbers(size_t components) {
@@ -198,22 +392,14 @@ FoamList FoamFile::numbers(size_t components) {
   list.count *= components;
   list.offset = spool_->append([&](const SpoolFile::Sink& sink) {
     Chunks<double> chunks(sink);
-    if (binary_) {
-      in.binary(list.count, in.scalar_bytes, [&](std::span<const std::byte> bytes) {
-        for (size_t at = 0; at < bytes.size(); at += in.scalar_bytes)
-          chunks.add(in.scalar_bytes == 8
-                         ? loadStored<double>(bytes.data() + at, in.swap)
-                         : static_cast<double>(loadStored<float>(bytes.data() + at, in.swap)));
+    if (binary_)
+      in.binary(list.count, in.scalar_bytes, [&](std::span<const std::byte> bytes, size_t width) {
+        for (size_t at = 0; at < bytes.size(); at += width)
+          chunks.add(width == 8 ? loadStored<double>(bytes.data() + at, in.swap)
+                                : static_cast<double>(loadStored<float>(bytes.data() + at, in.swap)));
       });
-    } else {
-      in.expect("(");
-      for (uint64_t n = 0; n < list.count; n += components) {
-        if (components > 1) in.expect("(");
-        for (size_t c = 0; c < components; ++c) chunks.add(in.number());
-        if (components > 1) in.expect(")");
-      }
-      in.expect(")");
-    }
+    else
+      in.addTuples(list.count / components, components, chunks);
     chunks.flush();
   });
   return list;
@@ -224,17 +410,7 @@ FoamList FoamFile::labels() {
   FoamList list{spool_, 0, in.label()};
   list.offset = spool_->append([&](const SpoolFile::Sink& sink) {
     Chunks<uint64_t> chunks(sink);
-    if (binary_) {
-      in.binary(list.count, in.label_bytes, [&](std::span<const std::byte> bytes) {
-        for (size_t at = 0; at < bytes.size(); at += in.label_bytes)
-          chunks.add(in.label_bytes == 8 ? loadStored<uint64_t>(bytes.data() + at, in.swap)
-                                         : loadStored<uint32_t>(bytes.data() + at, in.swap));
-      });
-    } else if (list.count > 0 || in.peek() == '(') {
-      in.expect("(");
-      for (uint64_t n = 0; n < list.count; ++n) chunks.add(in.label());
-      in.expect(")");
-    }
+    in.addLabels(list.count, binary_, chunks);
     chunks.flush();
   });
   return list;
@@ -256,9 +432,7 @@ FoamFile::Faces FoamFile::faces() {
     begins.add(0);
     for (uint64_t face = 0; face < count; ++face) {
       const uint64_t points = in.label();
-      in.expect("(");
-      for (uint64_t n = 0; n < points; ++n) labels.add(in.label());
-      in.expect(")");
+      in.addLabels(points, binary_, labels);
       total += points;
       begins.add(total);
     }
@@ -280,18 +454,14 @@ FoamFile::Faces FoamFile::faces() {
 
 std::vector<double> FoamFile::beginField(size_t components) {
   Parser& in = *parser_;
-  std::string word = in.token();
-  while (word != "internalField" && !word.empty()) word = in.token();
-  if (word.empty()) in.fail("has no internalField; the file is truncated or not a field");
-  word = in.token();
-  if (word == "uniform") {
-    std::vector<double> values;
-    if (components > 1) in.expect("(");
-    for (size_t c = 0; c < components; ++c) values.push_back(in.number());
-    return values;
-  }
-  if (word != "nonuniform") in.fail(fmt::format("found \"{}\"; expected uniform or nonuniform", word));
-  in.token();  // List<scalar>
+  const char* const key = type_.ends_with("::Internal") ? "value" : "internalField";
+  if (!in.findEntry(key)) in.fail(fmt::format("has no {}; the file is truncated or not a field", key));
+  const std::string word = in.token();
+  if (word == "uniform") return in.tuple(components);
+  if (word != "nonuniform") in.failValue(word, "uniform or nonuniform");
+  // List<scalar>, which the lists of processors without cells lack: nonuniform 0()
+  in.skipSpace();
+  if (in.peek() == 'L') in.token();
   return {};
 }
 

@@ -3,7 +3,11 @@
 //
 //    FoamFile { format ascii; class vectorField; arch "LSB;label=32;scalar=64"; ... }
 //    8 ( (0 0 0) (1 0 0) ... )               a list; in binary files bytes follow the opening parenthesis
+//    5{300}                                  a list of equal elements
 //    internalField nonuniform List<scalar> 8 ( ... )    in files of fields; or: uniform 300
+//
+// Values may be entries of the dictionary, `$name`, which the file or one that it includes defines. Collated files
+// (decomposedBlockData) hold the text of all processors, one after the other.
 #pragma once
 
 #include <cstdint>
@@ -23,12 +27,16 @@ using FoamList = SpooledNumbers;
 /// For one thread.
 class FoamFile {
  public:
-  /// Opens `path`, or `path`.gz where that is what there is. Throws Error if it is not a file of OpenFOAM.
+  /// Opens `path`, or `path`.gz where that is what there is; of a collated file, the processor's part. Throws Error
+  /// if it is not a file of OpenFOAM.
   FoamFile(const std::filesystem::path& path, std::shared_ptr<SpoolFile> spool,
-           const std::filesystem::path& temporary_folder);
+           const std::filesystem::path& temporary_folder, uint32_t processor = 0);
+  FoamFile(FoamFile&&) noexcept;
   ~FoamFile();
 
   static bool exists(const std::filesystem::path& path);
+  /// How many processors' parts a collated file has; 1 for any other.
+  static uint32_t processorsIn(const std::filesystem::path& path);
 
   /// "volScalarField".
   const std::string& type() const { return type_; }
@@ -45,11 +53,14 @@ class FoamFile {
   };
   Faces faces();
 
-  /// Goes to the values of a field. Returns the numbers of a uniform one, and none of a list.
+  /// Goes to the values of a field. Returns the numbers of a uniform one, and none of a list. Throws Error if only
+  /// OpenFOAM could evaluate them (#codeStream, #calc).
   std::vector<double> beginField(size_t components);
 
  private:
   struct Parser;
+  void readHeader();
+  void enterProcessor(uint32_t processor);
   std::filesystem::path original_;
   std::unique_ptr<UnpackedFile> unpacked_;
   std::unique_ptr<Parser> parser_;

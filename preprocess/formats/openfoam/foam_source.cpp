@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <tuple>
 
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/grid/grid_source.h"
@@ -27,15 +28,44 @@ fs::path caseOf(const fs::path& path) {
   return path.parent_path().empty() ? fs::path(".") : path.parent_path();
 }
 
-std::vector<fs::path> processorsOf(const fs::path& folder) {
-  std::vector<fs::path> processors;
+struct Processor {
+  fs::path folder;
+  uint32_t part = 0;  // of collated files
+};
+
+std::vector<Processor> processorsOf(const fs::path& folder) {
+  std::vector<Processor> processors;
   for (int n = 0; hasMesh(folder / fmt::format("processor{}", n)); ++n)
-    processors.push_back(folder / fmt::format("processor{}", n));
+    processors.push_back({folder / fmt::format("processor{}", n)});
+  if (!processors.empty()) return processors;
+  // "processors8", "processors8_0-3", or "processors" alone
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (!entry.path().filename().string().starts_with("processors") || !hasMesh(entry.path())) continue;
+    const uint32_t parts = FoamFile::processorsIn(entry.path() / "constant" / "polyMesh" / "faces");
+    for (uint32_t part = 0; part < parts; ++part) processors.push_back({entry.path(), part});
+  }
+  std::sort(processors.begin(), processors.end(), [](const Processor& a, const Processor& b) {
+    return std::tie(a.folder, a.part) < std::tie(b.folder, b.part);
+  });
   return processors;
 }
 
+/// The times that have a folder, in their order.
+std::vector<std::pair<double, std::string>> timesIn(const fs::path& folder) {
+  std::vector<std::pair<double, std::string>> times;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    double time = 0;
+    // A run that diverges may leave a folder "nan", which has no place among times.
+    if (entry.is_directory() && parseNumber(entry.path().filename().string(), time) && std::isfinite(time))
+      times.emplace_back(time, entry.path().filename().string());
+  }
+  std::sort(times.begin(), times.end());
+  return times;
+}
+
 size_t componentsOf(const std::string& type) {
-  if (type == "volScalarField" || type == "volScalarField::Internal") return 1;
+  if (type == "volScalarField" || type == "volScalarField::Internal" || type == "volSphericalTensorField")
+    return 1;
   if (type == "volVectorField" || type == "volVectorField::Internal") return 3;
   if (type == "volSymmTensorField") return 6;
   if (type == "volTensorField") return 9;
@@ -67,39 +97,50 @@ bool isFoamCase(const fs::path& path) {
 FoamSource::FoamSource(const OpenGridOptions& options)
     : spool_(std::make_shared<SpoolFile>(options.temporary_folder)),
       temporary_folder_(options.temporary_folder) {
-  const fs::path folder = caseOf(options.grid);
-  const std::vector<fs::path> processors = processorsOf(folder);
-  const std::vector<fs::path> folders = hasMesh(folder) ? std::vector{folder} : processors;
-  pieces_.reserve(folders.size());
-  for (const fs::path& of : folders) {
-    pieces_.emplace_back();
-    pieces_.back().folder = of;
-  }
+  choosePieces(caseOf(options.grid));
   findTimes(options.time_step, options.grid);
-  bool binary = false;
-  for (Piece& piece : pieces_) openPiece(piece.folder);
-  {
-    const FoamFile faces(meshFile(folders.front(), "faces"), spool_, temporary_folder_);
-    binary = faces.isBinary();
-  }
+  for (Piece& piece : pieces_) openPiece(piece);
+  const bool binary = open(pieces_.front(), meshFile(pieces_.front().folder, "faces")).isBinary();
+  values_.resize(pieces_.size());
   findFields();
   description_.coordinate_bytes = 8;
-  description_.format =
-      fmt::format("OpenFOAM case, {}, {}", binary ? "binary" : "ASCII",
-                  hasMesh(folder) ? "1 piece" : fmt::format("{} processors", pieces_.size()));
-  values_.resize(pieces_.size(), std::vector<Values>(fields_.size()));
+  description_.format = fmt::format(
+      "OpenFOAM case, {}, {}", binary ? "binary" : "ASCII",
+      decomposed_ ? pieces_.size() == 1 ? "1 processor" : fmt::format("{} processors", pieces_.size())
+                  : "1 piece");
+}
+
+void FoamSource::choosePieces(const fs::path& folder) {
+  const std::vector<Processor> processors = processorsOf(folder);
+  decomposed_ = !hasMesh(folder);
+  if (!decomposed_ && !processors.empty()) {
+    const auto whole = timesIn(folder), parts = timesIn(processors.front().folder);
+    decomposed_ = !parts.empty() && (whole.empty() || parts.back().first > whole.back().first);
+    if (decomposed_)
+      description_.notes.push_back(fmt::format(
+          "{}: the times of its processors are read, up to {}; {} (reconstructPar writes them there)",
+          folder.string(), parts.back().second,
+          whole.empty() ? "its own folder has none"
+                        : "those in its own folder end at " + whole.back().second));
+    else if (parts.size() > whole.size())
+      description_.notes.push_back(
+          fmt::format("{}: the {} times in its own folder are read; its processors have {} (reconstructPar "
+                      "writes them there)",
+                      folder.string(), whole.size(), parts.size()));
+  }
+  if (!decomposed_) {
+    pieces_.emplace_back().folder = folder;
+    return;
+  }
+  for (const Processor& processor : processors) {
+    Piece& piece = pieces_.emplace_back();
+    piece.folder = processor.folder;
+    piece.processor = processor.part;
+  }
 }
 
 void FoamSource::findTimes(std::optional<uint32_t> asked, const fs::path& shown) {
-  std::vector<std::pair<double, std::string>> times;
-  for (const auto& entry : fs::directory_iterator(pieces_.front().folder)) {
-    double time = 0;
-    // A run that diverges may leave a folder "nan", which has no place among times.
-    if (entry.is_directory() && parseNumber(entry.path().filename().string(), time) && std::isfinite(time))
-      times.emplace_back(time, entry.path().filename().string());
-  }
-  std::sort(times.begin(), times.end());
-  for (const auto& [time, name] : times) {
+  for (const auto& [time, name] : timesIn(pieces_.front().folder)) {
     description_.times.push_back(time);
     time_names_.push_back(name);
   }
@@ -115,25 +156,24 @@ fs::path FoamSource::meshFile(const fs::path& folder, const char* name) const {
   return folder / "constant" / "polyMesh" / name;
 }
 
-void FoamSource::openPiece(const fs::path& folder) {
-  const auto piece =
-      std::find_if(pieces_.begin(), pieces_.end(), [&](const Piece& p) { return p.folder == folder; });
-  const auto open = [&](const char* name) {
-    auto file = std::make_unique<FoamFile>(meshFile(folder, name), spool_, temporary_folder_);
-    description_.files.push_back(file->name());
+void FoamSource::openPiece(Piece& piece) {
+  const auto openMesh = [&](const char* name) {
+    FoamFile file = open(piece, meshFile(piece.folder, name));
+    if (piece.processor == 0) description_.files.push_back(file.name());
     return file;
   };
-  piece->points = open("points")->numbers(3);
-  piece->faces = open("faces")->faces();
-  const FoamList owner = open("owner")->labels(), neighbour = open("neighbour")->labels();
-  const std::string faces_file = description_.files[description_.files.size() - 3];
-  const uint64_t faces = piece->faces.begins.count > 0 ? piece->faces.begins.count - 1 : 0;
+  piece.points = openMesh("points").numbers(3);
+  piece.faces = openMesh("faces").faces();
+  const FoamList owner = openMesh("owner").labels(), neighbour = openMesh("neighbour").labels();
+  const std::string faces_file = meshFile(piece.folder, "faces").string();
+  const uint64_t faces = piece.faces.begins.count > 0 ? piece.faces.begins.count - 1 : 0;
   if (owner.count != faces || neighbour.count > faces)
     throw Error("{}: has {} faces, but {} have an owner and {} a neighbour; the mesh is damaged", faces_file,
                 faces, owner.count, neighbour.count);
-  listFacesOfCells(*piece, owner, neighbour);
-  description_.pieces.push_back(
-      {folder.filename().string(), faces_file, piece->points.count / 3, piece->cells.cells});
+  listFacesOfCells(piece, owner, neighbour);
+  std::string name = piece.folder.filename().string();
+  if (name.starts_with("processors")) name = fmt::format("{}, part {}", name, piece.processor);
+  description_.pieces.push_back({std::move(name), faces_file, piece.points.count / 3, piece.cells.cells});
 }
 
 /// Counts the cells and lists the faces of each.
@@ -179,26 +219,40 @@ void FoamSource::findFields() {
     const fs::path path = pieces_.front().folder / time / name;
     size_t components = 0;
     try {
-      components = componentsOf(FoamFile(path, spool_, temporary_folder_).type());
+      FoamFile file = open(pieces_.front(), path);
+      components = componentsOf(file.type());
+      if (components == 0) continue;
     } catch (const Error&) {
-      // Not a file of OpenFOAM.
+      continue;  // Not a file of OpenFOAM.
     }
-    if (components == 0) continue;
+    // Initial values may be expressions. Such a field is left out, and the others are read.
+    try {
+      open(pieces_.front(), path).beginField(components);
+    } catch (const Error& error) {
+      description_.warnings.push_back(fmt::format("{}; {} is left out", error.what(), name));
+      continue;
+    }
     description_.files.push_back(path.string());
-    const auto add = [&](const std::string& scalar_name, int component) {
-      GridScalar scalar;
-      scalar.name = scalar_name;
-      scalar.centring = Centring::kCell;
-      description_.scalars.push_back(std::move(scalar));
-      scalars_.push_back({fields_.size(), component});
-    };
-    if (components == 1) add(name, 0);
-    if (components == 3) add(fmt::format("{}:mag", name), -1);
-    for (size_t c = 0; c < components && components > 1; ++c)
-      add(components == 3 ? fmt::format("{}:{}", name, "xyz"[c]) : fmt::format("{}:{}", name, c),
-          static_cast<int>(c));
-    fields_.push_back({name, components});
+    addField(name, components);
   }
+}
+
+void FoamSource::addField(const std::string& name, size_t components) {
+  const auto add = [&](const std::string& scalar_name, int component) {
+    GridScalar scalar;
+    scalar.name = scalar_name;
+    scalar.centring = Centring::kCell;
+    description_.scalars.push_back(std::move(scalar));
+    scalars_.push_back({fields_.size(), component});
+  };
+  if (components == 1) add(name, 0);
+  if (components == 3) add(fmt::format("{}:mag", name), -1);
+  for (size_t c = 0; c < components && components > 1; ++c)
+    add(components == 3 ? fmt::format("{}:{}", name, "xyz"[c]) : fmt::format("{}:{}", name, c),
+        static_cast<int>(c));
+  fields_.push_back({name, components});
+  const MutexLock lock(mutex_);
+  for (std::vector<Values>& of_piece : values_) of_piece.resize(fields_.size());
 }
 
 const FoamList& FoamSource::valuesOf(uint32_t piece_number, size_t field,
@@ -207,8 +261,7 @@ const FoamList& FoamSource::valuesOf(uint32_t piece_number, size_t field,
   Values& values = values_[piece_number][field];
   if (!values.read) {
     const Piece& piece = pieces_[piece_number];
-    FoamFile file(piece.folder / time_names_[description_.time_step] / fields_[field].name, spool_,
-                  temporary_folder_);
+    FoamFile file = open(piece, piece.folder / time_names_[description_.time_step] / fields_[field].name);
     if (componentsOf(file.type()) != fields_[field].components)
       throw Error("{}: is a {}; expected the kind of field that the other processors have", file.name(),
                   file.type());

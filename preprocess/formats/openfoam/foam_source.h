@@ -1,5 +1,6 @@
 // OpenFOAM cases: constant/polyMesh, moving ones in the folders of times, and fields of cells; ASCII and binary,
-// compressed or not; decomposed cases (processor0, processor1, ...), which are pieces of one mesh.
+// compressed or not; decomposed cases (processor0, processor1, ..., or collated: processors8), which are pieces of one
+// mesh. A case that also has its mesh in its own folder is read from there, unless only the processors have the last times.
 #pragma once
 
 #include <filesystem>
@@ -33,7 +34,8 @@ class FoamSource final : public MeshSource {
 
  private:
   struct Piece {
-    std::filesystem::path folder;  // the case's, or a processor's
+    std::filesystem::path folder;  // the case's, a processor's, or that of several (collated)
+    uint32_t processor = 0;        // its part of the files of several
     FoamList points;               // 3 numbers each
     FoamFile::Faces faces;
     CellFaces cells;
@@ -47,17 +49,23 @@ class FoamSource final : public MeshSource {
     int component = 0;  // -1: the magnitude
   };
 
+  void choosePieces(const std::filesystem::path& folder);
   void findTimes(std::optional<uint32_t> asked, const std::filesystem::path& shown);
   std::filesystem::path meshFile(const std::filesystem::path& folder, const char* name) const;
-  void openPiece(const std::filesystem::path& folder);
+  FoamFile open(const Piece& piece, const std::filesystem::path& path) const {
+    return FoamFile(path, spool_, temporary_folder_, piece.processor);
+  }
+  void openPiece(Piece& piece);
   void listFacesOfCells(Piece& piece, const FoamList& owner, const FoamList& neighbour);
   void findFields();
+  void addField(const std::string& name, size_t components);
   const FoamList& valuesOf(uint32_t piece, size_t field, std::vector<double>& uniform) const;
 
   std::shared_ptr<SpoolFile> spool_;
   std::filesystem::path temporary_folder_;
   std::vector<std::string> time_names_;
   std::vector<Piece> pieces_;
+  bool decomposed_ = false;
   std::vector<Field> fields_;
   std::vector<Scalar> scalars_;  // [description_.scalars]
   GridDescription description_;

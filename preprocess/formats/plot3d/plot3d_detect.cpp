@@ -22,6 +22,8 @@ namespace {
 // with the wrong byte order or precision, most numbers are extreme, or differ from their neighbour along i
 // by many powers of two, since their exponents are arbitrary bits. Numbers of a field do so in few places.
 constexpr double kNoiseBelow = 1e-36, kNoiseAbove = 1e30;
+// Doubles that are rounding errors of zero may be as small as 1e-48 and less; bits of another order reach 1e-300.
+constexpr double kNoiseBelowOfDoubles = 1e-100;
 constexpr double kNoiseJump = 65536;
 constexpr double kUsualSize = 1e12;
 constexpr double kNoiseShare = 0.25;
@@ -45,14 +47,16 @@ std::vector<NodeBox> sampleRows(const Plot3dBlock& block, uint64_t most) {
   return boxes;
 }
 
-bool isExtreme(double value) {
+bool isExtreme(double value, int precision_bytes) {
   const double size = std::abs(value);
-  return size != 0 && (size < kNoiseBelow || size > kNoiseAbove);
+  const double noise_below = precision_bytes == 8 ? kNoiseBelowOfDoubles : kNoiseBelow;
+  return size != 0 && (size < noise_below || size > kNoiseAbove);
 }
 
 /// Whether numbers look like noise instead of a field.
 class NoiseTest {
  public:
+  explicit NoiseTest(int precision_bytes) : precision_bytes_(precision_bytes) {}
   /// The next number begins a row.
   void beginRow() { before_ = 0; }
   void add(std::span<const double> values) {
@@ -60,7 +64,7 @@ class NoiseTest {
       if (!std::isfinite(value)) continue;
       const double size = std::abs(value);
       ++finite_;
-      if (isExtreme(value)) {
+      if (isExtreme(value, precision_bytes_)) {
         ++extreme_;
         extreme_value_ = value;
       }
@@ -79,6 +83,7 @@ class NoiseTest {
   }
 
  private:
+  const int precision_bytes_;
   uint64_t finite_ = 0, extreme_ = 0, jumps_ = 0;
   double largest_ = 0, before_ = 0, extreme_value_ = 0;
 };
@@ -102,7 +107,7 @@ std::optional<std::string> implausibility(const Plot3dFit& fit) {
   const Plot3dFile file(fit);
   std::vector<double> values(1);
   file.read(0, 0, {0, 1, 0, 1, 0, 1}, values);
-  if (isExtreme(values.front()))
+  if (isExtreme(values.front(), fit.layout.precision_bytes))
     return fmt::format("its values begin with {}, as if its header were longer", values.front());
   std::vector<int32_t> iblank;
   const std::vector<uint32_t> blocks = sampleBlocks(fit.blocks.size());
@@ -110,7 +115,7 @@ std::optional<std::string> implausibility(const Plot3dFit& fit) {
     const uint64_t ni = fit.blocks[b].ni;
     const std::vector<NodeBox> rows = sampleRows(fit.blocks[b], 64 / blocks.size());
     for (uint32_t component = 0; component < fit.components; ++component) {
-      NoiseTest noise;
+      NoiseTest noise(fit.layout.precision_bytes);
       for (const NodeBox& row : rows) {
         noise.beginRow();
         for (const NodeBox& piece : piecesOf(row, ni)) {

@@ -48,31 +48,80 @@ size_t decodeFour(const std::byte* from, std::array<std::byte, 3>& to) {
   return bytes;
 }
 
+bool isSpace(std::byte c) {
+  return c == std::byte{' '} || (c >= std::byte{'\t'} && c <= std::byte{'\r'});
+}
+
 }  // namespace
 
 Base64Bytes::Base64Bytes(std::shared_ptr<const PooledFile> file, uint64_t begin, uint64_t end)
-    : file_(std::move(file)),
-      begin_(std::min(begin, file_->size())),
-      characters_(std::max(std::min(end, file_->size()), begin_) - begin_) {}
+    : file_(std::move(file)), begin_(std::min(begin, file_->size())), end_(std::min(end, file_->size())) {
+  findLines();
+  const uint64_t span = std::max(end_, begin_) - begin_;
+  characters_ = std::min(span, first_);
+  if (span > first_ + break_) {
+    const uint64_t rest = span - first_ - break_;
+    characters_ += rest / (line_ + break_) * line_ + std::min(rest % (line_ + break_), line_);
+  }
+}
+
+/// From the first two line breaks. Lines that groups of four do not fill are no lines of base64.
+void Base64Bytes::findLines() {
+  std::array<std::byte, 4096> text;
+  const auto some = std::span(text).first(std::min<uint64_t>(text.size(), std::max(end_, begin_) - begin_));
+  file_->readAt(begin_, some);
+  const auto first = std::find_if(some.begin(), some.end(), isSpace);
+  const auto next = std::find_if_not(first, some.end(), isSpace);
+  const auto last = std::find_if(next, some.end(), isSpace);
+  const auto length = static_cast<uint64_t>(first - some.begin()), line = static_cast<uint64_t>(last - next);
+  if (next == some.end() || length % 4 != 0 || length == 0 || line % 4 != 0) return;
+  first_ = length;
+  break_ = static_cast<uint64_t>(next - first);
+  line_ = last == some.end() ? kUnbroken : line;
+}
+
+uint64_t Base64Bytes::position(uint64_t four) const {
+  const uint64_t character = 4 * four;
+  if (character < first_) return begin_ + character;
+  return begin_ + character + (1 + (character - first_) / line_) * break_;
+}
+
+size_t Base64Bytes::readFours(uint64_t four, size_t count, std::span<std::byte> text) const {
+  const auto room = static_cast<uint64_t>(text.size());
+  while (position(four + count - 1) + 4 - position(four) > room) count /= 2;
+  const uint64_t from = position(four);
+  const auto raw = text.first(static_cast<size_t>(position(four + count - 1) + 4 - from));
+  file_->readAt(from, raw);
+  if (raw.size() > 4 * count)
+    for (size_t n = 0; n < count; ++n)
+      std::copy_n(&raw[static_cast<size_t>(position(four + n) - from)], 4, &text[4 * n]);
+  return count;
+}
 
 void Base64Bytes::readAt(uint64_t offset, std::span<std::byte> to) const {
-  std::array<std::byte, kPieceCharacters> text;
+  std::array<std::byte, 2 * kPieceCharacters> text;
   uint64_t four = offset / 3;
   auto skipped = static_cast<size_t>(offset % 3);
   while (!to.empty()) {
     const uint64_t wanted = (skipped + to.size() + 2) / 3;
     const uint64_t left = characters_ / 4 - std::min(four, characters_ / 4);
-    const auto fours = static_cast<size_t>(std::min({wanted, left, uint64_t{kPieceCharacters / 4}}));
+    auto fours = static_cast<size_t>(std::min({wanted, left, uint64_t{kPieceCharacters / 4}}));
     if (fours == 0)
       throw Error("{}: byte {}: expected {} more bytes in base64; the file is truncated or damaged",
-                  file_->name(), begin_ + 4 * four, to.size());
-    file_->readAt(begin_ + 4 * four, std::span(text).first(4 * fours));
+                  file_->name(), position(four), to.size());
+    fours = readFours(four, fours, text);
     for (size_t n = 0; n < fours && !to.empty(); ++n) {
       std::array<std::byte, 3> bytes;
-      const size_t count = decodeFour(&text[4 * n], bytes);
+      const std::byte* const group = &text[4 * n];
+      const size_t count = decodeFour(group, bytes);
       const size_t used = std::min(3 - skipped, to.size());
+      if (count == 0 && std::any_of(group, group + 4, isSpace))
+        throw Error(
+            "{}: byte {}: not valid base64: it is broken into lines of several lengths; write it without "
+            "line breaks",
+            file_->name(), position(four + n));
       if (count < skipped + used)
-        throw Error("{}: byte {}: {}; the file is damaged", file_->name(), begin_ + 4 * (four + n),
+        throw Error("{}: byte {}: {}; the file is damaged", file_->name(), position(four + n),
                     count == 0 ? "not valid base64" : "the base64 ends before the end of its data");
       std::copy_n(&bytes[skipped], used, to.begin());
       to = to.subspan(used);
@@ -84,15 +133,16 @@ void Base64Bytes::readAt(uint64_t offset, std::span<std::byte> to) const {
 
 bool Base64Bytes::endsWith(uint64_t bytes) const {
   const uint64_t last = (bytes - 1) / 3;
-  if (last >= characters_ / 4) return false;
-  std::byte character;
-  file_->readAt(begin_ + 4 * last + 3, std::span(&character, 1));
-  return character == std::byte{'='};
+  if (last >= characters_ / 4 || bytes % 3 == 0) return false;
+  std::array<std::byte, 4> group;
+  file_->readAt(position(last), group);
+  const auto padding = static_cast<uint64_t>(std::count(group.begin(), group.end(), std::byte{'='}));
+  return padding == 3 - bytes % 3;
 }
 
 std::shared_ptr<const Base64Bytes> Base64Bytes::behind(uint64_t bytes) const {
   const uint64_t fours = std::min((bytes + 2) / 3, characters_ / 4);
-  return std::make_shared<const Base64Bytes>(file_, begin_ + 4 * fours, begin_ + characters_);
+  return std::make_shared<const Base64Bytes>(file_, position(fours), end_);
 }
 
 namespace {

@@ -15,8 +15,8 @@
 
 namespace curvisplat {
 
-/// Contiguous base64 without white space. It ends at its padding, or at the end of its range of the file;
-/// reading beyond that is an Error.
+/// Base64, contiguous or in lines of one length, as MIME has them; the first may be shorter. It ends at its padding,
+/// or at the end of its range of the file; reading beyond that is an Error.
 class Base64Bytes final : public ByteSource {
  public:
   /// The characters [begin, end) of the file, or fewer.
@@ -25,15 +25,26 @@ class Base64Bytes final : public ByteSource {
   uint64_t size() const override { return characters_ / 4 * 3; }
   void readAt(uint64_t offset, std::span<std::byte> to) const override;
 
-  /// Whether the data ends after its first `bytes` bytes (at least 1): the group with the last of them ends
-  /// with padding.
+  /// Whether the data ends after its first `bytes` bytes (at least 1): the group with the last of them is padded
+  /// behind it. A group that is full shows nothing, and false is returned.
   bool endsWith(uint64_t bytes) const;
   /// The base64 that begins with the group after that of the first `bytes` bytes.
   std::shared_ptr<const Base64Bytes> behind(uint64_t bytes) const;
 
  private:
+  static constexpr uint64_t kUnbroken = UINT64_MAX / 4;
+
+  void findLines();
+  /// Of a group of four characters, in the file.
+  uint64_t position(uint64_t four) const;
+  /// Reads groups of four characters without the line breaks, `count` or as many as `text` has room for with them.
+  size_t readFours(uint64_t four, size_t count, std::span<std::byte> text) const;
+
   std::shared_ptr<const PooledFile> file_;
-  uint64_t begin_ = 0, characters_ = 0;
+  uint64_t begin_ = 0, end_ = 0;
+  uint64_t characters_ = 0;  // without line breaks
+  uint64_t first_ = kUnbroken, line_ = kUnbroken,
+           break_ = 0;  // characters of the first line, of others, of a break
 };
 
 enum class BlockCompressor { kZlib, kLz4, kLzma };

@@ -16,6 +16,7 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/vtk/encoded_bytes.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -194,6 +195,15 @@ std::string_view takeWord(std::string_view& text) {
   return word;
 }
 
+/// Programs in Fortran pad words to the length of their variables: NumberOfPoints="      120".
+void trimAttributes(const pugi::xml_node& node) {
+  for (pugi::xml_attribute attribute : node.attributes()) {
+    const std::string_view text = attribute.value(), word = trimmed(text);
+    if (word.size() < text.size()) attribute.set_value(std::string(word).c_str());
+  }
+  for (const pugi::xml_node child : node.children()) trimAttributes(child);
+}
+
 template <typename Integer>
 bool parseInteger(std::string_view text, Integer& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -218,6 +228,7 @@ VtkXmlFile::VtkXmlFile(const VtkFiles& files, const std::filesystem::path& path)
   const pugi::xml_parse_result parsed =
       document_.load_buffer_inplace(markup_.data(), markup_.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!parsed) fail(fmt::format("is not valid XML: {}", parsed.description()));
+  trimAttributes(document_);
   root_ = document_.child("VTKFile");
   type_ = root_.attribute("type").value();
   if (!root_ || type_.empty()) fail("has no <VTKFile type=...>");

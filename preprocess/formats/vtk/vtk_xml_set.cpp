@@ -7,9 +7,11 @@
 
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/vtk/vtk_grid.h"
+#include "preprocess/formats/vtk/vtk_mesh_source.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "preprocess/grid/grid_source.h"
+#include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -22,11 +24,45 @@ using Node = pugi::xml_node;
 constexpr size_t kMaxPieces = 100'000, kMaxFiles = 100'000;
 constexpr size_t kMaxPatches = 20'000, kMaxLevels = 64;  // of an AMR set
 
+/// Of the positions of the first and the last points of each piece or block, and of their number.
+uint64_t checksumOfFirstAndLast(const DataSource& source) {
+  constexpr uint64_t kSome = 4096;
+  std::vector<uint64_t> sums;
+  const auto add = [&](const auto& points) {
+    for (const auto* axis : {&points.x, &points.y, &points.z})
+      sums.push_back(checksumOf(std::as_bytes(std::span(*axis))));
+  };
+  const GridDescription& description = source.description();
+  if (const auto* mesh = dynamic_cast<const MeshSource*>(&source)) {
+    MeshPoints points;
+    for (uint32_t piece = 0; piece < description.pieces.size(); ++piece) {
+      const uint64_t all = description.pieces[piece].points, some = std::min(kSome, all);
+      sums.push_back(all);
+      for (const uint64_t first : {uint64_t{0}, all - some}) {
+        mesh->readPoints(piece, first, some, {}, points);
+        add(points);
+      }
+    }
+  } else if (const auto* grid = dynamic_cast<const GridSource*>(&source)) {
+    NodeArrays nodes;
+    for (uint32_t block = 0; block < description.blocks.size(); ++block) {
+      const GridBlock& of = description.blocks[block];
+      sums.insert(sums.end(), {of.ni, of.nj, of.nk});
+      grid->read(block, {0, 1, 0, 1}, {}, nodes);
+      add(nodes);
+      grid->read(block, {of.nj - 1, of.nj, of.nk - 1, of.nk}, {}, nodes);
+      add(nodes);
+    }
+  }
+  return checksumOf(std::as_bytes(std::span(sums)));
+}
+
 /// Follows the references of a file to other files, and gathers their pieces.
 class Gatherer {
  public:
   explicit Gatherer(const OpenGridOptions& options)
       : files_(options.temporary_folder),
+        temporary_folder_(options.temporary_folder),
         names_folder_(options.namesFolder()),
         time_step_(options.time_step) {}
 
@@ -291,16 +327,75 @@ class Gatherer {
     return ratios;
   }
 
+  static double timeOf(const VtkXmlFile& file, const Node& node) {
+    return node.attribute("timestep") ? file.numbers(node, "timestep", 1)[0] : 0;
+  }
+  static std::string partOf(const Node& node) {
+    std::string part;
+    for (const char* const key : {"group", "part", "name"})
+      part += fmt::format("{}\n", node.attribute(key).value());
+    return part;
+  }
+
+  void noteVersions(const VtkXmlFile& file, const Node& older, const Node& newer) {
+    if (replaced_.empty())
+      replaced_ =
+          fmt::format("names several files with the same part at time {:g} ({}, {}); the last one is read",
+                      timeOf(file, newer), older.attribute("file").value(), newer.attribute("file").value());
+  }
+
+  /// Removes the file that the step has for the part of `node`, which is read in its place.
+  void replacePart(const VtkXmlFile& file, const Node& node, std::vector<Node>& of_step) {
+    for (const Node& older : of_step)
+      if (partOf(older) == partOf(node)) noteVersions(file, older, node);
+    std::erase_if(of_step, [&](const Node& older) { return partOf(older) == partOf(node); });
+  }
+
+  /// Files of one time that do not differ in their part are parts all the same, as many programs write them, unless
+  /// they have the same points: then they are versions of one part, and the last one is read.
+  std::vector<Node> withoutVersions(const VtkXmlFile& file, const std::vector<Node>& nodes) {
+    std::map<std::string, size_t> files_of_part;
+    for (const Node& node : nodes) ++files_of_part[partOf(node)];
+    std::vector<Node> kept;
+    std::map<std::pair<std::string, uint64_t>, size_t> places;  // in `kept`
+    for (const Node& node : nodes) {
+      const std::string part = partOf(node);
+      if (files_of_part[part] > 1) {
+        const auto [place, is_new] = places.try_emplace({part, checksumOfPoints(file, node)}, kept.size());
+        if (!is_new) {
+          noteVersions(file, kept[place->second], node);
+          kept[place->second] = node;
+          continue;
+        }
+      }
+      kept.push_back(node);
+    }
+    return kept;
+  }
+
+  uint64_t checksumOfPoints(const VtkXmlFile& file, const Node& node) const {
+    OpenGridOptions options;
+    options.grid = pathOf(file, node, "file");
+    options.temporary_folder = temporary_folder_;
+    return checksumOfFirstAndLast(*Gatherer(options).gather(options.grid));
+  }
+
   void addTimeStep(const VtkXmlFile& file) {
     if (in_time_series_) file.fail("is a time series inside another time series");
     in_time_series_ = true;
     std::map<double, std::vector<Node>> steps;
-    for (const Node& node : file.content().children("DataSet"))
-      steps[node.attribute("timestep") ? file.numbers(node, "timestep", 1)[0] : 0].push_back(node);
+    Node before;
+    for (const Node& node : file.content().children("DataSet")) {
+      std::vector<Node>& of_step = steps[timeOf(file, node)];
+      // A run that was restarted goes back in time, and names the same parts of a step again.
+      if (before && timeOf(file, before) != timeOf(file, node)) replacePart(file, node, of_step);
+      of_step.push_back(before = node);
+    }
     if (steps.empty()) file.fail("names no file");
     for (const auto& [time, nodes] : steps) grid_.times.push_back(time);
     grid_.time_step = chosenTimeStep(file.name(), grid_.times, time_step_);
-    const std::vector<Node>& nodes = std::next(steps.begin(), grid_.time_step)->second;
+    const std::vector<Node> nodes = withoutVersions(file, std::next(steps.begin(), grid_.time_step)->second);
+    if (!replaced_.empty()) grid_.warnings.push_back(fmt::format("{}: {}", file.name(), replaced_));
     for (const Node& node : nodes) {
       const fs::path path = pathOf(file, node, "file");
       const std::string own = node.attribute("name").value();
@@ -309,6 +404,7 @@ class Gatherer {
   }
 
   VtkFiles files_;
+  const fs::path temporary_folder_;
   const fs::path names_folder_;  // of what the first file names
   std::optional<uint32_t> time_step_;
   VtkGrid grid_;  // and the files, times and warnings of a mesh
@@ -318,6 +414,7 @@ class Gatherer {
   std::string top_type_, leaf_type_, encoding_, mesh_type_, mesh_encoding_;
   std::string left_out_;  // the first file that is left out, and its type
   size_t left_out_files_ = 0;
+  std::string replaced_;  // the first time of a series with several versions of a part
 };
 
 }  // namespace
