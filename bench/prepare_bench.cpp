@@ -185,7 +185,7 @@ void prepare(benchmark::State& state, bool decode, bool sort) {
       keys.resize(projector.depths().size());
       depth_keys.setKeys(projector.mutableSplats(), projector.depths(),
                          cache.manifest().root.cellMin(of_index.cell), depth_keys.rangeOf(of_index), keys);
-      const auto order = sorter.sort(keys, depth_keys.order());
+      const auto order = sorter.sort(keys);
       for (size_t i = 0; i < order.size(); ++i) out[i] = projector.splats()[order[i].splat];
       benchmark::DoNotOptimize(out.data());
     }

@@ -176,7 +176,7 @@ HWY_NOINLINE bool paintBlock(Coloured& splat, const Window& window, const float*
                              float* HWY_RESTRICT block, Corner corner) {
   const Floats d;
   const V from_x = hn::Set(d, corner.x - splat.e.x), from_y = hn::Set(d, corner.y - splat.e.y);
-  const Cuts cuts{splat.faces, splat.line, {}, window};
+  const Cuts cuts{splat.faces, splat.line, window};
   Intervals of_opacity, of_colour;
   Row depths;
   V deepest = hn::Zero(d);

@@ -83,16 +83,10 @@ struct Window {
   const float* HWY_RESTRICT farther = nullptr;
 };
 
-/// What a splat hides of itself: Visits' along and cell_depth.
-struct Hiding {
-  float along, cell_depth;
-};
-
 /// What cuts a splat in a block.
 struct Cuts {
   const Faces& faces;
   const DepthLine& depth;
-  Hiding hiding;
   Window window;
 };
 
@@ -122,43 +116,11 @@ HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t la
   return {lo, hn::Max(hi, lo)};
 }
 
-/// The shade of a splat that is cut: what is left of the depths moves s by `per_deviation` a deviation; and what it
-/// hides of itself by `hiding` nearSide().
+/// The shade of a splat that is cut: what is left of the depths moves s by `per_deviation` a deviation.
 struct CutShade {
   Shade whole;
   float per_deviation;
-  float hiding = 0, cell_depth = 0;
 };
-
-/// What is seen of a splat lies nearer than its middle: so many half widths of its depths, L(tau / 2), where its
-/// optical depth is tau and its extinction constant. L(x) = coth x - 1 / x.
-HWY_INLINE V nearSide(V tau) {
-  const Floats d;
-  const V two = hn::Set(d, 2.0f), thin = hn::Mul(tau, hn::Set(d, 1.0f / 6));
-  const V part = absorbedOf<false>(tau), absorbed = hn::Mul(part, tau);
-  const V sum = hn::NegMulAdd(two, part, hn::Sub(two, absorbed));
-  const V side = hn::Div(sum, hn::Max(absorbed, hn::Set(d, 1e-30f)));
-  return hn::IfThenElse(hn::Lt(tau, hn::Set(d, 0.02f)), thin, side);
-}
-
-/// 1 less the variance of the depths that are seen, over that of all.
-HWY_INLINE V lostByHiding(V tau, V near_side) {
-  const Floats d;
-  const V one = hn::Set(d, 1.0f);
-  const V part = hn::Div(hn::Mul(hn::Set(d, 4.0f), near_side), hn::Max(tau, hn::Set(d, 1e-30f)));
-  const V seen = hn::Mul(hn::Set(d, 3.0f), hn::Sub(hn::NegMulAdd(near_side, near_side, one), part));
-  return hn::IfThenElseZero(hn::Ge(tau, hn::Set(d, 0.02f)), hn::Sub(one, hn::Clamp(seen, hn::Zero(d), one)));
-}
-
-/// The values of all of a splat, with the colour of what is seen of it. Where the seen side has hardly any extinction,
-/// the colour is that of all.
-HWY_INLINE void showNearSide(const V (&seen)[4], V (&value)[4]) {
-  const Floats d;
-  const V all = value[3], a_little = hn::Mul(hn::Set(d, 1.0f / 64), all);
-  const V factor = hn::Div(all, hn::Max(hn::Add(seen[3], a_little), hn::Set(d, 1e-37f)));
-  for (int c = 0; c < 3; ++c)
-    value[c] = hn::Mul(factor, hn::MulAdd(hn::Set(d, 1.0f / 64), value[c], seen[c]));
-}
 
 /// One block of a splat that is cut, by one parabola, or one colour. Whether it is saturated now.
 template <bool kFitted>
@@ -179,21 +141,10 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const CutShade& c
     }
     V value[4];
     if constexpr (kFitted) {
-      const auto valuesAt = [&](V s, V(&out)[4]) HWY_ATTR {
-        for (int c = 0; c < 4; ++c)
-          out[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
-                              hn::Set(d, shade.at[c]));
-      };
       const V s = hn::MulAdd(left.mean(share), hn::Set(d, cut_shade.per_deviation), shade.s.at(pixels));
-      valuesAt(s, value);
-      if (cut_shade.hiding != 0) {
-        const V tau =
-            hn::Mul(hn::Mul(hn::Set(d, cut_shade.cell_depth), share), hn::Max(value[3], hn::Zero(d)));
-        V seen[4];
-        valuesAt(hn::NegMulAdd(hn::Mul(hn::Set(d, cut_shade.hiding), share), nearSide(tau), s), seen);
-        seen[3] = hn::Max(seen[3], hn::Zero(d));
-        showNearSide(seen, value);
-      }
+      for (int c = 0; c < 4; ++c)
+        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
+                              hn::Set(d, shade.at[c]));
     } else {
       for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
     }
@@ -202,56 +153,17 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const CutShade& c
   return isSaturated(most);
 }
 
-/// What is left of a splat along the rays of its pixels: the share of its depths, the scalar's mean there, and its half
-/// width squared.
-struct AlongRay {
-  Row share, mean, width2;
-};
-
-/// What has been looked up becomes what is seen, of splats that hide some of themselves.
-HWY_INLINE void lookUpNearSide(const ShadingTable& table, const Hiding& hiding, AlongRay& ray,
-                               Intervals& intervals, LookedUp& out) {
-  const Floats d;
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    V value[4];
-    meansOf(out.integrals, hn::Load(d, out.scale.at + lane), lane, value);
-    const V left = hn::Load(d, ray.share.at + lane);
-    const V tau = hn::Mul(hn::Mul(hn::Set(d, hiding.cell_depth), left), value[3]), near_side = nearSide(tau);
-    const V moved = hn::Mul(hn::Mul(hn::Set(d, kSqrt3 * hiding.along), left), near_side);
-    hn::Store(hn::Sub(hn::Load(d, ray.mean.at + lane), moved), d, ray.mean.at + lane);
-    const V of_depth = hn::Mul(hn::Set(d, 3 * hiding.along * hiding.along), hn::Mul(left, left));
-    const V narrower =
-        hn::NegMulAdd(of_depth, lostByHiding(tau, near_side), hn::Load(d, ray.width2.at + lane));
-    hn::Store(narrower, d, ray.width2.at + lane);
-  }
-  alignas(64) float all[4 * kLanes];
-  Row all_scale = out.scale;
-  std::copy_n(out.integrals, 4 * kLanes, all);
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    const V half_width = hn::Sqrt(hn::Max(hn::Load(d, ray.width2.at + lane), hn::Zero(d)));
-    locate(table, hn::Load(d, ray.mean.at + lane), half_width, lane, intervals);
-  }
-  integrate(table, intervals, kLanes, out.integrals);
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    V seen[4], value[4];
-    meansOf(out.integrals, hn::Load(d, intervals.scale.at + lane), lane, seen);
-    meansOf(all, hn::Load(d, all_scale.at + lane), lane, value);
-    showNearSide(seen, value);
-    hn::StoreInterleaved4(value[0], value[1], value[2], value[3], d, out.integrals + 4 * lane);
-    hn::Store(hn::Set(d, 1.0f), d, out.scale.at + lane);
-  }
-}
-
-/// Of a splat that is cut, or hides some of itself. Whether anything is left of it in the
-/// block.
+/// Of a splat that is cut. Whether anything is left of it in the block.
 HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& cuts, const Tables& tables,
                             Corner corner, LookedUp& out) {
   const Floats d;
   const float* HWY_RESTRICT footprint = tables.footprint;
   const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   const Faces& faces = cuts.faces;
-  Intervals intervals;
-  AlongRay ray;
+  Intervals intervals, nearer;
+  const bool hides = scalar.nearer != 0;
+  const float hidden2 =
+      scalar.half_width * scalar.half_width - scalar.seen_half_width * scalar.seen_half_width;
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
@@ -269,13 +181,13 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
                                    hn::Set(d, scalar.half_width * scalar.half_width));
     locate(tables.shading, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
-    hn::Store(share, d, ray.share.at + lane);
-    hn::Store(mean, d, ray.mean.at + lane);
-    hn::Store(width2, d, ray.width2.at + lane);
+    if (hides)
+      locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)),
+             hn::Sqrt(hn::Max(hn::Sub(width2, hn::Set(d, hidden2)), hn::Zero(d))), lane, nearer);
   }
   if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return false;
   integrate(tables.shading, intervals, kLanes, out.integrals);
-  if (cuts.hiding.along != 0) lookUpNearSide(tables.shading, cuts.hiding, ray, intervals, out);
+  if (hides) showNearSides(tables.shading, nearer, out);
   return true;
 }
 
@@ -326,7 +238,6 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
   const DepthLine line = depthLineOf(records.depth);
   if (records.depth) faces.mean_per_deviation = ScreenDepth::of(*records.depth).correlation;
   const bool windowed = records.depth && work.windows;
-  const Hiding hiding{visit.all.along.at[visit.n], visit.all.cell_depth.at[visit.n]};
   const Ellipse e = visit.ellipse();
   Scalar scalar = visit.scalar();
   faces.mean_per_deviation = faces.mean_per_deviation * scalar.half_width * (1 / kSqrt3);
@@ -338,7 +249,7 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
     while (blocks != 0) {
       const int block = takeFirst(blocks);
       const auto in_window = [&](float* at, const Window& window) HWY_ATTR {
-        return paint_block(at, Cuts{faces, line, hiding, window}, block);
+        return paint_block(at, Cuts{faces, line, window}, block);
       };
       if (windowed ? paintWindows(work, block, in_window) : in_window(work.tile + block * kBlockFloats, {}))
         saturated |= BlockMask{1} << block;
@@ -348,8 +259,7 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
   // On a logarithmic scale there is no bound of what a narrower distribution sees.
   if (fit != kOther && !(work.table.logScale() && work.shading.per_pixel)) {
     const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
-    CutShade shade{shadeOf(visit.fits, visit.n), inverse * faces.mean_per_deviation * ScreenCut::kReach,
-                   inverse * kSqrt3 * hiding.along, hiding.cell_depth};
+    CutShade shade{shadeOf(visit.fits, visit.n), inverse * faces.mean_per_deviation * ScreenCut::kReach};
     shade.whole.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
     if (fit == kConstant)
       paint([&](float* at, const Cuts& cuts, int block)
@@ -370,7 +280,7 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
     return saturated;
   }
   return paintLookedUpBlocks(work, blocks, lit, [&](Corner corner, LookedUp& out) HWY_ATTR {
-    return lookUpBlock(e, scalar, Cuts{faces, line, hiding, {}}, tables, corner, out);
+    return lookUpBlock(e, scalar, Cuts{faces, line, {}}, tables, corner, out);
   });
 }
 

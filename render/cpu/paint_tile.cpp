@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <new>
 #include <vector>
 
 #include "render/cpu/tile.h"
@@ -64,10 +65,44 @@ HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, con
   return saturated;
 }
 
+/// Polylines of splats that are painted in several calls.
+class Lines {
+ public:
+  explicit Lines(size_t splats) : places_(splats, kUnknown) {}
+
+  /// Of splat `index`; null where none is good enough. Valid until the next call.
+  HWY_INLINE const Polyline* of(size_t index, const TileWork& work, const Visit& visit) {
+    if (places_[index] == kUnknown) {
+      Polyline line;
+      places_[index] = fit(work, visit, line) ? static_cast<int32_t>(lines_.size()) : kNone;
+      if (places_[index] != kNone) lines_.push_back(line);
+    }
+    return places_[index] == kNone ? nullptr : &lines_[static_cast<size_t>(places_[index])];
+  }
+
+  HWY_INLINE static bool fit(const TileWork& work, const Visit& visit, Polyline& line) {
+    if (!fitPolyline(work.table, visit.all.pieces, visit.n, line)) return false;
+    if (work.shading.lit) line.light(visit.all.lit(work, visit.n));
+    return true;
+  }
+
+ private:
+  static constexpr int32_t kUnknown = -1, kNone = -2;
+
+  std::vector<int32_t> places_;  // [splat] in lines_
+  std::vector<Polyline> lines_;
+};
+
+/// Where what is made for a splat is kept for its next call; null: nowhere.
+struct Kept {
+  Lines* lines = nullptr;
+  size_t index = 0;
+};
+
 /// `several`: the splat touches more than one block, be they open or not: how a block is painted must not depend on others,
 /// of which another process may know.
 HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool several, const Visit& visit,
-                                const float* footprint) {
+                                const float* footprint, const Kept& kept) {
   const auto& [visits, fits, n] = visit;
   const Ellipse e = visit.ellipse();
   // A skewed footprint may be a tenth higher than F(0).
@@ -86,11 +121,14 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool sev
   }
   // A polyline's error is a 25th of a parabola's or so, where it does not fall much faster; and it is as much
   // work as a block looked up.
-  Polyline line;
-  if (fits.excess.at[n] < 25 && several && fitPolyline(work.table, visits.pieces, n, line)) {
-    if (work.shading.lit) line.light(visits.lit(work, n));
-    return paintPolyline(work, blocks, e, line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
-                         footprint);
+  if (fits.excess.at[n] < 25 && several) {
+    Polyline own;
+    const Polyline* const line = kept.lines                     ? kept.lines->of(kept.index, work, visit)
+                                 : Lines::fit(work, visit, own) ? &own
+                                                                : nullptr;
+    if (line)
+      return paintPolyline(work, blocks, e, *line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
+                           footprint);
   }
   return paintPixelByPixel(work, blocks, e, scalar, visits.lit(work, n), footprint);
 }
@@ -112,10 +150,12 @@ struct Prepared {
     for (size_t n = 0; n < kLanes; ++n)
       numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);
     setUp(work, numbers, visits);
-    if (work.shading.per_pixel)
+    if (work.shading.per_pixel) {
       fitPieces(work.table, visits.pieces, count, fits);
-    else
+      if (!work.colours) fitNearSides(work.table, visits, count, fits);
+    } else {
       fitMeans(work.table, visits.pieces, count, fits);
+    }
     if (work.colours)
       setUpColours(work, numbers, visits, fits, count, colours);
     else if (work.shading.lit)
@@ -129,12 +169,12 @@ struct Prepared {
 
   /// Paints splat n in `blocks`, some of those touched; returns those of them that are saturated then.
   HWY_INLINE BlockMask paint(const TileWork& work, BlockMask blocks, BlockMask touched, size_t n,
-                             const float* footprint) const {
+                             const float* footprint, const Kept& kept = {}) const {
     const auto number = static_cast<size_t>(numbers.at[n]);
     if (work.colours) return paintColoured(work, blocks, {visits, fits, colours, n}, number, footprint);
     const Visit visit{visits, fits, n};
     if (visits.cut.at[n] != 0) return paintCut(work, blocks, visit, number, footprint);
-    return paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint);
+    return paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint, kept);
   }
 };
 
@@ -163,25 +203,32 @@ BlockMask blocksOfOrderTile(size_t number) {
   return blocks;
 }
 
-/// Each order tile in its own order: all splats are prepared first.
+/// Each order tile in its own order. Splats are prepared once for all.
 BlockMask paintByLists(const TileWork& work) {
   const float* footprint = footprintPolynomial();
-  const size_t count = work.order.size();
-  const auto prepared = hwy::MakeUniqueAlignedArray<Prepared>((count + kLanes - 1) / kLanes);
+  const size_t count = work.order.size(), groups = (count + kLanes - 1) / kLanes;
+  const auto prepared = hwy::AllocateAligned<Prepared>(groups);
+  if (!prepared) throw std::bad_alloc();
+  std::vector<uint8_t> is_prepared(groups);
   std::vector<BlockMask> touched(count);
-  for (size_t begin = 0; begin < count; begin += kLanes) {
-    Prepared& group = prepared[begin / kLanes];
-    group.prepare(work, begin);
-    for (size_t n = 0; n < group.count; ++n) touched[begin + n] = group.touched(n);
-  }
+  Lines lines(count);
   BlockMask open = work.open;
   for (size_t number = 0; number < kOrderTiles; ++number) {
     const BlockMask of_tile = blocksOfOrderTile(number);
+    if ((open & of_tile) == 0) continue;
     for (const uint64_t item : (*work.lists)[number]) {
       const auto index = static_cast<uint32_t>(item);
+      const size_t of_index = index / kLanes, begin = of_index * kLanes;
+      Prepared& group = prepared[of_index];
+      if (!is_prepared[of_index]) {
+        is_prepared[of_index] = 1;
+        group.fits = {};
+        group.prepare(work, begin);
+        for (size_t n = 0; n < group.count; ++n) touched[begin + n] = group.touched(n);
+      }
       const BlockMask blocks = touched[index] & open & of_tile;
-      if (blocks != 0)
-        open &= ~prepared[index / kLanes].paint(work, blocks, touched[index], index % kLanes, footprint);
+      if (blocks == 0) continue;
+      open &= ~group.paint(work, blocks, touched[index], index % kLanes, footprint, {&lines, index});
       if ((open & of_tile) == 0) break;
     }
   }

@@ -30,13 +30,14 @@ constexpr auto kHalfWidthMask = static_cast<int32_t>(0xffff0000u);  // as light.
 
 /// Sixteen splats of a tile, ready to be painted.
 struct Visits {
-  Row x, y, a, b, c;      // Ellipse
-  Row tp, tq;             // Scalar's
-  Row cut;                // 1 where the splat is cut; its pieces' reach is then that of the cut, too
-  Row along;              // ScreenSplat's, of splats that hide some of themselves; else 0
-  Row cell_depth;         // geometric, of their cells
-  Row diffuse, specular;  // Lit, in lit pictures
-  Pieces pieces;          // all of the splat that is in the tile
+  Row x, y, a, b, c;            // Ellipse
+  Row tp, tq;                   // Scalar's
+  Row cut;                      // 1 where the splat is cut; its pieces' reach is then that of the cut, too
+  Row along;                    // ScreenSplat's, of splats that hide some of themselves; else 0
+  Row nearer, seen_half_width;  // Scalar's
+  Row cell_depth;               // geometric, of their cells
+  Row diffuse, specular;        // Lit, in lit pictures
+  Pieces pieces;                // all of the splat that is in the tile
   Row l11, l21, l22;
   IntRow skew;            // ScreenSplat's
   IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
@@ -52,7 +53,8 @@ struct Visits {
     return work.shading.lit ? Lit{diffuse.at[n], specular.at[n]} : Lit{};
   }
   HWY_INLINE Scalar scalar(size_t n) const {
-    return {pieces.mean.at[n], pieces.reach.at[n], tp.at[n], tq.at[n], pieces.half_width.at[n]};
+    return {pieces.mean.at[n], pieces.reach.at[n],   tp.at[n], tq.at[n], pieces.half_width.at[n],
+            nearer.at[n],      seen_half_width.at[n]};
   }
 };
 
@@ -100,8 +102,8 @@ HWY_INLINE V hidesItself(const TileWork& work, V cell_depth, V along) {
                  hn::Min(hn::Mul(tau, hn::Set(d, 1.0f / 6)), hn::Set(d, 1.0f)));
 }
 
-// In cells of the table: what is seen of splats with less is not worth the work. A 2,000th of the function.
-constexpr float kHidingCells = 2;
+// In cells of the table: what is seen of splats with less is not worth the work. A 500th of the function.
+constexpr float kHidingCells = 8;
 
 /// From the splats with these numbers.
 HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
@@ -130,6 +132,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const V amplitude = gather(work, offsets, 5);
     const auto cut = hn::Lt(amplitude, zero);
     store(hn::Abs(amplitude), out.pieces.amplitude);
+    store(hn::IfThenElseZero(cut, one), out.cut);
 
     // The pixels of the tile that lie in the ellipse's own rectangle.
     const V reach_x = hn::Mul(support, l11);
@@ -161,9 +164,8 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     }
     store(gather(work, offsets, 6), out.pieces.mean);
     if (!work.shading.per_pixel) {
-      store(hn::IfThenElseZero(cut, one), out.cut);
       for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to, &out.tp,
-                       &out.tq, &out.pieces.width_loss, &out.along, &out.cell_depth})
+                       &out.tq, &out.pieces.width_loss, &out.along, &out.nearer, &out.cell_depth})
         store(zero, *row);
       continue;
     }
@@ -187,14 +189,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const auto hides = hn::Gt(hn::Mul(seen_nearer, cellsAScalar(work.table, gather(work, offsets, 6))),
                               hn::Set(d, kHidingCells));
     store(hn::IfThenElseZero(hides, along), out.along);
-    store(hn::IfThenElseZero(hn::Or(cut, hides), one), out.cut);
-    if (!hn::AllFalse(d, hides)) {
-      const V along2 = hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along));
-      const V narrowest = hn::Sqrt(hn::Max(hn::MulSub(half_width, half_width, along2), zero));
-      reach = hn::IfThenElse(hides, hn::Add(reach, seen_nearer), reach);
-      width_loss = hn::IfThenElseZero(hides, hn::Sub(half_width, narrowest));
-      t = {hn::IfThenElse(hides, hn::Neg(one), t.from), hn::IfThenElse(hides, one, t.to)};
-    }
+    store(zero, out.nearer);
     if (!hn::AllFalse(d, cut)) {
       // ScreenCut's correlation: how far the mean moves by what is left along the ray, which is all over the
       // splat, and how much narrower the scalar's distribution becomes.
@@ -208,8 +203,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
       const V moved = hn::Mul(hn::Mul(hn::Abs(correlation), half_width), hn::Set(d, kReachOfHalfWidth));
       const V kept = hn::Sqrt(hn::Max(hn::NegMulAdd(correlation, correlation, one), zero));
       reach = hn::IfThenElse(cut, hn::Add(reach, moved), reach);
-      width_loss =
-          hn::IfThenElse(cut, hn::Max(width_loss, hn::Mul(half_width, hn::Sub(one, kept))), width_loss);
+      width_loss = hn::IfThenElseZero(cut, hn::Mul(half_width, hn::Sub(one, kept)));
       t = {hn::IfThenElse(cut, hn::Neg(one), t.from), hn::IfThenElse(cut, one, t.to)};
     }
     store(reach, out.pieces.reach);
@@ -299,6 +293,72 @@ HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks,
         saturated |= BlockMask{1} << numbers[n];
   }
   return saturated;
+}
+
+/// What is seen of splats that hide some of themselves, in the place of the colours in `fits`: those of their nearer
+/// sides. The optical depths stay. By the extinction in their middles.
+HWY_INLINE void fitNearSides(const ShadingTable& table, Visits& visits, size_t count, Fits& fits) {
+  const Floats d;
+  const V zero = hn::Zero(d);
+  V any = zero;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
+    any = hn::Max(any, hn::Abs(hn::Load(d, visits.along.at + lane)));
+  if (hn::AllTrue(d, hn::Eq(any, zero))) return;
+  Pieces nearer = visits.pieces;
+  any = zero;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const V along = hn::Load(d, visits.along.at + lane),
+            half_width = hn::Load(d, visits.pieces.half_width.at + lane);
+    const V tau = hn::Mul(hn::Load(d, visits.cell_depth.at + lane), hn::Load(d, fits.at.of[3].at + lane));
+    const V side = nearSide(tau), moved = hn::Mul(hn::Mul(hn::Set(d, kSqrt3), along), side);
+    const V lost = hn::Mul(hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along)), lostByHiding(tau, side));
+    const V narrower = hn::Sqrt(hn::Max(hn::MulSub(half_width, half_width, lost), zero));
+    // By the largest extinction of all, more seemed to hide something.
+    const V cells = hn::Mul(hn::Abs(moved), cellsAScalar(table, hn::Load(d, visits.pieces.mean.at + lane)));
+    const auto worth = hn::Gt(cells, hn::Set(d, kHidingCells));
+    any = hn::Max(any, hn::IfThenElseZero(worth, cells));
+    hn::Store(hn::IfThenElseZero(worth, along), d, visits.along.at + lane);
+    hn::Store(hn::IfThenElseZero(worth, moved), d, visits.nearer.at + lane);
+    hn::Store(narrower, d, visits.seen_half_width.at + lane);
+    hn::Store(hn::Sub(hn::Load(d, visits.pieces.mean.at + lane), moved), d, nearer.mean.at + lane);
+    hn::Store(narrower, d, nearer.half_width.at + lane);
+  }
+  if (hn::AllTrue(d, hn::Eq(any, zero))) return;
+  Fits seen{};
+  fitPieces(table, nearer, count, seen);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const auto hides = hn::Ne(hn::Load(d, visits.along.at + lane), zero);
+    // At both ends and in the middle.
+    V value[3][4], of_near[3][4];
+    for (int c = 0; c < 4; ++c) {
+      const auto points = [&](const Fits& of, V(&out)[3][4]) HWY_ATTR {
+        const V at = hn::Load(d, of.at.of[c].at + lane), by = hn::Load(d, of.by.of[c].at + lane);
+        const V ends = hn::Add(at, hn::Load(d, of.bend.of[c].at + lane));
+        out[0][c] = hn::Max(hn::Sub(ends, by), zero);
+        out[1][c] = hn::Max(at, zero);
+        out[2][c] = hn::Max(hn::Add(ends, by), zero);
+      };
+      points(fits, value);
+      points(seen, of_near);
+    }
+    for (int point = 0; point < 3; ++point) showNearSide(of_near[point], value[point]);
+    const V half = hn::Set(d, 0.5f);
+    for (int c = 0; c < 3; ++c) {
+      const auto replace = [&](Values& values, V by) HWY_ATTR {
+        float* const place = values.of[c].at + lane;
+        hn::Store(hn::IfThenElse(hides, by, hn::Load(d, place)), d, place);
+      };
+      replace(fits.at, value[1][c]);
+      replace(fits.by, hn::Mul(half, hn::Sub(value[2][c], value[0][c])));
+      replace(fits.bend, hn::Sub(hn::Mul(half, hn::Add(value[0][c], value[2][c])), value[1][c]));
+    }
+    // The worse of both; nothing only where the whole has nothing.
+    const auto fit = hn::Load(Ints(), fits.fit.at + lane), of_seen = hn::Load(Ints(), seen.fit.at + lane);
+    const auto worse = hn::IfThenElseZero(hn::Gt(fit, hn::Set(Ints(), kNothing)), hn::Max(fit, of_seen));
+    hn::Store(hn::IfThenElse(hn::RebindMask(Ints(), hides), worse, fit), Ints(), fits.fit.at + lane);
+    const V excess = hn::Load(d, fits.excess.at + lane);
+    hn::Store(hn::IfThenElse(hides, hn::Set(d, 1e9f), excess), d, fits.excess.at + lane);
+  }
 }
 
 /// Visit `n` of sixteen.

@@ -92,7 +92,7 @@ void main() {
   float cell_depth = abs(amplitude) * passed / sqrt(max(determinant, 1e-4 * passed * passed));
   float nearer = 1.7320508 * abs(along_ray) * min(1.0, cell_depth * most_extinction / 6.0);
   float cells_a_scalar = abs(cells_from_scalar.x) / (log_scale ? max(abs(scalar.x), 1e-37) : 1.0);
-  hiding = vec3(nearer * cells_a_scalar > 2.0 ? along_ray : 0.0, colour1.y, cell_depth);
+  hiding = vec3(nearer * cells_a_scalar > 8.0 ? along_ray : 0.0, colour1.y, cell_depth);
   // The ellipse's own rectangle, within the pixels that it is clipped to.
   vec2 reach = support * vec2(part0.z, length(vec2(part0.w, part1.x)));
   vec2 first = vec2(clip.x & 0xffff, clip.x >> 16 & 0xffff);
@@ -243,7 +243,7 @@ vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
                   integral(colours, ends.x, colours_below, colours_above)).rgb / (ends.y - ends.x), 0.0) * seen.w;
 #else
   if (PER_PIXEL && hiding.x != 0.0) {
-    vec4 near_scalar = seenOf(scalar, hiding.x * left.x, nearSide(hiding.z * left.x * seen.w));
+    vec4 near_scalar = seenOf(scalar, hiding.x, nearSide(hiding.z * seen.w));
     ends = intervalOf(near_scalar, cut.y, u, vec2(left.y, lost), LOG_SCALE, cells_from_scalar);
     vec4 near = max((integral(classes, ends.y, below, above) - integral(classes, ends.x, below, above)) / (ends.y - ends.x), 0.0);
     if (seen.w > 0.0) seen.rgb = (near.rgb + seen.rgb / 64.0) * (seen.w / (near.w + seen.w / 64.0));

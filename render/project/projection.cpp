@@ -139,6 +139,33 @@ struct BrickArrays {
   const VariableArrays<const float>* colours;  // null: of pictures of one scalar
 };
 
+/// Of the distribution of depths, the part between the faces on the ray through the centre.
+float shareAtCentre(const ScreenCut& cut) {
+  float lo = -1, hi = 1;
+  for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
+    const float at = cut.faces[n][0] / ScreenCut::kReach;
+    if (cut.far_sides >> n & 1)
+      lo = std::max(lo, -at);
+    else
+      hi = std::min(hi, at);
+  }
+  const auto below = [](float x) { return x * (0.9375f + x * x * (-0.625f + 0.1875f * x * x)); };
+  return std::max(0.0f, below(std::min(hi, 1.0f)) - below(std::min(lo, 1.0f)));
+}
+
+/// A cell at a border is drawn as a wider splat that is cut at the face, which gives it the right density; but its scalar
+/// stays that of the cell, which does not reach as far into those behind it. `cell`: its ellipse; `x`, `y`: its centre.
+void keepScalarOf(const Ellipse& cell, float mean, float x, float y, ScreenSplat& splat, ScreenCut& cut) {
+  const float by_y = cell.slope1 / cell.l22, by_x = (cell.slope0 - cell.l21 * by_y) / cell.l11;
+  splat.mean = mean + by_x * (splat.x - x) + by_y * (splat.y - y);
+  splat.slope0 = splat.l11 * by_x + splat.l21 * by_y;
+  splat.slope1 = splat.l22 * by_y;
+  splat.half_width = cell.half_width;
+  // Painters take the wide splat's optical depth for the cell's, which is this share of it.
+  splat.along = cell.along * shareAtCentre(cut);
+  cut.correlation = 0;
+}
+
 /// What cuts the splats of a brick.
 struct Cutting {
   const BorderStyle* borders;  // null: cells at borders are drawn as any cell, and clip planes do not cut
@@ -199,7 +226,8 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   const size_t least = brick.colours ? 2 : 1;
   const bool has_faces = inward.faces != 0 || layers != 0;
   size_t own = how.clipped || how.layered || has_faces ? least : 0;
-  const SplatPiece* coloured = nullptr;  // the part that is placed, with the scalar of the colours
+  const SplatPiece* part = nullptr;      // that is placed
+  const SplatPiece* coloured = nullptr;  // the same, with the scalar of the colours
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
@@ -216,6 +244,15 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     if (left.pieces + own < records) return false;
     ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean, how.plane);
     if (piece.growth.count > 0) splat.skew = skewOf(at.rows, piece.growth, ellipse);
+    const bool whole_part = piece.position == part->position;  // perspective has not cut it up
+    if (faces && whole_part && !across && !how.clipped && !brick.colours) {
+      const glm::vec3 back = whole.position - piece.position;
+      const float x = at.x + at.rows.x0 * back.x + at.rows.y0 * back.y + at.rows.z0 * back.z;
+      const float y = at.y + at.rows.x1 * back.x + at.rows.y1 * back.y + at.rows.z1 * back.z;
+      const Ellipse cell = ellipseOf(at.rows, whole.shape, whole.slope, variable.variance[i],
+                                     whole.weight * at.volume, map.low_pass);
+      keepScalarOf(cell, whole.mean, x, y, splat, cut);
+    }
     ScreenDepth along_ray;
     if (across) {
       along_ray = depthAlongRay(at.rows, at.depth_row, cutting.layers.depthOf(at.depth), piece, ellipse,
@@ -245,6 +282,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   const size_t count = divide(whole, pass.parts);
   if (brick.colours) divide(wholeOf(brick.geometry, *brick.colours, i), pass.coloured_parts);
   for (size_t n = 0; n < count; ++n) {
+    part = &pass.parts[n];
     if (brick.colours) coloured = &pass.coloured_parts[n];
     if (how.clipped) cutting.clip.addFaces(pass.parts[n]);
     if (!place(map, pass.parts[n], left.looks, take)) return {};

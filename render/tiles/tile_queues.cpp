@@ -12,6 +12,7 @@ namespace {
 constexpr size_t kWorthPainting = 192, kShareOfWaiting = 2;
 // Splats that are prepared and sorted together; more would not stay in a core's cache.
 constexpr size_t kRound = 512;
+constexpr uint32_t kNothingLeft = UINT32_MAX;  // keys are smaller
 // Of a thread: a round, the splats that wait in a tile, and what the painter prepares of them.
 constexpr uint64_t kScratchBytes = 2 << 20;
 
@@ -113,42 +114,52 @@ void TileQueues::listTile(size_t number, uint32_t painted, uint32_t front, uint6
                           Scratch& scratch) const {
   const auto left = static_cast<float>(static_cast<int>(number) % columns_ * kTileSide);
   const auto top = static_cast<float>(static_cast<int>(number) / columns_ * kTileSide);
-  scratch.order.clear();
   for (OrderList& list : scratch.lists) list.clear();
-  scratch.kept.clear();
+  scratch.order.clear();
+  scratch.by_middle.clear();
+  constexpr float kMiddle = 0.5f * kTileSide;
+  for (const Active& active : scratch.active) {
+    const uint64_t key = keyAt(scratch.splats[active.splat], left + kMiddle, top + kMiddle);
+    scratch.by_middle.push_back(key << 32 | scratch.order.size());
+    scratch.order.push_back(active.splat);
+  }
+  // Layers have one order over all of the tile as a rule; the lists are then sorted as they are filled.
+  std::sort(scratch.by_middle.begin(), scratch.by_middle.end());
+  for (const uint64_t item : scratch.by_middle) {
+    const auto index = static_cast<uint32_t>(item);
+    Active& active = scratch.active[index];
+    if (active.next <= front) active.next = listSplat({left, top}, painted, {front, open, index}, scratch);
+    active.seen = true;
+  }
+  for (OrderList& list : scratch.lists)
+    if (!std::is_sorted(list.begin(), list.end())) std::sort(list.begin(), list.end());
+  std::erase_if(scratch.active, [](const Active& active) { return active.next == kNothingLeft; });
+}
+
+/// Of one splat. Returns the first key behind the front.
+uint32_t TileQueues::listSplat(const Corner& corner, uint32_t painted, const Listed& listed,
+                               Scratch& scratch) {
   constexpr auto kSupport = static_cast<float>(kKernelSupport);
   constexpr float kHalf = 0.5f * kOrderSide;
-  for (const Active& active : scratch.active) {
-    if (active.next > front) {
-      scratch.kept.push_back(active);
-      continue;
+  const Active& active = scratch.active[listed.index];
+  const ScreenSplat& splat = scratch.splats[active.splat];
+  const float reach_x = kSupport * splat.l11;
+  const float reach_y = kSupport * std::sqrt(splat.l21 * splat.l21 + splat.l22 * splat.l22);
+  const OrderTileRange columns = orderTilesAlong(splat.x - reach_x - corner.x, splat.x + reach_x - corner.x);
+  const OrderTileRange rows = orderTilesAlong(splat.y - reach_y - corner.y, splat.y + reach_y - corner.y);
+  uint32_t next = kNothingLeft;
+  for (int row = rows.first; row <= rows.last; ++row)
+    for (int column = columns.first; column <= columns.last; ++column) {
+      const int tile = row * kOrderTilesAlong + column;
+      if (!(listed.open >> tile & 1)) continue;
+      const uint32_t key = keyAt(splat, corner.x + static_cast<float>(column * kOrderSide) + kHalf,
+                                 corner.y + static_cast<float>(row * kOrderSide) + kHalf);
+      if (key > listed.front)
+        next = std::min(next, key);
+      else if (!active.seen || key > painted)
+        scratch.lists[static_cast<size_t>(tile)].push_back(uint64_t{key} << 32 | listed.index);
     }
-    const ScreenSplat& splat = scratch.splats[active.splat];
-    const float reach_x = kSupport * splat.l11;
-    const float reach_y = kSupport * std::sqrt(splat.l21 * splat.l21 + splat.l22 * splat.l22);
-    const OrderTileRange columns = orderTilesAlong(splat.x - reach_x - left, splat.x + reach_x - left);
-    const OrderTileRange rows = orderTilesAlong(splat.y - reach_y - top, splat.y + reach_y - top);
-    const auto index = static_cast<uint32_t>(scratch.order.size());
-    bool is_listed = false;
-    uint32_t next = UINT32_MAX;  // nothing is left
-    for (int row = rows.first; row <= rows.last; ++row)
-      for (int column = columns.first; column <= columns.last; ++column) {
-        const int tile = row * kOrderTilesAlong + column;
-        if (!(open >> tile & 1)) continue;
-        const uint32_t key = keyAt(splat, left + static_cast<float>(column * kOrderSide) + kHalf,
-                                   top + static_cast<float>(row * kOrderSide) + kHalf);
-        if (key > front) {
-          next = std::min(next, key);
-        } else if (!active.seen || key > painted) {
-          scratch.lists[static_cast<size_t>(tile)].push_back(uint64_t{key} << 32 | index);
-          is_listed = true;
-        }
-      }
-    if (is_listed) scratch.order.push_back(active.splat);
-    if (next < UINT32_MAX) scratch.kept.push_back({active.splat, active.records, next, true});
-  }
-  scratch.active.swap(scratch.kept);
-  for (OrderList& list : scratch.lists) std::sort(list.begin(), list.end());
+  return next;
 }
 
 void TileQueues::paint(size_t number, const New& added, uint64_t open, const Paint& paint) {

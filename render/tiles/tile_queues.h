@@ -88,8 +88,9 @@ class TileQueues {
   };
   struct Scratch {
     std::vector<ScreenSplat> splats;
-    std::vector<Active> active, kept;
-    std::vector<uint32_t> order;
+    std::vector<Active> active;
+    std::vector<uint32_t> order;      // of `splats`: all of `active`
+    std::vector<uint64_t> by_middle;  // the same as those of an OrderList, by the keys in the tile's middle
     std::array<OrderList, kOrderTiles> lists;
   };
 
@@ -98,6 +99,15 @@ class TileQueues {
   void append(Queue& queue, std::span<const ScreenSplat> splats, uint32_t next);
   void free(Queue& queue);
   void listTile(size_t number, uint32_t painted, uint32_t front, uint64_t open, Scratch& scratch) const;
+  struct Corner {
+    float x, y;
+  };
+  struct Listed {
+    uint32_t front;
+    uint64_t open;
+    uint32_t index;  // in Scratch::active
+  };
+  static uint32_t listSplat(const Corner& corner, uint32_t painted, const Listed& listed, Scratch& scratch);
 
   const int columns_;
   std::vector<Queue> queues_;  // [tile]

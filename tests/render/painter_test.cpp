@@ -236,7 +236,7 @@ TEST_P(PainterTest, BlendsNearerSplatsOverFartherOnes) {
       },
       0, 1);
   const std::vector<ScreenSplat> splats{{10, 10, 4, 0, 4, 1, 0.2f, 0, 0, 0, 0, 0, 0, 0, 0, 0},
-                                        {10, 10, 4, 0, 4, 1, 0.8f, 0, 0, 0, 0}};
+                                        {10, 10, 4, 0, 4, 1, 0.8f, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
   const Image image = paint(splats, table, true, {20, 20});
   EXPECT_NEAR(image.pixel(10, 10)[0], 1, 1e-5);
   EXPECT_NEAR(image.pixel(10, 10)[2], 0, 1e-5);
@@ -250,7 +250,7 @@ TEST_P(PainterTest, KeepsVeryThinSplats) {
   std::vector<ScreenSplat> splats;
   double depth = 0;
   for (int layer = 0; layer < 50000; ++layer) {
-    splats.push_back({2.5f, 2.5f, 1e4f, 0, 1e4f, amplitude(random), 0.5f, 0, 0, 0, 0});
+    splats.push_back({2.5f, 2.5f, 1e4f, 0, 1e4f, amplitude(random), 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});
     depth += splats.back().amplitude * footprint(0);
   }
   const Image image = paint(splats, table, true, {5, 5});
