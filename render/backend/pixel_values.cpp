@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "render/cpu/half_depths.h"
-#include "render/tiles/splat_bins.h"
-#include "render/tiles/tile_queues.h"
 #include "render/project/footprint.h"
 #include "render/project/light.h"
+#include "render/tiles/splat_bins.h"
+#include "render/tiles/tile_queues.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/threads.h"
 

@@ -59,14 +59,15 @@ HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const 
     }
     const V slope0 = gather(work, offsets, 1), slope1 = gather(work, offsets, 3);
     // What is seen of a splat is nearer than its middle, all over it by the opacity there.
-    const V along = gather(work, offsets, 5);
+    const V along = gather(work, offsets, 5), all = gather(work, offsets, 4);
     const V tau = hn::Mul(hn::Load(d, visits.cell_depth.at + lane), hn::Load(d, opacity.at.of[3].at + lane));
-    const V near_side = nearSide(tau);
-    store(hn::NegMulAdd(hn::Mul(hn::Set(d, kSqrt3), along), near_side, mean), out.pieces.mean);
-    const V all = gather(work, offsets, 4),
-            lost = hn::Mul(hn::Mul(along, along), lostByHiding(tau, near_side));
-    const V half_width =
-        hn::Sqrt(hn::Max(hn::MulSub(all, all, hn::Mul(hn::Set(d, 3.0f), lost)), hn::Zero(d)));
+    const V near_side = nearSide(tau), nearer = hn::Mul(hn::Mul(hn::Set(d, kSqrt3), along), near_side);
+    const auto hides =
+        hn::Gt(hn::Mul(hn::Abs(nearer), cellsAScalar(*work.colours, mean)), hn::Set(d, kHidingCells));
+    store(hn::IfThenElse(hides, hn::Sub(mean, nearer), mean), out.pieces.mean);
+    const V lost = hn::Mul(hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along)), lostByHiding(tau, near_side));
+    const V narrower = hn::Sqrt(hn::Max(hn::MulSub(all, all, lost), zero));
+    const V half_width = hn::IfThenElse(hides, narrower, all);
     const V correlation = hn::Sub(hn::Neg(gather(work, offsets, 2)), hn::Set(d, 194.0f));
     const V slope = hn::Sqrt(hn::MulAdd(slope0, slope0, hn::Mul(slope1, slope1)));
     const V inverse = hn::Div(one, hn::Max(slope, hn::Set(d, 1e-37f)));

@@ -47,8 +47,11 @@ struct FrameRenderer::State {
     clear.background = glm::vec4(0.0f);
     statistics = {};
     // Where the memory has room for both painters, the second draws of the bricks that the first has decoded.
-    const bool beside = pipeline.backend().isSoftware() &&
-                        pipeline.setAside(valueBytes(clear.size, {.threads = clear.threads}), clear);
+    const bool beside =
+        pipeline.backend().isSoftware() &&
+        pipeline.setAside(valueBytes(clear.size, {.threads = clear.threads,
+                                                  .waiting_splats = FrameBudget::kMinWaitingSplats}),
+                          clear);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear); });
     if (options.ranks) planner.share(plan, clear);

@@ -35,6 +35,8 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // Larger buffers do not make a frame faster: they only even out bricks that take different times.
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
+constexpr uint64_t kMaxWaitingBytes = 64 << 20;
+constexpr uint64_t kWaitingSplatBytes = sizeof(ScreenSplat) + sizeof(uint32_t);  // render/tiles/tile_queues.h
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
 // picture of a slightly different size then needs no new pools, and the cache keeps its bricks.
 constexpr uint64_t kParts = 16;
@@ -59,7 +61,10 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t fit = (memory_bytes - taken - pools) / worker_bytes;
   budget.workers =
       static_cast<unsigned>(std::min<uint64_t>(wanted, std::max(std::min(fit, kFirstWorkers), fit / 2)));
-  const uint64_t free = memory_bytes - taken - pools - budget.workers * worker_bytes;
+  uint64_t free = memory_bytes - taken - pools - budget.workers * worker_bytes;
+  const uint64_t waiting_bytes = std::min(free / 8, kMaxWaitingBytes);
+  budget.waiting_splats += waiting_bytes / kWaitingSplatBytes;
+  free -= waiting_bytes;
   const uint64_t share = free / 4;
   const uint64_t ring_bytes = std::min(kMinRingBytes + share, kMaxRingBytes);
   budget.ring_splats = ring_bytes / sizeof(ScreenSplat);
@@ -76,11 +81,6 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   budget.kept_bytes = fixed.is_series ? rest * kKeptArrays / (kArraysOfSplats + kKeptArrays) : 0;
   budget.cache_bytes = rest - budget.kept_bytes;
   return budget;
-}
-
-size_t waitingSplats(uint64_t memory_bytes) {
-  constexpr uint64_t kShare = 16, kLeast = 32768, kMost = 1 << 20;
-  return std::clamp(memory_bytes / kShare / sizeof(ScreenSplat), kLeast, kMost);
 }
 
 namespace {

@@ -20,18 +20,21 @@ namespace curvisplat {
 
 /// The stages' shares of a frame's memory.
 struct FrameBudget {
+  static constexpr size_t kMinWaitingSplats = 32768;
+
   unsigned workers = 1;
   size_t ring_splats = 0;
   size_t sweep_splats = 0;
-  uint64_t pager_bytes = 0;  // encoded bricks that are read ahead of the workers
-  uint64_t cache_bytes = 0;  // decoded bricks that are kept between frames
-  uint64_t kept_bytes = 0;   // decoded values of several time steps, kept between frames
+  uint64_t pager_bytes = 0;                   // encoded bricks that are read ahead of the workers
+  size_t waiting_splats = kMinWaitingSplats;  // PaintResources::waiting_splats
+  uint64_t cache_bytes = 0;                   // decoded bricks that are kept between frames
+  uint64_t kept_bytes = 0;                    // decoded values of several time steps, kept between frames
 
   /// Requirements that do not depend on the budget.
   struct Fixed {
     uint64_t index_bytes = 0;        // the octree, and a frame's notes about its bricks
     uint64_t least_pager_bytes = 0;  // what the largest brick needs
-    uint64_t painter_bytes = 0;      // in addition to the picture
+    uint64_t painter_bytes = 0;      // in addition to the picture, with kMinWaitingSplats
     uint64_t output_bytes = 0;       // reserved for the use of the finished picture
     uint64_t splats = 0;             // the most that any picture can have
     ImageSize size;
@@ -48,9 +51,6 @@ struct FrameBudget {
 
   bool operator==(const FrameBudget&) const = default;
 };
-
-/// How many splats may wait in the painter's tiles (PaintResources), where a frame has that memory.
-size_t waitingSplats(uint64_t memory_bytes);
 
 /// A rectangle of the picture that is swept on its own.
 struct FrameRegion {

@@ -77,7 +77,7 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
       planner_.bytes(),
       least_pager_bytes_,
       backend_->bytes(options.size,
-                      {.threads = options.threads, .waiting_splats = waitingSplats(options.memory_bytes)}) +
+                      {.threads = options.threads, .waiting_splats = FrameBudget::kMinWaitingSplats}) +
           LayerDrawer::bytes(options) + exchange_bytes + aside_bytes_,
       options.output_bytes,
       planner_.mostSplats(),
@@ -341,12 +341,15 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
 Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
                            const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
   Image image;
+  // A further painter has what setAside() left it.
+  const size_t waiting =
+      painting_ == backend_.get() ? pools_->budget.waiting_splats : FrameBudget::kMinWaitingSplats;
   painting_->run([&](Painter& painter) {
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
                   {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers,
                    planner_.colourClasses(), static_cast<float>(plan.settings.view.low_pass_px2)},
                   {.threads = options.threads,
-                   .waiting_splats = waitingSplats(options.memory_bytes),
+                   .waiting_splats = waiting,
                    .stop = options.stop,
                    .permits = permits_.get()});
     if (regions.front().tiles) painter.drawOnly(*regions.front().tiles);

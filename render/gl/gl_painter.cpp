@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "render/tiles/splat_bins.h"
-#include "render/tiles/tile_queues.h"
 #include "render/gl/gl_functions.h"
 #include "render/gl/splat_shader.h"
 #include "render/project/footprint.h"
+#include "render/tiles/splat_bins.h"
+#include "render/tiles/tile_queues.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
 
@@ -274,6 +274,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
                static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
   gl.Uniform1i(program.uniform("cells"), ClassificationTable::kCells);
   gl.Uniform1f(program.uniform("low_pass"), shading.low_pass_px2);
+  gl.Uniform1i(program.uniform("log_scale"), table.logScale() ? 1 : 0);
   gl.Uniform1f(program.uniform("most_extinction"), mostExtinction(table));
   gl.Uniform1f(program.uniform("least_logarithmic"), ClassificationTable::kMinLogarithmic);
   const auto set = [&](const char* cells, const char* low, const char* high, const ClassificationTable& of) {
@@ -285,6 +286,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
   set("cells_from_scalar", "below", "above", table);
   if (!shading.colours) return;
   gl.Uniform1i(program.uniform("colours"), kColoursUnit);
+  gl.Uniform1i(program.uniform("colour_log_scale"), shading.colours->logScale() ? 1 : 0);
   set("cells_from_colour", "colours_below", "colours_above", *shading.colours);
 }
 

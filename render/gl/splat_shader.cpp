@@ -24,6 +24,8 @@ uniform float low_pass;         // pixels squared
 uniform float most_extinction;  // of the table
 uniform vec2 cells_from_scalar;
 uniform bool log_scale;
+uniform vec2 cells_from_colour;
+uniform bool colour_log_scale;
 uniform vec2 clip_from_pixel;
 uniform float support;
 uniform bool lit;
@@ -92,7 +94,10 @@ void main() {
   float cell_depth = abs(amplitude) * passed / sqrt(max(determinant, 1e-4 * passed * passed));
   float nearer = 1.7320508 * abs(along_ray) * min(1.0, cell_depth * most_extinction / 6.0);
   float cells_a_scalar = abs(cells_from_scalar.x) / (log_scale ? max(abs(scalar.x), 1e-37) : 1.0);
-  hiding = vec3(nearer * cells_a_scalar > 8.0 ? along_ray : 0.0, colour1.y, cell_depth);
+  float of_colour = 1.7320508 * abs(colour1.y) * min(1.0, cell_depth * most_extinction / 6.0);
+  float cells_a_colour = abs(cells_from_colour.x) / (colour_log_scale ? max(abs(colour.x), 1e-37) : 1.0);
+  hiding = vec3(nearer * cells_a_scalar > 8.0 ? along_ray : 0.0, of_colour * cells_a_colour > 8.0 ? colour1.y : 0.0,
+                cell_depth);
   // The ellipse's own rectangle, within the pixels that it is clipped to.
   vec2 reach = support * vec2(part0.z, length(vec2(part0.w, part1.x)));
   vec2 first = vec2(clip.x & 0xffff, clip.x >> 16 & 0xffff);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/cpu/tile.h"
 #include "render/project/footprint.h"
 #include "stream/base/error.h"
 #include "stream/base/trace.h"

@@ -14,7 +14,7 @@ constexpr size_t kWorthPainting = 192, kShareOfWaiting = 2;
 constexpr size_t kRound = 512;
 constexpr uint32_t kNothingLeft = UINT32_MAX;  // keys are smaller
 // Of a thread: a round, the splats that wait in a tile, and what the painter prepares of them.
-constexpr uint64_t kScratchBytes = 2 << 20;
+constexpr uint64_t kScratchBytes = 1 << 20;
 
 /// How many records lie before a splat.
 uint32_t recordsBefore(std::span<const ScreenSplat> splats, uint32_t splat) {

@@ -97,10 +97,13 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_
     const int columns = TileSet::tilesAlong(options.size.width, kOrderSide);
     const size_t tiles = TileSet::tilesOf(options.size, kOrderSide);
     for (size_t tile = 0; tile < tiles; ++tile) {
-      std::vector<uint32_t> owners(tiles, 1);
-      owners[tile] = 0;
       const int x = static_cast<int>(tile) % columns * kOrderSide,
                 y = static_cast<int>(tile) / columns * kOrderSide;
+      // The shared tile around it; what lies beside the order tile is not taken.
+      std::vector<uint32_t> owners(TileSet::tilesOf(options.size, kSharedTileSide), 1);
+      owners[static_cast<size_t>(y / kSharedTileSide *
+                                     TileSet::tilesAlong(options.size.width, kSharedTileSide) +
+                                 x / kSharedTileSide)] = 0;
       begin();
       painter.drawOnly(TileSet(options.size, owners, 0));
       painter.draw(sorted(inTile(placed, x, y)));

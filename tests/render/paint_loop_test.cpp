@@ -17,8 +17,8 @@
 
 #include "render/cpu/cpu_painter.h"
 #include "render/cpu/half_depths.h"
-#include "render/tiles/splat_bins.h"
 #include "render/cpu/tile.h"
+#include "render/tiles/splat_bins.h"
 #include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {

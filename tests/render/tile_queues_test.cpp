@@ -5,9 +5,9 @@
 #include <random>
 #include <tuple>
 
+#include "render/project/footprint.h"
 #include "render/tiles/splat_bins.h"
 #include "render/tiles/tile_queues.h"
-#include "render/project/footprint.h"
 
 namespace curvisplat {
 namespace {
