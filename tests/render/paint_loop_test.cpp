@@ -121,8 +121,9 @@ TEST(SplatBins, LeavesRecordsAtTheEndToBeAddedWithTheirSplat) {
 
 TEST(SplatBins, CountsSplatsOfClosedTilesAsHidden) {
   PaintLoop loop(3, nullptr);
-  std::vector<ScreenSplat> splats(50, {16, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0});  // in the first tile
-  splats.resize(80, {3 * kTileSide + 5, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0});
+  std::vector<ScreenSplat> splats(
+      50, {16, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});  // in the first tile
+  splats.resize(80, {3 * kTileSide + 5, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});
   SplatBins bins(kSize, splats.size(), kManyEntries, 2);
   bins.close(0);
   EXPECT_EQ(bins.sortBorrowed(splats, loop), splats.size());
