@@ -21,7 +21,11 @@ import subprocess
 import sys
 import tempfile
 
-import numpy as np
+try:
+    import numpy as np
+except ImportError:
+    print("layered: needs numpy; skipped")
+    sys.exit(77)
 
 CROSS = 3.0  # optical depth of a slab, at right angles
 
