@@ -30,7 +30,7 @@ void sort(benchmark::State& state, bool moves) {
   std::vector<ScreenSplat> sorted(count);
   DepthSorter sorter;
   for (auto _ : state) {
-    const auto order = sorter.sort(keys, DrawingOrder::kFrontToBack);
+    const auto order = sorter.sort(keys);
     benchmark::DoNotOptimize(order.data());
     if (!moves) continue;
     for (size_t n = 0; n < count; ++n) sorted[n] = splats[order[n].splat];

@@ -82,8 +82,7 @@ void planFrame(benchmark::State& state) {
   options.size = {1024, 1024};
   options.lod_pixels = static_cast<double>(state.range(0));
   double parts = 0;
-  for (auto _ : state)
-    parts = static_cast<double>(planned.plan(camera(), options, DrawingOrder::kFrontToBack).parts.size());
+  for (auto _ : state) parts = static_cast<double>(planned.plan(camera(), options).parts.size());
   state.counters["parts"] = parts;
 }
 BENCHMARK(planFrame)->ArgName("lod_pixels")->Arg(0)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
@@ -94,7 +93,7 @@ void chooseRegions(benchmark::State& state) {
   FrameOptions options;
   options.size = {1024, 1024};
   options.lod_pixels = 0;
-  const FramePlan plan = planned.plan(camera(), options, DrawingOrder::kFrontToBack);
+  const FramePlan plan = planned.plan(camera(), options);
   const auto splats = static_cast<size_t>(state.range(0)) * 1'000'000;
   double regions = 0;
   for (auto _ : state) regions = static_cast<double>(frameRegions(plan, reader(), 0, splats).size());

@@ -162,7 +162,7 @@ void prepare(benchmark::State& state, bool decode, bool sort) {
   if (!decode)
     for (size_t n = 0; n < bricks.bytes.size(); ++n) decodeOne(n, n);
   BrickProjector projector;
-  const DepthKeys depth_keys(view.settings.view, cache.manifest().root, DrawingOrder::kFrontToBack);
+  const DepthKeys depth_keys(view.settings.view, cache.manifest().root);
   std::vector<uint32_t> keys;
   DepthSorter sorter;
   std::vector<ScreenSplat> out(BrickProjector::kMaxSplats);
@@ -183,9 +183,9 @@ void prepare(benchmark::State& state, bool decode, bool sort) {
       if (!sort) continue;
       const Brick& of_index = cache.bricks()[brick.id];
       keys.resize(projector.depths().size());
-      depth_keys.keysOf(projector.depths(), cache.manifest().root.cellMin(of_index.cell),
-                        depth_keys.rangeOf(of_index), keys);
-      const auto order = sorter.sort(keys, depth_keys.order());
+      depth_keys.setKeys(projector.mutableSplats(), projector.depths(),
+                         cache.manifest().root.cellMin(of_index.cell), depth_keys.rangeOf(of_index), keys);
+      const auto order = sorter.sort(keys);
       for (size_t i = 0; i < order.size(); ++i) out[i] = projector.splats()[order[i].splat];
       benchmark::DoNotOptimize(out.data());
     }

@@ -21,16 +21,10 @@ class GlBackend final : public PaintingBackend {
   void run(const Job& job) override {
     gl_.run([&](const GlContext&) { job(*painter_); });
   }
-  DrawingOrder order() const override { return painter_->order(); }
   const std::string& name() const override { return gl_.contextName(); }
   bool isSoftware() const override { return gl_.isSoftware(); }
-  std::span<ScreenSplat> splatMemory(size_t count) override {
-    std::span<ScreenSplat> mapped;
-    gl_.run([&](const GlContext&) { mapped = painter_->mapSplats(count); });
-    return mapped.empty() ? PaintingBackend::splatMemory(count) : mapped;
-  }
-  uint64_t bytes(ImageSize size, const PaintResources&) const override {
-    return 4 * sizeof(float) * size.pixels();  // the framebuffer
+  uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
+    return GlPainter::bytes(size, resources);
   }
 
  private:
@@ -42,7 +36,6 @@ class GlBackend final : public PaintingBackend {
 class CpuBackend final : public PaintingBackend {
  public:
   void run(const Job& job) override { job(painter_); }
-  DrawingOrder order() const override { return painter_.order(); }
   const std::string& name() const override { return name_; }
   bool isSoftware() const override { return true; }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
@@ -71,12 +64,6 @@ std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
 }
 
 }  // namespace
-
-std::span<ScreenSplat> PaintingBackend::splatMemory(size_t count) {
-  splats_.reset();
-  splats_ = std::make_unique_for_overwrite<ScreenSplat[]>(count);
-  return {splats_.get(), count};
-}
 
 std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
   switch (backend) {

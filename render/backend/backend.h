@@ -32,20 +32,12 @@ class PaintingBackend {
   /// Runs `job` on the painter's thread and waits until it ends. Rethrows what `job` throws. One caller at a
   /// time.
   virtual void run(const Job& job) = 0;
-  /// The order in which the painter needs its splats.
-  virtual DrawingOrder order() const = 0;
   /// The name shown to users: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   virtual const std::string& name() const = 0;
   /// Whether the processor draws, either directly or through a software OpenGL.
   virtual bool isSoftware() const = 0;
-  /// Memory for `count` splats. The painter draws from it without a copy if it can. Each call replaces the
-  /// memory that the call before returned.
-  virtual std::span<ScreenSplat> splatMemory(size_t count);
   /// Memory in bytes that a frame of this size takes in addition to the resulting image.
   virtual uint64_t bytes(ImageSize size, const PaintResources& resources) const = 0;
-
- private:
-  std::unique_ptr<ScreenSplat[]> splats_;
 };
 
 /// Throws Error if the backend is not available; the message names the library that was tried and its error.

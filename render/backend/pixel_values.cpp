@@ -15,9 +15,10 @@
 #include <vector>
 
 #include "render/cpu/half_depths.h"
-#include "render/cpu/splat_bins.h"
 #include "render/project/footprint.h"
 #include "render/project/light.h"
+#include "render/tiles/splat_bins.h"
+#include "render/tiles/tile_queues.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/threads.h"
 
@@ -136,8 +137,6 @@ class ValuePainter final : public Painter {
  public:
   explicit ValuePainter(const ValueInputs& inputs) : inputs_(inputs) {}
 
-  DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
-
   void begin(ImageSize size, const glm::vec4&, const ClassificationTable& table, PixelShading shading,
              const PaintResources& resources) override {
     size_ = size;
@@ -147,6 +146,7 @@ class ValuePainter final : public Painter {
     loop_.emplace(threadsOrCores(resources.threads), resources.permits);
     bins_.emplace(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, loop_->threads());
     bins_->open();
+    queues_.emplace(size, resources.waiting_splats);
     constexpr float kNone = std::numeric_limits<float>::infinity(),
                     kUnknown = std::numeric_limits<float>::quiet_NaN();
     halves_.assign(TileSet::tilesOf(size), {});
@@ -166,7 +166,7 @@ class ValuePainter final : public Painter {
   }
 
   void drawOnly(const TileSet& tiles) override {
-    if (!bins_->empty()) paintBatch();
+    paintBatch(true);
     for (size_t number = 0; number < TileSet::tilesOf(size_); ++number)
       if (tiles.hasAnyOf(number))
         bins_->open(static_cast<int>(number));
@@ -178,13 +178,13 @@ class ValuePainter final : public Painter {
     const Computing computing(loop_->permits());
     while (!splats.empty()) {
       splats = splats.subspan(bins_->add(splats));
-      if (!splats.empty()) paintBatch();
+      if (!splats.empty()) paintBatch(false);
     }
   }
 
   Image end() override {
     const Computing computing(loop_->permits());
-    if (!bins_->empty()) paintBatch();
+    paintBatch(true);
     Image image(size_);
     for (size_t tile = 0; tile < halves_.size(); ++tile)
       forPixels(tile, [&](size_t pixel, int x, int y) {
@@ -197,6 +197,7 @@ class ValuePainter final : public Painter {
 
   double uploadSeconds() const override { return 0; }
   double drawSeconds() const override { return 0; }
+  bool isOverfull() const override { return queues_->isFull(); }
 
  private:
   glm::ivec2 firstOf(size_t tile) const {
@@ -212,43 +213,62 @@ class ValuePainter final : public Painter {
         visit(static_cast<size_t>(y * kTileSide + x), first.x + x, first.y + y);
   }
 
-  void paintBatch() {
+  /// `last`: no more splats will come for any tile.
+  void paintBatch(bool last) {
     bins_->sort(*loop_);
-    loop_->forAll("find depths", TileSet::tilesOf(size_), 1, [this](size_t number) { paintTile(number); });
+    const uint32_t front = bins_->empty() ? 0 : bins_->splats().back().first;
+    loop_->forAll("find depths", TileSet::tilesOf(size_), 1, [&, this](size_t number) {
+      const auto entries = bins_->tile(static_cast<int>(number));
+      if (entries.empty() && !(last && queues_->waits(number))) return;
+      queues_->paint(number, {bins_->splats(), entries, front, last}, TileQueues::kAllOpen,
+                     [&, this](const OrderedTile& ordered) { return paintTile(number, ordered); });
+    });
     bins_->clear();
   }
 
-  void paintTile(size_t number) {
-    const auto order = bins_->tile(static_cast<int>(number));
-    if (order.empty()) return;
+  /// Returns which order tiles can still change.
+  uint64_t paintTile(size_t number, const OrderedTile& ordered) {
     const glm::ivec2 first = firstOf(number);
-    const int x1 = std::min(first.x + kTileSide, size_.width),
-              y1 = std::min(first.y + kTileSide, size_.height);
-    HalfTile& half = halves_[number];
-    for (const uint32_t n : order) {
-      const UnpackedSplat splat(bins_->splats()[n], shading_);
-      constexpr double kSupport = kKernelSupport;
-      const ScreenSplat& s = splat.splat;
-      const double reach_x = kSupport * s.l11, reach_y = kSupport * std::hypot(s.l21, s.l22);
-      const auto from = [](int least, double at) {
-        return std::max(least, static_cast<int>(std::ceil(std::max(at, -1.0))));
-      };
-      const auto to = [](int end, double at) {
-        return static_cast<int>(std::min<double>(end - 1, std::max(at, -1.0)));
-      };
-      const HalfBox box{first.x,
-                        first.y,
-                        from(first.x, s.x - reach_x - 0.5),
-                        from(first.y, s.y - reach_y - 0.5),
-                        to(x1, s.x + reach_x - 0.5),
-                        to(y1, s.y + reach_y - 0.5)};
-      if (box.x0 > box.x1 || box.y0 > box.y1) continue;
-      Events events(*this, number, splat);
-      addToHalf(splat.half, box, *extinction_, half, events);
+    if (!ordered.lists) {
+      const HalfBox all = {
+          first.x, first.y, first.x, first.y, first.x + kTileSide - 1, first.y + kTileSide - 1};
+      for (const uint32_t n : ordered.order) addSplat(number, ordered.splats[n], all);
+    } else {
+      for (size_t tile = 0; tile < kOrderTiles; ++tile) {
+        const int x = first.x + static_cast<int>(tile) % kOrderTilesAlong * kOrderSide,
+                  y = first.y + static_cast<int>(tile) / kOrderTilesAlong * kOrderSide;
+        for (const uint64_t item : (*ordered.lists)[tile])
+          addSplat(number, ordered.splats[ordered.order[static_cast<uint32_t>(item)]],
+                   {first.x, first.y, x, y, x + kOrderSide - 1, y + kOrderSide - 1});
+      }
     }
-    if (std::all_of(half.target.begin(), half.target.end(),
-                    [](double target) { return target == HalfTile::kFound; }))
-      bins_->close(static_cast<int>(number));
+    const HalfTile& half = halves_[number];
+    const bool all_found = std::all_of(half.target.begin(), half.target.end(),
+                                       [](double target) { return target == HalfTile::kFound; });
+    if (all_found) bins_->close(static_cast<int>(number));
+    return all_found ? 0 : TileQueues::kAllOpen;
+  }
+
+  /// Adds a splat to those of its pixels that lie in the box.
+  void addSplat(size_t number, const ScreenSplat& s, HalfBox box) {
+    const UnpackedSplat splat(s, shading_);
+    constexpr double kSupport = kKernelSupport;
+    const double reach_x = kSupport * s.l11, reach_y = kSupport * std::hypot(s.l21, s.l22);
+    const auto from = [](int least, double at) {
+      return std::max(least, static_cast<int>(std::ceil(std::max(at, -1.0))));
+    };
+    const auto to = [](int last, double at) {
+      return static_cast<int>(std::min<double>(last, std::max(at, -1.0)));
+    };
+    box = {box.tile_x,
+           box.tile_y,
+           from(box.x0, s.x - reach_x - 0.5),
+           from(box.y0, s.y - reach_y - 0.5),
+           to(std::min(box.x1, size_.width - 1), s.x + reach_x - 0.5),
+           to(std::min(box.y1, size_.height - 1), s.y + reach_y - 0.5)};
+    if (box.x0 > box.x1 || box.y0 > box.y1) return;
+    Events events(*this, number, splat);
+    addToHalf(splat.half, box, *extinction_, halves_[number], events);
   }
 
   /// Of one splat in one tile.
@@ -361,6 +381,7 @@ class ValuePainter final : public Painter {
   std::optional<MeanExtinction> extinction_;
   PixelShading shading_;
   std::optional<SplatBins> bins_;
+  std::optional<TileQueues> queues_;
   std::optional<PaintLoop> loop_;
   std::vector<HalfTile> halves_;  // [tiles]
   std::vector<FoundTile> found_;  // [tiles]
@@ -371,7 +392,6 @@ class ValueBackend final : public PaintingBackend {
   explicit ValueBackend(const ValueInputs& inputs) : painter_(inputs) {}
 
   void run(const Job& job) override { job(painter_); }
-  DrawingOrder order() const override { return painter_.order(); }
   const std::string& name() const override { return name_; }
   bool isSoftware() const override { return true; }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
@@ -399,7 +419,8 @@ uint64_t valueBytes(ImageSize size, const PaintResources& resources) {
   constexpr uint64_t kLayer = sizeof(PixelLayer) + sizeof(uint32_t);  // everywhere()'s
   return TileSet::tilesOf(size) * (sizeof(HalfTile) + sizeof(FoundTile)) + size.pixels() * kLayer +
          SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
-                          threadsOrCores(resources.threads));
+                          threadsOrCores(resources.threads)) +
+         TileQueues::bytes(size, resources.waiting_splats, threadsOrCores(resources.threads));
 }
 
 std::unique_ptr<PaintingBackend> makeValueBackend(const ValueInputs& inputs) {

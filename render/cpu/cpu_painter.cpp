@@ -5,13 +5,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
 #include "render/cpu/tile_windows.h"
+#include "render/tiles/splat_bins.h"
+#include "render/tiles/tile_queues.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/threads.h"
 #include "stream/base/trace.h"
@@ -64,13 +66,14 @@ Image blackImage(ImageSize size) {
 struct CpuPainter::State {
   ImageSize size{0, 0};
   glm::vec4 background{0};
-  size_t batch_splats = 0;
+  size_t batch_splats = 0, waiting_splats = 0;
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
   std::vector<uint32_t> touched;                   // tiles of a batch
   Image image;                                     // black until end()
   WindowTiles windows;
   std::optional<SplatBins> bins;
+  std::optional<TileQueues> queues;
   std::optional<ShadingTable> table, colours;
   std::optional<PaintLoop> loop;
   PixelShading shading;
@@ -83,11 +86,13 @@ struct CpuPainter::State {
   BlockMask inImage(size_t number) const;
   BlockMask blocksIn(const TileSet& wanted, size_t number) const;
   void clear(size_t number);
-  void allocate(ImageSize wanted, unsigned threads, size_t batch_splats_);
+  void allocate(ImageSize wanted, unsigned threads, const PaintResources& resources);
   void paintBatch();
   void paintBorrowed(std::span<const ScreenSplat>& splats);
-  void listTiles();
-  void paintTiles();
+  void listTiles(bool last);
+  void paintTiles(bool last);
+  void paintLast();
+  BlockMask paintOrdered(size_t number, const OrderedTile& ordered);
 };
 
 CpuPainter::CpuPainter() : state_(std::make_unique<State>()) {}
@@ -107,13 +112,15 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   state.table.emplace(table);
   state.colours.reset();
   if (shading.colours) state.colours.emplace(*shading.colours);
-  if (size != state.size || threads != threads_before || resources.batch_splats != state.batch_splats)
-    state.allocate(size, threads, resources.batch_splats);
+  if (size != state.size || threads != threads_before || resources.batch_splats != state.batch_splats ||
+      resources.waiting_splats != state.waiting_splats)
+    state.allocate(size, threads, resources);
   if (threads != threads_before || resources.permits != state.loop->permits())
     state.loop.emplace(threads, resources.permits);
   state.background = background;
   state.bins->clear();  // of a frame that was not ended
   state.bins->open();
+  state.queues->clear();
   state.windows.begin(shading.layers, *state.loop);
   state.forRanges("clear tiles", tileCount(size), [&](size_t number) { state.clear(number); });
   // One thread fills it. Now the others prepare the first splats; at the end they would wait.
@@ -122,7 +129,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
 
 void CpuPainter::drawOnly(const TileSet& tiles) {
   State& state = *state_;
-  if (!state.bins->empty()) state.paintBatch();
+  state.paintLast();
   for (size_t number = 0; number < tileCount(state.size); ++number) {
     const BlockMask open = state.inImage(number) & state.blocksIn(tiles, number);
     state.open[number].store(open, std::memory_order_relaxed);
@@ -169,29 +176,32 @@ void CpuPainter::State::clear(size_t number) {
   open[number].store(inImage(number), std::memory_order_relaxed);
 }
 
-void CpuPainter::State::allocate(ImageSize wanted, unsigned threads, size_t batch_splats_) {
+void CpuPainter::State::allocate(ImageSize wanted, unsigned threads, const PaintResources& resources) {
   size = {0, 0};
   bins.reset();
+  queues.reset();
   tiles.reset();
   tiles = hwy::AllocateAligned<float>(tileCount(wanted) * kTileFloats);
   if (!tiles) throw std::bad_alloc();
   open = std::make_unique<std::atomic<BlockMask>[]>(tileCount(wanted));
-  bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads);
+  bins.emplace(wanted, resources.batch_splats, kEntriesASplat * resources.batch_splats, threads);
+  queues.emplace(wanted, resources.waiting_splats);
   size = wanted;
-  batch_splats = batch_splats_;
+  batch_splats = resources.batch_splats;
+  waiting_splats = resources.waiting_splats;
 }
 
 void CpuPainter::State::paintBatch() {
   const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
   bins->sort(*loop);
-  paintTiles();
+  paintTiles(false);
 }
 
 /// As many as fit into a batch of their own, which are taken off the span's beginning.
 void CpuPainter::State::paintBorrowed(std::span<const ScreenSplat>& splats) {
   const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
   splats = splats.subspan(bins->sortBorrowed(splats, *loop));
-  paintTiles();
+  paintTiles(false);
 }
 
 /// job(n), for n below `count`. A few neighbours at a time: of 2,040 tiles a batch may touch 400, with some microseconds of
@@ -202,14 +212,15 @@ void CpuPainter::State::forRanges(const char* name, size_t count, const Job& job
   loop->forAll(name, count, std::max<size_t>(1, count / (kRangesAThread * loop->threads())), job);
 }
 
-/// The tiles that have splats. Those that have many come first: a thread that took one last would keep all others waiting.
-void CpuPainter::State::listTiles() {
+/// The tiles that have splats, or in which some wait. Those that have many come first: a thread that took one last would
+/// keep all others waiting.
+void CpuPainter::State::listTiles(bool last) {
   const TraceScope trace("list tiles");
   const auto splatsOf = [&](size_t number) { return bins->tile(static_cast<int>(number)).size(); };
   touched.clear();
   size_t entries = 0;
   for (size_t number = 0; number < tileCount(size); ++number) {
-    if (splatsOf(number) == 0) continue;
+    if (splatsOf(number) == 0 && !(last && queues->waits(number))) continue;
     touched.push_back(static_cast<uint32_t>(number));
     entries += splatsOf(number);
   }
@@ -217,21 +228,46 @@ void CpuPainter::State::listTiles() {
                         [&](uint32_t number) { return splatsOf(number) * touched.size() > 2 * entries; });
 }
 
-void CpuPainter::State::paintTiles() {
-  listTiles();
-  forRanges("paint tiles", touched.size(), [this](size_t n) {
+/// `last`: no more splats will come for any tile.
+void CpuPainter::State::paintTiles(bool last) {
+  listTiles(last);
+  const uint32_t front = bins->empty() ? 0 : bins->splats().back().first;
+  forRanges("paint tiles", touched.size(), [&, this](size_t n) {
     if (stop.stop_requested()) return;
     const size_t number = touched[n];
-    const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
-    const auto columns = static_cast<size_t>(bins->columns());
-    const BlockMask left = paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
-                                      static_cast<int>(number / columns) * kTileSide,
-                                      open[number].load(std::memory_order_relaxed), bins->splats(), order,
-                                      *table, colours ? &*colours : nullptr, shading, windows.tile(number)});
-    open[number].store(left, std::memory_order_relaxed);
-    if (left == 0) bins->close(static_cast<int>(number));
+    const auto orderTilesOf = [](BlockMask blocks) {
+      uint64_t with_blocks = 0;
+      for (; blocks != 0; blocks &= blocks - 1)
+        with_blocks |= uint64_t{1} << orderTileOf(std::countr_zero(blocks));
+      return with_blocks;
+    };
+    const BlockMask before = open[number].load(std::memory_order_relaxed);
+    queues->paint(number, {bins->splats(), bins->tile(static_cast<int>(number)), front, last},
+                  orderTilesOf(before),
+                  [&](const OrderedTile& ordered) { return orderTilesOf(paintOrdered(number, ordered)); });
+    if (before != 0 && open[number].load(std::memory_order_relaxed) == 0)
+      bins->close(static_cast<int>(number));
   });
   bins->clear();
+}
+
+/// Returns the blocks that are still open.
+BlockMask CpuPainter::State::paintOrdered(size_t number, const OrderedTile& ordered) {
+  const auto columns = static_cast<size_t>(bins->columns());
+  const BlockMask left =
+      paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
+                 static_cast<int>(number / columns) * kTileSide, open[number].load(std::memory_order_relaxed),
+                 ordered.splats, ordered.order, ordered.lists, *table, colours ? &*colours : nullptr, shading,
+                 windows.tile(number)});
+  open[number].store(left, std::memory_order_relaxed);
+  return left;
+}
+
+/// Paints what was collected, and what waits.
+void CpuPainter::State::paintLast() {
+  const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
+  bins->sort(*loop);
+  paintTiles(true);
 }
 
 void CpuPainter::draw(std::span<const ScreenSplat> splats) {
@@ -254,6 +290,7 @@ void CpuPainter::draw(std::span<const ScreenSplat> splats) {
 }
 
 bool CpuPainter::hides(const ScreenBox& box) const {
+  if (state_->queues->isFull()) return true;  // the picture will be drawn again
   if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return false;
   const BlockRange columns = blocksAlong(box.x0, box.x1, state_->size.width);
   const BlockRange rows = blocksAlong(box.y0, box.y1, state_->size.height);
@@ -270,7 +307,7 @@ bool CpuPainter::hides(const ScreenBox& box) const {
 Image CpuPainter::end() {
   State& state = *state_;
   const Computing computing(state.loop->permits());
-  if (!state.bins->empty()) state.paintBatch();
+  state.paintLast();
   const StageTimer timer(state.draw_s, "finish picture", TraceKind::kStage);
   Image image = std::exchange(state.image, Image());
   const auto columns = static_cast<size_t>(state.bins->columns());
@@ -315,13 +352,18 @@ uint64_t CpuPainter::hiddenSplats() const {
   return state_->bins ? state_->bins->hidden() : 0;
 }
 
+bool CpuPainter::isOverfull() const {
+  return state_->queues && state_->queues->isFull();
+}
+
 uint64_t CpuPainter::frameBytes(ImageSize size) {
   return tileCount(size) * (kTileFloats * sizeof(float) + sizeof(std::atomic<BlockMask>) + sizeof(uint32_t));
 }
 
 uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {
   return SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
-                          threadsOrCores(resources.threads));
+                          threadsOrCores(resources.threads)) +
+         TileQueues::bytes(size, resources.waiting_splats, threadsOrCores(resources.threads));
 }
 
 uint64_t CpuPainter::layerBytes(const PixelLayers& layers) {

@@ -25,7 +25,6 @@ class CpuPainter final : public Painter {
   CpuPainter();
   ~CpuPainter() override;
 
-  DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
              PixelShading shading, const PaintResources& resources = {}) override;
   void drawOnly(const TileSet& tiles) override;
@@ -36,6 +35,7 @@ class CpuPainter final : public Painter {
   double uploadSeconds() const override;
   double drawSeconds() const override;
   uint64_t hiddenSplats() const override;
+  bool isOverfull() const override;
 
   /// What it takes for a frame beside the picture itself.
   static uint64_t frameBytes(ImageSize size);

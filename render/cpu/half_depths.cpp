@@ -132,6 +132,8 @@ void addToHalf(const HalfSplat& splat, const HalfBox& box, const MeanExtinction&
                            hn::Set(d, splat.per_l22));
       const V rho2 = hn::MulAdd(u0, u0, hn::Mul(u1, u1));
       auto open = hn::And(hn::Lt(rho2, hn::Set(d, kSupport2)), hn::Lt(target, found));
+      const V of_box = hn::Add(hn::Set(d, box.tile_x + column), hn::Iota(d, 0));
+      open = hn::And(open, hn::And(hn::Ge(of_box, hn::Set(d, box.x0)), hn::Le(of_box, hn::Set(d, box.x1))));
       if (hn::AllFalse(d, open)) continue;
       const V inner = hn::NegMulAdd(rho2, hn::Set(d, 1 / kSupport2), one);
       V sum = hn::Set(d, double{footprint[kFootprintTerms - 1]});

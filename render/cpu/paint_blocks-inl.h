@@ -78,6 +78,36 @@ HWY_INLINE V absorbedOf(V x) {
   return hn::Div(absorbed, hn::Max(x, hn::Set(d, 1e-30f)));
 }
 
+/// What is seen of a splat lies nearer than its middle: so many half widths of its depths, L(tau / 2), where its
+/// optical depth is tau and its extinction constant. L(x) = coth x - 1 / x.
+HWY_INLINE V nearSide(V tau) {
+  const Floats d;
+  const V two = hn::Set(d, 2.0f), thin = hn::Mul(tau, hn::Set(d, 1.0f / 6));
+  const V part = absorbedOf<false>(tau), absorbed = hn::Mul(part, tau);
+  const V sum = hn::NegMulAdd(two, part, hn::Sub(two, absorbed));
+  const V side = hn::Div(sum, hn::Max(absorbed, hn::Set(d, 1e-30f)));
+  return hn::IfThenElse(hn::Lt(tau, hn::Set(d, 0.02f)), thin, side);
+}
+
+/// 1 less the variance of the depths that are seen, over that of all.
+HWY_INLINE V lostByHiding(V tau, V near_side) {
+  const Floats d;
+  const V one = hn::Set(d, 1.0f);
+  const V part = hn::Div(hn::Mul(hn::Set(d, 4.0f), near_side), hn::Max(tau, hn::Set(d, 1e-30f)));
+  const V seen = hn::Mul(hn::Set(d, 3.0f), hn::Sub(hn::NegMulAdd(near_side, near_side, one), part));
+  return hn::IfThenElseZero(hn::Ge(tau, hn::Set(d, 0.02f)), hn::Sub(one, hn::Clamp(seen, hn::Zero(d), one)));
+}
+
+/// The values of all of a splat, with the colour of what is seen of it. Where the seen side has hardly any extinction,
+/// the colour is that of all.
+HWY_INLINE void showNearSide(const V (&seen)[4], V (&value)[4]) {
+  const Floats d;
+  const V all = value[3], a_little = hn::Mul(hn::Set(d, 1.0f / 64), all);
+  const V factor = hn::Div(all, hn::Max(hn::Add(seen[3], a_little), hn::Set(d, 1e-37f)));
+  for (int c = 0; c < 3; ++c)
+    value[c] = hn::Mul(factor, hn::MulAdd(hn::Set(d, 1.0f / 64), value[c], seen[c]));
+}
+
 /// Optical depth per unit of extinction, zero outside of the footprint; and p and q.
 struct Pixels {
   V depth, p, q;
@@ -205,9 +235,11 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Polyline& line, const Along& 
   return isSaturated(most);
 }
 
-/// The scalar: mean + reach (tp p + tq q), ± half_width.
+/// The scalar: mean + reach (tp p + tq q), ± half_width. What is seen of the splat, if that is something else, has the
+/// means less `nearer`, and another half width.
 struct Scalar {
   float mean, reach, tp, tq, half_width;
+  float nearer = 0, seen_half_width = 0;
 };
 
 /// A block of which every pixel is looked up.
@@ -222,22 +254,42 @@ struct Tables {
   const float* footprint;
 };
 
+/// What was looked up becomes what is seen of it: by the intervals of the nearer side.
+HWY_INLINE void showNearSides(const ShadingTable& table, const Intervals& nearer, LookedUp& out) {
+  const Floats d;
+  alignas(64) float integrals[4 * kLanes];
+  integrate(table, nearer, kLanes, integrals);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V seen[4], value[4];
+    meansOf(integrals, hn::Load(d, nearer.scale.at + lane), lane, seen);
+    meansOf(out.integrals, hn::Load(d, out.scale.at + lane), lane, value);
+    showNearSide(seen, value);
+    hn::StoreInterleaved4(value[0], value[1], value[2], value[3], d, out.integrals + 4 * lane);
+    hn::Store(hn::Set(d, 1.0f), d, out.scale.at + lane);
+  }
+}
+
 HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Tables& tables, Corner corner,
                             LookedUp& out) {
   const float* HWY_RESTRICT footprint = tables.footprint;
   const Floats d;
   const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
-  Intervals intervals;
+  Intervals intervals, nearer;
+  const bool hides = scalar.nearer != 0;
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
                                    hn::Add(hn::Load(d, kLaneY + lane), from_y));
     const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
     hn::Store(pixels.depth, d, out.depth.at + lane);
-    locate(tables.shading, hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)),
-           hn::Set(d, scalar.half_width), lane, intervals);
+    const V mean = hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean));
+    locate(tables.shading, mean, hn::Set(d, scalar.half_width), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
+    if (hides)
+      locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)), hn::Set(d, scalar.seen_half_width),
+             lane, nearer);
   }
   integrate(tables.shading, intervals, kLanes, out.integrals);
+  if (hides) showNearSides(tables.shading, nearer, out);
   return true;
 }
 

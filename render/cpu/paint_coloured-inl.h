@@ -37,8 +37,8 @@ struct ColourVisits {
 };
 
 /// From the ScreenColours beside the splats with these numbers.
-HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const Visits& visits, size_t count,
-                             ColourVisits& out) {
+HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const Visits& visits,
+                             const Fits& opacity, size_t count, ColourVisits& out) {
   constexpr int32_t kFloats = sizeof(ScreenSplat) / sizeof(float);
   const Floats d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), support = hn::Set(d, kSupport);
@@ -46,18 +46,28 @@ HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const 
     const auto store = [&](V value, Row& row) HWY_ATTR { hn::Store(value, d, row.at + lane); };
     const auto beside = hn::Sub(hn::Load(Ints(), numbers.at + lane), hn::Set(Ints(), 1));
     const auto offsets = hn::Mul(beside, hn::Set(Ints(), kFloats));
-    store(gather(work, offsets, 0), out.pieces.mean);
+    const V mean = gather(work, offsets, 0);
     hn::Store(hn::Load(d, visits.pieces.amplitude.at + lane), d, out.pieces.amplitude.at + lane);
     store(hn::Neg(one), out.pieces.from);
     store(one, out.pieces.to);
     if (!work.shading.per_pixel) {
+      store(mean, out.pieces.mean);
       for (Row* row : {&out.tp, &out.tq, &out.slope_reach, &out.correlation, &out.pieces.reach,
                        &out.pieces.half_width, &out.pieces.width_loss})
         store(zero, *row);
       continue;
     }
     const V slope0 = gather(work, offsets, 1), slope1 = gather(work, offsets, 3);
-    const V half_width = gather(work, offsets, 4);
+    // What is seen of a splat is nearer than its middle, all over it by the opacity there.
+    const V along = gather(work, offsets, 5), all = gather(work, offsets, 4);
+    const V tau = hn::Mul(hn::Load(d, visits.cell_depth.at + lane), hn::Load(d, opacity.at.of[3].at + lane));
+    const V near_side = nearSide(tau), nearer = hn::Mul(hn::Mul(hn::Set(d, kSqrt3), along), near_side);
+    const auto hides =
+        hn::Gt(hn::Mul(hn::Abs(nearer), cellsAScalar(*work.colours, mean)), hn::Set(d, kHidingCells));
+    store(hn::IfThenElse(hides, hn::Sub(mean, nearer), mean), out.pieces.mean);
+    const V lost = hn::Mul(hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along)), lostByHiding(tau, near_side));
+    const V narrower = hn::Sqrt(hn::Max(hn::MulSub(all, all, lost), zero));
+    const V half_width = hn::IfThenElse(hides, narrower, all);
     const V correlation = hn::Sub(hn::Neg(gather(work, offsets, 2)), hn::Set(d, 194.0f));
     const V slope = hn::Sqrt(hn::MulAdd(slope0, slope0, hn::Mul(slope1, slope1)));
     const V inverse = hn::Div(one, hn::Max(slope, hn::Set(d, 1e-37f)));

@@ -160,7 +160,10 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
   const float* HWY_RESTRICT footprint = tables.footprint;
   const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   const Faces& faces = cuts.faces;
-  Intervals intervals;
+  Intervals intervals, nearer;
+  const bool hides = scalar.nearer != 0;
+  const float hidden2 =
+      scalar.half_width * scalar.half_width - scalar.seen_half_width * scalar.seen_half_width;
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
@@ -178,9 +181,13 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
                                    hn::Set(d, scalar.half_width * scalar.half_width));
     locate(tables.shading, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
+    if (hides)
+      locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)),
+             hn::Sqrt(hn::Max(hn::Sub(width2, hn::Set(d, hidden2)), hn::Zero(d))), lane, nearer);
   }
   if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return false;
   integrate(tables.shading, intervals, kLanes, out.integrals);
+  if (hides) showNearSides(tables.shading, nearer, out);
   return true;
 }
 

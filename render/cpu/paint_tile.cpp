@@ -1,8 +1,11 @@
+#include <hwy/aligned_allocator.h>
 #include <hwy/cache_control.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <new>
+#include <vector>
 
 #include "render/cpu/tile.h"
 
@@ -62,10 +65,44 @@ HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, con
   return saturated;
 }
 
+/// Polylines of splats that are painted in several calls.
+class Lines {
+ public:
+  explicit Lines(size_t splats) : places_(splats, kUnknown) {}
+
+  /// Of splat `index`; null where none is good enough. Valid until the next call.
+  HWY_INLINE const Polyline* of(size_t index, const TileWork& work, const Visit& visit) {
+    if (places_[index] == kUnknown) {
+      Polyline line;
+      places_[index] = fit(work, visit, line) ? static_cast<int32_t>(lines_.size()) : kNone;
+      if (places_[index] != kNone) lines_.push_back(line);
+    }
+    return places_[index] == kNone ? nullptr : &lines_[static_cast<size_t>(places_[index])];
+  }
+
+  HWY_INLINE static bool fit(const TileWork& work, const Visit& visit, Polyline& line) {
+    if (!fitPolyline(work.table, visit.all.pieces, visit.n, line)) return false;
+    if (work.shading.lit) line.light(visit.all.lit(work, visit.n));
+    return true;
+  }
+
+ private:
+  static constexpr int32_t kUnknown = -1, kNone = -2;
+
+  std::vector<int32_t> places_;  // [splat] in lines_
+  std::vector<Polyline> lines_;
+};
+
+/// Where what is made for a splat is kept for its next call; null: nowhere.
+struct Kept {
+  Lines* lines = nullptr;
+  size_t index = 0;
+};
+
 /// `several`: the splat touches more than one block, be they open or not: how a block is painted must not depend on others,
 /// of which another process may know.
 HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool several, const Visit& visit,
-                                const float* footprint) {
+                                const float* footprint, const Kept& kept) {
   const auto& [visits, fits, n] = visit;
   const Ellipse e = visit.ellipse();
   // A skewed footprint may be a tenth higher than F(0).
@@ -84,58 +121,122 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool sev
   }
   // A polyline's error is a 25th of a parabola's or so, where it does not fall much faster; and it is as much
   // work as a block looked up.
-  Polyline line;
-  if (fits.excess.at[n] < 25 && several && fitPolyline(work.table, visits.pieces, n, line)) {
-    if (work.shading.lit) line.light(visits.lit(work, n));
-    return paintPolyline(work, blocks, e, line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
-                         footprint);
+  if (fits.excess.at[n] < 25 && several) {
+    Polyline own;
+    const Polyline* const line = kept.lines                     ? kept.lines->of(kept.index, work, visit)
+                                 : Lines::fit(work, visit, own) ? &own
+                                                                : nullptr;
+    if (line)
+      return paintPolyline(work, blocks, e, *line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
+                           footprint);
   }
   return paintPixelByPixel(work, blocks, e, scalar, visits.lit(work, n), footprint);
 }
 
-BlockMask paintTile(const TileWork& work) {
-  const float* footprint = footprintPolynomial();
-  BlockMask open = work.open;
+/// Sixteen splats, prepared.
+struct Prepared {
   Visits visits;
   Fits fits{};
   ColourVisits colours;
-  for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
-    const size_t count = std::min(kLanes, work.order.size() - begin);
+  IntRow numbers;  // of the tile's splats
+  size_t count;
+
+  /// Those of work.order from `begin` on.
+  HWY_INLINE void prepare(const TileWork& work, size_t begin) {
+    count = std::min(kLanes, work.order.size() - begin);
     // The next sixteen come from anywhere in the batch.
     const size_t end = std::min(begin + 2 * kLanes, work.order.size());
-    for (size_t n = begin + count; n < end; ++n) {
-      const ScreenSplat& next = work.splats[work.order[n]];
-      hwy::Prefetch(&next.x);
-      hwy::Prefetch(&next.skew);  // which may lie in another cache line
-    }
-    IntRow numbers;
+    for (size_t n = begin + count; n < end; ++n) hwy::Prefetch(&work.splats[work.order[n]]);
     for (size_t n = 0; n < kLanes; ++n)
       numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);
     setUp(work, numbers, visits);
-    if (work.shading.per_pixel)
+    if (work.shading.per_pixel) {
       fitPieces(work.table, visits.pieces, count, fits);
-    else
+      if (!work.colours) fitNearSides(work.table, visits, count, fits);
+    } else {
       fitMeans(work.table, visits.pieces, count, fits);
+    }
     if (work.colours)
-      setUpColours(work, numbers, visits, count, colours);
+      setUpColours(work, numbers, visits, fits, count, colours);
     else if (work.shading.lit)
       fits.light(visits.diffuse, visits.specular);
-    for (size_t n = 0; n < count; ++n) {
-      if (fits.fit.at[n] == kNothing) continue;
-      const BlockMask touched = blocksOf(visits, n), blocks = touched & open;
-      if (blocks == 0) continue;
-      if (work.colours) {
-        open &= ~paintColoured(work, blocks, {visits, fits, colours, n}, static_cast<size_t>(numbers.at[n]),
-                               footprint);
-        continue;
-      }
-      const Visit visit{visits, fits, n};
-      open &= ~(visits.cut.at[n] != 0
-                    ? paintCut(work, blocks, visit, static_cast<size_t>(numbers.at[n]), footprint)
-                    : paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint));
+  }
+
+  /// The blocks that splat n may touch; none if it can be left out.
+  HWY_INLINE BlockMask touched(size_t n) const {
+    return fits.fit.at[n] == kNothing ? 0 : blocksOf(visits, n);
+  }
+
+  /// Paints splat n in `blocks`, some of those touched; returns those of them that are saturated then.
+  HWY_INLINE BlockMask paint(const TileWork& work, BlockMask blocks, BlockMask touched, size_t n,
+                             const float* footprint, const Kept& kept = {}) const {
+    const auto number = static_cast<size_t>(numbers.at[n]);
+    if (work.colours) return paintColoured(work, blocks, {visits, fits, colours, n}, number, footprint);
+    const Visit visit{visits, fits, n};
+    if (visits.cut.at[n] != 0) return paintCut(work, blocks, visit, number, footprint);
+    return paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint, kept);
+  }
+};
+
+BlockMask paintInOrder(const TileWork& work) {
+  const float* footprint = footprintPolynomial();
+  BlockMask open = work.open;
+  Prepared prepared;
+  for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
+    prepared.prepare(work, begin);
+    for (size_t n = 0; n < prepared.count; ++n) {
+      const BlockMask touched = prepared.touched(n), blocks = touched & open;
+      if (blocks != 0) open &= ~prepared.paint(work, blocks, touched, n, footprint);
     }
   }
   return open;
+}
+
+/// The blocks of an order tile.
+BlockMask blocksOfOrderTile(size_t number) {
+  constexpr size_t kBlocksAlong = kOrderSide / kBlockSide;
+  const size_t row = number / kOrderTilesAlong * kBlocksAlong,
+               column = number % kOrderTilesAlong * kBlocksAlong;
+  BlockMask blocks = 0;
+  for (size_t n = 0; n < kBlocksAlong; ++n)
+    blocks |= ((BlockMask{1} << kBlocksAlong) - 1) << ((row + n) * kTileBlocks + column);
+  return blocks;
+}
+
+/// Each order tile in its own order. Splats are prepared once for all.
+BlockMask paintByLists(const TileWork& work) {
+  const float* footprint = footprintPolynomial();
+  const size_t count = work.order.size(), groups = (count + kLanes - 1) / kLanes;
+  const auto prepared = hwy::AllocateAligned<Prepared>(groups);
+  if (!prepared) throw std::bad_alloc();
+  std::vector<uint8_t> is_prepared(groups);
+  std::vector<BlockMask> touched(count);
+  Lines lines(count);
+  BlockMask open = work.open;
+  for (size_t number = 0; number < kOrderTiles; ++number) {
+    const BlockMask of_tile = blocksOfOrderTile(number);
+    if ((open & of_tile) == 0) continue;
+    for (const uint64_t item : (*work.lists)[number]) {
+      const auto index = static_cast<uint32_t>(item);
+      const size_t of_index = index / kLanes, begin = of_index * kLanes;
+      Prepared& group = prepared[of_index];
+      if (!is_prepared[of_index]) {
+        is_prepared[of_index] = 1;
+        group.fits = {};
+        group.prepare(work, begin);
+        for (size_t n = 0; n < group.count; ++n) touched[begin + n] = group.touched(n);
+      }
+      const BlockMask blocks = touched[index] & open & of_tile;
+      if (blocks == 0) continue;
+      open &= ~group.paint(work, blocks, touched[index], index % kLanes, footprint, {&lines, index});
+      if ((open & of_tile) == 0) break;
+    }
+  }
+  return open;
+}
+
+BlockMask paintTile(const TileWork& work) {
+  return work.lists ? paintByLists(work) : paintInOrder(work);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -30,11 +30,14 @@ constexpr auto kHalfWidthMask = static_cast<int32_t>(0xffff0000u);  // as light.
 
 /// Sixteen splats of a tile, ready to be painted.
 struct Visits {
-  Row x, y, a, b, c;      // Ellipse
-  Row tp, tq;             // Scalar's
-  Row cut;                // 1 where the splat is cut; its pieces' reach is then that of the cut, too
-  Row diffuse, specular;  // Lit, in lit pictures
-  Pieces pieces;          // all of the splat that is in the tile
+  Row x, y, a, b, c;            // Ellipse
+  Row tp, tq;                   // Scalar's
+  Row cut;                      // 1 where the splat is cut; its pieces' reach is then that of the cut, too
+  Row along;                    // ScreenSplat's, of splats that hide some of themselves; else 0
+  Row nearer, seen_half_width;  // Scalar's
+  Row cell_depth;               // geometric, of their cells
+  Row diffuse, specular;        // Lit, in lit pictures
+  Pieces pieces;                // all of the splat that is in the tile
   Row l11, l21, l22;
   IntRow skew;            // ScreenSplat's
   IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
@@ -50,7 +53,8 @@ struct Visits {
     return work.shading.lit ? Lit{diffuse.at[n], specular.at[n]} : Lit{};
   }
   HWY_INLINE Scalar scalar(size_t n) const {
-    return {pieces.mean.at[n], pieces.reach.at[n], tp.at[n], tq.at[n], pieces.half_width.at[n]};
+    return {pieces.mean.at[n], pieces.reach.at[n],   tp.at[n], tq.at[n], pieces.half_width.at[n],
+            nearer.at[n],      seen_half_width.at[n]};
   }
 };
 
@@ -68,10 +72,43 @@ HWY_INLINE Range tOver(V by_x, V by_y, V middle_x, V middle_y, V half_x, V half_
           hn::Clamp(hn::Add(middle, half), hn::Neg(one), one)};
 }
 
+/// How many cells of the table a unit of the scalar is, around this one.
+HWY_INLINE V cellsAScalar(const ShadingTable& table, V scalar) {
+  const Floats d;
+  const V scale = hn::Set(d, std::abs(table.scale()));
+  if (!table.logScale()) return scale;
+  return hn::Div(scale, hn::Max(hn::Abs(scalar), hn::Set(d, ClassificationTable::kMinLogarithmic)));
+}
+
+/// What the cells of splats have along the ray: the footprints of neighbours add up to one, so it is the amplitude
+/// without the low-pass.
+HWY_INLINE V cellDepth(const TileWork& work, V amplitude, V l11, V l21, V l22) {
+  const Floats d;
+  const V low_pass = hn::Set(d, work.shading.low_pass_px2);
+  const V s00 = hn::MulSub(l11, l11, low_pass);
+  const V s11 = hn::Sub(hn::MulAdd(l21, l21, hn::Mul(l22, l22)), low_pass);
+  const V s01 = hn::Mul(l11, l21), passed = hn::Mul(l11, l22);
+  const V determinant = hn::NegMulAdd(s01, s01, hn::Mul(s00, s11));
+  const V least = hn::Mul(hn::Set(d, 1e-4f), hn::Mul(passed, passed));
+  return hn::Mul(amplitude, hn::Div(passed, hn::Sqrt(hn::Max(determinant, least))));
+}
+
+/// By how much the scalar that is seen of splats may differ from their mean, since their nearer sides hide the others:
+/// at the most.
+HWY_INLINE V hidesItself(const TileWork& work, V cell_depth, V along) {
+  const Floats d;
+  const V tau = hn::Mul(cell_depth, hn::Set(d, work.table.mostExtinction()));
+  return hn::Mul(hn::Mul(hn::Set(d, kSqrt3), hn::Abs(along)),
+                 hn::Min(hn::Mul(tau, hn::Set(d, 1.0f / 6)), hn::Set(d, 1.0f)));
+}
+
+// In cells of the table: what is seen of splats with less is not worth the work. A 500th of the function.
+constexpr float kHidingCells = 8;
+
 /// From the splats with these numbers.
 HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
   constexpr int32_t kFloats = sizeof(ScreenSplat) / sizeof(float);
-  static_assert(kFloats == 11);
+  static_assert(kFloats == 16);
   const Floats d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
   const V support = hn::Set(d, kSupport), last_pixel = hn::Set(d, kTileSide - 1);
@@ -128,7 +165,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     store(gather(work, offsets, 6), out.pieces.mean);
     if (!work.shading.per_pixel) {
       for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to, &out.tp,
-                       &out.tq, &out.pieces.width_loss})
+                       &out.tq, &out.pieces.width_loss, &out.along, &out.nearer, &out.cell_depth})
         store(zero, *row);
       continue;
     }
@@ -145,6 +182,14 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
                     hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x), hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y),
                     hn::Mul(half, hn::Sub(x1, x0)), hn::Mul(half, hn::Sub(y1, y0)));
     V reach = hn::Mul(support, slope), width_loss = zero;
+    const V along = gather(work, offsets, 11),
+            cell_depth = cellDepth(work, hn::Abs(amplitude), l11, l21, l22);
+    const V seen_nearer = hidesItself(work, cell_depth, along);
+    store(cell_depth, out.cell_depth);
+    const auto hides = hn::Gt(hn::Mul(seen_nearer, cellsAScalar(work.table, gather(work, offsets, 6))),
+                              hn::Set(d, kHidingCells));
+    store(hn::IfThenElseZero(hides, along), out.along);
+    store(zero, out.nearer);
     if (!hn::AllFalse(d, cut)) {
       // ScreenCut's correlation: how far the mean moves by what is left along the ray, which is all over the
       // splat, and how much narrower the scalar's distribution becomes.
@@ -248,6 +293,72 @@ HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks,
         saturated |= BlockMask{1} << numbers[n];
   }
   return saturated;
+}
+
+/// What is seen of splats that hide some of themselves, in the place of the colours in `fits`: those of their nearer
+/// sides. The optical depths stay. By the extinction in their middles.
+HWY_INLINE void fitNearSides(const ShadingTable& table, Visits& visits, size_t count, Fits& fits) {
+  const Floats d;
+  const V zero = hn::Zero(d);
+  V any = zero;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
+    any = hn::Max(any, hn::Abs(hn::Load(d, visits.along.at + lane)));
+  if (hn::AllTrue(d, hn::Eq(any, zero))) return;
+  Pieces nearer = visits.pieces;
+  any = zero;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const V along = hn::Load(d, visits.along.at + lane),
+            half_width = hn::Load(d, visits.pieces.half_width.at + lane);
+    const V tau = hn::Mul(hn::Load(d, visits.cell_depth.at + lane), hn::Load(d, fits.at.of[3].at + lane));
+    const V side = nearSide(tau), moved = hn::Mul(hn::Mul(hn::Set(d, kSqrt3), along), side);
+    const V lost = hn::Mul(hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along)), lostByHiding(tau, side));
+    const V narrower = hn::Sqrt(hn::Max(hn::MulSub(half_width, half_width, lost), zero));
+    // By the largest extinction of all, more seemed to hide something.
+    const V cells = hn::Mul(hn::Abs(moved), cellsAScalar(table, hn::Load(d, visits.pieces.mean.at + lane)));
+    const auto worth = hn::Gt(cells, hn::Set(d, kHidingCells));
+    any = hn::Max(any, hn::IfThenElseZero(worth, cells));
+    hn::Store(hn::IfThenElseZero(worth, along), d, visits.along.at + lane);
+    hn::Store(hn::IfThenElseZero(worth, moved), d, visits.nearer.at + lane);
+    hn::Store(narrower, d, visits.seen_half_width.at + lane);
+    hn::Store(hn::Sub(hn::Load(d, visits.pieces.mean.at + lane), moved), d, nearer.mean.at + lane);
+    hn::Store(narrower, d, nearer.half_width.at + lane);
+  }
+  if (hn::AllTrue(d, hn::Eq(any, zero))) return;
+  Fits seen{};
+  fitPieces(table, nearer, count, seen);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const auto hides = hn::Ne(hn::Load(d, visits.along.at + lane), zero);
+    // At both ends and in the middle.
+    V value[3][4], of_near[3][4];
+    for (int c = 0; c < 4; ++c) {
+      const auto points = [&](const Fits& of, V(&out)[3][4]) HWY_ATTR {
+        const V at = hn::Load(d, of.at.of[c].at + lane), by = hn::Load(d, of.by.of[c].at + lane);
+        const V ends = hn::Add(at, hn::Load(d, of.bend.of[c].at + lane));
+        out[0][c] = hn::Max(hn::Sub(ends, by), zero);
+        out[1][c] = hn::Max(at, zero);
+        out[2][c] = hn::Max(hn::Add(ends, by), zero);
+      };
+      points(fits, value);
+      points(seen, of_near);
+    }
+    for (int point = 0; point < 3; ++point) showNearSide(of_near[point], value[point]);
+    const V half = hn::Set(d, 0.5f);
+    for (int c = 0; c < 3; ++c) {
+      const auto replace = [&](Values& values, V by) HWY_ATTR {
+        float* const place = values.of[c].at + lane;
+        hn::Store(hn::IfThenElse(hides, by, hn::Load(d, place)), d, place);
+      };
+      replace(fits.at, value[1][c]);
+      replace(fits.by, hn::Mul(half, hn::Sub(value[2][c], value[0][c])));
+      replace(fits.bend, hn::Sub(hn::Mul(half, hn::Add(value[0][c], value[2][c])), value[1][c]));
+    }
+    // The worse of both; nothing only where the whole has nothing.
+    const auto fit = hn::Load(Ints(), fits.fit.at + lane), of_seen = hn::Load(Ints(), seen.fit.at + lane);
+    const auto worse = hn::IfThenElseZero(hn::Gt(fit, hn::Set(Ints(), kNothing)), hn::Max(fit, of_seen));
+    hn::Store(hn::IfThenElse(hn::RebindMask(Ints(), hides), worse, fit), Ints(), fits.fit.at + lane);
+    const V excess = hn::Load(d, fits.excess.at + lane);
+    hn::Store(hn::IfThenElse(hides, hn::Set(d, 1e9f), excess), d, fits.excess.at + lane);
+  }
 }
 
 /// Visit `n` of sixteen.

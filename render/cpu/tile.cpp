@@ -39,6 +39,7 @@ ShadingTable::ShadingTable(const ClassificationTable& table)
   double bend = 0, twist = 0;
   for (int n = -1; n <= kCells + 1; ++n) {
     cells_.push_back({toValue(start(n)), toValue(density(n))});
+    most_extinction_ = std::max(most_extinction_, cells_.back().density.of[3]);
     bends_.push_back({static_cast<float>(bend), static_cast<float>(twist)});
     bend += largest(second(n));
     twist += largest(second(n + 1) - second(n));

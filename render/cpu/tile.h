@@ -29,6 +29,7 @@
 #include "render/project/painter.h"
 #include "render/project/screen_splat.h"
 #include "render/project/tile_set.h"
+#include "render/tiles/tile_queues.h"
 
 namespace curvisplat {
 
@@ -66,6 +67,7 @@ class ShadingTable {
   bool logScale() const { return log_scale_; }
   float scale() const { return scale_; }
   float bias() const { return bias_; }
+  float mostExtinction() const { return most_extinction_; }
 
   /// [kCells + 3]: all below the table, its cells, all above it, and where that would end. An x in cells is
   /// in element floor(x + 1), at the most kCells + 1; its start lies at x = element - 1.
@@ -74,7 +76,7 @@ class ShadingTable {
 
  private:
   bool log_scale_;
-  float scale_, bias_;
+  float scale_, bias_, most_extinction_ = 0;
   std::vector<Cell> cells_;
   std::vector<Bend> bends_;
 };
@@ -98,6 +100,12 @@ inline constexpr float kSaturated = 1.0f / 4096;
 using BlockMask = uint64_t;
 static_assert(kTileBlocks * kTileBlocks == 64);
 
+/// The order tile of a block.
+inline int orderTileOf(int block) {
+  constexpr int kBlocksAlong = kOrderSide / kBlockSide;
+  return block / kTileBlocks / kBlocksAlong * kOrderTilesAlong + block % kTileBlocks / kBlocksAlong;
+}
+
 /// The layers of a tile's pixels, and the windows behind the first (tile_windows.h).
 struct TileWindows {
   int layers;     // the most of any pixel
@@ -113,6 +121,8 @@ struct TileWork {
   BlockMask open;                       // the blocks that are not saturated; has one at least
   std::span<const ScreenSplat> splats;  // one that is cut behind its records
   std::span<const uint32_t> order;      // of `splats`, nearest first
+  const std::array<OrderList, kOrderTiles>*
+      lists;  // of `order`, in that of each order tile; null: in its own
   const ShadingTable& table;
   const ShadingTable* colours;  // of pictures of two scalars; else null
   PixelShading shading;

@@ -16,9 +16,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
 #include "render/project/pixel_layers.h"
+#include "render/tiles/splat_bins.h"
 
 namespace curvisplat {
 

@@ -33,8 +33,7 @@ struct FrameRenderer::State {
     statistics = {};
     pipeline.setAside(0, options);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
-    FramePlan plan =
-        timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options, pipeline.order()); });
+    FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options); });
     if (options.ranks) planner.share(plan, options);
     pipeline.drawLayers(plan, options, statistics);
     Image image = pipeline.draw(plan, options, statistics, progress);
@@ -48,11 +47,13 @@ struct FrameRenderer::State {
     clear.background = glm::vec4(0.0f);
     statistics = {};
     // Where the memory has room for both painters, the second draws of the bricks that the first has decoded.
-    const bool beside = pipeline.backend().isSoftware() &&
-                        pipeline.setAside(valueBytes(clear.size, {.threads = clear.threads}), clear);
+    const bool beside =
+        pipeline.backend().isSoftware() &&
+        pipeline.setAside(valueBytes(clear.size, {.threads = clear.threads,
+                                                  .waiting_splats = FrameBudget::kMinWaitingSplats}),
+                          clear);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
-    FramePlan plan =
-        timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear, pipeline.order()); });
+    FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear); });
     if (options.ranks) planner.share(plan, clear);
     pipeline.drawLayers(plan, clear, statistics);
     Image image = pipeline.draw(plan, clear, statistics, progress);
@@ -86,7 +87,7 @@ struct FrameRenderer::State {
   };
   Image paintValues(const Camera& camera, const FrameOptions& options, const Drawn& drawn,
                     Progress* progress) {
-    FramePlan plan = planner.plan(camera, options, DrawingOrder::kFrontToBack);
+    FramePlan plan = planner.plan(camera, options);
     if (options.ranks) planner.share(plan, options);
     if (drawn.plan.layers) planner.addLayers(plan, drawn.plan.layers, options);
     const PixelLayers all = everywhere(drawn.picture.size, depthOrigin(drawn.plan));
@@ -103,8 +104,8 @@ struct FrameRenderer::State {
     CURVISPLAT_CHECK(!options.ranks && "one process draws a quick picture");
     statistics = {};
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
-    QuickPlan quick = timed(statistics.plan_s, "plan",
-                            [&] { return planner.planQuick(camera, options, limits, pipeline.order()); });
+    QuickPlan quick =
+        timed(statistics.plan_s, "plan", [&] { return planner.planQuick(camera, options, limits); });
     is_final = quick.isFinal();
     pipeline.drawLayers(quick.plan, options, statistics);
     Image picture = pipeline.draw(quick.plan, options, statistics, progress);
@@ -166,7 +167,7 @@ Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& opt
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
   try {
-    state_->pipeline.prefetch(state_->planner.plan(camera, options, state_->pipeline.order()), options);
+    state_->pipeline.prefetch(state_->planner.plan(camera, options), options);
   } catch (const Error&) {
     // render() will report it.
   }
@@ -174,8 +175,7 @@ void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) 
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options, const QuickLimits& limits) {
   try {
-    state_->pipeline.prefetch(
-        state_->planner.planQuick(camera, options, limits, state_->pipeline.order()).plan, options);
+    state_->pipeline.prefetch(state_->planner.planQuick(camera, options, limits).plan, options);
   } catch (const Error&) {
     // renderQuickly() will report it.
   }

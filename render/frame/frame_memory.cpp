@@ -35,6 +35,8 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // Larger buffers do not make a frame faster: they only even out bricks that take different times.
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
+constexpr uint64_t kMaxWaitingBytes = 64 << 20;
+constexpr uint64_t kWaitingSplatBytes = sizeof(ScreenSplat) + sizeof(uint32_t);  // render/tiles/tile_queues.h
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
 // picture of a slightly different size then needs no new pools, and the cache keeps its bricks.
 constexpr uint64_t kParts = 16;
@@ -59,7 +61,10 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t fit = (memory_bytes - taken - pools) / worker_bytes;
   budget.workers =
       static_cast<unsigned>(std::min<uint64_t>(wanted, std::max(std::min(fit, kFirstWorkers), fit / 2)));
-  const uint64_t free = memory_bytes - taken - pools - budget.workers * worker_bytes;
+  uint64_t free = memory_bytes - taken - pools - budget.workers * worker_bytes;
+  const uint64_t waiting_bytes = std::min(free / 8, kMaxWaitingBytes);
+  budget.waiting_splats += waiting_bytes / kWaitingSplatBytes;
+  free -= waiting_bytes;
   const uint64_t share = free / 4;
   const uint64_t ring_bytes = std::min(kMinRingBytes + share, kMaxRingBytes);
   budget.ring_splats = ring_bytes / sizeof(ScreenSplat);
@@ -80,7 +85,7 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
 
 namespace {
 
-constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
+constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, kMaxRegions};
 // What a layer may fill of the sweep's memory, by the estimate: pages are not full, and parts are swept ahead.
 constexpr double kLayerShare = 0.7;
 // What a slab has of it, on average, where the layer does not fit.
@@ -179,9 +184,10 @@ double largestLayer(const std::vector<PartInRegion>& parts) {
 }
 
 std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& cache, size_t variable,
-                                      size_t sweep_splats) {
+                                      size_t sweep_splats, uint32_t least_regions) {
   const auto capacity = static_cast<double>(sweep_splats);
-  if (static_cast<double>(plan.cut.splats) <= kLayerShare * capacity) return {{plan.tiles, {}}};
+  if (least_regions == 1 && static_cast<double>(plan.cut.splats) <= kLayerShare * capacity)
+    return {{plan.tiles, {}}};
   const ImageSize size = plan.settings.view.size;
   const std::vector<PartCost> costs =
       partCosts(plan.parts, cache.bricks(), cache.brickVariables(variable), plan.settings.view);
@@ -204,6 +210,7 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
   std::vector<uint32_t> owners;
   uint32_t regions = 1;
   for (const uint32_t number : kNumbers) {
+    if (number < least_regions) continue;
     if (number > std::max<size_t>(1, all.tiles() / (kUnit * kUnit))) break;
     std::vector<uint32_t> dealt = dealTiles(sample, size, {all, kUnit, true}, number);
     double work = 0;

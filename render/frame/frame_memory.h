@@ -20,18 +20,21 @@ namespace curvisplat {
 
 /// The stages' shares of a frame's memory.
 struct FrameBudget {
+  static constexpr size_t kMinWaitingSplats = 32768;
+
   unsigned workers = 1;
   size_t ring_splats = 0;
   size_t sweep_splats = 0;
-  uint64_t pager_bytes = 0;  // encoded bricks that are read ahead of the workers
-  uint64_t cache_bytes = 0;  // decoded bricks that are kept between frames
-  uint64_t kept_bytes = 0;   // decoded values of several time steps, kept between frames
+  uint64_t pager_bytes = 0;                   // encoded bricks that are read ahead of the workers
+  size_t waiting_splats = kMinWaitingSplats;  // PaintResources::waiting_splats
+  uint64_t cache_bytes = 0;                   // decoded bricks that are kept between frames
+  uint64_t kept_bytes = 0;                    // decoded values of several time steps, kept between frames
 
   /// Requirements that do not depend on the budget.
   struct Fixed {
     uint64_t index_bytes = 0;        // the octree, and a frame's notes about its bricks
     uint64_t least_pager_bytes = 0;  // what the largest brick needs
-    uint64_t painter_bytes = 0;      // in addition to the picture
+    uint64_t painter_bytes = 0;      // in addition to the picture, with kMinWaitingSplats
     uint64_t output_bytes = 0;       // reserved for the use of the finished picture
     uint64_t splats = 0;             // the most that any picture can have
     ImageSize size;
@@ -64,9 +67,10 @@ struct FrameRegion {
 ///
 /// The number of regions is the one with the least estimated work. If a layer is larger than estimated, its
 /// region is drawn in slabs. There is one region at least; together they have the plan's tiles, each once.
-/// `sweep_splats`: what the sweep can hold.
+/// `sweep_splats`: what the sweep can hold. `least`: regions, if there are as many tiles.
 std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& cache, size_t variable,
-                                      size_t sweep_splats);
+                                      size_t sweep_splats, uint32_t least = 1);
+inline constexpr uint32_t kMaxRegions = 64;
 
 /// A part of the cut in a region: how many of its splats are there, and their depth keys, which are taken to
 /// lie evenly in between.

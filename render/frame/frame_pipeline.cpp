@@ -14,6 +14,7 @@
 #include "stream/base/error.h"
 #include "stream/base/memory.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "stream/base/threads.h"
 #include "stream/base/trace.h"
 #include "stream/paging/brick_source.h"
@@ -29,40 +30,23 @@ unsigned threadsOf(const FrameOptions& options) {
   return threadsOrCores(options.threads);
 }
 
-/// Waits for the painter's draws when a frame ends, however it ends: the next frame uses the same ring
-/// memory.
-class DrawsFinished {
- public:
-  explicit DrawsFinished(Painter& painter) : painter_(painter) {}
-  ~DrawsFinished() {
-    try {
-      painter_.finishDraws();
-    } catch (const Error&) {
-      // A painter that has failed reports it again at the next begin().
-    }
-  }
-  DrawsFinished(const DrawsFinished&) = delete;
-  DrawsFinished& operator=(const DrawsFinished&) = delete;
-
- private:
-  Painter& painter_;
-};
-
 }  // namespace
 
 /// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
   Pools(const CacheReader& cache, const BrickSource::Variables& variables, const FrameBudget& budget_,
-        const PagerOptions& pager_, std::span<ScreenSplat> splats, ComputePermits& permits)
+        const PagerOptions& pager_, ComputePermits& permits)
       : budget(budget_),
         pager(pager_),
-        ring(splats),
+        splats(std::make_unique_for_overwrite<ScreenSplat[]>(budget.ring_splats)),
+        ring({splats.get(), budget.ring_splats}),
         sweep(budget.sweep_splats, budget.ring_splats / 2),
         source(cache, variables, pager, budget.cache_bytes, budget.kept_bytes),
         workers(source, sweep, ring, permits, budget.workers) {}
 
   const FrameBudget budget;
   const PagerOptions pager;
+  const std::unique_ptr<ScreenSplat[]> splats;
   SegmentRing ring;
   SweepBuffer sweep;
   BrickSource source;
@@ -89,16 +73,18 @@ FramePipeline::~FramePipeline() {
 
 FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
   const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
-  const FrameBudget::Fixed fixed{planner_.bytes(),
-                                 least_pager_bytes_,
-                                 backend_->bytes(options.size, {.threads = options.threads}) +
-                                     LayerDrawer::bytes(options) + exchange_bytes + aside_bytes_,
-                                 options.output_bytes,
-                                 planner_.mostSplats(),
-                                 options.size,
-                                 cache_.series().steps.size() > 1,
-                                 coloured_by_.has_value(),
-                                 options.ranks != nullptr};
+  const FrameBudget::Fixed fixed{
+      planner_.bytes(),
+      least_pager_bytes_,
+      backend_->bytes(options.size,
+                      {.threads = options.threads, .waiting_splats = FrameBudget::kMinWaitingSplats}) +
+          LayerDrawer::bytes(options) + exchange_bytes + aside_bytes_,
+      options.output_bytes,
+      planner_.mostSplats(),
+      options.size,
+      cache_.series().steps.size() > 1,
+      coloured_by_.has_value(),
+      options.ranks != nullptr};
   return FrameBudget::of(options.memory_bytes, fixed, options.threads);
 }
 
@@ -117,7 +103,7 @@ void FramePipeline::makePools(const FrameOptions& options) {
   dropPools();  // before the new ones take their memory
   permits_ = std::make_unique<ComputePermits>(threadsOf(options));
   auto fresh = std::make_unique<Pools>(cache_, BrickSource::Variables(variable_, coloured_by_), budget, pager,
-                                       backend_->splatMemory(budget.ring_splats), *permits_);
+                                       *permits_);
   requireSpareMemory();
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
@@ -188,8 +174,7 @@ bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, 
     return true;
   }
   for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
-  // Nothing is hidden when drawing back to front. With keep_going, see FrameWorkers::prepare().
-  const bool may_hide = order() == DrawingOrder::kFrontToBack && !options.keep_going;
+  const bool may_hide = !options.keep_going;  // FrameWorkers::prepare() says why
   pools_->source.start(parts, [this, may_hide, &plan](uint32_t brick) {
     return (may_hide && hidden_.hides(brick)) ||
            pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
@@ -267,6 +252,23 @@ void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
+  for (uint32_t least = 1; least <= kMaxRegions; least *= 4) {
+    FrameStatistics drawn = statistics;
+    auto image = drawInRegions(least, plan, options, drawn, progress);
+    if (!image) continue;
+    statistics = std::move(drawn);
+    return *std::move(image);
+  }
+  throw UsageError(
+      "--memory {}: too little for what lies in one place of the picture; give more, or a coarser "
+      "--lod-pixels",
+      byteText(options.memory_bytes));
+}
+
+/// Nothing where more splats wait in the painter's tiles than it has memory for: fewer do in smaller regions.
+std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePlan& plan,
+                                                  const FrameOptions& options, FrameStatistics& statistics,
+                                                  Progress* progress) {
   std::optional<TraceScope> starting(std::in_place, "start frame");
   makePools(options);
   exchange_.reset();
@@ -274,9 +276,12 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   const FrameWork work{cache_,    plan.parts, plan.settings,      planner_.table(),
                        plan.keys, hidden_,    options.keep_going, exchange_.get()};
   // With keep_going, what replaces a damaged brick may reach into any region.
-  const std::vector<FrameRegion> regions =
-      options.keep_going ? std::vector<FrameRegion>{{plan.tiles, {}}}
-                         : frameRegions(plan, cache_, variable_, pools_->budget.sweep_splats);
+  std::vector<FrameRegion> regions =
+      options.keep_going && least == 1
+          ? std::vector<FrameRegion>{{plan.tiles, {}}}
+          : frameRegions(plan, cache_, variable_, pools_->budget.sweep_splats, least);
+  if (options.keep_going)
+    for (FrameRegion& region : regions) region.left_out.clear();
   const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   {
     const MutexLock lock(mutex_);
@@ -286,6 +291,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     pools_->workers.beginFrame(work);
     hidden_.begin(cache_.bricks(), plan.settings.view);
   }
+  overfull_ = false;
   if (progress) progress->begin("drawing", plan.parts.size(), "bricks");
   Image image;
   try {
@@ -306,6 +312,9 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     throw;
   }
   throwIfStopped(options.stop);
+  uint64_t overfull = overfull_;
+  if (options.ranks) options.ranks->sum(std::span<uint64_t>(&overfull, 1));
+  if (overfull > 0) return {};
   if (progress) progress->end();
 
   const Cut& cut = plan.cut;
@@ -332,12 +341,17 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
                            const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
   Image image;
+  // A further painter has what setAside() left it.
+  const size_t waiting =
+      painting_ == backend_.get() ? pools_->budget.waiting_splats : FrameBudget::kMinWaitingSplats;
   painting_->run([&](Painter& painter) {
-    const DrawsFinished finished(painter);
-    painter.begin(
-        plan.settings.view.size, options.background, planner_.table(),
-        {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers, planner_.colourClasses()},
-        {.threads = options.threads, .stop = options.stop, .permits = permits_.get()});
+    painter.begin(plan.settings.view.size, options.background, planner_.table(),
+                  {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers,
+                   planner_.colourClasses(), static_cast<float>(plan.settings.view.low_pass_px2)},
+                  {.threads = options.threads,
+                   .waiting_splats = waiting,
+                   .stop = options.stop,
+                   .permits = permits_.get()});
     if (regions.front().tiles) painter.drawOnly(*regions.front().tiles);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
@@ -355,6 +369,7 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
       if (pools_->ring.isClosed()) return;
     } while (nextSlab(plan, regions, options, painter));
     image = painter.end();
+    overfull_ = painter.isOverfull();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
     statistics.draw_s = painter.drawSeconds();

@@ -126,8 +126,6 @@ class FramePipeline {
   /// The cache is at another step of the same geometry. Nothing may be drawn or fetched meanwhile.
   void stepChanged();
 
-  /// The order in which plans must list their parts.
-  DrawingOrder order() const { return painting_->order(); }
   const PaintingBackend& backend() const { return *backend_; }
   /// See FrameRenderer::permits().
   ComputePermits* permits() const { return permits_.get(); }
@@ -143,6 +141,8 @@ class FramePipeline {
   bool beginExchangedSlab(const FrameRegion* region);
   void beginExchange(const FramePlan& plan, const FrameOptions& options);
   uint64_t exchangeBytes(const FrameOptions& options) const;
+  std::optional<Image> drawInRegions(uint32_t least, const FramePlan& plan, const FrameOptions& options,
+                                     FrameStatistics& statistics, Progress* progress);
   void stopStages();
   FrameBudget budgetOf(const FrameOptions& options) const;
   void makePools(const FrameOptions& options);
@@ -162,6 +162,7 @@ class FramePipeline {
   std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn
+  bool overfull_ = false;                    // the last picture: Painter::isOverfull()
   std::unique_ptr<ComputePermits> permits_;  // as many as the options said that threads were to be used
   uint64_t least_pager_bytes_ = 0;           // that the largest brick of any step so far needs
 

@@ -55,9 +55,8 @@ std::pair<float, float> reachedBy(const BrickVariable& values) {
   return {values.min - values.largest_slope, values.max + values.largest_slope};
 }
 
-CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
+CutOptions limitsOf(const FrameOptions& options) {
   CutOptions limits;
-  limits.order = order;
   limits.lod_pixels = options.lod_pixels;
   limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
   return limits;
@@ -230,12 +229,11 @@ Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptio
 }
 
 SweptPart sweptPart(const BrickPart& part, const Brick& brick, const DepthKeys& keys) {
-  const uint32_t rank = keys.order() == DrawingOrder::kFrontToBack ? part.brick : ~part.brick;
-  return {part, rank, keys.rangeOf(brick)};
+  return {part, part.brick, keys.rangeOf(brick)};
 }
 
-FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut, DrawingOrder order) const {
-  FramePlan plan{settings, std::move(cut), DepthKeys(settings.view, cache_.manifest().root, order), {}};
+FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut) const {
+  FramePlan plan{settings, std::move(cut), DepthKeys(settings.view, cache_.manifest().root), {}};
   plan.parts.reserve(plan.cut.parts.size());
   for (const BrickPart& part : plan.cut.parts)
     plan.parts.push_back(sweptPart(part, cache_.bricks()[part.brick], plan.keys));
@@ -244,10 +242,10 @@ FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut, Draw
   return plan;
 }
 
-FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
+FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  const CutOptions limits = limitsOf(options, order);
-  FramePlan plan = planOf(settings, chooseCut(settings, options, limits), order);
+  const CutOptions limits = limitsOf(options);
+  FramePlan plan = planOf(settings, chooseCut(settings, options, limits));
   plan.slices = planSlices(settings, options, limits);
   planIsosurfaces(options, limits, plan);
   return plan;
@@ -292,16 +290,16 @@ void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers>
 }
 
 QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options,
-                                  const QuickLimits& quick_limits, DrawingOrder order) const {
+                                  const QuickLimits& quick_limits) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  CutOptions limits = limitsOf(options, order);
+  CutOptions limits = limitsOf(options);
   limits.max_splats = std::min(limits.max_splats, quick_limits.max_splats);
   limits.max_bytes = std::min(limits.max_bytes, quick_limits.max_bytes);
   Cut cut = chooseCut(settings, options, limits);
   const ReducedSize size(options.size,
                          std::max(quick_limits.detail_px, cut.complete ? 0 : cut.largest_error_px));
   ProjectionSettings reduced = size.isWhole() ? settings : settingsFor(camera, options, size.size());
-  FramePlan plan = planOf(reduced, std::move(cut), order);
+  FramePlan plan = planOf(reduced, std::move(cut));
   plan.slices = planSlices(plan.settings, options, limits);
   planIsosurfaces(options, limits, plan);
   return {std::move(plan), size};

@@ -77,10 +77,9 @@ class FramePlanner {
   FramePlanner(const CacheReader& cache, const DrawnScalars& scalars);
 
   /// Throws UsageError for an invalid view, and if options.max_splats is too small.
-  FramePlan plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const;
+  FramePlan plan(const Camera& camera, const FrameOptions& options) const;
   /// Plans the best picture within `limits`. Throws as plan() does.
-  QuickPlan planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
-                      DrawingOrder order) const;
+  QuickPlan planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& limits) const;
 
   /// The cache is at another step of the same geometry. Nothing may be planned or drawn meanwhile.
   void stepChanged();
@@ -121,7 +120,7 @@ class FramePlanner {
                 const CutOptions& limits) const;
   std::vector<SlicePlan> planSlices(const ProjectionSettings& settings, const FrameOptions& options,
                                     const CutOptions& limits) const;
-  FramePlan planOf(const ProjectionSettings& settings, Cut cut, DrawingOrder order) const;
+  FramePlan planOf(const ProjectionSettings& settings, Cut cut) const;
 
   const CacheReader& cache_;
   const size_t variable_;

@@ -295,7 +295,8 @@ void FrameWorkers::project(Worker& worker, const BrickSource::Splats& fetched, c
                            {fetched.values, fetched.second}, fetched.ranges);
   if (tiles_) worker.projector.keepTouching(*tiles_);
   worker.keys.resize(worker.projector.depths().size());
-  work_->keys.keysOf(worker.projector.depths(), cell_min, keys, worker.keys);
+  work_->keys.setKeys(worker.projector.mutableSplats(), worker.projector.depths(), cell_min, keys,
+                      worker.keys);
 }
 
 void FrameWorkers::markSeen(uint32_t number, Seen seen) {
@@ -337,7 +338,7 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank, const
   {
     const TraceNumbers numbers{static_cast<int64_t>(sequence), static_cast<int64_t>(projected.keys.size())};
     const StageTimer timer(statistics.sort_s, "sort brick", TraceKind::kWork, numbers);
-    sorted = worker.sorter.sort(projected.keys, work_->keys.order());
+    sorted = worker.sorter.sort(projected.keys);
   }
   {
     const WaitTimer timer(statistics.workers_waited_s, "wait for its turn");

@@ -13,6 +13,8 @@
 #include "render/gl/gl_functions.h"
 #include "render/gl/splat_shader.h"
 #include "render/project/footprint.h"
+#include "render/tiles/splat_bins.h"
+#include "render/tiles/tile_queues.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
 
@@ -24,6 +26,7 @@ constexpr int kFootprintSteps = 1024;
 // splats took 330 MiB. Two draws under way keep all its threads busy.
 constexpr size_t kSplatsPerDraw = 16384;
 constexpr size_t kDrawsInFlight = 2;
+constexpr size_t kBatchSplats = 65536, kEntriesASplat = 4;
 constexpr GLint kFootprintUnit = 0, kClassesUnit = 1, kLayersUnit = 2, kColoursUnit = 3;
 
 /// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
@@ -43,11 +46,12 @@ struct TableTexture {
   }
 };
 
-/// How many records of a splat may come behind it.
+/// How many records of a splat may come before it.
 constexpr size_t kMaxRecords = 3;
 
-/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the two records that cut it,
-/// so that there are more in the buffer than are drawn; its skew; and its ScreenColour. Leaves itself bound.
+/// Splats as the shader's instances, behind kMaxRecords elements that are not drawn: ScreenSplat's floats as 4 + 4 + 2,
+/// and those of the two records that cut it, which lie before it; its skew, `along` and the pixels that it is clipped
+/// to, in the place of its keys; and its ScreenColour. Leaves itself bound.
 struct InstanceBuffer {
   GlObject buffer, vertex_array;
 
@@ -58,6 +62,7 @@ struct InstanceBuffer {
   /// `coloured`: a ScreenColour lies between a splat and what cuts it.
   void setUp(const GlFunctions& gl, bool coloured) {
     static constexpr GLint kComponents[] = {4, 4, 2};
+    constexpr size_t kSplat = kMaxRecords * sizeof(ScreenSplat);
     bind(gl);
     GLuint attribute = 0;
     const auto point = [&](GLint components, size_t offset) {
@@ -66,20 +71,25 @@ struct InstanceBuffer {
                              reinterpret_cast<const void*>(offset));
       gl.VertexAttribDivisor(attribute++, 1);
     };
+    const auto pointToInts = [&](GLint components, size_t member) {
+      gl.EnableVertexAttribArray(attribute);
+      gl.VertexAttribIPointer(attribute, components, GL_INT, sizeof(ScreenSplat),
+                              reinterpret_cast<const void*>(kSplat + member));
+      gl.VertexAttribDivisor(attribute++, 1);
+    };
     for (size_t record = 0; record < 3; ++record) {
-      size_t offset = (record > 0 && coloured ? record + 1 : record) * sizeof(ScreenSplat);
+      size_t offset = kSplat - (record > 0 && coloured ? record + 1 : record) * sizeof(ScreenSplat);
       for (const GLint components : kComponents) {
         point(components, offset);
         offset += static_cast<size_t>(components) * sizeof(float);
       }
     }
-    gl.EnableVertexAttribArray(attribute);
-    gl.VertexAttribIPointer(attribute, 1, GL_INT, sizeof(ScreenSplat),
-                            reinterpret_cast<const void*>(offsetof(ScreenSplat, skew)));
-    gl.VertexAttribDivisor(attribute++, 1);
+    pointToInts(1, offsetof(ScreenSplat, skew));
+    pointToInts(2, offsetof(ScreenSplat, key));
+    point(1, kSplat + offsetof(ScreenSplat, along));
     if (!coloured) return;
-    point(4, sizeof(ScreenSplat));
-    point(1, sizeof(ScreenSplat) + 4 * sizeof(float));
+    point(4, kSplat - sizeof(ScreenSplat));
+    point(2, kSplat - sizeof(ScreenSplat) + 4 * sizeof(float));
   }
 
   void bind(const GlFunctions& gl) const {
@@ -87,6 +97,25 @@ struct InstanceBuffer {
     gl.BindBuffer(GL_ARRAY_BUFFER, buffer.name());
   }
 };
+
+/// The pixels of a rectangle, in the place of a splat's keys.
+struct ClipBox {
+  int x, y, side;
+
+  void writeTo(ScreenSplat& splat) const {
+    static_assert(offsetof(ScreenSplat, first) == offsetof(ScreenSplat, key) + sizeof(uint32_t));
+    splat.key = static_cast<uint32_t>(x) | static_cast<uint32_t>(y) << 16;
+    splat.first = static_cast<uint32_t>(side);
+  }
+};
+
+float mostExtinction(const ClassificationTable& table) {
+  float most = std::max(table.below().w, table.above().w);
+  const auto cumulative = table.cumulative();
+  for (size_t n = 0; n + 1 < cumulative.size(); ++n)
+    most = std::max(most, cumulative[n + 1].w - cumulative[n].w);
+  return most;
+}
 
 /// Value and step to the next value, so that linear interpolation needs one fetch.
 std::vector<std::array<float, 2>> footprintTexels() {
@@ -97,15 +126,6 @@ std::vector<std::array<float, 2>> footprintTexels() {
   return texels;
 }
 
-/// How many of the last of `splats` belong to a splat of which records are still to come. Farthest first.
-size_t lacksRecords(std::span<const ScreenSplat> splats, bool coloured) {
-  const ScreenSplat& last = splats.back();
-  if (!isRecord(last)) return coloured || hasCut(last) ? 1 : 0;
-  if (isColour(last)) return hasCut(splats[splats.size() - 2]) ? 2 : 0;
-  if (isDepth(last) && ScreenDepth::of(last).has_cut) return coloured ? 3 : 2;
-  return 0;
-}
-
 }  // namespace
 
 struct GlPainter::State {
@@ -114,18 +134,20 @@ struct GlPainter::State {
         footprint(gl),
         classes(gl),
         colour_classes(gl),
-        copied(gl),
+        instances(gl),
         framebuffer(makeFramebuffer(gl)),
         layers_texture(makeTexture(gl)) {}
 
   const GlFunctions& gl;
   std::map<int, GlProgram> programs;  // by their kinds, each compiled when it is first needed
   TableTexture footprint, classes, colour_classes;
-  bool coloured = false;                 // splats have ScreenColours
-  InstanceBuffer copied;                 // what lies elsewhere is copied here to be drawn
-  std::optional<InstanceBuffer> mapped;  // what lies here is not
-  std::span<ScreenSplat> mapped_splats;
-  std::vector<ScreenSplat> held;  // the last splat of a draw, with those of its records that have arrived
+  bool coloured = false;  // splats have ScreenColours
+  InstanceBuffer instances;
+  std::vector<ScreenSplat> staged;  // the next draw
+  std::optional<SplatBins> bins;
+  std::optional<TileQueues> queues;
+  size_t waiting_splats = 0;
+  PaintLoop loop{1, nullptr};
   GlObject framebuffer, layers_texture;
   std::vector<GlObject> colours;  // an attachment for each window of depth
   ImageSize size{0, 0};
@@ -134,10 +156,8 @@ struct GlPainter::State {
   struct InFlight {
     GlFence fence;
     GlObject timer;  // a query, done when the fence is passed
-    uint64_t draw;
   };
   std::deque<InFlight> in_flight;
-  uint64_t draws = 0;  // calls of draw()
   double upload_s = 0, draw_s = 0, gl_draw_s = 0;
 
   void allocate(ImageSize wanted, int windows);
@@ -145,7 +165,11 @@ struct GlPainter::State {
   void useRecords(bool with_colours);
   const GlProgram& program(const SplatShaderKind& kind);
   int windows() const { return layers ? layers->windows() : 1; }
-  void drawPart(std::span<const ScreenSplat> splats);
+  void paintBatch(bool last);
+  void stageTile(size_t number, const OrderedTile& ordered);
+  void stage(std::span<const ScreenSplat> splats, uint32_t splat, const ClipBox& clip);
+  void drawStaged();
+  void finishDraws();
   void finishOldest();
   void use(const GlProgram& program, const ClassificationTable& table, const PixelShading& shading) const;
 };
@@ -157,7 +181,7 @@ GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(
 
   gl.Enable(GL_BLEND);
   gl.Enable(GL_SCISSOR_TEST);
-  gl.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  gl.BlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);  // nearest first
   gl.check("setting up the painter");
 }
 
@@ -214,8 +238,7 @@ void GlPainter::State::allocate(ImageSize wanted, int windows) {
 void GlPainter::State::useRecords(bool with_colours) {
   if (with_colours == coloured) return;
   coloured = with_colours;
-  copied.setUp(gl, coloured);
-  if (mapped) mapped->setUp(gl, coloured);
+  instances.setUp(gl, coloured);
 }
 
 /// The depths of the pixels' layers, as the shader reads them.
@@ -250,6 +273,9 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
   gl.Uniform1f(program.uniform("footprint_steps"),
                static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
   gl.Uniform1i(program.uniform("cells"), ClassificationTable::kCells);
+  gl.Uniform1f(program.uniform("low_pass"), shading.low_pass_px2);
+  gl.Uniform1i(program.uniform("log_scale"), table.logScale() ? 1 : 0);
+  gl.Uniform1f(program.uniform("most_extinction"), mostExtinction(table));
   gl.Uniform1f(program.uniform("least_logarithmic"), ClassificationTable::kMinLogarithmic);
   const auto set = [&](const char* cells, const char* low, const char* high, const ClassificationTable& of) {
     const glm::vec4 below = of.below(), above = of.above();
@@ -260,18 +286,28 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
   set("cells_from_scalar", "below", "above", table);
   if (!shading.colours) return;
   gl.Uniform1i(program.uniform("colours"), kColoursUnit);
+  gl.Uniform1i(program.uniform("colour_log_scale"), shading.colours->logScale() ? 1 : 0);
   set("cells_from_colour", "colours_below", "colours_above", *shading.colours);
 }
 
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
-                      PixelShading shading, const PaintResources&) {
+                      PixelShading shading, const PaintResources& resources) {
   const GlFunctions& gl = state_->gl;
-  finishDraws();  // of a frame that was not ended
-  state_->held.clear();
+  state_->finishDraws();  // of a frame that was not ended
+  state_->staged.assign(kMaxRecords, {});
+  const bool same_size = size == state_->size;
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
   state_->layers = shading.layers && !shading.layers->empty() ? shading.layers : nullptr;
   const int windows = state_->windows();
   state_->allocate(size, windows);
+  if (!same_size || !state_->bins || resources.waiting_splats != state_->waiting_splats) {
+    state_->bins.emplace(size, kBatchSplats, kEntriesASplat * kBatchSplats, 1);
+    state_->queues.emplace(size, resources.waiting_splats);
+    state_->waiting_splats = resources.waiting_splats;
+  }
+  state_->bins->clear();
+  state_->bins->open();
+  state_->queues->clear();
   if (state_->layers) state_->loadLayers();
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
   state_->useRecords(shading.colours != nullptr);
@@ -287,86 +323,93 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   gl.Viewport(0, 0, size.width, size.height);
   gl.Scissor(0, 0, size.width, size.height);
   state_->background = background;
-  // With layers the picture is put together in end().
-  const glm::vec4 behind = state_->layers ? glm::vec4(0) : background;
-  gl.ClearColor(behind.r, behind.g, behind.b, behind.a);
+  gl.ClearColor(0, 0, 0, 0);
   gl.Clear(GL_COLOR_BUFFER_BIT);
   gl.check("beginning a frame");
 }
 
 void GlPainter::drawOnly(const TileSet& tiles) {
+  state_->paintBatch(true);
+  state_->drawStaged();
   const TileBox box = tiles.box();
   state_->gl.Scissor(box.x0 * kSharedTileSide, box.y0 * kSharedTileSide, box.columns() * kSharedTileSide,
                      box.rows() * kSharedTileSide);
 }
 
-std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
-  State& state = *state_;
-  const GlFunctions& gl = state.gl;
-  finishDraws();
-  state.mapped.reset();
-  state.mapped_splats = {};
-  if (!gl.has44()) return {};
-  state.mapped.emplace(gl);
-  state.mapped->setUp(gl, state.coloured);
-  const auto bytes = static_cast<GLsizeiptr>((count + kMaxRecords) * sizeof(ScreenSplat));
-  constexpr GLbitfield kHow = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-  gl.BufferStorage(GL_ARRAY_BUFFER, bytes, nullptr, kHow);
-  void* const memory = gl.MapBufferRange(GL_ARRAY_BUFFER, 0, bytes, kHow);
-  gl.check("mapping memory for splats");
-  state.mapped_splats = {static_cast<ScreenSplat*>(memory), count};
-  return state.mapped_splats;
-}
-
 void GlPainter::draw(std::span<const ScreenSplat> splats) {
   State& state = *state_;
-  ++state.draws;
-  for (; !state.held.empty() && !splats.empty(); splats = splats.subspan(1)) {
-    state.held.push_back(splats.front());
-    if (lacksRecords(state.held, state.coloured) > 0) continue;
-    state.drawPart(state.held);
-    state.held.clear();
-  }
   while (!splats.empty()) {
-    size_t count = std::min(splats.size(), kSplatsPerDraw);
-    while (count < splats.size() && lacksRecords(splats.first(count), state.coloured) > 0) ++count;
-    const size_t last = lacksRecords(splats.first(count), state.coloured);
-    if (last > 0) state.held.assign(splats.begin() + static_cast<std::ptrdiff_t>(count - last), splats.end());
-    if (count > last) state.drawPart(splats.first(count - last));
-    splats = splats.subspan(count);
+    splats = splats.subspan(state.bins->add(splats));
+    if (!splats.empty()) state.paintBatch(false);
   }
 }
 
-void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
-  const auto count = static_cast<GLsizei>(splats.size());
-  GlObject query = makeQuery(gl);
-  const std::less_equal<const ScreenSplat*> not_after;
-  if (!mapped_splats.empty() && not_after(mapped_splats.data(), splats.data()) &&
-      not_after(splats.data() + splats.size(), mapped_splats.data() + mapped_splats.size())) {
-    const StageTimer timer(draw_s, "draw (OpenGL)");
-    mapped->bind(gl);
-    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
-    gl.DrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, count,
-                                       static_cast<GLuint>(splats.data() - mapped_splats.data()));
+/// Draws what was collected: as it came, if it has one order; else tile by tile.
+void GlPainter::State::paintBatch(bool last) {
+  const std::span<const ScreenSplat> splats = bins->splats();
+  const bool one_order = !queues->anyWaits() && std::none_of(splats.begin(), splats.end(), leans);
+  if (one_order) {
+    for (uint32_t n = 0; n < splats.size(); ++n)
+      if (!isRecord(splats[n])) stage(splats, n, {0, 0, std::max(size.width, size.height)});
   } else {
-    copied.bind(gl);
-    {
-      // Fresh storage each time: the driver keeps what it still draws from.
-      const StageTimer timer(upload_s, "upload splats");
-      const auto bytes = static_cast<GLsizeiptr>(splats.size_bytes());
-      gl.BufferData(GL_ARRAY_BUFFER, bytes + static_cast<GLsizeiptr>(kMaxRecords * sizeof(ScreenSplat)),
-                    nullptr, GL_STREAM_DRAW);
-      gl.BufferSubData(GL_ARRAY_BUFFER, 0, bytes, splats.data());
+    bins->sort(loop);
+    const uint32_t front = splats.empty() ? 0 : splats.back().first;
+    for (size_t number = 0; number < TileSet::tilesOf(size); ++number) {
+      const auto entries = bins->tile(static_cast<int>(number));
+      if (entries.empty() && !(last && queues->waits(number))) continue;
+      queues->paint(number, {splats, entries, front, last}, TileQueues::kAllOpen,
+                    [&](const OrderedTile& ordered) {
+                      stageTile(number, ordered);
+                      return TileQueues::kAllOpen;
+                    });
     }
-    const StageTimer timer(draw_s, "draw (OpenGL)");
-    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
-    gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, count);
+  }
+  bins->clear();
+}
+
+void GlPainter::State::stageTile(size_t number, const OrderedTile& ordered) {
+  const auto columns = static_cast<size_t>(bins->columns());
+  const int x = static_cast<int>(number % columns) * kTileSide,
+            y = static_cast<int>(number / columns) * kTileSide;
+  if (!ordered.lists) {
+    for (const uint32_t n : ordered.order) stage(ordered.splats, n, {x, y, kTileSide});
+    return;
+  }
+  for (size_t tile = 0; tile < kOrderTiles; ++tile) {
+    const ClipBox clip{x + static_cast<int>(tile) % kOrderTilesAlong * kOrderSide,
+                       y + static_cast<int>(tile) / kOrderTilesAlong * kOrderSide, kOrderSide};
+    for (const uint64_t item : (*ordered.lists)[tile])
+      stage(ordered.splats, ordered.order[static_cast<uint32_t>(item)], clip);
+  }
+}
+
+/// Adds a splat, and the records before it, to the next draw.
+void GlPainter::State::stage(std::span<const ScreenSplat> splats, uint32_t splat, const ClipBox& clip) {
+  uint32_t first = splat;
+  while (first > 0 && isRecord(splats[first - 1])) --first;
+  staged.insert(staged.end(), splats.begin() + first, splats.begin() + splat + 1);
+  clip.writeTo(staged.back());
+  if (staged.size() >= kSplatsPerDraw) drawStaged();
+}
+
+void GlPainter::State::drawStaged() {
+  if (staged.size() <= kMaxRecords) return;
+  GlObject query = makeQuery(gl);
+  instances.bind(gl);
+  {
+    // Fresh storage each time: the driver keeps what it still draws from.
+    const StageTimer timer(upload_s, "upload splats");
+    gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(std::span(staged).size_bytes()), staged.data(),
+                  GL_STREAM_DRAW);
   }
   const StageTimer timer(draw_s, "draw (OpenGL)");
+  gl.BeginQuery(GL_TIME_ELAPSED, query.name());
+  gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(staged.size() - kMaxRecords));
   gl.EndQuery(GL_TIME_ELAPSED);
   gl.check("drawing splats");
-  in_flight.push_back({GlFence(gl), std::move(query), draws});
+  in_flight.push_back({GlFence(gl), std::move(query)});
   if (in_flight.size() > kDrawsInFlight) finishOldest();
+  staged.resize(kMaxRecords);
 }
 
 void GlPainter::State::finishOldest() {
@@ -377,19 +420,26 @@ void GlPainter::State::finishOldest() {
   in_flight.pop_front();
 }
 
-size_t GlPainter::drawsUnderWay() const {
-  const State& state = *state_;
-  return state.in_flight.empty() ? 0 : state.draws - state.in_flight.front().draw + 1;
+void GlPainter::State::finishDraws() {
+  const StageTimer timer(draw_s, "draw (OpenGL)");
+  while (!in_flight.empty()) finishOldest();
 }
 
-void GlPainter::finishDraws() {
-  const StageTimer timer(state_->draw_s, "draw (OpenGL)");
-  while (!state_->in_flight.empty()) state_->finishOldest();
+bool GlPainter::isOverfull() const {
+  return state_->queues->isFull();
+}
+
+uint64_t GlPainter::bytes(ImageSize size, const PaintResources& resources) {
+  return 4 * sizeof(float) * size.pixels() +  // the framebuffer
+         SplatBins::bytes(size, kBatchSplats, kEntriesASplat * kBatchSplats, 1) +
+         TileQueues::bytes(size, resources.waiting_splats, 1);
 }
 
 Image GlPainter::end() {
   const GlFunctions& gl = state_->gl;
-  finishDraws();
+  state_->paintBatch(true);
+  state_->drawStaged();
+  state_->finishDraws();
   const StageTimer timer(state_->draw_s, "draw (OpenGL)");
   const State& state = *state_;
   std::vector<Image> windows;
@@ -399,7 +449,6 @@ Image GlPainter::end() {
     gl.ReadPixels(0, 0, state.size.width, state.size.height, GL_RGBA, GL_FLOAT, windows.back().rgba.data());
   }
   gl.check("reading the picture");
-  if (!state.layers) return std::move(windows.front());
   Image image(state.size);
   for (int y = 0; y < image.size.height; ++y)
     for (int x = 0; x < image.size.width; ++x) {
@@ -407,7 +456,7 @@ Image GlPainter::end() {
       const auto add = [&](const float* c) { result.add({c[0], c[1], c[2]}, 1 - c[3]); };
       add(windows[0].pixel(x, y));
       size_t window = 1;
-      for (const PixelLayer& layer : state.layers->at(x, y)) {
+      for (const PixelLayer& layer : state.layers ? state.layers->at(x, y) : std::span<const PixelLayer>()) {
         result.add(glm::vec3(layer.colour), 1 - layer.colour.w);
         if (layer.colour.w >= 1) break;
         add(windows[window++].pixel(x, y));

@@ -18,22 +18,19 @@ class GlPainter final : public Painter {
   explicit GlPainter(const GlContext& context);
   ~GlPainter() override;
 
-  DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
              PixelShading shading, const PaintResources& resources = {}) override;
   void drawOnly(const TileSet& tiles) override;
   void draw(std::span<const ScreenSplat> splats) override;
-  size_t drawsUnderWay() const override;
-  void finishDraws() override;
   Image end() override;
 
   double uploadSeconds() const override;
   double drawSeconds() const override;
   double glSeconds() const override;
+  bool isOverfull() const override;
 
-  /// An OpenGL buffer for `count` splats, persistently mapped; valid until the next call. Empty if OpenGL is
-  /// older than 4.4.
-  std::span<ScreenSplat> mapSplats(size_t count);
+  /// What it takes for a frame beside the picture itself.
+  static uint64_t bytes(ImageSize size, const PaintResources& resources);
 
  private:
   struct State;

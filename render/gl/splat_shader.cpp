@@ -9,15 +9,23 @@ constexpr const char* kVertexShader = R"(#version 330 core
 layout(location = 0) in vec4 part0;  // x, y, l11, l21
 layout(location = 1) in vec4 part1;  // l22, amplitude, mean, slope0
 layout(location = 2) in vec2 part2;  // slope1, half_width
-layout(location = 3) in vec4 next0;  // the record behind it: its ScreenCut or ScreenDepth, if its amplitude is negative
+layout(location = 3) in vec4 next0;  // the record before it: its ScreenCut or ScreenDepth, if its amplitude is negative
 layout(location = 4) in vec4 next1;
 layout(location = 5) in vec2 next2;
-layout(location = 6) in vec4 beyond0;  // the record behind that, which is the ScreenCut of one with a ScreenDepth
+layout(location = 6) in vec4 beyond0;  // the record before that, which is the ScreenCut of one with a ScreenDepth
 layout(location = 7) in vec4 beyond1;
 layout(location = 8) in vec2 beyond2;
 layout(location = 9) in int packed_skew;
-layout(location = 10) in vec4 colour0;  // its ScreenColour, which then lies before those
-layout(location = 11) in float colour1;
+layout(location = 10) in ivec2 clip;    // the pixels that it is drawn in: x and y of the first, 16 bits each; the side
+layout(location = 11) in float along_ray;
+layout(location = 12) in vec4 colour0;  // its ScreenColour, which then lies between it and those
+layout(location = 13) in vec2 colour1;
+uniform float low_pass;         // pixels squared
+uniform float most_extinction;  // of the table
+uniform vec2 cells_from_scalar;
+uniform bool log_scale;
+uniform vec2 cells_from_colour;
+uniform bool colour_log_scale;
 uniform vec2 clip_from_pixel;
 uniform float support;
 uniform bool lit;
@@ -30,6 +38,7 @@ flat out vec4 colour;   // the same of the scalar of the colours
 flat out float colour_correlation;
 flat out mat3 faces;    // a face a column; of the splats that are cut
 flat out vec2 cut;      // far_sides, correlation
+flat out vec3 hiding;   // along, that of the colours' scalar, the cell's depth; paint_visits-inl.h
 flat out vec2 light;    // diffuse, specular
 flat out vec4 skew;       // t30, t21, t12, t03: footprint.h
 flat out vec4 depth_line;  // of the splats that meet layers: the middle, by u, deviations per depth; else no more than 0
@@ -46,6 +55,7 @@ void main() {
     scalar = vec4(0.0);
     colour = vec4(0.0);
     colour_correlation = 0.0;
+    hiding = vec3(0.0);
     faces = mat3(0.0);
     cut = vec2(0.0);
     light = vec2(0.0);
@@ -69,7 +79,7 @@ void main() {
   u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
   amplitude = part1.y;
   scalar = vec4(part1.zw, part2);
-  colour = vec4(colour0.xyw, colour1);
+  colour = vec4(colour0.xyw, colour1.x);
   colour_correlation = -colour0.z - 194.0;
   skew = skewOf(packed_skew);
   light = vec2(1.0, 0.0);
@@ -78,9 +88,21 @@ void main() {
     scalar.w = uintBitsToFloat(bits & 0xffff0000u);
     light = vec2(float(bits >> 7 & 511u) / 511.0, float(bits & 127u) / 127.0);
   }
-  // The square around the support's circle, through L: a parallelogram as large as the ellipse's own rectangle.
-  vec2 u = support * vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
-  vec2 pixel = centre + vec2(part0.z * u.x, part0.w * u.x + part1.x * u.y);
+  // What the cell has along the ray: the amplitude without the low-pass.
+  float passed = part0.z * part1.x, s01 = part0.z * part0.w;
+  float determinant = (part0.z * part0.z - low_pass) * (part0.w * part0.w + part1.x * part1.x - low_pass) - s01 * s01;
+  float cell_depth = abs(amplitude) * passed / sqrt(max(determinant, 1e-4 * passed * passed));
+  float nearer = 1.7320508 * abs(along_ray) * min(1.0, cell_depth * most_extinction / 6.0);
+  float cells_a_scalar = abs(cells_from_scalar.x) / (log_scale ? max(abs(scalar.x), 1e-37) : 1.0);
+  float of_colour = 1.7320508 * abs(colour1.y) * min(1.0, cell_depth * most_extinction / 6.0);
+  float cells_a_colour = abs(cells_from_colour.x) / (colour_log_scale ? max(abs(colour.x), 1e-37) : 1.0);
+  hiding = vec3(nearer * cells_a_scalar > 8.0 ? along_ray : 0.0, of_colour * cells_a_colour > 8.0 ? colour1.y : 0.0,
+                cell_depth);
+  // The ellipse's own rectangle, within the pixels that it is clipped to.
+  vec2 reach = support * vec2(part0.z, length(vec2(part0.w, part1.x)));
+  vec2 first = vec2(clip.x & 0xffff, clip.x >> 16 & 0xffff);
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+  vec2 pixel = clamp(centre + reach * (2.0 * corner - 1.0), first, first + float(clip.y));
   gl_Position = vec4(pixel * clip_from_pixel - 1.0, 0.0, 1.0);
 }
 )";
@@ -109,6 +131,7 @@ flat in vec4 colour;
 flat in float colour_correlation;
 flat in mat3 faces;
 flat in vec2 cut;
+flat in vec3 hiding;
 flat in vec2 light;
 flat in vec4 skew;
 flat in vec4 depth_line;
@@ -182,6 +205,21 @@ vec3 remainder(vec2 u, float lo, float hi) {
   return vec3(share, mean, left.z / max(share, 1e-6) - mean * mean);
 }
 
+// How much nearer than its middle a splat of this optical depth is seen, in half widths of its depths; and which part of
+// their variance is not seen. As nearSide() and lostByHiding() in paint_cut-inl.h.
+vec2 nearSide(float tau) {
+  if (tau < 0.02) return vec2(tau / 6.0, 0.0);
+  float part = absorbed(tau) / tau;
+  float side = (2.0 - absorbed(tau) - 2.0 * part) / absorbed(tau);
+  return vec2(side, 1.0 - clamp(3.0 * (1.0 - side * side - 4.0 * side / tau), 0.0, 1.0));
+}
+
+// A scalar (mean, slopes, half_width), with the mean and the width of what is seen of it, where `side` is nearSide() and
+// `along` the scalar's change with the depth.
+vec4 seenOf(vec4 of, float along, vec2 side) {
+  return vec4(of.x - 1.7320508 * along * side.x, of.yz, sqrt(max(0.0, of.w * of.w - 3.0 * along * along * side.y)));
+}
+
 // Of a scalar (mean, slopes, half_width) at u. By its correlation with the depth, what is left of the depths moves the
 // mean and narrows the width: `left` has their mean, and the part of their variance that is lost.
 vec2 intervalOf(vec4 of, float correlation, vec2 u, vec2 left, bool log_scale, vec2 cells_from) {
@@ -202,9 +240,19 @@ vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
   vec2 ends = intervalOf(scalar, cut.y, u, vec2(left.y, lost), LOG_SCALE, cells_from_scalar);
   vec4 seen = max((integral(classes, ends.y, below, above) - integral(classes, ends.x, below, above)) / (ends.y - ends.x), 0.0);
 #if COLOURED
-  ends = intervalOf(colour, colour_correlation, u, vec2(left.y, lost), COLOUR_LOG_SCALE, cells_from_colour);
+  vec2 middle = interval(scalar.x, PER_PIXEL ? scalar.w : 0.0, LOG_SCALE, cells_from_scalar);
+  float of_middle = max((integral(classes, middle.y, below, above) - integral(classes, middle.x, below, above)).w / (middle.y - middle.x), 0.0);
+  vec4 near_colour = PER_PIXEL ? seenOf(colour, hiding.y, nearSide(hiding.z * of_middle)) : colour;
+  ends = intervalOf(near_colour, colour_correlation, u, vec2(left.y, lost), COLOUR_LOG_SCALE, cells_from_colour);
   seen.rgb = max((integral(colours, ends.y, colours_below, colours_above) -
                   integral(colours, ends.x, colours_below, colours_above)).rgb / (ends.y - ends.x), 0.0) * seen.w;
+#else
+  if (PER_PIXEL && hiding.x != 0.0) {
+    vec4 near_scalar = seenOf(scalar, hiding.x, nearSide(hiding.z * seen.w));
+    ends = intervalOf(near_scalar, cut.y, u, vec2(left.y, lost), LOG_SCALE, cells_from_scalar);
+    vec4 near = max((integral(classes, ends.y, below, above) - integral(classes, ends.x, below, above)) / (ends.y - ends.x), 0.0);
+    if (seen.w > 0.0) seen.rgb = (near.rgb + seen.rgb / 64.0) * (seen.w / (near.w + seen.w / 64.0));
+  }
 #endif
 
   float alpha = absorbed(seen.w * depth);

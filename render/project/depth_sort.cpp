@@ -6,81 +6,100 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numbers>
 
+#include "render/project/tile_key.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr double kMaxKey = (1 << 28) - 1;
+// Of 2^32: steps are below a micron of a metre, and parts of bricks have no more than a few million.
+constexpr double kMaxKey = (1 << 28) - 1, kMaxPerspectiveKey = (1 << 30) - 1;
 // Of a brick's largest radius. Cutting a splat moves the centres of its pieces by less than half the sum of
 // A's columns, 1.5 of its singular values, and a border by less than 0.6; a radius has 1.55 of them.
 constexpr double kPieceReach = 1.35;
-
-/// Defined for NaN as well.
-uint32_t keyOf(double steps) {
-  return static_cast<uint32_t>(std::min(std::max(0.0, steps), kMaxKey));
-}
-
-/// The bits of a distance, which must not be negative: they increase with the distance.
-uint32_t bitsOf(float distance) {
-  return std::bit_cast<uint32_t>(distance);
-}
+// Pixels from a splat's own support to the middle of a tile that it touches: half the tile's diagonal, and
+// what the low-pass adds.
+const double kBeyond = std::numbers::sqrt2 * 0.5 * kOrderSide + kKernelSupport * std::sqrt(kLowPass);
 
 }  // namespace
 
-DepthKeys::DepthKeys(const ScreenView& view, const RootCube& root, DrawingOrder order)
-    : view_(view), order_(order) {
-  if (view.projection == Projection::kPerspective) return;
+DepthKeys::DepthKeys(const ScreenView& view, const RootCube& root) : view_(view) {
   const glm::dvec3 along = view.forward * view.scale;
-  nearest_ = depthOf(root.min + glm::dvec3(along.x < 0, along.y < 0, along.z < 0) * root.size);
-  const double extent = root.size * (std::abs(along.x) + std::abs(along.y) + std::abs(along.z));
-  if (extent > 0) steps_ = kMaxKey / extent;
+  const double middle = depthOf(root.min + 0.5 * glm::dvec3(root.size));
+  const double half = 0.5 * root.size * (std::abs(along.x) + std::abs(along.y) + std::abs(along.z));
+  if (!perspective()) {
+    nearest_ = middle - half;
+    if (half > 0) steps_ = kMaxKey / (2 * half);
+    return;
+  }
+  const double from_eye = middle - glm::dot(view.forward, view.eye);
+  const double near = std::max(from_eye - half, view.near), far = std::max(from_eye + half, near);
+  nearest_ = -1 / near;
+  if (far > near) steps_ = kMaxPerspectiveKey / (1 / near - 1 / far);
 }
 
 double DepthKeys::depthOf(const glm::dvec3& data) const {
   return glm::dot(view_.forward, view_.scale * data);
 }
 
+/// Defined for NaN as well.
+uint32_t DepthKeys::keyOf(double depth) const {
+  const double most = perspective() ? kMaxPerspectiveKey : kMaxKey;
+  return static_cast<uint32_t>(std::min(std::max(0.0, (depth - nearest_) * steps_), most));
+}
+
 KeyRange DepthKeys::rangeOf(const Brick& brick) const {
-  const glm::dvec3 lower = view_.scale * brick.lower, upper = view_.scale * brick.upper;
+  const double pixel = 1 / view_.focal_px;  // in perspective at a distance of 1
+  const double radius = brick.largest_radius * std::max({view_.scale.x, view_.scale.y, view_.scale.z});
+  const double middle = depthOf(0.5 * (brick.lower + brick.upper));
+  const double half = 0.5 * glm::dot(glm::abs(view_.forward * view_.scale), brick.upper - brick.lower);
+  const double leaning = kSteepest * kBeyond * pixel;
   uint32_t nearest, farthest;
-  if (view_.projection == Projection::kPerspective) {
-    double near = glm::length(glm::clamp(view_.eye, lower, upper) - view_.eye);
-    double far = glm::length(glm::max(glm::abs(lower - view_.eye), glm::abs(upper - view_.eye)));
+  if (perspective()) {
+    const double from_eye = middle - glm::dot(view_.forward, view_.eye);
+    double near = from_eye - half, far = from_eye + half;
     // Splats that are wide for their distance are cut into pieces, each of which has its own depth.
-    const double radius = brick.largest_radius * std::max({view_.scale.x, view_.scale.y, view_.scale.z});
-    const glm::dvec3 half = 0.5 * (upper - lower);
-    const double nearest_plane =
-        glm::dot(view_.forward, 0.5 * (lower + upper) - view_.eye) - glm::dot(glm::abs(view_.forward), half);
-    if (nearest_plane < view_.near || radius > view_.widest * nearest_plane) {
+    if (near < view_.near || radius > view_.widest * near) {
       near -= kPieceReach * radius;
       far += kPieceReach * radius;
     }
-    nearest = bitsOf(static_cast<float>(std::max(near, 0.0)));
-    farthest = bitsOf(static_cast<float>(far));
+    near = std::max(near, view_.near);
+    far = std::max(far, near);
+    nearest = keyOf(-1 / near * (1 + radius / near + leaning));
+    farthest = keyOf(-1 / far);
   } else {
-    const glm::dvec3 along = view_.forward * view_.scale;
-    const double middle = depthOf(0.5 * (brick.lower + brick.upper)) - nearest_;
-    const double half = 0.5 * glm::dot(glm::abs(along), brick.upper - brick.lower);
-    nearest = keyOf((middle - half) * steps_);
-    farthest = keyOf((middle + half) * steps_);
+    nearest = keyOf(middle - half - radius - leaning);
+    farthest = keyOf(middle + half);
   }
-  return order_ == DrawingOrder::kFrontToBack ? KeyRange{nearest, farthest} : KeyRange{~farthest, ~nearest};
+  return {nearest, farthest};
 }
 
-void DepthKeys::keysOf(std::span<const float> depths, const glm::dvec3& cell_min, const KeyRange& range,
-                       std::span<uint32_t> keys) const {
+void DepthKeys::setKeys(std::span<ScreenSplat> splats, std::span<const float> depths,
+                        const glm::dvec3& cell_min, const KeyRange& range, std::span<uint32_t> keys) const {
   CURVISPLAT_CHECK_OP(depths.size(), ==, keys.size());
-  const uint32_t flip = order_ == DrawingOrder::kFrontToBack ? 0 : ~uint32_t{0};
-  if (view_.projection == Projection::kPerspective) {
-    for (size_t n = 0; n < depths.size(); ++n)
-      keys[n] = std::clamp(bitsOf(depths[n]) ^ flip, range.first, range.last);
-  } else {
-    const double origin = depthOf(cell_min) - nearest_;
-    for (size_t n = 0; n < depths.size(); ++n)
-      keys[n] = std::clamp(keyOf((origin + static_cast<double>(depths[n])) * steps_) ^ flip, range.first,
-                           range.last);
+  CURVISPLAT_CHECK_OP(depths.size(), ==, splats.size());
+  const double inverse_base = perspective() ? 1 / view_.orderBase(cell_min) : 0;
+  const double origin = perspective() ? -inverse_base : depthOf(cell_min);
+  const auto steps_a_pixel =
+      static_cast<float>(steps_ / view_.focal_px);  // at a distance of 1, in perspective
+  size_t first_record = 0;                          // the records of a splat come before it
+  for (size_t n = 0; n < splats.size(); ++n) {
+    ScreenSplat& splat = splats[n];
+    if (isRecord(splat)) continue;
+    const auto depth = static_cast<double>(depths[n]);
+    splat.first = splat.key = keyOf(origin + depth);
+    if (leans(splat)) {
+      const float steps =
+          perspective() ? steps_a_pixel * static_cast<float>(inverse_base - depth) : steps_a_pixel;
+      splat.key_slope0 *= steps;
+      splat.key_slope1 *= steps;
+      splat.first -= std::min(splat.key, static_cast<uint32_t>(std::min(mostBefore(splat), 0x1p31f)));
+    }
+    splat.first = std::clamp(splat.first, range.first, range.last);
+    splat.key = std::clamp(splat.key, range.first, range.last);
+    for (; first_record <= n; ++first_record) keys[first_record] = splat.first;
   }
 }
 
@@ -135,14 +154,9 @@ std::span<const DepthItem> DepthSorter::sort() {
   return items_;
 }
 
-std::span<const DepthItem> DepthSorter::sort(std::span<const uint32_t> keys, DrawingOrder order) {
+std::span<const DepthItem> DepthSorter::sort(std::span<const uint32_t> keys) {
   items_.resize(keys.size());
-  const auto count = static_cast<uint32_t>(keys.size());
-  if (order == DrawingOrder::kFrontToBack) {
-    for (uint32_t n = 0; n < count; ++n) items_[n] = {keys[n], n};
-  } else {
-    for (uint32_t n = 0; n < count; ++n) items_[n] = {keys[count - 1 - n], count - 1 - n};
-  }
+  for (uint32_t n = 0; n < keys.size(); ++n) items_[n] = {keys[n], n};
   return sort();
 }
 

@@ -17,6 +17,7 @@
 #include <span>
 #include <vector>
 
+#include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
 #include "stream/model/octree.h"
 #include "stream/paging/cut.h"
@@ -31,31 +32,32 @@ struct KeyRange {
 /// Keys that increase in drawing order: front to back they increase with the depth; back to front they are
 /// the complements of those keys.
 ///
-/// A splat's key is the depth of its centre. If a piece of a splat (at a border, or cut in perspective) has
-/// its centre outside of the box of its brick's centres, it gets the box's nearest or farthest key.
-/// Orthographic keys are the depth in the root's cube in 2^28 steps, perspective ones the bits of the
-/// distance from the eye as a float. A step is a sixteenth of the smallest cell's size; more bits take
-/// longer to sort.
+/// A splat has a key at its centre, and how that changes over the screen (tile_key.h). The sweep takes it by
+/// the first key that it has in any tile; if that lies before the keys of its brick, by the first of those.
+/// Keys are even steps of the depth along the view in the root's cube, in perspective of one over it: then
+/// they are linear over a plane as it is seen. More bits take longer to sort.
 class DepthKeys {
  public:
-  DepthKeys(const ScreenView& view, const RootCube& root, DrawingOrder order);
+  DepthKeys(const ScreenView& view, const RootCube& root);
 
-  DrawingOrder order() const { return order_; }
   KeyRange rangeOf(const Brick& brick) const;
   /// Computes the keys of a brick's projected splats.
+  ///   splats  [n]  BrickProjector::splats(): their keys are set, and their slopes become keys a pixel
   ///   depths  [n]  BrickProjector::depths(), from the brick's cell with the minimum corner `cell_min`
   ///   range        of the brick
-  ///   keys    [n]  overwritten
-  void keysOf(std::span<const float> depths, const glm::dvec3& cell_min, const KeyRange& range,
-              std::span<uint32_t> keys) const;
+  ///   keys    [n]  overwritten: the first key of each splat, and of the records before it
+  void setKeys(std::span<ScreenSplat> splats, std::span<const float> depths, const glm::dvec3& cell_min,
+               const KeyRange& range, std::span<uint32_t> keys) const;
 
  private:
+  bool perspective() const { return view_.projection == Projection::kPerspective; }
   double depthOf(const glm::dvec3& data) const;
+  uint32_t keyOf(double depth) const;
 
   const ScreenView view_;
-  const DrawingOrder order_;
-  double nearest_ = 0;  // orthographic: the depth of the root cube's nearest point
-  double steps_ = 1;    // orthographic: keys per stretched unit
+  // Depths are stretched units along the view; in perspective, minus one over those from the eye.
+  double nearest_ = 0;  // of the root's cube
+  double steps_ = 1;    // keys a unit of depth
 };
 
 struct DepthItem {
@@ -67,7 +69,7 @@ class DepthSorter {
  public:
   /// Sorts splats 0 .. keys.size() - 1 by their keys. Splats with equal keys are sorted by their numbers,
   /// ascending if `order` is front to back and descending if it is back to front. Valid until the next call.
-  std::span<const DepthItem> sort(std::span<const uint32_t> keys, DrawingOrder order);
+  std::span<const DepthItem> sort(std::span<const uint32_t> keys);
 
   /// Space for `count` items, which the caller fills before sort().
   std::span<DepthItem> items(size_t count);

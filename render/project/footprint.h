@@ -72,7 +72,7 @@ struct ScreenRows {
 
 /// The part of a ScreenSplat that does not depend on where it is.
 struct Ellipse {
-  float l11, l21, l22, amplitude, slope0, slope1, half_width;
+  float l11, l21, l22, amplitude, slope0, slope1, half_width, along;
 };
 
 /// What is added to covariances on the screen, in pixels²: to the footprint's, and to that which gives the
@@ -122,10 +122,11 @@ struct LowPass {
   // What the screen does not see of the slope lies along the ray. At the least it is w's part along n; where
   // the ellipse is a line to float's precision, n is noise.
   const float wn = w.w0 * n0 + w.w1 * n1 + w.w2 * n2;
-  const float along = nn > 1e-8f * s00 * s11 ? wn * wn / nn : 0.0f;
+  const float along2 = nn > 1e-8f * s00 * s11 ? wn * wn / nn : 0.0f;
   const float hidden = w.w0 * w.w0 + w.w1 * w.w1 + w.w2 * w.w2 - (h0 * g0 + h1 * g1);
   constexpr auto kKernelVariance = static_cast<float>(kKernelSigma * kKernelSigma);
-  e.half_width = std::sqrt(3.0f * (kKernelVariance * std::max(hidden, along) + variance));
+  e.half_width = std::sqrt(3.0f * (kKernelVariance * std::max(hidden, along2) + variance));
+  e.along = std::copysign(static_cast<float>(kKernelSigma) * std::sqrt(along2), wn);
   return e;
 }
 

@@ -1,6 +1,6 @@
 // The interface of painters, which draw screen splats with OpenGL or on the processor.
 //
-//   begin -> draw, draw, ... (in the painter's order) -> end
+//   begin -> draw, draw, ... (nearest first) -> end
 //
 // Colours are premultiplied. One frame at a time, on the thread of the painter's backend.
 #pragma once
@@ -14,6 +14,7 @@
 #include "render/image/image.h"
 #include "render/project/pixel_layers.h"
 #include "render/project/screen_splat.h"
+#include "render/project/screen_view.h"
 #include "render/project/tile_set.h"
 #include "stream/base/compute_permits.h"
 #include "stream/paging/cut.h"
@@ -22,8 +23,9 @@ namespace curvisplat {
 
 /// The resources that a painter may use for a frame. They do not bind OpenGL's driver.
 struct PaintResources {
-  unsigned threads = 0;         // 0: one per core
-  size_t batch_splats = 65536;  // the most splats that may be collected and drawn together
+  unsigned threads = 0;           // 0: one per core
+  size_t batch_splats = 65536;    // the most splats that may be collected and drawn together
+  size_t waiting_splats = 65536;  // the most splats that may wait for others in tiles (tile_key.h)
   std::stop_token stop =
       {};  // once it is requested, the rest may be left out: nobody wants the picture any more
   ComputePermits* permits =
@@ -38,14 +40,12 @@ struct PixelShading {
   /// In pictures of two scalars: the colours, with extinction 1, of the scalar of the splats' ScreenColours, which all
   /// of them have then. Of the other table's values the extinctions alone count. Outlives the frame; null: none.
   const ClassificationTable* colours = nullptr;
+  float low_pass_px2 = static_cast<float>(kLowPass);  // ScreenView's
 };
 
 class Painter {
  public:
   virtual ~Painter() = default;
-
-  /// The order in which splats must be drawn.
-  virtual DrawingOrder order() const = 0;
 
   /// Begins a frame filled with `background`. `table` outlives the frame. Throws Error where the image is
   /// larger than the painter's limit, which it names.
@@ -54,14 +54,10 @@ class Painter {
   /// After begin(): from now on only `tiles` are drawn, which fill their box. No two calls name pixels of the same square of
   /// kTileSide, and all splats of one are drawn before the next; what no call has named shows nothing that matters.
   virtual void drawOnly(const TileSet& tiles) = 0;
-  /// Blends `splats` into the frame in their order: behind all splats drawn so far, or in front of them, as
-  /// order() says. The memory may be used again when the call returns, unless drawsUnderWay() counts the
-  /// draw.
+  /// Blends `splats` into the frame, behind all splats drawn so far, each behind those before it; but for those
+  /// that lean, which each tile takes in its own order (tile_key.h). The memory may be used again when the call
+  /// returns.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
-  /// How many of the last draws may still read their splats, if these lie in PaintingBackend::splatMemory().
-  virtual size_t drawsUnderWay() const { return 0; }
-  /// Waits until drawsUnderWay() is 0.
-  virtual void finishDraws() {}
   /// Whether all splats drawn from now on whose footprints lie in `box` would be hidden. The picture's bits
   /// do not depend on whether they are drawn. Any thread, between begin() and end().
   virtual bool hides(const ScreenBox&) const { return false; }
@@ -75,6 +71,9 @@ class Painter {
   /// Seconds of drawing by OpenGL's own clock, without waits for splats; 0 if OpenGL does not draw. Complete
   /// after end().
   virtual double glSeconds() const { return 0; }
+  /// After end(): more splats waited for others than PaintResources allow, and the picture is wrong. Smaller
+  /// regions of it need fewer.
+  virtual bool isOverfull() const { return false; }
   /// How many of the splats given to draw() since begin() were left out because they are hidden completely.
   virtual uint64_t hiddenSplats() const { return 0; }
 };

@@ -5,6 +5,7 @@
 
 #include "render/project/footprint.h"
 #include "render/project/light.h"
+#include "render/project/plane_block.h"
 #include "render/project/plane_cuts.h"
 #include "render/project/splat_chooser.h"
 #include "render/project/splat_pieces.h"
@@ -24,12 +25,13 @@ struct Block {
   float x[kBlock], y[kBlock], depth[kBlock];
   float l11[kBlock], l21[kBlock], l22[kBlock];
   float amplitude[kBlock];
-  float slope0[kBlock], slope1[kBlock], half_width[kBlock];
+  float slope0[kBlock], slope1[kBlock], half_width[kBlock], along[kBlock];
+  float order[kBlock];       // BrickProjector::depths()
   int32_t too_wide[kBlock];  // perspective: to be cut up, or before the near plane
   uint32_t skew[kBlock];     // of splats that are drawn as they are
 
   Ellipse ellipse(size_t n) const {
-    return {l11[n], l21[n], l22[n], amplitude[n], slope0[n], slope1[n], half_width[n]};
+    return {l11[n], l21[n], l22[n], amplitude[n], slope0[n], slope1[n], half_width[n], along[n]};
   }
   [[gnu::always_inline]] void set(size_t n, const Ellipse& ellipse) {
     l11[n] = ellipse.l11;
@@ -39,11 +41,13 @@ struct Block {
     slope0[n] = ellipse.slope0;
     slope1[n] = ellipse.slope1;
     half_width[n] = ellipse.half_width;
+    along[n] = ellipse.along;
   }
 };
 
-ScreenSplat screenSplat(float x, float y, const Ellipse& e, float mean) {
-  return {x, y, e.l11, e.l21, e.l22, e.amplitude, mean, e.slope0, e.slope1, e.half_width, 0};
+ScreenSplat screenSplat(float x, float y, const Ellipse& e, float mean, const PlaneSlope& slope) {
+  return {x, y,       e.l11, e.l21, e.l22,   e.amplitude, mean, e.slope0, e.slope1, e.half_width,
+          0, e.along, 0,     0,     slope.x, slope.y};
 }
 
 CURVISPLAT_VECTOR_CLONES void computeBlock(const OrthographicMap& map,
@@ -56,7 +60,7 @@ CURVISPLAT_VECTOR_CLONES void computeBlock(const OrthographicMap& map,
     const float x = geometry.x[i], y = geometry.y[i], z = geometry.z[i];
     block.x[n] = map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z;
     block.y[n] = map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z;
-    block.depth[n] = map.depth.x * x + map.depth.y * y + map.depth.z * z;
+    block.order[n] = block.depth[n] = map.depth.x * x + map.depth.y * y + map.depth.z * z;
     block.too_wide[n] = 0;
     block.set(n, ellipseOf(map.rows, shapeOf(geometry, i), slopeOf(variable, i), variable.variance[i],
                            geometry.weight[i] * map.volume, map.low_pass));
@@ -76,10 +80,35 @@ CURVISPLAT_VECTOR_CLONES void computeBlock(const PerspectiveMap& map,
     block.x[n] = map.pixelX(centre);
     block.y[n] = map.pixelY(centre);
     block.depth[n] = centre.distance;
+    block.order[n] = map.orderAt(centre, x, y, z);
     block.too_wide[n] = map.tooWide(centre, map.radiusOf(shape));
     block.set(n, ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
                            geometry.weight[i] * map.volumeAt(centre), map.low_pass));
   }
+}
+
+template <typename Map>
+[[gnu::always_inline]] inline void fillPlanes(const Map& map, const GeometryArrays<const float>& geometry,
+                                              size_t begin, size_t count, PlaneBlock& planes) {
+#pragma GCC ivdep
+  for (size_t n = 0; n < count; ++n) {
+    const size_t i = begin + n;
+    const float x = geometry.x[i], y = geometry.y[i], z = geometry.z[i];
+    planes.fill(n, rowsAt(map, x, y, z), map.depthPixels(x, y, z), shapeOf(geometry, i));
+  }
+  planes.find(count);
+}
+
+CURVISPLAT_VECTOR_CLONES void computePlanes(const OrthographicMap& map,
+                                            const GeometryArrays<const float>& geometry, size_t begin,
+                                            size_t count, PlaneBlock& planes) {
+  fillPlanes(map, geometry, begin, count, planes);
+}
+
+CURVISPLAT_VECTOR_CLONES void computePlanes(const PerspectiveMap& map,
+                                            const GeometryArrays<const float>& geometry, size_t begin,
+                                            size_t count, PlaneBlock& planes) {
+  fillPlanes(map, geometry, begin, count, planes);
 }
 
 /// As skewOf() has them.
@@ -109,6 +138,33 @@ struct BrickArrays {
   const VariableArrays<const float>& variable;
   const VariableArrays<const float>* colours;  // null: of pictures of one scalar
 };
+
+/// Of the distribution of depths, the part between the faces on the ray through the centre.
+float shareAtCentre(const ScreenCut& cut) {
+  float lo = -1, hi = 1;
+  for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
+    const float at = cut.faces[n][0] / ScreenCut::kReach;
+    if (cut.far_sides >> n & 1)
+      lo = std::max(lo, -at);
+    else
+      hi = std::min(hi, at);
+  }
+  const auto below = [](float x) { return x * (0.9375f + x * x * (-0.625f + 0.1875f * x * x)); };
+  return std::max(0.0f, below(std::min(hi, 1.0f)) - below(std::min(lo, 1.0f)));
+}
+
+/// A cell at a border is drawn as a wider splat that is cut at the face, which gives it the right density; but its scalar
+/// stays that of the cell, which does not reach as far into those behind it. `cell`: its ellipse; `x`, `y`: its centre.
+void keepScalarOf(const Ellipse& cell, float mean, float x, float y, ScreenSplat& splat, ScreenCut& cut) {
+  const float by_y = cell.slope1 / cell.l22, by_x = (cell.slope0 - cell.l21 * by_y) / cell.l11;
+  splat.mean = mean + by_x * (splat.x - x) + by_y * (splat.y - y);
+  splat.slope0 = splat.l11 * by_x + splat.l21 * by_y;
+  splat.slope1 = splat.l22 * by_y;
+  splat.half_width = cell.half_width;
+  // Painters take the wide splat's optical depth for the cell's, which is this share of it.
+  splat.along = cell.along * shareAtCentre(cut);
+  cut.correlation = 0;
+}
 
 /// What cuts the splats of a brick.
 struct Cutting {
@@ -145,6 +201,7 @@ struct SplatCutting {
   uint32_t border_code = kNoBorder;
   bool clipped = false;  // a clip plane crosses it
   bool layered = false;  // it meets layers, and is drawn as one piece if it is not cut otherwise
+  PlaneSlope plane = {};
 };
 
 /// Takes splat `i` to the parts and pieces that it is drawn as, and chooses among them: the best fate of any.
@@ -169,7 +226,8 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   const size_t least = brick.colours ? 2 : 1;
   const bool has_faces = inward.faces != 0 || layers != 0;
   size_t own = how.clipped || how.layered || has_faces ? least : 0;
-  const SplatPiece* coloured = nullptr;  // the part that is placed, with the scalar of the colours
+  const SplatPiece* part = nullptr;      // that is placed
+  const SplatPiece* coloured = nullptr;  // the same, with the scalar of the colours
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
@@ -184,8 +242,17 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     const bool faces = remains == Remains::kSome, across = side == LayerSide::kAcross;
     const size_t records = least + (faces ? 1u : 0u) + (across ? 1u : 0u);
     if (left.pieces + own < records) return false;
-    ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean);
+    ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean, how.plane);
     if (piece.growth.count > 0) splat.skew = skewOf(at.rows, piece.growth, ellipse);
+    const bool whole_part = piece.position == part->position;  // perspective has not cut it up
+    if (faces && whole_part && !across && !how.clipped && !brick.colours) {
+      const glm::vec3 back = whole.position - piece.position;
+      const float x = at.x + at.rows.x0 * back.x + at.rows.y0 * back.y + at.rows.z0 * back.z;
+      const float y = at.y + at.rows.x1 * back.x + at.rows.y1 * back.y + at.rows.z1 * back.z;
+      const Ellipse cell = ellipseOf(at.rows, whole.shape, whole.slope, variable.variance[i],
+                                     whole.weight * at.volume, map.low_pass);
+      keepScalarOf(cell, whole.mean, x, y, splat, cut);
+    }
     ScreenDepth along_ray;
     if (across) {
       along_ray = depthAlongRay(at.rows, at.depth_row, cutting.layers.depthOf(at.depth), piece, ellipse,
@@ -196,10 +263,10 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     if (coloured)
       colour = colourOf(map, at, withScalarOf(*coloured, piece), brick.colours->variance[i], faces, across);
     const auto fate = records == 1
-                          ? chooser.choose(splat, at.depth, lit)
+                          ? chooser.choose(splat, at.order, lit)
                           : chooser.chooseWith({faces ? &cut : nullptr, across ? &along_ray : nullptr,
                                                 coloured ? &colour : nullptr},
-                                               splat, at.depth, lit);
+                                               splat, at.order, lit);
     if (fate == SplatChooser::Fate::kKept) {
       left.pieces -= records - own;
       own = 0;
@@ -215,6 +282,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   const size_t count = divide(whole, pass.parts);
   if (brick.colours) divide(wholeOf(brick.geometry, *brick.colours, i), pass.coloured_parts);
   for (size_t n = 0; n < count; ++n) {
+    part = &pass.parts[n];
     if (brick.colours) coloured = &pass.coloured_parts[n];
     if (how.clipped) cutting.clip.addFaces(pass.parts[n]);
     if (!place(map, pass.parts[n], left.looks, take)) return {};
@@ -232,15 +300,18 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
   const VariableArrays<const float>& variable = brick.variable;
   Block block;
   GrowthBlock growth;
+  PlaneBlock planes;
   std::array<ClipSide, kBlock> sides{};
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
     computeBlock(map, geometry, variable, begin, count, block);
     computeSkews(map, geometry, begin, count, growth, block);
+    computePlanes(map, geometry, begin, count, planes);
     if (!cutting.clip.empty()) cutting.clip.sidesOf(geometry, begin, count, sides);
     for (size_t n = 0; n < count; ++n) {
       const size_t i = begin + n;
-      SplatCutting how{cutting.borders ? geometry.border_code[i] : kNoBorder, sides[n] == ClipSide::kAcross};
+      SplatCutting how{cutting.borders ? geometry.border_code[i] : kNoBorder, sides[n] == ClipSide::kAcross,
+                       false, planes.of(n)};
       if (how.clipped && !cutting.borders) {
         if (!cutting.clip.contains({geometry.x[i], geometry.y[i], geometry.z[i]}))
           sides[n] = ClipSide::kOutside;
@@ -272,13 +343,13 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
         fate = *best;
       } else {
         const Ellipse ellipse = block.ellipse(n);
-        ScreenSplat splat = screenSplat(block.x[n], block.y[n], ellipse, variable.mean[i]);
+        ScreenSplat splat = screenSplat(block.x[n], block.y[n], ellipse, variable.mean[i], how.plane);
         splat.skew = block.skew[n];
         if (brick.colours) {
           const ScreenColour colour = colourOf(map, geometry, *brick.colours, i);
-          fate = pass.chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.depth[n], lit);
+          fate = pass.chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.order[n], lit);
         } else {
-          fate = pass.chooser.choose(splat, block.depth[n], lit);
+          fate = pass.chooser.choose(splat, block.order[n], lit);
         }
       }
       counts.off_screen += fate == SplatChooser::Fate::kOffScreen;

@@ -98,10 +98,13 @@ class BrickProjector {
   /// depend on the tiles.
   void keepTouching(const TileSet& tiles);
 
-  /// In the order of the ranges. A splat's records precede it and have the same depth.
+  /// In the order of the ranges. A splat's records precede it and have the same depth. Their keys are not
+  /// known yet: until DepthKeys::setKeys() their slopes are pixels of depth a pixel.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
-  /// [splats()], larger is farther: orthographic, distance along the view from any origin; perspective,
-  /// distance from the eye.
+  std::span<ScreenSplat> mutableSplats() { return splats_; }
+  /// [splats()], larger is farther: orthographic, the distance along the view from the brick's origin;
+  /// perspective, with z that distance from the eye, 1 / b - 1 / z, where b is ScreenView::orderBase(). On
+  /// the screen both are linear over a plane.
   const std::vector<float>& depths() const { return depths_; }
   const ProjectionCounts& counts() const { return counts_; }
 

@@ -1,6 +1,6 @@
 // The records that the projection passes to the painters: splats as ellipses on the screen; what cuts them:
 // faces, and the layers of the pixels; and the scalar of their colours, if it is not that of their opacity.
-// Every record takes 44 bytes.
+// Every record takes 64 bytes, a cache line.
 #pragma once
 
 #include <array>
@@ -21,8 +21,12 @@ struct ScreenSplat {
   float slope0, slope1;  // along the columns of L
   float half_width;      // √3 deviations along the ray at rho = 0; in lit pictures with the light (light.h)
   uint32_t skew;         // of the footprint, packed (footprint.h); 0: none
+  float along;           // by how much the scalar changes with each deviation of depth along the ray
+  // Where the splat comes in each tile's order (tile_key.h).
+  uint32_t key, first;           // in drawing order: at (x, y); the first of any tile's
+  float key_slope0, key_slope1;  // keys a pixel to the right, and down
 };
-static_assert(sizeof(ScreenSplat) == 44);
+static_assert(sizeof(ScreenSplat) == 64);
 // So that the large buffers of a frame take no memory before they are filled.
 static_assert(std::is_trivially_default_constructible_v<ScreenSplat>);
 
@@ -75,6 +79,7 @@ struct ScreenColour {
   std::array<float, 2> slope{};
   float half_width = 0;
   float correlation = 0;  // of this scalar and depth along the ray, as the cuts see it
+  float along = 0;        // as ScreenSplat's
 
   ScreenSplat record() const;
   static ScreenColour of(const ScreenSplat& record);
@@ -101,7 +106,9 @@ inline ScreenSplat ScreenCut::record() const {
   return {f[0][0], f[0][1], -(4 * static_cast<float>(far_sides) + 2 + correlation),
           f[0][2], f[1][0], f[1][1],
           f[1][2], f[2][0], f[2][1],
-          f[2][2], 0};
+          f[2][2], 0,       0,
+          0,       0,       0,
+          0};
 }
 inline ScreenCut ScreenCut::of(const ScreenSplat& r) {
   ScreenCut cut;
@@ -113,7 +120,9 @@ inline ScreenCut ScreenCut::of(const ScreenSplat& r) {
 
 // The correlation is found as that of a ScreenCut, with far_sides 8 or 24.
 inline ScreenSplat ScreenDepth::record() const {
-  return {middle, by[0], -(has_cut ? 98.0f : 34.0f) - correlation, by[1], per_depth, 0, 0, 0, 0, 0, 0};
+  return {
+      middle, by[0], -(has_cut ? 98.0f : 34.0f) - correlation, by[1], per_depth, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+      0,      0};
 }
 inline ScreenDepth ScreenDepth::of(const ScreenSplat& r) {
   ScreenDepth depth;
@@ -126,10 +135,10 @@ inline ScreenDepth ScreenDepth::of(const ScreenSplat& r) {
 }
 
 inline ScreenSplat ScreenColour::record() const {
-  return {mean, slope[0], -194.0f - correlation, slope[1], half_width, 0, 0, 0, 0, 0, 0};
+  return {mean, slope[0], -194.0f - correlation, slope[1], half_width, along, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
 }
 inline ScreenColour ScreenColour::of(const ScreenSplat& r) {
-  return {r.x, {r.y, r.l21}, r.l22, -r.l11 - 194.0f};
+  return {r.x, {r.y, r.l21}, r.l22, -r.l11 - 194.0f, r.amplitude};
 }
 
 /// A splat's records, found beside it. `step` is -1 where splats come from the nearest to the farthest, else

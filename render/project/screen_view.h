@@ -5,6 +5,8 @@
 // from the top; pixel (0, 0) covers [0, 1) x [0, 1).
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
@@ -47,6 +49,11 @@ struct ScreenView {
   glm::dvec3 viewFromData(const glm::dvec3& data) const;
   /// The same view as the cut needs it, with the image's edges moved out by the reach of the low-pass.
   CutView cutView() const;
+
+  /// Perspective: a depth along the view from which the splats of the brick with this corner are ordered.
+  double orderBase(const glm::dvec3& corner) const {
+    return std::max(std::abs(viewFromData(corner).z), near);
+  }
 
   /// Where a point in view axes lies in the image; perspective: in front of the eye.
   glm::dvec2 pixelFromView(const glm::dvec3& view) const;

@@ -64,10 +64,10 @@ class SplatChooser {
     const bool on_screen = splat.x + reach_x > 0 && splat.x - reach_x < width_ && splat.y + reach_y > 0 &&
                            splat.y - reach_y < height_;
     if (!on_screen) return Fate::kOffScreen;
-    if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
+    if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = splat.along = 0;
     float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + widening * splat.half_width;
     if (!(std::abs(splat.mean) + spread <= largest_scalar_)) {
-      splat.slope0 = splat.slope1 = splat.half_width = spread = 0;
+      splat.slope0 = splat.slope1 = splat.half_width = splat.along = spread = 0;
       splat.mean = std::clamp(splat.mean, -largest_scalar_, largest_scalar_);
     }
     splat.amplitude = std::min(splat.amplitude, kLargestAmplitude);
@@ -117,7 +117,7 @@ class SplatChooser {
         kSupport * (std::abs(colour.slope[0]) + std::abs(colour.slope[1])) + colour.half_width;
     if (!(std::abs(colour.mean) + spread <= kLargestColour)) {
       colour.slope = {};
-      colour.half_width = 0;
+      colour.half_width = colour.along = 0;
       colour.mean = std::clamp(colour.mean, -kLargestColour, kLargestColour);
     }
     return colour;
@@ -181,7 +181,7 @@ ScreenColour colourOf(const Map& map, const PlacedPiece& at, const SplatPiece& p
                       bool faces, bool across) {
   const Ellipse e =
       ellipseOf(at.rows, piece.shape, piece.slope, variance, piece.weight * at.volume, map.low_pass);
-  ScreenColour colour{piece.mean, {e.slope0, e.slope1}, e.half_width, 0};
+  ScreenColour colour{piece.mean, {e.slope0, e.slope1}, e.half_width, 0, e.along};
   if (across) {
     colour.correlation =
         depthAlongRay(at.rows, at.depth_row, at.depth, piece, e, map.low_pass.footprint_px2).correlation;
@@ -219,7 +219,7 @@ ScreenColour colourOf(const Map& map, const GeometryArrays<const float>& geometr
                       const VariableArrays<const float>& colours, size_t i) {
   const Ellipse e = ellipseOf(rowsAt(map, geometry.x[i], geometry.y[i], geometry.z[i]), shapeOf(geometry, i),
                               slopeOf(colours, i), colours.variance[i], geometry.weight[i], map.low_pass);
-  return {colours.mean[i], {e.slope0, e.slope1}, e.half_width, 0};
+  return {colours.mean[i], {e.slope0, e.slope1}, e.half_width, 0, e.along};
 }
 
 }  // namespace curvisplat

@@ -18,6 +18,7 @@ OrthographicMap::OrthographicMap(const ScreenView& view, const glm::dvec3& origi
   rows = {static_cast<float>(across.x), static_cast<float>(across.y), static_cast<float>(across.z),
           static_cast<float>(along.x),  static_cast<float>(along.y),  static_cast<float>(along.z)};
   depth = glm::vec3(view.forward * view.scale);
+  focal_px = static_cast<float>(view.focal_px);
   volume = static_cast<float>(view.focal_px * view.focal_px * view.scale.x * view.scale.y * view.scale.z);
   low_pass = {static_cast<float>(view.low_pass_px2), static_cast<float>(view.slope_low_pass_px2)};
 }
@@ -35,6 +36,9 @@ PerspectiveMap::PerspectiveMap(const ScreenView& view, const glm::dvec3& origin_
       near(static_cast<float>(view.near) * coarseness),
       widest(static_cast<float>(view.widest) * coarseness),
       low_pass{static_cast<float>(view.low_pass_px2), static_cast<float>(view.slope_low_pass_px2)} {
+  const double base = view.orderBase(origin_);
+  order_base = static_cast<float>(base);
+  from_base = static_cast<float>(view.viewFromData(origin_).z - base);
   const auto reach = static_cast<float>(kKernelSupport) * std::sqrt(low_pass.footprint_px2);
   tangent_x = (middle_x + reach) / focal_px;
   tangent_y = (middle_y + reach) / focal_px;

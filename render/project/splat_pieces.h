@@ -28,13 +28,16 @@ struct OrthographicMap {
   float x, y;       // the origin, pixels
   ScreenRows rows;  // pixels to a unit of the data
   glm::vec3 depth;  // stretched units along the view
-  float volume;     // pixels² and stretched depth to a unit cubed of the data
+  float focal_px;
+  float volume;  // pixels² and stretched depth to a unit cubed of the data
   LowPass low_pass;
 
   OrthographicMap(const ScreenView& view, const glm::dvec3& origin);
 
   /// Depth per unit of the data.
   glm::vec3 depthRow(float, float, float) const { return depth; }
+  /// Depth in pixels per unit of the data.
+  glm::vec3 depthPixels(float, float, float) const { return focal_px * depth; }
 };
 
 /// The local affine map of each splat (Zwicker et al., "EWA Volume Splatting", 2001), with the distance from
@@ -52,8 +55,9 @@ struct PerspectiveMap {
   float volume;  // the stretch's
   float near, widest;
   LowPass low_pass;
-  float tangent_x, tangent_y;  // of the image's edges, the low-pass' reach added
-  float slant_x, slant_y;      // √(1 + tangent²)
+  float order_base, from_base;  // view.orderBase(); how far the origin is behind it
+  float tangent_x, tangent_y;   // of the image's edges, the low-pass' reach added
+  float slant_x, slant_y;       // √(1 + tangent²)
 
   /// `coarseness` multiplies the near plane's distance and the view's `widest`.
   PerspectiveMap(const ScreenView& view, const glm::dvec3& origin, float coarseness);
@@ -80,6 +84,12 @@ struct PerspectiveMap {
     return (c.x * right + c.y * down + c.z * forward) / std::max(c.distance, 1e-30f);
   }
   glm::vec3 depthRow(float x, float y, float z) const { return depthRowAt(centreOf(x, y, z)); }
+  /// Depth along the view in pixels, those at the centre, per unit of the data.
+  glm::vec3 depthPixels(float x, float y, float z) const { return focal_px / centreOf(x, y, z).z * forward; }
+  /// What orders splats: 1 / order_base - 1 / z, without cancellation.
+  float orderAt(const Centre& c, float x, float y, float z) const {
+    return (from_base + forward.x * x + forward.y * y + forward.z * z) / (order_base * c.z);
+  }
 
   float volumeAt(const Centre& c) const {
     return volume * focal_px * focal_px * c.distance / (c.z * c.z * c.z);
@@ -192,6 +202,7 @@ struct PlacedPiece {
   float x, y, depth, volume;
   ScreenRows rows;
   glm::vec3 depth_row;
+  float order;  // BrickProjector::depths()
 };
 
 /// Calls take(piece, its place) for what is to be drawn of `piece`: under the one map of an orthographic
@@ -200,16 +211,17 @@ struct PlacedPiece {
 template <typename Take>
 bool place(const OrthographicMap& map, const SplatPiece& piece, size_t&, const Take& take) {
   const float x = piece.position.x, y = piece.position.y, z = piece.position.z;
+  const float depth = map.depth.x * x + map.depth.y * y + map.depth.z * z;
   return take(piece, PlacedPiece{map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z,
-                                 map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z,
-                                 map.depth.x * x + map.depth.y * y + map.depth.z * z, map.volume, map.rows,
-                                 map.depth});
+                                 map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z, depth,
+                                 map.volume, map.rows, map.depth, depth});
 }
 template <typename Take>
 bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, const Take& take) {
   return cutUp(map, piece, looks, [&](const SplatPiece& part, const PerspectiveMap::Centre& centre) {
     return take(part, PlacedPiece{map.pixelX(centre), map.pixelY(centre), centre.distance,
-                                  map.volumeAt(centre), map.rowsAt(centre), map.depthRowAt(centre)});
+                                  map.volumeAt(centre), map.rowsAt(centre), map.depthRowAt(centre),
+                                  map.orderAt(centre, part.position.x, part.position.y, part.position.z)});
   });
 }
 

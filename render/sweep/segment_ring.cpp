@@ -118,8 +118,6 @@ void SegmentRing::close() {
 bool SegmentDrawer::drawNext() {
   std::optional<std::span<const ScreenSplat>> segment = ring_.nextIfReady();
   if (!segment) {
-    painter_.finishDraws();
-    release();
     const WaitTimer timer(waited_s_, "wait for splats");
     segment = ring_.next();
   }
@@ -128,13 +126,8 @@ bool SegmentDrawer::drawNext() {
     const TraceScope trace("draw batch", TraceKind::kStage);
     painter_.draw(*segment);
   }
-  ++kept_;
-  release();
+  ring_.release();
   return true;
-}
-
-void SegmentDrawer::release() {
-  for (; kept_ > painter_.drawsUnderWay(); --kept_) ring_.release();
 }
 
 }  // namespace curvisplat

@@ -5,10 +5,9 @@
 // contiguous, and are drawn and freed in the same order.
 //
 //   worker n     acquire(sequence, count) -> fill -> commit(sequence)
-//   painter      next() -> draw -> release(), or several next() before their release(): OpenGL draws later
+//   painter      next() -> draw -> release()
 //
-// The memory belongs to the painter (PaintingBackend::splatMemory()), which draws from where the workers
-// write. close() wakes all waiting threads; after it nothing is granted or handed out. SegmentDrawer is the
+// The painter draws from where the workers write. close() wakes all waiting threads; after it nothing is granted or handed out. SegmentDrawer is the
 // painter's side, on its thread.
 #pragma once
 
@@ -92,10 +91,8 @@ class SegmentRing {
   size_t peak_ GUARDED_BY(mutex_) = 0;
 };
 
-/// Draws the segments of a SegmentRing, in sequence. A segment is released when the painter no longer reads
-/// it, which with OpenGL is one or two draws later. All segments are released before a wait, since the
-/// worker that the painter waits for may need their space. Used on the painter's thread, between the
-/// painter's begin() and end().
+/// Draws the segments of a SegmentRing, in sequence. Used on the painter's thread, between the painter's begin()
+/// and end().
 class SegmentDrawer {
  public:
   /// Adds the seconds that it waits to `waited_s`. All arguments are borrowed.
@@ -106,12 +103,9 @@ class SegmentDrawer {
   bool drawNext();
 
  private:
-  void release();
-
   Painter& painter_;
   SegmentRing& ring_;
   double& waited_s_;
-  size_t kept_ = 0;  // segments drawn and not yet released
 };
 
 }  // namespace curvisplat

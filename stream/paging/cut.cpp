@@ -293,7 +293,6 @@ Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds&
               : Refinement(bricks);
   Cut cut = CutWalk(bricks, refinement).walk();
   cut.complete = refinement.complete();
-  if (options.order == DrawingOrder::kFrontToBack) std::reverse(cut.parts.begin(), cut.parts.end());
   return cut;
 }
 

@@ -61,8 +61,6 @@ struct CutTree {
   std::span<const ValueBounds> subtrees;  // from subtreeBounds()
 };
 
-enum class DrawingOrder { kBackToFront, kFrontToBack };
-
 struct CutOptions {
   static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
@@ -70,7 +68,6 @@ struct CutOptions {
   /// A brick's error counts this much, from 0 to 1, when it is compared with lod_pixels; not in the order of
   /// refinement. Null: all errors count whole.
   std::function<double(uint32_t brick)> error_weight = nullptr;
-  DrawingOrder order = DrawingOrder::kBackToFront;
   /// What the cut may hold, and what its bricks' streams may take on disk. The root is drawn even where it
   /// alone is more.
   uint64_t max_splats = kNoLimit, max_bytes = kNoLimit;

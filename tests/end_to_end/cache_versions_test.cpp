@@ -49,7 +49,8 @@ TEST_P(CacheVersion, IsStillRead) {
       const fs::path picture = drawn / "a.png";
       writeImage(smallPictureOf(cache, variable), picture);
       const Image kept = readImage(fmt::format("{}.{}.png", base.string(), variable));
-      EXPECT_GE(compareImages(readImage(picture), kept).psnr_db, 60) << variable;
+      // The kept pictures are from before tiles had their own order, and border cells their own scalar.
+      EXPECT_GE(compareImages(readImage(picture), kept).psnr_db, 50) << variable;
     }
   }
   EXPECT_GT(CacheReader(folder() / "blocks.splats").manifest().levels, 1u);

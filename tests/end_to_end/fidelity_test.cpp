@@ -72,12 +72,12 @@ class Fidelity : public ProgramSuite<Fidelity> {
     runSilently(halfAnnulusWords(cacheOf(scene), output, function, kSize, lod_pixels) + more);
   }
 
-  /// OpenGL draws the same picture, and no better but for what the painter leaves out (tile.h).
+  /// OpenGL draws the same picture, and no better but for what the painter leaves out, or fits (tile.h).
   static void expectOpenGlAlike(const std::string& name, const Image& picture, const Image& reference,
                                 double psnr_db, const std::string& lod_pixels) {
     render("half-annulus", name, file("gl.pfm"), {"--backend", "osmesa"}, lod_pixels);
     const Image by_gl = readImage(file("gl.pfm"));
-    EXPECT_GE(psnr_db, compareImages(by_gl, reference).psnr_db - 0.1) << "at " << lod_pixels << " pixels";
+    EXPECT_GE(psnr_db, compareImages(by_gl, reference).psnr_db - 0.3) << "at " << lod_pixels << " pixels";
     const ImageDifference difference = compareImages(picture, by_gl);
     fmt::print("{} at {} pixels: {:.1f} dB, {:.5f} at the most from OpenGL\n", name, lod_pixels,
                difference.psnr_db, difference.largest);

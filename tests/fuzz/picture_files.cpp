@@ -87,12 +87,11 @@ void fuzzPicture(std::span<const std::byte> bytes) {
   static CpuPainter painter;
   projector.project(settings, table(), corner, splats.geometry, splats.values);
   static DepthSorter sorter;
-  const DepthKeys keys(settings.view, RootCube{corner, size}, painter.order());
+  const DepthKeys keys(settings.view, RootCube{corner, size});
   std::vector<uint32_t> of_splats(projector.depths().size());
-  keys.keysOf(projector.depths(), corner, {0, ~uint32_t{0}}, of_splats);
+  keys.setKeys(projector.mutableSplats(), projector.depths(), corner, {0, ~uint32_t{0}}, of_splats);
   std::vector<ScreenSplat> sorted;
-  for (const DepthItem& item : sorter.sort(of_splats, painter.order()))
-    sorted.push_back(projector.splats()[item.splat]);
+  for (const DepthItem& item : sorter.sort(of_splats)) sorted.push_back(projector.splats()[item.splat]);
   painter.begin(pixels, {1, 1, 1, 1}, table(), {settings.per_pixel, settings.light.has_value()}, {1, 512});
   painter.draw(sorted);
   const Image image = painter.end();

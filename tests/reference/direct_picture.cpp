@@ -14,6 +14,7 @@
 #include "preprocess/seams/seams.h"
 #include "preprocess/shape/merge.h"
 #include "render/cpu/cpu_painter.h"
+#include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "render/surface/scene_layers.h"
 #include "tests/reference/splat_compositor.h"
@@ -131,6 +132,14 @@ PixelLayers sceneLayers(const DirectOptions& options, const ProjectionSettings& 
   return layersOf(scene, settings.view, slices, look);
 }
 
+/// A splat's depth, as layers have it.
+float distanceOf(const ScreenView& view, const ScreenSplat& splat, float depth, const glm::dvec3& origin) {
+  if (view.projection == Projection::kOrthographic) return depth;
+  const double z = 1 / (1 / view.orderBase(origin) - double{depth});
+  return static_cast<float>(z * std::hypot(1.0, (splat.x - 0.5 * view.size.width) / view.focal_px,
+                                           (splat.y - 0.5 * view.size.height) / view.focal_px));
+}
+
 /// Whether the layers of its pixel hide a splat's centre; depths from the layers' origin.
 bool isBehind(const PixelLayers& layers, const ScreenSplat& splat, float depth) {
   const ImageSize size = layers.size();
@@ -161,7 +170,11 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
     });
   }
   glm::dvec3 origin = splats.front().splat.position;
-  for (const DirectSplat& splat : splats) origin = glm::min(origin, splat.splat.position);
+  glm::dvec3 farthest = origin;
+  for (const DirectSplat& splat : splats) {
+    origin = glm::min(origin, splat.splat.position);
+    farthest = glm::max(farthest, splat.splat.position);
+  }
   const ProjectedArrays arrays = projectedArrays(splats, origin);
   const ClassificationTable table = ClassificationTable::of(function, low, high);
   settings.view = ScreenView::of(camera, size, glm::dvec3(1), options.low_pass_px2, options.near);
@@ -176,30 +189,39 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   BrickProjector projector;
   projector.project(settings, table, origin, arrays.geometry, arrays.variable);
 
-  std::vector<ScreenSplat> sorted;
+  const DepthKeys keys(settings.view, RootCube::around(origin, farthest));
+  std::vector<uint32_t> first(projector.splats().size());
+  keys.setKeys(projector.mutableSplats(), projector.depths(), origin, {0, ~uint32_t{0}}, first);
+  std::vector<ScreenSplat> sorted, records;
   sorted.reserve(projector.splats().size());
-  bool is_behind = false;
-  for (const uint32_t n : farthestFirst(projector.depths())) {
+  DepthSorter sorter;
+  for (const DepthItem& item : sorter.sort(first)) {
     if (options.scene && !options.scene->volume) break;
-    // A splat's records come behind it.
-    if (layers && !options.cut_splats && !isRecord(projector.splats()[n]))
-      is_behind = isBehind(*layers, projector.splats()[n], projector.depths()[n]);
-    if (is_behind) continue;
-    ScreenSplat splat = projector.splats()[n];
+    ScreenSplat splat = projector.splats()[item.splat];
+    // A splat's records come before it.
     if (isRecord(splat)) {
-      sorted.push_back(splat);
+      records.push_back(splat);
       continue;
     }
-    if (!options.hidden_slope) splat.half_width = 0;
-    if (!options.secant && camera.projection == Projection::kPerspective)
-      splat.amplitude /=
-          static_cast<float>(std::hypot(1.0, (splat.x - 0.5 * size.width) / settings.view.focal_px,
-                                        (splat.y - 0.5 * size.height) / settings.view.focal_px));
-    sorted.push_back(splat);
+    const bool is_behind =
+        layers && !options.cut_splats &&
+        isBehind(*layers, splat, distanceOf(settings.view, splat, projector.depths()[item.splat], origin));
+    if (!is_behind) {
+      if (!options.hidden_slope) splat.half_width = 0;
+      if (!options.secant && camera.projection == Projection::kPerspective)
+        splat.amplitude /=
+            static_cast<float>(std::hypot(1.0, (splat.x - 0.5 * size.width) / settings.view.focal_px,
+                                          (splat.y - 0.5 * size.height) / settings.view.focal_px));
+      sorted.insert(sorted.end(), records.begin(), records.end());
+      sorted.push_back(splat);
+    }
+    records.clear();
   }
   CpuPainter painter;
-  return paintFrame(painter, sorted, table,
-                    {options.per_pixel, options.light.has_value(), layers ? &*layers : nullptr}, {size});
+  painter.begin(size, glm::vec4(1), table,
+                {options.per_pixel, options.light.has_value(), layers ? &*layers : nullptr});
+  painter.draw(sorted);
+  return painter.end();
 }
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
-// The specification of a frame's drawing order: all splats of its cut in memory, in one sort, drawn by one
-// painter.
+// The specification of a frame's drawing order: all splats of its cut in memory, sorted for each order tile by
+// itself, and each tile drawn as a picture of its own.
 #pragma once
 
 #include <vector>

@@ -180,7 +180,7 @@ std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, 
     if (n % 31 == 0) l11 = 0.1f, l21 = 0.3f * around(random), l22 = 0.2f;
     splats.push_back({width * (1.4f * unit(random) - 0.2f), height * (1.4f * unit(random) - 0.2f), l11, l21,
                       l22, opacity * unit(random), 1.4f * unit(random) - 0.2f, slope * around(random),
-                      slope * around(random), 0.2f * unit(random), 0});
+                      slope * around(random), 0.2f * unit(random), 0, 0, 0, 0, 0, 0});
   }
   // Half of them skewed, without a change to the numbers above.
   for (size_t n = 0; n < splats.size(); n += 2) {
@@ -189,13 +189,6 @@ std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, 
     splats[n].skew = skew.pack();
   }
   return splats;
-}
-
-std::vector<uint32_t> farthestFirst(std::span<const float> depths) {
-  std::vector<uint32_t> order(depths.size());
-  std::iota(order.rbegin(), order.rend(), 0u);
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return depths[a] > depths[b]; });
-  return order;
 }
 
 std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed) {
@@ -287,7 +280,7 @@ std::vector<ScreenSplat> colourAll(const std::vector<ScreenSplat>& splats, uint3
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
                  PixelShading shading, const EmptyPicture& empty, const PaintResources& resources) {
   std::vector<ScreenSplat> ordered(splats.begin(), splats.end());
-  if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
+  std::reverse(ordered.begin(), ordered.end());
   painter.begin(empty.size, empty.background, table, shading, resources);
   painter.draw(ordered);
   return painter.end();

@@ -61,8 +61,6 @@ ClassificationTable smooth(bool log_scale = false);
 std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, float slope = 0.3f,
                                       float opacity = 0.5f);
 
-/// The places of `depths`, the largest first; of equal depths the last first.
-std::vector<uint32_t> farthestFirst(std::span<const float> depths);
 /// The same splats in their order, every third of them cut at up to three faces.
 std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed);
 

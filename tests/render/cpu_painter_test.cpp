@@ -145,7 +145,7 @@ TEST(CpuPainter, EveryTargetDrawsTheSame) {
 }
 
 TEST(CpuPainter, LeavesUntouchedPixelsAlone) {
-  const ScreenSplat splat{40, 40, 3, 2, 3, 1, 0.9f, 0.1f, 0.1f, 0.1f, 0};
+  const ScreenSplat splat{40, 40, 3, 2, 3, 1, 0.9f, 0.1f, 0.1f, 0.1f, 0, 0, 0, 0, 0, 0};
   const Image image = paint({&splat, 1}, lively(), true, {100, 100}, {0.3f, 0.1f, 0.7f, 0.9f});
   for (int y = 0; y < 100; ++y)
     for (int x = 0; x < 100; ++x) {
@@ -201,10 +201,11 @@ TEST(CpuPainter, LeavesOutLessThanAFourThousandth) {
   const ImageSize size{64, 64};
   const ClassificationTable table([](double f) { return TransferFunction::Value{glm::dvec3(f), 1}; }, 0, 1);
   // A black layer before what is white and opaque.
-  const ScreenSplat behind{32, 32, 1e4f, 0, 1e4f, 100, 1, 0, 0, 0, 0};
+  const ScreenSplat behind{32, 32, 1e4f, 0, 1e4f, 100, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   for (const float depth : {8.0f, 8.31f, 8.325f, 9.0f}) {  // log 4096 = 8.318
     const auto amplitude = static_cast<float>(depth / footprint(0));
-    const std::vector<ScreenSplat> splats{behind, {32, 32, 1e4f, 0, 1e4f, amplitude, 0, 0, 0, 0, 0}};
+    const std::vector<ScreenSplat> splats{behind,
+                                          {32, 32, 1e4f, 0, 1e4f, amplitude, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
     const glm::vec4 black(0, 0, 0, 1);
     const Image image = paint(splats, table, false, size, black);
     const Image layer_alone = paint({&splats[1], 1}, table, false, size, black);
@@ -219,7 +220,7 @@ TEST(CpuPainter, LeavesOutLessThanAFourThousandth) {
 TEST(CpuPainter, DrawsNothingBehindWhatIsOpaque) {
   const ImageSize size{150, 100};
   const auto far = randomSplats(2000, 3, size, 0.3f, 100);
-  const ScreenSplat wall{75, 50, 1e4f, 0, 1e4f, 1000, 0.9f, 0, 0, 0, 0};
+  const ScreenSplat wall{75, 50, 1e4f, 0, 1e4f, 1000, 0.9f, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   auto splats = far;
   splats.push_back(wall);
   CpuPainter painter;
@@ -238,8 +239,8 @@ TEST(CpuPainter, HidesWhatIsBehindOpaqueBlocks) {
   EXPECT_TRUE(painter.hides({-20, 5, -1, 9}));  // what is outside of the image
   EXPECT_TRUE(painter.hides({150, 5, 1e30f, 9}));
   EXPECT_FALSE(painter.hides({NAN, 5, 160, 9}));
-  const std::vector<ScreenSplat> splats{{60, 60, 20, 0, 20, 1000, 0.9f, 0, 0, 0, 0},
-                                        {60, 60, 1, 0, 1, 1, 0.9f, 0, 0, 0, 0}};
+  const std::vector<ScreenSplat> splats{{60, 60, 20, 0, 20, 1000, 0.9f, 0, 0, 0, 0, 0, 0, 0, 0, 0},
+                                        {60, 60, 1, 0, 1, 1, 0.9f, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
   painter.draw(splats);
   EXPECT_TRUE(painter.hides({55, 55, 65, 65}));
   EXPECT_TRUE(painter.hides({45, 45, 75, 75}));  // four tiles

@@ -10,6 +10,7 @@
 
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
+#include "render/project/tile_key.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
@@ -39,8 +40,14 @@ class DepthKeysTest : public testing::Test {
   std::unique_ptr<CacheReader> cache_;
 };
 
+/// A splat at the middle of the picture that leans by so many pixels of depth a pixel.
+ScreenSplat leaning(float x, float y) {
+  ScreenSplat splat{60, 50, 3, 0, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, x, y};
+  return splat;
+}
+
 // Against depths in double precision: no two splats that differ by more than rounding change places, and
-// holding keys within their brick's range moves none by more than that.
+// holding keys within their brick's range moves none.
 TEST_F(DepthKeysTest, AreInTheOrderOfTheDepths) {
   std::mt19937 random(3);
   const RootCube& root = cache_->manifest().root;
@@ -48,32 +55,34 @@ TEST_F(DepthKeysTest, AreInTheOrderOfTheDepths) {
     for (const glm::dvec3& position : {glm::dvec3(90, 20, 30), glm::dvec3(-20, 16, 16), glm::dvec3(5, 6, 7)})
       for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
         const ScreenView view = viewFrom(position, projection, scale);
-        const DepthKeys nearest_first(view, root, DrawingOrder::kFrontToBack);
-        const DepthKeys farthest_first(view, root, DrawingOrder::kBackToFront);
+        const bool perspective = projection == Projection::kPerspective;
+        const DepthKeys made(view, root);
         std::vector<std::pair<double, uint32_t>> keyed;
         for (const Brick& brick : cache_->bricks()) {
           const glm::dvec3 corner = root.cellMin(brick.cell);
-          const KeyRange range = nearest_first.rangeOf(brick);
+          const KeyRange range = made.rangeOf(brick);
           ASSERT_LE(range.first, range.last);
           std::vector<float> depths;
           std::vector<double> exact;
-          for (int n = 0; n < 50; ++n) {
+          while (depths.size() < 50) {
             const glm::dvec3 part(random() / 4294967295.0, random() / 4294967295.0, random() / 4294967295.0);
-            const glm::dvec3 at = view.viewFromData(glm::mix(brick.lower, brick.upper, part));
-            const bool perspective = projection == Projection::kPerspective;
-            exact.push_back(perspective ? glm::length(at) : at.z);
-            depths.push_back(
-                static_cast<float>(perspective ? glm::length(at) : at.z - view.viewFromData(corner).z));
+            const double z = view.viewFromData(glm::mix(brick.lower, brick.upper, part)).z;
+            if (perspective && z < view.near) {
+              if (view.viewFromData(brick.upper).z < view.near) break;
+              continue;
+            }
+            exact.push_back(z);
+            depths.push_back(static_cast<float>(perspective ? 1 / view.orderBase(corner) - 1 / z
+                                                            : z - view.viewFromData(corner).z));
           }
-          std::vector<uint32_t> keys(depths.size()), free(depths.size()), backwards(depths.size());
-          nearest_first.keysOf(depths, corner, range, keys);
-          nearest_first.keysOf(depths, corner, {0, ~uint32_t{0}}, free);
-          farthest_first.keysOf(depths, corner, farthest_first.rangeOf(brick), backwards);
+          std::vector<ScreenSplat> splats(depths.size(), leaning(0, 0));
+          std::vector<uint32_t> keys(depths.size()), free(depths.size());
+          made.setKeys(splats, depths, corner, {0, ~uint32_t{0}}, free);
+          made.setKeys(splats, depths, corner, range, keys);
+          EXPECT_EQ(keys, free);
           for (size_t n = 0; n < keys.size(); ++n) {
-            EXPECT_GE(keys[n], range.first);
-            EXPECT_LE(keys[n], range.last);
-            EXPECT_EQ(backwards[n], ~keys[n]);
-            EXPECT_LE(std::abs(static_cast<double>(keys[n]) - free[n]), 128);  // 5e-7 of the root
+            EXPECT_EQ(splats[n].key, keys[n]);
+            EXPECT_EQ(splats[n].first, keys[n]);
             keyed.push_back({exact[n], keys[n]});
           }
         }
@@ -98,15 +107,71 @@ TEST_F(DepthKeysTest, StayInTheirBricksRangeWhateverTheDepth) {
   const std::vector<float> depths{-1e30f, 0.0f, 1e30f, std::numeric_limits<float>::quiet_NaN(), INFINITY};
   std::vector<uint32_t> keys(depths.size());
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective})
-    for (const DrawingOrder order : {DrawingOrder::kFrontToBack, DrawingOrder::kBackToFront}) {
-      const DepthKeys made(viewFrom({90, 20, 30}, projection, glm::dvec3(1)), root, order);
+    for (const float slope : {0.0f, 5.0f}) {
+      const DepthKeys made(viewFrom({90, 20, 30}, projection, glm::dvec3(1)), root);
       const KeyRange range = made.rangeOf(brick);
-      made.keysOf(depths, root.cellMin(brick.cell), range, keys);
+      std::vector<ScreenSplat> splats(depths.size(), leaning(slope, slope));
+      made.setKeys(splats, depths, root.cellMin(brick.cell), range, keys);
       for (const uint32_t key : keys) {
         EXPECT_GE(key, range.first);
         EXPECT_LE(key, range.last);
       }
     }
+}
+
+// In whichever tile that it touches, a splat has the depth at which its plane meets the tile's middle; and it is taken
+// before all of those.
+TEST_F(DepthKeysTest, ASplatThatLeansHasItsPlanesDepthInEveryTile) {
+  const RootCube& root = cache_->manifest().root;
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    const ScreenView view = viewFrom({90, 20, 30}, projection, glm::dvec3(1));
+    const bool perspective = projection == Projection::kPerspective;
+    const DepthKeys made(view, root);
+    const glm::dvec3 corner = root.cellMin(cache_->bricks()[40].cell), centre = corner + glm::dvec3(0.5);
+    const glm::dvec3 at = view.viewFromData(centre);
+    const glm::dvec2 pixel = view.pixelFromView(at);
+    // z grows by a (x - x0) + b (y - y0), all in view axes.
+    const double a = 0.7, b = -1.6;
+    const auto depthAt = [&](const glm::dvec2& where) {
+      const glm::dvec2 from_middle =
+          (where - 0.5 * glm::dvec2(view.size.width, view.size.height)) / view.focal_px;
+      if (!perspective) return at.z + a * (from_middle.x - at.x) + b * (from_middle.y - at.y);
+      return (at.z - a * at.x - b * at.y) / (1 - a * from_middle.x - b * from_middle.y);
+    };
+    const double step = 1e-4;
+    const double z_pixels = view.focal_px / (perspective ? at.z : 1);
+    ScreenSplat splat =
+        leaning(static_cast<float>((depthAt(pixel + glm::dvec2(step, 0)) - at.z) / step * z_pixels),
+                static_cast<float>((depthAt(pixel + glm::dvec2(0, step)) - at.z) / step * z_pixels));
+    splat.x = static_cast<float>(pixel.x);
+    splat.y = static_cast<float>(pixel.y);
+    const auto keyOfDepth = [&](double z) {
+      ScreenSplat flat = leaning(0, 0);
+      const float depth = static_cast<float>(perspective ? 1 / view.orderBase(corner) - 1 / z
+                                                         : z - view.viewFromData(corner).z);
+      uint32_t key = 0;
+      made.setKeys({&flat, 1}, {&depth, 1}, corner, {0, ~uint32_t{0}}, {&key, 1});
+      return key;
+    };
+    const float depth = static_cast<float>(perspective ? 1 / view.orderBase(corner) - 1 / at.z
+                                                       : at.z - view.viewFromData(corner).z);
+    uint32_t first = 0;
+    made.setKeys({&splat, 1}, {&depth, 1}, corner, {0, ~uint32_t{0}}, {&first, 1});
+    EXPECT_LT(first, splat.key);
+    int tiles = 0;
+    for (int y = -16; y <= 16; y += kOrderSide)
+      for (int x = -16; x <= 16; x += kOrderSide) {
+        const glm::dvec2 middle = pixel + glm::dvec2(x, y);
+        const uint32_t key = keyAt(splat, static_cast<float>(middle.x), static_cast<float>(middle.y));
+        EXPECT_GE(key, first);
+        const double expected = keyOfDepth(depthAt(middle));
+        // Farther away than the splat reaches, or than the data.
+        if (key == first || key >= keyOfDepth(1e6)) continue;
+        EXPECT_NEAR(key, expected, 2e-3 * std::abs(expected - splat.key) + 200) << x << ' ' << y;
+        ++tiles;
+      }
+    EXPECT_GT(tiles, 10);
+  }
 }
 
 // Where splats are cut into pieces, their depths are still their own.
@@ -119,7 +184,7 @@ TEST_F(DepthKeysTest, RangesHoldThePiecesOfWideSplats) {
   camera.view_angle_deg = 60;
   const ProjectionSettings settings{ScreenView::of(camera, {120, 100}, glm::dvec3(1), 0.3, 0.001)};
   const auto table = ClassificationTable::of(TransferFunction::preset("grey", 0, 1, 1.0), 0, 1);
-  const DepthKeys made(settings.view, cache_->manifest().root, DrawingOrder::kFrontToBack);
+  const DepthKeys made(settings.view, cache_->manifest().root);
   BrickProjector projector;
   SplatGeometry geometry;
   SplatVariable values;
@@ -132,8 +197,9 @@ TEST_F(DepthKeysTest, RangesHoldThePiecesOfWideSplats) {
     projector.project(settings, table, corner, geometry, values);
     pieces += projector.counts().pieces - projector.counts().drawn;
     std::vector<uint32_t> held(projector.depths().size()), free(held.size());
-    made.keysOf(projector.depths(), corner, made.rangeOf(brick), held);
-    made.keysOf(projector.depths(), corner, {0, ~uint32_t{0}}, free);
+    std::vector<ScreenSplat> splats = projector.splats();
+    made.setKeys(splats, projector.depths(), corner, {0, ~uint32_t{0}}, free);
+    made.setKeys(projector.mutableSplats(), projector.depths(), corner, made.rangeOf(brick), held);
     for (size_t n = 0; n < held.size(); ++n)
       EXPECT_LE(std::abs(static_cast<double>(held[n]) - free[n]), 64) << id << ' ' << n;
   }
@@ -160,22 +226,11 @@ TEST(DepthSorter, SortsByKeyAndKeepsTheOrderOfEquals) {
         std::iota(expected.begin(), expected.end(), 0u);
         std::stable_sort(expected.begin(), expected.end(),
                          [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
-        const auto sorted = sorter.sort(keys, DrawingOrder::kFrontToBack);
+        const auto sorted = sorter.sort(keys);
         EXPECT_EQ(placesOf(sorted), expected) << count << " keys in " << span;
         EXPECT_TRUE(std::all_of(sorted.begin(), sorted.end(),
                                 [&](const DepthItem& item) { return item.key == keys[item.splat]; }));
       }
-}
-
-TEST(DepthSorter, BackToFrontIsFrontToBackFromItsEnd) {
-  DepthSorter sorter;
-  std::mt19937 random(2);
-  std::vector<uint32_t> keys(3000), complements;
-  for (uint32_t& key : keys) key = static_cast<uint32_t>(random() % 100);
-  for (const uint32_t key : keys) complements.push_back(~key);
-  std::vector<uint32_t> forwards = placesOf(sorter.sort(keys, DrawingOrder::kFrontToBack));
-  std::reverse(forwards.begin(), forwards.end());
-  EXPECT_EQ(placesOf(sorter.sort(complements, DrawingOrder::kBackToFront)), forwards);
 }
 
 }  // namespace

@@ -67,6 +67,7 @@ class FrameOrderTest : public testing::TestWithParam<Backend> {
   /// As little memory as renders at all.
   static uint64_t leastMemory(FrameRenderer& renderer, const Camera& camera, FrameOptions wanted) {
     wanted.memory_bytes = 1 << 20;
+    wanted.threads = 8;  // as many as any test has: each takes some
     FrameStatistics statistics;
     try {
       renderer.render(camera, wanted, statistics);

@@ -139,7 +139,7 @@ TEST_P(FrameTest, IsTheSameForAnyThreadsAndMemory) {
     FrameStatistics statistics;
     std::vector<float> first;
     for (const unsigned threads : {1u, 2u, 4u, 3u})
-      for (const uint64_t memory : {uint64_t{1} << 30, uint64_t{40} << 20}) {
+      for (const uint64_t memory : {uint64_t{1} << 30, uint64_t{56} << 20}) {
         FrameOptions wanted = options(2);
         wanted.threads = threads;
         wanted.memory_bytes = memory;

@@ -85,7 +85,7 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
   painter.begin({100, 100}, glm::vec4(1), table, {}, {1, 1});
   hidden.ask(&painter);
   EXPECT_FALSE(hidden.hides(0));
-  const std::vector<ScreenSplat> walls(2, {50, 50, 1e4f, 0, 1e4f, 1e4f, 0.5f, 0, 0, 0, 0});
+  const std::vector<ScreenSplat> walls(2, {50, 50, 1e4f, 0, 1e4f, 1e4f, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});
   painter.draw(walls);
   for (uint32_t id = 0; id < cache.bricks().size(); ++id) EXPECT_TRUE(hidden.hides(id)) << id;
   hidden.begin(cache.bricks(), view);
@@ -95,7 +95,6 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
 /// Says that the left half of the screen is hidden, and what lies outside of it.
 class HalfHidden final : public Painter {
  public:
-  DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
   void begin(ImageSize, const glm::vec4&, const ClassificationTable&, PixelShading,
              const PaintResources&) override {}
   void drawOnly(const TileSet&) override {}
@@ -114,7 +113,7 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
   const ImageSize size{60, 50};
   const Camera camera = Camera::named("-y", manifest.lower, manifest.upper, size, Projection::kOrthographic);
   const ProjectionSettings settings{ScreenView::of(camera, size, glm::dvec3(1), 1.5, 1)};
-  const DepthKeys keys(settings.view, manifest.root, DrawingOrder::kFrontToBack);
+  const DepthKeys keys(settings.view, manifest.root);
   std::vector<BrickPart> parts;
   std::vector<SweptPart> swept;
   uint64_t expected_hidden = 0, expected_bytes = 0;
@@ -181,7 +180,7 @@ TEST_F(HiddenBricksTest, FramesAreTheSameHoweverMuchIsLeftOut) {
   const Image whole = renderer.render(camera, options, statistics);
   const uint64_t parts = statistics.bricks_drawn + statistics.bricks_hidden;
   for (const unsigned threads : {1u, 2u})
-    for (const uint64_t memory : {uint64_t{48} << 20, uint64_t{2} << 30}) {
+    for (const uint64_t memory : {uint64_t{56} << 20, uint64_t{2} << 30}) {
       options.threads = threads;
       options.memory_bytes = memory;
       EXPECT_EQ(renderer.render(camera, options, statistics).rgba, whole.rgba) << threads << ' ' << memory;

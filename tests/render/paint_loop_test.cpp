@@ -17,8 +17,8 @@
 
 #include "render/cpu/cpu_painter.h"
 #include "render/cpu/half_depths.h"
-#include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
+#include "render/tiles/splat_bins.h"
 #include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {
@@ -34,7 +34,7 @@ std::vector<ScreenSplat> someSplats(int count) {
   return splats;
 }
 
-using Lists = std::vector<std::vector<std::array<uint32_t, 11>>>;  // [tile][splat], as bits
+using Lists = std::vector<std::vector<std::array<uint32_t, 16>>>;  // [tile][splat], as bits
 
 void appendLists(const SplatBins& bins, Lists& lists) {
   lists.resize(static_cast<size_t>(bins.columns() * bins.rows()));
@@ -121,8 +121,9 @@ TEST(SplatBins, LeavesRecordsAtTheEndToBeAddedWithTheirSplat) {
 
 TEST(SplatBins, CountsSplatsOfClosedTilesAsHidden) {
   PaintLoop loop(3, nullptr);
-  std::vector<ScreenSplat> splats(50, {16, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0});  // in the first tile
-  splats.resize(80, {3 * kTileSide + 5, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0});
+  std::vector<ScreenSplat> splats(
+      50, {16, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});  // in the first tile
+  splats.resize(80, {3 * kTileSide + 5, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});
   SplatBins bins(kSize, splats.size(), kManyEntries, 2);
   bins.close(0);
   EXPECT_EQ(bins.sortBorrowed(splats, loop), splats.size());

@@ -221,7 +221,7 @@ class FrameRegionsTest : public testing::Test {
     options.lod_pixels = 0;
     const Camera camera = Camera::named("iso", cache_->manifest().lower, cache_->manifest().upper, size,
                                         Projection::kOrthographic);
-    return planner.plan(camera, options, DrawingOrder::kFrontToBack);
+    return planner.plan(camera, options);
   }
 
   static std::unique_ptr<TemporaryFolder> folder_;
@@ -286,7 +286,7 @@ TEST_F(FrameRegionsTest, FewBricksArePreparedAgain) {
   const Image expected = renderer.render(camera, options, statistics);
   EXPECT_EQ(statistics.regions, 1u);
   EXPECT_EQ(statistics.bricks_again, 0u);
-  options.memory_bytes = uint64_t{44} << 20;
+  options.memory_bytes = uint64_t{72} << 20;
   EXPECT_EQ(renderer.render(camera, options, statistics).rgba, expected.rgba);
   EXPECT_GT(statistics.regions, 1u);
   EXPECT_LT(statistics.bricks_again, 2 * statistics.bricks_drawn);

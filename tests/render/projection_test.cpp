@@ -235,9 +235,9 @@ TEST(Projection, DepthOrdersAlongTheViewAndFromTheEye) {
                       geometry, variable);
     ASSERT_EQ(projector.depths().size(), 3u);
     const auto& depths = projector.depths();
-    EXPECT_NEAR(depths[2] - depths[0], 0.1, 1e-6);
-    EXPECT_NEAR(depths[1] - depths[0], projection == Projection::kOrthographic ? 0 : std::hypot(2, 0.5) - 2,
-                1e-6);
+    const double farther = projection == Projection::kOrthographic ? 0.1 : 1 / 2.0 - 1 / 2.1;
+    EXPECT_NEAR(depths[2] - depths[0], farther, 1e-6);
+    EXPECT_NEAR(depths[1] - depths[0], 0, 1e-6);
   }
 }
 

@@ -12,6 +12,7 @@
 #include "render/gl/gl_context.h"
 #include "render/gl/gl_painter.h"
 #include "render/image/image.h"
+#include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "stream/codec/brick_codec.h"
 #include "tests/reference/known_pictures.h"
@@ -87,21 +88,26 @@ class Quantisation : public testing::Test {
                                       nullptr, 0, 0.01);
   }
 
-  /// All splats in one order: farthest first.
+  /// All splats at once.
   Image paint(const RootCube& root, const std::vector<BrickSplats>& bricks,
               const ClassificationTable& table) {
     const ProjectionSettings settings{ScreenView::of(halfAnnulusCamera(), kSize, glm::dvec3(1), 1.5, 1e-4)};
     BrickProjector projector;
+    const DepthKeys keys(settings.view, root);
     std::vector<ScreenSplat> splats;
-    std::vector<float> depths;
+    std::vector<uint32_t> first;
     for (const BrickSplats& brick : bricks) {
       const Splats arrays = inArrays(root, brick);
-      projector.project(settings, table, root.cellMin(brick.cell), arrays.geometry, arrays.variable);
+      const glm::dvec3 corner = root.cellMin(brick.cell);
+      projector.project(settings, table, corner, arrays.geometry, arrays.variable);
+      std::vector<uint32_t> of_brick(projector.splats().size());
+      keys.setKeys(projector.mutableSplats(), projector.depths(), corner, {0, ~uint32_t{0}}, of_brick);
       splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
-      depths.insert(depths.end(), projector.depths().begin(), projector.depths().end());
+      first.insert(first.end(), of_brick.begin(), of_brick.end());
     }
     std::vector<ScreenSplat> sorted;
-    for (const uint32_t n : farthestFirst(depths)) sorted.push_back(splats[n]);
+    DepthSorter sorter;
+    for (const DepthItem& item : sorter.sort(first)) sorted.push_back(splats[item.splat]);
 
     Image image;
     gl_.run([&](const GlContext& context) {

@@ -124,34 +124,20 @@ TEST(SegmentRing, ClosingWakesAllWhoWait) {
   EXPECT_FALSE(ring.next());
 }
 
-/// Draws two draws later than it is told to, as OpenGL may, and looks at the splats only then.
-class LatePainter final : public Painter {
+/// Notes what it draws.
+class NotingPainter final : public Painter {
  public:
-  DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
   void begin(ImageSize, const glm::vec4&, const ClassificationTable&, PixelShading,
              const PaintResources&) override {}
   void drawOnly(const TileSet&) override {}
   void draw(std::span<const ScreenSplat> splats) override {
-    under_way_.push_back(splats);
-    if (under_way_.size() > 2) finishOldest();
-  }
-  size_t drawsUnderWay() const override { return under_way_.size(); }
-  void finishDraws() override {
-    while (!under_way_.empty()) finishOldest();
+    for (const ScreenSplat& splat : splats) drawn.push_back(splat.x);
   }
   Image end() override { return Image(); }
   double uploadSeconds() const override { return 0; }
   double drawSeconds() const override { return 0; }
 
   std::vector<float> drawn;  // x of each splat
-
- private:
-  void finishOldest() {
-    for (const ScreenSplat& splat : under_way_.front()) drawn.push_back(splat.x);
-    under_way_.pop_front();
-  }
-
-  std::deque<std::span<const ScreenSplat>> under_way_;
 };
 
 TEST(SegmentDrawer, GivesBackWhatIsDrawnAndNeverStarvesTheWorkers) {
@@ -172,11 +158,10 @@ TEST(SegmentDrawer, GivesBackWhatIsDrawnAndNeverStarvesTheWorkers) {
         ring.commit(sequence);
       }
     });
-    LatePainter painter;
+    NotingPainter painter;
     double waited_s = 0;
     SegmentDrawer drawer(painter, ring, waited_s);
     for (size_t sequence = 0; sequence < kSegments; ++sequence) ASSERT_TRUE(drawer.drawNext());
-    painter.finishDraws();
     worker.join();
     EXPECT_EQ(painter.drawn, expected) << capacity;
     ring.close();
@@ -267,7 +252,7 @@ class Sweeper {
       ASSERT_TRUE(part < scene_.parts.size());
       const bool behind = buffer_.isBehind(scene_.parts[part]);
       const auto splats = scene_.splatsOf(part);
-      const auto sorted = sorter.sort(scene_.keys[part], DrawingOrder::kFrontToBack);
+      const auto sorted = sorter.sort(scene_.keys[part]);
       ASSERT_TRUE(buffer_.awaitTurn(sequence));
       if (behind) {
         buffer_.skip();
@@ -365,7 +350,7 @@ TEST(SweepBuffer, ClosingWakesAllWhoWait) {
   early.join();
   idle.join();
   DepthSorter sorter;
-  const auto sorted = sorter.sort(scene.keys[0], DrawingOrder::kFrontToBack);
+  const auto sorted = sorter.sort(scene.keys[0]);
   EXPECT_FALSE(buffer.awaitTurn(0));
   EXPECT_FALSE(buffer.enter(0, sorted));
   EXPECT_FALSE(buffer.awaitSpace(0, sorted));

@@ -311,19 +311,6 @@ TEST(CutLimits, DrawTheRootWhereNothingFits) {
   EXPECT_FALSE(cut.complete);
 }
 
-TEST(CutLimits, FrontToBackIsTheReverse) {
-  std::mt19937 random(15);
-  const CutTestTree tree(29);
-  for (int n = 0; n < 6; ++n) {
-    const CutView view = randomView(random, n % 2 == 0);
-    CutOptions options = limited(0.2, 5000);
-    Cut cut = tree.cut(view, options);
-    options.order = DrawingOrder::kFrontToBack;
-    std::reverse(cut.parts.begin(), cut.parts.end());
-    EXPECT_EQ(tree.cut(view, options).parts, cut.parts);
-  }
-}
-
 TEST(CutLimits, PartsOfABrickAreRunsOfItsSplats) {
   Brick brick;
   brick.octant_splats = {3, 0, 5, 7, 0, 11, 2, 4};

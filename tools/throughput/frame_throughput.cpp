@@ -32,8 +32,7 @@ class Frames {
         planner_(scene.cache, {scene.variable, scene.transfer_function}) {}
 
   void measure(const FrameConfiguration& configuration) {
-    const Cut cut =
-        planner_.plan(scene_.orbit(1).front(), optionsOf(configuration), DrawingOrder::kFrontToBack).cut;
+    const Cut cut = planner_.plan(scene_.orbit(1).front(), optionsOf(configuration)).cut;
     const double left = effort_.total_s - secondsSince(start_);
     const double expected = 2 * expectedSeconds(configuration, cut.splats);
     if (left <= 0 || expected > left)

@@ -46,7 +46,7 @@ PlotLine lineOf(const RankSimulation& simulation, const std::string& name,
 RankSimulation simulateRanks(const SimulatedPicture& picture, const Camera& camera,
                              const std::vector<uint32_t>& counts) {
   const FramePlanner planner(picture.cache, {picture.variable, picture.function});
-  const FramePlan plan = planner.plan(camera, picture.options, DrawingOrder::kFrontToBack);
+  const FramePlan plan = planner.plan(camera, picture.options);
   const std::vector<PartCost> parts = partCosts(
       plan.parts, picture.cache.bricks(), picture.cache.brickVariables(picture.variable), plan.settings.view);
   RankSimulation simulation{plan.cut.splats, plan.parts.size(), {}};

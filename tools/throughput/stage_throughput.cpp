@@ -56,7 +56,7 @@ namespace {
 
 void sortInto(DepthSorter& sorter, const std::vector<uint32_t>& keys, const std::vector<ScreenSplat>& splats,
               std::vector<ScreenSplat>& sorted) {
-  const auto order = sorter.sort(keys, DrawingOrder::kFrontToBack);
+  const auto order = sorter.sort(keys);
   sorted.resize(std::max(sorted.size(), splats.size()));
   for (size_t n = 0; n < order.size(); ++n) sorted[n] = splats[order[n].splat];
 }
@@ -105,8 +105,9 @@ void PreparedSample::project(const SampledBrick& brick, const SplatGeometry& geo
 const std::vector<uint32_t>& PreparedSample::keysOf(const SampledBrick& brick, Scratch& scratch) const {
   const Brick& of_index = cache_.bricks()[brick.part.brick];
   scratch.keys.resize(scratch.projector.depths().size());
-  plan_.keys.keysOf(scratch.projector.depths(), cache_.manifest().root.cellMin(of_index.cell),
-                    plan_.keys.rangeOf(of_index), scratch.keys);
+  plan_.keys.setKeys(scratch.projector.mutableSplats(), scratch.projector.depths(),
+                     cache_.manifest().root.cellMin(of_index.cell), plan_.keys.rangeOf(of_index),
+                     scratch.keys);
   return scratch.keys;
 }
 
@@ -202,7 +203,7 @@ class Stages {
         to_(to),
         progress_(progress),
         planner_(scene.cache, {scene.variable, scene.transfer_function}),
-        plan_(planner_.plan(scene.orbit(1).front(), scene.options, DrawingOrder::kFrontToBack)) {
+        plan_(planner_.plan(scene.orbit(1).front(), scene.options)) {
     report_.frame_splats = plan_.cut.splats;
   }
 
@@ -324,25 +325,16 @@ class Stages {
   std::vector<double> secondsOfDrawing(PaintingBackend& backend, const PreparedSample& sample,
                                        unsigned threads) const {
     const std::vector<ScreenSplat>& splats = sample.toDraw();
-    const std::span<ScreenSplat> memory = backend.splatMemory(splats.size());
-    std::vector<uint32_t> segments = sample.segments();
-    if (backend.order() == DrawingOrder::kFrontToBack) {
-      std::copy(splats.begin(), splats.end(), memory.begin());
-    } else {
-      std::reverse_copy(splats.begin(), splats.end(), memory.begin());
-      std::reverse(segments.begin(), segments.end());
-    }
     return secondsOfRuns(effort_.sample_s, effort_.samples, [&] {
       backend.run([&](Painter& painter) {
         painter.begin(plan_.settings.view.size, scene_.options.background, planner_.table(),
                       {plan_.settings.per_pixel}, {.threads = threads});
         size_t begin = 0;
-        for (const uint32_t count : segments) {
-          painter.draw(memory.subspan(begin, count));
+        for (const uint32_t count : sample.segments()) {
+          painter.draw(std::span(splats).subspan(begin, count));
           begin += count;
         }
         painter.end();
-        painter.finishDraws();
       });
       progress_.throwIfStopped();
     });

@@ -1,9 +1,8 @@
-#include "render/cpu/splat_bins.h"
+#include "render/tiles/splat_bins.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "render/cpu/tile.h"
 #include "render/project/footprint.h"
 #include "stream/base/error.h"
 #include "stream/base/trace.h"

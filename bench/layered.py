@@ -1,0 +1,205 @@
+#!/usr/bin/env python3
+"""Layers seen obliquely, against integrals: do splats come in the order of the layers?
+
+    bench/layered.py CURVISPLAT [--quick] [--limit E] [--backend cpu|osmesa|egl] [--only REGEX]
+
+slab            cells 24 to 480 times as wide as thick, f = 0 to 1 from the bottom to the top, optical depth 3 across, seen from above to 80
+                degrees, by parallel rays and in perspective; grey values of the middle of the picture
+levels          the slab of 256 x 256 x 64 nodes at 0, 4 and 16 pixels
+boundary layer  half a cylinder, 21 layers within 0.04 of the wall (1e-4 to 9e-3 thick), f = 1 - sqrt(distance / 0.04), by the functions
+                "smooth" and "band" of bench/fidelity per 0.02 of length; from the front, obliquely, and from the top
+
+Prints truth, mean error and rms, of the boundary layer PSNR. --limit: exit status 1 if a mean error is larger. --quick: the slabs alone.
+Needs numpy.
+"""
+import argparse
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numpy as np
+except ImportError:
+    print("layered: needs numpy; skipped")
+    sys.exit(77)
+
+CROSS = 3.0  # optical depth of a slab, at right angles
+
+
+class Judge:
+    """Prints what differs, and keeps the worst."""
+
+    def __init__(self, only):
+        self.only, self.worst = re.compile(only), 0.0
+
+    def wants(self, what):
+        return self.only.search(what) is not None
+
+    def compare(self, what, drawn, truth):
+        error = drawn - truth
+        of_channels = np.abs(error.reshape(-1, error.shape[-1] if error.ndim > 1 else 1).mean(0))
+        self.worst = max(self.worst, of_channels.max())
+        print(f"{what:58} truth {truth.mean():.4f}  mean error {error.mean():+.4f}  rms {error.std():.4f}", flush=True)
+
+
+class Program:
+    def __init__(self, path, folder, backend):
+        self.path, self.folder, self.backend = path.resolve(), folder, backend
+
+    def run(self, *words):
+        done = subprocess.run([self.path, *map(str, words)], capture_output=True, text=True, cwd=self.folder)
+        if done.returncode:
+            sys.exit(f"layered: {' '.join(map(str, words))}: {done.stderr.strip()}")
+
+    def convert(self, name, x, y, z, f):
+        """A PLOT3D grid with one function."""
+        for suffix, head, arrays in ((".xyz", x.shape, (x, y, z)), (".fun", (*x.shape, 1), (f,))):
+            with open(self.folder / (name + suffix), "wb") as out:
+                np.array(head, "<i4").tofile(out)
+                for array in arrays:
+                    array.astype("<f8").ravel(order="F").tofile(out)
+        self.run("convert", name + ".xyz", name + ".fun", "-o", name + ".splats", "--overwrite")
+
+    def render(self, name, *options):
+        self.run("render", name + ".splats", "-o", "a.pfm", "--backend", self.backend, *options)
+        with open(self.folder / "a.pfm", "rb") as file:
+            channels = 3 if file.readline().strip() == b"PF" else 1
+            width, height = map(int, file.readline().split())
+            file.readline()
+            return np.fromfile(file, "<f4").reshape(height, width, channels)
+
+
+def seen_of_slab(cosines):
+    """The integral of f exp(-tau), for rays at these angles with the slab's normal."""
+    s = (np.arange(20000) + 0.5) / 20000
+    tau = (CROSS / np.asarray(cosines, float)).reshape(-1, 1)
+    return ((1 - s) * np.exp(-tau * s)).sum(1) * tau[:, 0] / 20000
+
+
+def convert_slab(program, nodes, layers, thickness):
+    i, j, k = np.meshgrid(np.arange(nodes), np.arange(nodes), np.arange(layers), indexing="ij")
+    at = [i / (nodes - 1) - 0.5, j / (nodes - 1) - 0.5, (k / (layers - 1) - 0.5) * thickness]
+    program.convert("slab", *at, k / (layers - 1.0))
+
+
+def draw_slab(program, thickness, degrees, level, perspective):
+    """The middle of the picture, and what is true there."""
+    pixels, angle = 300, math.radians(degrees)
+    eye = 4 * np.array([0.8 * math.sin(angle), 0.6 * math.sin(angle), math.cos(angle)])
+    lens = ("--view-angle", "17") if perspective else ("--parallel-scale", "0.6")
+    picture = program.render(
+        "slab", "--size", f"{pixels}x{pixels}", "--position=%g,%g,%g" % tuple(eye), "--focal-point", "0,0,0", "--view-up",
+        "0,1,0.0001", *lens, "--background", "black", "--range", "0,1", "--opacity", "0:0.5,1:0.5", "--opacity-unit",
+        repr(math.log(2) * thickness / CROSS), "--tf", "grey", "--lod-pixels", level)
+    rows, columns = (slice(140, 160), slice(140, 160)) if degrees < 60 else (slice(147, 153), slice(130, 170))
+    drawn = picture[rows, columns, 0].ravel()
+    if not perspective:
+        return drawn, seen_of_slab([math.cos(angle)]).repeat(drawn.size)
+    forward = -eye / np.linalg.norm(eye)
+    right = np.cross(forward, [0, 1, 0.0001])
+    right /= np.linalg.norm(right)
+    down = np.cross(forward, right)
+    tangent = (np.arange(pixels) + 0.5 - pixels / 2) * math.tan(math.radians(8.5)) / (pixels / 2)
+    across, along = np.meshgrid(tangent[columns], -tangent[rows])  # a PFM's first row is the lowest
+    rays = forward + across[..., None] * right + along[..., None] * down
+    return drawn, seen_of_slab((np.abs(rays[..., 2]) / np.linalg.norm(rays, axis=-1)).ravel())
+
+
+def slabs(program, judge, quick):
+    for thickness in (0.1, 0.02, 0.001):
+        convert_slab(program, 32, 16, thickness)
+        for degrees in (0, 10, 30, 60, 80) if thickness < 0.1 else (0, 10, 30):
+            for perspective in (False, True):
+                what = f"slab, {1.5 / thickness / 3.1:.0f} times as wide, {degrees} degrees" + ", perspective" * perspective
+                if judge.wants(what):
+                    judge.compare(what, *draw_slab(program, thickness, degrees, "0", perspective))
+    if quick or not judge.wants("levels"):
+        return
+    convert_slab(program, 256, 64, 0.02)
+    for degrees in (0, 30):
+        for level in ("0", "4", "16"):
+            judge.compare(f"levels, {degrees} degrees, {level} pixels", *draw_slab(program, 0.02, degrees, level, False))
+
+
+LENGTH, HALF = 0.02, 0.7  # of the functions; the camera's parallel scale
+FUNCTIONS = {"smooth": lambda f: 8 * f * f, "band": lambda f: 24 * np.exp(-((f - 0.5) ** 2) / 0.0018)}
+
+
+def colours(f):
+    return [np.clip(2 * f - 0.4, 0, 1), np.clip(1 - 2.5 * abs(f - 0.5), 0, 1), np.clip(1 - 2 * f, 0, 1)]
+
+
+def write_function(path, extinction):
+    f = np.arange(2049) / 2048
+    points = np.stack([f, 1 - np.exp(-extinction(f) * 0.05), 0 * f + 0.5, 0 * f], 1).ravel()
+    rgb = np.stack([f, *colours(f)], 1).ravel()
+    path.write_text(json.dumps([{"Name": "x", "ColorSpace": "RGB", "RGBPoints": list(rgb), "Points": list(points),
+                                 "ScalarOpacityUnitDistance": 0.05}]))
+
+
+def march(pixels, position, focus, up, extinction, thickest):
+    """The picture by fine sums along each pixel's ray."""
+    back = np.subtract(position, focus)
+    back = back / np.linalg.norm(back)
+    right = np.cross(up, back)
+    right /= np.linalg.norm(right)
+    above = np.cross(back, right)
+    picture, steps = np.zeros((pixels, pixels, 3)), 12000
+    u, t = (np.arange(pixels) + 0.5) / pixels * 2 - 1, np.linspace(1.6, -1.6, steps)
+    for row in range(pixels):
+        at = focus + u[row] * HALF * above + (u * HALF)[:, None] * right
+        at = at[:, None, :] + t[None, :, None] * back
+        wall = np.hypot(at[..., 0], at[..., 1]) - 0.5
+        inside = (wall >= 0) & (wall <= thickest) & (at[..., 1] >= 0) & (at[..., 2] >= 0) & (at[..., 2] <= 1)
+        f = 1 - np.sqrt(np.clip(wall / 0.04, 0, 1))
+        depth = np.cumsum(np.where(inside, extinction(f) / LENGTH * 3.2 / steps, 0), 1)
+        left = np.exp(-np.concatenate([np.zeros((pixels, 1)), depth], 1))
+        weight = left[:, :-1] - left[:, 1:]
+        picture[row] = np.stack([(weight * c).sum(1) + left[:, -1] for c in colours(f)], 1)
+    return picture
+
+
+def boundary_layers(program, judge, pixels=128):
+    distance = 1e-4 * np.cumsum(np.r_[0, 1.25 ** np.arange(39)])
+    distance = distance[distance < 0.5]
+    angle, d, z = np.meshgrid(np.linspace(0, math.pi, 65), distance, np.linspace(0, 1, 17), indexing="ij")
+    program.convert("layer", (0.5 + d) * np.cos(angle), (0.5 + d) * np.sin(angle), z, 1 - np.sqrt(np.minimum(1, d / 0.04)))
+    focus = np.array([0, 0.3, 0.5])
+    for view, position, up in (("front", (0, 4, 0.5), (0, 0, 1)), ("oblique", (2, 3, 2), (0, 0, 1)), ("top", (1.2, 1, 4), (0, 1, 0))):
+        for name, extinction in FUNCTIONS.items():
+            what = f"boundary layer, {view}, {name}"
+            if not judge.wants(what):
+                continue
+            write_function(program.folder / "function.json", extinction)
+            drawn = program.render("layer", "--size", f"{pixels}x{pixels}", "--position=%g,%g,%g" % position, "--focal-point",
+                                   "0,0.3,0.5", "--view-up", "%g,%g,%g" % up, "--parallel-scale", HALF, "--tf", "function.json",
+                                   "--range=0,1", "--opacity-unit", 0.05 * LENGTH, "--background", "white", "--lod-pixels", "0")
+            truth = march(pixels, position, focus, up, extinction, distance[-1])
+            data = truth.min(2) < 0.95
+            psnr = -10 * math.log10(((drawn - truth) ** 2).mean())
+            judge.compare(f"{what}: {psnr:.1f} dB; where data is", drawn[data], truth[data])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--limit", type=float)
+    parser.add_argument("--backend", default="cpu")
+    parser.add_argument("--only", default="")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        program, judge = Program(options.program, pathlib.Path(folder), options.backend), Judge(options.only)
+        slabs(program, judge, options.quick)
+        if not options.quick and judge.wants("boundary layer"):
+            boundary_layers(program, judge)
+    print(f"worst mean error {judge.worst:.4f}")
+    return options.limit is not None and judge.worst > options.limit
+
+
+if __name__ == "__main__":
+    sys.exit(main())

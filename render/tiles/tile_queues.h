@@ -1,0 +1,124 @@
+// Brings the splats of each tile into the tile's own order (tile_key.h), from batches that come in the order of
+// their first keys.
+//
+// What a batch brings is final for a tile up to the batch's front, the first key of its last splat: no later splat
+// comes before that in any tile. So a tile paints what its splats have up to the front, each of its order tiles
+// sorted by itself, and keeps the splats that have something behind it: those that the front cuts through. Where all
+// splats have one key in all tiles, nothing is kept and nothing sorted.
+//
+//   batch -> its bins (splat_bins.h) -> paint(tile): waiting + new, by rounds -> what is kept
+//
+// How splats were batched changes nothing, so memory and threads do not either. The splats that are kept have a fixed
+// memory; where that does not suffice, isFull() says so, and the picture has to be drawn again in smaller regions.
+// One thread a tile at a time; different tiles on any threads.
+#pragma once
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "render/project/screen_splat.h"
+#include "render/project/tile_key.h"
+#include "render/project/tile_set.h"
+#include "stream/base/mutex.h"
+
+namespace curvisplat {
+
+/// Along a painter's tile, and in it; row by row.
+inline constexpr int kOrderTilesAlong = kTileSide / kOrderSide;
+inline constexpr size_t kOrderTiles = size_t{kOrderTilesAlong} * kOrderTilesAlong;
+
+/// Splats of one order tile as they are to be painted: key << 32 | index into OrderedTile::order.
+using OrderList = std::vector<uint64_t>;
+
+/// What is to be painted of a tile.
+struct OrderedTile {
+  std::span<const ScreenSplat> splats;                        // one that is cut behind its records
+  std::span<const uint32_t> order;                            // of `splats`
+  const std::array<OrderList, kOrderTiles>* lists = nullptr;  // null: all of the tile in the order of `order`
+};
+
+class TileQueues {
+ public:
+  /// Paints, and returns which of the tile's order tiles can still change: bit n, number n.
+  using Paint = std::function<uint64_t(const OrderedTile&)>;
+  static constexpr uint64_t kAllOpen = ~uint64_t{0};
+  static_assert(kOrderTiles <= 64);
+
+  /// At most `splats` wait in all tiles together, records counted.
+  TileQueues(ImageSize size, size_t splats);
+  static uint64_t bytes(ImageSize size, size_t splats, unsigned threads);
+
+  /// Nothing waits.
+  void clear();
+
+  struct New {
+    std::span<const ScreenSplat> splats;  // of the batch
+    std::span<const uint32_t> entries;    // those that touch the tile
+    uint32_t front;
+    bool last = false;  // no more will come for the tile: all is painted
+  };
+  /// Paints of tile `number` what can be. `open`: as `paint` returns it.
+  void paint(size_t number, const New& added, uint64_t open, const Paint& paint);
+  bool waits(size_t number) const { return queues_[number].count > 0; }
+  bool anyWaits() const { return free_count_.load(std::memory_order_relaxed) < chunks_; }
+  /// Splats had to be left out: the picture is wrong.
+  bool isFull() const { return full_.load(std::memory_order_relaxed); }
+
+ private:
+  static constexpr size_t kChunk = 32;  // splats and records
+
+  struct Queue {
+    std::vector<uint32_t> chunks;
+    uint32_t count = 0, seen = 0;  // splats and records; of these, how many have been painted up to `painted`
+    uint32_t painted = 0;          // the last key
+  };
+  struct Active {
+    uint32_t splat;    // in Scratch::splats; its records lie before it
+    uint32_t records;  // how many
+    uint32_t next;     // the first key that has not been painted, or one before it
+    bool seen;
+  };
+  struct Scratch {
+    std::vector<ScreenSplat> splats;
+    std::vector<Active> active;
+    std::vector<uint32_t> order;      // of `splats`: all of `active`
+    std::vector<uint64_t> by_middle;  // the same as those of an OrderList, by the keys in the tile's middle
+    std::array<OrderList, kOrderTiles> lists;
+  };
+
+  void load(Queue& queue, Scratch& scratch);
+  void store(Queue& queue, const Scratch& scratch);
+  void append(Queue& queue, std::span<const ScreenSplat> splats, uint32_t next);
+  void free(Queue& queue);
+  void listTile(size_t number, uint32_t painted, uint32_t front, uint64_t open, Scratch& scratch) const;
+  struct Corner {
+    float x, y;
+  };
+  struct Listed {
+    uint32_t front;
+    uint64_t open;
+    uint32_t index;  // in Scratch::active
+  };
+  static uint32_t listSplat(const Corner& corner, uint32_t painted, const Listed& listed, Scratch& scratch);
+
+  const int columns_;
+  std::vector<Queue> queues_;  // [tile]
+  std::unique_ptr<ScreenSplat[]> memory_;
+  std::unique_ptr<uint32_t[]> next_;  // of each splat in memory_: Active's
+  Mutex mutex_;
+  std::vector<uint32_t> free_ GUARDED_BY(mutex_);  // chunks
+  std::atomic<size_t> free_count_;
+  const size_t chunks_;
+  std::atomic<bool> full_ = false;
+  tbb::enumerable_thread_specific<Scratch> scratch_;
+};
+
+}  // namespace curvisplat

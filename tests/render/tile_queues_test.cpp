@@ -1,0 +1,172 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <tuple>
+
+#include "render/project/footprint.h"
+#include "render/tiles/splat_bins.h"
+#include "render/tiles/tile_queues.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{100, 70};
+
+/// In the order of their first keys; `mean` is the number. Some have a record before them, whose x is minus that.
+std::vector<ScreenSplat> leaningSplats(int count, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
+  std::vector<ScreenSplat> splats;
+  for (int n = 0; n < count; ++n) {
+    ScreenSplat splat{};
+    splat.x = 100 * unit(random);
+    splat.y = 70 * unit(random);
+    splat.l11 = 1 + 6 * unit(random) * unit(random);
+    splat.l21 = around(random);
+    splat.l22 = 0.5f + 3 * unit(random);
+    splat.amplitude = 1;
+    splat.key = 20000 + static_cast<uint32_t>(random() % 3000);
+    if (n % 3 != 0) {
+      splat.key_slope0 = 300 * around(random);
+      splat.key_slope1 = 300 * around(random);
+    }
+    splat.first = splat.key - static_cast<uint32_t>(leans(splat) ? mostBefore(splat) : 0);
+    splats.push_back(splat);
+  }
+  std::stable_sort(splats.begin(), splats.end(),
+                   [](const ScreenSplat& a, const ScreenSplat& b) { return a.first < b.first; });
+  std::vector<ScreenSplat> with_records;
+  for (size_t n = 0; n < splats.size(); ++n) {
+    splats[n].mean = static_cast<float>(n);
+    if (n % 5 == 0) {
+      splats[n].amplitude = -1;
+      ScreenSplat record = ScreenCut{}.record();
+      record.x = -static_cast<float>(n);
+      with_records.push_back(record);
+    }
+    with_records.push_back(splats[n]);
+  }
+  return with_records;
+}
+
+/// [tile's number << 8 | order tile] the numbers of the splats that may touch it, in the order of the tile.
+using Orders = std::map<size_t, std::vector<int>>;
+
+void note(Orders& orders, size_t place, const ScreenSplat* splat) {
+  const int number = static_cast<int>(splat->mean);
+  if (number % 5 == 0) {
+    ASSERT_TRUE(isRecord(splat[-1]));
+    ASSERT_EQ(splat[-1].x, static_cast<float>(-number));
+  }
+  orders[place].push_back(number);
+}
+
+Orders ordersOf(TileQueues& queues, std::span<const ScreenSplat> splats, const std::vector<size_t>& batches) {
+  SplatBins bins(kSize, 4096, 4 * 4096, 2);
+  PaintLoop loop(2, nullptr);
+  queues.clear();
+  Orders orders;
+  Mutex mutex;
+  const auto paint = [&](bool last) {
+    bins.sort(loop);
+    const uint32_t front = bins.empty() ? 0 : bins.splats().back().first;
+    loop.forAll("tiles", TileSet::tilesOf(kSize), 1, [&](size_t number) {
+      const auto entries = bins.tile(static_cast<int>(number));
+      if (entries.empty() && !(last && queues.waits(number))) return;
+      queues.paint(number, {bins.splats(), entries, front, last}, TileQueues::kAllOpen,
+                   [&](const OrderedTile& tile) {
+                     const MutexLock lock(mutex);
+                     for (size_t of_tile = 0; of_tile < kOrderTiles; ++of_tile) {
+                       const size_t place = number << 8 | of_tile;
+                       if (!tile.lists)
+                         for (const uint32_t n : tile.order) note(orders, place, &tile.splats[n]);
+                       else
+                         for (const uint64_t item : (*tile.lists)[of_tile])
+                           note(orders, place, &tile.splats[tile.order[static_cast<uint32_t>(item)]]);
+                     }
+                     return TileQueues::kAllOpen;
+                   });
+    });
+    bins.clear();
+  };
+  size_t begin = 0;
+  for (const size_t count : batches) {
+    begin += bins.add(splats.subspan(begin, std::min(count, splats.size() - begin)));
+    if (!bins.awaitsSplat()) paint(false);
+  }
+  while (begin < splats.size()) begin += bins.add(splats.subspan(begin));
+  paint(true);
+  return orders;
+}
+
+/// Those that a tile's list must have: that touch the order tile by their rectangles.
+Orders specifiedFor(std::span<const ScreenSplat> splats) {
+  Orders orders;
+  const int columns = TileSet::tilesAlong(kSize.width);
+  for (size_t number = 0; number < TileSet::tilesOf(kSize); ++number)
+    for (size_t of_tile = 0; of_tile < kOrderTiles; ++of_tile) {
+      const float x = static_cast<float>(static_cast<int>(number) % columns * kTileSide +
+                                         static_cast<int>(of_tile) % kOrderTilesAlong * kOrderSide);
+      const float y = static_cast<float>(static_cast<int>(number) / columns * kTileSide +
+                                         static_cast<int>(of_tile) / kOrderTilesAlong * kOrderSide);
+      std::vector<std::tuple<uint32_t, int>> sorted;
+      for (const ScreenSplat& splat : splats) {
+        if (isRecord(splat)) continue;
+        const float reach_x = static_cast<float>(kKernelSupport) * splat.l11;
+        const float reach_y = static_cast<float>(kKernelSupport) * std::hypot(splat.l21, splat.l22);
+        if (splat.x + reach_x < x || splat.x - reach_x >= x + kOrderSide || splat.y + reach_y < y ||
+            splat.y - reach_y >= y + kOrderSide)
+          continue;
+        sorted.emplace_back(keyAt(splat, x + 0.5f * kOrderSide, y + 0.5f * kOrderSide),
+                            static_cast<int>(splat.mean));
+      }
+      std::sort(sorted.begin(), sorted.end());
+      for (const auto& [key, splat] : sorted) orders[number << 8 | of_tile].push_back(splat);
+    }
+  return orders;
+}
+
+/// A tile that has splats of one order gives them to all of its order tiles: leaves out what does not touch.
+void expectOrders(const Orders& found, const Orders& specified) {
+  for (const auto& [place, wanted] : specified) {
+    ASSERT_TRUE(found.contains(place)) << place;
+    std::vector<int> touching;
+    for (const int n : found.at(place))
+      if (std::find(wanted.begin(), wanted.end(), n) != wanted.end()) touching.push_back(n);
+    EXPECT_EQ(touching, wanted) << place;
+  }
+}
+
+TEST(TileQueues, GiveEachTileItsOwnOrderHoweverSplatsAreBatched) {
+  const auto splats = leaningSplats(1500, 3);
+  const Orders specified = specifiedFor(splats);
+  TileQueues queues(kSize, 1 << 16);
+  expectOrders(ordersOf(queues, splats, {}), specified);
+  expectOrders(ordersOf(queues, splats, std::vector<size_t>(50, 40)), specified);
+  expectOrders(ordersOf(queues, splats, {1, 2, 3, 500, 7, 300, 300}), specified);
+  EXPECT_FALSE(queues.isFull());
+  EXPECT_FALSE(queues.anyWaits());
+}
+
+TEST(TileQueues, SayWhenMoreWaitThanTheyHold) {
+  const auto splats = leaningSplats(1500, 4);
+  TileQueues queues(kSize, 200);
+  ordersOf(queues, splats, std::vector<size_t>(50, 40));
+  EXPECT_TRUE(queues.isFull());
+  queues.clear();
+  EXPECT_FALSE(queues.isFull());
+}
+
+TEST(TileQueues, SplatsThatDoNotLeanNeverWait) {
+  auto splats = leaningSplats(800, 5);
+  for (ScreenSplat& splat : splats)
+    if (!isRecord(splat)) splat.key_slope0 = splat.key_slope1 = 0, splat.key = splat.first;
+  TileQueues queues(kSize, 32);
+  expectOrders(ordersOf(queues, splats, std::vector<size_t>(50, 40)), specifiedFor(splats));
+  EXPECT_FALSE(queues.isFull());
+}
+
+}  // namespace
+}  // namespace curvisplat
