@@ -210,7 +210,7 @@ void writeJournals(const Seeds& seeds) {
   };
   write("begun");
   ScatteredSplats splats;
-  splats.survey = {24, {1, 2, 3}, {0, 0, 0}, {1, 2, 3}, {{0, 1}}};
+  splats.survey = {24, {1, 2, 3, {}}, {0, 0, 0}, {1, 2, 3}, {{0, 1}}};
   splats.tree.split(
       0, [](const Cell& cell) { return cell.at[0] == 0 ? 100 : 1; }, 50, 2);
   const auto leaves = splats.tree.leavesBelow(0);
