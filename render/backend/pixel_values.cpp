@@ -238,7 +238,7 @@ class ValuePainter final : public Painter {
         const int x = first.x + static_cast<int>(tile) % kOrderTilesAlong * kOrderSide,
                   y = first.y + static_cast<int>(tile) / kOrderTilesAlong * kOrderSide;
         for (const uint64_t item : (*ordered.lists)[tile])
-          addSplat(number, ordered.splats[ordered.order[static_cast<uint32_t>(item)]],
+          addSplat(number, ordered.splats[ordered.order[numberOf(item)]],
                    {first.x, first.y, x, y, x + kOrderSide - 1, y + kOrderSide - 1});
       }
     }

@@ -22,6 +22,7 @@ namespace curvisplat {
 namespace {
 
 static_assert(kSharedTileSide % kBlockSide == 0);
+static_assert(kOrderSide == kBlockSide);  // blocks are the order tiles, and have their numbers
 
 // Of most scenes' splats, one in four touches a second tile. Where they touch more, batches are smaller.
 constexpr size_t kEntriesASplat = 4;
@@ -235,16 +236,9 @@ void CpuPainter::State::paintTiles(bool last) {
   forRanges("paint tiles", touched.size(), [&, this](size_t n) {
     if (stop.stop_requested()) return;
     const size_t number = touched[n];
-    const auto orderTilesOf = [](BlockMask blocks) {
-      uint64_t with_blocks = 0;
-      for (; blocks != 0; blocks &= blocks - 1)
-        with_blocks |= uint64_t{1} << orderTileOf(std::countr_zero(blocks));
-      return with_blocks;
-    };
     const BlockMask before = open[number].load(std::memory_order_relaxed);
     queues->paint(number, {bins->splats(), bins->tile(static_cast<int>(number)), front, last},
-                  orderTilesOf(before),
-                  [&](const OrderedTile& ordered) { return orderTilesOf(paintOrdered(number, ordered)); });
+                  before, [&](const OrderedTile& ordered) { return paintOrdered(number, ordered); });
     if (before != 0 && open[number].load(std::memory_order_relaxed) == 0)
       bins->close(static_cast<int>(number));
   });

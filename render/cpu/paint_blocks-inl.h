@@ -27,7 +27,7 @@ alignas(64) constexpr float kLaneY[kBlockPixels] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2
 struct SkewPolynomial {
   float p1 = 0, q1 = 0, p3 = 0, p2q = 0, pq2 = 0, q3 = 0;
 
-  explicit SkewPolynomial(uint32_t skew) {
+  explicit SkewPolynomial(uint32_t skew = 0) {
     if (skew == 0) return;
     constexpr auto kScale = static_cast<float>(kKernelSupport / kKernelSigma);
     constexpr float kCubic = kScale * kScale * kScale / 6;

@@ -229,59 +229,79 @@ HWY_INLINE DepthLine depthLineOf(const ScreenSplat* record) {
           depth.per_depth * (1 / ScreenCut::kReach)};
 }
 
-/// A splat that is cut, and has the number `number`. Returns those of `blocks` that are saturated then.
-HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Visit& visit, size_t number,
-                                const float* footprint) {
+/// A splat that is cut, with all that its blocks need.
+struct CutSplat {
+  Ellipse e;
+  Scalar scalar;
+  Faces faces;
+  DepthLine line;
+  CutShade shade;
+  Lit lit;
+  Fit fit;        // kOther: every pixel is looked up
+  bool windowed;  // it is painted in each window of its pixels
+
+  HWY_INLINE bool isLookedUp() const { return fit == kOther && !windowed; }
+};
+
+/// `number`: in the splats of the tile.
+HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number, CutSplat& out) {
   const ScreenSplat& splat = work.splats[number];
   const SplatRecords records = SplatRecords::beside(&splat, -1, false);
-  Faces faces = facesOf(records.cut);
-  const DepthLine line = depthLineOf(records.depth);
-  if (records.depth) faces.mean_per_deviation = ScreenDepth::of(*records.depth).correlation;
-  const bool windowed = records.depth && work.windows;
-  const Ellipse e = visit.ellipse();
-  Scalar scalar = visit.scalar();
-  faces.mean_per_deviation = faces.mean_per_deviation * scalar.half_width * (1 / kSqrt3);
+  out.e = visit.ellipse();
+  out.lit = visit.all.lit(work, visit.n);
+  out.faces = facesOf(records.cut);
+  out.line = depthLineOf(records.depth);
+  if (records.depth) out.faces.mean_per_deviation = ScreenDepth::of(*records.depth).correlation;
+  out.windowed = records.depth && work.windows;
+  Scalar& scalar = out.scalar = visit.scalar();
+  out.faces.mean_per_deviation *= scalar.half_width * (1 / kSqrt3);
   if (work.shading.per_pixel)
     scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
-
-  BlockMask saturated = 0;
-  const auto paint = [&](const auto& paint_block) HWY_ATTR {
-    while (blocks != 0) {
-      const int block = takeFirst(blocks);
-      const auto in_window = [&](float* at, const Window& window) HWY_ATTR {
-        return paint_block(at, Cuts{faces, line, window}, block);
-      };
-      if (windowed ? paintWindows(work, block, in_window) : in_window(work.tile + block * kBlockFloats, {}))
-        saturated |= BlockMask{1} << block;
-    }
-  };
-  const int32_t fit = visit.fit();
   // On a logarithmic scale there is no bound of what a narrower distribution sees.
-  if (fit != kOther && !(work.table.logScale() && work.shading.per_pixel)) {
-    const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
-    CutShade shade{shadeOf(visit.fits, visit.n), inverse * faces.mean_per_deviation * ScreenCut::kReach};
-    shade.whole.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
-    if (fit == kConstant)
-      paint([&](float* at, const Cuts& cuts, int block)
-                HWY_ATTR { return paintBlock<false>(e, cuts, shade, footprint, at, cornerOf(block)); });
-    else
-      paint([&](float* at, const Cuts& cuts, int block)
-                HWY_ATTR { return paintBlock<true>(e, cuts, shade, footprint, at, cornerOf(block)); });
-    return saturated;
-  }
-  const Tables tables{work.table, footprint};
-  const Lit lit = visit.all.lit(work, visit.n);
-  if (windowed) {
-    paint([&](float* at, const Cuts& cuts, int block) HWY_ATTR {
-      LookedUp looked_up;
-      return lookUpBlock(e, scalar, cuts, tables, cornerOf(block), looked_up) &&
-             paintLookedUp(looked_up, lit, at);
+  out.fit =
+      work.table.logScale() && work.shading.per_pixel ? kOther : static_cast<Fit>(visit.fit());
+  if (out.fit == kOther) return;
+  const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
+  out.shade = {shadeOf(visit.fits, visit.n), inverse * out.faces.mean_per_deviation * ScreenCut::kReach};
+  out.shade.whole.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
+}
+
+/// Of a splat that is looked up. Whether anything is left of it in the block.
+HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float* footprint, int block,
+                          LookedUp& out) {
+  return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}}, {work.table, footprint},
+                     cornerOf(block), out);
+}
+
+/// One block of a splat that is not looked up, or is windowed. Whether it is saturated then.
+HWY_NOINLINE bool paintCutBlock(const TileWork& work, const CutSplat& cut, const float* footprint,
+                                int block) {
+  const auto in_window = [&](float* at, const Window& window) HWY_ATTR {
+    const Cuts cuts{cut.faces, cut.line, window};
+    const Corner corner = cornerOf(block);
+    if (cut.fit == kConstant) return paintBlock<false>(cut.e, cuts, cut.shade, footprint, at, corner);
+    if (cut.fit == kParabola) return paintBlock<true>(cut.e, cuts, cut.shade, footprint, at, corner);
+    LookedUp looked_up;
+    return lookUpBlock(cut.e, cut.scalar, cuts, {work.table, footprint}, corner, looked_up) &&
+           paintLookedUp(looked_up, cut.lit, at);
+  };
+  if (cut.windowed) return paintWindows(work, block, in_window);
+  return in_window(work.tile + block * kBlockFloats, {});
+}
+
+/// Returns those of `blocks` that are saturated then.
+HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const CutSplat& cut,
+                                const float* footprint) {
+  if (cut.isLookedUp())
+    return paintLookedUpBlocks(work, blocks, cut.lit, [&](int block, LookedUp& out) HWY_ATTR {
+      return lookUpCut(work, cut, footprint, block, out);
     });
-    return saturated;
+  BlockMask saturated = 0;
+  while (blocks != 0) {
+    const int block = takeFirst(blocks);
+    if (paintCutBlock(work, cut, footprint, block)) saturated |= BlockMask{1} << block;
   }
-  return paintLookedUpBlocks(work, blocks, lit, [&](Corner corner, LookedUp& out) HWY_ATTR {
-    return lookUpBlock(e, scalar, Cuts{faces, line, {}}, tables, corner, out);
-  });
+  return saturated;
 }
 
 }  // namespace HWY_NAMESPACE

@@ -26,24 +26,61 @@ namespace curvisplat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+/// A splat of one colour, or one parabola, with all that its blocks need: two cache lines.
+struct alignas(64) Plain {
+  Ellipse e;
+  Shade shade;
+  bool fitted, thin;
+};
+static_assert(sizeof(Plain) == 128);
+
+/// Blends some pixels of a block under the splats before, whose colours and transmittance these are.
+HWY_INLINE void blendPlain(const Plain& plain, const float* footprint, Corner corner, size_t lane,
+                           V (&colour)[3], V& through) {
+  const Floats d;
+  const auto& [e, shade, fitted, thin] = plain;
+  const Pixels pixels =
+      pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), hn::Set(d, corner.x - e.x)),
+               hn::Add(hn::Load(d, kLaneY + lane), hn::Set(d, corner.y - e.y)));
+  V value[4];
+  if (fitted) {
+    const V s = shade.s.at(pixels);
+    for (int c = 0; c < 4; ++c)
+      value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
+                            hn::Set(d, shade.at[c]));
+  } else {
+    for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
+  }
+  const V tau = hn::Max(hn::Mul(pixels.depth, value[3]), hn::Zero(d));
+  const V part = thin ? absorbedOf<true>(tau) : absorbedOf<false>(tau);
+  const V weight = hn::Mul(hn::Mul(pixels.depth, part), through);
+  for (int c = 0; c < 3; ++c) colour[c] = hn::MulAdd(value[c], weight, colour[c]);
+  through = hn::NegMulAdd(hn::Mul(tau, part), through, through);
+}
+
 // These paint `blocks`, and return those of them that are saturated then.
 
-template <bool kFitted, bool kThin>
-HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const Ellipse& e, const Shade& shade,
-                                 const float* footprint) {
+HWY_INLINE BlockMask paintPlain(const TileWork& work, BlockMask blocks, const Plain& plain,
+                                const float* footprint) {
   BlockMask saturated = 0;
   while (blocks != 0) {
     const int block = takeFirst(blocks);
-    if (paintBlock<kFitted, kThin>(e, shade, footprint, work.tile + block * kBlockFloats, cornerOf(block)))
-      saturated |= BlockMask{1} << block;
+    float* const at = work.tile + block * kBlockFloats;
+    const auto& [e, shade, fitted, thin] = plain;
+    const Corner corner = cornerOf(block);
+    const bool full = fitted ? thin ? paintBlock<true, true>(e, shade, footprint, at, corner)
+                                    : paintBlock<true, false>(e, shade, footprint, at, corner)
+                      : thin ? paintBlock<false, true>(e, shade, footprint, at, corner)
+                             : paintBlock<false, false>(e, shade, footprint, at, corner);
+    if (full) saturated |= BlockMask{1} << block;
   }
   return saturated;
 }
 
 HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
                                          const Scalar& scalar, const Lit& lit, const float* footprint) {
-  return paintLookedUpBlocks(work, blocks, lit, [&](Corner corner, LookedUp& out) HWY_ATTR {
-    return lookUpBlock(e, scalar, {work.table, footprint}, corner, out);
+  return paintLookedUpBlocks(work, blocks, lit, [&](int block, LookedUp& out) HWY_ATTR {
+    return lookUpBlock(e, scalar, {work.table, footprint}, cornerOf(block), out);
   });
 }
 
@@ -65,72 +102,46 @@ HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, con
   return saturated;
 }
 
-/// Polylines of splats that are painted in several calls.
-class Lines {
- public:
-  explicit Lines(size_t splats) : places_(splats, kUnknown) {}
+/// Whether a polyline does for the splat. Its error is a 25th of a parabola's or so, where it does not fall much faster; and
+/// it is as much work as a block looked up. `several`: the splat touches more than one block, be they open or not: how a
+/// block is painted must not depend on others, of which another process may know.
+HWY_INLINE bool fitsPolyline(const TileWork& work, const Visit& visit, bool several, Polyline& line) {
+  if (!several || visit.fits.excess.at[visit.n] >= 25) return false;
+  if (!fitPolyline(work.table, visit.all.pieces, visit.n, line)) return false;
+  if (work.shading.lit) line.light(visit.all.lit(work, visit.n));
+  return true;
+}
 
-  /// Of splat `index`; null where none is good enough. Valid until the next call.
-  HWY_INLINE const Polyline* of(size_t index, const TileWork& work, const Visit& visit) {
-    if (places_[index] == kUnknown) {
-      Polyline line;
-      places_[index] = fit(work, visit, line) ? static_cast<int32_t>(lines_.size()) : kNone;
-      if (places_[index] != kNone) lines_.push_back(line);
-    }
-    return places_[index] == kNone ? nullptr : &lines_[static_cast<size_t>(places_[index])];
-  }
+HWY_INLINE Along alongPolyline(const Visit& visit) {
+  return along(visit.all.pieces, visit.n, visit.scalar(), 0, Polyline::kParts);
+}
 
-  HWY_INLINE static bool fit(const TileWork& work, const Visit& visit, Polyline& line) {
-    if (!fitPolyline(work.table, visit.all.pieces, visit.n, line)) return false;
-    if (work.shading.lit) line.light(visit.all.lit(work, visit.n));
-    return true;
-  }
+HWY_INLINE bool isPlain(const Visit& visit) {
+  return visit.fit() == kConstant || visit.fit() == kParabola;
+}
 
- private:
-  static constexpr int32_t kUnknown = -1, kNone = -2;
-
-  std::vector<int32_t> places_;  // [splat] in lines_
-  std::vector<Polyline> lines_;
-};
-
-/// Where what is made for a splat is kept for its next call; null: nowhere.
-struct Kept {
-  Lines* lines = nullptr;
-  size_t index = 0;
-};
-
-/// `several`: the splat touches more than one block, be they open or not: how a block is painted must not depend on others,
-/// of which another process may know.
-HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool several, const Visit& visit,
-                                const float* footprint, const Kept& kept) {
+/// Writes it where it is to be: copying what has just been written in parts would wait for that.
+HWY_INLINE void makePlain(const Visit& visit, Plain* place) {
   const auto& [visits, fits, n] = visit;
-  const Ellipse e = visit.ellipse();
+  Plain& plain = *new (place) Plain{visit.ellipse(), shadeOf(fits, n), visit.fit() == kParabola, false};
   // A skewed footprint may be a tenth higher than F(0).
-  const bool thin = e.amplitude * kPeak * fits.most.at[n] < (e.skewed ? 0.3f : 0.34f);
-  if (visit.fit() == kConstant) {
-    const Shade shade = shadeOf(fits, n);
-    if (thin) return paintBlocks<false, true>(work, blocks, e, shade, footprint);
-    return paintBlocks<false, false>(work, blocks, e, shade, footprint);
+  plain.thin = plain.e.amplitude * kPeak * fits.most.at[n] < (plain.e.skewed ? 0.3f : 0.34f);
+  if (plain.fitted) plain.shade.s = along(visits.pieces, n, visit.scalar(), -1, 1);
+}
+
+HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool several, const Visit& visit,
+                                const float* footprint) {
+  if (isPlain(visit)) {
+    alignas(Plain) std::byte place[sizeof(Plain)];
+    auto* const plain = reinterpret_cast<Plain*>(place);
+    makePlain(visit, plain);
+    return paintPlain(work, blocks, *plain, footprint);
   }
-  const Scalar scalar = visit.scalar();
-  if (visit.fit() == kParabola) {
-    Shade shade = shadeOf(fits, n);
-    shade.s = along(visits.pieces, n, scalar, -1, 1);
-    if (thin) return paintBlocks<true, true>(work, blocks, e, shade, footprint);
-    return paintBlocks<true, false>(work, blocks, e, shade, footprint);
-  }
-  // A polyline's error is a 25th of a parabola's or so, where it does not fall much faster; and it is as much
-  // work as a block looked up.
-  if (fits.excess.at[n] < 25 && several) {
-    Polyline own;
-    const Polyline* const line = kept.lines                     ? kept.lines->of(kept.index, work, visit)
-                                 : Lines::fit(work, visit, own) ? &own
-                                                                : nullptr;
-    if (line)
-      return paintPolyline(work, blocks, e, *line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
-                           footprint);
-  }
-  return paintPixelByPixel(work, blocks, e, scalar, visits.lit(work, n), footprint);
+  const Ellipse e = visit.ellipse();
+  Polyline line;
+  if (fitsPolyline(work, visit, several, line))
+    return paintPolyline(work, blocks, e, line, alongPolyline(visit), footprint);
+  return paintPixelByPixel(work, blocks, e, visit.scalar(), visit.all.lit(work, visit.n), footprint);
 }
 
 /// Sixteen splats, prepared.
@@ -169,12 +180,16 @@ struct Prepared {
 
   /// Paints splat n in `blocks`, some of those touched; returns those of them that are saturated then.
   HWY_INLINE BlockMask paint(const TileWork& work, BlockMask blocks, BlockMask touched, size_t n,
-                             const float* footprint, const Kept& kept = {}) const {
+                             const float* footprint) const {
     const auto number = static_cast<size_t>(numbers.at[n]);
     if (work.colours) return paintColoured(work, blocks, {visits, fits, colours, n}, number, footprint);
     const Visit visit{visits, fits, n};
-    if (visits.cut.at[n] != 0) return paintCut(work, blocks, visit, number, footprint);
-    return paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint, kept);
+    if (visits.cut.at[n] != 0) {
+      CutSplat cut;
+      makeCut(work, visit, number, cut);
+      return paintCut(work, blocks, cut, footprint);
+    }
+    return paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint);
   }
 };
 
@@ -192,45 +207,177 @@ BlockMask paintInOrder(const TileWork& work) {
   return open;
 }
 
-/// The blocks of an order tile.
-BlockMask blocksOfOrderTile(size_t number) {
-  constexpr size_t kBlocksAlong = kOrderSide / kBlockSide;
-  const size_t row = number / kOrderTilesAlong * kBlocksAlong,
-               column = number % kOrderTilesAlong * kBlocksAlong;
-  BlockMask blocks = 0;
-  for (size_t n = 0; n < kBlocksAlong; ++n)
-    blocks |= ((BlockMask{1} << kBlocksAlong) - 1) << ((row + n) * kTileBlocks + column);
-  return blocks;
-}
 
-/// Each order tile in its own order. Splats are prepared once for all.
-BlockMask paintByLists(const TileWork& work) {
-  const float* footprint = footprintPolynomial();
-  const size_t count = work.order.size(), groups = (count + kLanes - 1) / kLanes;
-  const auto prepared = hwy::AllocateAligned<Prepared>(groups);
-  if (!prepared) throw std::bad_alloc();
-  std::vector<uint8_t> is_prepared(groups);
-  std::vector<BlockMask> touched(count);
-  Lines lines(count);
-  BlockMask open = work.open;
-  for (size_t number = 0; number < kOrderTiles; ++number) {
-    const BlockMask of_tile = blocksOfOrderTile(number);
-    if ((open & of_tile) == 0) continue;
-    for (const uint64_t item : (*work.lists)[number]) {
-      const auto index = static_cast<uint32_t>(item);
-      const size_t of_index = index / kLanes, begin = of_index * kLanes;
-      Prepared& group = prepared[of_index];
-      if (!is_prepared[of_index]) {
-        is_prepared[of_index] = 1;
-        group.fits = {};
-        group.prepare(work, begin);
-        for (size_t n = 0; n < group.count; ++n) touched[begin + n] = group.touched(n);
+/// Splats that are painted one block at a time, by the lists of the blocks. Each is prepared when it is first needed, with
+/// its fifteen neighbours.
+class Listed {
+ public:
+  explicit Listed(const TileWork& work) : work_(work), ways_(work.order.size(), kUnknown) {
+    const size_t count = work.order.size();
+    plains_ = hwy::AllocateAligned<Plain>(count);
+    if (!plains_) throw std::bad_alloc();
+    others_.resize(count);
+    if (work.colours) coloured_.resize((count + kLanes - 1) / kLanes);
+  }
+
+  /// Paints the splats of an order tile's list in its block. Whether that is saturated then. Some are looked up before the
+  /// first of them is blended: what was written as many narrow vectors is not ready at once to be read as a wide one.
+  HWY_INLINE bool paint(const OrderList& list, int block) {
+    constexpr size_t kAtOnce = 8;
+    LookedUp looked_up[kAtOnce];
+    bool found[kAtOnce];
+    for (size_t begin = 0; begin < list.size(); begin += kAtOnce) {
+      const OrderList some = list.subspan(begin, std::min(kAtOnce, list.size() - begin));
+      for (size_t n = 0; n < some.size(); ++n) {
+        const uint32_t number = numberOf(some[n]);
+        if (ways_[number] == kUnknown) prepare(number / kLanes);
+        if (ways_[number] == kPixels)
+          found[n] = lookUpBlock(pixelwise_[others_[number]].e, pixelwise_[others_[number]].scalar,
+                                 {work_.table, footprint_}, cornerOf(block), looked_up[n]);
+        else if (ways_[number] == kCutPixels)
+          found[n] = lookUpCut(work_, cuts_[others_[number]], footprint_, block, looked_up[n]);
       }
-      const BlockMask blocks = touched[index] & open & of_tile;
-      if (blocks == 0) continue;
-      open &= ~group.paint(work, blocks, touched[index], index % kLanes, footprint, {&lines, index});
-      if ((open & of_tile) == 0) break;
+      for (size_t n = 0; n < some.size();)
+        if (ways_[numberOf(some[n])] == kPlain) {
+          if (paintPlains(some, n, block)) return true;
+        } else {
+          const bool is_looked_up = ways_[numberOf(some[n])] == kPixels || ways_[numberOf(some[n])] == kCutPixels;
+          if (is_looked_up ? found[n] && paintFound(looked_up[n], numberOf(some[n]), block)
+                           : paintOther(numberOf(some[n]), block))
+            return true;
+          ++n;
+        }
     }
+    return false;
+  }
+
+ private:
+  enum Way : uint8_t { kUnknown, kPlain, kLine, kPixels, kCutPixels, kCut, kColoured, kNoWay };
+  struct LineSplat {
+    Ellipse e;
+    Along s;
+    Polyline line;
+  };
+  struct PixelwiseSplat {
+    Ellipse e;
+    Scalar scalar;
+    Lit lit;
+  };
+
+  HWY_INLINE float* placeOf(int block) const { return work_.tile + block * kBlockFloats; }
+
+  HWY_INLINE bool paintFound(const LookedUp& found, uint32_t number, int block) const {
+    const Lit lit = ways_[number] == kPixels ? pixelwise_[others_[number]].lit : cuts_[others_[number]].lit;
+    return paintLookedUp(found, lit, placeOf(block));
+  }
+
+  HWY_NOINLINE bool paintOther(uint32_t number, int block) {
+    const uint32_t other = others_[number];
+    switch (ways_[number]) {
+      case kLine: {
+        const LineSplat& line = lines_[other];
+        return paintBlock(line.e, line.line, line.s, footprint_, placeOf(block), cornerOf(block));
+      }
+      case kCut:
+        return paintCutBlock(work_, cuts_[other], footprint_, block);
+      case kColoured: {
+        const BlockMask bit = BlockMask{1} << block;
+        const Prepared& group = coloured_[number / kLanes];
+        const size_t n = number % kLanes;
+        return (group.touched(n) & bit) != 0 && group.paint(work_, bit, bit, n, footprint_) != 0;
+      }
+      default:
+        return false;
+    }
+  }
+
+  /// Those from the n-th on that are plain, and leaves n behind them. Whether the block is saturated then. The colours stay
+  /// in registers.
+  HWY_INLINE bool paintPlains(const OrderList& list, size_t& n, int block) {
+    const Floats d;
+    const Corner corner = cornerOf(block);
+    float* HWY_RESTRICT const at = placeOf(block);
+    constexpr size_t kVectors = kBlockPixels / hn::MaxLanes(d);
+    V colour[kVectors][3], through[kVectors];
+    for (size_t v = 0; v < kVectors; ++v) {
+      const size_t lane = v * hn::Lanes(d);
+      for (int c = 0; c < 3; ++c) colour[v][c] = hn::Load(d, at + c * kBlockPixels + lane);
+      through[v] = hn::Load(d, at + 3 * kBlockPixels + lane);
+    }
+    bool saturated = false;
+    do {
+      if (n + 1 < list.size()) hwy::Prefetch(&plains_[numberOf(list[n + 1])]);
+      const Plain& plain = plains_[numberOf(list[n])];
+      V most = hn::Zero(d);
+      for (size_t v = 0; v < kVectors; ++v) {
+        blendPlain(plain, footprint_, corner, v * hn::Lanes(d), colour[v], through[v]);
+        most = hn::Max(most, through[v]);
+      }
+      ++n;
+      saturated = isSaturated(most);
+    } while (!saturated && n < list.size() && ways_[numberOf(list[n])] == kPlain);
+    for (size_t v = 0; v < kVectors; ++v) {
+      const size_t lane = v * hn::Lanes(d);
+      for (int c = 0; c < 3; ++c) hn::Store(colour[v][c], d, at + c * kBlockPixels + lane);
+      hn::Store(through[v], d, at + 3 * kBlockPixels + lane);
+    }
+    return saturated;
+  }
+
+  HWY_NOINLINE void prepare(size_t number) {
+    const size_t begin = number * kLanes;
+    Prepared& group = work_.colours ? coloured_[number] : group_;
+    group.prepare(work_, begin);
+    for (size_t n = 0; n < group.count; ++n) {
+      const Visit visit{group.visits, group.fits, n};
+      const BlockMask touched = group.touched(n);
+      ways_[begin + n] = touched == 0 ? kNoWay : make(visit, touched, static_cast<size_t>(group.numbers.at[n]), begin + n);
+    }
+  }
+
+  HWY_INLINE Way make(const Visit& visit, BlockMask touched, size_t splat, size_t number) {
+    if (work_.colours) return kColoured;
+    if (visit.all.cut.at[visit.n] != 0) {
+      others_[number] = static_cast<uint32_t>(cuts_.size());
+      makeCut(work_, visit, splat, cuts_.emplace_back());
+      return cuts_.back().isLookedUp() ? kCutPixels : kCut;
+    }
+    if (isPlain(visit)) {
+      makePlain(visit, &plains_[number]);
+      return kPlain;
+    }
+    Polyline line;
+    if (fitsPolyline(work_, visit, std::popcount(touched) > 1, line)) {
+      others_[number] = static_cast<uint32_t>(lines_.size());
+      lines_.push_back({visit.ellipse(), alongPolyline(visit), line});
+      return kLine;
+    }
+    others_[number] = static_cast<uint32_t>(pixelwise_.size());
+    pixelwise_.push_back({visit.ellipse(), visit.scalar(), visit.all.lit(work_, visit.n)});
+    return kPixels;
+  }
+
+  const TileWork& work_;
+  const float* const footprint_ = footprintPolynomial();
+  Prepared group_;
+  std::vector<Way> ways_;                          // [splat]
+  hwy::AlignedFreeUniquePtr<Plain[]> plains_;      // [splat], of those that are
+  std::vector<uint32_t> others_;                   // [splat] in one of the following
+  std::vector<LineSplat> lines_;
+  std::vector<PixelwiseSplat> pixelwise_;
+  std::vector<CutSplat> cuts_;
+  std::vector<Prepared> coloured_;  // [splat / 16], in pictures of two scalars
+};
+
+static_assert(kOrderSide == kBlockSide);  // blocks are the order tiles, and have their numbers
+
+/// Each block in its own order.
+BlockMask paintByLists(const TileWork& work) {
+  Listed listed(work);
+  BlockMask open = work.open;
+  for (BlockMask left = open; left != 0;) {
+    const int block = takeFirst(left);
+    if (listed.paint((*work.lists)[static_cast<size_t>(block)], block)) open &= ~(BlockMask{1} << block);
   }
   return open;
 }

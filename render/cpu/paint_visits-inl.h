@@ -272,7 +272,7 @@ HWY_INLINE Corner cornerOf(int block) {
           static_cast<float>(block / kTileBlocks * kBlockSide)};
 }
 
-/// With a look-up for every pixel: look_up(corner, where to), false for nothing. A few blocks are looked up
+/// With a look-up for every pixel: look_up(block, where to), false for nothing. A few blocks are looked up
 /// before they are blended: what was written as many narrow vectors is not ready at once to be read as a wide
 /// one.
 template <typename LookUp>
@@ -286,7 +286,7 @@ HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks,
     int count = 0;
     while (blocks != 0 && count < kAtOnce) {
       const int block = numbers[count] = takeFirst(blocks);
-      if (look_up(cornerOf(block), looked_up[count])) ++count;
+      if (look_up(block, looked_up[count])) ++count;
     }
     for (int n = 0; n < count; ++n)
       if (paintLookedUp(looked_up[n], lit, work.tile + numbers[n] * kBlockFloats))

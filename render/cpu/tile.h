@@ -100,12 +100,6 @@ inline constexpr float kSaturated = 1.0f / 4096;
 using BlockMask = uint64_t;
 static_assert(kTileBlocks * kTileBlocks == 64);
 
-/// The order tile of a block.
-inline int orderTileOf(int block) {
-  constexpr int kBlocksAlong = kOrderSide / kBlockSide;
-  return block / kTileBlocks / kBlocksAlong * kOrderTilesAlong + block % kTileBlocks / kBlocksAlong;
-}
-
 /// The layers of a tile's pixels, and the windows behind the first (tile_windows.h).
 struct TileWindows {
   int layers;     // the most of any pixel

@@ -6,6 +6,7 @@
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_pipeline.h"
 #include "render/frame/frame_plan.h"
+#include "render/project/screen_splat.h"
 #include "render/ranks/picture_shares.h"
 #include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
@@ -31,7 +32,7 @@ struct FrameRenderer::State {
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress) {
     statistics = {};
-    pipeline.setAside(0, options);
+    pipeline.setAside(0, 0, options);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options); });
     if (options.ranks) planner.share(plan, options);
@@ -47,11 +48,11 @@ struct FrameRenderer::State {
     clear.background = glm::vec4(0.0f);
     statistics = {};
     // Where the memory has room for both painters, the second draws of the bricks that the first has decoded.
+    const size_t waiting = FrameBudget::kMinWaitingSplats + clear.memory_bytes / 32 / sizeof(ScreenSplat);
     const bool beside =
         pipeline.backend().isSoftware() &&
-        pipeline.setAside(valueBytes(clear.size, {.threads = clear.threads,
-                                                  .waiting_splats = FrameBudget::kMinWaitingSplats}),
-                          clear);
+        pipeline.setAside(valueBytes(clear.size, {.threads = clear.threads, .waiting_splats = waiting}),
+                          waiting, clear);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear); });
     if (options.ranks) planner.share(plan, clear);

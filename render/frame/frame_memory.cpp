@@ -36,7 +36,7 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
 constexpr uint64_t kMaxWaitingBytes = 64 << 20;
-constexpr uint64_t kWaitingSplatBytes = sizeof(ScreenSplat) + sizeof(uint32_t);  // render/tiles/tile_queues.h
+constexpr uint64_t kWaitingSplatBytes = sizeof(ScreenSplat) + sizeof(uint64_t);  // render/tiles/tile_queues.h
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
 // picture of a slightly different size then needs no new pools, and the cache keeps its bricks.
 constexpr uint64_t kParts = 16;

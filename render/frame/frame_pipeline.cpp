@@ -109,8 +109,9 @@ void FramePipeline::makePools(const FrameOptions& options) {
   pools_ = std::move(fresh);
 }
 
-bool FramePipeline::setAside(uint64_t bytes, const FrameOptions& options) {
+bool FramePipeline::setAside(uint64_t bytes, size_t waiting_splats, const FrameOptions& options) {
   aside_bytes_ = bytes;
+  aside_waiting_splats_ = waiting_splats;
   if (bytes == 0) return true;
   try {
     least_pager_bytes_ =
@@ -341,9 +342,8 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
 Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
                            const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
   Image image;
-  // A further painter has what setAside() left it.
   const size_t waiting =
-      painting_ == backend_.get() ? pools_->budget.waiting_splats : FrameBudget::kMinWaitingSplats;
+      painting_ == backend_.get() ? pools_->budget.waiting_splats : aside_waiting_splats_;
   painting_->run([&](Painter& painter) {
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
                   {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers,

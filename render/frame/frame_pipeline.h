@@ -108,8 +108,9 @@ class FramePipeline {
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
              Progress* progress);
   /// Frames leave `bytes` of the memory to a further painter, for drawBy(), until it is called again. False,
-  /// and they leave nothing, if the memory is too little for that.
-  bool setAside(uint64_t bytes, const FrameOptions& options);
+  /// and they leave nothing, if the memory is too little for that. `waiting_splats`: what the painter gets of them
+  /// (PaintResources).
+  bool setAside(uint64_t bytes, size_t waiting_splats, const FrameOptions& options);
   /// draw() by that painter, on the processor: of the bricks that are kept, in the same memory.
   Image drawBy(PaintingBackend& painter, const FramePlan& plan, const FrameOptions& options,
                FrameStatistics& statistics, Progress* progress);
@@ -157,6 +158,7 @@ class FramePipeline {
   const std::unique_ptr<PaintingBackend> backend_;
   PaintingBackend* painting_;  // backend_, except in drawBy()
   uint64_t aside_bytes_ = 0;
+  size_t aside_waiting_splats_ = 0;
   HiddenBricks hidden_;
   LayerDrawer layers_;
   std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone

@@ -379,7 +379,7 @@ void GlPainter::State::stageTile(size_t number, const OrderedTile& ordered) {
     const ClipBox clip{x + static_cast<int>(tile) % kOrderTilesAlong * kOrderSide,
                        y + static_cast<int>(tile) / kOrderTilesAlong * kOrderSide, kOrderSide};
     for (const uint64_t item : (*ordered.lists)[tile])
-      stage(ordered.splats, ordered.order[static_cast<uint32_t>(item)], clip);
+      stage(ordered.splats, ordered.order[numberOf(item)], clip);
   }
 }
 

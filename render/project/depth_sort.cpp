@@ -68,10 +68,10 @@ KeyRange DepthKeys::rangeOf(const Brick& brick) const {
     near = std::max(near, view_.near);
     far = std::max(far, near);
     nearest = keyOf(-1 / near * (1 + radius / near + leaning));
-    farthest = keyOf(-1 / far);
+    farthest = keyOf(-1 / far * (1 - radius / far - leaning));
   } else {
     nearest = keyOf(middle - half - radius - leaning);
-    farthest = keyOf(middle + half);
+    farthest = keyOf(middle + half + radius + leaning);
   }
   return {nearest, farthest};
 }
@@ -89,14 +89,14 @@ void DepthKeys::setKeys(std::span<ScreenSplat> splats, std::span<const float> de
     ScreenSplat& splat = splats[n];
     if (isRecord(splat)) continue;
     const auto depth = static_cast<double>(depths[n]);
-    splat.first = splat.key = keyOf(origin + depth);
+    splat.key = keyOf(origin + depth);
     if (leans(splat)) {
       const float steps =
           perspective() ? steps_a_pixel * static_cast<float>(inverse_base - depth) : steps_a_pixel;
       splat.key_slope0 *= steps;
       splat.key_slope1 *= steps;
-      splat.first -= std::min(splat.key, static_cast<uint32_t>(std::min(mostBefore(splat), 0x1p31f)));
     }
+    setFirst(splat);
     splat.first = std::clamp(splat.first, range.first, range.last);
     splat.key = std::clamp(splat.key, range.first, range.last);
     for (; first_record <= n; ++first_record) keys[first_record] = splat.first;

@@ -7,7 +7,7 @@
 //
 //   key in a tile = key + slope · (the tile's middle - the splat's centre), no less than `first`
 //
-// Keys are integers that increase in drawing order (depth_sort.h). Splats with equal keys in a tile come by
+// Keys are integers below 2^31 that increase in drawing order (depth_sort.h). Splats with equal keys in a tile come by
 // `first`, then by brick, then by number: in the order in which the sweep releases them, which is that of
 // `first`. All that a tile's order depends on is the splats themselves.
 #pragma once
@@ -35,23 +35,61 @@ inline bool leans(const ScreenSplat& splat) {
   return splat.key_slope0 != 0 || splat.key_slope1 != 0;
 }
 
+/// Keys that a tile may lie from a splat's own, at the most: all there are (DepthKeys).
+inline constexpr float kMostSteps = 0x1p30f;
+
 /// The splat's key in the tile with its middle at (x, y).
 inline uint32_t keyAt(const ScreenSplat& splat, float x, float y) {
   const float moved = splat.key_slope0 * (x - splat.x) + splat.key_slope1 * (y - splat.y);
-  constexpr float kMaxSteps = 0x1p32f;  // steps: all there are
-  const float held = !(moved > -kMaxSteps) ? -kMaxSteps : moved > kMaxSteps ? kMaxSteps : moved;
-  const int64_t key = int64_t{splat.key} + static_cast<int64_t>(held);
-  if (key < int64_t{splat.first}) return splat.first;
-  return static_cast<uint32_t>(std::min(key, int64_t{UINT32_MAX - 1}));
+  const float held = std::clamp(moved, -kMostSteps, kMostSteps);
+  const int32_t key = static_cast<int32_t>(splat.key) + static_cast<int32_t>(held);
+  return static_cast<uint32_t>(std::max(key, static_cast<int32_t>(splat.first)));
 }
 
-/// How much before its centre's key a splat may come in any tile that it touches. In steps.
+/// The order tiles along one side that a splat's rectangle touches: numbers, the last included.
+struct OrderTileSpan {
+  float first, last;
+
+  /// `centre`, `reach`: pixels.
+  static OrderTileSpan of(float centre, float reach) {
+    constexpr float kPerPixel = 1.0f / kOrderSide;
+    return {std::floor((centre - reach) * kPerPixel), std::floor((centre + reach) * kPerPixel)};
+  }
+  /// The least that `slope` adds from `centre` to the middle of one of them.
+  float least(float centre, float slope) const {
+    constexpr float kHalf = 0.5f * kOrderSide;
+    return std::min(slope * (first * kOrderSide + kHalf - centre),
+                    slope * (last * kOrderSide + kHalf - centre));
+  }
+};
+
+/// How much before its centre's key a splat may come in any tile that its ellipse touches. In steps.
 inline float mostBefore(const ScreenSplat& splat) {
   constexpr auto kSupport = static_cast<float>(kKernelSupport);
   const float across = splat.l11 * splat.key_slope0 + splat.l21 * splat.key_slope1;
   const float down = splat.l22 * splat.key_slope1;
   return kSupport * std::sqrt(across * across + down * down) +
          0.5f * kOrderSide * (std::abs(splat.key_slope0) + std::abs(splat.key_slope1)) + 1;
+}
+
+/// Sets `first` of a splat with all other members set. One that touches a single tile does not lean: it gets the key that
+/// it has there.
+inline void setFirst(ScreenSplat& splat) {
+  splat.first = splat.key;
+  if (!leans(splat)) return;
+  constexpr auto kSupport = static_cast<float>(kKernelSupport);
+  const auto columns = OrderTileSpan::of(splat.x, kSupport * splat.l11);
+  const auto rows =
+      OrderTileSpan::of(splat.y, kSupport * std::sqrt(splat.l21 * splat.l21 + splat.l22 * splat.l22));
+  const float least = columns.least(splat.x, splat.key_slope0) + rows.least(splat.y, splat.key_slope1);
+  const float before = std::min(1 - least, mostBefore(splat));
+  if (before > 0)
+    splat.first -= std::min(splat.key, static_cast<uint32_t>(std::min(before, 0x1p31f)));
+  else
+    splat.first += static_cast<uint32_t>(std::min(0x1p30f, -before));
+  if (columns.first != columns.last || rows.first != rows.last) return;
+  splat.key = splat.first;
+  splat.key_slope0 = splat.key_slope1 = 0;
 }
 
 }  // namespace curvisplat

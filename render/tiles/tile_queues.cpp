@@ -9,10 +9,10 @@ namespace curvisplat {
 namespace {
 
 // A tile is painted when this many new splats have come, or a share of what waits: what waits is looked at each time.
-constexpr size_t kWorthPainting = 192, kShareOfWaiting = 2;
+constexpr size_t kWorthPainting = 1024, kShareOfWaiting = 1;
 // Splats that are prepared and sorted together; more would not stay in a core's cache.
-constexpr size_t kRound = 512;
-constexpr uint32_t kNothingLeft = UINT32_MAX;  // keys are smaller
+constexpr size_t kRound = 2048;
+constexpr uint32_t kLastKey = INT32_MAX;
 // Of a thread: a round, the splats that wait in a tile, and what the painter prepares of them.
 constexpr uint64_t kScratchBytes = 1 << 20;
 
@@ -23,16 +23,13 @@ uint32_t recordsBefore(std::span<const ScreenSplat> splats, uint32_t splat) {
   return records;
 }
 
-struct OrderTileRange {
-  int first, last;
-};
-
-/// Those along a tile that pixels from .. to may lie in, which count from the tile's edge.
-OrderTileRange orderTilesAlong(float from, float to) {
-  constexpr float kPerPixel = 1.0f / kOrderSide;
-  if (!(to >= 0 && from <= kTileSide)) return {0, -1};
-  return {static_cast<int>(std::max(from, 0.0f) * kPerPixel),
-          static_cast<int>(std::min(to * kPerPixel, kOrderTilesAlong - 1.0f))};
+// A tile's splats come from anywhere in the batch.
+constexpr size_t kAhead = 16;
+[[gnu::always_inline]] inline void prefetch(const TileQueues::New& added, size_t entry) {  // a call would be left out
+  if (entry >= added.entries.size()) return;
+  const ScreenSplat* const splat = &added.splats[added.entries[entry]];
+  __builtin_prefetch(splat);
+  __builtin_prefetch(splat - 1);
 }
 
 }  // namespace
@@ -41,14 +38,14 @@ TileQueues::TileQueues(ImageSize size, size_t splats)
     : columns_(TileSet::tilesAlong(size.width)),
       queues_(TileSet::tilesOf(size)),
       memory_(std::make_unique_for_overwrite<ScreenSplat[]>((splats + kChunk - 1) / kChunk * kChunk)),
-      next_(std::make_unique_for_overwrite<uint32_t[]>((splats + kChunk - 1) / kChunk * kChunk)),
+      left_(std::make_unique_for_overwrite<OrderTileMask[]>((splats + kChunk - 1) / kChunk * kChunk)),
       free_count_(0),
       chunks_((splats + kChunk - 1) / kChunk) {
   clear();
 }
 
 uint64_t TileQueues::bytes(ImageSize size, size_t splats, unsigned threads) {
-  return (splats + kChunk) * (sizeof(ScreenSplat) + sizeof(uint32_t)) +
+  return (splats + kChunk) * (sizeof(ScreenSplat) + sizeof(OrderTileMask)) +
          TileSet::tilesOf(size) * sizeof(Queue) + threads * kScratchBytes;
 }
 
@@ -61,7 +58,7 @@ void TileQueues::clear() {
   full_ = false;
 }
 
-void TileQueues::append(Queue& queue, std::span<const ScreenSplat> splats, uint32_t next) {
+void TileQueues::append(Queue& queue, std::span<const ScreenSplat> splats, OrderTileMask left) {
   for (const ScreenSplat& splat : splats) {
     if (queue.count == queue.chunks.size() * kChunk) {
       const MutexLock lock(mutex_);
@@ -75,7 +72,7 @@ void TileQueues::append(Queue& queue, std::span<const ScreenSplat> splats, uint3
     }
     const size_t place = queue.chunks[queue.count / kChunk] * kChunk + queue.count % kChunk;
     memory_[place] = splat;
-    next_[place] = next;
+    left_[place] = left;
     ++queue.count;
   }
 }
@@ -85,19 +82,26 @@ void TileQueues::free(Queue& queue) {
   free_.insert(free_.end(), queue.chunks.begin(), queue.chunks.end());
   free_count_.store(free_.size(), std::memory_order_relaxed);
   queue.chunks.clear();
-  queue.count = queue.seen = 0;
+  queue.count = queue.looked_at = 0;
+}
+
+TileCorner TileQueues::cornerOf(size_t number) const {
+  return {static_cast<float>(static_cast<int>(number) % columns_ * kTileSide),
+          static_cast<float>(static_cast<int>(number) / columns_ * kTileSide)};
 }
 
 /// Moves what waits into the scratch memory.
-void TileQueues::load(Queue& queue, Scratch& scratch) {
+void TileQueues::load(Queue& queue, const TileCorner& corner, Scratch& scratch) {
   for (uint32_t n = 0, records = 0; n < queue.count; ++n) {
     const size_t place = queue.chunks[n / kChunk] * kChunk + n % kChunk;
-    scratch.splats.push_back(memory_[place]);
-    if (isRecord(scratch.splats.back())) {
+    const ScreenSplat& splat = memory_[place];
+    scratch.splats.push_back(splat);
+    if (isRecord(splat)) {
       ++records;
       continue;
     }
-    scratch.active.push_back({n, records, next_[place], n < queue.seen});
+    const OrderTileMask left = left_[place];
+    scratch.active.push_back({n, records, left == kUnknown ? orderTilesOf(corner, splat) : left});
     records = 0;
   }
   free(queue);
@@ -105,61 +109,19 @@ void TileQueues::load(Queue& queue, Scratch& scratch) {
 
 void TileQueues::store(Queue& queue, const Scratch& scratch) {
   for (const Active& active : scratch.active)
-    append(queue, {&scratch.splats[active.splat - active.records], active.records + size_t{1}}, active.next);
-  queue.seen = queue.count;
+    append(queue, {&scratch.splats[active.splat - active.records], active.records + size_t{1}}, active.left);
+  queue.looked_at = queue.count;
 }
 
-/// Lists what lies up to the front and has not been painted, and keeps in `active` what has more behind it.
-void TileQueues::listTile(size_t number, uint32_t painted, uint32_t front, uint64_t open,
-                          Scratch& scratch) const {
-  const auto left = static_cast<float>(static_cast<int>(number) % columns_ * kTileSide);
-  const auto top = static_cast<float>(static_cast<int>(number) / columns_ * kTileSide);
-  for (OrderList& list : scratch.lists) list.clear();
-  scratch.order.clear();
-  scratch.by_middle.clear();
-  constexpr float kMiddle = 0.5f * kTileSide;
-  for (const Active& active : scratch.active) {
-    const uint64_t key = keyAt(scratch.splats[active.splat], left + kMiddle, top + kMiddle);
-    scratch.by_middle.push_back(key << 32 | scratch.order.size());
-    scratch.order.push_back(active.splat);
+/// Lists what lies up to the front, and keeps in `active` what has more behind it.
+void TileQueues::listActive(uint32_t front, OrderTileMask open, Scratch& scratch) {
+  for (Active& active : scratch.active) {
+    const ScreenSplat& splat = scratch.splats[active.splat];
+    active.left &= open;
+    if (splat.first <= front) active.left = scratch.lists.add(splat, active.splat, active.left, front);
   }
-  // Layers have one order over all of the tile as a rule; the lists are then sorted as they are filled.
-  std::sort(scratch.by_middle.begin(), scratch.by_middle.end());
-  for (const uint64_t item : scratch.by_middle) {
-    const auto index = static_cast<uint32_t>(item);
-    Active& active = scratch.active[index];
-    if (active.next <= front) active.next = listSplat({left, top}, painted, {front, open, index}, scratch);
-    active.seen = true;
-  }
-  for (OrderList& list : scratch.lists)
-    if (!std::is_sorted(list.begin(), list.end())) std::sort(list.begin(), list.end());
-  std::erase_if(scratch.active, [](const Active& active) { return active.next == kNothingLeft; });
-}
-
-/// Of one splat. Returns the first key behind the front.
-uint32_t TileQueues::listSplat(const Corner& corner, uint32_t painted, const Listed& listed,
-                               Scratch& scratch) {
-  constexpr auto kSupport = static_cast<float>(kKernelSupport);
-  constexpr float kHalf = 0.5f * kOrderSide;
-  const Active& active = scratch.active[listed.index];
-  const ScreenSplat& splat = scratch.splats[active.splat];
-  const float reach_x = kSupport * splat.l11;
-  const float reach_y = kSupport * std::sqrt(splat.l21 * splat.l21 + splat.l22 * splat.l22);
-  const OrderTileRange columns = orderTilesAlong(splat.x - reach_x - corner.x, splat.x + reach_x - corner.x);
-  const OrderTileRange rows = orderTilesAlong(splat.y - reach_y - corner.y, splat.y + reach_y - corner.y);
-  uint32_t next = kNothingLeft;
-  for (int row = rows.first; row <= rows.last; ++row)
-    for (int column = columns.first; column <= columns.last; ++column) {
-      const int tile = row * kOrderTilesAlong + column;
-      if (!(listed.open >> tile & 1)) continue;
-      const uint32_t key = keyAt(splat, corner.x + static_cast<float>(column * kOrderSide) + kHalf,
-                                 corner.y + static_cast<float>(row * kOrderSide) + kHalf);
-      if (key > listed.front)
-        next = std::min(next, key);
-      else if (!active.seen || key > painted)
-        scratch.lists[static_cast<size_t>(tile)].push_back(uint64_t{key} << 32 | listed.index);
-    }
-  return next;
+  scratch.lists.end();
+  std::erase_if(scratch.active, [](const Active& active) { return active.left == 0; });
 }
 
 void TileQueues::paint(size_t number, const New& added, uint64_t open, const Paint& paint) {
@@ -172,35 +134,40 @@ void TileQueues::paint(size_t number, const New& added, uint64_t open, const Pai
     if (!entries.empty()) paint({added.splats, entries});
     return;
   }
-  const size_t fresh = queue.count - queue.seen + entries.size();
+  const size_t fresh = queue.count - queue.looked_at + entries.size();
   const bool has_space = free_count_.load(std::memory_order_relaxed) > chunks_ / 4;
-  if (!added.last && has_space && fresh < std::max(kWorthPainting, queue.seen / kShareOfWaiting)) {
-    for (const uint32_t n : entries) {
+  if (!added.last && has_space && fresh < std::max(kWorthPainting, queue.looked_at / kShareOfWaiting)) {
+    for (size_t entry = 0; entry < entries.size(); ++entry) {
+      prefetch(added, entry + kAhead);
+      const uint32_t n = entries[entry];
       const uint32_t records = recordsBefore(added.splats, n);
-      append(queue, added.splats.subspan(n - records, records + size_t{1}), added.splats[n].first);
+      append(queue, added.splats.subspan(n - records, records + size_t{1}), kUnknown);
     }
     return;
   }
   Scratch& scratch = scratch_.local();
   scratch.splats.clear();
   scratch.active.clear();
-  load(queue, scratch);
+  const TileCorner corner = cornerOf(number);
+  load(queue, corner, scratch);
   size_t next = 0;
   do {
     const size_t worth = std::max(kRound, scratch.active.size() / kShareOfWaiting);
     for (size_t round = 0; round < worth && next < entries.size(); ++round, ++next) {
+      prefetch(added, next + kAhead);
       const uint32_t splat = entries[next], records = recordsBefore(added.splats, splat);
       scratch.splats.insert(scratch.splats.end(), added.splats.begin() + (splat - records),
                             added.splats.begin() + splat + 1);
-      scratch.active.push_back(
-          {static_cast<uint32_t>(scratch.splats.size() - 1), records, added.splats[splat].first, false});
+      scratch.active.push_back({static_cast<uint32_t>(scratch.splats.size() - 1), records,
+                                orderTilesOf(corner, added.splats[splat])});
     }
     const uint32_t front = next < entries.size() ? added.splats[entries[next]].first
-                           : added.last          ? UINT32_MAX
+                           : added.last          ? kLastKey
                                                  : added.front;
-    listTile(number, queue.painted, front, open, scratch);
-    if (!scratch.order.empty()) open = paint({scratch.splats, scratch.order, &scratch.lists});
-    queue.painted = front;
+    scratch.lists.begin(corner);
+    listActive(front, open, scratch);
+    if (!scratch.lists.order().empty())
+      open = paint({scratch.splats, scratch.lists.order(), &scratch.lists.lists()});
   } while (next < entries.size() && open != 0);
   if (open != 0) store(queue, scratch);
 }

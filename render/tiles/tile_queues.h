@@ -25,18 +25,11 @@
 #include <vector>
 
 #include "render/project/screen_splat.h"
-#include "render/project/tile_key.h"
 #include "render/project/tile_set.h"
+#include "render/tiles/tile_lists.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {
-
-/// Along a painter's tile, and in it; row by row.
-inline constexpr int kOrderTilesAlong = kTileSide / kOrderSide;
-inline constexpr size_t kOrderTiles = size_t{kOrderTilesAlong} * kOrderTilesAlong;
-
-/// Splats of one order tile as they are to be painted: key << 32 | index into OrderedTile::order.
-using OrderList = std::vector<uint64_t>;
 
 /// What is to be painted of a tile.
 struct OrderedTile {
@@ -74,45 +67,34 @@ class TileQueues {
 
  private:
   static constexpr size_t kChunk = 32;  // splats and records
+  static constexpr OrderTileMask kUnknown = 0;
 
   struct Queue {
     std::vector<uint32_t> chunks;
-    uint32_t count = 0, seen = 0;  // splats and records; of these, how many have been painted up to `painted`
-    uint32_t painted = 0;          // the last key
+    uint32_t count = 0, looked_at = 0;  // splats and records; of these, how many were there when the tile was last painted
   };
   struct Active {
-    uint32_t splat;    // in Scratch::splats; its records lie before it
-    uint32_t records;  // how many
-    uint32_t next;     // the first key that has not been painted, or one before it
-    bool seen;
+    uint32_t splat;      // in Scratch::splats; its records lie before it
+    uint32_t records;    // how many
+    OrderTileMask left;  // where it has not been painted
   };
   struct Scratch {
     std::vector<ScreenSplat> splats;
     std::vector<Active> active;
-    std::vector<uint32_t> order;      // of `splats`: all of `active`
-    std::vector<uint64_t> by_middle;  // the same as those of an OrderList, by the keys in the tile's middle
-    std::array<OrderList, kOrderTiles> lists;
+    TileLists lists;
   };
 
-  void load(Queue& queue, Scratch& scratch);
+  TileCorner cornerOf(size_t number) const;
+  void load(Queue& queue, const TileCorner& corner, Scratch& scratch);
   void store(Queue& queue, const Scratch& scratch);
-  void append(Queue& queue, std::span<const ScreenSplat> splats, uint32_t next);
+  void append(Queue& queue, std::span<const ScreenSplat> splats, OrderTileMask left);
   void free(Queue& queue);
-  void listTile(size_t number, uint32_t painted, uint32_t front, uint64_t open, Scratch& scratch) const;
-  struct Corner {
-    float x, y;
-  };
-  struct Listed {
-    uint32_t front;
-    uint64_t open;
-    uint32_t index;  // in Scratch::active
-  };
-  static uint32_t listSplat(const Corner& corner, uint32_t painted, const Listed& listed, Scratch& scratch);
+  static void listActive(uint32_t front, OrderTileMask open, Scratch& scratch);
 
   const int columns_;
   std::vector<Queue> queues_;  // [tile]
   std::unique_ptr<ScreenSplat[]> memory_;
-  std::unique_ptr<uint32_t[]> next_;  // of each splat in memory_: Active's
+  std::unique_ptr<OrderTileMask[]> left_;  // of each splat in memory_: Active's; kUnknown of those that no tile has looked at
   Mutex mutex_;
   std::vector<uint32_t> free_ GUARDED_BY(mutex_);  // chunks
   std::atomic<size_t> free_count_;

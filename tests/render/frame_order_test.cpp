@@ -1,5 +1,6 @@
-// All splats of a frame are drawn in one order of depth, whatever the view, the level of detail, the memory
-// and the threads: bit for bit as if they were sorted all together.
+// The splats of each order tile are drawn in one order, whatever the view, the level of detail, the memory and the threads:
+// bit for bit as if those that touch it were sorted all together. OpenGL's painter draws fewer cases: it takes a hundred
+// times as long on the processor, and what brings splats into their order is shared (render/tiles).
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -102,7 +103,7 @@ TEST_P(FrameOrderTest, IsThatOfOneSortInAnyView) {
          {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(1, 0.0017, 0.001),
           glm::dvec3(0.01, 1, 0.014), glm::dvec3(0.04, 0.03, -1), glm::dvec3(0.6, 0.64, 0.48)})
       cameras.push_back(looking(*cache, glm::normalize(direction)));
-    if (GetParam() == Backend::kEgl) cameras.resize(2);
+    if (GetParam() != Backend::kCpu) cameras.resize(2);
     for (size_t n = 0; n < cameras.size(); ++n) {
       FrameStatistics statistics;
       const Image image = renderer.render(cameras[n], options(), statistics);
@@ -116,9 +117,12 @@ TEST_P(FrameOrderTest, IsThatOfOneSortInAnyView) {
 }
 
 TEST_P(FrameOrderTest, IsThatOfOneSortAtAnyLevelAndWithPartsOfBricks) {
+  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
   const TransferFunction transfer_function = function(*scene_);
   FrameRenderer renderer(*scene_, 0, transfer_function, GetParam());
-  for (const Camera& camera : {looking(*scene_, {0, 1, 0}), inside(*scene_)})
+  std::vector<Camera> cameras{inside(*scene_)};
+  if (GetParam() == Backend::kCpu) cameras.push_back(looking(*scene_, {0, 1, 0}));
+  for (const Camera& camera : cameras)
     for (const auto& [lod_pixels, limit] :
          {std::pair{2.0, 1'000'000u}, std::pair{8.0, 1'000'000u}, std::pair{0.0, 123'456u}}) {
       FrameOptions wanted = options(lod_pixels);
@@ -141,6 +145,7 @@ TEST_P(FrameOrderTest, IsThatOfOneSortInAnyMemoryWithAnyThreads) {
       const uint64_t least = leastMemory(renderer, camera, options());
       for (const uint64_t memory : {least, least + (3 << 20), least + (40 << 20)})
         for (const unsigned threads : {1u, 3u}) {
+          if (GetParam() != Backend::kCpu && (memory != least || threads == 1)) continue;
           FrameOptions wanted = options();
           wanted.memory_bytes = memory;
           wanted.threads = threads;

@@ -32,7 +32,7 @@ std::vector<ScreenSplat> leaningSplats(int count, uint32_t seed) {
       splat.key_slope0 = 300 * around(random);
       splat.key_slope1 = 300 * around(random);
     }
-    splat.first = splat.key - static_cast<uint32_t>(leans(splat) ? mostBefore(splat) : 0);
+    setFirst(splat);
     splats.push_back(splat);
   }
   std::stable_sort(splats.begin(), splats.end(),
@@ -84,7 +84,7 @@ Orders ordersOf(TileQueues& queues, std::span<const ScreenSplat> splats, const s
                          for (const uint32_t n : tile.order) note(orders, place, &tile.splats[n]);
                        else
                          for (const uint64_t item : (*tile.lists)[of_tile])
-                           note(orders, place, &tile.splats[tile.order[static_cast<uint32_t>(item)]]);
+                           note(orders, place, &tile.splats[tile.order[numberOf(item)]]);
                      }
                      return TileQueues::kAllOpen;
                    });
@@ -101,7 +101,18 @@ Orders ordersOf(TileQueues& queues, std::span<const ScreenSplat> splats, const s
   return orders;
 }
 
-/// Those that a tile's list must have: that touch the order tile by their rectangles.
+/// Whether a pixel of the order tile with this first pixel has its centre in the splat's ellipse.
+bool touches(const ScreenSplat& splat, float x, float y) {
+  for (int pixel = 0; pixel < kOrderSide * kOrderSide; ++pixel) {
+    const float dx = x + static_cast<float>(pixel % kOrderSide) + 0.5f - splat.x;
+    const float dy = y + static_cast<float>(pixel / kOrderSide) + 0.5f - splat.y;
+    const float u = dx / splat.l11, v = (dy - splat.l21 * u) / splat.l22;
+    if (u * u + v * v < kKernelSupport * kKernelSupport) return true;
+  }
+  return false;
+}
+
+/// Those that a tile's list must have.
 Orders specifiedFor(std::span<const ScreenSplat> splats) {
   Orders orders;
   const int columns = TileSet::tilesAlong(kSize.width);
@@ -112,16 +123,10 @@ Orders specifiedFor(std::span<const ScreenSplat> splats) {
       const float y = static_cast<float>(static_cast<int>(number) / columns * kTileSide +
                                          static_cast<int>(of_tile) / kOrderTilesAlong * kOrderSide);
       std::vector<std::tuple<uint32_t, int>> sorted;
-      for (const ScreenSplat& splat : splats) {
-        if (isRecord(splat)) continue;
-        const float reach_x = static_cast<float>(kKernelSupport) * splat.l11;
-        const float reach_y = static_cast<float>(kKernelSupport) * std::hypot(splat.l21, splat.l22);
-        if (splat.x + reach_x < x || splat.x - reach_x >= x + kOrderSide || splat.y + reach_y < y ||
-            splat.y - reach_y >= y + kOrderSide)
-          continue;
-        sorted.emplace_back(keyAt(splat, x + 0.5f * kOrderSide, y + 0.5f * kOrderSide),
-                            static_cast<int>(splat.mean));
-      }
+      for (const ScreenSplat& splat : splats)
+        if (!isRecord(splat) && touches(splat, x, y))
+          sorted.emplace_back(keyAt(splat, x + 0.5f * kOrderSide, y + 0.5f * kOrderSide),
+                              static_cast<int>(splat.mean));
       std::sort(sorted.begin(), sorted.end());
       for (const auto& [key, splat] : sorted) orders[number << 8 | of_tile].push_back(splat);
     }
