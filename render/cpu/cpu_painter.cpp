@@ -237,8 +237,8 @@ void CpuPainter::State::paintTiles(bool last) {
     if (stop.stop_requested()) return;
     const size_t number = touched[n];
     const BlockMask before = open[number].load(std::memory_order_relaxed);
-    queues->paint(number, {bins->splats(), bins->tile(static_cast<int>(number)), front, last},
-                  before, [&](const OrderedTile& ordered) { return paintOrdered(number, ordered); });
+    queues->paint(number, {bins->splats(), bins->tile(static_cast<int>(number)), front, last}, before,
+                  [&](const OrderedTile& ordered) { return paintOrdered(number, ordered); });
     if (before != 0 && open[number].load(std::memory_order_relaxed) == 0)
       bins->close(static_cast<int>(number));
   });

@@ -258,8 +258,7 @@ HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number,
   if (work.shading.per_pixel)
     scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
   // On a logarithmic scale there is no bound of what a narrower distribution sees.
-  out.fit =
-      work.table.logScale() && work.shading.per_pixel ? kOther : static_cast<Fit>(visit.fit());
+  out.fit = work.table.logScale() && work.shading.per_pixel ? kOther : static_cast<Fit>(visit.fit());
   if (out.fit == kOther) return;
   const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
   out.shade = {shadeOf(visit.fits, visit.n), inverse * out.faces.mean_per_deviation * ScreenCut::kReach};

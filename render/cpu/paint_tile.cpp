@@ -207,7 +207,6 @@ BlockMask paintInOrder(const TileWork& work) {
   return open;
 }
 
-
 /// Splats that are painted one block at a time, by the lists of the blocks. Each is prepared when it is first needed, with
 /// its fifteen neighbours.
 class Listed {
@@ -241,7 +240,8 @@ class Listed {
         if (ways_[numberOf(some[n])] == kPlain) {
           if (paintPlains(some, n, block)) return true;
         } else {
-          const bool is_looked_up = ways_[numberOf(some[n])] == kPixels || ways_[numberOf(some[n])] == kCutPixels;
+          const bool is_looked_up =
+              ways_[numberOf(some[n])] == kPixels || ways_[numberOf(some[n])] == kCutPixels;
           if (is_looked_up ? found[n] && paintFound(looked_up[n], numberOf(some[n]), block)
                            : paintOther(numberOf(some[n]), block))
             return true;
@@ -331,7 +331,8 @@ class Listed {
     for (size_t n = 0; n < group.count; ++n) {
       const Visit visit{group.visits, group.fits, n};
       const BlockMask touched = group.touched(n);
-      ways_[begin + n] = touched == 0 ? kNoWay : make(visit, touched, static_cast<size_t>(group.numbers.at[n]), begin + n);
+      ways_[begin + n] =
+          touched == 0 ? kNoWay : make(visit, touched, static_cast<size_t>(group.numbers.at[n]), begin + n);
     }
   }
 
@@ -360,9 +361,9 @@ class Listed {
   const TileWork& work_;
   const float* const footprint_ = footprintPolynomial();
   Prepared group_;
-  std::vector<Way> ways_;                          // [splat]
-  hwy::AlignedFreeUniquePtr<Plain[]> plains_;      // [splat], of those that are
-  std::vector<uint32_t> others_;                   // [splat] in one of the following
+  std::vector<Way> ways_;                      // [splat]
+  hwy::AlignedFreeUniquePtr<Plain[]> plains_;  // [splat], of those that are
+  std::vector<uint32_t> others_;               // [splat] in one of the following
   std::vector<LineSplat> lines_;
   std::vector<PixelwiseSplat> pixelwise_;
   std::vector<CutSplat> cuts_;

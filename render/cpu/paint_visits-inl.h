@@ -102,8 +102,8 @@ HWY_INLINE V hidesItself(const TileWork& work, V cell_depth, V along) {
                  hn::Min(hn::Mul(tau, hn::Set(d, 1.0f / 6)), hn::Set(d, 1.0f)));
 }
 
-// In cells of the table: what is seen of splats with less is not worth the work. A 500th of the function.
-constexpr float kHidingCells = 8;
+// In cells of the table: what is seen of splats with less is not worth the work: a 250th of the function.
+constexpr float kHidingCells = 16;
 
 /// From the splats with these numbers.
 HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {

@@ -342,8 +342,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
 Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
                            const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
   Image image;
-  const size_t waiting =
-      painting_ == backend_.get() ? pools_->budget.waiting_splats : aside_waiting_splats_;
+  const size_t waiting = painting_ == backend_.get() ? pools_->budget.waiting_splats : aside_waiting_splats_;
   painting_->run([&](Painter& painter) {
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
                   {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers,

@@ -96,7 +96,7 @@ void main() {
   float cells_a_scalar = abs(cells_from_scalar.x) / (log_scale ? max(abs(scalar.x), 1e-37) : 1.0);
   float of_colour = 1.7320508 * abs(colour1.y) * min(1.0, cell_depth * most_extinction / 6.0);
   float cells_a_colour = abs(cells_from_colour.x) / (colour_log_scale ? max(abs(colour.x), 1e-37) : 1.0);
-  hiding = vec3(nearer * cells_a_scalar > 8.0 ? along_ray : 0.0, of_colour * cells_a_colour > 8.0 ? colour1.y : 0.0,
+  hiding = vec3(nearer * cells_a_scalar > 16.0 ? along_ray : 0.0, of_colour * cells_a_colour > 16.0 ? colour1.y : 0.0,
                 cell_depth);
   // The ellipse's own rectangle, within the pixels that it is clipped to.
   vec2 reach = support * vec2(part0.z, length(vec2(part0.w, part1.x)));

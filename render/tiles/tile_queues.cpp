@@ -25,7 +25,8 @@ uint32_t recordsBefore(std::span<const ScreenSplat> splats, uint32_t splat) {
 
 // A tile's splats come from anywhere in the batch.
 constexpr size_t kAhead = 16;
-[[gnu::always_inline]] inline void prefetch(const TileQueues::New& added, size_t entry) {  // a call would be left out
+[[gnu::always_inline]] inline void prefetch(const TileQueues::New& added,
+                                            size_t entry) {  // a call would be left out
   if (entry >= added.entries.size()) return;
   const ScreenSplat* const splat = &added.splats[added.entries[entry]];
   __builtin_prefetch(splat);
