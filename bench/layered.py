@@ -6,6 +6,8 @@
 slab            cells 24 to 480 times as wide as thick, f = 0 to 1 from the bottom to the top, optical depth 3 across, seen from above to 80
                 degrees, by parallel rays and in perspective; grey values of the middle of the picture
 levels          the slab of 256 x 256 x 64 nodes at 0, 4 and 16 pixels
+ocean           a patch of a sphere, 16 layers, a thousandth of the radius deep, f and the optical depth as the slab's, where it is seen
+                at 0, 30, 60 and 70 degrees; cells of one degree, and of a quarter
 boundary layer  half a cylinder, 21 layers within 0.04 of the wall (1e-4 to 9e-3 thick), f = 1 - sqrt(distance / 0.04), by the functions
                 "smooth" and "band" of bench/fidelity per 0.02 of length; from the front, obliquely, and from the top
 
@@ -125,6 +127,32 @@ def slabs(program, judge, quick):
             judge.compare(f"levels, {degrees} degrees, {level} pixels", *draw_slab(program, 0.02, degrees, level, False))
 
 
+def oceans(program, judge):
+    for nodes in ((161, 41, 16), (641, 161, 16)):
+        ocean(program, judge, nodes)
+
+
+def ocean(program, judge, nodes):
+    """From the equator, where the eye is: a point at a longitude is seen at that angle."""
+    depth, pixels, half = 1e-3, 300, 1.05
+    i, j, k = np.meshgrid(*(np.linspace(0, 1, n) for n in nodes), indexing="ij")
+    longitude, latitude, radius = math.pi * 0.9 * (i - 0.5), 0.8 * (j - 0.5), 1 - depth * (1 - k)
+    at = [radius * np.cos(latitude) * np.cos(longitude), radius * np.cos(latitude) * np.sin(longitude), radius * np.sin(latitude)]
+    program.convert("ocean", *at, k)
+    picture = program.render(
+        "ocean", "--size", f"{pixels}x{pixels}", "--position", "4,0,0", "--focal-point", "0,0,0", "--view-up", "0,0,1",
+        "--parallel-scale", repr(half), "--background", "black", "--range", "0,1", "--opacity", "0:0.5,1:0.5", "--opacity-unit",
+        repr(math.log(2) * depth / CROSS), "--tf", "grey", "--lod-pixels", "0")
+    across = ((np.arange(pixels) + 0.5) / pixels * 2 - 1) * half
+    rows = slice(148, 152)
+    for degrees in (0, 30, 60, 70):
+        what = f"ocean, cells of {162 / (nodes[0] - 1):.2g} degrees, {degrees} degrees"
+        columns = np.abs(across - math.sin(math.radians(degrees))) < 0.015
+        if judge.wants(what):
+            y, z = np.meshgrid(across[columns], across[rows])
+            judge.compare(what, picture[rows][:, columns, 0].ravel(), seen_of_slab(np.sqrt(1 - y**2 - z**2).ravel()))
+
+
 LENGTH, HALF = 0.02, 0.7  # of the functions; the camera's parallel scale
 FUNCTIONS = {"smooth": lambda f: 8 * f * f, "band": lambda f: 24 * np.exp(-((f - 0.5) ** 2) / 0.0018)}
 
@@ -195,6 +223,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         program, judge = Program(options.program, pathlib.Path(folder), options.backend), Judge(options.only)
         slabs(program, judge, options.quick)
+        if not options.quick:
+            oceans(program, judge)
         if not options.quick and judge.wants("boundary layer"):
             boundary_layers(program, judge)
     print(f"worst mean error {judge.worst:.4f}")

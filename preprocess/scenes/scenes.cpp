@@ -46,6 +46,12 @@ double boundaryLayer(const glm::dvec3& p) {
          std::exp(-square((std::hypot(p.x, p.y) - 0.3) / 0.004));
 }
 
+// 1 at the wall, and 0 where the layers end; steepest at the wall.
+constexpr double kLayersWall = 0.96;
+double wallLayers(const glm::dvec3& p) {
+  return 1 - std::sqrt(std::clamp((std::hypot(p.x, p.y) - kLayersWall) / (1 - kLayersWall), 0.0, 1.0));
+}
+
 // The pipe scenes: an annulus around the z axis, or half of it, whose floor waves with the angle.
 class Pipe : public Scene {
  public:
@@ -92,6 +98,54 @@ class Pipe : public Scene {
   PipeShape shape_;
   double growth_;
   Field field_;
+};
+
+// A sixth of a sphere's surface, as thin as an ocean is: a thousandth of the radius. u runs to the east, v down, w to the north.
+class Ocean : public Scene {
+ public:
+  Ocean(std::string name, double clustering)
+      : Scene(std::move(name)), clustering_(clustering), growth_(std::expm1(clustering)) {}
+
+  glm::dvec3 alongU(double u) const override {
+    const double longitude = kReach * (2 * u - 1);
+    return {std::cos(longitude), std::sin(longitude), 1};
+  }
+  glm::dvec3 alongV(double v) const override {
+    return glm::dvec3(1 - kDepth * std::expm1(clustering_ * v) / growth_);
+  }
+  glm::dvec3 alongW(double w) const override {
+    const double latitude = kReach * (2 * w - 1);
+    return {std::cos(latitude), std::cos(latitude), std::sin(latitude)};
+  }
+  glm::dvec3 join(const glm::dvec3& of_u, const glm::dvec3& of_v, const glm::dvec3& of_w) const override {
+    return of_u * of_v * of_w;
+  }
+  std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
+    const double u = 0.5 + 0.5 * std::atan2(world.y, world.x) / kReach, depth = depthOf(world);
+    const double w = 0.5 + 0.5 * std::atan2(world.z, std::hypot(world.x, world.y)) / kReach;
+    if (!inUnitInterval(u) || !inUnitInterval(depth) || !inUnitInterval(w)) return std::nullopt;
+    return glm::dvec3(u, std::log1p(depth * growth_) / clustering_, w);
+  }
+  // A temperature: warm at the surface and towards the equator, cold below the thermocline.
+  double scalar(const glm::dvec3& world) const override {
+    const double radius = glm::length(world), north = world.z / radius;
+    return std::clamp((1 - square(north)) * std::exp(-5 * std::max(depthOf(world), 0.0)), 0.0, 1.0);
+  }
+  std::pair<glm::dvec3, glm::dvec3> bounds() const override {
+    const double side = std::sin(kReach);
+    return {{(1 - kDepth) * square(std::cos(kReach)), -side, -side}, {1, side, side}};
+  }
+  double volume() const override {
+    return 2 * kReach * 2 * std::sin(kReach) * (1 - std::pow(1 - kDepth, 3)) / 3;
+  }
+
+ private:
+  static constexpr double kReach = pi / 3, kDepth = 1e-3;
+
+  // 0 at the surface, 1 at the bottom.
+  static double depthOf(const glm::dvec3& world) { return (1 - glm::length(world)) / kDepth; }
+
+  double clustering_, growth_;
 };
 
 // A parallelepiped of strongly sheared cells. The scalar is that of Marschner and Lobb, "An Evaluation of
@@ -261,7 +315,8 @@ std::vector<std::string> sceneNames() {
           "axis",         "sheared-waves",
           "wake",         "spectral",
           "dome",         "globe",
-          "duct"};
+          "duct",         "boundary-layer",
+          "ocean"};
 }
 
 std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
@@ -279,6 +334,8 @@ std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
   if (name == "axis") return pipe(1, 0, 1, halfAnnulusField);
   if (name == "wake") return {std::make_shared<Wake>(std::string(name), clustering.value_or(9))};
   if (name == "dome") return {makeDome(clustering)};
+  if (name == "boundary-layer") return pipe(0.5, kLayersWall, 4.5, wallLayers);
+  if (name == "ocean") return {std::make_shared<Ocean>(std::string(name), clustering.value_or(3))};
 
   const auto names = sceneNames();
   if (std::find(names.begin(), names.end(), name) == names.end())

@@ -27,11 +27,13 @@ namespace curvisplat {
 /// dome                   a half ball with a flat base; cells grow by 1.5 from one to the next; periodic along i
 /// globe                  six thin shells, the faces of a cubed sphere: six blocks
 /// duct                   three abutting blocks of a bent duct, with cells of very different lengths
+/// boundary-layer         layers on the half of a pipe, 0.04 of its radius together; f falls as the root of the distance
+/// ocean                  a sixth of a sphere, a thousandth of its radius deep, not exaggerated; f is warm at the surface
 std::vector<std::string> sceneNames();
 
 /// The blocks of a scene: one, except for globe (6) and duct (3). `clustering`: the outermost cells along j
 /// are about e^clustering times as long as the innermost; nullopt: the scene's default (2.5; shell 4, axis 1,
-/// wake 9, dome 9.7). Throws UsageError for an unknown name (listing the names), for a clustering outside
+/// wake 9, dome 9.7, boundary-layer 4.5, ocean 3). Throws UsageError for an unknown name (listing the names), for a clustering outside
 /// (0, 20], and for a clustering of a scene without one.
 std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
                                                      std::optional<double> clustering = std::nullopt);

@@ -96,7 +96,6 @@ template <typename Map>
     const float x = geometry.x[i], y = geometry.y[i], z = geometry.z[i];
     planes.fill(n, rowsAt(map, x, y, z), map.depthPixels(x, y, z), shapeOf(geometry, i));
   }
-  planes.find(count);
 }
 
 CURVISPLAT_VECTOR_CLONES void computePlanes(const OrthographicMap& map,
