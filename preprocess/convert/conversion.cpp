@@ -191,7 +191,7 @@ class Conversion {
     openWriter();
     if (!isFirst()) return;
     report_.warnings = origin_->warnings();
-    warnOfLostValues();
+    warnOfValues();
     report_.notes = origin_->notes();
     splats_.overlap = origin_->overlap();
   }
@@ -385,7 +385,9 @@ class Conversion {
     report_.resumed_bricks = ranks_ ? 0 : writer_->bricks().size();
   }
 
-  void warnOfLostValues() {
+  void warnOfValues() {
+    for (std::string& tiny : tinyValues(origin_->description(), options_.scalars, splats_.survey.ranges))
+      report_.warnings.push_back(std::move(tiny));
     const auto& lost = splats_.survey.blanked.lost;
     for (size_t n = 0; n < lost.size(); ++n)
       if (lost[n].samples > 0)
