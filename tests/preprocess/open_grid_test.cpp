@@ -264,6 +264,14 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   }
   write("b.inp", "# by AVS\n4 1 0 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n1 0 tet 1 2 3 4\n");
   expectNamed("b.inp", "an AVS UCD mesh");
+  // Binary, as AVS/Express writes it: a byte 7, then counts, here of a tetrahedron with a value at each node.
+  for (const bool big : {false, true}) {
+    std::string bytes(1, '\7');
+    for (const char count : {4, 1, 1, 0, 0, 4})
+      bytes += big ? std::string(3, '\0') + count : count + std::string(3, '\0');
+    write("c.inp", bytes + std::string(100, '\1'));
+    expectNamed("c.inp", "an AVS UCD mesh");
+  }
 }
 
 TEST_F(ForeignFormats, AvsUcdFilesAreNamedHoweverLateTheirCellsBegin) {
