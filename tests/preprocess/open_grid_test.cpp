@@ -238,6 +238,8 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("a.geo", "an EnSight geometry file (give its case file instead)");
   write("points", "/*--- a banner ---*/\nFoamFile\n{\n    version 2.0;\n}\n");
   expectNamed("points", "a file of an OpenFOAM case");
+  write("a.vtk", "version https://git-lfs.github.com/spec/v1\noid sha256:0a1b\nsize 1234\n");
+  expectNamed("a.vtk", "a pointer of Git LFS in the place of the file itself (git lfs pull)");
   write("a.mat", "MATLAB 5.0 MAT-file Platform: posix" + std::string(128, '\0'));
   expectNamed("a.mat", "a MATLAB file, which is not read");
   write("b.mat", "MATLAB 7.3 MAT-file, Platform: GLNXA64" + std::string(512, '\0'));
@@ -366,6 +368,10 @@ TEST_F(ForeignFormats, PlainHdf5IsNamed) {
   Hdf5Editor(file).group("/VTKHDF");
   Hdf5Editor(file).group("/VTKHDF/PointData");
   expectNamed("plain.h5", "a VTKHDF file (save it as .vts, .vti or .vtu)");
+  for (const char* group : {"/settings", "/settings/a", "/meshes", "/meshes/1"})
+    Hdf5Editor(file).group(group);
+  Hdf5Editor(file).remove("/VTKHDF");
+  expectNamed("plain.h5", "a Fluent case or its data (save it as CGNS or EnSight Gold)");
 }
 
 }  // namespace

@@ -250,6 +250,11 @@ std::optional<std::string> foreignNetcdf(const NetcdfFiles& file) {
   const std::vector<std::string>& groups = file.groups();
   if (file.plainHdf5() && std::find(groups.begin(), groups.end(), "VTKHDF") != groups.end())
     return "a VTKHDF file (save it as .vts, .vti or .vtu)";
+  const auto has = [&](const char* group) {
+    return std::find(groups.begin(), groups.end(), group) != groups.end();
+  };
+  if (file.plainHdf5() && has("settings") && (has("meshes") || has("results")))
+    return "a Fluent case or its data (save it as CGNS or EnSight Gold)";
   if (file.plainHdf5()) return "an HDF5 file, but neither NetCDF-4 nor CGNS";
   return std::nullopt;
 }

@@ -60,6 +60,7 @@ constexpr Magic kMagics[] = {
      "an ECLIPSE grid (GRID), which is not read"},
     {"\xff\xfe"sv, kUtf16},
     {"\xfe\xff"sv, kUtf16},
+    {"version https://git-lfs"sv, "a pointer of Git LFS in the place of the file itself (git lfs pull)"},
     {"#std "sv, "a field file of Nek5000, which is not read (save it as VTK with VisIt or pymech)"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
     {"{"sv,
