@@ -240,8 +240,8 @@ class Columns(MeshFormats):
         self.assertEqual([[b["ni"], b["nj"], b["nk"]] for b in manifest["blocks"]], [[5, 4, 3]])
         self.assertAlmostEqual(manifest["variables"][0]["max"], float(values.max()), places=6)
 
-    def write_icon(self):
-        """Returns the triangles, and their heights at the levels in metres. The grid is in a second file, icon_grid.nc."""
+    def write_icon(self, cells="cell"):
+        """`cells`: the data's name of the cells. Returns the triangles, and their heights at the levels in metres. The grid is in a second file, icon_grid.nc."""
         triangles = [t for face in self.faces for t in ([face] if len(face) == 3 else [face[:3], [face[k] for k in (0, 2, 3)]])]
         self.t = RANDOM.random((self.LAYERS, len(triangles))).astype("f4")
         heights = RANDOM.random(len(triangles))[None] * 50 + self.levels[::-1, None]
@@ -255,21 +255,31 @@ class Columns(MeshFormats):
             f.createVariable("vertex_of_cell", "i4", ("nv", "cell"))[:] = np.array(triangles).T + 1
         with netCDF4.Dataset(self.path, "w") as f:
             f.number_of_grid_used = 24
-            for name, size in (("time", None), ("height", self.LAYERS), ("height_2", self.LAYERS + 1), ("cell", len(triangles))):
+            for name, size in (("time", None), ("height", self.LAYERS), ("height_2", self.LAYERS + 1), (cells, len(triangles))):
                 f.createDimension(name, size)
             f.createVariable("time", "f8", ("time",))[:] = [0]
-            f.createVariable("t", "f4", ("time", "height", "cell"))[0] = self.t
-            z = f.createVariable("z_ifc", "f8", ("height_2", "cell"))
+            f.createVariable("t", "f4", ("time", "height", cells))[0] = self.t
+            z = f.createVariable("z_ifc", "f8", ("height_2", cells))
             z.units = "m"
             z[:] = heights
         return triangles, heights
 
     def test_icon_with_its_grid_in_a_second_file(self):
-        triangles, heights = self.write_icon()
-        of_nodes = np.array([[np.mean([heights[l, n] for n, face in enumerate(triangles) if node in face])
-                              for node in range(len(self.nodes))] for l in range(self.LAYERS + 1)]) / 1000
-        self.expect_columns([self.path, self.folder / "icon_grid.nc"], self.expected(heights=of_nodes, faces=triangles))
+        for cells in ("cell", "ncells"):  # ICON itself writes data with the second
+            triangles, heights = self.write_icon(cells)
+            of_nodes = np.array([[np.mean([heights[l, n] for n, face in enumerate(triangles) if node in face])
+                                  for node in range(len(self.nodes))] for l in range(self.LAYERS + 1)]) / 1000
+            self.expect_columns([self.path, self.folder / "icon_grid.nc"], self.expected(heights=of_nodes, faces=triangles))
         self.expect_line(self.path, scalar="t", words="ICON")
+        # Without heights, their absence is reported, not that of a field: the grid file has variables of cells and their corners.
+        with netCDF4.Dataset(self.path) as f, netCDF4.Dataset(self.folder / "b.nc", "w") as to:
+            for name, dim in f.dimensions.items():
+                to.createDimension(name, len(dim))
+            for name in ("t", "u"):
+                to.createVariable(name, "f4", ("time", "height", "ncells"))[:] = f["t"][:]
+        with netCDF4.Dataset(self.folder / "icon_grid.nc", "a") as f:
+            f.createVariable("edge_of_cell", "i4", ("nv", "cell"))[:] = 1
+        self.expect_line(self.folder / "b.nc", self.folder / "icon_grid.nc", scalar="t", words="the layers of ICON (height) have no heights")
 
     def write_mpas(self, nodes, faces, heights, ocean):
         """`heights`: [level][face], in metres."""

@@ -240,6 +240,8 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("points", "a file of an OpenFOAM case");
   write("a.vtk", "version https://git-lfs.github.com/spec/v1\noid sha256:0a1b\nsize 1234\n");
   expectNamed("a.vtk", "a pointer of Git LFS in the place of the file itself (git lfs pull)");
+  write("a.silo", "!<<PDB:II>>!\n$\4\2\4\4\4" + std::string(900, '\0'));
+  expectNamed("a.silo", "a file of PDB or Silo, which is not read");
   write("a.mat", "MATLAB 5.0 MAT-file Platform: posix" + std::string(128, '\0'));
   expectNamed("a.mat", "a MATLAB file, which is not read");
   write("b.mat", "MATLAB 7.3 MAT-file, Platform: GLNXA64" + std::string(512, '\0'));

@@ -269,14 +269,19 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     group->variables.push_back(&variable);
   }
   // What has three dimensions but is of the map itself (edgesOnCell, ...) are integers without layers' heights.
+  std::string lacking;  // the heights of the largest group
+  size_t largest = 0;
   std::erase_if(groups, [&](const ColumnsScalars& g) {
     try {
       findColumnsHeights(file, map, g);
       return false;
-    } catch (const Error&) {
-      return groups.size() > 1;
+    } catch (const Error& error) {
+      if (g.variables.size() > largest) lacking = error.what();
+      largest = std::max(largest, g.variables.size());
+      return true;
     }
   });
+  if (groups.empty() && !lacking.empty()) throw Error("{}", lacking);
   if (groups.empty())
     throw Error(
         "{}: is a grid of {} without a variable of faces or nodes and layers: no part of it has a volume",

@@ -23,6 +23,11 @@ bool countsTime(const NetcdfVariable& variable) {
   return variable.dims.size() == 1 && variable.text("units").find(" since ") != std::string::npos;
 }
 
+/// ICON's grid files call the cells otherwise than its data do.
+bool isCellsOfIcon(const std::string& name) {
+  return name == "cell" || name == "ncells";
+}
+
 }  // namespace
 
 NetcdfFiles::NetcdfFiles(const OpenGridOptions& options) {
@@ -116,7 +121,9 @@ void NetcdfFiles::add(size_t number) {
     NetcdfDimension dimension = file.dimensions()[dim];
     dimension.length = tiles.length(dim);
     const auto same = std::find_if(dimensions_.begin(), dimensions_.end(), [&](const NetcdfDimension& other) {
-      return !dimension.name.empty() && other.name == dimension.name && other.length == dimension.length;
+      const bool same_name =
+          other.name == dimension.name || (isCellsOfIcon(other.name) && isCellsOfIcon(dimension.name));
+      return !dimension.name.empty() && same_name && other.length == dimension.length;
     });
     merged.push_back(static_cast<size_t>(same - dimensions_.begin()));
     if (same == dimensions_.end()) dimensions_.push_back(dimension);

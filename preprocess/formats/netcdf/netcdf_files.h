@@ -20,7 +20,7 @@ namespace curvisplat {
 
 class NetcdfFiles {
  public:
-  /// Dimensions of the same name and length are one dimension. If several files have a variable of the same
+  /// Dimensions of the same name and length are one dimension, and so are ICON's cells by either name. If several files have a variable of the same
   /// name, the first file's is taken and warnings() lists the others; but each file keeps its times since
   /// a date. Of the options, the files and `select` count. Throws Error as NetcdfFile does, and for a file that
   /// is not NetCDF; UsageError for a selection of what is not there.

@@ -61,6 +61,7 @@ constexpr Magic kMagics[] = {
     {"\xff\xfe"sv, kUtf16},
     {"\xfe\xff"sv, kUtf16},
     {"version https://git-lfs"sv, "a pointer of Git LFS in the place of the file itself (git lfs pull)"},
+    {"!<<PDB:"sv, "a file of PDB or Silo, which is not read (save it as VTK, with VisIt)"},
     {"#std "sv, "a field file of Nek5000, which is not read (save it as VTK with VisIt or pymech)"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
     {"{"sv,
