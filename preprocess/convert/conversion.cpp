@@ -33,16 +33,6 @@
 
 namespace curvisplat {
 
-void reportCache(const Manifest& written, ConvertReport& report) {
-  report.centring = written.cells ? Centring::kCell : Centring::kNode;
-  report.nodes = written.nodes;
-  report.splats = written.splats;
-  report.bricks = written.bricks;
-  report.levels = written.levels;
-  report.volume = written.volume;
-  for (const FileInfo& file : written.files) report.files.push_back({file.name, file.size});
-}
-
 namespace {
 
 uint64_t nodesOf(const SplatOrigin& origin) {
@@ -191,7 +181,8 @@ class Conversion {
     openWriter();
     if (!isFirst()) return;
     report_.warnings = origin_->warnings();
-    warnOfLostValues();
+    for (std::string& warning : warningsOfValues(splats_.survey, origin_->description(), options_.scalars))
+      report_.warnings.push_back(std::move(warning));
     report_.notes = origin_->notes();
     splats_.overlap = origin_->overlap();
   }
@@ -366,7 +357,9 @@ class Conversion {
 
   void finishCache() {
     if (splats_removed_.valid()) splats_removed_.get();
-    reportCache(writer_->finish(manifest()), report_);
+    Manifest manifest = manifestOf(*origin_, options_, splats_);
+    if (faces_file_) manifest.files.push_back(*faces_file_);
+    reportCache(writer_->finish(manifest), report_);
     writer_.reset();
     file_.reset();  // of ranks, which all read it
     report_.blanked = splats_.survey.blanked;
@@ -385,16 +378,6 @@ class Conversion {
     report_.resumed_bricks = ranks_ ? 0 : writer_->bricks().size();
   }
 
-  void warnOfLostValues() {
-    const auto& lost = splats_.survey.blanked.lost;
-    for (size_t n = 0; n < lost.size(); ++n)
-      if (lost[n].samples > 0)
-        report_.warnings.push_back(fmt::format(
-            "{} of the values of {} are left out, since other scalars of the cache have none there; "
-            "convert it to a cache of its own",
-            lost[n].samples, origin_->description().scalars[options_.scalars[n]].name));
-  }
-
   void forgetSplats() {
     workspace_->forgetSplats();
     file_.reset();
@@ -403,12 +386,6 @@ class Conversion {
 
   std::vector<VariableInfo> variables() const {
     return variablesOf(origin_->description(), options_.scalars, splats_.survey);
-  }
-
-  Manifest manifest() const {
-    Manifest manifest = manifestOf(*origin_, options_, splats_);
-    if (faces_file_) manifest.files.push_back(*faces_file_);
-    return manifest;
   }
 
   const EstimateNeeds estimate_;
@@ -434,13 +411,6 @@ class Conversion {
 };
 
 constexpr const char* kKept = "; finished work is kept: continue with --resume";
-
-RoomNeeded roomNeeded(const ConvertOptions& options) {
-  RoomNeeded room{options.given_folders, "the cache and its temporary files", options.full_disk_hint};
-  if (room.folders.empty()) room.folders = {folderOf(options.output), temporaryFolder(options)};
-  if (room.advice.empty()) room.advice = kFullDiskHint;
-  return room;
-}
 
 }  // namespace
 

@@ -7,6 +7,16 @@
 
 namespace curvisplat {
 
+void reportCache(const Manifest& written, ConvertReport& report) {
+  report.centring = written.cells ? Centring::kCell : Centring::kNode;
+  report.nodes = written.nodes;
+  report.splats = written.splats;
+  report.bricks = written.bricks;
+  report.levels = written.levels;
+  report.volume = written.volume;
+  for (const FileInfo& file : written.files) report.files.push_back({file.name, file.size});
+}
+
 std::vector<VariableInfo> variablesOf(const GridDescription& description, std::span<const uint32_t> scalars,
                                       const GridSurvey& survey) {
   std::vector<VariableInfo> variables;

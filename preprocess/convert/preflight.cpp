@@ -123,4 +123,11 @@ bool hasDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
   }
 }
 
+RoomNeeded roomNeeded(const ConvertOptions& options) {
+  RoomNeeded room{options.given_folders, "the cache and its temporary files", options.full_disk_hint};
+  if (room.folders.empty()) room.folders = {folderOf(options.output), temporaryFolder(options)};
+  if (room.advice.empty()) room.advice = kFullDiskHint;
+  return room;
+}
+
 }  // namespace curvisplat

@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <string>
 
+#include "preprocess/convert/convert_options.h"
 #include "preprocess/convert/splat_origin.h"
+#include "stream/base/disk_space.h"
 
 namespace curvisplat {
 
@@ -54,5 +56,8 @@ void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                     const std::filesystem::path& temporary_folder, const std::string& hint = kSmallDiskHint);
 bool hasDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                   const std::filesystem::path& temporary_folder);
+
+/// What is reported of a disk that fills up during a conversion.
+RoomNeeded roomNeeded(const ConvertOptions& options);
 
 }  // namespace curvisplat

@@ -1,5 +1,6 @@
 #include "preprocess/convert/scan.h"
 
+#include <fmt/format.h>
 #include <tbb/blocked_range.h>
 
 #include <algorithm>
@@ -136,6 +137,19 @@ GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const 
   if (ranks) survey = combinedSurvey(survey, *ranks);
   checkExtent(survey, reader.source().description());
   return survey;
+}
+
+std::vector<std::string> warningsOfValues(const GridSurvey& survey, const GridDescription& description,
+                                          std::span<const uint32_t> scalars) {
+  std::vector<std::string> warnings = tinyValues(description, scalars, survey.ranges);
+  const auto& lost = survey.blanked.lost;
+  for (size_t n = 0; n < lost.size(); ++n)
+    if (lost[n].samples > 0)
+      warnings.push_back(fmt::format(
+          "{} of the values of {} are left out, since other scalars of the cache have none there; "
+          "convert it to a cache of its own",
+          lost[n].samples, description.scalars[scalars[n]].name));
+  return warnings;
 }
 
 void checkRanges(const GridSurvey& survey, const GridDescription& description,

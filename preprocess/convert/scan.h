@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "preprocess/convert/bucket_plan.h"
@@ -32,6 +33,11 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description);
 /// the square of.
 void checkRanges(const GridSurvey& survey, const GridDescription& description,
                  std::span<const uint32_t> scalars);
+
+/// Sentences on values that no picture shows: those that are too small, and those of samples that are left out for the sake of
+/// another scalar.
+std::vector<std::string> warningsOfValues(const GridSurvey& survey, const GridDescription& description,
+                                          std::span<const uint32_t> scalars);
 
 /// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for
 /// its scalar's sake is counted, which makes the plan no worse than a little uneven.

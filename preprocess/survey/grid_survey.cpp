@@ -1,5 +1,6 @@
 #include "preprocess/survey/grid_survey.h"
 
+#include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <glm/common.hpp>
 
@@ -18,6 +19,22 @@
 #include "stream/base/trace.h"
 
 namespace curvisplat {
+
+std::vector<std::string> tinyValues(const GridDescription& description, std::span<const uint32_t> scalars,
+                                    std::span<const ScalarRange> ranges) {
+  constexpr double kMinNormal = std::numeric_limits<float>::min();
+  std::vector<std::string> sentences;
+  for (size_t n = 0; n < scalars.size(); ++n) {
+    const double largest = std::max(std::abs(ranges[n].min), std::abs(ranges[n].max));
+    if (largest > 0 && largest < kMinNormal)
+      sentences.push_back(
+          fmt::format("{}: its values are smaller than {:.1e} in magnitude, too small for single precision: "
+                      "pictures cannot "
+                      "show them; multiply them by a power of ten",
+                      description.scalars[scalars[n]].name, kMinNormal));
+  }
+  return sentences;
+}
 
 GridSurvey unitedSurvey(GridSurvey a, const GridSurvey& b) {
   a.nodes += b.nodes;

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "preprocess/coincidence/abutting_faces.h"
@@ -36,6 +37,11 @@ struct GridSurvey {
   std::vector<ScalarRange> ranges;  // [scalar]; of the samples that are not blanked
   uint64_t grid_checksum = 0;       // GridChecksum's
 };
+
+/// A sentence on each of these scalars of which no value but 0 is large enough for single precision, so that
+/// pictures cannot show it. `ranges`: [scalar].
+std::vector<std::string> tinyValues(const GridDescription& description, std::span<const uint32_t> scalars,
+                                    std::span<const ScalarRange> ranges);
 
 /// The survey of the samples of both, which have the same scalars and no sample in common.
 GridSurvey unitedSurvey(GridSurvey a, const GridSurvey& b);

@@ -24,8 +24,8 @@ class MeshCase(FormatCase):
         np.testing.assert_allclose(info["bounds"]["lower"], points[used].min(0), rtol=1e-6)
         np.testing.assert_allclose(info["bounds"]["upper"], points[used].max(0), rtol=1e-6)
         solid = np.array([grid.GetCell(n).GetCellDimension() == 3 for n in range(grid.GetNumberOfCells())])
-        arrays = {"p": vtk_to_numpy(grid.GetPointData().GetArray("p")),
-                  "v:mag": np.linalg.norm(vtk_to_numpy(grid.GetPointData().GetArray("v")), axis=1),
+        arrays = {"p": vtk_to_numpy(grid.GetPointData().GetArray("p"))[used],
+                  "v:mag": np.linalg.norm(vtk_to_numpy(grid.GetPointData().GetArray("v"))[used], axis=1),
                   "c": vtk_to_numpy(grid.GetCellData().GetArray("c"))[solid]}
         scalars = {scalar["name"]: scalar for scalar in info["scalars"]}
         for name, values in arrays.items():

@@ -182,6 +182,13 @@ class MeshFiles(MeshCase):
                 grid.GetCellData().GetArray("c").SetValue(n, 1000)
         write_xml(grid, self.folder / "mesh.vtu")
         self.assertLess({s["name"]: s["max"] for s in self.info(self.folder / "mesh.vtu")["scalars"]}["c"], 1000)
+        # A point that no cell has, as one in the middle of an edge of a quadratic cell.
+        grid.GetPoints().InsertNextPoint(0, 0, 0)
+        for name, value in (("p", 5000), ("v", None)):
+            array = grid.GetPointData().GetArray(name)
+            array.InsertNextTuple([value or 0] * array.GetNumberOfComponents())
+        write_xml(grid, self.folder / "mesh.vtu")
+        self.assertLess({s["name"]: s["max"] for s in self.info(self.folder / "mesh.vtu")["scalars"]}["p"], 5000)
 
     def test_names_of_steps_with_decimals(self):
         grid = cube(1, kinds=("hexahedron",))
@@ -333,8 +340,10 @@ class MeshFiles(MeshCase):
             for prefix, name in (("nod", "pressure"), ("elem", "density")):
                 names = f.createVariable(f"name_{prefix}_var", "S1", (f"num_{prefix}_var", "len_name"))
                 names[0] = np.array(list(name.ljust(33, "\0")), "S1")
-            values = f.createVariable("vals_nod_var1", "f8", ("time_step", "num_nodes"))
-            values[0], values[1] = p, p + 1
+            if one_coord:
+                f.createVariable("vals_nod_var", "f8", ("time_step", "num_nod_var", "num_nodes"))[:] = [[p], [p + 1]]
+            else:
+                f.createVariable("vals_nod_var1", "f8", ("time_step", "num_nodes"))[:] = [p, p + 1]
             f.createVariable("elem_var_tab", "i4", ("num_el_blk", "num_elem_var"))[:] = [[1], [1], [0]]
             for n, (kind, c) in enumerate(blocks, 1):
                 f.createDimension(f"num_el_in_blk{n}", len(c))

@@ -166,6 +166,62 @@ class Columns(MeshFormats):
             np.testing.assert_allclose(info["bounds"]["upper"], [1, 1, 0], atol=1e-9)
             self.assertAlmostEqual(self.volume([self.path], "S"), bottom.mean() / 1000, delta=1e-4)
 
+    def test_ugrid_of_which_only_fields_tell_the_faces(self):
+        """GNOME: connectivity (corner, face) without face_dimension; face_links are no field, whatever their dimensions."""
+        self.write_ugrid()
+        expected = self.info(self.path)
+        other = self.folder / "b.nc"
+        with netCDF4.Dataset(self.path) as f, netCDF4.Dataset(other, "w") as to:
+            for name, dim in f.dimensions.items():
+                to.createDimension(name, None if dim.isunlimited() else len(dim))
+            for name, v in f.variables.items():
+                v.set_auto_mask(False)
+                turned = v.dimensions[::-1] if name == "corners" else v.dimensions
+                copy = to.createVariable(name, v.dtype, turned, fill_value=getattr(v, "_FillValue", None))
+                copy.setncatts({a: v.getncattr(a) for a in v.ncattrs() if a not in ("_FillValue", "face_dimension")})
+                if v.shape:
+                    copy[:] = v[:].T if name == "corners" else v[:]
+            links = to.createVariable("links", "i4", ("layer", "face"))
+            links.cf_role = "face_face_connectivity"
+            links[:] = 0
+        info = self.info(other)
+        self.assertEqual([s["name"] for s in info["scalars"]], ["t"])
+        for key in ("cells", "nodes", "bounds"):
+            self.assertEqual(info[key], expected[key])
+
+    def test_fesom_ends_at_its_bottom(self):
+        """FESOM: data at layers nz1 between levels nz, 0 below nlevels and nlevels_nod2D, which count levels; two triangles."""
+        levels, numbers, of_nodes = np.array([0, 5, 10, 30, 100.0]), np.array([5, 3]), np.array([5, 5, 4, 3])
+        faces = np.array([[0, 1, 2], [0, 2, 3]])
+        below = np.arange(4)[:, None] >= numbers - 1, np.arange(4)[:, None] >= of_nodes - 1
+        mesh = self.folder / "fesom.mesh.diag.nc"
+        with netCDF4.Dataset(self.path, "w") as data, netCDF4.Dataset(mesh, "w") as f:
+            for file in (data, f):
+                for dim, size in (("nod2", 4), ("elem", 2), ("nz1", 4), ("nz", 5), ("n3", 3), ("time", None)):
+                    file.createDimension(dim, size)
+            def add(file, called, dims, what, kind="f8", **attributes):
+                v = file.createVariable(called, kind, tuple(dims.split()))
+                v.setncatts(attributes)
+                v[:] = what
+            add(data, "nz1", "nz1", (levels[1:] + levels[:-1]) / 2, units="m", positive="down", axis="Z", long_name="depth at layer midpoint")
+            add(data, "time", "time", [0], units="seconds since 1948-01-01 0:0:0", standard_name="time", axis="T")
+            add(data, "u", "time nz1 elem", np.where(below[0], 0, 7)[None], location="elem", mesh="fesom_mesh")
+            add(data, "temp", "time nz1 nod2", np.where(below[1], 0, 9)[None], location="node", mesh="fesom_mesh")
+            f.createVariable("fesom_mesh", "i4").setncatts({"cf_role": "mesh_topology", "topology_dimension": np.int32(2), "node_coordinates": "lon lat",
+                                                            "face_node_connectivity": "face_nodes", "face_dimension": "elem"})
+            add(f, "nz", "nz", levels, units="meters", positive="down", long_name="depth of levels")
+            add(f, "nlevels", "elem", numbers, "i4", long_name="number of levels below elements")
+            add(f, "nlevels_nod2D", "nod2", of_nodes, "i4", long_name="number of levels below nodes")
+            add(f, "lon", "nod2", [0, 1, 1, 0], units="degrees_east", standard_name="longitude")
+            add(f, "lat", "nod2", [-0.5, -0.5, 0.5, 0.5], units="degrees_north", standard_name="latitude")
+            add(f, "face_nodes", "n3 elem", faces.T + 1, "i4", start_index=np.int32(1))
+        self.assertEqual([self.info(self.path, mesh)["scalars"][0][word] for word in ("name", "min", "max")], ["u", 7, 7])
+        area = 6371 ** 2 * np.radians(1) * 2 * np.sin(np.radians(0.5)) / 2  # of a triangle, to a permille
+        self.assertAlmostEqual(self.volume([self.path, mesh], "u") / (area * (100 + 10) / 1000), 1, delta=2e-3)
+        manifest = self.manifest(self.convert([self.path, mesh], "temp", "--vertical-scale", "100"))
+        # 16 points, of which 3 are below the bottom and 2 in no cell above it.
+        self.assertEqual((manifest["splats"], manifest["blanked_nodes"], manifest["variables"][0]["min"]), (11, 3, 9))
+
     def test_ugrid_beside_a_structured_grid(self):
         self.write_ugrid()
         values = RANDOM.random((3, 4, 5)).astype("f4")
@@ -184,8 +240,8 @@ class Columns(MeshFormats):
         self.assertEqual([[b["ni"], b["nj"], b["nk"]] for b in manifest["blocks"]], [[5, 4, 3]])
         self.assertAlmostEqual(manifest["variables"][0]["max"], float(values.max()), places=6)
 
-    def write_icon(self):
-        """Returns the triangles, and their heights at the levels in metres. The grid is in a second file, icon_grid.nc."""
+    def write_icon(self, cells="cell"):
+        """`cells`: the data's name of the cells. Returns the triangles, and their heights at the levels in metres. The grid is in a second file, icon_grid.nc."""
         triangles = [t for face in self.faces for t in ([face] if len(face) == 3 else [face[:3], [face[k] for k in (0, 2, 3)]])]
         self.t = RANDOM.random((self.LAYERS, len(triangles))).astype("f4")
         heights = RANDOM.random(len(triangles))[None] * 50 + self.levels[::-1, None]
@@ -199,21 +255,31 @@ class Columns(MeshFormats):
             f.createVariable("vertex_of_cell", "i4", ("nv", "cell"))[:] = np.array(triangles).T + 1
         with netCDF4.Dataset(self.path, "w") as f:
             f.number_of_grid_used = 24
-            for name, size in (("time", None), ("height", self.LAYERS), ("height_2", self.LAYERS + 1), ("cell", len(triangles))):
+            for name, size in (("time", None), ("height", self.LAYERS), ("height_2", self.LAYERS + 1), (cells, len(triangles))):
                 f.createDimension(name, size)
             f.createVariable("time", "f8", ("time",))[:] = [0]
-            f.createVariable("t", "f4", ("time", "height", "cell"))[0] = self.t
-            z = f.createVariable("z_ifc", "f8", ("height_2", "cell"))
+            f.createVariable("t", "f4", ("time", "height", cells))[0] = self.t
+            z = f.createVariable("z_ifc", "f8", ("height_2", cells))
             z.units = "m"
             z[:] = heights
         return triangles, heights
 
     def test_icon_with_its_grid_in_a_second_file(self):
-        triangles, heights = self.write_icon()
-        of_nodes = np.array([[np.mean([heights[l, n] for n, face in enumerate(triangles) if node in face])
-                              for node in range(len(self.nodes))] for l in range(self.LAYERS + 1)]) / 1000
-        self.expect_columns([self.path, self.folder / "icon_grid.nc"], self.expected(heights=of_nodes, faces=triangles))
+        for cells in ("cell", "ncells"):  # ICON itself writes data with the second
+            triangles, heights = self.write_icon(cells)
+            of_nodes = np.array([[np.mean([heights[l, n] for n, face in enumerate(triangles) if node in face])
+                                  for node in range(len(self.nodes))] for l in range(self.LAYERS + 1)]) / 1000
+            self.expect_columns([self.path, self.folder / "icon_grid.nc"], self.expected(heights=of_nodes, faces=triangles))
         self.expect_line(self.path, scalar="t", words="ICON")
+        # Without heights, their absence is reported, not that of a field: the grid file has variables of cells and their corners.
+        with netCDF4.Dataset(self.path) as f, netCDF4.Dataset(self.folder / "b.nc", "w") as to:
+            for name, dim in f.dimensions.items():
+                to.createDimension(name, len(dim))
+            for name in ("t", "u"):
+                to.createVariable(name, "f4", ("time", "height", "ncells"))[:] = f["t"][:]
+        with netCDF4.Dataset(self.folder / "icon_grid.nc", "a") as f:
+            f.createVariable("edge_of_cell", "i4", ("nv", "cell"))[:] = 1
+        self.expect_line(self.folder / "b.nc", self.folder / "icon_grid.nc", scalar="t", words="the layers of ICON (height) have no heights")
 
     def write_mpas(self, nodes, faces, heights, ocean):
         """`heights`: [level][face], in metres."""

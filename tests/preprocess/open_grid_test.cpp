@@ -238,6 +238,10 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   expectNamed("a.geo", "an EnSight geometry file (give its case file instead)");
   write("points", "/*--- a banner ---*/\nFoamFile\n{\n    version 2.0;\n}\n");
   expectNamed("points", "a file of an OpenFOAM case");
+  write("a.vtk", "version https://git-lfs.github.com/spec/v1\noid sha256:0a1b\nsize 1234\n");
+  expectNamed("a.vtk", "a pointer of Git LFS in the place of the file itself (git lfs pull)");
+  write("a.silo", "!<<PDB:II>>!\n$\4\2\4\4\4" + std::string(900, '\0'));
+  expectNamed("a.silo", "a file of PDB or Silo, which is not read");
   write("a.mat", "MATLAB 5.0 MAT-file Platform: posix" + std::string(128, '\0'));
   expectNamed("a.mat", "a MATLAB file, which is not read");
   write("b.mat", "MATLAB 7.3 MAT-file, Platform: GLNXA64" + std::string(512, '\0'));
@@ -264,6 +268,14 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   }
   write("b.inp", "# by AVS\n4 1 0 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n1 0 tet 1 2 3 4\n");
   expectNamed("b.inp", "an AVS UCD mesh");
+  // Binary, as AVS/Express writes it: a byte 7, then counts, here of a tetrahedron with a value at each node.
+  for (const bool big : {false, true}) {
+    std::string bytes(1, '\7');
+    for (const char count : {4, 1, 1, 0, 0, 4})
+      bytes += big ? std::string(3, '\0') + count : count + std::string(3, '\0');
+    write("c.inp", bytes + std::string(100, '\1'));
+    expectNamed("c.inp", "an AVS UCD mesh");
+  }
 }
 
 TEST_F(ForeignFormats, AvsUcdFilesAreNamedHoweverLateTheirCellsBegin) {
@@ -358,6 +370,10 @@ TEST_F(ForeignFormats, PlainHdf5IsNamed) {
   Hdf5Editor(file).group("/VTKHDF");
   Hdf5Editor(file).group("/VTKHDF/PointData");
   expectNamed("plain.h5", "a VTKHDF file (save it as .vts, .vti or .vtu)");
+  for (const char* group : {"/settings", "/settings/a", "/meshes", "/meshes/1"})
+    Hdf5Editor(file).group(group);
+  Hdf5Editor(file).remove("/VTKHDF");
+  expectNamed("plain.h5", "a Fluent case or its data (save it as CGNS or EnSight Gold)");
 }
 
 }  // namespace

@@ -65,6 +65,13 @@ nlohmann::ordered_json jsonOf(const ScalarRange& range, bool lower) {
   return lower ? range.min : range.max;
 }
 
+std::vector<std::string> warningsOf(const GridInfo& info) {
+  std::vector<std::string> warnings = info.description->warnings;
+  const auto tiny = tinyValues(*info.description, info.stored, info.statistics.scalars);
+  warnings.insert(warnings.end(), tiny.begin(), tiny.end());
+  return warnings;
+}
+
 /// What blanks nodes, in words; empty if nothing does.
 std::string blankingRule(const GridDescription& description) {
   if (!description.blanking.empty()) return description.blanking;
@@ -175,7 +182,7 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
          {"share_of_smaller", overlap.share}});
   json["estimate"] = info.estimate.toJson();
   json["notes"] = description.notes;
-  json["warnings"] = description.warnings;
+  json["warnings"] = warningsOf(info);
   return json;
 }
 
@@ -224,7 +231,7 @@ void printAsText(const GridInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   if (!info.series.empty()) printLine("series    {}", info.series);
-  for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
+  for (const std::string& warning : warningsOf(info)) printLine("warning: {}", warning);
   if (!info.overlaps.empty()) printLine("note: {}", overlapNote(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
   printLine("nodes     {} in {}; {} blanked by the grid, {} {}", info.nodes,

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <optional>
 
 #include "preprocess/convert/memory_plan.h"
@@ -85,6 +86,7 @@ void measure(const MeshSource& source, Centring centring, MeshInfo& info) {
   source.prepare(scalars, MemoryPlan::ofOptions(0, 1, 0).mesh_bytes, progress);
   MeshPoints points;
   MeshCells cells;
+  uint64_t point = 0;  // the first of the piece
   for (uint32_t piece = 0; piece < info.description->pieces.size(); ++piece) {
     const MeshPiece& of = info.description->pieces[piece];
     const bool nodes = centring == Centring::kNode;
@@ -95,12 +97,13 @@ void measure(const MeshSource& source, Centring centring, MeshInfo& info) {
             : source.readCells(piece, first, count, scalars, cells);
       for (size_t n = 0; n < scalars.size(); ++n)
         info.not_finite[scalars[n]] +=
-            nodes ? widen(info.ranges[scalars[n]], points.scalars[n],
-                          [&](size_t at) { return !points.hidden[at]; })
-                  : widen(info.ranges[scalars[n]], cells.scalars[n], [&](size_t at) {
-                      return !cells.hidden[at] && cells.shapes[at] != CellKind::kNone;
-                    });
+            nodes
+                ? widen(info.ranges[scalars[n]], points.scalars[n],
+                        [&](size_t at) { return !points.hidden[at] && info.survey.used[point + first + at]; })
+                : widen(info.ranges[scalars[n]], cells.scalars[n],
+                        [&](size_t at) { return !cells.hidden[at] && cells.shapes[at] != CellKind::kNone; });
     }
+    point += of.points;
   }
 }
 
@@ -126,6 +129,15 @@ MeshInfo inspect(const MeshSource& source) {
 
 bool isEmpty(const ScalarRange& range) {
   return range.min > range.max;
+}
+
+std::vector<std::string> warningsOf(const MeshInfo& info) {
+  std::vector<std::string> warnings = info.description->warnings;
+  std::vector<uint32_t> scalars(info.ranges.size());
+  std::iota(scalars.begin(), scalars.end(), 0);
+  const auto tiny = tinyValues(*info.description, scalars, info.ranges);
+  warnings.insert(warnings.end(), tiny.begin(), tiny.end());
+  return warnings;
 }
 
 nlohmann::ordered_json asJson(const MeshInfo& info) {
@@ -162,7 +174,7 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
   json["time_step"] = description.time_step;
   json["estimate"] = info.estimate.toJson();
   json["notes"] = description.notes;
-  json["warnings"] = description.warnings;
+  json["warnings"] = warningsOf(info);
   return json;
 }
 
@@ -170,7 +182,7 @@ void printAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   if (!info.series.empty()) printLine("series    {}", info.series);
-  for (const std::string& warning : description.warnings) printLine("warning: {}", warning);
+  for (const std::string& warning : warningsOf(info)) printLine("warning: {}", warning);
   printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} at NaN or infinity",
             info.points, countText(description.pieces.size(), "piece"), info.survey.unused_points,
             info.survey.grid.blanked.by_grid, info.survey.grid.blanked.not_finite);

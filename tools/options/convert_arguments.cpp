@@ -72,6 +72,12 @@ void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
 void addGridOptions(CLI::App& app, OpenGridOptions& options) {
   app.add_option("--time-step", options.time_step,
                  "Time step to read from the grid's files, counted from 0 (default 0)");
+  app.add_option("--select", options.select,
+                 "Value to read of a dimension of NetCDF that is neither space nor time: month=3 "
+                 "(of its coordinate; without one, counted from 0)")
+      ->type_name("DIMENSION=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
   addGlobeOptions(app, options.globe);
   Plot3dForce& force = options.force;
   addChoice<ByteOrder>(app, "--byte-order", "Byte order of binary files",

@@ -31,6 +31,7 @@ namespace curvisplat {
 /// Adds to `app` the options that set the given fields of `options`, which must outlive parsing:
 ///   options.time_step   --time-step
 ///   options.force       --byte-order, --records, --precision, --blocks, --iblank, --ascii, --binary
+///   options.select      --select
 ///   options.globe       --sphere, --flat, --vertical-scale
 void addGridOptions(CLI::App& app, OpenGridOptions& options);
 

@@ -16,7 +16,6 @@ namespace {
 constexpr uint64_t kChunk = 65536;
 constexpr int64_t kNone = std::numeric_limits<int64_t>::min();
 constexpr double kLargestInteger = 0x1p53;
-constexpr double kNewest = 4;         // of files that do not tell: the numbers have not changed since
 constexpr int64_t kMaxCorners = 200;  // of a polygon
 
 struct Kind {
@@ -53,7 +52,7 @@ double versionOf(const CgnsFile& file) {
   for (const CgnsNode& node : file.children(file.root()))
     if (node.name == "CGNSLibraryVersion")
       if (const std::vector<double> numbers = file.numbers(node); !numbers.empty()) return numbers[0] + 1e-4;
-  return kNewest;
+  return kNewestCgns;
 }
 
 /// A column of an array of integers.

@@ -40,11 +40,14 @@ struct CgnsElementKind {
 /// up to 3.1 a polygon among MIXED elements had the type NGON_n and the number of its nodes in one number.
 CgnsElementKind cgnsElementKind(int64_t type, double version);
 
+/// A version since which the numbers of types have not changed; of files that do not tell theirs.
+inline constexpr double kNewestCgns = 4;
+
 struct CgnsSection {
   std::string path;
   int type = 0;  // as CGNS numbers them since 3.1
   double version = 0;
-  CgnsElementKind kind() const { return cgnsElementKind(type, 4); }
+  CgnsElementKind kind() const { return cgnsElementKind(type, kNewestCgns); }
   CgnsElementKind kindOf(int64_t of_mixed) const { return cgnsElementKind(of_mixed, version); }
   uint64_t first = 0, elements = 0;  // numbers of elements begin at 1 in their zone
   CgnsIntegers connectivity;

@@ -60,7 +60,7 @@ void convert(const std::byte* from, uint64_t count, Value* to) {
   for (uint64_t n = 0; n < count; ++n) {
     Stored stored;
     std::memcpy(&stored, from + n * sizeof(Stored), sizeof(Stored));
-    to[n] = static_cast<Value>(stored);
+    to[n] = convertedTo<Value>(stored);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <exception>
 #include <optional>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
@@ -317,6 +318,19 @@ void CgnsHdf5::read(const CgnsNode& node, const CgnsBox& box, double* to) const 
 
 void CgnsHdf5::read(const CgnsNode& node, const CgnsBox& box, float* to) const {
   readBox(node, box, H5T_NATIVE_FLOAT, to);
+  // HDF5 makes 0 of doubles that are too small.
+  const size_t plane = box.memory[0] * box.memory[1];
+  std::vector<size_t> rows;
+  for (size_t k = 0; k < box.count[2]; ++k)
+    for (size_t j = 0; j < box.count[1]; ++j) rows.push_back(k * plane + j * box.memory[0]);
+  const auto isZero = [](float value) { return value == 0; };
+  if (!std::all_of(rows.begin(), rows.end(),
+                   [&](size_t row) { return std::all_of(to + row, to + row + box.count[0], isZero); }))
+    return;
+  std::vector<double> stored(plane * box.count[2]);
+  read(node, box, stored.data());
+  for (const size_t row : rows)
+    std::transform(&stored[row], &stored[row] + box.count[0], to + row, convertedTo<float, double>);
 }
 
 }  // namespace curvisplat

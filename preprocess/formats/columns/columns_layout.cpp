@@ -78,12 +78,19 @@ ColumnsMap ugridOf(const NetcdfFiles& file, const NetcdfVariable& topology) {
   map.latitude = &required(file, second, "UGRID");
   const CfRole role = cfRole(file, *map.longitude);
   if (role == CfRole::kLatitude || role == CfRole::kY) std::swap(map.longitude, map.latitude);
-  // Faces come first unless the file says otherwise.
-  const auto face = dimensionNamed(file, topology.text("face_dimension"));
-  if (map.nodes_of_face->dims.empty())
+  const std::vector<size_t>& dims = map.nodes_of_face->dims;
+  if (dims.empty())
     throw Error("{}: {} has no dimensions; the file is damaged", file.path().string(),
                 map.nodes_of_face->name);
-  map.face_dim = face.value_or(map.nodes_of_face->dims[0]);
+  // Faces come first unless the file says otherwise, or has fields of the other dimension alone.
+  const auto hasFields = [&](size_t dim) {
+    return std::any_of(file.variables().begin(), file.variables().end(), [&](const NetcdfVariable& variable) {
+      return &variable != map.nodes_of_face && hasDimension(variable, dim) &&
+             variable.text("cf_role").empty();
+    });
+  };
+  const bool last = dims.size() == 2 && hasFields(dims[1]) && !hasFields(dims[0]);
+  map.face_dim = dimensionNamed(file, topology.text("face_dimension")).value_or(dims[last ? 1 : 0]);
   return map;
 }
 
@@ -118,6 +125,24 @@ std::vector<double> around(const std::vector<double>& middles) {
   return levels;
 }
 
+/// The levels around layers that are a coordinate of their own beside that of the layers: FESOM's nz beside nz1.
+/// `around`: where they lie about. Empty if there is none.
+std::vector<double> storedLevels(const NetcdfFiles& file, const std::vector<double>& around) {
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (variable.dims.size() != 1 || file.dimension(variable, 0).length != around.size() ||
+        !variable.numeric || variable.text("positive").empty())
+      continue;
+    const std::vector<double> levels = heightsOf(file, variable, variable);
+    bool fits = levels.size() == around.size();
+    for (size_t n = 0; fits && n + 1 < levels.size(); ++n) {
+      const double middle = (around[n] + around[n + 1]) / 2;
+      fits = (levels[n] - middle) * (levels[n + 1] - middle) < 0;
+    }
+    if (fits) return levels;
+  }
+  return {};
+}
+
 /// The heights by the coordinate variable of the layers.
 std::vector<double> levelsOf(const NetcdfFiles& file, const NetcdfVariable& coordinate, bool between) {
   std::vector<double> middles = heightsOf(file, coordinate, coordinate);
@@ -132,7 +157,8 @@ std::vector<double> levelsOf(const NetcdfFiles& file, const NetcdfVariable& coor
       return levels;
     }
   }
-  return around(middles);
+  const std::vector<double> estimated = around(middles), stored = storedLevels(file, estimated);
+  return stored.empty() ? estimated : stored;
 }
 
 /// A variable of heights at the levels of each face: one level more than layers.
@@ -206,7 +232,9 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
                                     std::vector<std::string>& warnings) {
   std::vector<ColumnsScalars> groups;
   for (const NetcdfVariable& variable : file.variables()) {
-    if (!variable.numeric || variable.name == "zgrid" || variable.name == "z_ifc") continue;
+    if (!variable.numeric || variable.name == "zgrid" || variable.name == "z_ifc" ||
+        !variable.text("cf_role").empty())
+      continue;
     const bool faces = hasDimension(variable, map.face_dim);
     if (faces == hasDimension(variable, map.node_dim)) continue;
     const size_t across = faces ? map.face_dim : map.node_dim;
@@ -241,14 +269,19 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     group->variables.push_back(&variable);
   }
   // What has three dimensions but is of the map itself (edgesOnCell, ...) are integers without layers' heights.
+  std::string lacking;  // the heights of the largest group
+  size_t largest = 0;
   std::erase_if(groups, [&](const ColumnsScalars& g) {
     try {
       findColumnsHeights(file, map, g);
       return false;
-    } catch (const Error&) {
-      return groups.size() > 1;
+    } catch (const Error& error) {
+      if (g.variables.size() > largest) lacking = error.what();
+      largest = std::max(largest, g.variables.size());
+      return true;
     }
   });
+  if (groups.empty() && !lacking.empty()) throw Error("{}", lacking);
   if (groups.empty())
     throw Error(
         "{}: is a grid of {} without a variable of faces or nodes and layers: no part of it has a volume",
@@ -312,6 +345,27 @@ ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map
       : map.format == "MPAS" ? "zgrid or refBottomDepth (give the file that has it, too), or "
                              : "",
       name);
+}
+
+ColumnsBottom findColumnsBottom(const NetcdfFiles& file, const ColumnsMap& map,
+                                const ColumnsScalars& scalars) {
+  const bool cells = scalars.centring == Centring::kCell;
+  const auto levels = dimensionNamed(file, "nz");
+  const bool between = levels && file.dimensions()[*levels].length == scalars.layers + 1;
+  const struct {
+    const char *format, *name;
+    bool of_cells;
+    double surplus;
+  } known[] = {{"MPAS", "maxLevelCell", true, 0},
+               {"UGRID", "nlevels", true, between ? 1.0 : 0.0},
+               {"UGRID", "nlevels_nod2D", false, between ? 1.0 : 0.0}};
+  for (const auto& [format, name, of_cells, surplus] : known) {
+    const NetcdfVariable* const found = file.find(name);
+    if (found && map.format == format && of_cells == cells && found->numeric &&
+        found->dims == std::vector{cells ? map.face_dim : map.node_dim})
+      return {found, surplus};
+  }
+  return {};
 }
 
 ColumnsReader::ColumnsReader(const NetcdfFiles& file, const NetcdfVariable& variable, size_t across_dim,

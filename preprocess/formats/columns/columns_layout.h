@@ -59,6 +59,16 @@ struct ColumnsHeights {
 ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map,
                                   const ColumnsScalars& scalars);
 
+/// How many layers each column has data in, from the top: below it there is ground.
+struct ColumnsBottom {
+  const NetcdfVariable* layers = nullptr;  // null: all have all
+  double surplus = 0;                      // by which its values exceed the number of layers
+};
+
+/// MPAS' maxLevelCell, FESOM's nlevels and nlevels_nod2D, which count the levels around the layers.
+ColumnsBottom findColumnsBottom(const NetcdfFiles& file, const ColumnsMap& map,
+                                const ColumnsScalars& scalars);
+
 /// Two dimensions of a variable, and its time: a box of them as numbers. Others have length 1.
 class ColumnsReader {
  public:

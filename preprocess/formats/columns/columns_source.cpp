@@ -19,12 +19,6 @@ namespace {
 
 constexpr uint64_t kFacesAtOnce = 65536;
 
-std::vector<std::filesystem::path> filesOf(const OpenGridOptions& options) {
-  std::vector<std::filesystem::path> files{options.grid};
-  files.insert(files.end(), options.solutions.begin(), options.solutions.end());
-  return files;
-}
-
 ColumnsMap mapOf(const NetcdfFiles& file) {
   auto map = findColumnsMap(file);
   if (!map) throw Error("{}: has no faces by UGRID, ICON or MPAS", file.path().string());
@@ -46,7 +40,7 @@ std::vector<std::string> structuredVariables(const NetcdfFiles& file) {
 
 bool isColumnsGrid(const OpenGridOptions& options) {
   try {
-    const NetcdfFiles file(filesOf(options));
+    const NetcdfFiles file(options);
     if (!findColumnsMap(file)) return false;
     if (options.scalars.empty()) return true;
     const std::vector<std::string> others = structuredVariables(file);
@@ -57,10 +51,11 @@ bool isColumnsGrid(const OpenGridOptions& options) {
 }
 
 ColumnsSource::ColumnsSource(const OpenGridOptions& options)
-    : file_(filesOf(options)),
+    : file_(options),
       map_(mapOf(file_)),
       scalars_(chooseColumnsScalars(file_, map_, options.scalars, description_.warnings)),
-      heights_(findColumnsHeights(file_, map_, scalars_)) {
+      heights_(findColumnsHeights(file_, map_, scalars_)),
+      bottom_(findColumnsBottom(file_, map_, scalars_)) {
   findTimes(options);
   const std::string unit = lowerCase(map_.longitude->text("units"));
   const auto length = kilometresOf(unit);
@@ -68,9 +63,6 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
   const bool plane = length.has_value() || map_.longitude->name == "xVertex";
   to_degrees_ = plane ? length.value_or(1e-3) : radians ? 180 / std::numbers::pi : 1;
   globe_.emplace(options.globe, !plane, 0.0);
-  deepest_ =
-      map_.format == "MPAS" && scalars_.centring == Centring::kCell ? file_.find("maxLevelCell") : nullptr;
-  if (deepest_ && (deepest_->dims != std::vector{map_.face_dim} || !deepest_->numeric)) deepest_ = nullptr;
   if (heights_.levels.empty()) spoolHeights(options.temporary_folder);
   describe(options);
 }
@@ -110,14 +102,15 @@ void ColumnsSource::describe(const OpenGridOptions& options) {
   description_.format =
       fmt::format("{} ({}), {} faces, {}, heights of {} times {:g}, in km", map_.format, file_.kind(),
                   map_.faces, shape, heights_.words, options.globe.vertical_scale);
+  if (!file_.selected().empty()) description_.format += ", " + file_.selected();
   const std::vector<std::string> others = structuredVariables(file_);
   if (!others.empty())
     description_.warnings.push_back(fmt::format(
         "left out: {}{}, on a structured grid; choose it with --scalar {}",
         fmt::join(others.begin(), others.begin() + std::min<ptrdiff_t>(3, std::ssize(others)), ", "),
         others.size() > 3 ? fmt::format(" and {} more", others.size() - 3) : "", others.front()));
-  const auto& duplicates = file_.duplicates();
-  description_.warnings.insert(description_.warnings.end(), duplicates.begin(), duplicates.end());
+  const auto& warnings = file_.warnings();
+  description_.warnings.insert(description_.warnings.end(), warnings.begin(), warnings.end());
 }
 
 uint64_t ColumnsSource::levels() const {
@@ -215,6 +208,14 @@ std::vector<double> ColumnsSource::readAngles(const NetcdfVariable& variable, ui
   return values;
 }
 
+std::vector<double> ColumnsSource::layersOf(uint64_t first, uint64_t count) const {
+  std::vector<double> layers(count, std::numeric_limits<double>::infinity());
+  if (!bottom_.layers || count == 0) return layers;
+  file_.read(*bottom_.layers, {{first}, {count}}, std::span(layers));
+  for (double& number : layers) number -= bottom_.surplus;
+  return layers;
+}
+
 void ColumnsSource::readScalars(uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                                 std::vector<std::vector<float>>& out) const {
   const bool cells = scalars_.centring == Centring::kCell;
@@ -235,6 +236,8 @@ void ColumnsSource::readScalars(uint64_t first, uint64_t count, std::span<const 
 void ColumnsSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                                MeshPoints& out) const {
   for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->clear();
+  out.hidden.clear();
+  const bool values_at_nodes = scalars_.centring == Centring::kNode;
   forEachPart(first, count, map_.nodes, levels(), [&](const Part& part) {
     const std::vector<double> longitude = readAngles(*map_.longitude, part.across, part.columns);
     const std::vector<double> latitude = readAngles(*map_.latitude, part.across, part.columns);
@@ -246,8 +249,11 @@ void ColumnsSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::sp
       else
         std::fill(row.begin(), row.end(), heights_.levels[part.layer + layer]);
     }
+    std::vector<double> layers;
+    if (values_at_nodes) layers = layersOf(part.across, part.columns);
     for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n) {
       const uint64_t column = n / part.layers, layer = n % part.layers;
+      out.hidden.push_back(values_at_nodes && static_cast<double>(part.layer + layer) >= layers[column]);
       const GlobePlace place = globe_->place(globe_->column(longitude[column], latitude[column]),
                                              heights[layer * part.columns + column]);
       out.x.push_back(place.x);
@@ -255,9 +261,8 @@ void ColumnsSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::sp
       out.z.push_back(place.z);
     }
   });
-  out.hidden.assign(count, 0);
   out.scalars.clear();
-  if (scalars_.centring == Centring::kNode) readScalars(first, count, scalars, out.scalars);
+  if (values_at_nodes) readScalars(first, count, scalars, out.scalars);
 }
 
 void ColumnsSource::readCells(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
@@ -267,8 +272,8 @@ void ColumnsSource::readCells(uint32_t, uint64_t first, uint64_t count, std::spa
   std::vector<uint64_t> points;
   forEachPart(first, count, map_.faces, layers, [&](const Part& part) {
     const std::vector<int64_t> nodes = nodesOf(part.across, part.columns);
-    std::vector<double> deepest(part.columns, std::numeric_limits<double>::infinity());
-    if (deepest_) file_.read(*deepest_, {{part.across}, {part.columns}}, std::span(deepest));
+    std::vector<double> with_data(part.columns, std::numeric_limits<double>::infinity());
+    if (scalars_.centring == Centring::kCell) with_data = layersOf(part.across, part.columns);
     for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n) {
       const uint64_t column = n / part.layers, layer = part.layer + n % part.layers;
       points.clear();
@@ -277,7 +282,7 @@ void ColumnsSource::readCells(uint32_t, uint64_t first, uint64_t count, std::spa
           if (const int64_t node = nodes[column * map_.most_sides + side]; node >= 0)
             points.push_back(pointOf(static_cast<uint64_t>(node), level));
       out.appendPrism(points);
-      if (static_cast<double>(layer) >= deepest[column]) out.hidden.back() = 1;
+      if (static_cast<double>(layer) >= with_data[column]) out.hidden.back() = 1;
     }
   });
   out.scalars.clear();

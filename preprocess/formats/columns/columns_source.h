@@ -47,6 +47,8 @@ class ColumnsSource final : public MeshSource {
   std::vector<double> readAngles(const NetcdfVariable& variable, uint64_t first, uint64_t count) const;
   uint64_t levels() const;
   uint64_t pointOf(uint64_t node, uint64_t level) const;
+  /// How many layers from the top have data in some columns: faces, or nodes, by the scalars' centring.
+  std::vector<double> layersOf(uint64_t first, uint64_t count) const;
   /// The nodes of some faces: `sides` of each, -1 where there are fewer.
   std::vector<int64_t> nodesOf(uint64_t first, uint64_t count) const;
 
@@ -57,8 +59,8 @@ class ColumnsSource final : public MeshSource {
   ColumnsHeights heights_;
   double to_degrees_ = 1;  // of longitudes; of lengths, kilometres
   std::optional<Globe> globe_;
-  SpooledNumbers node_heights_;              // [level][node], if heights_.levels is empty
-  const NetcdfVariable* deepest_ = nullptr;  // of MPAS' ocean: layers of each face
+  SpooledNumbers node_heights_;  // [level][node], if heights_.levels is empty
+  ColumnsBottom bottom_;
 };
 
 }  // namespace curvisplat

@@ -12,15 +12,18 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <list>
 #include <memory>
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
@@ -61,16 +64,37 @@ Stored loadStored(const std::byte* from, bool swap) {
   return std::bit_cast<Stored>(swap ? byteSwapped(bits) : bits);
 }
 
-/// Converts `count` numbers from `from` to `to`. A double that is too large for a float becomes infinite,
-/// which blanks its sample.
+/// A number in the type that is asked for. A double that is too large for a float becomes infinite, which blanks
+/// its sample; one that is too small does not become 0, so that a scalar of such values can be told from one of
+/// zeros (tinyValues(), preprocess/survey).
+template <typename Value, typename Stored>
+Value convertedTo(Stored stored) {
+  const auto value = static_cast<Value>(stored);
+  if constexpr (std::is_same_v<Value, float> && std::is_same_v<Stored, double>)
+    if (value == 0 && stored != 0)
+      return std::copysign(std::numeric_limits<float>::denorm_min(), static_cast<float>(stored));
+  return value;
+}
+
+/// For floats that a library has made of doubles: if all are 0, reads the doubles, by read(std::span<double>), and
+/// converts them.
+template <typename Read>
+void convertIfZero(std::span<float> values, const Read& read) {
+  if (std::any_of(values.begin(), values.end(), [](float value) { return value != 0; })) return;
+  std::vector<double> stored(values.size());
+  if (!stored.empty()) read(std::span(stored));
+  for (size_t n = 0; n < values.size(); ++n) values[n] = convertedTo<float>(stored[n]);
+}
+
+/// Converts `count` numbers from `from` to `to`.
 template <typename Stored, typename Value>
 void convertStored(const std::byte* from, size_t count, bool swap, Value* to) {
   if (swap)
     for (size_t n = 0; n < count; ++n)
-      to[n] = static_cast<Value>(loadStored<Stored>(from + n * sizeof(Stored), true));
+      to[n] = convertedTo<Value>(loadStored<Stored>(from + n * sizeof(Stored), true));
   else
     for (size_t n = 0; n < count; ++n)
-      to[n] = static_cast<Value>(loadStored<Stored>(from + n * sizeof(Stored), false));
+      to[n] = convertedTo<Value>(loadStored<Stored>(from + n * sizeof(Stored), false));
 }
 
 /// A bounded pool of open input files, most recently used first. Thread-safe.

@@ -140,9 +140,18 @@ DerivedMeshSource::DerivedMeshSource(std::unique_ptr<MeshSource> source, const D
     if (quantity.needs != 0 && (quantity.needs & ~kOwn) == 0 && offers(inputs_, quantity) &&
         addQuantity(quantity, inputs_.centring, stored, description_))
       quantities_.push_back(quantity);
+  constant_ = description_.scalars.empty() && !description_.format.starts_with("SU2");
+  if (!constant_) return;
+  GridScalar scalar;
+  scalar.name = "constant";
+  scalar.centring = Centring::kCell;
+  description_.scalars.push_back(std::move(scalar));
+  description_.warnings.emplace_back(
+      "the files contain no scalar; a constant, 1 in all cells, takes its place");
 }
 
 std::vector<uint32_t> DerivedMeshSource::neededFor(std::span<const uint32_t> scalars) const {
+  if (constant_) return {};
   const size_t stored = source_->description().scalars.size();
   std::vector<uint32_t> needed;
   const auto add = [&](uint32_t scalar) {
@@ -197,7 +206,10 @@ void DerivedMeshSource::readCells(uint32_t piece, uint64_t first, uint64_t count
                                   std::span<const uint32_t> scalars, MeshCells& out) const {
   const std::vector<uint32_t> needed = neededFor(scalars);
   source_->readCells(piece, first, count, needed, out);
-  derive(scalars, needed, out.scalars);
+  if (constant_)
+    out.scalars.assign(scalars.size(), std::vector<float>(out.size(), 1));
+  else
+    derive(scalars, needed, out.scalars);
 }
 
 }  // namespace curvisplat

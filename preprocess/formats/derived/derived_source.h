@@ -51,7 +51,8 @@ class DerivedSource final : public GridSource {
 
 /// Derived scalars of an unstructured grid: those that a sample's own density, velocity and pressure give.
 /// Scalars of gradients need the neighbours of a cell: preprocess/gradients/gradient_mesh.h. The Jacobian
-/// and the volume of structured grids are not offered.
+/// and the volume of structured grids are not offered. A mesh without any scalar gets one that is 1 in all cells,
+/// and a warning; but not a mesh of SU2, whose scalars are in another file.
 class DerivedMeshSource final : public MeshSource {
  public:
   /// Throws UsageError if gamma or the gas constant is out of range.
@@ -80,6 +81,7 @@ class DerivedMeshSource final : public MeshSource {
   std::optional<float> blank_value_;
   FlowInputs inputs_;
   std::vector<QuantityInfo> quantities_;  // of the derived scalars, in order
+  bool constant_ = false;                 // the only scalar is 1 in all cells
 };
 
 }  // namespace curvisplat

@@ -46,7 +46,7 @@ void EnsightList::read(uint64_t first, std::span<float> to) const {
     const auto part = std::span(values).first(std::min<uint64_t>(kChunk, to.size() - done));
     spooled->read(begin + first + done, part);
     std::transform(part.begin(), part.end(), to.begin() + static_cast<ptrdiff_t>(done),
-                   [](double value) { return static_cast<float>(value); });
+                   [](double value) { return convertedTo<float>(value); });
   }
 }
 

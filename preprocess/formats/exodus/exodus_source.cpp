@@ -14,6 +14,9 @@
 namespace curvisplat {
 namespace {
 
+// Files of before 2004 have all scalars of the nodes in one variable; later ones have a number behind its name.
+constexpr const char* kAllOfNodes = "vals_nod_var";
+
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 uint64_t lengthOf(const NetcdfFile& file, const std::string& dimension) {
@@ -87,7 +90,7 @@ ExodusSource::ExodusSource(const OpenGridOptions& options)
   const NetcdfVariable* const x = file_->find(file_->find("coord") ? "coord" : "coordx");
   if (!x) throw Error("{}: has no coordinates (coordx)", name);
   description_.coordinate_bytes = x->value_bytes == 8 ? 8 : 4;
-  findScalars("name_nod_var", "vals_nod_var", Centring::kNode);
+  findScalars("name_nod_var", kAllOfNodes, Centring::kNode);
   findScalars("name_elem_var", "vals_elem_var", Centring::kCell);
 }
 
@@ -151,7 +154,8 @@ void ExodusSource::findScalars(const char* names, const char* values, Centring c
   const std::vector<std::string> all = namesIn(names);
   for (size_t n = 0; n < all.size(); ++n) {
     bool any = false;
-    if (centring == Centring::kNode) any = file_->find(fmt::format("{}{}", values, n + 1)) != nullptr;
+    if (centring == Centring::kNode)
+      any = file_->find(fmt::format("{}{}", values, n + 1)) || file_->find(values);
     for (const Block& block : blocks_)
       any = any || file_->find(fmt::format("{}{}eb{}", values, n + 1, block.number)) != nullptr;
     if (!any) continue;
@@ -166,17 +170,24 @@ void ExodusSource::findScalars(const char* names, const char* values, Centring c
   }
 }
 
-/// Values [first, ...) of the open step; NaN without a variable.
-void ExodusSource::readValues(const NetcdfVariable* variable, uint64_t first, std::span<float> to) const {
+/// Values [first, ...) of the open step; NaN without a variable. `of_all`: which of all scalars, in a variable that has them together.
+void ExodusSource::readValues(const NetcdfVariable* variable, uint64_t first, std::span<float> to,
+                              std::optional<size_t> of_all) const {
   if (!variable) return std::fill(to.begin(), to.end(), kNaN);
   if (description_.times.empty())
     throw Error("{}: has no time step: its variables ({}) hold no values yet", file_->path().string(),
                 variable->name);
-  if (variable->dims.size() != 2 || file_->dimension(*variable, 0).length <= description_.time_step ||
-      first + to.size() > file_->dimension(*variable, 1).length)
+  const size_t last = of_all ? 2 : 1;
+  if (variable->dims.size() != last + 1 || file_->dimension(*variable, 0).length <= description_.time_step ||
+      (of_all && *of_all >= file_->dimension(*variable, 1).length) ||
+      first + to.size() > file_->dimension(*variable, last).length)
     throw Error("{}: {} has other dimensions than time steps and {} values; the file is damaged",
                 file_->path().string(), variable->name, first + to.size());
-  if (!to.empty()) file_->read(*variable, {{description_.time_step, first}, {1, to.size()}}, to);
+  if (to.empty()) return;
+  if (of_all)
+    file_->read(*variable, {{description_.time_step, *of_all, first}, {1, 1, to.size()}}, to);
+  else
+    file_->read(*variable, {{description_.time_step, first}, {1, to.size()}}, to);
 }
 
 void ExodusSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
@@ -199,8 +210,11 @@ void ExodusSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::spa
   out.scalars.resize(scalars.size());
   for (size_t n = 0; n < scalars.size(); ++n) {
     out.scalars[n].resize(count);
-    readValues(file_->find(fmt::format("vals_nod_var{}", number_of_scalar_.at(scalars[n]))), first,
-               out.scalars[n]);
+    const size_t number = number_of_scalar_.at(scalars[n]);
+    if (const NetcdfVariable* const of_all = file_->find(kAllOfNodes))
+      readValues(of_all, first, out.scalars[n], number - 1);
+    else
+      readValues(file_->find(fmt::format("{}{}", kAllOfNodes, number)), first, out.scalars[n]);
   }
 }
 

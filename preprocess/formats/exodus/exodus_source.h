@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,7 +39,8 @@ class ExodusSource final : public MeshSource {
   void findBlocks();
   void findScalars(const char* names, const char* values, Centring centring);
   std::vector<std::string> namesIn(const char* variable) const;
-  void readValues(const NetcdfVariable* variable, uint64_t first, std::span<float> to) const;
+  void readValues(const NetcdfVariable* variable, uint64_t first, std::span<float> to,
+                  std::optional<size_t> of_all = {}) const;
 
   std::unique_ptr<NetcdfFile> file_;
   std::vector<Block> blocks_;

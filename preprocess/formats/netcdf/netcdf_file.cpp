@@ -10,6 +10,7 @@
 #include <mutex>
 #include <numeric>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "preprocess/formats/common/text_reader.h"
@@ -301,15 +302,21 @@ bool NetcdfFile::hasAttribute(const char* attribute) const {
   return nc_inq_attid(opened(), NC_GLOBAL, attribute, &id) == NC_NOERR;
 }
 
-std::optional<double> NetcdfFile::number(const char* attribute) const {
+std::vector<double> NetcdfFile::numbers(const char* attribute) const {
   const QuietHdf5 quiet;
   nc_type type = NC_NAT;
   size_t length = 0;
-  double value = 0;
-  if (nc_inq_att(opened(), NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length != 1 ||
-      netcdfBytes(type) == 0 || nc_get_att_double(file_, NC_GLOBAL, attribute, &value) != NC_NOERR)
-    return std::nullopt;
-  return value;
+  if (nc_inq_att(opened(), NC_GLOBAL, attribute, &type, &length) != NC_NOERR || netcdfBytes(type) == 0 ||
+      length > kMaxAttributeValues)
+    return {};
+  std::vector<double> numbers(length);
+  if (nc_get_att_double(file_, NC_GLOBAL, attribute, numbers.data()) != NC_NOERR) return {};
+  return numbers;
+}
+
+std::optional<double> NetcdfFile::number(const char* attribute) const {
+  const std::vector<double> found = numbers(attribute);
+  return found.size() == 1 ? std::optional(found[0]) : std::nullopt;
 }
 
 const NetcdfDimension& NetcdfFile::dimension(const NetcdfVariable& variable, size_t axis) const {
@@ -383,6 +390,8 @@ void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std:
 
 void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const {
   readWith(nc_get_vara_float, variable, box, to);
+  if (variable.type == NC_DOUBLE)
+    convertIfZero(to.first(box.values()), [&](std::span<double> stored) { read(variable, box, stored); });
 }
 
 }  // namespace curvisplat

@@ -49,7 +49,9 @@ class NetcdfFile {
   /// The text of an attribute of the file; empty if there is none, or if it is not text.
   std::string text(const char* attribute) const;
   bool hasAttribute(const char* attribute) const;
-  /// A numeric attribute of the file with one value.
+  /// A numeric attribute of the file; empty if there is none, or if it is text.
+  std::vector<double> numbers(const char* attribute) const;
+  /// The same with one value.
   std::optional<double> number(const char* attribute) const;
   /// Which stored values of a variable read() replaces by NaN, in words; empty if none.
   std::string missingValues(const NetcdfVariable& variable) const {

@@ -1,7 +1,7 @@
 // One or more NetCDF files that describe one grid: coordinates and masks in one, fields in others.
-// NetcdfFiles offers their variables and dimensions as those of one file. foreignNetcdf() names files that
-// hold no structured grid by design. Any number of threads may use a NetcdfFiles; calls into libnetcdf run
-// one after the other.
+// NetcdfFiles offers their variables and dimensions as those of one file; a dimension of which the user has
+// chosen one value has the length 1, and parts of a map are one file (netcdf_tiles.h). foreignNetcdf() names files that hold no structured grid by design. Any
+// number of threads may use a NetcdfFiles; calls into libnetcdf run one after the other.
 #pragma once
 
 #include <cstddef>
@@ -13,20 +13,22 @@
 #include <string_view>
 #include <vector>
 
-#include "preprocess/formats/netcdf/netcdf_file.h"
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/formats/netcdf/netcdf_tiles.h"
 
 namespace curvisplat {
 
 class NetcdfFiles {
  public:
-  /// Dimensions of the same name and length are one dimension. If several files have a variable of the same
-  /// name, the first file's is taken and duplicates() lists the others; but each file keeps its times since
-  /// a date. Throws Error as NetcdfFile does, and for a file that is not NetCDF.
-  explicit NetcdfFiles(const std::vector<std::filesystem::path>& paths);
+  /// Dimensions of the same name and length are one dimension, and so are ICON's cells by either name. If several files have a variable of the same
+  /// name, the first file's is taken and warnings() lists the others; but each file keeps its times since
+  /// a date. Of the options, the files and `select` count. Throws Error as NetcdfFile does, and for a file that
+  /// is not NetCDF; UsageError for a selection of what is not there.
+  explicit NetcdfFiles(const OpenGridOptions& options);
 
   /// Of the first file.
-  const std::filesystem::path& path() const { return files_.front()->path(); }
-  const std::string& kind() const { return files_.front()->kind(); }
+  const std::filesystem::path& path() const { return files_.front().front().path(); }
+  const std::string& kind() const { return files_.front().front().kind(); }
   std::vector<std::string> paths() const;
 
   const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
@@ -35,16 +37,18 @@ class NetcdfFiles {
   /// The coordinate of a dimension: in the file of `data` if it is there.
   const NetcdfVariable* coordinateOf(size_t dimension, const NetcdfVariable& data) const;
   const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
-  /// One sentence for each further file with variables that an earlier file has too.
-  const std::vector<std::string>& duplicates() const { return duplicates_; }
+  /// One sentence for each further file with variables that an earlier file has too, and for each map of which parts are missing.
+  const std::vector<std::string>& warnings() const { return warnings_; }
+  /// The chosen values of dimensions, for messages: "month 3"; empty if there are none.
+  const std::string& selected() const { return selected_; }
 
   /// Of the first file that has the attribute; as NetcdfFile's.
   std::string text(const char* attribute) const;
   bool hasAttribute(const char* attribute) const;
   std::optional<double> number(const char* attribute) const;
   /// Of the first file; as NetcdfFile's.
-  const std::vector<std::string>& groups() const { return files_.front()->groups(); }
-  bool plainHdf5() const { return files_.front()->plainHdf5(); }
+  const std::vector<std::string>& groups() const { return files_.front().front().groups(); }
+  bool plainHdf5() const { return files_.front().front().plainHdf5(); }
 
   /// As NetcdfFile's.
   std::string missingValues(const NetcdfVariable& variable) const;
@@ -54,12 +58,18 @@ class NetcdfFiles {
   void release() const;
 
  private:
-  void add(const NetcdfFile& file);
+  void add(size_t number);
+  void select(const std::string& choice);
+  size_t indexOf(size_t dimension, const std::string& value) const;
+  template <typename Value>
+  void readFrom(const NetcdfVariable& variable, const NetcdfBox& box, std::span<Value> to) const;
 
-  std::vector<std::unique_ptr<NetcdfFile>> files_;
+  std::vector<NetcdfTiles> files_;
   std::vector<NetcdfDimension> dimensions_;
+  std::vector<size_t> first_;  // [dimension]: the index of the chosen value; 0 where all are read
+  std::string selected_;
   std::vector<NetcdfVariable> variables_;
-  std::vector<std::string> duplicates_;
+  std::vector<std::string> warnings_;
 };
 
 /// What the files hold if it is no structured grid by design, an unstructured mesh or plain HDF5: "an

@@ -70,16 +70,10 @@ std::optional<std::pair<size_t, size_t>> positionOf(const std::vector<CfGrid>& g
   return std::nullopt;
 }
 
-std::vector<std::filesystem::path> filesOf(const OpenGridOptions& options) {
-  std::vector<std::filesystem::path> files{options.grid};
-  files.insert(files.end(), options.solutions.begin(), options.solutions.end());
-  return files;
-}
-
 }  // namespace
 
 NetcdfSource::NetcdfSource(const OpenGridOptions& options, const NetcdfSource* beside)
-    : file_(filesOf(options)),
+    : file_(options),
       grid_(chooseGrid(file_, options, description_, mask_)),
       globe_(beside ? beside->globe_ : globeOf(options.globe)) {
   grid_.vertical.setRadius(options.globe.radius_km);
@@ -246,7 +240,7 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   if (grid_.mask)
     description_.blanking +=
         fmt::format("{}{}", description_.blanking.empty() ? "" : ", or where ", grid_.mask->description());
-  for (const auto* warnings : {&grid_.vertical.warnings(), &file_.duplicates()})
+  for (const auto* warnings : {&grid_.vertical.warnings(), &file_.warnings()})
     description_.warnings.insert(description_.warnings.end(), warnings->begin(), warnings->end());
   if (!grid_.degrees && !grid_.indices && isUnitless(grid_.longitude.variable().text("units")))
     description_.warnings.push_back(fmt::format("{} and {} have no unit of length; metres are assumed",
@@ -265,6 +259,7 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
       fmt::format("{}, {}, {}{} {}, vertical {} times {:g}, in km", file_.kind(),
                   grid_.longitude.variable().name, grid_.latitude.variable().name, projection, shape,
                   grid_.vertical.description(), options.globe.vertical_scale);
+  if (!file_.selected().empty()) description_.format += ", " + file_.selected();
   if (!grid_.steps_of.empty())
     description_.notes.push_back(
         fmt::format("the steps are the {} values of {}", description_.times.size(), grid_.steps_of));

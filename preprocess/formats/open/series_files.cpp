@@ -10,6 +10,7 @@
 #include <set>
 
 #include "preprocess/formats/netcdf/fms_mosaic.h"
+#include "preprocess/formats/netcdf/netcdf_tiles.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/su2/su2_source.h"
 #include "stream/base/error.h"
@@ -128,6 +129,16 @@ bool isCalledNetcdf(fs::path path) {
   return path.extension() == ".nc" || path.extension() == ".nc4";
 }
 
+/// Whether the file is one of several parts of a map, of a processor each (netcdf_tiles.h).
+bool isPartOfMap(const fs::path& path) {
+  if (!isCalledNetcdf(path) || !isRegularFile(path)) return false;
+  try {
+    return NetcdfFile::recognises(InputFile(path)) && NetcdfDomain::of(NetcdfFile(path));
+  } catch (const Error&) {
+    return false;  // the reader says what is wrong
+  }
+}
+
 /// The path with '#' for each number in its file name, decimals included: equal for the files of a series. The number of a tile stays: the
 /// tiles of a cubed sphere are parts of one step.
 std::string shapeOf(const fs::path& path) {
@@ -139,6 +150,25 @@ std::string shapeOf(const fs::path& path) {
   }
   if (const auto tile = tileNumber(path); tile && isCalledNetcdf(path)) shape += fmt::format("/{}", *tile);
   return shape;
+}
+
+/// The shapes of the files, the grid's first. The number at the end of the names stays where it tells the parts of a map apart.
+std::vector<std::string> shapesOf(const OpenGridOptions& options) {
+  std::vector<fs::path> files{options.grid};
+  files.insert(files.end(), options.solutions.begin(), options.solutions.end());
+  std::vector<std::string> shapes;
+  std::map<std::string, std::vector<size_t>> alike;
+  for (const fs::path& path : files) {
+    shapes.push_back(shapeOf(path));
+    alike[shapes.back()].push_back(shapes.size() - 1);
+  }
+  for (const auto& [shape, numbers] : alike)
+    if (numbers.size() > 1 && isPartOfMap(files[numbers.front()]))
+      for (const size_t n : numbers) {
+        const std::string stem = files[n].stem().string();
+        shapes[n] += "/" + stem.substr(stem.find_last_not_of("0123456789") + 1);
+      }
+  return shapes;
 }
 
 /// A pattern for fnmatch(): "%04d" stands for a number. Empty if the path is no pattern.
@@ -202,10 +232,11 @@ Groups groupsOf(const OpenGridOptions& options) {
   Groups groups;
   groups.grids = {options.grid};
   std::map<std::string, size_t> group_of_shape;
-  const std::string grid_shape = shapeOf(options.grid);
-  for (const fs::path& path : options.solutions) {
-    const std::string shape = shapeOf(path);
-    if (shape == grid_shape) {
+  const std::vector<std::string> shapes = shapesOf(options);
+  for (size_t n = 0; n < options.solutions.size(); ++n) {
+    const fs::path& path = options.solutions[n];
+    const std::string& shape = shapes[n + 1];
+    if (shape == shapes[0]) {
       groups.grids.push_back(path);
       continue;
     }
@@ -311,8 +342,7 @@ void expandPatterns(OpenGridOptions& options) {
 
 bool hasSeveralStepFiles(const OpenGridOptions& options) {
   if (areZones(options)) return false;
-  std::vector<std::string> shapes{shapeOf(options.grid)};
-  for (const fs::path& path : options.solutions) shapes.push_back(shapeOf(path));
+  std::vector<std::string> shapes = shapesOf(options);
   std::sort(shapes.begin(), shapes.end());
   return std::adjacent_find(shapes.begin(), shapes.end()) != shapes.end();
 }

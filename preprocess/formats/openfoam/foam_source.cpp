@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <tuple>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
@@ -217,17 +219,17 @@ void FoamSource::findFields() {
   }
   for (const std::string& name : names) {
     const fs::path path = pieces_.front().folder / time / name;
-    size_t components = 0;
+    std::optional<FoamFile> file;
     try {
-      FoamFile file = open(pieces_.front(), path);
-      components = componentsOf(file.type());
-      if (components == 0) continue;
+      file.emplace(open(pieces_.front(), path));
     } catch (const Error&) {
       continue;  // Not a file of OpenFOAM.
     }
+    const size_t components = componentsOf(file->type());
+    if (components == 0) continue;
     // Initial values may be expressions. Such a field is left out, and the others are read.
     try {
-      open(pieces_.front(), path).beginField(components);
+      file->beginField(components);
     } catch (const Error& error) {
       description_.warnings.push_back(fmt::format("{}; {} is left out", error.what(), name));
       continue;
@@ -320,7 +322,7 @@ void FoamSource::readCells(uint32_t piece_number, uint64_t first, uint64_t count
     out.scalars[n].resize(count);
     for (size_t cell = 0; cell < count; ++cell) {
       const double* tuple = values.data() + cell * components;
-      out.scalars[n][cell] = static_cast<float>(
+      out.scalars[n][cell] = convertedTo<float>(
           scalar.component < 0 ? std::sqrt(tuple[0] * tuple[0] + tuple[1] * tuple[1] + tuple[2] * tuple[2])
                                : tuple[scalar.component]);
     }

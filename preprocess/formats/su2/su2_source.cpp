@@ -136,7 +136,7 @@ void Su2Restart::read(size_t variable, uint64_t first, std::span<float> to) cons
       text_.read((first + done) * stride_, std::span(values));
     }
     for (uint64_t n = 0; n < count; ++n)
-      to[done + n] = static_cast<float>(values[n * stride_ + columns_[variable]]);
+      to[done + n] = convertedTo<float>(values[n * stride_ + columns_[variable]]);
   }
 }
 

@@ -17,7 +17,7 @@ constexpr size_t kBufferBytes = size_t{256} << 10;
 template <typename Stored, typename Value>
 void convert(std::span<const std::byte> bytes, uint64_t stride, bool swap, std::span<Value> to) {
   for (size_t n = 0; n < to.size(); ++n)
-    to[n] = static_cast<Value>(loadStored<Stored>(bytes.data() + n * stride, swap));
+    to[n] = convertedTo<Value>(loadStored<Stored>(bytes.data() + n * stride, swap));
 }
 
 }  // namespace

@@ -159,7 +159,7 @@ void convertTuples(const std::byte* from, size_t count, uint32_t components, boo
   if (wanted.component != WantedComponent<Value>::kMagnitude) {
     from += static_cast<size_t>(wanted.component) * sizeof(Stored);
     for (size_t n = 0; n < count; ++n)
-      to[n] = static_cast<Value>(loadStored<Stored>(from + n * stride, swap));
+      to[n] = convertedTo<Value>(loadStored<Stored>(from + n * stride, swap));
     return;
   }
   for (size_t n = 0; n < count; ++n) {

@@ -91,7 +91,8 @@ void appendVtkCell(uint8_t type, std::span<const uint64_t> points, MeshCells& ou
 // Bits of vtkGhostType (vtkDataSetAttributes). Another piece has a duplicate cell; a duplicate point may
 // well be one of a cell that no other piece has.
 constexpr int kHiddenPoint = 2;
-constexpr int kHiddenCell = 1 | 8 | 32;  // duplicate, refined, hidden
+constexpr int kDuplicateCell = 1;
+constexpr int kHiddenCell = kDuplicateCell | 8 | 32;  // refined, hidden
 
 constexpr uint64_t kChunk = 65536;
 // Numbers of points are read as doubles, which hold them up to this.
@@ -153,7 +154,27 @@ VtkMeshSource::VtkMeshSource(VtkMesh mesh) : mesh_(std::move(mesh)) {
     if (bytesOf(std::get<VtkPoints>(mesh_.pieces[n].nodes).type) == 8) description_.coordinate_bytes = 8;
   }
   checkTypes();
+  warnOfCopies();
   fields_.describe(mesh_.pieces, pieces, description_);
+}
+
+/// One of several pieces, opened alone: the cells that it shares with others are missing then.
+void VtkMeshSource::warnOfCopies() {
+  if (mesh_.pieces.size() > 1 || !mesh_.pieces.front().cell_ghosts) return;
+  const uint64_t cells = mesh_.cells.front().types.tuples;
+  uint64_t copies = 0;
+  std::vector<uint8_t> flags;
+  for (uint64_t first = 0; first < cells; first += kChunk) {
+    readFlags(mesh_.pieces.front().cell_ghosts, first, std::min(kChunk, cells - first), kDuplicateCell,
+              flags);
+    copies += static_cast<uint64_t>(std::count(flags.begin(), flags.end(), 1));
+  }
+  if (copies > 0)
+    description_.warnings.push_back(
+        fmt::format("left out: {} of {} cells, which vtkGhostType marks as copies of other pieces'; the file "
+                    "that names all "
+                    "pieces (.pvtu) draws them",
+                    copies, cells));
 }
 
 void VtkMeshSource::checkTypes() {

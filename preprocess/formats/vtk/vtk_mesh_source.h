@@ -50,6 +50,7 @@ class VtkMeshSource final : public MeshSource {
 
  private:
   void checkTypes();
+  void warnOfCopies();
   void readScalars(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                    std::vector<std::vector<float>>& out) const;
 

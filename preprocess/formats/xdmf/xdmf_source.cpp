@@ -29,7 +29,7 @@ void forEachTuple(const XdmfValues& values, uint64_t components, uint64_t first,
 
 template <typename Value>
 Value pick(std::span<const double> tuple, int component) {
-  if (component != kMagnitude) return static_cast<Value>(tuple[static_cast<size_t>(component)]);
+  if (component != kMagnitude) return convertedTo<Value>(tuple[static_cast<size_t>(component)]);
   double squares = 0;
   for (const double value : tuple) squares += value * value;
   return static_cast<Value>(std::sqrt(squares));

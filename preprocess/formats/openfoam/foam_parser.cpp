@@ -1,0 +1,206 @@
+#include "preprocess/formats/openfoam/foam_parser.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <span>
+#include <utility>
+
+#include "preprocess/formats/common/text_reader.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kBufferBytes = size_t{256} << 10;
+constexpr size_t kFirstRead = 4096;
+constexpr uint64_t kMaxNumbers = 100'000'000'000'000;
+constexpr int kMaxExpansions = 100;
+constexpr size_t kMaxEntryTokens = 100;  // longer ones are lists of values, which no field uses
+constexpr int kMaxIncludes = 8;          // in one another
+
+bool isSpace(int c) {
+  return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+bool isPunctuation(int c) {
+  return c == '(' || c == ')' || c == '{' || c == '}' || c == '[' || c == ']' || c == ';';
+}
+
+}  // namespace
+
+FoamParser::FoamParser(const std::filesystem::path& path, std::string shown)
+    : file_(path), name_(std::move(shown)), end_(file_.size()), buffer_(kBufferBytes), refill_(kFirstRead) {}
+
+void FoamParser::fail(const std::string& what) const {
+  throw Error("{}: byte {}: {}", name_, offset(), printable(what));
+}
+
+int FoamParser::peek() {
+  if (at_ == filled_) {
+    buffer_offset_ += filled_;
+    at_ = 0;
+    filled_ = static_cast<size_t>(std::min<uint64_t>(refill_, end_ - buffer_offset_));
+    refill_ = std::min(2 * refill_, buffer_.size());
+    file_.readAt(buffer_offset_, std::span(buffer_.data(), filled_));
+    if (filled_ == 0) return -1;
+  }
+  return static_cast<unsigned char>(buffer_[at_]);
+}
+
+int FoamParser::take() {
+  const int c = peek();
+  if (c >= 0) ++at_;
+  return c;
+}
+
+void FoamParser::add(std::string& word, int c) const {
+  word += static_cast<char>(c);
+  if (word.size() > 1000) fail("has a word of more than 1000 characters; the file is damaged");
+}
+
+void FoamParser::seek(uint64_t offset) {
+  buffer_offset_ = offset;
+  at_ = filled_ = 0;
+  refill_ = kFirstRead;
+}
+
+uint64_t FoamParser::enterPart() {
+  const uint64_t bytes = label();
+  expect("(");
+  if (bytes >= end_ - offset())
+    fail(fmt::format("needs {} bytes, but {} are left; the file is truncated", bytes, end_ - offset()));
+  return offset() + bytes;
+}
+
+void FoamParser::skipSpace() {
+  while (isSpace(peek())) take();
+}
+
+std::string FoamParser::token() {
+  for (;;) {
+    std::string word = nextToken();
+    if (word.empty() || word[0] != '$') return word;
+    if (word == "$" && peek() == '{')
+      for (int next = 0; next != '}' && peek() >= 0; add(word, next)) next = take();
+    std::string key = word.substr(1);
+    if (key.size() > 2 && key.front() == '{') key = key.substr(1, key.size() - 2);
+    const auto entry = entries_.find(key);
+    // Entries may name one another in a circle.
+    if (entry == entries_.end() || ++expansions_ > kMaxExpansions) return word;
+    expanded_.insert(expanded_.begin(), entry->second.begin(), entry->second.end());
+  }
+}
+
+std::string FoamParser::nextToken() {
+  if (!expanded_.empty()) {
+    std::string word = std::move(expanded_.front());
+    expanded_.pop_front();
+    return word;
+  }
+  for (;;) {
+    skipSpace();
+    const int c = take();
+    if (c < 0) return "";
+    if (c == '/' && peek() == '/') {
+      while (peek() >= 0 && peek() != '\n') take();
+      continue;
+    }
+    if (c == '/' && peek() == '*') {
+      for (int before = 0; peek() >= 0;) {
+        const int next = take();
+        if (before == '*' && next == '/') break;
+        before = next;
+      }
+      continue;
+    }
+    std::string word(1, static_cast<char>(c));
+    if (isPunctuation(c)) return word;
+    if (c == '"') {
+      for (int next = take(); next >= 0 && next != '"'; next = take()) add(word, next);
+      return word;
+    }
+    while (peek() >= 0 && !isSpace(peek()) && !isPunctuation(peek())) add(word, take());
+    return word;
+  }
+}
+
+void FoamParser::expect(const char* wanted) {
+  const std::string found = token();
+  if (found != wanted)
+    fail(fmt::format("found \"{}\"; expected \"{}\"; the file is truncated or damaged", found.substr(0, 30),
+                     wanted));
+}
+
+void FoamParser::failValue(const std::string& word, const char* wanted) const {
+  if (!word.empty() && (word[0] == '$' || word[0] == '#'))
+    fail(
+        fmt::format("has \"{}\" in the place of {}, which only OpenFOAM can evaluate: write the values with "
+                    "foamDictionary -expand FILE",
+                    word.substr(0, 30), wanted));
+  fail(
+      fmt::format("found \"{}\"; expected {}; the file is truncated or damaged", word.substr(0, 30), wanted));
+}
+
+double FoamParser::number() {
+  double value = 0;
+  const std::string word = token();
+  if (!parseNumber(word, value)) failValue(word, "a number");
+  return value;
+}
+
+uint64_t FoamParser::label() {
+  const std::string word = token();
+  uint64_t value = 0;
+  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc{} || stop != word.data() + word.size() || value > kMaxNumbers)
+    failValue(word, "a number of 0 or more");
+  return value;
+}
+
+bool FoamParser::atEnd() {
+  const uint64_t begin = offset();
+  const bool ended = token().empty();
+  seek(begin);
+  return ended;
+}
+
+std::vector<std::string> FoamParser::entryTokens() {
+  std::vector<std::string> tokens;
+  int braces = 0;
+  for (std::string word = token(); !word.empty(); word = token()) {
+    if (word == ";" && braces == 0) break;
+    braces += word == "{" ? 1 : word == "}" ? -1 : 0;
+    if (tokens.size() <= kMaxEntryTokens) tokens.push_back(word);
+    if (word == "}" && braces <= 0) break;
+  }
+  return tokens;
+}
+
+void FoamParser::include(const std::filesystem::path& path, int depth) {
+  const std::filesystem::path included = std::filesystem::path(name_).parent_path() / path;
+  if (depth >= kMaxIncludes || !isRegularFile(included))
+    return;  // what it defines is missed where it is used
+  FoamParser other(included, included.string());
+  other.findEntry("", depth + 1);
+  entries_.merge(other.entries_);
+}
+
+bool FoamParser::findEntry(const std::string& wanted, int depth) {
+  for (std::string key = token(); !key.empty(); key = token()) {
+    if (key == wanted) return true;
+    if (key.starts_with("#include")) {
+      const std::string path = token();
+      if (path.starts_with('"')) include(path.substr(1), depth);
+    } else if (key == "#inputMode" || key == "#remove") {
+      token();
+    } else if (key != ";" && key != "}") {
+      std::vector<std::string> tokens = entryTokens();
+      if (tokens.size() <= kMaxEntryTokens) entries_[key] = std::move(tokens);
+    }
+  }
+  return false;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,71 @@
+// The text of a file of OpenFOAM as tokens: words, numbers, quoted text, and punctuation, one character each.
+// Comments are left out. Entries of the dictionaries that have been read stand for "$name". For one thread.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "stream/base/file.h"
+
+namespace curvisplat {
+
+class FoamParser {
+ public:
+  /// `shown`: the name of the file in errors, which all members throw at bytes that are not what is expected.
+  FoamParser(const std::filesystem::path& path, std::string shown);
+
+  const InputFile& file() const { return file_; }
+  const std::string& name() const { return name_; }
+  /// Where the text ends: that of the file, or of a processor's part of it.
+  uint64_t end() const { return end_; }
+  void setEnd(uint64_t end) { end_ = end; }
+  uint64_t offset() const { return buffer_offset_ + at_; }
+  void seek(uint64_t offset);
+  [[noreturn]] void fail(const std::string& what) const;
+
+  /// The next character; -1 at the end of the text.
+  int peek();
+  int take();
+  void skipSpace();
+  /// The next token; empty at the end. "$name" and "${name}" are replaced by the tokens of the entry that they
+  /// name.
+  std::string token();
+  bool atEnd();
+  void expect(const char* wanted);
+  /// For a value that is not `wanted`.
+  [[noreturn]] void failValue(const std::string& word, const char* wanted) const;
+  double number();
+  /// A number of 0 or more.
+  uint64_t label();
+
+  /// Goes to the next part of a collated file, `// Processor3 NEWLINE bytes NEWLINE ( ... )`. Returns its end.
+  uint64_t enterPart();
+  /// Reads entries of a dictionary up to the one called `wanted`, or to the end of the text. Returns whether it was
+  /// found. Those before it are kept, since values may refer to them; so are those of files that are included.
+  bool findEntry(const std::string& wanted, int depth = 0);
+  /// The tokens of an entry, up to its semicolon or the end of its dictionary.
+  std::vector<std::string> entryTokens();
+
+ private:
+  std::string nextToken();
+  void add(std::string& word, int c) const;
+  void include(const std::filesystem::path& path, int depth);
+
+  InputFile file_;
+  std::string name_;
+  uint64_t end_;
+  std::vector<char> buffer_;
+  uint64_t buffer_offset_ = 0;
+  size_t at_ = 0, filled_ = 0, refill_;  // bytes to read next: few, in case it goes on elsewhere
+  std::map<std::string, std::vector<std::string>> entries_;  // what "$name" stands for
+  std::deque<std::string> expanded_;                         // tokens of such entries, which come next
+  int expansions_ = 0;
+};
+
+}  // namespace curvisplat

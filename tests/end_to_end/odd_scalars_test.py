@@ -1,0 +1,129 @@
+#!/usr/bin/python3
+"""odd_scalars_test.py CURVISPLAT
+
+Scalars that are too small for single precision, meshes that have none, and cells that are copies of those of other pieces. VTK, netCDF4
+and h5py write the files. Exit status 77 (skipped) without python3-vtk9, python3-netcdf4 and python3-h5py.
+"""
+import sys
+import unittest
+
+from format_case import np
+
+try:
+    import h5py
+    import netCDF4
+    import vtk
+    from vtk.util.numpy_support import numpy_to_vtk
+
+    from mesh_case import MeshCase
+    from mesh_cubes import cube, hexahedra, insert, lattice, write_xml
+except ModuleNotFoundError as error:
+    print(f"skipped: {error}; install python3-vtk9, python3-netcdf4 and python3-h5py")
+    sys.exit(77)
+
+
+class OddScalars(MeshCase):
+    VALUES = np.linspace(0, 3.4e-105, 60)  # from a public report: concentrations before anything arrives
+
+    def write_vtk(self, binary):
+        image = vtk.vtkImageData()
+        image.SetDimensions(3, 4, 5)
+        array = numpy_to_vtk(self.values, deep=True)
+        array.SetName("c")
+        image.GetPointData().AddArray(array)
+        writer = vtk.vtkXMLImageDataWriter()
+        (writer.SetDataModeToAppended if binary else writer.SetDataModeToAscii)()
+        writer.SetFileName(str(self.folder / "a.vti"))
+        writer.SetInputData(image)
+        writer.Write()
+        return self.folder / "a.vti"
+
+    def write_netcdf(self, form):
+        with netCDF4.Dataset(self.folder / "a.nc", "w", format=form) as f:
+            for name, size, unit in (("z", 5, "m"), ("lat", 4, "degrees_north"), ("lon", 3, "degrees_east")):
+                f.createDimension(name, size)
+                v = f.createVariable(name, "f8", (name,))
+                v.units, v[:] = unit, np.arange(size)
+            f["z"].positive = "up"
+            f.createVariable("c", "f8", ("z", "lat", "lon"))[:] = self.values.reshape(5, 4, 3)
+        return self.folder / "a.nc"
+
+    def write_xdmf(self):
+        with h5py.File(self.folder / "a.h5", "w") as f:
+            f["c"] = self.values.reshape(5, 4, 3)
+        path = self.folder / "a.xmf"
+        path.write_text('<Xdmf Version="3.0"><Domain><Grid><Topology TopologyType="3DCoRectMesh" Dimensions="5 4 3"/><Geometry GeometryType="ORIGIN_DXDYDZ">'
+                        '<DataItem Dimensions="3">0 0 0</DataItem><DataItem Dimensions="3">1 1 1</DataItem></Geometry><Attribute Name="c" Center="Node">'
+                        '<DataItem Dimensions="5 4 3" Format="HDF" NumberType="Float" Precision="8">a.h5:/c</DataItem></Attribute></Grid></Domain></Xdmf>')
+        return path
+
+    def write_tecplot(self):
+        k, j, i = np.meshgrid(np.arange(5), np.arange(4), np.arange(3), indexing="ij")
+        rows = np.stack([i.ravel(), j.ravel(), k.ravel(), self.values], 1)
+        path = self.folder / "a.dat"
+        path.write_text('VARIABLES = "x" "y" "z" "c"\nZONE I=3 J=4 K=5 F=POINT DT=(DOUBLE DOUBLE DOUBLE DOUBLE)\n'
+                        + "\n".join(" ".join(map(repr, map(float, row))) for row in rows) + "\n")
+        return path
+
+    def test_values_too_small_for_single_precision(self):
+        warning = "c: its values are smaller than 1.2e-38 in magnitude, too small for single precision"
+        for sign in (1, -1):
+            self.values = sign * self.VALUES
+            for path in (self.write_vtk(True), self.write_vtk(False), self.write_netcdf("NETCDF4"), self.write_netcdf("NETCDF3_CLASSIC"),
+                         self.write_xdmf(), self.write_tecplot()):
+                with self.subTest(path=path.name, sign=sign):
+                    info = self.info(path)
+                    self.assertTrue(any(w.startswith(warning) for w in info["warnings"]), info["warnings"])
+                    self.assertGreater(max(sign * info["scalars"][0][word] for word in ("min", "max")), 0)
+                    result = self.run_program("convert", path, "-o", self.folder / "d.splats", "--overwrite")
+                    self.assertEqual(result.returncode, 0, result.stderr)
+                    self.assertIn("warning: " + warning, result.stderr)
+
+    def test_a_mesh_warns_as_well(self):
+        grid = cube(2, ("hexahedron",))
+        for n in range(grid.GetNumberOfCells()):
+            grid.GetCellData().GetArray("c").SetValue(n, 1e-60 * n)
+        write_xml(grid, self.folder / "m.vtu")
+        self.assertTrue(any(w.startswith("c: its values are smaller") for w in self.info(self.folder / "m.vtu")["warnings"]))
+
+    def test_zeros_and_ordinary_values_are_no_reason_to_warn(self):
+        for self.values in (np.zeros(60), np.linspace(0, 1, 60), np.linspace(1e-37, 1e-36, 60)):
+            for path in (self.write_vtk(True), self.write_netcdf("NETCDF4")):
+                self.assertEqual(self.info(path)["warnings"], [])
+
+    def test_a_mesh_without_scalars(self):
+        """Its volume is drawn as a constant, which a warning says. A mesh of SU2 asks for its restart file instead."""
+        points, grid = vtk.vtkPoints(), vtk.vtkUnstructuredGrid()
+        for point in lattice(3):
+            points.InsertNextPoint(point)
+        grid.SetPoints(points)
+        for corners in hexahedra(3):
+            insert(grid, vtk.VTK_HEXAHEDRON, corners)
+        write_xml(grid, self.folder / "m.vtu")
+        info = self.info(self.folder / "m.vtu")
+        self.assertEqual([(s["name"], s["min"], s["max"], s["centring"]) for s in info["scalars"]], [("constant", 1, 1, "cell")])
+        self.assertEqual(info["warnings"], ["the files contain no scalar; a constant, 1 in all cells, takes its place"])
+        result = self.run_program("convert", self.folder / "m.vtu", "-o", self.folder / "d.splats")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("warning: the files contain no scalar", result.stderr)
+        manifest = self.manifest(self.folder / "d.splats")
+        self.assertEqual((manifest["centring"], manifest["splats"], manifest["variables"][0]["name"]), ("cell", len(list(hexahedra(3))), "constant"))
+        result = self.run_program("render", self.folder / "d.splats", "-o", self.folder / "p.png", "--size", "64x64")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn("empty", result.stderr)
+
+    def test_a_piece_alone_lacks_the_copies_of_others(self):
+        grid = cube(2, ("hexahedron",))
+        flags = np.zeros(grid.GetNumberOfCells(), "u1")
+        flags[:3] = vtk.vtkDataSetAttributes.DUPLICATECELL
+        array = numpy_to_vtk(flags, deep=True)
+        array.SetName("vtkGhostType")
+        grid.GetCellData().AddArray(array)
+        write_xml(grid, self.folder / "m.vtu")
+        info = self.info(self.folder / "m.vtu")
+        self.assertEqual(info["warnings"], [f"left out: 3 of {len(flags)} cells, which vtkGhostType marks as copies of other pieces'; the file "
+                                            "that names all pieces (.pvtu) draws them"])
+
+
+if __name__ == "__main__":
+    unittest.main()
