@@ -293,6 +293,7 @@ class Conversion {
       splats_ = *workspace_->splats();
     if (ranks_ && !file_) openSplats();
     openWriter();
+    if (isFirst()) warnOfLostValues();
   }
 
   void openSplats() {
@@ -387,7 +388,7 @@ class Conversion {
 
   void warnOfLostValues() {
     const auto& lost = splats_.survey.blanked.lost;
-    for (size_t n = 0; n < lost.size(); ++n)
+    for (size_t n = 0; n < std::min(lost.size(), options_.scalars.size()); ++n)
       if (lost[n].samples > 0)
         report_.warnings.push_back(fmt::format(
             "{} of the values of {} are left out, since other scalars of the cache have none there; "
