@@ -6,6 +6,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -59,6 +61,7 @@ class NetcdfFiles {
   std::vector<std::unique_ptr<NetcdfFile>> files_;
   std::vector<NetcdfDimension> dimensions_;
   std::vector<NetcdfVariable> variables_;
+  std::map<std::string, size_t, std::less<>> numbers_;  // of the first of each name
   std::vector<std::string> duplicates_;
 };
 
