@@ -223,7 +223,7 @@ class SeriesConversion {
       step.first.scalars = input_.scalars(description);
       step.first.time = timeOf(description, unit_).value_or(0);
       if (!std::isfinite(*step.first.time))
-        throw Error("its time is {:g}; expected a number", *step.first.time);
+        throw Error("its time is {}; expected a finite number", numberText(*step.first.time));
     }
     return step;
   }

@@ -181,8 +181,7 @@ class Conversion {
     openWriter();
     if (!isFirst()) return;
     report_.warnings = origin_->warnings();
-    for (std::string& warning : warningsOfValues(splats_.survey, origin_->description(), options_.scalars))
-      report_.warnings.push_back(std::move(warning));
+    warnOfValues();
     report_.notes = origin_->notes();
     splats_.overlap = origin_->overlap();
   }
@@ -284,6 +283,7 @@ class Conversion {
       splats_ = *workspace_->splats();
     if (ranks_ && !file_) openSplats();
     openWriter();
+    if (isFirst()) warnOfValues();
   }
 
   void openSplats() {
@@ -376,6 +376,11 @@ class Conversion {
     if (writer_ || !isFirst()) return;
     writer_ = std::make_unique<CacheWriter>(workspace_->partial(), root_, variables(), progress_);
     report_.resumed_bricks = ranks_ ? 0 : writer_->bricks().size();
+  }
+
+  void warnOfValues() {
+    for (std::string& warning : warningsOfValues(splats_.survey, origin_->description(), options_.scalars))
+      report_.warnings.push_back(std::move(warning));
   }
 
   void forgetSplats() {

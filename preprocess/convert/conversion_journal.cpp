@@ -101,9 +101,13 @@ json jsonOf(const glm::dvec3& vector) {
 json jsonOf(const GridSurvey& survey) {
   json ranges = json::array();
   for (const ScalarRange& range : survey.ranges) ranges.push_back({range.min, range.max});
+  json lost = json::array();
+  for (const BlankCounts::Lost& of_scalar : survey.blanked.lost)
+    lost.push_back({of_scalar.samples, of_scalar.set});
   return {{"nodes", survey.nodes},
           {"grid_checksum", survey.grid_checksum},
           {"blanked", {survey.blanked.by_grid, survey.blanked.by_value, survey.blanked.not_finite}},
+          {"lost", lost},
           {"lower", jsonOf(survey.lower)},
           {"upper", jsonOf(survey.upper)},
           {"ranges", ranges}};
@@ -115,6 +119,9 @@ GridSurvey surveyOf(const JsonField& from) {
   survey.grid_checksum = from.at("grid_checksum").count();
   const JsonField blanked = from.at("blanked");
   survey.blanked = {blanked[0].count(), blanked[1].count(), blanked[2].count(), {}};
+  if (const auto lost = from.find("lost"))  // journals of older programs have none
+    for (const JsonField& of_scalar : lost->elements())
+      survey.blanked.lost.push_back({of_scalar[0].count(), of_scalar[1].count()});
   survey.lower = from.at("lower").point();
   survey.upper = from.at("upper").point();
   for (const JsonField& range : from.at("ranges").elements())

@@ -143,7 +143,7 @@ std::vector<std::string> warningsOfValues(const GridSurvey& survey, const GridDe
                                           std::span<const uint32_t> scalars) {
   std::vector<std::string> warnings = tinyValues(description, scalars, survey.ranges);
   const auto& lost = survey.blanked.lost;
-  for (size_t n = 0; n < lost.size(); ++n)
+  for (size_t n = 0; n < std::min(lost.size(), scalars.size()); ++n)
     if (lost[n].samples > 0)
       warnings.push_back(fmt::format(
           "{} of the values of {} are left out, since other scalars of the cache have none there; "

@@ -78,8 +78,8 @@ uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked) {
   const std::vector<double>& times = description.times;
   if (asked || times.size() < 2) return std::nullopt;
-  return fmt::format("{} time steps from {:g} to {:g}; using the first: choose with --time-step 0..{}",
-                     times.size(), times.front(), times.back(), times.size() - 1);
+  return fmt::format("{} time steps from {} to {}; using the first: choose with --time-step 0..{}",
+                     times.size(), numberText(times.front()), numberText(times.back()), times.size() - 1);
 }
 
 std::optional<double> statedTime(const GridDescription& description) {

@@ -217,26 +217,20 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool l
 
 /// Puts the background, and the grid's lines on it, behind a picture.
 void putBehind(Image& picture, const Annotations& annotations, const AnnotatedScene& scene) {
+  const glm::vec4 background = scene.background;
+  const auto put = [](float* pixel, const glm::vec4& behind) {
+    const float through = 1 - pixel[3];
+    for (int c = 0; c < 4; ++c) pixel[c] += through * behind[c];
+  };
   if (!annotations.axes_grid) {
-    const glm::vec4 behind = scene.background;
-    for (size_t n = 0; n < picture.rgba.size(); n += 4) {
-      const float through = 1 - picture.rgba[n + 3];
-      for (size_t c = 0; c < 4; ++c) picture.rgba[n + c] += through * behind[static_cast<int>(c)];
-    }
+    for (size_t n = 0; n < picture.rgba.size(); n += 4) put(&picture.rgba[n], background);
     return;
   }
-  Image behind(picture.size);
-  for (size_t n = 0; n < behind.rgba.size(); ++n) behind.rgba[n] = scene.background[static_cast<int>(n % 4)];
   Canvas canvas(picture.size);
-  drawAxesGrid(canvas.get(), scene, inkFor(scene.background));
-  canvas.forEachPixel([&](int x, int y, const glm::vec4& over) {
-    float* const pixel = behind.pixel(x, y);
-    for (int c = 0; c < 4; ++c) pixel[c] = over[c] + (1 - over.a) * pixel[c];
+  drawAxesGrid(canvas.get(), scene, inkFor(background));
+  canvas.forEachPixel<true>([&](int x, int y, const glm::vec4& over) {
+    put(picture.pixel(x, y), over + (1 - over.a) * background);
   });
-  for (size_t n = 0; n < picture.rgba.size(); n += 4) {
-    const float through = 1 - picture.rgba[n + 3];
-    for (size_t c = 0; c < 4; ++c) picture.rgba[n + c] += through * behind.rgba[n + c];
-  }
 }
 
 }  // namespace
@@ -254,14 +248,21 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture, const Tran
   return dataSize(annotations, picture, {&shown, 1});
 }
 
-Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& scene) {
+Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& scene) {
   CURVISPLAT_CHECK_OP(data.size.width, ==, scene.view.size.width);
   CURVISPLAT_CHECK_OP(data.size.height, ==, scene.picture.height);
   CURVISPLAT_CHECK_OP(data.size.width, <=, scene.picture.width);
-  Image picture(scene.picture);
-  for (int y = 0; y < picture.size.height; ++y)
-    std::copy_n(data.pixel(0, y), 4 * static_cast<size_t>(data.size.width), picture.pixel(0, y));
-  if (annotations.axes_grid || data.size.width < picture.size.width) putBehind(picture, annotations, scene);
+  const bool is_narrower = data.size.width < scene.picture.width;
+  Image picture;
+  if (is_narrower) {
+    picture = Image(scene.picture);
+    for (int y = 0; y < picture.size.height; ++y)
+      std::copy_n(data.pixel(0, y), 4 * static_cast<size_t>(data.size.width), picture.pixel(0, y));
+    data = Image();
+  } else {
+    picture = std::move(data);
+  }
+  if (annotations.axes_grid || is_narrower) putBehind(picture, annotations, scene);
   if (!(annotations == Annotations{}))
     drawn(annotations, scene, false).forEachPixel([&](int x, int y, const glm::vec4& over) {
       float* const pixel = picture.pixel(x, y);
@@ -271,9 +272,8 @@ Image annotated(const Image& data, const Annotations& annotations, const Annotat
 }
 
 uint64_t annotatedBytes(ImageSize picture) {
-  // Of two Images and of two Canvases.
-  constexpr uint64_t kPixel = 2 * (4 * sizeof(float) + sizeof(uint32_t));
-  return kPixel * picture.pixels();
+  // Of an Image and a Canvas.
+  return (4 * sizeof(float) + sizeof(uint32_t)) * picture.pixels();
 }
 
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene) {

@@ -1,7 +1,7 @@
 // Annotations drawn over a picture: scalar bars, the directions of the axes, the box around the data, a grid
 // with coordinates; and a picture of the built-in colour maps. `render` and the window share them.
 //
-// Scalar bars have a strip of their own at the right, so that they never cover data. Drawing takes up to 40
+// Scalar bars have a strip of their own at the right, so that they never cover data. Drawing takes up to 20
 // bytes a pixel (annotatedBytes()). Pure; any thread. In a build without Cairo asking for an annotation is a
 // UsageError.
 #pragma once
@@ -34,11 +34,12 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture,
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function);
 
 /// The whole picture: `data`, which has the size of scene.view, over the background where it is transparent,
-/// and the annotations. The text's size follows the picture's height. Throws Error if the picture is larger
-/// than Cairo supports (32,767 pixels a side).
-Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& scene);
+/// and the annotations. The text's size follows the picture's height. Takes the memory of `data` if it is as
+/// large as the picture, and frees it otherwise. Throws Error if the picture is larger than Cairo supports
+/// (32,767 pixels a side).
+Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& scene);
 
-/// Memory that annotated() needs, its result included.
+/// Memory that annotated() needs beside `data`, its result included.
 uint64_t annotatedBytes(ImageSize picture);
 
 /// The annotations alone, for the whole picture: four bytes a pixel (red, green, blue, alpha; not

@@ -25,7 +25,7 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture, const Tran
   return picture;
 }
 
-Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& /*scene*/) {
+Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& /*scene*/) {
   refuse(annotations);
   return data;
 }

@@ -63,8 +63,8 @@ class Canvas {
 
   cairo_t* get() const { return surface_.cairo(); }
 
-  /// Calls `use` with the channels (0..1, premultiplied) of every pixel that is not transparent.
-  template <typename Use>
+  /// Calls `use` with the channels (0..1, premultiplied) of every pixel, or of those that are not transparent.
+  template <bool kAll = false, typename Use>
   void forEachPixel(const Use& use) const {
     cairo_surface_t* const surface = surface_.flushed();
     const unsigned char* const bytes = cairo_image_surface_get_data(surface);
@@ -76,7 +76,7 @@ class Canvas {
       const auto* const row = reinterpret_cast<const uint32_t*>(bytes + static_cast<ptrdiff_t>(y) * stride);
       for (int x = 0; x < width; ++x) {
         const uint32_t argb = row[x];
-        if (argb == 0) continue;
+        if (!kAll && argb == 0) continue;
         const auto channel = [&](int shift) { return static_cast<float>(argb >> shift & 255) / 255; };
         use(x, y, glm::vec4(channel(16), channel(8), channel(0), channel(24)));
       }

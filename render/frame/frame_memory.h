@@ -14,9 +14,19 @@
 #include "render/camera/camera.h"
 #include "render/frame/frame_plan.h"
 #include "render/project/tile_set.h"
+#include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
+
+/// `least_bytes` are needed for a picture of `size`.
+class TooLittleMemory : public UsageError {
+ public:
+  TooLittleMemory(uint64_t memory_bytes, uint64_t least, ImageSize picture);
+
+  uint64_t least_bytes;
+  ImageSize size;
+};
 
 /// The stages' shares of a frame's memory.
 struct FrameBudget {
@@ -45,8 +55,7 @@ struct FrameBudget {
   /// Divides `memory_bytes` for at most `threads` workers (0: one per core). Two workers come first, more
   /// take half at most; then the ring, the pager and the sweep, each up to the size from which more does not
   /// help; the cache gets the rest. Pictures of different sizes have the same shares as long as their needs
-  /// lie in the same sixteenth of the memory. Throws UsageError if `memory_bytes` is too little; the message
-  /// says how much is needed.
+  /// lie in the same sixteenth of the memory. Throws TooLittleMemory.
   static FrameBudget of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads);
 
   bool operator==(const FrameBudget&) const = default;

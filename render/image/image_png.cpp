@@ -143,6 +143,7 @@ Bytes encodePng(const Image& image, PngEffort effort) {
   std::vector<png_byte> row(4 * static_cast<size_t>(image.size.width));
   PngWriter writer;
   Bytes bytes;
+  bytes.reserve(4 * image.size.pixels() + image.size.pixels() / 128 + (64 << 10));  // never grows by copying
   if (!writeAll(writer, bytes, image, effort, row.data()))
     throw Error("an image of {} x {} pixels cannot be written as PNG: {}", image.size.width,
                 image.size.height, writer.message.text);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -55,6 +56,10 @@ std::string byteText(uint64_t bytes) {
   // From what would be printed as 1024, the next unit is shorter.
   for (; size >= 1023.5 && unit + 1 < kUnits.size(); ++unit) size /= 1024;
   return fmt::format("{:.4g} {}", size, kUnits[unit]);
+}
+
+std::string numberText(double value, int digits) {
+  return std::isnan(value) ? "NaN" : fmt::format("{:.{}g}", value, digits);
 }
 
 namespace {

@@ -40,6 +40,9 @@ inline const char* isOrAre(uint64_t count) {
 /// that differ by little read differently. Units are powers of 1024.
 std::string byteText(uint64_t bytes);
 
+/// A number with up to `digits` digits, as "{:g}" has it; NaN is "NaN", whatever its sign.
+std::string numberText(double value, int digits = 6);
+
 /// `word` as a user copies it into a shell (bash, zsh or POSIX 2024), which reads back the same word. It is
 /// quoted only if it has to be; control characters become escapes, since a terminal would obey them.
 std::string shellWord(const std::string& word);

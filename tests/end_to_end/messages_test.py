@@ -13,6 +13,11 @@ import unittest
 
 from format_case import PROGRAM, FormatCase, np
 
+try:
+    import netCDF4
+except ImportError:
+    netCDF4 = None
+
 NI, NJ, NK = 6, 5, 4
 NODES, CELLS = NI * NJ * NK, (NI - 1) * (NJ - 1) * (NK - 1)
 
@@ -260,6 +265,34 @@ class Messages(FormatCase):
         printed = self.run_program("info", self.vti("a.vti", "p", nodes=-VALUES)).stdout
         self.assertIn("-47 .. 0\n".replace("-47", f"{-VALUES.max():g}"), printed)
         self.assertNotIn("-0\n", printed)
+
+    def test_nan_has_no_sign(self):
+        conditions, nodes = np.full(4, -np.nan, "<f4"), np.ones((5, NK, NJ, NI), "<f4")
+        sizes = np.array([NI, NJ, NK], "<i4").tobytes()
+        (self.folder / "a.xyz").write_bytes(sizes + np.moveaxis(POINTS, -1, 0).astype("<f4").tobytes())
+        for n in (1, 2):
+            (self.folder / f"{n}.q").write_bytes(sizes + conditions.tobytes() + nodes.tobytes())
+        self.assertIn("Mach NaN, alpha NaN, Reynolds NaN, time NaN\n", self.run_program("info", self.folder / "a.xyz", self.folder / "1.q").stdout)
+        self.expect_error(["convert", self.folder / "a.xyz", self.folder / "?.q", "-o", self.folder / "a.splats"], "its time is NaN; expected a finite number")
+
+    @unittest.skipUnless(netCDF4, "without python3-netcdf4")
+    def test_nan_in_netcdf_has_no_sign_and_is_no_bound(self):
+        with netCDF4.Dataset(self.folder / "a.nc", "w") as file:
+            for name, unit, count in (("time", "days since 2000-01-01", 2), ("lat", "degrees_north", NJ), ("lon", "degrees_east", NI)):
+                file.createDimension(name, count)
+                variable = file.createVariable(name, "f8", (name,))
+                variable.units = unit
+                variable[:] = np.full(count, -np.nan) if name == "time" else np.arange(count)
+            file.createDimension("depth", NK)
+            depth = file.createVariable("depth", "f8", ("depth",))
+            depth.units, depth.positive, depth[:] = "m", "down", np.arange(NK)
+            values = file.createVariable("temp", "f4", ("time", "depth", "lat", "lon"))
+            values.valid_min, values.missing_value = np.float32(-np.nan), np.float32(-np.nan)
+            values[:] = np.broadcast_to(VALUES, (2, NK, NJ, NI))
+        printed = self.run_program("info", self.folder / "a.nc").stdout
+        self.assertIn("times     2 steps, NaN days since 2000-01-01 .. NaN days since 2000-01-01\n", printed)
+        self.assertNotIn("valid_min", printed)
+        self.assertNotIn("-nan", printed + self.run_program("convert", self.folder / "a.nc", "-o", self.folder / "a.splats").stderr)
 
 
 if __name__ == "__main__":

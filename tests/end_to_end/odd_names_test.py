@@ -2,15 +2,18 @@
 """odd_names_test.py CURVISPLAT
 
 File names with escape sequences, which a terminal would obey: nothing that the program prints has control characters in it,
-those of ASCII or of Latin-1 (U+0080 to U+009F), in whatever command. Bytes that are not UTF-8 do no harm either.
+those of ASCII or of Latin-1 (U+0080 to U+009F), in whatever command. Bytes that are not UTF-8 do no harm either. And very many
+names: looked up one by one in lists, they would take minutes.
 """
 import os
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
 import unittest
 
+PATIENCE_S = 100
 PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
 
 # Erase the screen, set the window's title, the same by the one-byte introducers, line breaks; and bytes of no encoding.
@@ -25,13 +28,36 @@ def controls(text):
     return found + [c for c in text.decode("utf-8", "surrogateescape") if "\udc80" <= c < "\udca0"]
 
 
+def classic_netcdf(scalars):
+    """A file of 2 x 2 x 2 nodes, with scalars of these names."""
+    def name(text):
+        data = text.encode()
+        return struct.pack(">I", len(data)) + data + bytes(-len(data) % 4)
+
+    def attribute(key, text):
+        return name(key) + struct.pack(">I", 2) + name(text)
+
+    axes = {"depth": "m", "lat": "degrees_north", "lon": "degrees_east"}
+    head = b"CDF\1" + struct.pack(">III", 0, 10, 3) + b"".join(name(axis) + struct.pack(">I", 2) for axis in axes) + bytes(8)
+    variables = [(axis, [n], attribute("units", unit), 6, 16) for n, (axis, unit) in enumerate(axes.items())]
+    variables += [(scalar, [0, 1, 2], b"", 5, 32) for scalar in scalars]
+    parts = [(name(text) + struct.pack(f">I{len(dims)}I", len(dims), *dims) + (struct.pack(">II", 12, 1) + units if units else bytes(8))
+              + struct.pack(">II", kind, size), size) for text, dims, units, kind, size in variables]
+    offset, table = len(head) + 8 + sum(len(part) + 4 for part, _ in parts), b""
+    for part, size in parts:
+        table += part + struct.pack(">I", offset)
+        offset += size
+    values = struct.pack(">6d", 0, 1, 0, 1, 0, 1) + struct.pack(">8f", *range(8)) * len(scalars)
+    return head + struct.pack(">II", 11, len(parts)) + table + values
+
+
 class OddNames(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
 
     def run_in(self, *words, status=0):
-        run = subprocess.run([PROGRAM, *words], cwd=self.folder.name, capture_output=True, stdin=subprocess.DEVNULL)
+        run = subprocess.run([PROGRAM, *words], cwd=self.folder.name, capture_output=True, stdin=subprocess.DEVNULL, timeout=PATIENCE_S)
         self.assertEqual(run.returncode, status, run.stderr)
         for stream in (run.stdout, run.stderr):
             self.assertEqual(controls(stream), [], stream)
@@ -78,6 +104,17 @@ class OddNames(unittest.TestCase):
                 self.run_in("info", "g.splats", "--probe", "0.5,0.5,0.5")
                 self.run_in("render", "g.splats", "-o", "g.png", "--size", "32x32")
                 self.run_in("export", "g.splats", "-o", "g.ply", "--no-comparison")
+
+    def test_very_many_names(self):
+        names = [f"s{n}" for n in range(30000)]
+        folder = pathlib.Path(self.folder.name)
+        (folder / "a.vtk").write_text("# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
+                                      f"SPACING 1 1 1\nPOINT_DATA 8\nFIELD f {len(names)}\n"
+                                      + "".join(f"{name} 1 8 double\n1 2 3 4 5 6 7 8\n" for name in names))
+        (folder / "a.nc").write_bytes(classic_netcdf(names[:15000]))
+        for file in ("a.vtk", "a.nc"):
+            with self.subTest(file=file):
+                self.run_in("convert", file, "--scalar", "s14999", "-o", f"{file}.splats")
 
 
 if __name__ == "__main__":

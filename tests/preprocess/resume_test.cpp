@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <map>
 #include <random>
 
@@ -408,6 +409,29 @@ TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
   }
   EXPECT_GT(left, 3);
   EXPECT_GT(removed, 0);
+}
+
+TEST_F(Resume, RepeatsTheWarningOfLostValues) {
+  setUp(FunctionGridSource({gridBlock(60, 40, 30)}, 2, [](const GridNode& n) {
+    const float value = n.i < 3 ? std::numeric_limits<float>::quiet_NaN() : 1;
+    return NodeValues{{n.i, n.j, n.k}, {static_cast<float>(n.i), value}};
+  }));
+  const auto convertBoth = [&](bool resume, int64_t fail_write_at) {
+    Progress progress;
+    ConvertOptions options = optionsFor({resume, false, kBucketSplats});
+    options.scalars = {0, 1};
+    faults::FaultySystemCalls full;
+    full.fail_write_at = fail_write_at;
+    const ScopedSystemCalls scope(full);
+    const ConvertReport report = convert(*source_, options, progress);
+    fs::remove_all(output_);
+    return std::pair(report.warnings, full.writes.load());
+  };
+  const auto [warnings, writes] = convertBoth(false, -1);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_THROW(convertBoth(true, writes - 10), Error);
+  ASSERT_TRUE(readJournal(partial())->splats);
+  EXPECT_EQ(convertBoth(true, -1).first, warnings);
 }
 
 TEST_F(Resume, KeepsWhatIsDoneOnAFullDiskIfAskedTo) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <deque>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -72,6 +73,18 @@ TEST(PictureMessage, LosslessOnesHaveThePixelsOfAWrittenFile) {
   const auto* const file = reinterpret_cast<const std::byte*>(message.data() + kPictureHeaderBytes);
   const Image sent = decodePng({file, message.size() - kPictureHeaderBytes}, "sent");
   EXPECT_EQ(sent.rgba, decodePng(encodePng(image), "written").rgba);
+}
+
+TEST(PictureMessage, OfNoiseAreAsLongAsPromisedAtMost) {
+  std::mt19937 random(1);
+  for (const ImageSize size : {ImageSize{1, 1}, {1, 3000}, {3000, 1}, {300, 200}}) {
+    Image image(size);
+    for (size_t n = 0; n < image.rgba.size(); ++n)
+      image.rgba[n] = n % 4 == 3 ? 1 : static_cast<float>(random() % 256) / 255;
+    EXPECT_LE(jpegMessage(header(), image, {90, 1}).size(), messageBytes(size));
+    for (size_t n = 3; n < image.rgba.size(); n += 4) image.rgba[n] = 0.5f + 0.5f * image.rgba[n - 1];
+    EXPECT_LE(losslessMessage(header(), image).size(), messageBytes(size));
+  }
 }
 
 TEST(PictureMessage, CoarserQualitiesHaveFewerBytes) {
@@ -170,6 +183,19 @@ TEST(LineQuality, IgnoresReportsOfPicturesThatWereNotSent) {
   EXPECT_EQ(quality.onTheWay(), 1u) << "the first was shown before the second";
   quality.shown(2, 2);
   EXPECT_EQ(quality.onTheWay(), 1u);
+}
+
+TEST(LineQuality, CountsTheBytesOnTheWay) {
+  LineQuality quality;
+  quality.sent(1, 1, true, 100);
+  quality.sent(2, 1, true, 50);
+  EXPECT_TRUE(quality.isOpen(150));
+  EXPECT_FALSE(quality.isOpen(149));
+  quality.shown(1, 2);
+  EXPECT_TRUE(quality.isOpen(50));
+  EXPECT_FALSE(quality.isOpen(49));
+  quality.shown(2, 2);
+  EXPECT_TRUE(quality.isOpen(0));
 }
 
 TEST(LineQuality, LearnsNothingFromLosslessPictures) {

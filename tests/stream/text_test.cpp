@@ -4,6 +4,7 @@
 // it, what was found and what was expected.
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -58,6 +59,13 @@ TEST(Words, OfAShellHaveQuotesWhereTheyNeedThem) {
   EXPECT_EQ(shellWord("a\nb'"), "$'a\\012b\\''");
   EXPECT_EQ(shellOption("--scalar", "T (K)"), "--scalar 'T (K)'");
   EXPECT_EQ(shellOption("--range", "-1,2"), "--range=-1,2");
+}
+
+TEST(NumberText, OfNaNHasNoSign) {
+  EXPECT_EQ(numberText(-0.1), "-0.1");
+  EXPECT_EQ(numberText(1234567.25), "1.23457e+06");
+  EXPECT_EQ(numberText(1234567.25, 9), "1234567.25");
+  EXPECT_EQ(numberText(-std::numeric_limits<double>::quiet_NaN()), "NaN");
 }
 
 TEST(ByteText, HasTheUnitThatPeopleWouldTake) {

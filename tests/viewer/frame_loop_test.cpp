@@ -180,6 +180,37 @@ TEST_F(FrameLoopTest, TooLittleMemoryEndsTheRequestOnly) {
   EXPECT_TRUE(all(loop).back().is_final);
 }
 
+TEST_F(FrameLoopTest, OneAtATimeDrawsTheSamePictures) {
+  FrameLoop loop(cache_, Backend::kCpu, waker());
+  FrameRequest request = requestOf();
+  request.one_at_a_time = true;
+  const auto last = [&] {
+    std::optional<ShownFrame> shown;
+    while (!shown || !shown->is_final) {
+      wait();
+      if (auto frame = loop.take()) {
+        shown = std::move(frame);
+        EXPECT_TRUE(loop.busy()) << "it waits for the picture's memory";
+        loop.giveBack();
+      }
+    }
+    return std::move(*shown);
+  };
+  loop.request(request);
+  const ShownFrame first = last();
+  request.camera.parallel_scale *= 2;
+  loop.request(request);
+  const uint64_t splats = last().statistics.splats_drawn;
+  request.one_at_a_time = false;
+  request.camera.parallel_scale /= 2;
+  loop.request(request);
+  EXPECT_EQ(all(loop).back().image.rgba, first.image.rgba);
+  EXPECT_NE(splats, first.statistics.splats_drawn);
+  request.one_at_a_time = true;
+  loop.request(request);
+  wait();  // the loop ends although its picture is not taken
+}
+
 /// What `render --keep-going` draws.
 TEST_F(FrameLoopTest, CoarserDataIsDrawnWhereABrickIsDamaged) {
   const std::filesystem::path copy = *folder_ / "leaf.splats";

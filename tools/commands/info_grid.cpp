@@ -87,7 +87,7 @@ std::optional<std::string> dateOfStep(const GridDescription& description, size_t
 
 /// "36 days since 1950-01-01 (1950-02-06 00:00:00)"
 std::string timeText(const GridDescription& description, size_t step) {
-  std::string text = fmt::format("{:.9g}", description.times[step]);
+  std::string text = numberText(description.times[step], 9);
   if (!description.time_unit.empty()) text += fmt::format(" {}", description.time_unit);
   if (const auto date = dateOfStep(description, step)) text += fmt::format(" ({})", *date);
   return text;
@@ -254,8 +254,9 @@ void printAsText(const GridInfo& info) {
   printScalars(info);
   for (size_t n = 0; n < std::min(kBlocksListed, description.flow.size()); ++n) {
     const FlowConditions& flow = description.flow[n];
-    printLine("flow      block {}: Mach {:.6g}, alpha {:.6g}, Reynolds {:.6g}, time {:.6g}", flow.block + 1,
-              flow.mach, flow.alpha, flow.reynolds, flow.time);
+    printLine("flow      block {}: Mach {}, alpha {}, Reynolds {}, time {}", flow.block + 1,
+              numberText(flow.mach), numberText(flow.alpha), numberText(flow.reynolds),
+              numberText(flow.time));
   }
   printTimes(description);
   printLine("estimate  {}", info.estimate.toText());

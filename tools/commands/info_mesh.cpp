@@ -218,8 +218,9 @@ void printAsText(const MeshInfo& info) {
   }
   const size_t steps = description.times.size();
   if (steps > 1)
-    printLine("times     {} steps, {:.9g} .. {:.9g}; step {} was read", steps, description.times.front(),
-              description.times.back(), description.time_step);
+    printLine("times     {} steps, {} .. {}; step {} was read", steps,
+              numberText(description.times.front(), 9), numberText(description.times.back(), 9),
+              description.time_step);
   printLine("estimate  {}", info.estimate.toText());
 }
 

@@ -34,6 +34,8 @@ struct ServeArguments {
   std::optional<std::string> frame_time;
 };
 
+constexpr size_t kLargeBlock = size_t{1} << 20;  // goes back to the system as soon as it is freed
+
 ServerOptions optionsFrom(const ServeArguments& arguments) {
   ServerOptions options;
   options.address = arguments.listen;
@@ -67,6 +69,7 @@ void serve(const ServeArguments& arguments) {
   // What viewers had goes back to the system once they have left: of three of 96 MiB, a heap for each thread kept up to 480 MiB. A
   // picture takes the same time (on two cores).
   limitHeaps(1);
+  returnFreedMemory(kLargeBlock);
   const ServerOptions options = optionsFrom(arguments);
   warnOfNetwork(options);
   const ServedCaches caches(arguments.caches);

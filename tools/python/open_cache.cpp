@@ -252,7 +252,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments, image,
         {manifest, manifest.variables[scalars.opacity.variable], function, at, frame, picture.statistics});
     if (!(annotations == Annotations{}))
-      image = annotated(image, annotations,
+      image = annotated(std::move(image), annotations,
                         {size, renderer.screenView(at, frame), functions, manifest.lower, manifest.upper,
                          arguments.frame.background, axisTitles(arguments.annotations)});
     picture.chosen = choice.chosenOptions();

@@ -34,10 +34,11 @@ PictureQuality LineQuality::quality() const {
   return kLevels[static_cast<size_t>(level_)];
 }
 
-void LineQuality::sent(uint64_t picture, double now_s, bool counts) {
+void LineQuality::sent(uint64_t picture, double now_s, bool counts, uint64_t bytes) {
   // One that does not count holds up those behind it.
   const bool held_up = std::any_of(sent_.begin(), sent_.end(), [](const Sent& one) { return !one.counts; });
-  sent_.push_back({picture, now_s, counts && !held_up});
+  sent_.push_back({picture, bytes, now_s, counts && !held_up});
+  bytes_ += bytes;
 }
 
 void LineQuality::shown(uint64_t picture, double now_s) {
@@ -46,6 +47,7 @@ void LineQuality::shown(uint64_t picture, double now_s) {
   if (found == sent_.end()) return;
   const bool counts = found->counts;
   const double delay_s = now_s - found->at_s;
+  for (auto one = sent_.begin(); one <= found; ++one) bytes_ -= one->bytes;
   sent_.erase(sent_.begin(), found + 1);
   if (counts) learn(delay_s);
 }
@@ -103,13 +105,55 @@ struct JpegWriter {
   JpegWriter& operator=(const JpegWriter&) = delete;
 };
 
-/// Red, green and blue in bytes, rows from the top.
-struct BytePicture {
-  ImageSize size;
-  std::vector<unsigned char> rgb;
+/// The picture that is encoded, a row at a time in red, green and blue.
+class ByteRows {
+ public:
+  ByteRows(const Image& image, int reduction)
+      : size{std::max(1, image.size.width / reduction), std::max(1, image.size.height / reduction)},
+        image_(image),
+        reduction_(reduction),
+        row_(3 * static_cast<size_t>(size.width)) {}
+
+  /// Valid until the next call.
+  unsigned char* row(int y) {
+    reduction_ > 1 ? reduce(y) : convert(y);
+    return row_.data();
+  }
+
+  const ImageSize size;
+
+ private:
+  /// The mean of each `reduction` x `reduction` pixels; those that are left over at the right and below are
+  /// left out.
+  void reduce(int y) {
+    const int columns = std::min(reduction_, image_.size.width),
+              rows = std::min(reduction_, image_.size.height);
+    const float share = 1 / static_cast<float>(columns * rows);
+    unsigned char* to = row_.data();
+    for (int x = 0; x < size.width; ++x)
+      for (int c = 0; c < 3; ++c) {
+        float sum = 0;
+        for (int v = 0; v < rows; ++v)
+          for (int u = 0; u < columns; ++u) sum += image_.pixel(x * reduction_ + u, y * reduction_ + v)[c];
+        *to++ = toByte(sum * share);
+      }
+  }
+
+  /// Not toByte(): a loop that the compiler turns into vector instructions.
+  void convert(int y) {
+    const float* const from = image_.pixel(0, y);
+    for (size_t x = 0; x < row_.size() / 3; ++x)
+      for (size_t c = 0; c < 3; ++c)
+        row_[3 * x + c] =
+            static_cast<unsigned char>(std::min(1.0f, std::max(0.0f, from[4 * x + c])) * 255 + 0.5f);
+  }
+
+  const Image& image_;
+  const int reduction_;
+  std::vector<unsigned char> row_;
 };
 
-bool writeAll(JpegWriter& writer, const BytePicture& picture, int quality) {
+bool writeAll(JpegWriter& writer, ByteRows& picture, int quality) {
   if (setjmp(writer.errors.stop)) return false;
   jpeg_create_compress(&writer.jpeg);
   jpeg_mem_dest(&writer.jpeg, &writer.bytes, &writer.size);
@@ -121,45 +165,12 @@ bool writeAll(JpegWriter& writer, const BytePicture& picture, int quality) {
   jpeg_set_quality(&writer.jpeg, quality, TRUE);
   writer.jpeg.dct_method = JDCT_IFAST;
   jpeg_start_compress(&writer.jpeg, TRUE);
-  const size_t row_bytes = 3 * static_cast<size_t>(picture.size.width);
   while (writer.jpeg.next_scanline < writer.jpeg.image_height) {
-    auto* row = const_cast<JSAMPROW>(picture.rgb.data() + row_bytes * writer.jpeg.next_scanline);
+    JSAMPROW row = picture.row(static_cast<int>(writer.jpeg.next_scanline));
     jpeg_write_scanlines(&writer.jpeg, &row, 1);
   }
   jpeg_finish_compress(&writer.jpeg);
   return true;
-}
-
-/// The mean of each `reduction` x `reduction` pixels; those that are left over at the right and below are
-/// left out.
-BytePicture reduced(const Image& image, int reduction) {
-  BytePicture picture{{std::max(1, image.size.width / reduction), std::max(1, image.size.height / reduction)},
-                      {}};
-  picture.rgb.resize(3 * static_cast<size_t>(picture.size.width) * static_cast<size_t>(picture.size.height));
-  const int columns = std::min(reduction, image.size.width), rows = std::min(reduction, image.size.height);
-  const float share = 1 / static_cast<float>(columns * rows);
-  unsigned char* to = picture.rgb.data();
-  for (int y = 0; y < picture.size.height; ++y)
-    for (int x = 0; x < picture.size.width; ++x)
-      for (int c = 0; c < 3; ++c) {
-        float sum = 0;
-        for (int v = 0; v < rows; ++v)
-          for (int u = 0; u < columns; ++u) sum += image.pixel(x * reduction + u, y * reduction + v)[c];
-        *to++ = toByte(sum * share);
-      }
-  return picture;
-}
-
-/// Not toByte(): a loop that the compiler turns into vector instructions.
-BytePicture whole(const Image& image) {
-  BytePicture picture{image.size, {}};
-  const size_t pixels = image.rgba.size() / 4;
-  picture.rgb.resize(3 * pixels);
-  for (size_t n = 0; n < pixels; ++n)
-    for (size_t c = 0; c < 3; ++c)
-      picture.rgb[3 * n + c] =
-          static_cast<unsigned char>(std::min(1.0f, std::max(0.0f, image.rgba[4 * n + c])) * 255 + 0.5f);
-  return picture;
 }
 
 template <typename T>
@@ -188,13 +199,18 @@ std::string message(const PictureHeader& header, const void* file, size_t file_b
 
 }  // namespace
 
+uint64_t messageBytes(ImageSize size) {
+  // Four bytes a pixel that cannot be compressed, and what zlib adds to them: 1/1000 of it, and some for each row.
+  return 4 * size.pixels() + size.pixels() / 128 + 64 * static_cast<uint64_t>(size.height) + (64 << 10);
+}
+
 std::string losslessMessage(const PictureHeader& header, const Image& image) {
   const Bytes file = encodePng(image, PngEffort::kQuick);
   return message(header, file.data(), file.size());
 }
 
 std::string jpegMessage(const PictureHeader& header, const Image& image, const PictureQuality& quality) {
-  const BytePicture picture = quality.reduction > 1 ? reduced(image, quality.reduction) : whole(image);
+  ByteRows picture(image, quality.reduction);
   JpegWriter writer;
   if (!writeAll(writer, picture, quality.jpeg))
     throw Error("a picture of {} x {} pixels cannot be written as JPEG: {}", picture.size.width,

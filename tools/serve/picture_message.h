@@ -1,8 +1,8 @@
 // Pictures on their way to a page: the bytes of a message (PictureHeader, and a JPEG or PNG file), and how
 // fine the pictures of one viewer may be, so that they arrive in time (LineQuality).
 //
-// Encoding compresses the whole picture on the calling thread. The functions keep no state: any thread may
-// call them.
+// Encoding compresses the whole picture on the calling thread, row by row: beside the picture it takes the
+// memory of the message, twice (messageBytes()). The functions keep no state: any thread may call them.
 #pragma once
 
 #include <cstddef>
@@ -31,27 +31,31 @@ class LineQuality {
   static constexpr size_t kMaxOnTheWay = 3;
   static constexpr int kCoarsest = 6;
 
-  /// Whether a further picture may be sent.
-  bool isOpen() const { return sent_.size() < kMaxOnTheWay; }
+  /// Whether a further picture may be sent: not while more than `most_bytes` are on their way.
+  bool isOpen(uint64_t most_bytes = UINT64_MAX) const {
+    return sent_.size() < kMaxOnTheWay && bytes_ <= most_bytes;
+  }
   size_t onTheWay() const { return sent_.size(); }
+  uint64_t bytesOnTheWay() const { return bytes_; }
   int level() const { return level_; }
   PictureQuality quality() const;
 
   /// A picture was sent. `counts`: whether its delay tells about the line, since a lossless picture may take
   /// long.
-  void sent(uint64_t picture, double now_s, bool counts);
+  void sent(uint64_t picture, double now_s, bool counts, uint64_t bytes = 0);
   /// The page has drawn this picture and all before it. Pictures that are not on their way are ignored.
   void shown(uint64_t picture, double now_s);
 
  private:
   struct Sent {
-    uint64_t picture;
+    uint64_t picture, bytes;
     double at_s;
     bool counts;
   };
   void learn(double delay_s);
 
   std::deque<Sent> sent_;
+  uint64_t bytes_ = 0;         // of sent_
   std::deque<double> delays_;  // lately
   int level_ = 0;
   int in_time_ = 0;                  // pictures since the last late one
@@ -90,6 +94,8 @@ struct PictureHeader {
 };
 inline constexpr size_t kPictureHeaderBytes = 44;
 
+/// The most bytes that the message of a picture of this size has.
+uint64_t messageBytes(ImageSize size);
 /// The message of a lossless picture.
 std::string losslessMessage(const PictureHeader& header, const Image& image);
 /// The message of a JPEG of `image`, which is opaque. With a reduction it has fewer pixels than header.size.

@@ -1,14 +1,20 @@
 #include "tools/serve/remote_viewer.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <utility>
 
 #include "render/annotate/annotations.h"
+#include "render/frame/frame_memory.h"
 #include "render/frame/frame_plan.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 #include "stream/base/threads.h"
 #include "tools/serve/picture_message.h"
 #include "tools/view/frame_loop.h"
@@ -28,11 +34,33 @@ double clockSeconds() {
 /// A request that the frame loop has, as far as its pictures need it.
 struct Asked {
   uint64_t request = 0;  // the frame loop's number
-  double number = 0;     // the page's
-  bool moving = false;
+  ViewRequest view;
   ViewState state;
+  int reduction = 1;  // of the resolution in each direction
   ImageSize picture, data;
 };
+
+/// What pictures take beside the frame that is drawn.
+struct PictureMemory {
+  bool one_at_a_time;  // while one is encoded, no other is drawn
+  uint64_t bytes;
+};
+
+constexpr int kCoarsest = 8;        // reduction
+constexpr uint64_t kLineShare = 4;  // of the longest message: as long as less is on its way, more is sent
+
+/// Of a viewer that has `memory_bytes`.
+PictureMemory memoryFor(ImageSize picture, const Annotations& annotations, uint64_t memory_bytes) {
+  const uint64_t image = 4 * sizeof(float) * picture.pixels(), message = messageBytes(picture);
+  // One after the other: an image of fewer pixels that is enlarged; the whole picture beside its data, at most twice as
+  // large; a message, and a copy. And the messages on their way.
+  const uint64_t making = annotations == Annotations{} ? std::max(image / 2, 2 * message)
+                                                       : std::max(image, image / 2 + 2 * message);
+  const uint64_t bytes = making + message / kLineShare + message;
+  // One image more is encoded, and one waits for that.
+  const bool has_room = bytes + 2 * image <= memory_bytes / 4;
+  return {!has_room, has_room ? bytes + 2 * image : bytes};
+}
 
 }  // namespace
 
@@ -61,11 +89,15 @@ class RemoteViewer::Work {
 
  private:
   void advance() {
-    if (wanted_ && (line_.isOpen() || !wanted_->moving)) ask(*std::exchange(wanted_, std::nullopt));
-    if (woken_ && line_.isOpen()) {
+    if (wanted_ && (lineIsOpen() || !wanted_->moving)) ask(*std::exchange(wanted_, std::nullopt));
+    if (woken_ && lineIsOpen()) {
       woken_ = false;
       show();
     }
+  }
+
+  bool lineIsOpen() const {
+    return line_.isOpen(asked_.empty() ? UINT64_MAX : messageBytes(asked_.back().picture) / kLineShare);
   }
 
   /// Once the values of the picture are there: the sample that is seen at the picked place. Empty until then.
@@ -117,17 +149,27 @@ class RemoteViewer::Work {
   void request(const ViewRequest& view, ViewState state) {
     const CacheReader& reader = caches_.reader(view.cache);
     const ShownFunctions functions(state, reader.manifest());
-    const nlohmann::json parsed = nlohmann::json::parse(view.state);
+    nlohmann::json parsed = nlohmann::json::parse(view.state);
     std::string text = parsed.at("preset").dump() + parsed.at("function").dump();
     if (state.opacity_by) text += parsed.at("opacity_by").dump();
     if (text != function_text_) {
       function_text_ = std::move(text);
       ++function_version_;
     }
-    const ImageSize data = dataSizeOf(state, reader.manifest(), view.size);
+    parsed.erase("camera");
+    std::string look =
+        fmt::format("{} {} {} {}", view.cache, view.size.width, view.size.height, parsed.dump());
+    if (look != look_) reduction_ = 1;
+    look_ = std::move(look);
+    const ImageSize picture{std::max(1, view.size.width / reduction_),
+                            std::max(1, view.size.height / reduction_)};
+    const ImageSize data = dataSizeOf(state, reader.manifest(), picture);
     FrameRequest request{functions.scalars(reader, state), function_version_, state.camera,
                          state.frameOptions(data)};
     screenViewOf(reader.manifest(), state.camera, request.options, data);  // refuses what cannot be drawn
+    const PictureMemory memory = memoryFor(picture, state.annotations, limits_.memory_bytes);
+    request.options.output_bytes = memory.bytes;
+    request.one_at_a_time = memory.one_at_a_time;
     request.moving = view.moving;
     request.wants_bytes = false;
     request.target_s = limits_.target_s;
@@ -144,8 +186,23 @@ class RemoteViewer::Work {
     const uint64_t number = frames_->request(std::move(request));
     // A page that asks faster than pictures come does not make this grow.
     if (asked_.size() == kMaxAsked) asked_.pop_front();
-    asked_.push_back(
-        {number, static_cast<double>(view.number), view.moving, std::move(state), view.size, data});
+    asked_.push_back({number, view, std::move(state), reduction_, picture, data});
+  }
+
+  /// Draws the newest request's picture with fewer pixels.
+  void reduce(const TooLittleMemory& error) {
+    if (asked_.empty() || asked_.back().data != error.size)
+      return;  // it was of a view that has been replaced
+    const ViewRequest view = asked_.back().view;
+    if (reduction_ == 1) least_bytes_ = error.least_bytes;
+    if (reduction_ >= kCoarsest) return report(UsageError("{}", tooLittle(view.size)));
+    reduction_ *= 2;
+    ask(view);
+  }
+
+  std::string tooLittle(ImageSize size) const {
+    return fmt::format("--viewer-memory {}: too little for {}x{} pixels of this cache, which need {} MiB",
+                       byteText(limits_.memory_bytes), size.width, size.height, (least_bytes_ >> 20) + 1);
   }
 
   /// Sends the newest picture, if there is one.
@@ -154,6 +211,8 @@ class RemoteViewer::Work {
     std::optional<ShownFrame> frame;
     try {
       frame = frames_->take();
+    } catch (const TooLittleMemory& error) {
+      return reduce(error);
     } catch (const UsageError& error) {
       report(error);
     } catch (const Error& error) {
@@ -162,10 +221,21 @@ class RemoteViewer::Work {
       return;
     }
     if (!frame) return;
-    reportDamage(frame->step, frame->statistics.bricks_unreadable);
-    while (!asked_.empty() && asked_.front().request < frame->request) asked_.pop_front();
-    if (asked_.empty() || asked_.front().request != frame->request) return;
-    send(asked_.front(), *frame);
+    const GivesBack gives_back{*frames_};
+    show(std::move(*frame));
+  }
+
+  /// Gives the last picture's memory back, whatever happens to it.
+  struct GivesBack {
+    FrameLoop& frames;
+    ~GivesBack() { frames.giveBack(); }
+  };
+
+  void show(ShownFrame frame) {
+    reportDamage(frame.step, frame.statistics.bricks_unreadable);
+    while (!asked_.empty() && asked_.front().request < frame.request) asked_.pop_front();
+    if (asked_.empty() || asked_.front().request != frame.request) return;
+    send(asked_.front(), std::move(frame));
   }
 
   /// When there is more of it than was said of this step.
@@ -178,18 +248,23 @@ class RemoteViewer::Work {
                  damaged.front().reason));
   }
 
-  void send(const Asked& asked, const ShownFrame& frame) {
+  void send(const Asked& asked, ShownFrame frame) {
+    if (asked.reduction > 1 && reduction_said_ != std::pair(asked.view.size, asked.reduction)) {
+      reduction_said_ = {asked.view.size, asked.reduction};
+      report(UsageError("{}; the picture has 1/{} of them each way", tooLittle(asked.view.size),
+                        asked.reduction));
+    }
     const Manifest& manifest = caches_.reader(cache_).manifest();
     const ShownFunctions functions(asked.state, manifest);
     const AnnotatedScene scene = sceneOf(asked.state, functions, frame, asked.picture);
-    const Image picture = annotated(frame.image, asked.state.annotations, scene);
+    const Image picture = annotated(std::move(frame.image), asked.state.annotations, scene);
     PictureHeader header;
     header.picture = ++pictures_;
-    header.request = asked.number;
+    header.request = static_cast<double>(asked.view.number);
     header.step = static_cast<uint32_t>(frame.step);
-    header.size = asked.picture;
-    header.data_width = asked.data.width;
-    header.is_final = frame.is_final && !asked.moving;
+    header.size = asked.view.size;
+    header.data_width = asked.data.width * asked.view.size.width / asked.picture.width;
+    header.is_final = frame.is_final && !asked.view.moving;
     header.is_png = header.is_final;
     header.level = static_cast<uint8_t>(line_.level());
     header.seconds = static_cast<float>(frame.statistics.total_s);
@@ -197,7 +272,7 @@ class RemoteViewer::Work {
     header.splats = static_cast<uint32_t>(frame.statistics.splats_drawn);
     std::string message =
         header.is_png ? losslessMessage(header, picture) : jpegMessage(header, picture, line_.quality());
-    line_.sent(header.picture, clockSeconds(), !header.is_png);
+    line_.sent(header.picture, clockSeconds(), !header.is_png, message.size());
     viewer_.send_(std::move(message), false);
   }
 
@@ -211,6 +286,10 @@ class RemoteViewer::Work {
   std::string function_text_;
   uint64_t function_version_ = 0;
   std::deque<Asked> asked_;
+  std::string look_;          // all of the last request but its camera and step
+  int reduction_ = 1;         // of the pictures of look_, as its memory allows
+  uint64_t least_bytes_ = 0;  // that it would need for all pixels
+  std::pair<ImageSize, int> reduction_said_;
   LineQuality line_;
   uint32_t pictures_ = 0;
   std::map<uint64_t, size_t> damaged_said_;  // by step: bricks of the cache, of which the viewer was told

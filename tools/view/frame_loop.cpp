@@ -130,12 +130,19 @@ std::optional<ShownFrame> FrameLoop::take() {
   const MutexLock lock(mutex_);
   if (failure_)
     std::rethrow_exception(state_ == State::kFailed ? failure_ : std::exchange(failure_, nullptr));
+  in_use_ = shown_.has_value();
   return std::exchange(shown_, std::nullopt);
 }
 
 void FrameLoop::requestValues() {
   const MutexLock lock(mutex_);
   values_wanted_ = true;
+  changed_.notify_all();
+}
+
+void FrameLoop::giveBack() {
+  const MutexLock lock(mutex_);
+  in_use_ = false;
   changed_.notify_all();
 }
 
@@ -165,6 +172,11 @@ void FrameLoop::publish(ShownFrame frame) {
     shown_ = std::move(frame);
   }
   wake_();
+}
+
+void FrameLoop::waitForUse() {
+  MutexLock lock(mutex_);
+  while ((shown_ || in_use_) && state_ != State::kStopping) changed_.wait(lock);
 }
 
 void FrameLoop::loop() {
@@ -264,6 +276,7 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
     const bool is_final = frame.is_final;
     publish(std::move(frame));
     if (request.next) readAhead(drawing, request);
+    if (request.one_at_a_time) waitForUse();
     if (is_final || request.moving || superseded(number)) return;
   }
 }

@@ -70,6 +70,7 @@ struct FrameRequest {
   uint64_t step = 0;                      // time step
   double part = 0;                        // of the way to the next one: its values, with the faces of `step`
   bool wants_bytes = true;                // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
+  bool one_at_a_time = false;             // nothing is drawn until a picture has been given back
   std::optional<StepPosition> next = {};  // is likely to be wanted next, with this camera: read ahead
   FaceNames faces = {};                   // of options.scene's grid surfaces, which have their look only
   FacesAtStep faces_at = {};              // needed where there are faces
@@ -140,6 +141,8 @@ class FrameLoop {
   /// the loop, or UsageError (too little memory for this size, no faces at this step), which ends only the
   /// request.
   std::optional<ShownFrame> take();
+  /// The memory of the last picture taken is free: for requests that want one_at_a_time. No effect otherwise.
+  void giveBack();
   /// Asks for the values of the newest request's picture, once that is shown. A request ends it.
   void requestValues();
   /// Those that were asked for, once.
@@ -165,6 +168,7 @@ class FrameLoop {
     return state_ == State::kRefining || state_ == State::kValues;
   }
   void publish(ShownFrame frame);
+  void waitForUse();
 
   CacheReader cache_;  // at the step that is drawn; of the loop's thread
   const Backend backend_;
@@ -178,6 +182,7 @@ class FrameLoop {
   uint64_t newest_ GUARDED_BY(mutex_) = 0;  // number of the newest request
   std::stop_source drawing_ GUARDED_BY(mutex_);
   std::optional<ShownFrame> shown_ GUARDED_BY(mutex_);
+  bool in_use_ GUARDED_BY(mutex_) = false;  // the last picture taken, until giveBack()
   bool values_wanted_ GUARDED_BY(mutex_) = false;
   std::optional<ShownValues> values_ GUARDED_BY(mutex_);
   std::exception_ptr failure_ GUARDED_BY(mutex_);  // of the loop in kFailed, else of the last request

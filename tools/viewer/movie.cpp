@@ -97,7 +97,8 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
     drawn.view = player.renderer().screenView(camera, options);
     drawn.data = {movie.cache.manifest().lower, movie.cache.manifest().upper};
     drawn.image = player.renderer().render(camera, options, drawn.statistics, &of_frame);
-    output->write(frame, annotated(drawn.image, state.annotations, sceneOf(state, functions, drawn, size)));
+    const AnnotatedScene shown = sceneOf(state, functions, drawn, size);
+    output->write(frame, annotated(std::move(drawn.image), state.annotations, shown));
     progress.advance(1);
   }
   output->finish();

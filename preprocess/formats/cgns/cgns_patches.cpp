@@ -6,6 +6,7 @@
 #include <string>
 
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -53,7 +54,7 @@ namespace {
 /// The index from 0 that a number from 1 stands for. Throws Error if there is no such sample.
 uint64_t indexOf(double number, uint64_t count) {
   if (!(number >= 1 && number <= static_cast<double>(count)) || number != std::floor(number))
-    throw Error("a hole has the index {:g}; expected 1 to {}", number, count);
+    throw Error("a hole has the index {}; expected 1 to {}", numberText(number), count);
   return static_cast<uint64_t>(number) - 1;
 }
 

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -190,8 +191,8 @@ CgnsSteps readCgnsSteps(const CgnsFile& file, const std::vector<CgnsNode>& base)
   if (!data) return steps;
   const std::vector<double> count = file.numbers(*data);
   if (count.size() != 1 || !(count[0] >= 1 && count[0] <= kMaxSteps))
-    throw Error("{0}: {1} has {3:g} time steps; expected 1 to {2}", file.path().string(), data->path,
-                kMaxSteps, count[0]);
+    throw Error("{}: {} has {} time steps; expected 1 to {}", file.path().string(), data->path,
+                numberText(count[0]), kMaxSteps);
   steps.count = static_cast<size_t>(count[0]);
   const std::vector<CgnsNode> children = file.children(*data);
   const CgnsNode* times = named(children, "TimeValues");

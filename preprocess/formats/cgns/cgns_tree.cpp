@@ -180,8 +180,8 @@ void TreeReader::readBase(const CgnsNode& base) {
   if (dimensions[0] != 3 || dimensions[1] != 3) {
     for (const CgnsNode& node : children)
       if (node.label == "Zone_t")
-        omitted_[fmt::format("of {:g}-dimensional cells in {:g}-dimensional space (volumes are needed)",
-                             dimensions[0], dimensions[1])]
+        omitted_[fmt::format("of {}-dimensional cells in {}-dimensional space (volumes are needed)",
+                             numberText(dimensions[0]), numberText(dimensions[1]))]
             .push_back(node.path.substr(1));
     return;
   }
@@ -210,16 +210,16 @@ bool TreeReader::setSizes(const CgnsNode& node, bool unstructured, CgnsZone& zon
                 unstructured ? "" : " along i, j, k");
   if (unstructured) {
     if (!(sizes[0] >= 1 && sizes[0] <= kMaxPoints && sizes[1] >= 0 && sizes[1] <= kMaxPoints))
-      throw Error("{}: {} declares {:g} nodes and {:g} cells; the file is damaged", file_.path().string(),
-                  node.path, sizes[0], sizes[1]);
+      throw Error("{}: {} declares {} nodes and {} cells; the file is damaged", file_.path().string(),
+                  node.path, numberText(sizes[0]), numberText(sizes[1]));
     zone.nodes = {static_cast<uint64_t>(sizes[0]), 1, 1};
     zone.cells = static_cast<uint64_t>(sizes[1]);
     return true;
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     if (!(sizes[axis] >= 1 && sizes[axis] <= kMaxNodes))
-      throw Error("{}: {} declares {:g} nodes along {}; the file is damaged", file_.path().string(),
-                  node.path, sizes[axis], "ijk"[axis]);
+      throw Error("{}: {} declares {} nodes along {}; the file is damaged", file_.path().string(), node.path,
+                  numberText(sizes[axis]), "ijk"[axis]);
     zone.nodes[axis] = static_cast<uint64_t>(sizes[axis]);
   }
   if (*std::min_element(zone.nodes.begin(), zone.nodes.end()) >= 2) return true;
@@ -368,8 +368,8 @@ std::vector<uint64_t> TreeReader::rindOf(const Nodes& children, size_t axes) con
                   axes == 3 ? "i, j, k" : "its list");
     for (size_t n = 0; n < rind.size(); ++n) {
       if (!(planes[n] >= 0 && planes[n] <= kMaxNodes))
-        throw Error("{}: {} declares {:g} planes; the file is damaged", file_.path().string(), child.path,
-                    planes[n]);
+        throw Error("{}: {} declares {} planes; the file is damaged", file_.path().string(), child.path,
+                    numberText(planes[n]));
       rind[n] = static_cast<uint64_t>(planes[n]);
     }
   }

@@ -67,8 +67,8 @@ ColumnsMap ugridOf(const NetcdfFiles& file, const NetcdfVariable& topology) {
   ColumnsMap map;
   map.format = "UGRID";
   if (numberIn(topology, "topology_dimension", 2) != 2)
-    throw Error("{}: is a mesh of UGRID of topology_dimension {:g}; expected 2, faces with layers",
-                file.path().string(), numberIn(topology, "topology_dimension", 2));
+    throw Error("{}: is a mesh of UGRID of topology_dimension {}; expected 2, faces with layers",
+                file.path().string(), numberText(numberIn(topology, "topology_dimension", 2)));
   map.nodes_of_face = &required(file, topology.text("face_node_connectivity"), "UGRID");
   map.first_node = numberIn(*map.nodes_of_face, "start_index", 0);
   std::istringstream names(topology.text("node_coordinates"));

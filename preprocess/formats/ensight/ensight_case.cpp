@@ -196,9 +196,9 @@ EnsightCase CaseReader::run(std::optional<uint32_t> step) {
     if (set.steps != static_cast<double>(set.times.size()) || !(set.steps <= kMaxSteps) || !finite ||
         !std::is_sorted(set.times.begin(), set.times.end()))
       throw Error(
-          "{}: time set {} has {} times for {:g} steps, or times that are not finite or do not rise; the "
+          "{}: time set {} has {} times for {} steps, or times that are not finite or do not rise; the "
           "file is damaged",
-          path_.string(), number, set.times.size(), set.steps);
+          path_.string(), number, set.times.size(), numberText(set.steps));
     result.times.insert(result.times.end(), set.times.begin(), set.times.end());
   }
   std::sort(result.times.begin(), result.times.end());

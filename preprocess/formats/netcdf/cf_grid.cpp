@@ -330,9 +330,9 @@ void CfGrid::setFace(uint64_t number) {
   if (mask) mask->setFace(number);
 }
 
-bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const std::vector<CfGrid>& grids) {
+bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const CfGrids& found) {
   if (cfRole(file, variable) != CfRole::kNone || CfMask::isMask(variable)) return false;
-  if (std::any_of(grids.begin(), grids.end(),
+  if (std::any_of(found.grids.begin(), found.grids.end(),
                   [&](const CfGrid& grid) { return grid.vertical.uses(variable); }))
     return false;
   // NEMO's meshes: sizes and depths of cells at the points t, u, v, w and f.
@@ -340,21 +340,19 @@ bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const std:
   const bool of_point = name.size() > 2 && std::string_view("tuvwf").find(name[2]) != std::string_view::npos;
   if (of_point && (name.starts_with("e1") || name.starts_with("e2") || name.starts_with("e3"))) return false;
   if (name.starts_with("gdep")) return false;
-  for (const NetcdfVariable& other : file.variables())
-    for (const char* const attribute : {"cell_measures", "formula_terms", "ancillary_variables"}) {
-      std::istringstream words(other.text(attribute));
-      for (std::string word; words >> word;)
-        if (word == variable.name) return false;
-    }
-  return true;
+  return !found.parts.contains(variable.name);
 }
 
 CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step) {
   CfGrids found = GridFinder(file, time_step).find();
+  for (const NetcdfVariable& variable : file.variables())
+    for (const char* const attribute : {"cell_measures", "formula_terms", "ancillary_variables"}) {
+      const std::string text = variable.text(attribute);
+      for (const std::string_view word : wordsOf(text)) found.parts.emplace(word);
+    }
   for (CfGrid& grid : found.grids)
-    std::stable_partition(grid.variables.begin(), grid.variables.end(), [&](const NetcdfVariable* variable) {
-      return isField(file, *variable, found.grids);
-    });
+    std::stable_partition(grid.variables.begin(), grid.variables.end(),
+                          [&](const NetcdfVariable* variable) { return isField(file, *variable, found); });
   return found;
 }
 

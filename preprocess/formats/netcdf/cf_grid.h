@@ -3,7 +3,9 @@
 // dimension may number the faces of a grid: of a cubed sphere (GEOS' nf), of the "lat-lon-cap" (MITgcm's face, ECCO's tile).
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -41,11 +43,12 @@ struct CfLeftOut {
 struct CfGrids {
   std::vector<CfGrid> grids;  // in the order of their first variables
   std::vector<CfLeftOut> left_out;
+  std::set<std::string, std::less<>> parts;  // variables that others name as measures, terms or ancillaries
 };
 
-/// Whether a variable is a field: not a coordinate or a mask, nor what heights, cells or maps are made of. `grids`: all of the
-/// files'.
-bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const std::vector<CfGrid>& grids);
+/// Whether a variable is a field: not a coordinate or a mask, nor what heights, cells or maps are made of. `found`: in the
+/// files.
+bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const CfGrids& found);
 
 /// `time_step`: the step at which time-dependent variables are read; not checked. `file` must outlive the
 /// result.

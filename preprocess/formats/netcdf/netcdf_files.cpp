@@ -134,6 +134,7 @@ void NetcdfFiles::add(size_t number) {
       if (variable.dims.size() >= 3) twice.push_back(variable.name);
       continue;
     }
+    numbers_.try_emplace(variable.name, variables_.size());
     NetcdfVariable& added = variables_.emplace_back(variable);
     added.file = number;
     for (size_t& dim : added.dims) dim = merged.at(dim);
@@ -155,9 +156,8 @@ std::vector<std::string> NetcdfFiles::paths() const {
 }
 
 const NetcdfVariable* NetcdfFiles::find(std::string_view name) const {
-  const auto found = std::find_if(variables_.begin(), variables_.end(),
-                                  [&](const NetcdfVariable& variable) { return variable.name == name; });
-  return found == variables_.end() ? nullptr : &*found;
+  const auto found = numbers_.find(name);
+  return found == numbers_.end() ? nullptr : &variables_[found->second];
 }
 
 const NetcdfVariable* NetcdfFiles::coordinateOf(size_t dimension, const NetcdfVariable& data) const {

@@ -6,6 +6,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -69,6 +71,7 @@ class NetcdfFiles {
   std::vector<size_t> first_;  // [dimension]: the index of the chosen value; 0 where all are read
   std::string selected_;
   std::vector<NetcdfVariable> variables_;
+  std::map<std::string, size_t, std::less<>> numbers_;  // of the first of each name
   std::vector<std::string> warnings_;
 };
 

@@ -149,7 +149,7 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
   const auto fieldsOf = [&](const CfGrid& grid) {
     size_t first = 0, all = 0;
     for (const NetcdfVariable* variable : grid.variables)
-      if (isField(file, *variable, found.grids)) {
+      if (isField(file, *variable, found)) {
         ++all;
         first += variable->file == 0;
       }

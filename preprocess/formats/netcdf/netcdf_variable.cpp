@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "stream/base/text.h"
+
 namespace curvisplat {
 
 std::string NetcdfVariable::text(const char* attribute) const {
@@ -127,6 +129,7 @@ void NetcdfPacking::addRange(const NetcdfVariable& variable) {
     const auto found = variable.attributes.find(attribute);
     if (found == variable.attributes.end() || found->second.numbers.size() != size) return;
     const double value = found->second.numbers[n];
+    if (std::isnan(value)) return;  // nothing is beyond it
     const bool convert = widens && found->second.type == unpacked;
     if (convert && !(std::isfinite(scale_) && scale_ != 0 && std::isfinite(offset_))) return;
     const bool stored_upper = upper != (convert && scale_ < 0);
@@ -148,7 +151,7 @@ std::string NetcdfPacking::missingValues() const {
   std::string words = range_;
   std::vector<std::string> values;  // as _FillValue and missing_value are often the same
   for (const double missing : missing_)
-    if (std::string value = fmt::format("{:g}", missing);
+    if (std::string value = numberText(missing);
         std::find(values.begin(), values.end(), value) == values.end())
       values.push_back(std::move(value));
   if (!values.empty())

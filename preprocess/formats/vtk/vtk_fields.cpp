@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
+#include <map>
+#include <utility>
 
 #include "preprocess/grid/grid_source.h"
 
@@ -22,7 +23,9 @@ void VtkFields::describe(const std::vector<VtkPiece>& pieces, std::span<const si
                          GridDescription& description) {
   addFields(pieces, blocks, Centring::kNode);
   addFields(pieces, blocks, Centring::kCell);
-  for (size_t n = 0; n < fields_.size(); ++n) addScalars(pieces, n, description);
+  std::set<std::string> names;
+  for (const GridScalar& scalar : description.scalars) names.insert(scalar.name);
+  for (size_t n = 0; n < fields_.size(); ++n) addScalars(pieces, n, names, description);
   for (const Field& field : fields_) {
     const auto without = std::count_if(blocks.begin(), blocks.end(),
                                        [&](size_t piece) { return field.array_of_piece[piece] < 0; });
@@ -38,25 +41,21 @@ const VtkArray* VtkFields::arrayOf(const Field& field, const std::vector<VtkPiec
   return position < 0 ? nullptr : &dataOf(pieces[piece], field.centring)[static_cast<size_t>(position)];
 }
 
-size_t VtkFields::fieldOf(const VtkArray& array, Centring centring, size_t pieces) {
-  const auto same = [&](const Field& field) {
-    return field.name == array.name && field.centring == centring && field.components == array.components;
-  };
-  const auto found = std::find_if(fields_.begin(), fields_.end(), same);
-  if (found != fields_.end()) return static_cast<size_t>(found - fields_.begin());
-  fields_.push_back({array.name, centring, array.components, std::vector<int32_t>(pieces, -1)});
-  return fields_.size() - 1;
-}
-
 void VtkFields::addFields(const std::vector<VtkPiece>& pieces, std::span<const size_t> blocks,
                           Centring centring) {
   const size_t before = fields_.size();
+  std::map<std::pair<std::string, uint32_t>, size_t> known;
   std::string active;
   for (const size_t block : blocks) {
     const VtkPiece& piece = pieces[block];
     const std::vector<VtkArray>& data = dataOf(piece, centring);
-    for (size_t n = 0; n < data.size(); ++n)
-      fields_[fieldOf(data[n], centring, pieces.size())].array_of_piece[block] = static_cast<int32_t>(n);
+    for (size_t n = 0; n < data.size(); ++n) {
+      const VtkArray& array = data[n];
+      const auto [field, is_new] = known.try_emplace({array.name, array.components}, fields_.size());
+      if (is_new)
+        fields_.push_back({array.name, centring, array.components, std::vector<int32_t>(pieces.size(), -1)});
+      fields_[field->second].array_of_piece[block] = static_cast<int32_t>(n);
+    }
     if (active.empty())
       active = centring == Centring::kNode ? piece.active_point_data : piece.active_cell_data;
   }
@@ -64,10 +63,10 @@ void VtkFields::addFields(const std::vector<VtkPiece>& pieces, std::span<const s
                         [&](const Field& field) { return field.name == active; });
 }
 
-void VtkFields::addScalars(const std::vector<VtkPiece>& pieces, size_t number, GridDescription& description) {
+/// `names`: of all scalars; those of the field are added.
+void VtkFields::addScalars(const std::vector<VtkPiece>& pieces, size_t number, std::set<std::string>& names,
+                           GridDescription& description) {
   const Field& field = fields_[number];
-  std::set<std::string> names;
-  for (const GridScalar& scalar : description.scalars) names.insert(scalar.name);
   std::vector<std::string> component_names;
   for (size_t piece = 0; piece < pieces.size() && component_names.empty(); ++piece)
     if (field.array_of_piece[piece] >= 0)
@@ -82,6 +81,7 @@ void VtkFields::addScalars(const std::vector<VtkPiece>& pieces, size_t number, G
       if (field.centring == Centring::kCell) scalar.name = field.name + ":cell" + suffix;
       if (names.count(scalar.name)) scalar.name += fmt::format(":{}", number);
     }
+    names.insert(scalar.name);
     scalar.aliases = std::move(aliases);
     description.scalars.push_back(std::move(scalar));
     scalars_.push_back({number, component});

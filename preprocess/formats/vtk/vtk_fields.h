@@ -12,6 +12,7 @@
 #pragma once
 
 #include <algorithm>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -67,8 +68,8 @@ class VtkFields {
   };
 
   void addFields(const std::vector<VtkPiece>& pieces, std::span<const size_t> blocks, Centring centring);
-  size_t fieldOf(const VtkArray& array, Centring centring, size_t pieces);
-  void addScalars(const std::vector<VtkPiece>& pieces, size_t number, GridDescription& description);
+  void addScalars(const std::vector<VtkPiece>& pieces, size_t number, std::set<std::string>& names,
+                  GridDescription& description);
 
   std::vector<Field> fields_;
   std::vector<Scalar> scalars_;  // [description.scalars]
