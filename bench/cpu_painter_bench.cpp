@@ -47,6 +47,11 @@ std::vector<ScreenSplat> roundSplats(float radius) {
              0.02f * around(random),
              0.02f * around(random),
              0.01f * unit(random),
+             0,
+             0,
+             0,
+             0,
+             0,
              0};
   return splats;
 }

@@ -211,12 +211,11 @@ BlockMask paintInOrder(const TileWork& work) {
 /// its fifteen neighbours.
 class Listed {
  public:
-  explicit Listed(const TileWork& work) : work_(work), ways_(work.order.size(), kUnknown) {
-    const size_t count = work.order.size();
-    plains_ = hwy::AllocateAligned<Plain>(count);
+  explicit Listed(const TileWork& work)
+      : work_(work), ways_(work.order.size(), kUnknown), others_(work.order.size()) {
+    plains_ = hwy::AllocateAligned<Plain>(work.order.size());
     if (!plains_) throw std::bad_alloc();
-    others_.resize(count);
-    if (work.colours) coloured_.resize((count + kLanes - 1) / kLanes);
+    if (work.colours) coloured_.resize((work.order.size() + kLanes - 1) / kLanes);
   }
 
   /// Paints the splats of an order tile's list in its block. Whether that is saturated then. Some are looked up before the

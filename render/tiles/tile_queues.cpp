@@ -9,12 +9,12 @@ namespace curvisplat {
 namespace {
 
 // A tile is painted when this many new splats have come, or a share of what waits: what waits is looked at each time.
-constexpr size_t kWorthPainting = 1024, kShareOfWaiting = 1;
+constexpr size_t kWorthPainting = 512, kShareOfWaiting = 1;
 // Splats that are prepared and sorted together; more would not stay in a core's cache.
-constexpr size_t kRound = 2048;
+constexpr size_t kRound = 1024;
 constexpr uint32_t kLastKey = INT32_MAX;
 // Of a thread: a round, the splats that wait in a tile, and what the painter prepares of them.
-constexpr uint64_t kScratchBytes = 1 << 20;
+constexpr uint64_t kScratchBytes = 3 << 20;
 
 /// How many records lie before a splat.
 uint32_t recordsBefore(std::span<const ScreenSplat> splats, uint32_t splat) {
