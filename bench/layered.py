@@ -228,7 +228,7 @@ def main():
         if not options.quick and judge.wants("boundary layer"):
             boundary_layers(program, judge)
     print(f"worst mean error {judge.worst:.4f}")
-    return options.limit is not None and judge.worst > options.limit
+    return 1 if options.limit is not None and judge.worst > options.limit else 0
 
 
 if __name__ == "__main__":

@@ -36,12 +36,12 @@ inline bool leans(const ScreenSplat& splat) {
 }
 
 /// Keys that a tile may lie from a splat's own, at the most: all there are (DepthKeys).
-inline constexpr float kMostSteps = 0x1p30f;
+inline constexpr float kMaxSteps = 0x1p30f;
 
 /// The splat's key in the tile with its middle at (x, y).
 inline uint32_t keyAt(const ScreenSplat& splat, float x, float y) {
   const float moved = splat.key_slope0 * (x - splat.x) + splat.key_slope1 * (y - splat.y);
-  const float held = std::clamp(moved, -kMostSteps, kMostSteps);
+  const float held = std::clamp(moved, -kMaxSteps, kMaxSteps);
   const int32_t key = static_cast<int32_t>(splat.key) + static_cast<int32_t>(held);
   return static_cast<uint32_t>(std::max(key, static_cast<int32_t>(splat.first)));
 }

@@ -14,7 +14,7 @@ constexpr size_t kWorthPainting = 512, kShareOfWaiting = 1;
 constexpr size_t kRound = 1024;
 constexpr uint32_t kLastKey = INT32_MAX;
 // Of a thread: a round, the splats that wait in a tile, and what the painter prepares of them.
-constexpr uint64_t kScratchBytes = 3 << 20;
+constexpr uint64_t kScratchBytes = 2 << 20;
 
 /// How many records lie before a splat.
 uint32_t recordsBefore(std::span<const ScreenSplat> splats, uint32_t splat) {

@@ -68,8 +68,8 @@ TEST_P(EveryScene, TouchesAndKeepsItsBounds) {
     glm::dvec3 least(1e9), most(-1e9);
     for (int i = 0; i <= 120; ++i)
       for (int j = 0; j <= 10; ++j)
-        for (int k = 0; k <= 1; ++k) {
-          const glm::dvec3 p = scene->position({i / 120.0, j / 10.0, k});
+        for (int k = 0; k <= 2; ++k) {
+          const glm::dvec3 p = scene->position({i / 120.0, j / 10.0, k / 2.0});
           least = glm::min(least, p);
           most = glm::max(most, p);
         }
