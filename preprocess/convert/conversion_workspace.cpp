@@ -50,6 +50,7 @@ std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& r
   const std::filesystem::path shared(std::string(sent.begin(), sent.end()));
   if (!std::filesystem::is_directory(shared))
     throw Error("{}: does not exist here; several ranks need a file system that they share", shared.string());
+  ranks.barrier();  // before the first may fail, and remove it
   return shared;
 }
 

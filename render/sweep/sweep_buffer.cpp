@@ -34,6 +34,12 @@ size_t countBefore(const SweepPosition& mark, uint32_t rank, std::span<const Dep
   return low;
 }
 
+/// Behind all splats with the same key. A slab ends there where it can: which of a part's splats another rank sends may
+/// differ from slab to slab, and so their numbers among those with equal keys.
+SweepPosition behindKey(const SweepPosition& position) {
+  return {position.key + 1, 0, 0};
+}
+
 }  // namespace
 
 void copySplats(std::span<const DepthItem> items, const ScreenSplat* from, ScreenSplat* to) {
@@ -285,7 +291,7 @@ void SweepBuffer::splitFinals(size_t finals, bool last_may_stay) {
 /// Makes space for those splats of the part to be entered that lie before the slab's end. Requires that
 /// nothing in the buffer is final: all splats are in live runs, and no batch is being sorted.
 void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
-  if (end_ == kSweepEnd) end_ = pageStart(kFirstEighths, rank, sorted);
+  if (end_ == kSweepEnd) end_ = behindKey(pageStart(kFirstEighths, rank, sorted));
   std::vector<std::pair<size_t, Run*>> behind;  // splats
   for (const auto& run : live_)
     if (const size_t count = run->count - firstNotBefore(*run, end_); count > 0)
@@ -298,7 +304,8 @@ void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
     forgetBehindEnd(*run);
   }
   if (free_.size() < pagesNeeded(rank, sorted)) {
-    end_ = pageStart(kNextEighths, rank, sorted);
+    const SweepPosition nearer = pageStart(kNextEighths, rank, sorted);
+    end_ = behindKey(nearer) < end_ ? behindKey(nearer) : nearer;
     for (const auto& run : live_) forgetBehindEnd(*run);
   }
   mark_ = std::min(mark_, end_);
