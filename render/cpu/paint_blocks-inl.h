@@ -137,23 +137,27 @@ HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint
   return {depth, p, q};
 }
 
-/// Blends one vector of a block's pixels under the splats before it. Returns the transmittance that is left.
+/// Blends one vector of pixels under the splats before, whose colours and transmittance these are.
+template <bool kThin>
+HWY_INLINE void blend(V depth, const V (&value)[4], V (&colour)[3], V& through) {
+  // A parabola may end below zero, by its error.
+  const V tau = hn::Max(hn::Mul(depth, value[3]), hn::Zero(Floats()));
+  const V part = absorbedOf<kThin>(tau);
+  const V weight = hn::Mul(hn::Mul(depth, part), through);
+  for (int c = 0; c < 3; ++c) colour[c] = hn::MulAdd(value[c], weight, colour[c]);
+  through = hn::NegMulAdd(hn::Mul(tau, part), through, through);
+}
+
+/// The same in a block. Returns the transmittance that is left.
 template <bool kThin>
 HWY_INLINE V blendUnder(float* HWY_RESTRICT at, V depth, const V (&value)[4]) {
   const Floats d;
-  // A parabola may end below zero, by its error.
-  const V tau = hn::Max(hn::Mul(depth, value[3]), hn::Zero(d));
-  const V part = absorbedOf<kThin>(tau);
-  float* transmittance = at + 3 * kBlockPixels;
-  const V before = hn::Load(d, transmittance);
-  const V weight = hn::Mul(hn::Mul(depth, part), before);
-  const V after = hn::NegMulAdd(hn::Mul(tau, part), before, before);
-  for (int c = 0; c < 3; ++c) {
-    float* place = at + c * kBlockPixels;
-    hn::Store(hn::MulAdd(value[c], weight, hn::Load(d, place)), d, place);
-  }
-  hn::Store(after, d, transmittance);
-  return after;
+  V colour[3], through = hn::Load(d, at + 3 * kBlockPixels);
+  for (int c = 0; c < 3; ++c) colour[c] = hn::Load(d, at + c * kBlockPixels);
+  blend<kThin>(depth, value, colour, through);
+  for (int c = 0; c < 3; ++c) hn::Store(colour[c], d, at + c * kBlockPixels);
+  hn::Store(through, d, at + 3 * kBlockPixels);
+  return through;
 }
 
 /// s = s0 + sp p + sq q.
@@ -170,6 +174,18 @@ struct Along {
 struct Shade {
   float at[4], by[4], bend[4];
   Along s;
+
+  template <bool kFitted>
+  HWY_INLINE void valuesAt(const Pixels& pixels, V (&value)[4]) const {
+    const Floats d;
+    if constexpr (kFitted) {
+      const V x = s.at(pixels);
+      for (int c = 0; c < 4; ++c)
+        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, bend[c]), x, hn::Set(d, by[c])), x, hn::Set(d, at[c]));
+    } else {
+      for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, at[c]);
+    }
+  }
 };
 
 HWY_INLINE bool isSaturated(V transmittance) {
@@ -187,14 +203,7 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HW
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
                                    hn::Add(hn::Load(d, kLaneY + lane), from_y));
     V value[4];
-    if constexpr (kFitted) {
-      const V s = shade.s.at(pixels);
-      for (int c = 0; c < 4; ++c)
-        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
-                              hn::Set(d, shade.at[c]));
-    } else {
-      for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
-    }
+    shade.valuesAt<kFitted>(pixels, value);
     most = hn::Max(most, blendUnder<kThin>(block + lane, pixels.depth, value));
   }
   return isSaturated(most);

@@ -34,7 +34,7 @@ struct alignas(64) Plain {
 };
 static_assert(sizeof(Plain) == 128);
 
-/// Blends some pixels of a block under the splats before, whose colours and transmittance these are.
+/// blend() of some pixels of a block.
 HWY_INLINE void blendPlain(const Plain& plain, const float* footprint, Corner corner, size_t lane,
                            V (&colour)[3], V& through) {
   const Floats d;
@@ -43,19 +43,14 @@ HWY_INLINE void blendPlain(const Plain& plain, const float* footprint, Corner co
       pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), hn::Set(d, corner.x - e.x)),
                hn::Add(hn::Load(d, kLaneY + lane), hn::Set(d, corner.y - e.y)));
   V value[4];
-  if (fitted) {
-    const V s = shade.s.at(pixels);
-    for (int c = 0; c < 4; ++c)
-      value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
-                            hn::Set(d, shade.at[c]));
-  } else {
-    for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
-  }
-  const V tau = hn::Max(hn::Mul(pixels.depth, value[3]), hn::Zero(d));
-  const V part = thin ? absorbedOf<true>(tau) : absorbedOf<false>(tau);
-  const V weight = hn::Mul(hn::Mul(pixels.depth, part), through);
-  for (int c = 0; c < 3; ++c) colour[c] = hn::MulAdd(value[c], weight, colour[c]);
-  through = hn::NegMulAdd(hn::Mul(tau, part), through, through);
+  if (fitted)
+    shade.valuesAt<true>(pixels, value);
+  else
+    shade.valuesAt<false>(pixels, value);
+  if (thin)
+    blend<true>(pixels.depth, value, colour, through);
+  else
+    blend<false>(pixels.depth, value, colour, through);
 }
 
 // These paint `blocks`, and return those of them that are saturated then.

@@ -71,9 +71,8 @@ class TileQueues {
 
   struct Queue {
     std::vector<uint32_t> chunks;
-    uint32_t count = 0,
-             looked_at =
-                 0;  // splats and records; of these, how many were there when the tile was last painted
+    uint32_t count = 0;      // splats and records
+    uint32_t looked_at = 0;  // those that were there when the tile was last painted
   };
   struct Active {
     uint32_t splat;      // in Scratch::splats; its records lie before it
@@ -96,8 +95,8 @@ class TileQueues {
   const int columns_;
   std::vector<Queue> queues_;  // [tile]
   std::unique_ptr<ScreenSplat[]> memory_;
-  std::unique_ptr<OrderTileMask[]>
-      left_;  // of each splat in memory_: Active's; kUnknown of those that no tile has looked at
+  // Active's, of each splat in memory_; kUnknown of those that were not looked at yet.
+  std::unique_ptr<OrderTileMask[]> left_;
   Mutex mutex_;
   std::vector<uint32_t> free_ GUARDED_BY(mutex_);  // chunks
   std::atomic<size_t> free_count_;
