@@ -265,14 +265,14 @@ HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number,
   out.shade.whole.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
 }
 
-/// Of a splat that is looked up. Whether anything is left of it in the block.
+/// Looks up a splat whose pixels have to be. Returns whether anything is left of it in the block.
 HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float* footprint, int block,
                           LookedUp& out) {
   return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}}, {work.table, footprint},
                      cornerOf(block), out);
 }
 
-/// One block of a splat that is not looked up, or is windowed. Whether it is saturated then.
+/// Paints one block of a splat that is not looked up, or is windowed. Returns whether it is saturated then.
 HWY_NOINLINE bool paintCutBlock(const TileWork& work, const CutSplat& cut, const float* footprint,
                                 int block) {
   const auto in_window = [&](float* at, const Window& window) HWY_ATTR {

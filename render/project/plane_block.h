@@ -32,7 +32,7 @@ class PlaneBlock {
   PlaneSlope of(size_t n) const { return {slope_x_[n], slope_y_[n]}; }
 
  private:
-  // Of the part of the depth's variance that the plane explains, over the rest.
+  // The least ratio of the depth's variance that the plane explains to the rest of it.
   static constexpr float kMinExplained = 2;
 
   float slope_x_[kMaxSplats], slope_y_[kMaxSplats];

@@ -19,7 +19,7 @@ struct RowExtents {
 
 /// `x`, `y`: the ellipse's centre, from the centre of the tile's first pixel.
 CURVISPLAT_VECTOR_CLONES void findExtents(float x, float y, const ScreenSplat& splat, RowExtents& out) {
-  // Of pixels at dy, the ellipse covers lean dy ± span √(reach² - dy²); it goes farthest right at dy = tip.
+  // The ellipse covers lean dy ± span √(reach² - dy²) of the pixels at dy; it goes farthest right at dy = tip.
   constexpr auto kSupport = static_cast<float>(kKernelSupport);
   const float s11 = splat.l21 * splat.l21 + splat.l22 * splat.l22, over = splat.l11 / s11;
   const float lean = over * splat.l21, span = over * splat.l22;
