@@ -4,14 +4,8 @@
 #pragma once
 
 // The choice is made while the program is loaded, when the runtimes of sanitizers are not there yet.
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#if defined(CURVISPLAT_SANITIZED) || !defined(__x86_64__)
 #define CURVISPLAT_VECTOR_CLONES
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__x86_64__)
-#define CURVISPLAT_VECTOR_CLONES
-#endif
-#ifndef CURVISPLAT_VECTOR_CLONES
+#else
 #define CURVISPLAT_VECTOR_CLONES [[gnu::target_clones("avx2", "default")]]
 #endif

