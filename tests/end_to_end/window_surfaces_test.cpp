@@ -12,13 +12,15 @@ class WindowSurfaces : public WindowTest {
     return eventually([&] { return !hasWidget(begin); });
   }
   /// Opens the window with room for the panels of surfaces.
-  void openWithRoom(const Words& options = {}) {
-    open(options);
+  void openWithRoom(const Words& options = {}, ImageSize size = kWindow) {
+    open(options, size);
     for (const auto& [section, inside] :
-         {std::pair("Colours and opacities", "curve"), {"Scalar", "opacity by"}, {"View", "view name"}}) {
-      click(section);
-      EXPECT_TRUE(gone(inside)) << section;
-    }
+         {std::pair("Colours and opacities", "curve"), {"Scalar", "opacity by"}, {"View", "view name"}})
+      fold(section, inside);
+  }
+  void fold(const std::string& section, const std::string& inside) {
+    click(section);
+    EXPECT_TRUE(gone(inside)) << section;
   }
   void unfold(const std::string& section, const std::string& first) {
     click(section);
@@ -120,6 +122,23 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndLeaveWithTheirScalar) {
   EXPECT_NE(valueOf(commands[0], "--iso"), valueOf(commands[1], "--iso"));
   expectDraws(commands[0], middle);
   expectDraws(commands[1], higher);
+}
+
+/// Widgets with one label below two headings both work: of all that can be listed at once, none is another's twin.
+TEST_F(WindowSurfaces, NoTwoWidgetsAreOne) {
+  openWithRoom({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);
+  fold("Picture", "scalar bar");
+  const Image both = save();
+  EXPECT_FALSE(hasWidget("twins:"));
+  click("isosurfaces by function");
+  const Image by_function = save();
+  EXPECT_LT(difference(both, by_function), 60);
+  click("slices by function");
+  EXPECT_LT(difference(by_function, save()), 60);
+  click("remove isosurface 1");
+  EXPECT_TRUE(gone("remove isosurface 1"));
+  EXPECT_TRUE(hasWidget("remove surface 1"));
+  close();
 }
 
 /// It can be typed, and stays where it is when the other side is kept.

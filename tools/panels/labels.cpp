@@ -33,26 +33,39 @@ bool option(const char* text, bool& value) {
   return changed;
 }
 
-bool section(const char* text, bool open_at_first) {
-  const bool open = ImGui::CollapsingHeader(text, open_at_first ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+Section::Section(const char* text, bool open_at_first)
+    : open_(ImGui::CollapsingHeader(text, open_at_first ? ImGuiTreeNodeFlags_DefaultOpen : 0)) {
   nameWidget(text);
-  return open;
+  if (open_) ImGui::PushID(text);
 }
 
-bool sectionOf(const char* text, std::optional<size_t>& seen, size_t number) {
-  constexpr float kSeenLines = 8;  // of the list below its header
-  const bool at_first = !seen, has_more = number > seen.value_or(0);
-  seen = number;
-  const bool was_open = ImGui::GetStateStorage()->GetInt(ImGui::GetID(text)) != 0;
+Section::~Section() {
+  if (open_) ImGui::PopID();
+}
+
+namespace {
+
+bool unfoldsFor(const char* text, const std::optional<size_t>& seen, size_t number) {
+  const bool has_more = number > seen.value_or(0);
   if (has_more) ImGui::SetNextItemOpen(true);
-  const bool open = section(text, false);
-  // Only a list that was folded: one that is in use must not move under the mouse. Nor do the panels begin
+  // Only a list that was folded is scrolled to: one that is in use must not move under the mouse. Nor do the panels begin
   // at a list.
+  return has_more && seen && ImGui::GetStateStorage()->GetInt(ImGui::GetID(text)) == 0;
+}
+
+}  // namespace
+
+Section::Section(const char* text, std::optional<size_t>& seen, size_t number)
+    : open_(unfoldsFor(text, seen, number)) {
+  constexpr float kSeenLines = 8;  // of the list below its header
+  const bool unfolds = open_;
+  seen = number;
+  open_ = ImGui::CollapsingHeader(text);
+  nameWidget(text);
   const float end = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
-  if (has_more && !at_first && !was_open &&
-      ImGui::GetItemRectMax().y + kSeenLines * ImGui::GetFrameHeight() > end)
+  if (unfolds && ImGui::GetItemRectMax().y + kSeenLines * ImGui::GetFrameHeight() > end)
     ImGui::SetScrollHereY(0);
-  return open;
+  if (open_) ImGui::PushID(text);
 }
 
 void hint(const char* text) {

@@ -42,12 +42,24 @@ void commandButton(Command command, PanelActions& actions, const char* text = nu
 void commandOption(Command command, PanelActions& actions, const char* text, bool on);
 /// A checkbox; named by its label. Returns whether it changed.
 bool option(const char* text, bool& value);
-/// A heading that folds what is below. Named by its text. Returns whether it is unfolded.
-bool section(const char* text, bool open_at_first);
-/// A heading of a list, which is folded at first. It unfolds if the list has grown, by the menu or by a
-/// saved view, and is then scrolled to if it would lie below the window's end. `seen`: how many entries
-/// there were in the frame before; nullopt before the first frame.
-bool sectionOf(const char* text, std::optional<size_t>& seen, size_t number);
+/// A heading that folds what is below. Named by its text. While one that is unfolded is in scope, widgets are told apart
+/// from those of the same label below other headings.
+class Section {
+ public:
+  Section(const char* text, bool open_at_first);
+  /// Of a list, which is folded at first. It unfolds if the list has grown, by the menu or by a saved view, and is then
+  /// scrolled to if it would lie below the window's end. `seen`: how many entries there were in the frame before; nullopt
+  /// before the first frame.
+  Section(const char* text, std::optional<size_t>& seen, size_t number);
+  ~Section();
+  Section(const Section&) = delete;
+  Section& operator=(const Section&) = delete;
+
+  explicit operator bool() const { return open_; }
+
+ private:
+  bool open_;
+};
 /// Shows a line under the widget that the mouse is over, after a moment.
 void hint(const char* text);
 

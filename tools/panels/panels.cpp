@@ -25,19 +25,19 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
                                       ImGuiWindowFlags_NoBringToFrontOnFocus |
                                       ImGuiWindowFlags_AlwaysVerticalScrollbar;
   ImGui::Begin("panels", nullptr, kFixed);
-  if (facts.playback && facts.playback->steps() > 1 && section("Time", true))
-    drawTime(actions, *facts.playback);
-  if (section("Scalar", true)) drawScalars(state, facts.further, actions);
-  if (section("Colours and opacities", true))
+  if (facts.playback && facts.playback->steps() > 1)
+    if (const Section open{"Time", true}) drawTime(actions, *facts.playback);
+  if (const Section open{"Scalar", true}) drawScalars(state, facts.further, actions);
+  if (const Section open{"Colours and opacities", true})
     drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
   actions.changed |= actions.function_changed;
-  if (section("Picture", true)) drawPicture(state, actions);
-  if (section("View", true)) drawView(state, actions, facts);
+  if (const Section open{"Picture", true}) drawPicture(state, actions);
+  if (const Section open{"View", true}) drawView(state, actions, facts);
   surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
   cuts_.draw(state, actions);
-  if (section("Markers", false)) drawMarkers(state, actions);
-  if (section("Detail and memory", false)) drawDetail(state, actions);
-  if (section("Statistics", false)) drawStatistics(state, facts.shown);
+  if (const Section open{"Markers", false}) drawMarkers(state, actions);
+  if (const Section open{"Detail and memory", false}) drawDetail(state, actions);
+  if (const Section open{"Statistics", false}) drawStatistics(state, facts.shown);
   ImGui::End();
   return actions;
 }

@@ -48,10 +48,10 @@ std::string coordinateFormat(double coordinate, double lowest, double highest) {
 }  // namespace
 
 void CutPanel::draw(ViewState& state, PanelActions& actions) {
-  if (section("Clip box", false)) drawClipBox(state, actions);
-  if (sectionOf("Clip planes", planes_seen_, state.clip_planes.size()))
+  if (const Section open{"Clip box", false}) drawClipBox(state, actions);
+  if (const Section open{"Clip planes", planes_seen_, state.clip_planes.size()})
     drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
-  if (sectionOf("Slices", slices_seen_, state.slices.size())) drawSlices(state, actions);
+  if (const Section open{"Slices", slices_seen_, state.slices.size()}) drawSlices(state, actions);
 }
 
 /// A plane's normal in data coordinates is its normal after --scale, times the scale.
@@ -227,9 +227,10 @@ void removeAt(List& list, size_t at, PanelActions& actions) {
 }  // namespace
 
 void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions) {
-  if (sectionOf("Surfaces", surfaces_seen_, state.surfaces.size() + state.faces.size()))
+  if (const Section open{"Surfaces", surfaces_seen_, state.surfaces.size() + state.faces.size()})
     drawSurfaces(state, faces, actions);
-  if (sectionOf("Isosurfaces", isovalues_seen_, state.isovalues.size())) drawIsosurfaces(state, actions);
+  if (const Section open{"Isosurfaces", isovalues_seen_, state.isovalues.size()})
+    drawIsosurfaces(state, actions);
 }
 
 void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>& faces,

@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 #include <imgui.h>
+#include <imgui_internal.h>  // GetItemID()
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <span>
 #include <string>
 #include <system_error>
@@ -103,6 +105,7 @@ namespace {
 struct Places {
   const char* const file = std::getenv("CURVISPLAT_WIDGETS");
   std::string now, written;
+  std::map<ImGuiID, std::pair<std::string, ImVec2>> widgets;  // of this frame: name and place
 };
 
 Places& places() {
@@ -118,6 +121,11 @@ void nameWidget(const std::string& name) {
   const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
   nameArea(name, static_cast<double>(at.x), static_cast<double>(at.y), static_cast<double>(size.x),
            static_cast<double>(size.y));
+  const ImGuiID id = ImGui::GetItemID();
+  const auto [first, is_new] = places().widgets.try_emplace(id, name, at);
+  const auto& [other, place] = first->second;
+  if (id != 0 && !is_new && (place.x != at.x || place.y != at.y))
+    nameArea(fmt::format("twins: {} and {}", other, name), 0, 0, 0, 0);
 }
 
 void nameArea(const std::string& name, double x, double y, double width, double height) {
@@ -128,6 +136,7 @@ void nameArea(const std::string& name, double x, double y, double width, double 
 void writeWidgetPlaces() {
   const char* const file = places().file;
   const std::string now = std::exchange(places().now, {});
+  places().widgets.clear();
   if (!file || now == places().written) return;
   const std::string part = std::string(file) + ".part";
   std::ofstream(part) << now;

@@ -39,7 +39,8 @@ class TypedNumbers {
 
 // Tests and scripts drive the window by the names of its widgets: if the environment has
 // CURVISPLAT_WIDGETS=FILE, the file has a line "X Y WIDTH HEIGHT NAME" for each named widget of the frame
-// that was drawn last, in the window's coordinates.
+// that was drawn last, in the window's coordinates. Two with one identifier, of which Dear ImGui hears only the first, have a
+// line that begins with "twins:" besides.
 
 /// Names the item that Dear ImGui drew last.
 void nameWidget(const std::string& name);
