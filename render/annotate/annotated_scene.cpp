@@ -59,11 +59,43 @@ std::vector<AxisTick> logTicks(double low, double high, int wanted) {
   return ticks;
 }
 
+/// Multiples of powers of ten, of the largest first and those nearest to zero first, each where it has room.
+std::vector<AxisTick> asinhTicks(const ScalarAxis& axis, int wanted) {
+  constexpr double kReach =
+      20;  // multiples of a power on either side of the centre: those further out have no room
+  constexpr double kLeastStep = 0.1, kLeastDistance = 0.7;
+  const auto [low, high] = axis.range;
+  std::vector<double> places;
+  std::vector<AxisTick> ticks;
+  const auto add = [&](double value) {
+    const double place = axis.fractionOf(value);
+    for (const double other : places)
+      if (std::abs(place - other) * wanted < kLeastDistance) return;
+    places.push_back(place);
+    ticks.push_back({value, fmt::format("{:g}", value)});
+  };
+  for (double step = std::pow(10, std::floor(std::log10(std::max(std::abs(low), std::abs(high)))));
+       step > kLeastStep * axis.asinh->width; step /= 10) {
+    const double first = std::ceil(std::max(low, axis.asinh->centre - kReach * step) / step - 1e-9);
+    const double last = std::floor(std::min(high, axis.asinh->centre + kReach * step) / step + 1e-9);
+    std::vector<double> multiples;
+    for (double n = first; n <= last; ++n) multiples.push_back(n == 0 ? 0 : n * step);  // no -0
+    std::stable_sort(multiples.begin(), multiples.end(),
+                     [](double a, double b) { return std::abs(a) < std::abs(b); });
+    for (const double value : multiples) add(value);
+  }
+  std::sort(ticks.begin(), ticks.end(),
+            [](const AxisTick& a, const AxisTick& b) { return a.value < b.value; });
+  return ticks;
+}
+
 }  // namespace
 
-std::vector<AxisTick> axisTicks(double low, double high, int wanted, bool log_scale) {
+std::vector<AxisTick> axisTicks(const ScalarAxis& axis, int wanted) {
+  const auto [low, high] = axis.range;
   if (!(high > low)) return {{low, fmt::format("{:g}", low)}};
-  return log_scale ? logTicks(low, high, wanted) : linearTicks(low, high, wanted);
+  if (axis.asinh) return asinhTicks(axis, wanted);
+  return axis.log_scale ? logTicks(low, high, wanted) : linearTicks(low, high, wanted);
 }
 
 }  // namespace curvisplat

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "render/colour/scalar_axis.h"
 #include "render/colour/transfer_function.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
@@ -17,9 +18,15 @@ namespace curvisplat {
 
 /// What a scalar bar shows. The function is borrowed for the call.
 struct ShownFunction {
+  enum class Part {
+    kColours,    // alone: the picture's opacities are not this function's
+    kOpacities,  // alone, in grey
+    kBoth        // colours, and the curve of the opacities beside them
+  };
+
   const TransferFunction* function;
-  std::string title;       // "density [kg/m3]"
-  bool opacities = false;  // its opacities, in grey, not its colours
+  std::string title;  // "density [kg/m3]"
+  Part part = Part::kColours;
 };
 
 /// The title of a scalar: "density [kg/m3]", or "density" if the unit is unknown.
@@ -41,10 +48,10 @@ struct AxisTick {
   std::string label;
 };
 
-/// Chooses about `wanted` (2 or more) ticks in [low, high], at multiples of 1, 2 or 5 times a power of ten.
-/// On a logarithmic scale they are at powers of ten, with 2 and 5 times them if there are few. All labels
-/// have the same number of decimals. If low == high there is one tick. Requires finite low <= high, and low
-/// > 0 on a logarithmic scale.
-std::vector<AxisTick> axisTicks(double low, double high, int wanted, bool log_scale);
+/// Chooses about `wanted` (2 or more) ticks in the axis' range, at multiples of 1, 2 or 5 times a power of ten.
+/// On a logarithmic scale they are at powers of ten, with 2 and 5 times them if there are few; on that of asinh at
+/// the roundest numbers that have room. All labels of a linear scale have the same number of decimals. If both ends
+/// are equal there is one tick. Requires finite ends that do not decrease, and above zero on a logarithmic scale.
+std::vector<AxisTick> axisTicks(const ScalarAxis& axis, int wanted);
 
 }  // namespace curvisplat

@@ -94,6 +94,7 @@ void drawAxes(cairo_t* cairo, const ScreenView& view, const glm::dvec3& ink) {
 
 // Offsets from the strip's left edge, in units of the font's size.
 constexpr double kBarLeft = 0.6, kBarWidth = 1.3, kLabelGap = 0.7;
+constexpr double kCurveWidth = 1.1;  // of opacities, left of the colours
 // Offset from its right edge.
 constexpr double kTitleWidth = 1.4, kTitleGap = 0.4;
 
@@ -103,14 +104,21 @@ struct ScalarBar {
   double width;  // of the strip, whole pixels
 };
 
-ScalarBar layOut(cairo_t* cairo, ImageSize picture, const TransferFunction& function) {
+/// From the strip's left edge, in pixels.
+double leftOf(const ShownFunction& shown, double font) {
+  return (kBarLeft + (shown.part == ShownFunction::Part::kBoth ? kCurveWidth : 0)) * font;
+}
+
+double opacityOf(const TransferFunction& function, const TransferFunction::Value& value) {
+  return -std::expm1(-value.extinction * function.opacityUnit());
+}
+
+ScalarBar layOut(cairo_t* cairo, ImageSize picture, const ShownFunction& shown) {
   const double font = fontSize(picture);
-  const auto [low, high] = function.range();
   ScalarBar bar;
   bar.height = std::floor(0.6 * picture.height);
   bar.top = std::floor((picture.height - bar.height) / 2);
-  bar.ticks =
-      axisTicks(low, high, std::max(2, static_cast<int>(bar.height / (3 * font))), function.logScale());
+  bar.ticks = axisTicks(shown.function->axis(), std::max(2, static_cast<int>(bar.height / (3 * font))));
   double labels = 0;
   for (const AxisTick& tick : bar.ticks) {
     cairo_text_extents_t extents;
@@ -120,39 +128,38 @@ ScalarBar layOut(cairo_t* cairo, ImageSize picture, const TransferFunction& func
   // In whole multiples of the font's size, so that the data does not move while an end of the range is
   // dragged.
   labels = std::ceil(labels / font) * font;
-  bar.width = std::floor((kBarLeft + kBarWidth + kLabelGap + kTitleGap + kTitleWidth) * font + labels);
+  bar.width =
+      std::floor(leftOf(shown, font) + (kBarWidth + kLabelGap + kTitleGap + kTitleWidth) * font + labels);
   return bar;
 }
 
 /// Of the colours, or of the opacities: how much ink.
 glm::dvec3 colourOf(const ShownFunction& shown, double scalar, const glm::dvec3& ink) {
   const TransferFunction::Value value = shown.function->at(scalar);
-  if (!shown.opacities) return value.colour;
-  const double opacity = -std::expm1(-value.extinction * shown.function->opacityUnit());
-  return glm::mix(1.0 - ink, ink, opacity);
+  if (shown.part != ShownFunction::Part::kOpacities) return value.colour;
+  return glm::mix(1.0 - ink, ink, opacityOf(*shown.function, value));
 }
 
 /// `right`: where the strip ends.
 void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, double right,
              const glm::dvec3& ink) {
-  const TransferFunction& function = *shown.function;
-  const double low = function.range().first, high = function.range().second;
-  const bool log_scale = function.logScale();
-  const auto fractionOf = [&, low = low, high = high](double scalar) {
-    if (!(high > low)) return 0.5;
-    return log_scale ? std::log(scalar / low) / std::log(high / low) : (scalar - low) / (high - low);
-  };
-  const auto scalarAt = [&, low = low, high = high](double fraction) {
-    return log_scale ? low * std::pow(high / low, fraction) : low + fraction * (high - low);
-  };
-
+  const ScalarAxis axis = shown.function->axis();
+  const bool is_one_value = !(axis.range.first < axis.range.second);
   const double font = fontSize(picture);
-  const ScalarBar bar = layOut(cairo, picture, function);
-  const double left = std::floor(right - bar.width + kBarLeft * font);
+  const ScalarBar bar = layOut(cairo, picture, shown);
+  const double left = std::floor(right - bar.width + leftOf(shown, font));
   const double width = std::floor(kBarWidth * font);
   for (double y = 0; y < bar.height; ++y) {
-    setInk(cairo, colourOf(shown, scalarAt(1 - (y + 0.5) / bar.height), ink));
+    const double scalar = axis.scalarAt(1 - (y + 0.5) / bar.height);
+    setInk(cairo, colourOf(shown, scalar, ink));
     cairo_rectangle(cairo, left, bar.top + y, width, 1);
+    cairo_fill(cairo);
+    if (shown.part != ShownFunction::Part::kBoth) continue;
+    // The square root, as the window's curve: most opacities are small.
+    const double length =
+        kCurveWidth * font * std::sqrt(opacityOf(*shown.function, shown.function->at(scalar)));
+    setInk(cairo, ink, 0.4);
+    cairo_rectangle(cairo, left - length, bar.top + y, length, 1);
     cairo_fill(cairo);
   }
   setInk(cairo, ink);
@@ -161,7 +168,8 @@ void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, doub
   cairo_stroke(cairo);
   cairo_text_extents_t extents;
   for (const AxisTick& tick : bar.ticks) {
-    const double y = std::floor(bar.top + bar.height * (1 - fractionOf(tick.value))) + 0.5;
+    const double y =
+        std::floor(bar.top + bar.height * (1 - (is_one_value ? 0.5 : axis.fractionOf(tick.value)))) + 0.5;
     cairo_move_to(cairo, left + width, y);
     cairo_line_to(cairo, left + width + kLabelGap * font / 2, y);
     cairo_stroke(cairo);
@@ -182,7 +190,7 @@ void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, doub
 /// The strip's width in whole pixels; at most half of the picture.
 double scalarBarsWidth(cairo_t* cairo, ImageSize picture, std::span<const ShownFunction> functions) {
   double width = 0;
-  for (const ShownFunction& shown : functions) width += layOut(cairo, picture, *shown.function).width;
+  for (const ShownFunction& shown : functions) width += layOut(cairo, picture, shown).width;
   return std::floor(std::min(width, picture.width / 2.0));
 }
 
@@ -190,7 +198,7 @@ void drawScalarBars(cairo_t* cairo, ImageSize picture, std::span<const ShownFunc
                     const glm::dvec3& ink) {
   double right = picture.width - scalarBarsWidth(cairo, picture, functions);
   for (const ShownFunction& shown : functions) {
-    right = std::min(right + layOut(cairo, picture, *shown.function).width, double(picture.width));
+    right = std::min(right + layOut(cairo, picture, shown).width, double(picture.width));
     drawBar(cairo, shown, picture, right, ink);
   }
 }

@@ -43,7 +43,7 @@ class Box {
       const double low = scene.lower[axis], high = scene.upper[axis];
       const int wanted = static_cast<int>(longest / (kLabelSpace * fontSize(scene.view.size)));
       if (std::isfinite(low) && std::isfinite(high) && low < high)
-        ticks_[axis] = axisTicks(low, high, std::clamp(wanted, kMinTicks, kMaxTicks), false);
+        ticks_[axis] = axisTicks({{low, high}}, std::clamp(wanted, kMinTicks, kMaxTicks));
     }
   }
 

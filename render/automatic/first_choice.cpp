@@ -30,6 +30,13 @@ constexpr int kRangeDigits = 3, kUnitDigits = 3, kPlaceDigits = 4;
 constexpr const char* kSequential = "viridis";
 constexpr const char* kDiverging = "cool-warm-extended";
 
+bool isDiverging(const std::string& map) {
+  const auto maps = builtInMaps();
+  return std::any_of(maps.begin(), maps.end(), [&](const PublishedMap& one) {
+    return one.name == map && one.category == MapCategory::kDiverging;
+  });
+}
+
 /// Numbers with weights, in bins by their size: a percentile sorts those of one bin alone.
 class WeightedBins {
  public:
@@ -114,7 +121,7 @@ FunctionParts FirstChoice::function(const std::string& map) const {
   auto [begin, end] = seenInterval(*histogram, extinctions);
   const double zero = histogram->coordinate(0);
   const double below = zero - begin, above = end - zero;
-  const bool diverging = map.empty() && below > 0 && above > 0 &&
+  const bool diverging = (map.empty() || isDiverging(map)) && below > 0 && above > 0 &&
                          std::min(below, above) > kDivergingShare * std::max(below, above);
   const double low = histogram->scalar(begin), high = histogram->scalar(end);
   if (diverging) {

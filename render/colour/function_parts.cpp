@@ -26,13 +26,6 @@ std::optional<double> parseUnit(std::string_view text) {
 
 }  // namespace
 
-double AsinhScale::coordinate(double scalar) const {
-  return std::asinh((scalar - centre) / width);
-}
-double AsinhScale::scalar(double coordinate) const {
-  return centre + width * std::sinh(coordinate);
-}
-
 TransferFunctionDefinition FunctionParts::definition() const {
   TransferFunctionDefinition preset = presetDefinition(map);
   if (!opacities.empty()) preset.opacities = opacities;
@@ -48,17 +41,16 @@ TransferFunctionDefinition spreadOver(TransferFunctionDefinition definition, std
     for (OpacityPoint& point : definition.opacities) point.x = std::lerp(low, high, point.x);
     return definition;
   }
-  const double begin = asinh->coordinate(low), end = asinh->coordinate(high);
+  const ScalarAxis axis{range, false, asinh};
   const ColourMap colours(definition.colours, definition.colour_space);
   const OpacityCurve curve(definition.opacities);
   definition.colours.clear();
   definition.opacities.clear();
   definition.colour_space = ColourSpace::kRgb;
+  definition.asinh = asinh;
   for (int piece = 0; piece <= kAsinhPieces; ++piece) {
     const double x = static_cast<double>(piece) / kAsinhPieces;
-    const double scalar = piece == 0              ? low
-                          : piece == kAsinhPieces ? high
-                                                  : asinh->scalar(std::lerp(begin, end, x));
+    const double scalar = axis.scalarAt(x);
     definition.colours.push_back({scalar, colours.at(x)});
     definition.opacities.push_back({scalar, curve.at(x)});
   }

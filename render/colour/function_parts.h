@@ -10,18 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "render/colour/scalar_axis.h"
 #include "render/colour/transfer_function.h"
 
 namespace curvisplat {
-
-/// Divides a range in asinh((f - centre) / width) in place of f: linear within `width` of the centre,
-/// logarithmic further out.
-struct AsinhScale {
-  double centre = 0, width = 1;  // width > 0
-
-  double coordinate(double scalar) const;
-  double scalar(double coordinate) const;
-};
 
 /// A definition over 0..1 spread over `range`: linearly, or by `asinh`, where its curves are replaced by
 /// short straight lines. Throws UsageError if the range is reversed or empty.

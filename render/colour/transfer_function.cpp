@@ -53,6 +53,7 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
                                    const std::pair<double, double>* range, double opacity_unit)
     : name_(std::move(definition.name)),
       log_scale_(definition.log_scale),
+      asinh_(definition.asinh),
       opacity_unit_(opacity_unit),
       nan_colour_(definition.nan_colour),
       notes_(std::move(definition.notes)) {

@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "render/colour/control_points.h"
+#include "render/colour/scalar_axis.h"
 
 namespace curvisplat {
 
@@ -31,9 +33,10 @@ struct TransferFunctionDefinition {
   std::vector<ColourPoint> colours;
   std::vector<OpacityPoint> opacities;  // empty: the default ramp, from the first to the last colour
   bool log_scale = false;               // interpolate in the logarithm of the scalar
-  double opacity_unit = 0;              // world units; 0: not stated
-  glm::dvec3 nan_colour{0.5, 0, 0};     // VTK's default
-  std::vector<std::string> notes;       // for the user
+  std::optional<AsinhScale> asinh = std::nullopt;  // what the points come from: people are shown values by it
+  double opacity_unit = 0;                         // world units; 0: not stated
+  glm::dvec3 nan_colour{0.5, 0, 0};                // VTK's default
+  std::vector<std::string> notes;                  // for the user
 };
 
 class TransferFunction {
@@ -67,6 +70,8 @@ class TransferFunction {
   std::pair<double, double> range() const { return range_; }
   /// Whether points are interpolated in the logarithm of the scalar.
   bool logScale() const { return log_scale_; }
+  /// The range as it is to be shown to people.
+  ScalarAxis axis() const { return {range_, log_scale_, asinh_}; }
   const std::string& name() const { return name_; }
   /// World units.
   double opacityUnit() const { return opacity_unit_; }
@@ -80,6 +85,7 @@ class TransferFunction {
   ColourMap colours_;       // over coordinate(scalar)
   OpacityCurve opacities_;  // over coordinate(scalar)
   bool log_scale_ = false;
+  std::optional<AsinhScale> asinh_;
   double opacity_unit_ = 1;
   glm::dvec3 nan_colour_{0.0};
   std::pair<double, double> range_;

@@ -9,7 +9,7 @@ namespace {
 
 std::vector<std::string> labels(double low, double high, int wanted, bool log_scale = false) {
   std::vector<std::string> texts;
-  for (const AxisTick& tick : axisTicks(low, high, wanted, log_scale)) texts.push_back(tick.label);
+  for (const AxisTick& tick : axisTicks({{low, high}, log_scale}, wanted)) texts.push_back(tick.label);
   return texts;
 }
 using Labels = std::vector<std::string>;
@@ -24,7 +24,7 @@ TEST(AxisTicks, StandAtRoundNumbers) {
 }
 
 TEST(AxisTicks, KeepTheirEndsThoughRoundingMovesThem) {
-  const auto ticks = axisTicks(0.1, 0.3, 3, false);
+  const auto ticks = axisTicks({{0.1, 0.3}}, 3);
   ASSERT_EQ(ticks.size(), 3u);
   EXPECT_EQ(ticks.front().label, "0.1");
   EXPECT_EQ(ticks.back().label, "0.3");
@@ -36,6 +36,24 @@ TEST(AxisTicks, OfALogarithmStandAtPowersOfTen) {
   EXPECT_LE(labels(1e-12, 1e12, 6, true).size(), 8u);
 }
 
+TEST(AxisTicks, OfAnAsinhScaleHaveRoom) {
+  const auto labels = [](std::pair<double, double> range, const AsinhScale& scale) {
+    const ScalarAxis axis{range, false, scale};
+    std::vector<std::string> texts;
+    double last = -1;
+    for (const AxisTick& tick : axisTicks(axis, 8)) {
+      EXPECT_GT(axis.fractionOf(tick.value), last + 0.08) << tick.label;
+      last = axis.fractionOf(tick.value);
+      texts.push_back(tick.label);
+    }
+    return texts;
+  };
+  EXPECT_EQ(labels({-25000, 1500}, {0, 1}),
+            (Labels{"-10000", "-1000", "-100", "-10", "-1", "0", "1", "10", "100", "1000"}));
+  EXPECT_EQ(labels({250, 400}, {300, 1}),
+            (Labels{"270", "290", "297", "299", "300", "301", "303", "310", "340", "400"}));
+}
+
 TEST(AxisTicks, OfARangeWithoutLengthIsOne) {
   EXPECT_EQ(labels(3, 3, 5), Labels{"3"});
 }
@@ -45,7 +63,7 @@ TEST(AxisTicks, EndWhereNumbersHardlyDiffer) {
     for (const bool log_scale : {false, true}) {
       if (log_scale && low < 0) continue;
       const double high = std::nextafter(low, 1e300);
-      EXPECT_EQ(axisTicks(low, high, 5, log_scale).size(), 1u) << low;
+      EXPECT_EQ(axisTicks({{low, high}, log_scale}, 5).size(), 1u) << low;
     }
 }
 

@@ -362,10 +362,13 @@ std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, 
     const VariableInfo& info = manifest.variables[variable];
     return scalarTitle(info.name, info.unit);
   };
-  shown.push_back({&coloured.function, titleOf(coloured.variable)});
   const bool volume = !scene || scene->volume;
+  using Part = ShownFunction::Part;
+  shown.push_back({&coloured.function, titleOf(coloured.variable),
+                   scalars.colour || !volume ? Part::kColours : Part::kBoth});
   if (scalars.colour && volume)
-    shown.push_back({&scalars.opacity.function, titleOf(scalars.opacity.variable) + " (opacity)", true});
+    shown.push_back(
+        {&scalars.opacity.function, titleOf(scalars.opacity.variable) + " (opacity)", Part::kOpacities});
   if (scene)
     for (const GridSurface& surface : scene->grid_surfaces) {
       if (!surface.function) continue;

@@ -133,7 +133,7 @@ void drawLines(PlotCanvas& canvas, double panel_left, double panel_top, const Li
   if (xs.empty()) return;
   const double largest = *ys.rbegin() > 0 ? 1.05 * *ys.rbegin() : 1;
   const double least = panel.log_values ? 0.8 * *ys.begin() : 0;
-  const std::vector<AxisTick> ticks = axisTicks(least, largest, 5, panel.log_values);
+  const std::vector<AxisTick> ticks = axisTicks({{least, largest}, panel.log_values}, 5);
   double label_width = 0;
   for (const AxisTick& tick : ticks) label_width = std::max(label_width, canvas.widthOf(tick.label));
 
@@ -208,7 +208,7 @@ void drawBars(PlotCanvas& canvas, double panel_left, double panel_top, const Bar
   const auto xOf = [&](double value) { return left + value / largest * (right - left); };
 
   cairo_set_line_width(canvas.get(), 1);
-  for (const AxisTick& tick : axisTicks(0, largest, 4, false)) {
+  for (const AxisTick& tick : axisTicks({{0, largest}}, 4)) {
     canvas.ink(kGrid);
     canvas.line(xOf(tick.value), top - 4, xOf(tick.value), bottom + 2);
     canvas.ink(kInk);

@@ -88,23 +88,6 @@ std::optional<FunctionParts> EditedFunction::parts(bool rounded) const {
   return parts;
 }
 
-double EditedFunction::scalarAt(double x) const {
-  const auto [low, high] = range_;
-  if (x == 0) return low;
-  if (x == 1) return high;
-  if (asinh_) return asinh_->scalar(std::lerp(asinh_->coordinate(low), asinh_->coordinate(high), x));
-  return logScale() ? low * std::pow(high / low, x) : std::lerp(low, high, x);
-}
-
-double EditedFunction::coordinateOf(double scalar) const {
-  const auto [low, high] = range_;
-  if (asinh_) {
-    const double begin = asinh_->coordinate(low);
-    return (asinh_->coordinate(scalar) - begin) / (asinh_->coordinate(high) - begin);
-  }
-  return logScale() ? std::log(scalar / low) / std::log(high / low) : (scalar - low) / (high - low);
-}
-
 TransferFunction EditedFunction::function() const {
   if (asinh_) return TransferFunction(definition(), nullptr, opacity_unit_);
   return TransferFunction(definition_, &range_, opacity_unit_);

@@ -59,8 +59,8 @@ class EditedFunction {
   bool logScale() const { return definition_.log_scale; }
   bool asinhScale() const { return asinh_.has_value(); }
   /// The scalar at a coordinate, and the coordinate of a scalar, which may lie outside 0..1.
-  double scalarAt(double x) const;
-  double coordinateOf(double scalar) const;
+  double scalarAt(double x) const { return axis().scalarAt(x); }
+  double coordinateOf(double scalar) const { return axis().fractionOf(scalar); }
   /// Returns false and changes nothing if the range is not above zero.
   bool setLogScale(bool log_scale);
   double opacityUnit() const { return opacity_unit_; }
@@ -93,6 +93,7 @@ class EditedFunction {
   glm::dvec3 colourAt(double x) const;
 
  private:
+  ScalarAxis axis() const { return {range_, logScale(), asinh_}; }
   void edited() { preset_.clear(); }
   void coloursEdited() { preset_.clear(), map_.clear(); }
 

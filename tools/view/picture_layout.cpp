@@ -19,7 +19,9 @@ std::string titleOf(const Manifest& manifest, const std::string& name) {
 }  // namespace
 
 ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
-    : colours_(state.function.function()), title_(titleOf(manifest, state.variable)) {
+    : colours_(state.function.function()),
+      title_(titleOf(manifest, state.variable)),
+      shows_opacities_(!state.opacity_by && (state.volume || !state.hasSheets())) {
   if (!state.faces.empty() && state.faces_by && state.faces_by->variable != state.variable) {
     of_faces_ = state.faces_by->function.function();
     faces_title_ = titleOf(manifest, state.faces_by->variable);
@@ -37,8 +39,9 @@ DrawnScalars ShownFunctions::scalars(const CacheReader& cache, const ViewState& 
 }
 
 std::vector<ShownFunction> ShownFunctions::bars() const {
-  std::vector<ShownFunction> bars{{&colours_, title_}};
-  if (opacities_ && !opacity_title_.empty()) bars.push_back({&*opacities_, opacity_title_, true});
+  using Part = ShownFunction::Part;
+  std::vector<ShownFunction> bars{{&colours_, title_, shows_opacities_ ? Part::kBoth : Part::kColours}};
+  if (opacities_ && !opacity_title_.empty()) bars.push_back({&*opacities_, opacity_title_, Part::kOpacities});
   if (of_faces_) bars.push_back({&*of_faces_, faces_title_});
   return bars;
 }

@@ -33,6 +33,7 @@ class ShownFunctions {
   TransferFunction colours_;
   std::optional<TransferFunction> opacities_, of_faces_;  // of faces that have a scalar of their own
   std::string title_, opacity_title_, faces_title_;
+  bool shows_opacities_;  // those of colours_
 };
 
 /// The part of a picture that shows the data.
