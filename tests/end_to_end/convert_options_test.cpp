@@ -60,6 +60,14 @@ TEST_F(ConvertOptionsTest, GivesTheSameCacheForAnyThreadsAndMemory) {
   EXPECT_TRUE(filesOf(folder_ / "wake.splats") == one);
 }
 
+TEST_F(ConvertOptionsTest, TakesAGridAfterItsSolutionAndAllScalarsWithADerivedOne) {
+  run({"convert", file("wake.fun"), file("wake.xyz"), "-o", file("a.splats"), "--scalar", "all,volume"});
+  run(convert({"--scalar", "all", "--scalar", "volume"}));
+  for (const char* const name : {"geometry.bin", "var.0.bin", "var.1.bin"})
+    EXPECT_TRUE(readTextFile(folder_ / "a.splats" / name) == readTextFile(folder_ / "wake.splats" / name))
+        << name;
+}
+
 TEST_F(ConvertOptionsTest, PutsTemporaryFilesIntoTheGivenFolderAndRemovesThem) {
   std::filesystem::create_directory(folder_ / "tmp");
   run(convert({"--tmp", file("tmp")}));

@@ -172,6 +172,7 @@ TEST(Plot3dDamage, TruncatedFilesAreReportedWithTheExpectedSize) {
   const std::string error = errorOf(folder, file);
   expectSays(error, "4000 bytes fit no PLOT3D grid");
   expectSays(error, "9x8x7: found 4000 bytes; expected 6060 (single precision, no iblank)");
+  expectSays(error, "the file seems to be truncated");
 
   Plot3dLayout fortran = layout;
   fortran.records = kFortran;

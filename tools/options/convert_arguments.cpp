@@ -239,12 +239,12 @@ std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std
     std::vector<uint32_t> stored;
     std::vector<std::string> words;
     for (const std::string& name : names) {
-      if (isScalar(description, name))
-        words.push_back(name);
-      else if (name == "all")
-        stored = storedScalars(description);
-      else
-        for (const std::string& part : splitAtCommas(name)) words.push_back(part);
+      const bool is_one = isScalar(description, name);  // its name may have commas
+      for (const std::string& part : is_one ? std::vector{name} : splitAtCommas(name))
+        if (part == "all" && !isScalar(description, part))
+          stored = storedScalars(description);
+        else
+          words.push_back(part);
     }
     if (names.empty()) stored = storedScalars(description);
     if (words.empty() && !stored.empty()) return stored;

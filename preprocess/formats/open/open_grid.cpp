@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "preprocess/formats/cgns/cgns_source.h"
@@ -153,6 +154,22 @@ std::string namesIn(const GridDescription& description) {
 
 // ---- opening ----
 
+/// The grid may also be named after its solutions.
+std::unique_ptr<DataSource> openPlot3d(const OpenGridOptions& options) {
+  try {
+    return std::make_unique<Plot3dSource>(options);
+  } catch (const Error&) {
+    for (size_t n = 0; n < options.solutions.size(); ++n) try {
+        OpenGridOptions other = options;
+        std::swap(other.grid, other.solutions[n]);
+        return std::make_unique<Plot3dSource>(other);
+      } catch (const Error&) {
+        continue;  // of the order that the user chose is spoken
+      }
+    throw;
+  }
+}
+
 std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options);
 
 /// Opens one of several files that are to be combined.
@@ -193,7 +210,7 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
   requireNoSelection(options);
   for (const std::filesystem::path& path : options.solutions)
     refuseForeign(path, "a PLOT3D Q or function file");
-  return std::make_unique<Plot3dSource>(options);
+  return openPlot3d(options);
 }
 
 }  // namespace

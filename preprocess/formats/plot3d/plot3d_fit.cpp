@@ -154,11 +154,15 @@ void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payloa
   // Random bytes often give dimensions that seem to fit the file; a truncated file lacks less than that.
   const bool near = expected(layouts.front()) / 4 <= payload.size();
   const uint64_t unit = layouts.front().ascii ? sizeof(double) : 1;
+  const bool cut_off = near && std::all_of(layouts.begin(), layouts.end(), [&](const Plot3dLayout& layout) {
+                         return payload.size() < expected(layout);
+                       });
   throw LayoutMisfit{
       near ? LayoutMisfit::kDimensions : LayoutMisfit::kFirstRecord,
-      fmt::format("{}: found {} {}; expected {}", curvisplat::describe(header.blocks), payload.size() / unit,
-                  unit == 1 ? "bytes" : "numbers",
-                  expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }))};
+      fmt::format("{}: found {} {}; expected {}{}", curvisplat::describe(header.blocks),
+                  payload.size() / unit, unit == 1 ? "bytes" : "numbers",
+                  expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }),
+                  cut_off ? "; the file seems to be truncated" : "")};
 }
 
 void fitHeader(const Plot3dCandidates& candidates, const Plot3dLayout& base, Plot3dFits& found) {
