@@ -252,7 +252,7 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture,
 }
 
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function) {
-  const ShownFunction shown{&function, {}};
+  const ShownFunction shown{&function, {}, ShownFunction::Part::kBoth};
   return dataSize(annotations, picture, {&shown, 1});
 }
 

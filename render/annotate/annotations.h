@@ -30,7 +30,7 @@ struct Annotations {
 /// picture's.
 ImageSize dataSize(const Annotations& annotations, ImageSize picture,
                    std::span<const ShownFunction> functions);
-/// The size with one bar.
+/// The size with one bar, of colours and opacities.
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function);
 
 /// The whole picture: `data`, which has the size of scene.view, over the background where it is transparent,
