@@ -146,27 +146,34 @@ CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm
 
 namespace {
 
-/// Coarse samples as seen from one side, sorted into square pixels: what areas are measured with. Immutable.
+struct Bounds {
+  glm::dvec3 lower{std::numeric_limits<double>::max()}, upper{-std::numeric_limits<double>::max()};
+
+  explicit Bounds(const CoarseSamples& samples) {
+    for (const glm::dvec3& position : samples.positions) {
+      lower = glm::min(lower, position);
+      upper = glm::max(upper, position);
+    }
+  }
+};
+
+/// Coarse samples as seen from one side, sorted into square pixels: what areas are measured with. Borrows the samples.
 class PixelSums {
  public:
   /// Of the longer side: some 50 samples for each pixel.
   static constexpr int kPixels = 80;
 
-  /// `view`: as Camera::named() knows it. Requires one sample or more.
-  PixelSums(const CoarseSamples& samples, std::string_view view) {
-    glm::dvec3 lower(std::numeric_limits<double>::max()), upper(-std::numeric_limits<double>::max());
-    for (const glm::dvec3& position : samples.positions) {
-      lower = glm::min(lower, position);
-      upper = glm::max(upper, position);
-    }
-    const Camera camera = Camera::named(view, lower, upper, {kPixels, kPixels}, Projection::kOrthographic);
-    const glm::dmat4 view_from_world = camera.viewFromWorld();
+  /// `view`: as Camera::named() knows it. `bounds`: of the samples, of which there are some.
+  PixelSums(const CoarseSamples& samples, const Bounds& bounds, std::string_view view)
+      : samples_(samples),
+        view_from_world_(
+            Camera::named(view, bounds.lower, bounds.upper, {kPixels, kPixels}, Projection::kOrthographic)
+                .viewFromWorld()) {
     glm::dvec2 lowest(std::numeric_limits<double>::max()), highest(-std::numeric_limits<double>::max());
-    places_.reserve(samples.size());
     for (const glm::dvec3& position : samples.positions) {
-      places_.emplace_back(view_from_world * glm::dvec4(position, 1));
-      lowest = glm::min(lowest, places_.back());
-      highest = glm::max(highest, places_.back());
+      const glm::dvec2 place = placeOf(position);
+      lowest = glm::min(lowest, place);
+      highest = glm::max(highest, place);
     }
     lowest_ = lowest;
     width_ = std::max(highest.x - lowest.x, highest.y - lowest.y) / kPixels;
@@ -177,8 +184,8 @@ class PixelSums {
   std::vector<double> of(const WeightOf& weightOf) const {
     std::vector<double> sums(size_t{kPixels} * kPixels, 0);
     if (!(width_ > 0)) return sums;
-    for (size_t n = 0; n < places_.size(); ++n) {
-      const glm::dvec2 place = (places_[n] - lowest_) / width_;
+    for (size_t n = 0; n < samples_.size(); ++n) {
+      const glm::dvec2 place = (placeOf(samples_.positions[n]) - lowest_) / width_;
       const auto column = static_cast<size_t>(std::min(kPixels - 1, static_cast<int>(place.x)));
       const auto row = static_cast<size_t>(std::min(kPixels - 1, static_cast<int>(place.y)));
       sums[row * kPixels + column] += weightOf(n);
@@ -198,21 +205,30 @@ class PixelSums {
   double pixelArea() const { return width_ * width_; }
 
  private:
-  std::vector<glm::dvec2> places_;  // [sample]
+  glm::dvec2 placeOf(const glm::dvec3& p) const {
+    const glm::dmat4& m = view_from_world_;
+    return {m[0].x * p.x + m[1].x * p.y + (m[2].x * p.z + m[3].x),
+            m[0].y * p.x + m[1].y * p.y + (m[2].y * p.z + m[3].y)};
+  }
+
+  const CoarseSamples& samples_;
+  const glm::dmat4 view_from_world_;
   glm::dvec2 lowest_{0};
   double width_ = 0;
 };
 
 constexpr double kPreferIso = 1.15, kPreferEarlier = 1.03;
-constexpr std::string_view kViews[] = {"iso", "+x", "-x", "+y", "-y", "+z", "-z"};
+// From the other side, a silhouette is as large.
+constexpr std::string_view kViews[] = {"iso", "+x", "+y", "+z"};
 
 }  // namespace
 
 Silhouette widestSilhouette(const CoarseSamples& samples) {
   if (samples.size() == 0) return {"iso", 0};
+  const Bounds bounds(samples);
   Silhouette best{"iso", 0};
   for (const std::string_view view : kViews) {
-    const double area = PixelSums(samples, view).coveredArea();
+    const double area = PixelSums(samples, bounds, view).coveredArea();
     if (view == "iso" || area > best.area * (best.view == "iso" ? kPreferIso : kPreferEarlier))
       best = {view, area};
   }
@@ -222,7 +238,7 @@ Silhouette widestSilhouette(const CoarseSamples& samples) {
 double seenArea(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths) {
   constexpr double kSeenPart = 0.01;  // of the mean depth
   if (samples.size() == 0) return 0;
-  const PixelSums pixels(samples, view);
+  const PixelSums pixels(samples, Bounds(samples), view);
   const double covered = pixels.coveredArea();
   if (!(covered > 0)) return 0;
   const auto sums = pixels.of([&](size_t n) { return depths[n]; });

@@ -148,7 +148,7 @@ FunctionParts FirstChoice::function(const std::string& map) const {
 double FirstChoice::opacityUnitOf(const TransferFunction& function) const {
   std::vector<double> depths(samples_.size());
   for (size_t n = 0; n < samples_.size(); ++n)
-    depths[n] = samples_.volumes[n] * function.at(samples_.values[n]).extinction;
+    depths[n] = samples_.volumes[n] * function.extinctionAt(samples_.values[n]);
   const double depth = std::accumulate(depths.begin(), depths.end(), 0.0);
   const double area = seenArea(samples_, silhouette_.view, depths);
   const double unit = area > 0 ? function.opacityUnit() * depth / (kMeanDepth * area) : 0;
@@ -174,7 +174,7 @@ ViewChoice FirstChoice::view(const TransferFunction& function, ImageSize size) c
     const glm::dvec4 place = view_from_world * glm::dvec4(samples_.positions[n], 1);
     places[0][n] = place.x;
     places[1][n] = place.y;
-    weights[n] = samples_.volumes[n] * function.at(samples_.values[n]).extinction;
+    weights[n] = samples_.volumes[n] * function.extinctionAt(samples_.values[n]);
     total += weights[n];
   }
   if (!(total > 0)) return choice;

@@ -1,5 +1,7 @@
 #include "render/automatic/opacity_rule.h"
 
+#include <hwy/contrib/sort/vqsort.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -43,7 +45,7 @@ ValueDistribution::ValueDistribution(const CoarseSamples& samples) {
   CURVISPLAT_CHECK(samples.size() > 0);
   std::vector<uint64_t> order(samples.size());
   for (size_t n = 0; n < order.size(); ++n) order[n] = uint64_t{sortable(samples.values[n])} << 32 | n;
-  std::sort(order.begin(), order.end());
+  hwy::Sorter()(order.data(), order.size(), hwy::SortAscending());
   values_.reserve(order.size());
   cumulative_.reserve(order.size());
   double sum = 0;

@@ -3,7 +3,7 @@
 //
 //   CoarseSamples -> ValueDistribution -> VolumeHistogram -> BinExtinctions -> seenInterval, opacityPoints
 //
-// Sorting the samples takes 30 ms for 300,000 of them, the rest a few passes over 128 bins. The same samples
+// Sorting 300,000 samples takes some milliseconds, the rest a few passes over 128 bins. The same samples
 // give the same opacities. All is pure or immutable; any thread.
 #pragma once
 

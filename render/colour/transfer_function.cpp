@@ -116,9 +116,13 @@ double TransferFunction::coordinate(double scalar) const {
 
 TransferFunction::Value TransferFunction::at(double scalar) const {
   if (std::isnan(scalar)) return {nan_colour_, 0};
-  const double x = coordinate(scalar);
-  const double opacity = std::min(opacities_.at(x), kLargestOpacity);
-  return {colours_.at(x), -std::log1p(-opacity) / opacity_unit_};
+  return {colours_.at(coordinate(scalar)), extinctionAt(scalar)};
+}
+
+double TransferFunction::extinctionAt(double scalar) const {
+  if (std::isnan(scalar)) return 0;
+  const double opacity = std::min(opacities_.at(coordinate(scalar)), kLargestOpacity);
+  return -std::log1p(-opacity) / opacity_unit_;
 }
 
 }  // namespace curvisplat

@@ -65,6 +65,7 @@ class TransferFunction {
 
   /// Outside of range(), the value at its nearer end, as in ParaView. NaN has no extinction.
   Value at(double scalar) const;
+  double extinctionAt(double scalar) const;
 
   /// From the lowest to the highest point of colours and opacities.
   std::pair<double, double> range() const { return range_; }

@@ -243,7 +243,9 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
   add("--range", exact(parts.range.first) + "," + exact(parts.range.second));
   if (parts.asinh) add("--asinh", exact(parts.asinh->centre) + "," + exact(parts.asinh->width));
   add("--opacity", textOf(parts.opacities));
-  return withUnit(definition, nullptr, arguments);
+  if (arguments.opacity_unit) return withUnit(definition, nullptr, arguments);
+  add("--opacity-unit", exact(parts.opacity_unit));
+  return TransferFunction(definition, nullptr, parts.opacity_unit);
 }
 
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
