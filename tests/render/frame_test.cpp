@@ -140,6 +140,7 @@ TEST_P(FrameTest, IsTheSameForAnyThreadsAndMemory) {
     std::vector<float> first;
     for (const unsigned threads : {1u, 2u, 4u, 3u})
       for (const uint64_t memory : {uint64_t{1} << 30, uint64_t{56} << 20}) {
+        if (GetParam() == Backend::kOsmesa && threads % 2 == memory >> 30) continue;  // each once
         FrameOptions wanted = options(2);
         wanted.threads = threads;
         wanted.memory_bytes = memory;

@@ -165,12 +165,12 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
 
 // Opaque splats, which hide more or less depending on memory and threads: the picture has the same bits.
 TEST_F(HiddenBricksTest, FramesAreTheSameHoweverMuchIsLeftOut) {
-  writeRandomCache(folder_ / "a.splats", 3, 30000);
+  writeRandomCache(folder_ / "a.splats", 3, 20000);
   const CacheReader cache(folder_ / "a.splats");
   const Manifest& manifest = cache.manifest();
   const auto opaque = TransferFunction::preset("viridis", -1, 1, 1e-6);
   FrameOptions options;
-  options.size = {300, 250};
+  options.size = {200, 160};
   options.lod_pixels = 0;
   options.low_pass_px2 = 1.5;  // few splats a pixel: wide ones, that leave no gap
   const Camera camera =

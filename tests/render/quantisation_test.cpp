@@ -9,8 +9,7 @@
 
 #include "preprocess/scenes/scenes.h"
 #include "preprocess/splats/node_splats.h"
-#include "render/gl/gl_context.h"
-#include "render/gl/gl_painter.h"
+#include "render/backend/backend.h"
 #include "render/image/image.h"
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
@@ -22,7 +21,7 @@ namespace curvisplat {
 namespace {
 
 constexpr ImageSize kSize{256, 256};
-constexpr SceneGridSize kNodes{128, 64, 64};
+constexpr SceneGridSize kNodes{96, 48, 48};
 
 struct Splats {
   SplatGeometry geometry;
@@ -110,8 +109,7 @@ class Quantisation : public testing::Test {
     for (const DepthItem& item : sorter.sort(first)) sorted.push_back(splats[item.splat]);
 
     Image image;
-    gl_.run([&](const GlContext& context) {
-      GlPainter painter(context);
+    makeBackend(Backend::kCpu)->run([&](Painter& painter) {
       painter.begin(kSize, {1, 1, 1, 1}, table, {});
       painter.draw(sorted);
       image = painter.end();
@@ -138,8 +136,6 @@ class Quantisation : public testing::Test {
     EXPECT_GT(computed_db, 50);
     EXPECT_LT(computed_db - decoded_db, 1);
   }
-
-  GlThread gl_{GlLibrary::kOsmesa};
 };
 
 TEST_F(Quantisation, OfASmoothFunctionCostsLessThanADecibel) {

@@ -5,6 +5,7 @@
 // ... until the job ends before it comes to the call that would fail.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
@@ -17,6 +18,11 @@ namespace curvisplat::faults {
 /// Whether all places are to be tried: CURVISPLAT_WHOLE is set, as tools/test.sh --whole does.
 inline bool isWholeSweep() {
   return std::getenv("CURVISPLAT_WHOLE") != nullptr;
+}
+
+/// Whether to try the n-th of many combinations: usually one in `stride`, which has no divisor in common with what they are made of.
+inline bool isTried(size_t n, size_t stride) {
+  return n % stride == 0 || isWholeSweep();
 }
 
 /// The place to try after this one. The first ones, where files are opened and made, are all tried; of the others
@@ -59,7 +65,7 @@ struct FaultSweep {
   std::string to_be_cut;   // only files whose paths begin so become shorter
   std::function<void()> prepare, job;
   std::function<void(const FaultOutcome&)> check;
-  int64_t stride = 5;  // of nextInSweep()
+  int64_t stride = 11;  // of nextInSweep()
 
   /// Calls prepare(), job() with the fault at the n-th call, and check(outcome), for n from 0 on as
   /// nextInSweep() says, until the fault is not reached any more. Expects that a failing job throws an Error of one line that
