@@ -9,6 +9,7 @@
 #include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 
 namespace curvisplat {
 namespace {
@@ -62,11 +63,13 @@ std::vector<TestBlock> doubleBlocks(uint32_t components) {
 }
 
 TEST(Plot3dDamage, EveryPrefixOfAGridIsRefusedOrReadRight) {
+  size_t combination = 0;
   const TestFolder folder("prefixes");
   for (const ByteOrder order : {kLittle, kBig})
     for (const RecordMarkers records : {kC, kFortran, RecordMarkers::kBytes8})
       for (const int precision : {4, 8})
         for (const bool blanking : {false, true}) {
+          if (!faults::isTried(combination++, 5)) continue;
           const Plot3dLayout layout{Plot3dKind::kGrid, false, order, records, precision, true, blanking};
           SCOPED_TRACE(describe(layout));
           const Bytes file = plot3dBytes(layout, doubleBlocks(0));
@@ -88,10 +91,12 @@ TEST(Plot3dDamage, EveryPrefixOfAGridIsRefusedOrReadRight) {
 }
 
 TEST(Plot3dDamage, EveryPrefixOfASolutionIsRefused) {
+  size_t combination = 0;
   const TestFolder folder("solution-prefixes");
   for (const Plot3dKind kind : {Plot3dKind::kQ, Plot3dKind::kFunction})
     for (const RecordMarkers records : {kC, kFortran})
       for (const int precision : {4, 8}) {
+        if (!faults::isTried(combination++, 3)) continue;
         Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, records, precision, true, false};
         const auto blocks = doubleBlocks(5);
         const Bytes grid = plot3dBytes(layout, blocks);
