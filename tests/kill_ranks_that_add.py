@@ -88,7 +88,7 @@ class Additions:
         return killed, victim, faults
 
 
-def main(program, kills=USUAL_KILLS, size="96x64x48"):
+def main(program, kills=USUAL_KILLS, size="64x48x40"):
     program = pathlib.Path(program).resolve()
     if not shutil.which("mpirun") or not (program.parent / "curvisplat-mpi.so").exists():
         print("skipped: no mpirun (Debian: openmpi-bin), or built without MPI")

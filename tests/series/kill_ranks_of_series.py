@@ -3,7 +3,8 @@
 
     kill_ranks_of_series.py PROGRAM [KILLS [SIZE [STEPS]]]
 
-KILLS (default 1; with CURVISPLAT_WHOLE, as tools/test.sh --whole sets it, 20) of each of: convert and convert --add-steps, on a fixed grid and on one that moves; at moments spread over the
+KILLS of each of: convert and convert --add-steps, on a fixed grid and on one that moves; without KILLS, usually one of the former on the fixed
+and of the latter on the other, with CURVISPLAT_WHOLE (tools/test.sh --whole) 20 of all; at moments spread over the
 time that an undisturbed run takes. After each the job must end, the cache, if there is one, must verify, and --resume by 1 to 4 ranks
 must complete it to the files of one process. Prints a line for each; exit status 1 if anything was wrong, 77 without mpirun.
 """
@@ -17,7 +18,7 @@ import sys
 import tempfile
 import time
 
-from kill_series import USUAL_KILLS, Series, digests
+from kill_series import IS_WHOLE, USUAL_KILLS, Series, digests
 
 MPIRUN = ["mpirun", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-q", "-n"]
 RANKS = 3
@@ -99,8 +100,8 @@ def main(program, kills=USUAL_KILLS, size="28x24x12", steps=8):
             series.run("convert", *series.whole, "-o", series.cache)
             wanted = digests(series.cache)
             for job, command in series.commands().items():
-                if job == "follow":
-                    continue  # one process
+                if job == "follow" or (moving != (job == "add") and len(sys.argv) < 3 and not IS_WHOLE):
+                    continue  # the former is one process
                 series.prepare(job)
                 duration = series.undisturbed(command)
                 faults = [] if digests(series.cache) == wanted else [f"{job} gives other bytes"]
