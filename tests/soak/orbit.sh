@@ -5,14 +5,14 @@
 #   tests/soak/orbit.sh [--short | --full] [PROGRAM [FOLDER [CACHE]]]
 #
 # In full: 1,000 frames with 128 MiB over a cache of 3.5 GB; FOLDER has room for 20 GB, and CACHE, if given, is used in
-# place of the one that is otherwise made there (with python3, which makes it hard to compress). In short: 30 frames.
+# place of the one that is otherwise made there (with python3, which makes it hard to compress). In short: 16 frames.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 if [ $form = full ]; then
   grid=936x468x468 frames=1000 memory=128M picture=600x600 splats=400000 interval_s=2
 else
-  grid=96x48x48 frames=30 memory=52M picture=160x160 splats=200000 interval_s=0.1
+  grid=96x48x48 frames=16 memory=52M picture=160x160 splats=200000 interval_s=0.1
 fi
 
 cache=${rest[0]:-}

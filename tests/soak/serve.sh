@@ -6,14 +6,14 @@
 #   tests/soak/serve.sh [--short | --full] [PROGRAM [FOLDER [SECONDS]]]
 #
 # In full: 10 minutes, or SECONDS, over a cache of 100 MB and a series of 40 steps; FOLDER has room for 2 GB.
-# In short: 12 seconds. Needs python3-websocket; exit status 77 without it.
+# In short: 5 seconds. Needs python3-websocket; exit status 77 without it.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 if [ $form = full ]; then
   grid=256x128x128 steps=40 seconds=${rest[0]:-600}
 else
-  grid=48x24x24 steps=4 seconds=${rest[0]:-12}
+  grid=48x24x24 steps=4 seconds=${rest[0]:-5}
 fi
 /usr/bin/python3 -c 'import websocket' 2> /dev/null || { echo "skipped: python3-websocket is not installed"; exit 77; }
 made still "$grid" f j
