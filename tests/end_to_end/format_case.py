@@ -90,7 +90,7 @@ class FormatCase(unittest.TestCase):
             wrong = bytearray(data)
             wrong[n] ^= int(self.RANDOM.integers(1, 256))
             damaged.append(bytes(wrong))
-        tried = some_of(damaged)
+        tried = some_of(damaged, 11)
         for bytes_of in tried:
             path.write_bytes(bytes_of)
             result = self.run_program("convert", opened or path, "-o", self.folder / "d.splats", "--overwrite",

@@ -11,6 +11,7 @@ import sys
 import unittest
 
 from structured_formats import PROGRAM, RANDOM, Block, StructuredFormats, np
+from sweep import some_of
 
 try:
     import h5py
@@ -85,13 +86,13 @@ class Xdmf(StructuredFormats):
         return Writer(self.folder, *words, **options)
 
     def test_storages(self):
-        for kind in ("f4", "f8"):
-            blocks = [Block(kind=kind), Block((4, 3, 5), 9, kind)]
-            for words, options in ((("HDF",), {}), (("HDF", ">"), {}), (("HDF",), {"chunks": True, "compression": "gzip"}),
-                                   (("Binary", "<"), {}), (("Binary", ">"), {}), (("XML",), {})):
-                for of in ("XYZ", "X_Y_Z"):
-                    writer = self.new(*words, **options)
-                    self.expect_same([self.write("".join(grid(writer, b, f"g{n}", kind=of) for n, b in enumerate(blocks)))], blocks)
+        cases = [(kind, storage, of) for storage in ((("HDF",), {}), (("HDF", ">"), {}), (("HDF",), {"chunks": True, "compression": "gzip"}),
+                                                     (("Binary", "<"), {}), (("Binary", ">"), {}), (("XML",), {}))
+                 for kind in ("f4", "f8") for of in ("XYZ", "X_Y_Z")]
+        blocks = {kind: [Block(kind=kind), Block((4, 3, 5), 9, kind)] for kind in ("f4", "f8")}
+        for kind, (words, options), of in some_of(cases, 3):  # usually each storage with another of the others
+            writer = self.new(*words, **options)
+            self.expect_same([self.write("".join(grid(writer, b, f"g{n}", kind=of) for n, b in enumerate(blocks[kind])))], blocks[kind])
         self.assertEqual([b["name"] for b in self.info(self.folder / "a.xmf")["blocks"]], ["g0", "g1"])
 
     def test_arrays_of_other_shapes(self):
@@ -167,10 +168,10 @@ class Xdmf(StructuredFormats):
         listed = '<Time TimeType="List"><DataItem Dimensions="3" Format="XML">0 0.5 1</DataItem></Time>'
         spread = '<Time TimeType="HyperSlab"><DataItem Dimensions="3" Format="XML">0 0.5 3</DataItem></Time>'
         stored = f'<Time TimeType="List">{writer.item(np.array([0, 0.5, 1]))}</Time>'
-        for text in ("".join(steps), listed + bare, spread + bare, stored + bare):
+        for turn, text in enumerate(("".join(steps), listed + bare, spread + bare, stored + bare)):
             path = self.write(temporal.format(text))
             self.assertEqual(self.info(path)["times"], [0, 0.5, 1])
-            for n, block in enumerate(blocks):
+            for n, block in some_of(enumerate(blocks), 3, turn=turn):
                 self.expect_same([path], [block], options=["--time-step", n])
         self.assertEqual(self.info(self.write(temporal.format(bare)))["times"], [0, 1, 2])
         both = '<Grid GridType="Collection" CollectionType="Spatial"><Time Value="{}"/>{}</Grid>'
@@ -200,14 +201,14 @@ class Xdmf(StructuredFormats):
         shape, ones = block.shape, (1, 1, 1)
         v, times = RANDOM.random((*shape, 3)), RANDOM.random((*shape, 5003))
         wide = RANDOM.random([4 * n for n in shape])
-        for words, stored in ((("HDF",), None), (("HDF",), (-1,)), (("Binary",), None), (("XML",), None)):
+        for turn, (words, stored) in enumerate(((("HDF",), None), (("HDF",), (-1,)), (("Binary",), None), (("XML",), None))):
             cases = [(v, v[..., 1], lambda item: slab(item, (0, 0, 0, 1), (1, 1, 1, 1), (*shape, 1))),
                      (v, v[1:, :, :, 2], lambda item: slab(item, (1, 0, 0, 2), (1, 1, 1, 9), (shape[0] - 1, *shape[1:], 1))),
                      (wide, wide[1::4, 2::4, 3::4], lambda item: slab(item, (1, 2, 3), (4, 4, 4), shape)),
                      (wide, wide[2::4, 2::4, 2::4], lambda item: slab(slab(item, (0, 0, 0), (2, 2, 2), [2 * n for n in shape]), ones, (2, 2, 2), shape))]
             if words != ("XML",):
                 cases.append((times, times[..., 17], lambda item: slab(item, (0, 0, 0, 17), (1, 1, 1, 1), (*shape, 1))))
-            for all_of, expected, part in cases:
+            for all_of, expected, part in some_of(cases, 2, turn=turn):
                 used = Block(expected.shape)
                 used.p = expected.copy()
                 writer = self.new(*words)
@@ -383,7 +384,7 @@ class Xdmf(StructuredFormats):
 
     def test_memory(self):
         block = Block((120, 120, 151), kind="f4")
-        for words, options in ((("HDF",), {"chunks": (8, 64, 64), "compression": "gzip"}), (("Binary",), {})):
+        for words, options in some_of(((("HDF",), {"chunks": (8, 64, 64), "compression": "gzip"}), (("Binary",), {})), 2):  # format_memory_test.py has both
             writer = self.new(*words)
             if options:
                 with h5py.File(self.folder / "a.h5", "w") as file:
