@@ -26,7 +26,7 @@ using faults::FaultOutcome;
 using faults::kFaults;
 
 TEST_F(ConversionSweep, AConversionIsWholeOrNothing) {
-  setUp(twoBlocks(10));
+  setUp(twoBlocks(7));
   for (const Fault& fault : kFaults) {
     EXPECT_GE(converting({}).run(fault), 4) << fault.name;
     if (HasFailure()) return;
@@ -34,7 +34,7 @@ TEST_F(ConversionSweep, AConversionIsWholeOrNothing) {
 }
 
 TEST_F(ConversionSweep, AnOldCacheIsReplacedOrAsItWas) {
-  setUp(twoBlocks(10));
+  setUp(twoBlocks(7));
   faults::FaultSweep sweep = converting({true, false});
   sweep.prepare = [this] { startWithOne(); };
   sweep.check = [this](const FaultOutcome& outcome) {
@@ -51,7 +51,7 @@ TEST_F(ConversionSweep, AnOldCacheIsReplacedOrAsItWas) {
 }
 
 TEST_F(ConversionSweep, AnAdditionIsThereOrNot) {
-  setUp(twoBlocks(10));
+  setUp(twoBlocks(7));
   for (const Fault& fault : kFaults) {
     EXPECT_GE(adding().run(fault), 2) << fault.name;
     if (HasFailure()) return;
@@ -59,7 +59,7 @@ TEST_F(ConversionSweep, AnAdditionIsThereOrNot) {
 }
 
 TEST_F(ConversionSweep, AStepIsThereOrNot) {
-  setUp(twoBlocks(10));
+  setUp(twoBlocks(7));
   expectStepsThereOrNot(kFaults);
 }
 
@@ -88,14 +88,14 @@ TEST_F(ConversionSweep, ALargerOneIsWholeOrNothing) {
   writeFiles(output_, both_);
   ASSERT_GT(CacheReader(output_).manifest().levels, 1u);
   faults::FaultSweep conversion = converting({}), addition = adding();
-  conversion.stride = addition.stride = 37;
-  EXPECT_GE(conversion.run(faults::kFailsOnce), 20);
+  conversion.stride = addition.stride = 83;
+  EXPECT_GE(conversion.run(faults::kFailsOnce), 15);
   ASSERT_FALSE(HasFailure());
-  EXPECT_GE(addition.run(faults::kFailsOnce), 14);
+  EXPECT_GE(addition.run(faults::kFailsOnce), 13);
 }
 
 TEST_F(ConversionSweep, ShortInterruptedAndSlowTransfersChangeNothing) {
-  setUp(twoBlocks(10));
+  setUp(twoBlocks(7));
   for (const bool is_slow : {false, true}) {
     startAnew();
     faults::FaultySystemCalls faulty;
