@@ -23,6 +23,7 @@
 #include "stream/cache/partial_folder.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
@@ -461,7 +462,8 @@ TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
                            Kind{"rename", &FaultySystemCalls::fail_rename_at, counting.renames},
                            Kind{"sync", &FaultySystemCalls::fail_sync_at, counting.syncs}}) {
     ASSERT_GE(kind.count, 3) << kind.name;
-    for (int64_t at = 0; at < kind.count; at += std::max<int64_t>(1, kind.count / 20)) {
+    for (int64_t at = 0; at < kind.count;
+         at += std::max<int64_t>(1, kind.count / (faults::isWholeSweep() ? 20 : 8))) {
       FaultySystemCalls failing;
       failing.*kind.fail_at = at;
       failing.error = EIO;

@@ -167,10 +167,12 @@ TEST(BlockOverlap, IsTheSameWithLittleMemory) {
   const auto source = boxes(many, turn);
   const auto all = overlapsIn(source);
   EXPECT_GT(all.size(), 100u);
-  for (const uint64_t point_bytes : {0, 500'000, 2'000'000, 8'000'000}) {
+  for (const auto& [slab_bytes, point_bytes] : {std::pair<uint64_t, uint64_t>{kSlabBytes, 0},
+                                                {30'000, 500'000},
+                                                {kSlabBytes, 2'000'000},
+                                                {30'000, 8'000'000}}) {
     SCOPED_TRACE(point_bytes);
-    expectSame(overlapsIn(source, kSlabBytes, point_bytes), all);
-    expectSame(overlapsIn(source, 30'000, point_bytes), all);
+    expectSame(overlapsIn(source, slab_bytes, point_bytes), all);
   }
   // Rows of which not all points fit.
   const FunctionGridSource rows({gridBlock(20'001, 2, 2), gridBlock(3, 3, 3)}, 0, [](const GridNode& node) {
@@ -205,7 +207,7 @@ TEST(BlockOverlap, OfASmallBlockWithinACellIsItsOwnVolume) {
 
 // A set may name one file thousands of times. All pairs of them would be the square of that.
 TEST(BlockOverlap, OfOneBlockManyTimesIsFoundInFewPairs) {
-  constexpr size_t kBlocks = 2000;
+  constexpr size_t kBlocks = 700;
   const auto source = boxes(std::vector<TestBox>(kBlocks, {{0, 0, 0}, {1, 1, 1}, 3}));
   const auto overlaps = overlapsIn(source);
   EXPECT_GE(overlaps.size(), kBlocks);
@@ -261,8 +263,8 @@ TEST(BlockOverlap, IsFoundAmongSlenderCellsThatAreSlanted) {
                       4 << 20);
   };
   for (const auto& [name, overlaps] :
-       {std::pair("needles", overlapsOf(gridBlock(201, 201, 4), {1, 1, 1e4})),
-        std::pair("plates", overlapsOf(gridBlock(40'001, 3, 3), {1e-3, 50, 50}))}) {
+       {std::pair("needles", overlapsOf(gridBlock(101, 101, 4), {1, 1, 1e4})),
+        std::pair("plates", overlapsOf(gridBlock(10'001, 3, 3), {1e-3, 50, 50}))}) {
     ASSERT_EQ(overlaps.size(), 1u) << name;
     EXPECT_NEAR(overlaps[0].share, 0.75, 0.01) << name;
   }

@@ -120,8 +120,8 @@ class Resume : public ::testing::Test {
 
   /// Kills a conversion when about `part` of its bricks are there.
   void killInBuild(double part = 0.6) {
-    const int64_t calls = callsOfAll({"writes"});
-    killedAt(static_cast<int64_t>(static_cast<double>(calls) * part));
+    if (!calls_of_all_) calls_of_all_ = callsOfAll({"writes"});
+    killedAt(static_cast<int64_t>(static_cast<double>(*calls_of_all_) * part));
     ASSERT_TRUE(readJournal(partial())->splats);
     ASSERT_GT(readBrickLog(partial(), 1).size(), 2u);
   }
@@ -163,6 +163,7 @@ class Resume : public ::testing::Test {
   const fs::path grid_ = folder_ / "in.xyz", function_ = folder_ / "in.fun";
   uint64_t dying_bucket_splats_ = kBucketSplats;
   bool surfaces_ = false;
+  std::optional<int64_t> calls_of_all_;  // that write
   fs::path work_, output_;
   std::unique_ptr<GridSource> source_;
   Files expected_;
@@ -172,7 +173,7 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
   const std::optional<uint64_t> bucket_splats[] = {kBucketSplats, std::nullopt, 3000};
   int resumed = 0;
   int64_t call = 0;
-  for (; !killedAt(call); call = faults::nextInSweep(call, 5)) {
+  for (; !killedAt(call); call = faults::nextInSweep(call, 11)) {
     SCOPED_TRACE(call);
     expectUnfinishedOrWhole(partial());
     expectUnfinishedOrWhole(output_);
@@ -182,7 +183,7 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
     fs::remove_all(output_);
   }
   EXPECT_GT(call, 60);
-  EXPECT_GT(resumed, faults::isWholeSweep() ? 30 : 6);
+  EXPECT_GT(resumed, faults::isWholeSweep() ? 30 : 3);
   expectWhole();
 }
 
@@ -193,7 +194,7 @@ TEST_F(Resume, ContinuesOrDropsTheBricksOfALargeCell) {
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
   for (int64_t call = calls - kCallsToFinish - 34; call < calls - kCallsToFinish;
-       call += faults::isWholeSweep() ? 2 : 5) {
+       call += faults::isWholeSweep() ? 2 : 9) {
     SCOPED_TRACE(call);
     killedAt(call);
     if (readJournal(partial())->splats) most = std::max(most, readBrickLog(partial(), 1).size());
@@ -213,7 +214,8 @@ TEST_F(Resume, TakesNodesThatAllCoincide) {
   }));
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
-  for (int64_t call = calls - kCallsToFinish - 18; call < calls - kCallsToFinish - 2; ++call) {
+  for (int64_t call = calls - kCallsToFinish - 18; call < calls - kCallsToFinish - 2;
+       call += faults::isWholeSweep() ? 1 : 5) {
     SCOPED_TRACE(call);
     killedAt(call);
     most = std::max(most, readBrickLog(partial(), 1).size());
@@ -228,8 +230,10 @@ TEST_F(Resume, TakesNodesThatAllCoincide) {
 TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
   const Files old{{"manifest.json", ""}, {"geometry.bin", ""}};
   const int64_t calls = callsOfAll({"writes"});
-  for (int64_t call = calls / 8; call <= calls + kCallsToRemove;
-       call += call < calls - kCallsToFinish ? calls / 8 : 1) {
+  for (int64_t call = calls / 8; call <= calls + kCallsToRemove; call += call < calls - kCallsToFinish
+                                                                             ? calls / 4
+                                                                         : faults::isWholeSweep() ? 1
+                                                                                                  : 3) {
     SCOPED_TRACE(call);
     Words other{false, true, std::nullopt};
     ConvertOptions options = optionsFor(other);
@@ -253,7 +257,7 @@ TEST_F(Resume, WritesFacesAnew) {
   fs::remove_all(output_);
   const int64_t calls = callsOfAll({"writes"});
   int without_splats = 0;
-  for (int64_t call = calls - 50; call < calls; call += faults::isWholeSweep() ? 2 : 7) {
+  for (int64_t call = calls - 50; call < calls; call += faults::isWholeSweep() ? 2 : 12) {
     SCOPED_TRACE(call);
     killedAt(call);
     const bool is_unfinished = fs::exists(partial() / "bricks.log");
@@ -274,7 +278,7 @@ TEST_F(Resume, WritesFacesAnew) {
 TEST_F(Resume, CompletesAfterBeingKilledAgainAndAgain) {
   const int64_t calls = callsOfAll({"all"});
   std::mt19937_64 random(7);
-  for (int turn = 0; turn < 4; ++turn) {
+  for (int turn = 0; turn < (faults::isWholeSweep() ? 4 : 2); ++turn) {
     SCOPED_TRACE(turn);
     bool killed = true;
     for (int kill = 0; kill < 4 && killed; ++kill)
@@ -389,7 +393,7 @@ TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
     fs::remove_all(output_);
   }
   int left = 0, removed = 0;
-  for (int64_t at = 0; at < counting.writes - 12; at += 5) {
+  for (int64_t at = 0; at < counting.writes - 12; at += faults::isWholeSweep() ? 5 : 11) {
     SCOPED_TRACE(at);
     Progress progress;
     {
@@ -407,7 +411,7 @@ TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
     expectWhole();
     fs::remove_all(output_);
   }
-  EXPECT_GT(left, 3);
+  EXPECT_GT(left, faults::isWholeSweep() ? 3 : 1);
   EXPECT_GT(removed, 0);
 }
 
