@@ -80,7 +80,7 @@ class EarlySignals(unittest.TestCase):
                    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)]
         ended_early = 0
         for n, command in enumerate(commands):
-            for milliseconds, number in some_of(moments, turn=n):
+            for milliseconds, number in some_of(moments, 7, turn=n):
                 with self.subTest(" ".join(command), milliseconds=milliseconds, signal=number.name):
                     program = subprocess.Popen([PROGRAM, *command], cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
                                                stderr=subprocess.PIPE, text=True)

@@ -54,7 +54,7 @@ class FewThreads(LimitedUserTest):
                     ["serve", "../o.splats", "--port", "0"])
         for n, command in enumerate(commands):
             succeeded = False
-            for processes in (*some_of(range(23), 3, turn=n), 23):
+            for processes in (*some_of(range(23), 5, turn=n), 23):
                 with self.subTest(" ".join(command), processes=processes):
                     status, message = self.limited(command, processes)
                     made = sorted(path.name for path in (self.folder / "work").iterdir() if path.name != ".cache")

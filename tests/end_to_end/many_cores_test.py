@@ -50,7 +50,7 @@ class ManyCores(unittest.TestCase):
         cls.folder = pathlib.Path(temporary.name)
         cls.library = cls.folder / "cores.so"
         subprocess.run(["cc", "-shared", "-fPIC", "-x", "c", "-", "-o", cls.library, "-ldl"], input=CORES, text=True, check=True)
-        cls.run_program("generate", "wake", "--size", "256x256x256" if IS_WHOLE else "160x160x160", "-o", "w")
+        cls.run_program("generate", "wake", "--size", "256x256x256" if IS_WHOLE else "128x128x128", "-o", "w")
 
     @classmethod
     def run_program(cls, *words):

@@ -205,12 +205,12 @@ class SeveralFiles(unittest.TestCase):
         for suffix, compress in COMPRESSIONS.items():
             packed = compress(data)
             self.assertEqual(compress(b""), compress(b""))
-            for size in some_of([*range(7, 40, 3), *range(40, len(packed), len(packed) // 25)]):
+            for size in some_of([*range(7, 40, 3), *range(40, len(packed), len(packed) // 25)], 11):
                 (self.folder / "cut").write_bytes(packed[:size])
                 done = self.run_program("info", "cut")
                 self.assertEqual(done.returncode, 1, f"{suffix} cut at {size}")
                 self.assertRegex(done.stderr, r"^curvisplat: cut: .*\n$")
-            for place in some_of(range(10, len(packed), len(packed) // 40)):
+            for place in some_of(range(10, len(packed), len(packed) // 40), 11):
                 wrong = bytearray(packed)
                 wrong[place] ^= 0x55
                 (self.folder / "wrong").write_bytes(wrong)
