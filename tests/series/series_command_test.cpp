@@ -41,16 +41,16 @@ TEST_F(SeriesCommand, EachStepDrawsAsACacheOfThatStepAlone) {
     const std::string name = moving ? "m" : "f";
     Words more;
     if (moving) more = {"--moving"};
-    generate(name, 5, more);
+    generate(name, 3, more);
     const std::string grid = moving ? file(name + "_%04d.xyz") : file(name + ".xyz");
     const ProgramResult converted =
         run({"convert", grid, file(name + "_%04d.fun"), "-o", file(name + ".splats")});
     EXPECT_EQ(lineCount(converted.out), 3) << converted.out;
-    EXPECT_EQ(CacheReader(file(name + ".splats")).series().geometries(), moving ? 5u : 1u);
+    EXPECT_EQ(CacheReader(file(name + ".splats")).series().geometries(), moving ? 3u : 1u);
     run({"info", file(name + ".splats"), "--verify"});
 
     draw(name + ".splats", "frame_%d.png", {"--steps", "all"});
-    for (int step = 0; step < 5; ++step) {
+    for (int step = 0; step < 3; ++step) {
       SCOPED_TRACE(step);
       const std::string number = fmt::format("{:04}", step);
       const std::string own_grid = moving ? file(name + "_" + number + ".xyz") : file(name + ".xyz");

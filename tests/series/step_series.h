@@ -30,10 +30,10 @@ struct StepKind {
 class StepSource : public GridSource {
  public:
   explicit StepSource(const StepKind& kind)
-      : grid_({gridBlock(kind.other_blocks ? 20 : 24, 18, 16), gridBlock(14, 18, 16)}, 2,
+      : grid_({gridBlock(kind.other_blocks ? 15 : 18, 12, 10), gridBlock(10, 12, 10)}, 2,
               [kind](const GridNode& node) {
                 NodeValues values;
-                const double i = static_cast<double>(node.i) + (node.block == 1 ? 23.0 : 0.0);
+                const double i = static_cast<double>(node.i) + (node.block == 1 ? 17.0 : 0.0);
                 const auto j = static_cast<double>(node.j), k = static_cast<double>(node.k);
                 values.position = {i + 0.2 * std::sin(j) + kind.shift, j + 0.1 * std::cos(k),
                                    k + 0.002 * i * i};
@@ -85,7 +85,7 @@ inline SeriesOptions optionsFor(const fs::path& output) {
   options.convert.memory_bytes = uint64_t{1} << 30;
   options.convert.threads = 2;
   options.convert.title = "series";
-  options.convert.bucket_splats = 4000;
+  options.convert.bucket_splats = 1200;
   return options;
 }
 
