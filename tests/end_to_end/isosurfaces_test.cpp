@@ -9,6 +9,7 @@
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image_file.h"
 #include "tests/reference/known_pictures.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
@@ -17,9 +18,11 @@ namespace {
 constexpr ImageSize kSize{256, 256};
 constexpr double kValue = 0.5;
 
-class Isosurfaces : public ProgramTest {
+class Isosurfaces : public ProgramSuite<Isosurfaces> {
  protected:
-  Isosurfaces() { convertGrid(SceneGridSource(annulus_, {128, 64, 64}), folder_ / "a.splats"); }
+  static void prepare() {
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {128, 64, 64}), *folder_ / "a.splats");
+  }
 
   /// Four rays a pixel: outlines are smooth.
   Image marched(const OpticalFunction& exact, const glm::dvec3& colour, double opacity) const {
@@ -36,23 +39,16 @@ class Isosurfaces : public ProgramTest {
                        fine.pixel(2 * x, 2 * y + 1)[c] + fine.pixel(2 * x + 1, 2 * y + 1)[c]);
     return image;
   }
-  struct Resources {
-    Backend backend = Backend::kCpu;
-    unsigned threads = 0;
-    uint64_t memory_bytes = 512 << 20;
-  };
   Image drawn(const TransferFunction& table, double opacity, bool volume, double lod,
-              const Resources& resources) const {
+              Backend backend = Backend::kCpu) const {
     FrameOptions options = knownFrame(kSize);
     options.lod_pixels = lod;
-    options.threads = resources.threads;
-    options.memory_bytes = resources.memory_bytes;
     auto scene = std::make_shared<SurfaceScene>();
     scene->isovalues = {kValue};
     scene->iso_opacity = {opacity};
     scene->volume = volume;
     options.scene = scene;
-    return drawCache(folder_ / "a.splats", table, halfAnnulusCamera(), options, nullptr, resources.backend);
+    return drawCache(*folder_ / "a.splats", table, halfAnnulusCamera(), options, nullptr, backend);
   }
 
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
@@ -74,8 +70,9 @@ TEST_F(Isosurfaces, CrossingsHaveTheirOpacityAndTheirLight) {
   for (const auto& [opacity, volume, least_db] : pictures) {
     const Image reference = marched(volume ? function.exact : nothing, colour, opacity);
     for (size_t n = 0; n < 3; ++n) {
+      if (n == 1 && !faults::isWholeSweep()) continue;
       const double lod = std::array{0.0, 4.0, 8.0}[n];
-      const double db = compareImages(drawn(function.table, opacity, volume, lod, {}), reference).psnr_db;
+      const double db = compareImages(drawn(function.table, opacity, volume, lod), reference).psnr_db;
       fmt::print("isosurface {} {}, {} pixels: {:.1f} dB\n", opacity, volume ? "in the volume" : "alone", lod,
                  db);
       EXPECT_GE(db, least_db[n]) << opacity << ' ' << volume << ' ' << lod;
@@ -83,20 +80,11 @@ TEST_F(Isosurfaces, CrossingsHaveTheirOpacityAndTheirLight) {
   }
 }
 
-TEST_F(Isosurfaces, BitsDependNeitherOnThreadsNorOnMemory) {
-  const TransferFunction table = KnownFunction::of("smooth").table;
-  for (const bool volume : {false, true}) {
-    const Image whole = drawn(table, 0.7, volume, 1, {});
-    EXPECT_EQ(drawn(table, 0.7, volume, 1, {Backend::kCpu, 1}).rgba, whole.rgba) << volume;
-    EXPECT_EQ(drawn(table, 0.7, volume, 1, {Backend::kCpu, 2, 96 << 20}).rgba, whole.rgba) << volume;
-  }
-}
-
 TEST_F(Isosurfaces, EveryPainterDrawsTheSame) {
   const TransferFunction table = KnownFunction::of("smooth").table;
   for (const bool volume : {false, true}) {
-    const Image cpu = drawn(table, 1, volume, 1, {});
-    EXPECT_GT(compareImages(drawn(table, 1, volume, 1, {Backend::kOsmesa}), cpu).psnr_db, 50) << volume;
+    const Image cpu = drawn(table, 1, volume, 8);
+    EXPECT_GT(compareImages(drawn(table, 1, volume, 8, Backend::kOsmesa), cpu).psnr_db, 50) << volume;
   }
 }
 

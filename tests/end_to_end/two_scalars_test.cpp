@@ -15,13 +15,13 @@
 #include "stream/base/progress.h"
 #include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr ImageSize kSize{256, 256};
-constexpr uint64_t kNodes[3] = {128, 64, 64};
 
 /// The scalar of the colours.
 double hueAt(const glm::dvec3& at) {
@@ -35,17 +35,19 @@ const TransferFunction& hues() {
 
 class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
  protected:
-  static void prepare() { convertTo("a.splats", 0); }
+  static void prepare() {
+    convertTo("a.splats", 0, {128, 64, 64});
+    convertTo("small.splats", 0, {40, 24, 24});
+  }
 
-  static void convertTo(const char* name, double added_to_hues) {
+  static void convertTo(const char* name, double added_to_hues, const std::array<uint64_t, 3>& nodes) {
     const auto annulus = makeScene("half-annulus");
-    const FunctionGridSource source(
-        {gridBlock(kNodes[0], kNodes[1], kNodes[2])}, 2, [&](const GridNode& node) {
-          const glm::dvec3 uvw(double(node.i) / (kNodes[0] - 1), double(node.j) / (kNodes[1] - 1),
-                               double(node.k) / (kNodes[2] - 1));
-          const glm::dvec3 at = annulus->position(uvw);
-          return NodeValues{at, {float(annulus->scalar(at)), float(hueAt(at) + added_to_hues)}};
-        });
+    const FunctionGridSource source({gridBlock(nodes[0], nodes[1], nodes[2])}, 2, [&](const GridNode& node) {
+      const glm::dvec3 uvw(double(node.i) / (nodes[0] - 1), double(node.j) / (nodes[1] - 1),
+                           double(node.k) / (nodes[2] - 1));
+      const glm::dvec3 at = annulus->position(uvw);
+      return NodeValues{at, {float(annulus->scalar(at)), float(hueAt(at) + added_to_hues)}};
+    });
     ConvertOptions options;
     options.output = *folder_ / name;
     options.scalars = {0, 1};
@@ -82,6 +84,7 @@ TEST_F(TwoScalarsTest, AreThoseOfTheRayMarchAtAllLevels) {
     const KnownFunction function = KnownFunction::of(name);
     const Image reference = marched(function.exact, field_);
     for (size_t level = 0; level < 3; ++level) {
+      if (level == 1 && name != "smooth" && !faults::isWholeSweep()) continue;
       FrameOptions options = knownFrame(kSize);
       options.lod_pixels = std::array{0.0, 4.0, 8.0}[level];
       const double all = db(drawn(function.table, options), reference);
@@ -237,7 +240,7 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
 
 /// Bricks are left out by the bounds of the isosurface's scalar, not of the other's.
 TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
-  convertTo("far.splats", 10);
+  convertTo("far.splats", 10, {128, 64, 64});
   FrameOptions options = knownFrame(kSize);
   const auto sceneWith = [](double isovalue) {
     auto scene = std::make_shared<SurfaceScene>();
@@ -303,6 +306,7 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
 TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
   const TransferFunction opacity = KnownFunction::of("smooth").table;
   FrameOptions options = knownFrame(kSize);
+  options.lod_pixels = 8;  // OpenGL takes a second for a hundred thousand splats
   for (const bool full : {false, true}) {
     if (full) {
       auto scene = std::make_shared<SurfaceScene>();
@@ -315,7 +319,7 @@ TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
     }
     const Image cpu = drawn(opacity, options);
     EXPECT_GT(db(drawn(opacity, options, Backend::kOsmesa), cpu), 50) << full;
-    for (const auto& [threads, memory] : {std::pair(1u, uint64_t{512} << 20), {2u, uint64_t{160} << 20}}) {
+    for (const auto& [threads, memory] : {std::pair(1u, uint64_t{160} << 20)}) {
       FrameOptions other = options;
       other.threads = threads;
       other.memory_bytes = memory;
@@ -325,7 +329,7 @@ TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
 }
 
 TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
-  const std::string cache = file("a.splats"), output = file("a.pfm");
+  const std::string cache = file("small.splats"), output = file("a.pfm");
   const auto render = [&](const Words& more) {
     return Words{"render", cache, "-o", output, "--size", "150x150", "--view", "iso"} + more;
   };
