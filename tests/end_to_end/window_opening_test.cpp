@@ -108,6 +108,9 @@ class WindowOpening : public KeptCaches {
     if (IsSkipped()) return;
     KeptCaches::SetUp();
   }
+  static void generateOnce(const std::string& stem, const std::string& size) {
+    if (!fs::exists(stem + ".xyz")) run({"generate", "half-annulus", "--size", size, "-o", stem});
+  }
   void openWith(const Words& files) {
     fs::remove("widgets");
     window_ = std::make_unique<RunningProgram>(
@@ -132,6 +135,11 @@ class WindowOpening : public KeptCaches {
                       "300"};
     const ProgramResult result = RunningProgram(words + files, "/usr/bin/env").wait();
     EXPECT_EQ(result.status, 0) << result.err;
+  }
+  /// y and z of the position are the focal point's.
+  static void expectFromX(const Words& command) {
+    const std::string position = valueOf(command, "--position"), focus = valueOf(command, "--focal-point");
+    EXPECT_EQ(position.substr(position.find(',')), focus.substr(focus.find(',')));
   }
   /// How many folders of previews there are.
   static size_t previewFolders() {
@@ -202,7 +210,7 @@ TEST_F(WindowOpening, OpeningWhatIsShownKeepsTheView) {
 }
 
 TEST_F(WindowOpening, AnswersWhileItConverts) {
-  run({"generate", "half-annulus", "--size", "256x160x160", "-o", "large"});
+  generateOnce("large", "256x160x160");
   openWith({"large.xyz", "large.fun"});
   placeOf("stop opening");
   press("F1");
@@ -216,12 +224,13 @@ TEST_F(WindowOpening, AnswersWhileItConverts) {
   EXPECT_TRUE(kept().empty());
 }
 
-/// A coarse sample is shown before a large grid is converted, and the whole takes its place.
+/// A coarse sample is shown before a large grid is converted, and the whole takes its place. What was changed in the preview stays.
 TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
-  run({"generate", "half-annulus", "--size", "128x96x96", "-o", "middle"});
+  generateOnce("middle", "128x96x96");
   openWith({"middle.xyz", "middle.fun"});
   EXPECT_TRUE(eventually([] { return hasWidget("state preview of every 2nd index plane"); }));
   EXPECT_EQ(previewFolders(), 1u);
+  press("x");
   EXPECT_TRUE(eventually([] { return !hasWidget("state preview") && hasWidget("state "); }, 300));
   EXPECT_FALSE(hasWidget("opening"));
   EXPECT_TRUE(
@@ -235,10 +244,11 @@ TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
   // The command names the grid, not a folder of the user's.
   EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "middle.xyz", "middle.fun"}));
   expectDraws(command, picture);
+  expectFromX(command);
 }
 
 TEST_F(WindowOpening, APreviewThatIsStoppedSaysSo) {
-  run({"generate", "half-annulus", "--size", "256x160x160", "-o", "large"});
+  generateOnce("large", "256x160x160");
   openWith({"large.xyz", "large.fun"});
   EXPECT_TRUE(eventually([] { return hasWidget("state preview of every 4th index plane"); }));
   click("stop opening");
@@ -250,7 +260,7 @@ TEST_F(WindowOpening, APreviewThatIsStoppedSaysSo) {
 
 /// The second preview is not the first one's, which is removed when the view changes.
 TEST_F(WindowOpening, AGridThatWasStoppedIsOpenedAgain) {
-  run({"generate", "half-annulus", "--size", "256x160x160", "-o", "large"});
+  generateOnce("large", "256x160x160");
   openWith({"large.xyz", "large.fun"});
   EXPECT_TRUE(eventually([] { return hasWidget("state preview"); }));
   click("stop opening");
@@ -285,25 +295,9 @@ TEST_F(WindowOpening, AnErrorOfAPictureIsSaidAndTheWindowLives) {
   close();
 }
 
-/// What was changed in the preview stays when the whole comes.
-TEST_F(WindowOpening, ThePreviewHandsItsViewOn) {
-  run({"generate", "half-annulus", "--size", "128x96x96", "-o", "middle"});
-  openWith({"middle.xyz", "middle.fun"});
-  EXPECT_TRUE(eventually([] { return hasWidget("state preview"); }));
-  press("x");
-  EXPECT_TRUE(eventually([] { return !hasWidget("state preview") && hasWidget("state "); }, 300));
-  cache_ = "middle";
-  saveAndCopy();
-  const auto command = close().at(0);
-  cache_ = "a";
-  const std::string position = valueOf(command, "--position"), focus = valueOf(command, "--focal-point");
-  // From +x: y and z are the focal point's.
-  EXPECT_EQ(position.substr(position.find(',')), focus.substr(focus.find(',')));
-}
-
 /// The first movements that the whole's view gets come before it has drawn anything.
 TEST_F(WindowOpening, ADragGoesOnWhenTheWholeComes) {
-  run({"generate", "half-annulus", "--size", "128x96x96", "-o", "middle"});
+  generateOnce("middle", "128x96x96");
   openWith({"middle.xyz", "middle.fun"});
   EXPECT_TRUE(eventually([] { return hasWidget("state preview"); }));
   const Place middle = placeOf("picture");
@@ -446,9 +440,8 @@ TEST_F(WindowOpening, ASeriesOfLargeStepsHasACoarsePreview) {
   saveAndCopy();
   const auto command = close().at(0);
   cache_ = "a";
-  const std::string position = valueOf(command, "--position"), focus = valueOf(command, "--focal-point");
-  EXPECT_EQ(position.substr(position.find(',')), focus.substr(focus.find(',')));  // still from +x
-  EXPECT_EQ(previewFolders(), 1u);                                                // series.*, with the whole
+  expectFromX(command);
+  EXPECT_EQ(previewFolders(), 1u);  // series.*, with the whole
 }
 
 /// A million cells and more: a lattice stands for them.
