@@ -17,8 +17,9 @@ exec pkg-config "$@"
 END
 chmod +x "$folder/pkg-config"
 without=(-DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON -DPKG_CONFIG_EXECUTABLE="$folder/pkg-config")
+quickly=(-DCURVISPLAT_PRECOMPILE=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O0)
 
-quietly cmake --preset headless -S "$root" -B "$folder/build" "${without[@]}"
+quietly cmake --preset headless -S "$root" -B "$folder/build" "${without[@]}" "${quickly[@]}"
 tools=tools/CMakeFiles/curvisplat.dir
 quietly cmake --build "$folder/build" --target \
   $tools/window/window_left_out.cpp.o $tools/commands/{view,serve,bench}_left_out.cpp.o \

@@ -59,9 +59,10 @@ completes '' curvisplat render -o ''
 for command in $commands; do
   text "$folder/curvisplat-$command.1" > "$folder/text"
   options=$("$program" "$command" --help | grep -oE '^  (-[a-z],)?--[a-z-]+' | grep -oE '\-\-[a-z-]+')
+  all=" $(completed curvisplat "$command" -) "
   for option in $options; do
     grep -qE "^ *(-[a-z], )?$option( |$)" "$folder/text" || fail "curvisplat-$command.1 lacks $option"
-    grep -qw -- "$option" <<< "$(completed curvisplat "$command" -)" || fail "$command: $option is not completed"
+    [[ $all == *" $option "* ]] || fail "$command: $option is not completed"
   done
 done
 [[ $failed -eq 1 ]] || echo "pages and completion of: ${commands//$'\n'/ }"
