@@ -27,6 +27,7 @@ MOST_SECONDS = 600
 class Form:
     """Arguments of the short form."""
     micro = ["--benchmark_min_time=0.05", "--benchmark_repetitions=3"]
+    bench = []
     micro_cache = False  # verify, decode and project make a half annulus of 2 M nodes
     cache = "200x200x200"
     convert_nodes = "8M"
@@ -38,7 +39,8 @@ class Form:
 
 class SmokeForm(Form):
     micro = ["--benchmark_min_time=0.000001", 
-             "--benchmark_filter=-plainReader|pager|osmesa/radius:[248]/|cpu/radius:[24]/"]
+             "--benchmark_filter=-plainReader|pager|osmesa/radius:([248]/|16/kind:[12])|cpu/radius:[24]/|chooseRegions/million:30|openIndex"]
+    bench = ["--size", "64x64", "--lod-pixels", "2"]
     micro_cache = True  # they use the cache of the step "bench"
     cache = "32x32x32"
     convert_nodes = "30K"
@@ -68,7 +70,7 @@ def step_micro(paths, form):
 
 
 def step_bench(paths, form):
-    return [*cache_commands(paths, form), [paths.program, "bench", paths.cache, "--quick", "--json", paths.json("bench"),
+    return [*cache_commands(paths, form), [paths.program, "bench", paths.cache, "--quick", *form.bench, "--json", paths.json("bench"),
                                            "--plot", paths.folder / "bench_plots"]]
 
 
