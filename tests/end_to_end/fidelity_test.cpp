@@ -90,7 +90,7 @@ class Fidelity : public ProgramSuite<Fidelity> {
   static void expectPsnr(const std::string& name, double least_db, double least_of_root_db) {
     const Image& reference = knownReference(name, kSize);
     double coarser_db = least_of_root_db;
-    for (const char* lod_pixels : {"1000", "8", "4", "2", "1", "0"}) {
+    for (const char* lod_pixels : {"1000", "8", "4", "2", "0"}) {
       render("half-annulus", name, file(name + ".pfm"), {"--backend", "cpu", "--stats", file("stats.json")},
              lod_pixels);
       const auto stats = jsonOf(file("stats.json"))["frames"][0];
@@ -105,7 +105,8 @@ class Fidelity : public ProgramSuite<Fidelity> {
       EXPECT_GE(psnr_db, expected_db - 1e-6) << "at " << lod_pixels << " pixels";
       if (psnr_db < expected_db - 1e-6) leavePictures(name, picture, reference);
       coarser_db = psnr_db;
-      if (lod_pixels == std::string("4") || lod_pixels == std::string("0"))
+      // Usually the coarser picture: it takes OpenGL seconds on the processor to draw half a million splats.
+      if (lod_pixels == std::string("8") || (lod_pixels == std::string("0") && faults::isWholeSweep()))
         expectOpenGlAlike(name, picture, reference, psnr_db, lod_pixels);
     }
   }
@@ -183,24 +184,26 @@ TEST_F(Fidelity, Step) {
 
 TEST_F(Fidelity, IsTheSameBytesForAnyThreadsAndAgain) {
   for (const std::string backend : {"osmesa", "cpu"}) {
-    render("half-annulus", "smooth", file("one.exr"), {"--threads", "1", "--backend", backend});
-    render("half-annulus", "smooth", file("two.exr"), {"--threads", "2", "--backend", backend});
-    render("half-annulus", "smooth", file("again.exr"), {"--threads", "2", "--backend", backend});
+    const std::string lod_pixels = backend == "cpu" ? "0" : "8";
+    render("half-annulus", "smooth", file("one.exr"), {"--threads", "1", "--backend", backend}, lod_pixels);
+    render("half-annulus", "smooth", file("two.exr"), {"--threads", "2", "--backend", backend}, lod_pixels);
+    render("half-annulus", "smooth", file("again.exr"), {"--threads", "2", "--backend", backend}, lod_pixels);
     const std::string one = readTextFile(file("one.exr"));
     EXPECT_EQ(one == readTextFile(file("two.exr")), true) << backend;
     EXPECT_EQ(one == readTextFile(file("again.exr")), true) << backend;
   }
 }
 
-/// `inside`: a camera inside of the data, which the other view is not.
+/// `inside`: a camera inside of the data, which the other view is not. Usually it classifies pixels, the other one splats.
 void expectBackendsAlike(const std::string& cache, const Words& inside) {
   const std::string picture = cache + ".pfm";
   for (const Words& view : {Words{"--lod-pixels", "0"}, inside})
     for (const std::string classify : {"pixel", "flat"}) {
+      if ((classify == "pixel") != (view == inside) && !faults::isWholeSweep()) continue;
       std::vector<Image> pictures;
       for (const std::string backend : {"osmesa", "cpu"}) {
         pictures.push_back(
-            pictureOf(cache, picture, Words{"--classify", classify, "--backend", backend} + view, "300x300"));
+            pictureOf(cache, picture, Words{"--classify", classify, "--backend", backend} + view, "160x160"));
       }
       const ImageDifference difference = compareImages(pictures[0], pictures[1]);
       EXPECT_GE(difference.psnr_db, 70) << classify;
@@ -314,6 +317,7 @@ TEST_F(AroundTheVolume, APlaneCutsTheSplats) {
     const KnownFunction function = KnownFunction::of(name);
     const Image reference = marched(clipped, function, nullptr);
     for (size_t level = 0; level < 3; ++level) {
+      if (level == 1 && !faults::isWholeSweep()) continue;
       DirectOptions options = atLevel(level);
       options.clip_planes = {kPlane};
       const double cut = db(options, function, reference);
@@ -335,6 +339,7 @@ TEST_F(AroundTheVolume, LightIsFromEachSplatsGradient) {
     const KnownFunction function = KnownFunction::of(name);
     const Image reference = marched(field_, function, &truth);
     for (size_t level = 0; level < 3; ++level) {
+      if (level == 1 && !faults::isWholeSweep()) continue;
       DirectOptions options = atLevel(level);
       const double unlit = db(options, function, reference);
       options.light = Light{};
