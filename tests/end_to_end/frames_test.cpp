@@ -43,9 +43,9 @@ class Frames : public ProgramSuite<Frames> {
 
   static std::string cache(const std::string& name = "small") { return file(name + ".splats"); }
 
-  /// Of 2 M nodes; made by the first who asks.
+  /// Of a million nodes; made by the first who asks.
   static std::string large() {
-    if (!fs::exists(cache("large"))) madeCache(file("large"), "half-annulus", "256x128x64");
+    if (!fs::exists(cache("large"))) madeCache(file("large"), "half-annulus", "160x80x80");
     return cache("large");
   }
 
@@ -256,7 +256,7 @@ TEST_F(Frames, AFirstImageIsWrittenEarlierAndLooksLikeTheFinalOne) {
   fmt::print("first image: {:.1f} dB, {} of {} splats\n", psnr_db, first["splats_read"].get<uint64_t>(),
              final["splats_read"].get<uint64_t>());
   EXPECT_GE(psnr_db, 25);
-  EXPECT_GT(final["splats_read"], 1'000'000);
+  EXPECT_GT(final["splats_read"], 500'000);
   EXPECT_LE(first["splats_read"], 100'000);
   EXPECT_LE(first["bytes_read"], 4 << 20);
   EXPECT_GT(stats["time_to_first_image_s"], 0);

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "stream/base/file.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
@@ -45,6 +46,7 @@ TEST_F(RanksCommand, DrawOnePictureTogether) {
   for (const Words& look : looks) {
     run(renderTo("one.exr", look));
     for (const unsigned count : {2u, 3u}) {
+      if ((count == 2) != look.empty() && !faults::isWholeSweep()) continue;
       const ProgramResult shared =
           runAsRanks(count, renderTo("shared.exr", look + Words{"--stats", file("s.json")}));
       EXPECT_EQ(shared.status, 0) << shared.err;
@@ -81,7 +83,7 @@ TEST_F(RanksCommand, ReportAFailureOnce) {
 
 TEST_F(RanksCommand, ReportADamagedStepOfASeriesOnce) {
   run({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")});
-  for (const int damaged : {1, 2, 3}) {  // of rank 0, and of another, which rank 0 tries again
+  for (const int damaged : {1, 3}) {  // of rank 0, and of another, which rank 0 tries again
     const std::string name = file(fmt::format("s_{:04}.fun", damaged));
     const auto size = fs::file_size(name);
     fs::resize_file(name, size - 7);
@@ -160,8 +162,6 @@ TEST_F(RanksCommand, ThatHaveOtherOptionsAreRefused) {
   const std::string convert = "convert g.xyz g.fun -o mixed.splats";
   for (const auto& [option, told] :
        {std::pair{" --value-precision fine", "--value-precision is 'fine' here and not given"},
-        {" --blank 0", "--blank is '0' here and not given"},
-        {" --refine 2", "--refine is '2' here and not given"},
         {" --memory 512M", "--memory is '512M' here and not given"}})
     expectOtherRefused(convert, convert + option, told);
   expectOtherRefused(convert + " --flat", convert, "--flat is not given here and 'true'");
@@ -190,6 +190,7 @@ TEST_F(RanksCommand, AreEndedByTheOneThatFails) {
 TEST_F(RanksCommand, ConvertTogether) {
   const Files expected = filesOf(file("g.splats"));
   for (const unsigned count : {2u, 3u}) {
+    if (count == 2 && !faults::isWholeSweep()) continue;
     fs::remove_all(file("shared.splats"));
     const ProgramResult shared =
         runAsRanks(count, {"convert", file("g.xyz"), file("g.fun"), "-o", file("shared.splats"), "--threads",
@@ -261,6 +262,7 @@ TEST_F(RanksCommand, AddScalarsTogether) {
   run(adding("one.splats"));
   const Files expected = filesOf(file("one.splats"));
   for (const unsigned count : {2u, 3u}) {
+    if (count == 3 && !faults::isWholeSweep()) continue;
     fs::remove_all(file("added.splats"));
     fs::copy(file("g.splats"), file("added.splats"));
     const ProgramResult shared = runAsRanks(count, adding("added.splats", {"--stats", file("a.json")}));
