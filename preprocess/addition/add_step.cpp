@@ -252,7 +252,7 @@ class StepAddition {
     options.overwrite = !options_.resume;
     options.scalars = scalars_;
     options.blank_value = options_.blank_value;
-    if (cache_.manifest().hasFeature(kFineValues)) options.precision = ValuePrecision::kFine;
+    options.precision = precisionOf(cache_.manifest());
     options.memory_bytes = options_.memory_bytes;
     options.threads = options_.threads;
     options.temporary_folder = temporaryFolder(options_);

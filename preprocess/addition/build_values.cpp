@@ -15,12 +15,13 @@
 namespace curvisplat {
 
 ValueBuilder::ValueBuilder(const CacheReader& cache, const ConversionOrder& order,
-                           const ValueBuckets& buckets, size_t variables, ValuesWriter& writer,
-                           Progress& progress)
+                           const ValueBuckets& buckets, std::vector<ValueCoding> codings,
+                           ValuesWriter& writer, Progress& progress)
     : cache_(&cache),
       order_(&order),
       buckets_(&buckets),
-      variables_(variables),
+      variables_(codings.size()),
+      codings_(std::move(codings)),
       numbers_(cache.manifest().blocks),
       writer_(&writer),
       progress_(&progress),
@@ -206,13 +207,11 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
 
 void ValueBuilder::encode(uint32_t position, BrickSplats& brick, Built& built) const {
   thread_local StepReferences::Scratch scratch;
-  const ValuePrecision precision =
-      cache_->manifest().hasFeature(kFineValues) ? ValuePrecision::kFine : ValuePrecision::kNormal;
   for (size_t v = 0; v < brick.variables.size(); ++v) {
     TimeReferences references;
     if (references_) references = references_->of((*order_)[position], v, scratch);
     built.values.push_back(
-        encodeValues(brick.runs, brick.border_codes, brick.variables[v], references, precision));
+        encodeValues(brick.runs, brick.border_codes, brick.variables[v], references, codings_[v]));
   }
 }
 

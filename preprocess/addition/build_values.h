@@ -23,9 +23,9 @@ namespace curvisplat {
 
 class ValueBuilder {
  public:
-  /// All references must outlive it.
+  /// All references must outlive it. `codings`: [variable], as many as there are.
   ValueBuilder(const CacheReader& cache, const ConversionOrder& order, const ValueBuckets& buckets,
-               size_t variables, ValuesWriter& writer, Progress& progress);
+               std::vector<ValueCoding> codings, ValuesWriter& writer, Progress& progress);
   /// Predicts from these from now on. They must outlive it.
   void predictFrom(const StepReferences& references) { references_ = &references; }
 
@@ -70,6 +70,7 @@ class ValueBuilder {
   const ConversionOrder* order_;
   const ValueBuckets* buckets_;
   const size_t variables_;
+  const std::vector<ValueCoding> codings_;  // [variable]
   const NodeNumbers numbers_;
   ValuesWriter* writer_;
   const StepReferences* references_ = nullptr;

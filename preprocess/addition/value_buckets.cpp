@@ -168,8 +168,8 @@ uint32_t ValueBuckets::of(uint32_t position) const {
 }
 
 ValueSink::ValueSink(const CacheReader& cache, const ConversionOrder& order, const ValueBuckets& buckets,
-                     uint32_t grouped, BucketFile& file)
-    : cache_(&cache), order_(&order), buckets_(&buckets), grouped_(grouped), file_(&file) {}
+                     uint32_t grouped, BucketFile& file, ValueSample& sample)
+    : cache_(&cache), order_(&order), buckets_(&buckets), grouped_(grouped), file_(&file), sample_(sample) {}
 
 void ValueSink::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
   const RootPosition position = cache_->manifest().root.fromWorld(splat.splat.position);
@@ -187,11 +187,13 @@ void ValueSink::add(const NodeSplat& splat, std::span<const SplatScalar> values)
   if (gathered_.size() + maxValueRecordBytes(values.size()) > kGatheredBytes) flush();
   packValueRecord(splat.node, order_->positionOf(leaf_), placeInCell(position, cache_->bricks()[leaf_].cell),
                   values, gathered_);
+  sample_.add(splat.node, splat.splat.weight, values);
 }
 
 void ValueSink::flush() {
   if (!gathered_.empty()) file_->append(number_, gathered_);
   gathered_.clear();
+  sample_.flush();
 }
 
 ValueLoader::ValueLoader(const CacheReader& cache, const ConversionOrder& order, const ValueBuckets& buckets,

@@ -28,6 +28,7 @@
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/splat_record.h"
+#include "preprocess/convert/value_sample.h"
 #include "preprocess/grid/read_ahead.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
@@ -145,7 +146,7 @@ class ValueSink : public SplatSink {
  public:
   /// All references must outlive it.
   ValueSink(const CacheReader& cache, const ConversionOrder& order, const ValueBuckets& buckets,
-            uint32_t grouped, BucketFile& file);
+            uint32_t grouped, BucketFile& file, ValueSample& sample);
 
   /// Throws Error if the cache has no cell for the splat.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) override;
@@ -158,6 +159,7 @@ class ValueSink : public SplatSink {
   const ValueBuckets* buckets_;
   const uint32_t grouped_;
   BucketFile* file_;
+  ValueSample::Adder sample_;
   uint32_t leaf_ = kNoBrick;
   bool leaf_shares_ = false;
   uint32_t number_ = 0;  // of the leaf's bucket, in the file

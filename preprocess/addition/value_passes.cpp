@@ -7,6 +7,7 @@
 
 #include "preprocess/addition/build_values.h"
 #include "preprocess/addition/drawn_samples.h"
+#include "preprocess/convert/sampled_scalars.h"
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/shared_passes.h"
 #include "stream/base/file.h"
@@ -25,7 +26,8 @@ ValuePasses::ValuePasses(const CacheReader& cache, size_t variables, const Memor
       shared_(scratch_),
       order_(cache),
       buckets_(cache.bricks(), order_, variables, plan.bucket_bytes),
-      grouped_(ValueLoader::grouping(buckets_.size(), plan)) {}
+      grouped_(ValueLoader::grouping(buckets_.size(), plan)),
+      sample_(variables) {}
 
 void ValuePasses::shareWith(Ranks& ranks, std::filesystem::path shared) {
   ranks_ = &ranks;
@@ -93,13 +95,16 @@ void ValuePasses::mergeSeams() {
     for (ValueSink& sink : sinks) sink.flush();
   }
   seams_.reset();
+  if (ranks_) sample_.gatherFrom(*ranks_);
   file_->close(ranks_ != nullptr);
   if (ranks_) joinFiles();
   if (file_) temporary_bytes_ = file_->size();
 }
 
 void ValuePasses::build(ValuesWriter& writer, const StepReferences* references) {
-  ValueBuilder builder(*cache_, order_, buckets_, variables_, writer, *progress_);
+  const SampledScalars scalars(sample_, variables_, precisionOf(cache_->manifest()));
+  scalars.divide(writer.histograms());
+  ValueBuilder builder(*cache_, order_, buckets_, scalars.codings, writer, *progress_);
   if (references) builder.predictFrom(*references);
   ValueLoader loader(*cache_, order_, buckets_, variables_, plan_, scratch_);
   loader.forEach(*file_, 0, buckets_.size(), grouped_, [&](LoadedValues& loaded) { builder.build(loaded); });

@@ -25,6 +25,7 @@
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_origin.h"
+#include "preprocess/convert/value_sample.h"
 #include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
@@ -67,7 +68,7 @@ class ValuePasses {
   std::filesystem::path fileOf(unsigned rank) const;
   void openFile();
   void joinFiles();
-  ValueSink newSink() const { return {*cache_, order_, buckets_, grouped_, *file_}; }
+  ValueSink newSink() { return {*cache_, order_, buckets_, grouped_, *file_, sample_}; }
 
   const CacheReader* cache_;
   const size_t variables_;
@@ -80,6 +81,7 @@ class ValuePasses {
   const ValueBuckets buckets_;
   const uint32_t grouped_;
   std::vector<BlockOverlap> overlaps_;
+  ValueSample sample_;
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<SeamMerger> seams_;
   int coordinate_bytes_ = 0;

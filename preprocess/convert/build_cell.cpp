@@ -115,13 +115,14 @@ struct CellBuilder::State {
   };
 
   State(const RootCube& root_cube, const std::vector<GridBlock>& grid_blocks, size_t variable_count,
-        HistogramSums& histogram_sums, const Progress& stopping, ValuePrecision value_precision)
+        HistogramSums& histogram_sums, const Progress& stopping, std::vector<ValueCoding> value_codings)
       : root(root_cube),
         blocks(&grid_blocks),
         variables(variable_count),
         histograms(&histogram_sums),
         progress(&stopping),
-        precision(value_precision),
+        codings(std::move(value_codings)),
+        codings_of_merged(codingsOfMerged(codings)),
         scratch([this] {
           return Scratch{{}, OctantMerger(root, variables)};
         }) {
@@ -144,8 +145,8 @@ struct CellBuilder::State {
   const size_t variables;
   HistogramSums* const histograms;
   const Progress* progress;
-  const ValuePrecision precision;
-  std::vector<uint64_t> first_nodes;  // [block]
+  const std::vector<ValueCoding> codings, codings_of_merged;  // [variable]
+  std::vector<uint64_t> first_nodes;                          // [block]
   tbb::enumerable_thread_specific<Scratch> scratch;
 };
 
@@ -166,7 +167,7 @@ Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool
   for (size_t begin = 0; begin < records.size(); begin += kMaxBrickSplats) {
     unpack(cell, records.subspan(begin, std::min<size_t>(kMaxBrickSplats, records.size() - begin)),
            own.brick);
-    leaf.built.bricks.push_back({encodeBrick(root, own.brick, precision), 0, true});
+    leaf.built.bricks.push_back({encodeBrick(root, own.brick, codings), 0, true});
     histograms->add(own.brick);
     if (!is_top) own.merger.add(own.brick);
   }
@@ -198,7 +199,8 @@ Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, boo
     std::move(child.built.bricks.begin(), child.built.bricks.end(), std::back_inserter(inner.built.bricks));
   }
   BrickSplats brick = joinOctants(cell, variables, std::move(octants));
-  inner.built.bricks.push_back({encodeBrick(root, brick), static_cast<float>(inner.built.error), false});
+  inner.built.bricks.push_back(
+      {encodeBrick(root, brick, codings_of_merged), static_cast<float>(inner.built.error), false});
   inner.built.own_bricks = 1;
   if (!is_top) {
     OctantMerger& merger = scratch.local().merger;
@@ -250,8 +252,9 @@ void CellBuilder::State::addToRuns(uint64_t node, std::vector<NodeRun>& runs) co
 }
 
 CellBuilder::CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-                         HistogramSums& histograms, const Progress& progress, ValuePrecision precision)
-    : state_(std::make_unique<State>(root, blocks, variables, histograms, progress, precision)) {}
+                         HistogramSums& histograms, const Progress& progress,
+                         std::vector<ValueCoding> codings)
+    : state_(std::make_unique<State>(root, blocks, variables, histograms, progress, std::move(codings))) {}
 
 CellBuilder::~CellBuilder() = default;
 
@@ -374,8 +377,15 @@ BrickSplats joinOctants(const Cell& cell, size_t variables, std::array<MergedOct
   return brick;
 }
 
-BuiltCell buildFromChildren(const RootCube& root, size_t variables, const Cell& cell,
+std::vector<ValueCoding> codingsOfMerged(std::vector<ValueCoding> codings) {
+  for (ValueCoding& coding : codings)
+    if (coding.precision == ValuePrecision::kFine) coding = {};
+  return codings;
+}
+
+BuiltCell buildFromChildren(const RootCube& root, const std::vector<ValueCoding>& codings, const Cell& cell,
                             const std::array<ChildBricks, 8>& children) {
+  const size_t variables = codings.size();
   std::array<MergedOctant, 8> octants;
   tbb::enumerable_thread_specific<OctantMerger> mergers([&] { return OctantMerger(root, variables); });
   // Of its own: where a loop around this one is cancelled, this one would end early as well, with children
@@ -399,7 +409,8 @@ BuiltCell buildFromChildren(const RootCube& root, size_t variables, const Cell& 
     if (!octants[octant].splats.positions.empty())
       built.error = std::max({built.error, children[octant].error, octants[octant].detail});
   BrickSplats brick = joinOctants(cell, variables, std::move(octants));
-  built.bricks.push_back({encodeBrick(root, brick), static_cast<float>(built.error), false});
+  built.bricks.push_back(
+      {encodeBrick(root, brick, codingsOfMerged(codings)), static_cast<float>(built.error), false});
   built.own_bricks = 1;
   return built;
 }

@@ -61,9 +61,9 @@ void sortByNode(RecordSpan records);
 class CellBuilder {
  public:
   /// `blocks`, `progress`, which can stop it, and `histograms`, which leaves are added to, must outlive it.
-  /// `precision`: of the leaves' values.
+  /// `codings`: [variable].
   CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-              HistogramSums& histograms, const Progress& progress, ValuePrecision precision);
+              HistogramSums& histograms, const Progress& progress, std::vector<ValueCoding> codings);
   ~CellBuilder();
 
   /// Builds `cell` from its records (one at least), whose places it reorders. A cell is a leaf if it has at
@@ -128,8 +128,12 @@ struct ChildBricks {
   std::function<BrickSplats(uint64_t n)> read;  // the n-th, decoded; any thread
 };
 
-/// The brick of a cell, merged from the bricks of its children, in parallel. Throws what reading throws.
-BuiltCell buildFromChildren(const RootCube& root, size_t variables, const Cell& cell,
+/// The codings of inner bricks, whose values are means of many: fine ones are for leaves alone.
+std::vector<ValueCoding> codingsOfMerged(std::vector<ValueCoding> codings);
+
+/// The brick of a cell, merged from the bricks of its children, in parallel. `codings`: [variable], of leaves. Throws what
+/// reading throws.
+BuiltCell buildFromChildren(const RootCube& root, const std::vector<ValueCoding>& codings, const Cell& cell,
                             const std::array<ChildBricks, 8>& children);
 
 }  // namespace curvisplat

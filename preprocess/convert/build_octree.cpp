@@ -156,13 +156,14 @@ void forEachRecordByNode(const BucketFile& file, uint32_t bucket, size_t variabl
 OctreeBuilder::OctreeBuilder(const OctreePlan& plan, BucketTree& tree, CacheWriter& writer,
                              Progress& progress)
     : root_(plan.root),
-      variables_(plan.variables),
+      variables_(plan.codings.size()),
+      codings_(plan.codings),
       plan_(plan.memory),
       tree_(&tree),
       writer_(&writer),
       temporary_folder_(plan.temporary_folder),
       progress_(&progress),
-      cells_(plan.root, plan.blocks, plan.variables, writer.histograms(), progress, plan.precision) {}
+      cells_(plan.root, plan.blocks, variables_, writer.histograms(), progress, plan.codings) {}
 
 uint32_t OctreeBuilder::takeUpBricks(uint32_t buckets) {
   matchBricks();
@@ -352,7 +353,7 @@ void OctreeBuilder::buildParent(uint32_t node) {
                         (*tree_)[first_child + octant].contents.splats > 0 ? built.bricks : 0, built.error,
                         [this, &built](uint64_t n) { return writer_->readBack(built.first_brick + n); }};
   }
-  append(node, buildFromChildren(root_, variables_, (*tree_)[node].cell, children));
+  append(node, buildFromChildren(root_, codings_, (*tree_)[node].cell, children));
 }
 
 }  // namespace curvisplat

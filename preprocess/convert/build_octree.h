@@ -31,10 +31,9 @@ namespace curvisplat {
 struct OctreePlan {
   const RootCube& root;
   const std::vector<GridBlock>& blocks;
-  size_t variables;
   const MemoryPlan& memory;
   std::filesystem::path temporary_folder;
-  ValuePrecision precision = ValuePrecision::kNormal;
+  std::vector<ValueCoding> codings;  // [variable]
 };
 
 class OctreeBuilder {
@@ -76,6 +75,7 @@ class OctreeBuilder {
 
   const RootCube root_;
   const size_t variables_;
+  const std::vector<ValueCoding> codings_;
   const MemoryPlan plan_;
   BucketTree* tree_;
   CacheWriter* writer_;

@@ -12,9 +12,9 @@
 #include "preprocess/convert/build_octree.h"
 #include "preprocess/convert/conversion_journal.h"
 #include "preprocess/convert/conversion_workspace.h"
-#include "preprocess/convert/grid_origin.h"
-#include "preprocess/convert/mesh_origin.h"
+#include "preprocess/convert/new_origin.h"
 #include "preprocess/convert/preflight.h"
+#include "preprocess/convert/sampled_scalars.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/shared_passes.h"
@@ -35,26 +35,9 @@ namespace curvisplat {
 
 namespace {
 
-uint64_t nodesOf(const SplatOrigin& origin) {
-  uint64_t nodes = 0;
-  for (const GridBlock& block : origin.blocks()) nodes += block.nodes();
-  if (nodes >= kMaxNodes)
-    throw Error("{}: has {} nodes; at most {} can be converted", origin.description().format, nodes,
-                kMaxNodes - 1);
-  return nodes;
-}
-
 Unfinished unfinishedOf(const ConvertOptions& options) {
   if (options.resume) return Unfinished::kResume;
   return options.overwrite ? Unfinished::kRemove : Unfinished::kRefuse;
-}
-
-std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOptions& options,
-                                      const MemoryPlan& plan, const ScratchFiles& scratch) {
-  if (const auto* mesh = dynamic_cast<const MeshSource*>(&source))
-    return std::make_unique<MeshOrigin>(*mesh, options.scalars, options.blank_value, plan, scratch);
-  return std::make_unique<GridOrigin>(dynamic_cast<const GridSource&>(source), options.scalars,
-                                      options.blank_value, options.overlap, plan, scratch.folder());
 }
 
 /// A conversion under way: what each pass leaves for the next.
@@ -204,6 +187,7 @@ class Conversion {
     file_ = std::make_unique<BucketFile>(ConversionWorkspace::splatsFileOf(scratch_, rank()), buckets,
                                          plan_.chunkBytes(buckets));
     contents_.assign(splats_.tree.size(), {});
+    sample_.emplace(options_.scalars.size());
   }
 
   /// Whether an interrupted conversion has left some of the splats, and this one adds the others.
@@ -219,6 +203,8 @@ class Conversion {
     }
     splats_.tree = left.tree;
     splats_.unfinished = left.unfinished;
+    sample_.emplace(options_.scalars.size());
+    sample_->add(left.sample);
     contents_.assign(splats_.tree.size(), {});
     for (const uint32_t leaf : splats_.tree.leavesBelow(0)) contents_[leaf] = splats_.tree[leaf].contents;
     return true;
@@ -228,11 +214,12 @@ class Conversion {
     ScatteredSplats so_far = splats_;
     so_far.unfinished = state;
     so_far.buckets = file_->chains();
+    so_far.sample = sample_->rows();
     so_far.tree.setContents(so_far.tree.leavesBelow(0), contents_);
     workspace_->noteSplats(std::move(so_far));
   }
 
-  SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_}; }
+  SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_, &*sample_}; }
 
   ScatterNotes scatterNotes() {
     if (ranks_) return {};
@@ -250,6 +237,8 @@ class Conversion {
     if (makesSplats()) splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
     file_->close(ranks_ != nullptr);
     splats_.buckets = file_->chains();
+    if (ranks_) sample_->gatherFrom(*ranks_);
+    splats_.sample = sample_->rows();
     if (ranks_) sumContents(contents_, *ranks_);
     if (ranks_) splats_.buckets_of_ranks = gatherChains(splats_.buckets, *ranks_);
     splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
@@ -293,11 +282,13 @@ class Conversion {
     for (unsigned n = 1; n <= splats_.buckets_of_ranks.size(); ++n) file_->join(file_of(n), chainsOf(n));
   }
 
-  OctreePlan octreePlan() const {
-    return {root_, origin_->blocks(), options_.scalars.size(), plan_, own_scratch_, options_.precision};
-  }
+  OctreePlan octreePlan() const { return {root_, origin_->blocks(), plan_, own_scratch_, scalars_.codings}; }
 
   void build() {
+    ValueSample sample(options_.scalars.size());
+    sample.add(splats_.sample);
+    scalars_ = SampledScalars(sample, options_.scalars.size(), options_.precision);
+    if (writer_) scalars_.divide(writer_->histograms());
     if (ranks_) return buildTogether();
     const auto buckets = static_cast<uint32_t>(splats_.buckets.chains.size());
     OctreeBuilder builder(octreePlan(), splats_.tree, *writer_, progress_);
@@ -330,10 +321,12 @@ class Conversion {
     Progress nothing_to_check;
     CacheWriter own(own_folder, root_, variables(), nothing_to_check);
     own.keep(0);
+    scalars_.divide(own.histograms());
     OctreeBuilder(octreePlan(), splats_.tree, own, progress_).buildShare(*file_, share.first, share.end);
     if (isFirst()) writer_->keep(0);
     const std::vector<VariableInfo> infos = variables();
-    joinBricks({root_, infos, splats_.tree, scratch_, partial_}, own, writer_.get(), *ranks_);
+    joinBricks({root_, infos, scalars_.codings, splats_.tree, scratch_, partial_}, own, writer_.get(),
+               *ranks_);
   }
 
   void writeFaces() {
@@ -408,6 +401,8 @@ class Conversion {
   ScatteredSplats splats_;
   RootCube root_;
   std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
+  std::optional<ValueSample> sample_;
+  SampledScalars scalars_;
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<CacheWriter> writer_;
   std::optional<FileInfo> faces_file_;

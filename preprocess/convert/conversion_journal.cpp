@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <limits>
 
@@ -42,7 +43,7 @@ namespace {
 using nlohmann::json;
 
 // To be raised when the journal, temporary files or the bricks of a grid change.
-constexpr int kJournalVersion = 6;
+constexpr int kJournalVersion = 7;
 constexpr uint64_t kLargestJournal = uint64_t{1} << 30;
 
 std::string checksumLine(const std::string& text) {
@@ -223,6 +224,30 @@ ScatterState stateOf(const JsonField& from) {
   return state;
 }
 
+/// The bits of numbers, 16 digits each: many of them, which JSON would print and parse one by one.
+std::string hexOf(const std::vector<double>& numbers) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  text.reserve(16 * numbers.size());
+  for (const double number : numbers)
+    for (int shift = 60; shift >= 0; shift -= 4)
+      text += kDigits[std::bit_cast<uint64_t>(number) >> shift & 15];
+  return text;
+}
+
+std::vector<double> numbersOf(const JsonField& field) {
+  const std::string text = field.text();
+  std::vector<double> numbers(text.size() / 16);
+  for (size_t n = 0; n < numbers.size(); ++n) {
+    uint64_t bits = 0;
+    const char* const begin = text.data() + 16 * n;
+    if (std::from_chars(begin, begin + 16, bits, 16).ptr != begin + 16)
+      field.fail("16 digits for each number");
+    numbers[n] = std::bit_cast<double>(bits);
+  }
+  return numbers;
+}
+
 json jsonOf(const ScatteredSplats& splats) {
   json of_ranks = json::array();
   for (const BucketChains& buckets : splats.buckets_of_ranks) of_ranks.push_back(jsonOf(buckets));
@@ -232,6 +257,7 @@ json jsonOf(const ScatteredSplats& splats) {
                     {"inverted", splats.counts.inverted},
                     {"overlap", splats.overlap},
                     {"merged_nodes", splats.merged_nodes},
+                    {"sample", hexOf(splats.sample)},
                     {"tree", jsonOf(splats.tree)},
                     {"buckets", jsonOf(splats.buckets)}};
   if (splats.unfinished) of_splats["unfinished"] = jsonOf(*splats.unfinished);
@@ -244,6 +270,7 @@ ScatteredSplats splatsOf(const JsonField& from) {
   splats.counts = {from.at("degenerate").count(), from.at("inverted").count()};
   splats.overlap = from.at("overlap").text();
   splats.merged_nodes = from.at("merged_nodes").count();
+  splats.sample = numbersOf(from.at("sample"));
   splats.buckets = bucketsOf(from.at("buckets"));
   if (const auto ranks = from.find("buckets_of_ranks"))
     for (const JsonField& buckets : ranks->elements()) {

@@ -36,6 +36,7 @@ struct ScatteredSplats {
   BucketTree tree;       // with contents, as it was scattered by: before any bucket was divided
   BucketChains buckets;  // of the temporary file
   std::vector<BucketChains> buckets_of_ranks = {};  // from rank 1 on, where several have scattered
+  std::vector<double> sample = {};                  // ValueSample::rows()
   std::optional<ScatterState> unfinished;           // not all splats are there: how far scatter had come
 
   uint64_t temporaryBytes() const {

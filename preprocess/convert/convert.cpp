@@ -226,7 +226,7 @@ ConvertReport convertScalars(const DataSource& source, const ConvertOptions& giv
   }
   std::vector<ConversionFact> facts =
       factsOf(source.description(), options.scalars, options.blank_value, options.overlap);
-  facts.push_back({"--value-precision", options.precision == ValuePrecision::kFine ? "fine" : "normal"});
+  facts.push_back({"--value-precision", wordOf(options.precision)});
   ConvertReport report;
   if (isFinished(options, facts)) {
     const std::filesystem::path manifest = options.output / "manifest.json";

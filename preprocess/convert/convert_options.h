@@ -33,14 +33,14 @@ struct ConvertOptions {
   unsigned threads = 0;                    // 0: as many as the machine has
   std::filesystem::path temporary_folder;  // empty: the folder of the output
   std::string full_disk_hint;              // what to do about it; empty: as for `convert`
-  std::vector<std::filesystem::path> given_folders;    // that the user gave, where these two are temporary
-  std::string title;                                   // empty: the output's name
-  std::optional<double> time;                          // of the step; otherwise the source's, or 0
-  std::optional<TimeUnit> time_unit;                   // of `time`; otherwise the source's
-  ValuePrecision precision = ValuePrecision::kNormal;  // of the samples' values
-  bool surfaces = true;                                // store the grid's outer faces in the cache
-  std::vector<IndexPlane> planes;                      // and these index planes
-  Overlap overlap = Overlap::kOwner;                   // of blocks
+  std::vector<std::filesystem::path> given_folders;  // that the user gave, where these two are temporary
+  std::string title;                                 // empty: the output's name
+  std::optional<double> time;                        // of the step; otherwise the source's, or 0
+  std::optional<TimeUnit> time_unit;                 // of `time`; otherwise the source's
+  ValuePrecision precision = ValuePrecision::kAuto;  // of the samples' values
+  bool surfaces = true;                              // store the grid's outer faces in the cache
+  std::vector<IndexPlane> planes;                    // and these index planes
+  Overlap overlap = Overlap::kOwner;                 // of blocks
 
   /// Processes that convert together: each has the same source and options, and calls convert(). Null: this process alone.
   Ranks* ranks = nullptr;

@@ -43,6 +43,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
     manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
   manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers};
   if (options.precision == ValuePrecision::kFine) manifest.requirements.push_back(kFineValues);
+  if (options.precision == ValuePrecision::kAuto) manifest.requirements.push_back(kScaledValues);
   if (origin.cutsOctants() && survey.blanked.total() > 0) manifest.requirements.push_back(kCellOctants);
   manifest.overlap = splats.overlap;
   manifest.cells = origin.centring() == Centring::kCell;

@@ -181,18 +181,23 @@ class SplatStream {
 class RecordSink : public SplatSink {
  public:
   explicit RecordSink(const SplatTarget& target)
-      : root_(target.root), router_(*target.tree, *target.file), contents_(target.contents) {}
+      : root_(target.root),
+        router_(*target.tree, *target.file),
+        contents_(target.contents),
+        sample_(*target.sample) {}
 
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) override {
     const RootPosition position = root_.fromWorld(splat.splat.position);
     record_.clear();
     packRecord(splat, values, position, record_);
     router_.add(record_, position);
+    sample_.add(splat.node, splat.splat.weight, values);
   }
 
-  /// Sends what is gathered, and adds what was sent since the last call to the contents.
+  /// Sends what is gathered, and adds what was sent since the last call to the contents and the sample.
   void flush() {
     router_.flush();
+    sample_.flush();
     for (size_t node = 0; node < contents_->size(); ++node)
       (*contents_)[node].add(std::exchange(router_.contents()[node], {}));
   }
@@ -201,6 +206,7 @@ class RecordSink : public SplatSink {
   const RootCube root_;
   RecordRouter router_;
   std::vector<CellContents>* contents_;
+  ValueSample::Adder sample_;
   std::vector<std::byte> record_;
 };
 

@@ -13,6 +13,7 @@
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_plan.h"
 #include "preprocess/convert/splat_origin.h"
+#include "preprocess/convert/value_sample.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/overset/block_owners.h"
@@ -73,10 +74,11 @@ struct SplatTarget {
   const BucketTree* tree = nullptr;
   BucketFile* file = nullptr;
   std::vector<CellContents>* contents = nullptr;  // [node of the tree]: what was routed is added
+  ValueSample* sample = nullptr;                  // what was routed is added
 };
 
 /// Routes all splats that the origin makes in scatter(). When it notes how far it has come, all splats until then are in
-/// the file and in the target's contents.
+/// the file and in the target's contents and sample.
 ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, const ScatterNotes& notes,
                             Progress& progress);
 

@@ -228,7 +228,7 @@ class Joiner {
                             }};
       }
       if (!complete) continue;  // in a cell that is built as a whole
-      BuiltCell cell = buildFromChildren(build_.root, build_.variables.size(), tree[node].cell, children);
+      BuiltCell cell = buildFromChildren(build_.root, build_.codings, tree[node].cell, children);
       const uint64_t id = own_.append(std::move(cell.bricks[0].encoded), cell.bricks[0].error);
       CURVISPLAT_CHECK_OP(id, ==, parts_[0].bricks.size());
       parts_[0].bricks.push_back(own_.appended(id));

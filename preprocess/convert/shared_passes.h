@@ -69,9 +69,10 @@ std::filesystem::path bricksOfRank(const std::filesystem::path& scratch, unsigne
 struct SharedBuild {
   RootCube root;
   const std::vector<VariableInfo>& variables;
-  const BucketTree& tree;         // with contents
-  std::filesystem::path scratch;  // seen by all ranks
-  std::filesystem::path partial;  // the folder of the cache, seen by all ranks
+  const std::vector<ValueCoding>& codings;  // [variable]
+  const BucketTree& tree;                   // with contents
+  std::filesystem::path scratch;            // seen by all ranks
+  std::filesystem::path partial;            // the folder of the cache, seen by all ranks
 };
 
 /// Joins the bricks that all ranks have built. `own`: the writer to bricksOfRank(); `whole`: the cache's,

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -190,11 +192,12 @@ class CacheReader::State::ValuesDecoder {
     TimeReferences references;
     State::decode(file, of_.brick, of_.times, [&] {
       references.steps_back = stepsBackOf(stream);
-      if (hasFineMeans(stream) && !state_.of_series->hasFeature(kFineValues))
+      const char* const feature = featureOf(stream);
+      if (feature && !state_.of_series->hasFeature(feature))
         throw Error(
             "its values use the feature '{}', which the manifest does not list; the cache is damaged: "
             "convert again",
-            kFineValues);
+            feature);
     });
     // The one further back first: the other may be predicted from it as well.
     for (const size_t n : {size_t{1}, size_t{0}})
@@ -391,14 +394,34 @@ void CacheReader::decode(uint32_t brick, size_t variable, std::span<const std::b
   state_->decodeValues({brick, variable, times, kept}, values, out);
 }
 
-double storedWithin(const CacheReader& reader, size_t variable) {
-  double range = 0;
+StreamErrors storedErrors(const CacheReader& reader, size_t variable) {
+  const InputFile file(reader.valuesPath(variable));
+  const std::span<const BrickVariable> table = reader.brickVariables(variable);
+  StreamErrors of_all;
+  double samples = 0;
   for (size_t n = 0; n < reader.bricks().size(); ++n) {
-    if (!reader.bricks()[n].isLeaf()) continue;
-    const BrickVariable& values = reader.brickVariables(variable)[n];
-    range = std::max(range, double{values.max} - double{values.min});
+    const Brick& brick = reader.bricks()[n];
+    if (!brick.isLeaf()) continue;
+    std::array<std::byte, sizeof(ValuesHeader)> header{};
+    const Extent& extent = table[n].values;
+    file.readAt(extent.offset, std::span(header).first(std::min<size_t>(extent.length, header.size())));
+    StreamErrors of_brick;
+    try {
+      of_brick = errorsOf(header, table[n].largest_slope);
+    } catch (const Error& error) {
+      throw DamagedBrick("{}: brick {}: {}; convert again", file.path().string(), n, error.what());
+    }
+    const auto add = [&](ValueErrors& sum, const ValueErrors& errors) {
+      sum.largest = std::max(sum.largest, errors.largest);
+      sum.typical += brick.splats * errors.typical * errors.typical;
+    };
+    add(of_all.means, of_brick.means);
+    add(of_all.slopes, of_brick.slopes);
+    samples += brick.splats;
   }
-  return range * (reader.manifest().hasFeature(kFineValues) ? kLargestFineMeanError : kLargestMeanError);
+  for (ValueErrors* errors : {&of_all.means, &of_all.slopes})
+    if (samples > 0) errors->typical = std::sqrt(errors->typical / samples);
+  return of_all;
 }
 
 }  // namespace curvisplat

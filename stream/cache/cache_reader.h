@@ -15,6 +15,7 @@
 #include "stream/cache/manifest.h"
 #include "stream/cache/series.h"
 #include "stream/cache/series_values.h"
+#include "stream/codec/values_codec.h"
 #include "stream/model/octree.h"
 #include "stream/model/splats.h"
 
@@ -101,9 +102,9 @@ class CacheReader {
   std::unique_ptr<State> state_;
 };
 
-/// How finely the cache stores a scalar: the largest distance, in the scalar's unit, between a sample's mean
-/// and the stored one at the reader's step. It is half an interval of the leaf with the widest range;
-/// rounding to a float comes on top. Reads tables only.
-double storedWithin(const CacheReader& reader, size_t variable);
+/// How far the stored means and slopes of a scalar's samples are from what they were, in its unit, at the reader's step: at
+/// most, and typically (the root mean square for values near the centre of its spread). Rounding to a float comes on top. Reads
+/// 40 bytes of each leaf.
+StreamErrors storedErrors(const CacheReader& reader, size_t variable);
 
 }  // namespace curvisplat

@@ -20,8 +20,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
-constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers,
-                                          kBorderPairs, kSteps,      kFineValues,    kCellOctants};
+constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth,   kMergedBorders,
+                                          kFaceLayers,  kBorderPairs,  kSteps,
+                                          kFineValues,  kScaledValues, kCellOctants};
 constexpr const char* kFormat = "curvisplat splat cache";
 // 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;
@@ -172,6 +173,11 @@ void checkVersion(uint64_t version, const std::filesystem::path& path) {
 
 bool Manifest::hasFeature(const char* feature) const {
   return std::find(requirements.begin(), requirements.end(), feature) != requirements.end();
+}
+
+ValuePrecision precisionOf(const Manifest& manifest) {
+  if (manifest.hasFeature(kFineValues)) return ValuePrecision::kFine;
+  return manifest.hasFeature(kScaledValues) ? ValuePrecision::kAuto : ValuePrecision::kNormal;
 }
 
 std::string Manifest::toJson() const {

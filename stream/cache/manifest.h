@@ -118,6 +118,10 @@ struct Manifest {
   static Manifest fromJson(const std::string& text, const std::filesystem::path& path);
 };
 
+/// How finely its values are stored, and those are that are added (stream/codec/values_codec.h).
+enum class ValuePrecision;
+ValuePrecision precisionOf(const Manifest& manifest);
+
 /// How the cells at the borders of a cache are drawn, by its centring and its features.
 inline BorderStyle borderStyleOf(const Manifest& manifest) {
   if (!manifest.cells) return kHalfCellStyle;

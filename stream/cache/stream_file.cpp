@@ -49,8 +49,11 @@ FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span
   if (histogram) {
     // It ends where the table begins.
     const HistogramRecord record = recordOf(*histogram);
-    const uint64_t pages = (file.size() + sizeof record + kPageBytes - 1) / kPageBytes;
-    padTo(file, pages * kPageBytes - sizeof record);
+    const bool has_percentiles = !histogram->percentiles.empty();
+    const uint64_t bytes = sizeof record + (has_percentiles ? sizeof(PercentilesRecord) : 0);
+    const uint64_t pages = (file.size() + bytes + kPageBytes - 1) / kPageBytes;
+    padTo(file, pages * kPageBytes - bytes);
+    if (has_percentiles) file.append(bytesOf(percentilesOf(*histogram)));
     file.append(bytesOf(record));
   }
   padToPage(file);

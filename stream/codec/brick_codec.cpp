@@ -112,9 +112,9 @@ Extent extentOf(std::span<const std::byte> bytes) {
 
 EncodedValues encodeInRows(std::span<const Row> rows, std::span<const uint32_t> border_codes,
                            std::span<SplatScalar> values, const TimeReferences& references,
-                           ValuePrecision precision) {
+                           const ValueCoding& coding) {
   EncodedValues encoded;
-  encoded.bytes = encodeValuesStream(rows, values, references, precision);
+  encoded.bytes = encodeValuesStream(rows, values, references, coding);
   encoded.variable = summaryOf(values, border_codes);
   encoded.variable.values = extentOf(encoded.bytes);
   return encoded;
@@ -150,7 +150,7 @@ void toCoordinates(const std::vector<uint32_t>& from, double interval, float ins
 
 }  // namespace
 
-EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick, ValuePrecision precision) {
+EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick, std::span<const ValueCoding> codings) {
   checkInput(brick);
   DecodedGeometry& decoded = scratchGeometry();
   EncodedBrick encoded;
@@ -159,8 +159,9 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick, ValuePrecisio
   encoded.brick = summaryOf(root, brick);
   encoded.brick.geometry = extentOf(encoded.geometry);
   for (const Splat& splat : brick.splats) encoded.weight += splat.weight;
-  for (auto& values : brick.variables) {
-    EncodedValues of_variable = encodeInRows(decoded.rows, brick.border_codes, values, {}, precision);
+  for (size_t v = 0; v < brick.variables.size(); ++v) {
+    EncodedValues of_variable = encodeInRows(decoded.rows, brick.border_codes, brick.variables[v], {},
+                                             codings.empty() ? ValueCoding() : codings[v]);
     encoded.values.push_back(std::move(of_variable.bytes));
     encoded.variables.push_back(of_variable.variable);
   }
@@ -169,8 +170,8 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick, ValuePrecisio
 
 EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
                            std::span<SplatScalar> values, const TimeReferences& references,
-                           ValuePrecision precision) {
-  return encodeInRows(rowsOf(runs, values.size()), border_codes, values, references, precision);
+                           const ValueCoding& coding) {
+  return encodeInRows(rowsOf(runs, values.size()), border_codes, values, references, coding);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,

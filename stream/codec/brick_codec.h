@@ -5,8 +5,8 @@
 //              value of A; σ_K = 0.447 is the kernel's standard deviation)
 //   shape      2 log axes, the log volume and 3 shears: ‖S^-½ S' S^-½ - I‖ <= 0.05 at any aspect ratio
 //   weight     relative to the decoded a0 a1 a2: error at most 1e-3
-//   mean       16 bits over the brick's range, or 24
-//   slope      error at most 2^-11 of the brick's span; √variance: 2^-13 of it (values_codec.h)
+//   mean       16 bits over the brick's range, or 24, or by its own scale
+//   slope      error at most 2^-11 of the brick's span; √variance: 2^-13 of it; or by their own scale (values_codec.h)
 //
 // The symbols (A, S, axes, shears) are those of stream/model/splats.h; stream/FORMAT.md specifies the bytes.
 // Encoding also returns the decoded splats, because merging and octree membership are computed from what a
@@ -33,9 +33,8 @@ struct EncodedBrick {
 };
 
 /// Encodes `brick` (1 to kMaxBrickSplats splats) and replaces its splats by the decoded ones, in double.
-/// Pure: any thread. Throws nothing but bad_alloc.
-EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick,
-                         ValuePrecision precision = ValuePrecision::kNormal);
+/// `codings`: [variable]; empty: ValuePrecision::kNormal. Pure: any thread. Throws nothing but bad_alloc.
+EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick, std::span<const ValueCoding> codings = {});
 
 /// One encoded variable of a brick.
 struct EncodedValues {
@@ -48,7 +47,7 @@ struct EncodedValues {
 /// the stream may be predicted from. Pure: any thread. Throws nothing but bad_alloc.
 EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
                            std::span<SplatScalar> values, const TimeReferences& references = {},
-                           ValuePrecision precision = ValuePrecision::kNormal);
+                           const ValueCoding& coding = {});
 
 /// Decodes the geometry stream of `brick`. The bytes are untrusted: throws an Error that names the brick
 /// unless they decode to exactly brick.splats finite splats inside the cell, and allocates memory for no more

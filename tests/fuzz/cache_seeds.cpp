@@ -98,7 +98,7 @@ void writeValuesInTime(const Seeds& seeds) {
     for (const bool two : {false, true}) {
       references.steps_back = {1, static_cast<uint8_t>(two ? 2 : 0)};
       auto values = valuesAt(3);
-      const EncodedValues encoded = encodeValues({}, {}, values, references, precision);
+      const EncodedValues encoded = encodeValues({}, {}, values, references, {precision});
       Seed seed;
       seed.add(static_cast<uint16_t>(kSplats - 1)).add(length(0)).add(two ? length(1) : uint16_t{0});
       seed.text(streams[0]).text(two ? streams[1] : "").text(unpacked(encoded.bytes, sizeof(ValuesHeader)));

@@ -139,16 +139,21 @@ BrickSplats backwardLeaf() {
   return brick;
 }
 
-/// The other leaves have weights that no histogram takes.
+/// The other leaves have weights that no histogram takes. Its values are coded by their own scale: of one variable the slopes,
+/// of the other the means as well.
 void makeWithHistogram(const fs::path& path) {
   CacheWriter writer(path, false, kRoot, {{0, "f", "", 1, 20}, {3, "g", "K", -1, 1}});
   Manifest manifest;
   manifest.lower = kRoot.min;
   manifest.upper = kRoot.min + kRoot.size;
   manifest.blocks = {{"a", 60, 10, 5}};
+  manifest.requirements = {kScaledValues};
   BrickSplats leaf = smoothLeaf();
   manifest.nodes = leaf.size();
-  writer.append(encodeBrick(kRoot, leaf), 0);
+  const std::vector<ValueCoding> codings{{ValuePrecision::kAuto, {5, 0.5}},
+                                         {ValuePrecision::kAuto, {0.1, 1e-4}}};
+  writer.append(encodeBrick(kRoot, leaf, codings), 0);
+  writer.histograms().divide(0, {{2, 5, 7}, {0.1, 0.4, 0.2, 0.3}, {}});
   writer.histograms().add(leaf);
   writer.finish(manifest);
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
@@ -254,6 +255,79 @@ TEST(Codec, KeepsConstantValuesExactly) {
   for (const SplatScalar& value : brick.variables[0]) {
     ASSERT_EQ(value.mean, 0.7f);
     ASSERT_EQ(value.slope, glm::dvec3(0.0));
+  }
+}
+
+/// Values within 1 of 100 but for a tail to ±30,000, as at degenerate cells.
+BrickSplats longTailed() {
+  BrickSplats brick = randomBrick({}, Cell{}, 2);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (SplatScalar& value : brick.variables[0]) {
+    const double scale = std::exp(12 * std::pow(std::abs(uniform(random)), 4)) / 6;
+    value = {100 + scale * uniform(random),
+             scale * glm::dvec3(uniform(random), uniform(random), uniform(random)),
+             uniform(random) > 0 ? 0 : scale * scale};
+  }
+  return brick;
+}
+
+TEST(Codec, KeepsValuesByTheirOwnScale) {
+  const ValueSpread spread{100, 0.5};
+  BrickSplats brick = longTailed();
+  const std::vector<SplatScalar> before = brick.variables[0];
+  const std::vector<ValueCoding> codings{{ValuePrecision::kAuto, spread}};
+  const EncodedBrick encoded = encodeBrick(RootCube{}, brick, codings);
+  EXPECT_STREQ(featureOf(encoded.values[0]), kScaledValues);
+  const auto [means, slopes] = errorsOf(encoded.values[0], encoded.variables[0].largest_slope);
+  size_t far = 0;
+  for (size_t n = 0; n < before.size(); ++n) {
+    const SplatScalar &was = before[n], &is = brick.variables[0][n];
+    const double own = spread.scaleAt(was.mean), rounding = 1e-7 * std::abs(was.mean);
+    ASSERT_NEAR(is.mean, was.mean, own / 2000 + rounding);
+    ASSERT_NEAR(is.mean, was.mean, means.largest + rounding);
+    for (int c = 0; c < 3; ++c) {
+      ASSERT_NEAR(is.slope[c], was.slope[c], (own + std::abs(was.slope[c])) / 1000);
+      ASSERT_NEAR(is.slope[c], was.slope[c], 1.01 * slopes.largest);
+    }
+    ASSERT_NEAR(std::sqrt(is.variance), std::sqrt(was.variance), (own + std::sqrt(was.variance)) / 1000);
+    if (was.variance == 0) {
+      ASSERT_EQ(is.variance, 0);
+    }
+    far += own > 1000;
+  }
+  EXPECT_GT(far, 10u);
+  SplatVariable decoded;
+  decodeVariable(encoded.brick, encoded.variables[0], encoded.values[0], decoded);
+  for (size_t n = 0; n < before.size(); ++n) {
+    ASSERT_EQ(decoded.mean[n], brick.variables[0][n].mean);
+    ASSERT_EQ(decoded.slope2[n], brick.variables[0][n].slope.z);
+    ASSERT_EQ(decoded.variance[n], brick.variables[0][n].variance);
+  }
+  // Even steps lose what lies near the centre.
+  BrickSplats even = longTailed();
+  encodeBrick(RootCube{}, even);
+  double worst = 0;
+  for (size_t n = 0; n < before.size(); ++n)
+    worst = std::max(worst, std::abs(even.variables[0][n].mean - before[n].mean));
+  EXPECT_GT(worst, spread.scale / 10);
+}
+
+TEST(Codec, ByOwnScaleIsAsBeforeWhereStepsAreFineAnyway) {
+  BrickSplats brick = longTailed(), same = brick;
+  const std::vector<ValueCoding> codings{{ValuePrecision::kAuto, {0, 1e6}}};
+  EXPECT_EQ(encodeBrick(RootCube{}, brick, codings).values, encodeBrick(RootCube{}, same).values);
+}
+
+TEST(Codec, RefusesScalesThatAreNone) {
+  BrickSplats brick = longTailed();
+  const std::vector<ValueCoding> codings{{ValuePrecision::kAuto, {100, 0.5}}};
+  const EncodedBrick encoded = encodeBrick(RootCube{}, brick, codings);
+  SplatVariable decoded;
+  for (const double scale : {0.0, -1.0, std::numeric_limits<double>::infinity(), std::nan("")}) {
+    std::vector<std::byte> bytes = encoded.values[0];
+    std::memcpy(&bytes[offsetof(ValuesHeader, slope_step)], &scale, sizeof scale);
+    EXPECT_THROW(decodeVariable(encoded.brick, encoded.variables[0], bytes, decoded), Error) << scale;
   }
 }
 

@@ -9,7 +9,7 @@ import numpy as np
 import zstandard
 from xxhash import xxh3_64_intdigest as checksum
 
-FEATURES = set("steps fine-values cell-growth merged-borders face-layers border-pairs border-faces cell-octants".split())
+FEATURES = set("steps fine-values cell-growth merged-borders face-layers border-pairs border-faces cell-octants scaled-values".split())
 SHAPE, VALUES = ["a0", "a1", "a2", "l10", "l20", "l21"], ["mean", "slope0", "slope1", "slope2", "variance"]
 
 
@@ -126,12 +126,25 @@ def decode_geometry(data, brick, root):
     return out | {"runs": runs}
 
 
+def scaled_code(x, bits):
+    above = (1 + np.abs(x)).view(np.uint64) - np.float64(1).view(np.uint64)
+    return np.where(x < 0, -1, 1).astype(np.int32).view(np.uint32) * ((above + np.uint64(1 << (51 - bits))) >> np.uint64(52 - bits)).astype(np.uint32)
+
+
+def scaled_number(codes, bits):
+    size = np.minimum(np.abs(codes.astype(np.int64)), 1000 << bits).astype(np.uint64)
+    return np.where(codes < 0, -1.0, 1.0) * ((np.float64(1).view(np.uint64) + (size << np.uint64(52 - bits))).view(np.float64) - 1)
+
+
 def decode_values(data, count, reference):
     """`reference(steps back)`: the values of the brick that many steps before."""
     lower, upper, slope_step, deviation_step, varint_bytes, *codes, b1, b2 = struct.unpack_from("<ffddI12B", data)
     need(varint_bytes <= 10 * count and (b2 == 0 or 0 < b1 < b2), "values header")
     most = 2**24 - 1 if codes[0] & 16 else 65535  # with `fine-values`
-    contents = Contents(data[40:], [codes[0] & ~16, *codes[1:]], count, varint_bytes, in_time=b1 > 0)
+    scaled_means, scaled, scale, centre = bool(codes[0] & 32), bool(codes[2] & 32), slope_step, deviation_step
+    need(scaled or not scaled_means, "values header")
+    codes[0], codes[2] = codes[0] & ~48, codes[2] & ~32
+    contents = Contents(data[40:], codes, count, varint_bytes, in_time=b1 > 0)
     lengths, distances = contents.varints[::2], contents.varints[1::2]
     firsts = np.cumsum([0, *lengths]).tolist()
     need(len(lengths) == len(distances) and firsts[-1] == (count if lengths else 0) and all(lengths), "number of values")
@@ -141,13 +154,20 @@ def decode_values(data, count, reference):
     scales = (lower, (upper - lower) / most, 0, most), *[(0, slope_step, -2.0**30, 2.0**30)] * 3, (0, deviation_step, 0, 2.0**30)
     numbers, earlier = [], [reference(b) for b in (b1, b2) if b]
     for name, (origin, step, lowest, highest) in zip(VALUES, scales):
+        by_scale, bits, unit = *((scaled_means, 10) if name == "mean" else (scaled, 9)), scale
+        if by_scale and name != "mean":
+            unit = scale + np.abs((numbers[0] + (centre if scaled_means else lower)).astype(np.float32).astype(np.float64) - centre)
         q, e = np.uint32(0), [values[name].astype(np.float32).astype(np.float64) for values in earlier]
-        if e and step > 0:
+        if e and (step > 0 or by_scale):
             e = np.sqrt(e) if name == "variance" else e
             e = e[0] + (e[0] - e[1]) * (b1 / (b2 - b1)) if b2 else e[0]
-            q = np.rint(np.clip((e - origin) / step, lowest, highest)).astype(np.int64).astype(np.uint32)
-        numbers.append(contents.values(expected=q).view(np.int32) * step)
-    return dict(zip(VALUES, (lower + numbers[0], *numbers[1:4], numbers[4]**2)))
+            if by_scale:
+                q = scaled_code((e - centre if name == "mean" else np.maximum(e, 0) if name == "variance" else e) / unit, bits)
+            else:
+                q = np.rint(np.clip((e - origin) / step, lowest, highest)).astype(np.int64).astype(np.uint32)
+        codes_of_array = contents.values(expected=q).view(np.int32)
+        numbers.append(scaled_number(codes_of_array, bits) * unit if by_scale else codes_of_array * step)
+    return dict(zip(VALUES, ((centre if scaled_means else lower) + numbers[0], *numbers[1:4], numbers[4]**2)))
 
 
 class Cache:

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "stream/base/error.h"
@@ -179,12 +180,72 @@ TEST(ValueHistogram, HasTheSharesOfTheVolume) {
   EXPECT_NEAR(histogram->percentile(1), 4, 0.01);
 }
 
+/// Values of a Cauchy distribution, whose tails reach to ±60,000 where its middle half lies from -1 to 1.
+TEST(ValueHistogram, HasPercentilesOfAnyTail) {
+  BrickSplats leaf = leafOf(100'000);
+  HistogramBins bins;
+  double lower = 0, upper = 0;
+  for (size_t n = 0; n < leaf.size(); ++n) {
+    const double rank =
+        (static_cast<double>(n * 7919 % leaf.size()) + 0.5) / static_cast<double>(leaf.size());
+    leaf.variables[0][n].mean = std::tan(std::numbers::pi * (rank - 0.5));
+    leaf.splats[n].weight = 1;
+    lower = std::min(lower, leaf.variables[0][n].mean);
+    upper = std::max(upper, leaf.variables[0][n].mean);
+  }
+  // By a part of them that is none too even.
+  for (size_t n = 0; n < leaf.size(); n += 37)
+    bins.edges.push_back(static_cast<float>(leaf.variables[0][n].mean));
+  std::sort(bins.edges.begin(), bins.edges.end());
+  bins.shares.assign(bins.edges.size() + 1, 1.0 / static_cast<double>(bins.edges.size() + 1));
+  bins.coding.precision = ValuePrecision::kFine;
+  HistogramSums sums(kRoot, {{0, "f", "", lower, upper}});
+  sums.divide(0, bins);
+  sums.add(leaf);
+  const auto histogram = sums.of(0);
+  ASSERT_TRUE(histogram && !histogram->percentiles.empty());
+  for (double part = 0.001; part < 1; part += 0.00025) {
+    const double value = histogram->percentile(part), rank = std::atan(value) / std::numbers::pi + 0.5;
+    EXPECT_NEAR(rank, part, 0.001) << value;
+    EXPECT_NEAR(histogram->shareBelow(value), part, 1e-4);
+  }
+  EXPECT_GT(histogram->binWidth(), 200);
+}
+
+/// Half of the volume lies within one step of the codes, as the free stream does beside a long tail.
+TEST(ValueHistogram, HasPercentilesBetweenRoundedValues) {
+  BrickSplats leaf = leafOf(20'000);
+  HistogramBins bins;
+  std::vector<double> exact;
+  for (size_t n = 0; n < leaf.size(); ++n) {
+    const double part = (static_cast<double>(n) + 0.5) / static_cast<double>(leaf.size());
+    exact.push_back(part < 0.5 ? 1.3 * std::pow(part, 3) : 1000 * part);
+    leaf.splats[n].weight = 1;
+    leaf.variables[0][n].mean = std::round(exact.back() * 65535 / 1000) * 1000 / 65535;
+    if (n % 10 == 0 && n > 0) bins.edges.push_back(static_cast<float>(exact.back()));
+  }
+  bins.shares.assign(bins.edges.size() + 1, 1.0 / static_cast<double>(bins.edges.size() + 1));
+  HistogramSums sums(kRoot, {{0, "f", "", 0, 1000}});
+  sums.divide(0, bins);
+  sums.add(leaf);
+  const auto histogram = sums.of(0);
+  ASSERT_TRUE(histogram);
+  for (double part = 0.002; part < 1; part += 0.01) {
+    const double value = histogram->percentile(part);
+    const auto above = std::upper_bound(exact.begin(), exact.end(), value);
+    EXPECT_NEAR(static_cast<double>(above - exact.begin()) / static_cast<double>(exact.size()), part, 0.001)
+        << value;
+  }
+}
+
 TEST(ValueHistogram, DependsOnNoOrder) {
   std::vector<BrickSplats> leaves;
   for (size_t n = 0; n < 50; ++n)
     leaves.push_back(leafOf(100 + 7 * n, std::pow(10.0, 0.3 * static_cast<double>(n) - 9)));
   HistogramSums one(kRoot, {{0, "f", "", -1, 3}}), other(kRoot, {{0, "f", "", -1, 3}}),
       rest(kRoot, {{0, "f", "", -1, 3}});
+  for (HistogramSums* sums : {&one, &other, &rest})
+    sums->divide(0, {{0.25f, 1, 1.5f, 3.5f}, {0.1, 0.2, 0.1, 0.5, 0.1}, {}});
   for (const BrickSplats& leaf : leaves) one.add(leaf);
   std::mt19937 random(1);
   std::shuffle(leaves.begin(), leaves.end(), random);
@@ -194,6 +255,7 @@ TEST(ValueHistogram, DependsOnNoOrder) {
   for (size_t n = 0; n < words.size(); ++n) words[n] += further[n];
   other.setWords(words);
   EXPECT_EQ(one.of(0)->shares, other.of(0)->shares);
+  EXPECT_EQ(one.of(0)->percentiles, other.of(0)->percentiles);
   EXPECT_EQ(one.of(0)->volume, other.of(0)->volume);
 }
 
@@ -228,15 +290,17 @@ class StoredHistogram : public ::testing::Test {
 
 TEST_F(StoredHistogram, EndsAtTheTableWhateverTheStreams) {
   HistogramSums sums(kRoot, {{0, "f", "", 0, 4}});
+  sums.divide(0, {{1, 2, 3}, {0.2, 0.3, 0.3, 0.2}, {}});
   sums.add(leafOf(1000));
   for (const size_t stream : {1u, 1967u, 1968u, 1969u, 4000u, 4064u, 4065u, 10'000u}) {
     SCOPED_TRACE(stream);
     const uint64_t table = write(stream, sums.of(0));
     EXPECT_EQ(table % kPageBytes, 0u);
-    EXPECT_LT(table, stream + sizeof(HistogramRecord) + 2 * kPageBytes);
+    EXPECT_LT(table, stream + sizeof(PercentilesRecord) + sizeof(HistogramRecord) + 2 * kPageBytes);
     const auto read = readHistogram(InputFile(path), table);
     ASSERT_TRUE(read);
     EXPECT_EQ(read->shares, sums.of(0)->shares);
+    EXPECT_EQ(read->percentiles, sums.of(0)->percentiles);
     EXPECT_EQ(read->lower, 0);
     EXPECT_EQ(read->upper, 4);
     EXPECT_EQ(read->volume, sums.of(0)->volume);
@@ -246,10 +310,14 @@ TEST_F(StoredHistogram, EndsAtTheTableWhateverTheStreams) {
 
 TEST_F(StoredHistogram, IsRefusedIfAnyByteIsDamaged) {
   HistogramSums sums(kRoot, {{0, "f", "", 0, 4}});
+  sums.divide(0, {{1, 2, 3}, {0.2, 0.3, 0.3, 0.2}, {}});
   sums.add(leafOf(1000));
   const uint64_t table = write(100, sums.of(0));
   const std::string good = bytesOfFile(path);
-  for (uint64_t at = table - sizeof(HistogramRecord) + 8; at < table; at += 37) {
+  const uint64_t begin = table - sizeof(HistogramRecord);
+  for (uint64_t at = begin - sizeof(PercentilesRecord) + 8; at < table; at += 37) {
+    if (at < begin + 8 && at + 4 >= begin)
+      continue;  // reserved bytes, and what says that there is a histogram
     std::string bad = good;
     bad[at] ^= 1;
     overwriteFile(path, bad);

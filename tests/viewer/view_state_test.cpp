@@ -279,7 +279,7 @@ TEST(RenderCommand, OfAMovieTurns) {
   expectParts(renderCommand(state, {"a.splats", {301, 201}, {}, {}, true}), {"--size 300x200"});
   expectParts(renderCommand(state, {"a.splats", {301, 201}, {}, {}}), {"--size 301x201"});
   CommandOptions fine{"a.xyz", {300, 200}, {}, {}};
-  fine.fine_values = true;
+  fine.precision = ValuePrecision::kFine;
   expectParts(renderCommand(state, fine), {"--value-precision fine"});
 }
 

@@ -221,10 +221,12 @@ std::unique_ptr<CacheReader> openWritten(const std::filesystem::path& cache, uin
 
 void printStoredPrecision(const CacheReader& cache, std::string_view where) {
   const auto& variables = cache.manifest().variables;
-  for (size_t n = 0; n < variables.size(); ++n)
-    printLine("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}", variables[n].name, where, variables[n].min,
-              variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
-              storedWithin(cache, n));
+  for (size_t n = 0; n < variables.size(); ++n) {
+    const ValueErrors errors = storedErrors(cache, n).means;
+    printLine("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}, typically {:.1e}", variables[n].name, where,
+              variables[n].min, variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
+              errors.largest, errors.typical);
+  }
 }
 
 }  // namespace curvisplat

@@ -109,9 +109,12 @@ Json histogramsAsJson(const CacheReader& reader, const Read& read) {
   Json json = Json::array();
   for (size_t v = 0; v < reader.manifest().variables.size(); ++v) {
     const std::optional<ValueHistogram> of = read(v);
-    json.push_back(
-        of ? Json{{"min", of->lower}, {"max", of->upper}, {"volume", of->volume}, {"shares", of->shares}}
-           : Json(nullptr));
+    json.push_back(of ? Json{{"min", of->lower},
+                             {"max", of->upper},
+                             {"volume", of->volume},
+                             {"shares", of->shares},
+                             {"percentiles", of->percentiles}}
+                      : Json(nullptr));
   }
   return json;
 }
@@ -119,8 +122,12 @@ Json histogramsAsJson(const CacheReader& reader, const Read& read) {
 /// A line on how a scalar's values are spread, if the cache says so.
 void printSpread(const char* of, const std::optional<ValueHistogram>& histogram) {
   if (!histogram || !(histogram->lower < histogram->upper)) return;
-  fmt::print("           by volume{}: 1 % below {:.4g}, 50 % below {:.4g}, 99 % below {:.4g}\n", of,
-             histogram->percentile(0.01), histogram->percentile(0.5), histogram->percentile(0.99));
+  fmt::print(
+      "           by volume{}: 1 % below {:.4g}, 50 % below {:.4g}, 99 % below {:.4g}{}\n", of,
+      histogram->percentile(0.01), histogram->percentile(0.5), histogram->percentile(0.99),
+      histogram->percentiles.empty()
+          ? fmt::format(" (to {:.2g}: the cache was made by an earlier program)", histogram->binWidth())
+          : "");
 }
 
 Json jsonOf(const ProbeResult& found, const CacheReader& reader) {
@@ -169,8 +176,13 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
   }
   json["histograms"] = histogramsAsJson(reader, [&](size_t v) { return stepHistogram(reader, v); });
   json["stored_within"] = Json::array();
-  for (size_t v = 0; v < manifest.variables.size(); ++v)
-    json["stored_within"].push_back(storedWithin(reader, v));
+  json["stored_errors"] = Json::array();
+  for (size_t v = 0; v < manifest.variables.size(); ++v) {
+    const auto [means, slopes] = storedErrors(reader, v);
+    json["stored_within"].push_back(means.largest);
+    json["stored_errors"].push_back({{"values", {{"largest", means.largest}, {"typical", means.typical}}},
+                                     {"slopes", {{"largest", slopes.largest}, {"typical", slopes.typical}}}});
+  }
   json["bytes"] = totalBytes(manifest);
   json["bytes_per_node"] = bytesPerSample(manifest, totalBytes(manifest));
   json["bricks_by_level"] = Json::array();
@@ -261,9 +273,14 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {
+    const auto [means, slopes] = storedErrors(reader, v);
     printLine("scalar     {} {}: {}, rounded within {:.1e}", m.variables[v].name,
               m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit),
-              rangeText(m.variables[v].min, m.variables[v].max, 6), storedWithin(reader, v));
+              rangeText(m.variables[v].min, m.variables[v].max, 6), means.largest);
+    fmt::print(
+        "           errors of stored values: at most {:.1e}, typically {:.1e}; of changes within a sample: "
+        "{:.1e}, {:.1e}\n",
+        means.largest, means.typical, slopes.largest, slopes.typical);
     printSpread("", stepHistogram(reader, v));
     if (reader.series().steps.size() > 1) printSpread(", all steps", seriesHistogram(reader, v));
   }

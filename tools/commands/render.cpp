@@ -101,7 +101,7 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
   files.insert(files.end(), arguments.solutions.begin(), arguments.solutions.end());
   const ValuePrecision precision = parseValuePrecision("--value-precision", arguments.value_precision);
   if (!isGrid(files)) {
-    if (precision != ValuePrecision::kNormal)
+    if (precision != ValuePrecision::kAuto)
       throw UsageError("--value-precision {}: is for grids; {} is a cache, which has its own",
                        arguments.value_precision, arguments.cache.string());
     return arguments.cache;
@@ -233,8 +233,8 @@ void addRender(CLI::App& app) {
       ->required();
   command->add_option("SOLUTION", arguments->solutions, "Further files of the grid");
   command->add_option("--value-precision", arguments->value_precision,
-                      "Precision of the values stored when CACHE is a grid: normal or fine, as for convert "
-                      "(default: normal)");
+                      "Precision of the values stored when CACHE is a grid: auto, normal or fine, as for "
+                      "convert (default: auto)");
   command
       ->add_option("-o,--output", arguments->output,
                    "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "

@@ -36,7 +36,7 @@ struct RenderArguments {
   SurfaceArguments surfaces;
   StepArguments steps;
   FrameArguments frame;
-  std::string backend = "auto", value_precision = "normal";
+  std::string backend = "auto", value_precision = "auto";
   std::optional<std::string> frame_rate, part, channels;
   AnnotationArguments annotations;
 };

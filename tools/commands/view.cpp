@@ -67,7 +67,7 @@ std::optional<std::vector<std::filesystem::path>> gridFirst(std::vector<std::fil
 struct ViewArguments {
   std::vector<std::filesystem::path>
       files;  // a cache, or a grid with its solutions; none: chosen in the window
-  std::string size = "1200x800", backend = "auto", value_precision = "normal";
+  std::string size = "1200x800", backend = "auto", value_precision = "auto";
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
   SurfaceArguments surfaces;
@@ -206,7 +206,8 @@ void addView(CLI::App& app) {
                       "converted into the user's cache folder. If none is given, the window asks for one");
   command->add_option(
       "--value-precision", arguments->value_precision,
-      "Precision of the values stored when FILE is a grid: normal or fine, as for convert (default: normal)");
+      "Precision of the values stored when FILE is a grid: auto, normal or fine, as for convert"
+      " (default: auto)");
   command->add_option("--size", arguments->size, "Size of the window, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
   command->add_option("--scalar", arguments->scalar, "Name of the scalar to show (default: as last time)");

@@ -58,7 +58,7 @@ struct ConvertArguments {
   std::vector<std::string> planes;  // --surface
   bool no_surfaces = false;
   std::optional<std::string> overlap;  // owner or all
-  std::string precision = "normal";    // or fine
+  std::string precision = "auto";      // or normal, fine
   std::optional<std::string> steps;    // of a series
   std::optional<uint64_t> every;
   bool keep_going = false, adds_steps = false, follows = false;

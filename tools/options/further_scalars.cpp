@@ -41,7 +41,7 @@ SeriesOptions optionsLike(const CacheReader& cache, const fs::path& output) {
   options.convert.title = cache.seriesManifest().title;
   options.convert.surfaces = FacesReader::open(cache.path(), cache.manifest()) != nullptr;
   options.convert.planes = planesOf(cache);
-  if (cache.manifest().hasFeature(kFineValues)) options.convert.precision = ValuePrecision::kFine;
+  options.convert.precision = precisionOf(cache.manifest());
   if (cache.manifest().overlap == kOverlapAll) options.convert.overlap = Overlap::kAll;
   return options;
 }

@@ -334,8 +334,7 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
   const std::vector<fs::path> files = wholePaths(given_files);
   const StampedFiles stamped(files, progress);
   const uint64_t contents = contentsOf(files, stamped, *folder / "known", progress);
-  const char* const suffix = precision == ValuePrecision::kFine ? "-fine" : "";
-  const fs::path place = *folder / fmt::format("{:016x}{}", contents, suffix);
+  const fs::path place = *folder / fmt::format("{:016x}-{}", contents, wordOf(precision));
   const fs::path cache = place / (files.front().stem().string() + ".splats");
   makePrivateFolders(place);
   {

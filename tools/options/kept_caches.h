@@ -35,7 +35,7 @@ bool isGrid(const std::vector<std::filesystem::path>& files);
 /// once `progress` is stopped.
 std::filesystem::path keptCacheOf(const std::vector<std::filesystem::path>& files, Progress& progress,
                                   const KeptCacheEvents& events, const std::vector<std::string>& scalars = {},
-                                  ValuePrecision precision = ValuePrecision::kNormal);
+                                  ValuePrecision precision = ValuePrecision::kAuto);
 
 /// Removes the caches in `folder` that were not used for longest, until the rest takes `limit` bytes at most. Keeps
 /// `kept`, and those that are being made.

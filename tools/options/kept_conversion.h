@@ -68,6 +68,6 @@ inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
 /// Interrupted once `progress` is stopped.
 void makeKeptCache(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output,
                    Progress& progress, const KeptCacheEvents& events,
-                   ValuePrecision precision = ValuePrecision::kNormal);
+                   ValuePrecision precision = ValuePrecision::kAuto);
 
 }  // namespace curvisplat

@@ -47,9 +47,10 @@ Backend parseBackend(std::string_view text);
 /// off?)".
 void requireChoice(std::string_view option, std::string_view text, const std::vector<std::string>& choices);
 
-/// The value of --value-precision: "normal" or "fine".
+/// The value of --value-precision: "auto", "normal" or "fine".
 inline ValuePrecision parseValuePrecision(std::string_view option, std::string_view text) {
-  requireChoice(option, text, {"normal", "fine"});
+  requireChoice(option, text, {"auto", "normal", "fine"});
+  if (text == "auto") return ValuePrecision::kAuto;
   return text == "fine" ? ValuePrecision::kFine : ValuePrecision::kNormal;
 }
 

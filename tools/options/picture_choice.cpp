@@ -11,6 +11,7 @@
 #include "render/automatic/first_choice.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
+#include "stream/cache/value_histogram.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {
@@ -159,7 +160,10 @@ std::pair<double, double> PictureChoice::parseRange(const std::string& text) {
     const double percent = parseNumber("--range", word.substr(0, word.size() - 1));
     if (!(percent >= 0 && percent <= 100))
       throw UsageError("--range {}: expected a percentage from 0% to 100%", text);
-    return data().percentile(percent / 100);
+    const auto stored =
+        what_ == ChosenFor::kSeries ? seriesHistogram(cache_, variable_) : stepHistogram(cache_, variable_);
+    return stored && !stored->percentiles.empty() ? stored->percentile(percent / 100)
+                                                  : data().percentile(percent / 100);
   };
   if (text.find('%') == std::string::npos) {
     const auto ends = parseNumbers("--range", text, "LO,HI");

@@ -274,7 +274,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   for (const std::filesystem::path& file : options.solutions)
     files += fmt::format(" {}", shellWord(file.string()));
   Words words(fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
-  if (options.fine_values) words.add("--value-precision", "fine");
+  if (options.precision != ValuePrecision::kAuto) words.add("--value-precision", wordOf(options.precision));
   const int multiple = options.turns ? 2 : 1;  // an .mp4 has an even width and height
   words.add("--size", fmt::format("{}x{}", options.size.width / multiple * multiple,
                                   options.size.height / multiple * multiple));

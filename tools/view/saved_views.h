@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "stream/codec/values_codec.h"
 #include "tools/view/view_state.h"
 
 namespace curvisplat {
@@ -50,7 +51,7 @@ struct CommandOptions {
   std::filesystem::path function_file, opacity_file;  // those that needsFile() asks for
   bool turns = false;                                 // a movie: once around the focal point
   std::vector<std::filesystem::path> solutions = {};  // where `cache` is a grid: its further files
-  bool fine_values = false;                           // of such a grid: --value-precision fine
+  ValuePrecision precision = ValuePrecision::kAuto;   // of such a grid: --value-precision
 };
 
 /// Whether options cannot state the function, so that it has to be in a file (toParaViewPreset()).

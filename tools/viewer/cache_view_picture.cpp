@@ -252,7 +252,7 @@ void CacheView::copyCommand(bool turns) {
     if (!grid_files_.empty() && grid_files_.size() <= kMaxNamedFiles) {
       options.cache = shortPath(grid_files_.front());
       for (size_t n = 1; n < grid_files_.size(); ++n) options.solutions.push_back(shortPath(grid_files_[n]));
-      options.fine_values = cache_.seriesManifest().hasFeature(kFineValues);
+      options.precision = precisionOf(cache_.seriesManifest());
     }
     const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
       if (!needsFile(function)) return;

@@ -35,14 +35,14 @@ def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory
              title: str) -> dict:
     return {"overwrite": _arguments.flag("overwrite", overwrite), "resume": _arguments.flag("resume", resume),
             "blank_value": blank_value, "threads": _arguments.whole("threads", threads), "title": _arguments.text("title", title),
-            "memory": "" if memory is None else str(memory), "value_precision": "normal"}
+            "memory": "" if memory is None else str(memory), "value_precision": "auto"}
 
 
 @_arguments.in_one_line
 def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, scalars: Union[str, Sequence[str]] = (),
             time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False, vertical_scale: float = 1,
             blank_value: Optional[float] = None, refine: int = 1, overwrite: bool = False, resume: bool = False,
-            memory: Union[str, int, None] = None, threads: int = 0, title: str = "", value_precision: str = "normal",
+            memory: Union[str, int, None] = None, threads: int = 0, title: str = "", value_precision: str = "auto",
             progress: Optional[Progress] = None) -> Report:
     """Converts grid files of any kind that `curvisplat convert` reads to the cache `output`, with the same bytes.
 
@@ -53,7 +53,7 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
     scalars: names (default: all that the files store). vertical_scale: the exaggeration of heights on the globe.
     blank_value: samples with this value are not drawn. refine: cut each cell into so many parts along each axis, by its own
     trilinear map (1 to 16). resume: go on from an interrupted conversion. memory: the limit of this process, in bytes or as
-    "2G". value_precision: "normal" (16 bits for the range of a brick) or "fine" (24). progress: called with (phase, done,
+    "2G". value_precision: "auto" (as fine as the spread of values needs), "normal" (16 bits for the range of a brick) or "fine" (24). progress: called with (phase, done,
     total, unit).
 
     Raises Error, UsageError and, after Ctrl-C, KeyboardInterrupt; then no partial cache is left unless `resume` was given,
@@ -115,7 +115,7 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
 @_arguments.in_one_line
 def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, refine: int = 1,
                    overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
-                   time: Optional[float] = None, value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
+                   time: Optional[float] = None, value_precision: str = "auto", progress: Optional[Progress] = None) -> Report:
     """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
 
     refine: as in convert(). time: of this step, if others are to follow by append_arrays(), with the same value_precision.
@@ -154,7 +154,7 @@ def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
                      scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None, refine: int = 1,
                      overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
-                     value_precision: str = "normal", progress: Optional[Progress] = None) -> Report:
+                     value_precision: str = "auto", progress: Optional[Progress] = None) -> Report:
     """Converts a grid larger than memory that `read` hands out piece by piece.
 
     shapes: (nk, nj, ni) of each block. scalars: names, or units by name. read(block, k0, k1, j0, j1, names) returns (x, y, z, [values of
