@@ -1,6 +1,8 @@
 #include "stream/cache/probe.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stream/model/kernel.h"
 
@@ -9,8 +11,8 @@ namespace {
 
 bool reaches(const Brick& brick, const glm::dvec3& point) {
   for (int axis = 0; axis < 3; ++axis)
-    if (point[axis] < brick.lower[axis] - brick.largest_radius ||
-        point[axis] > brick.upper[axis] + brick.largest_radius)
+    if (!(point[axis] >= brick.lower[axis] - brick.largest_radius &&
+          point[axis] <= brick.upper[axis] + brick.largest_radius))
       return false;
   return true;
 }
@@ -21,62 +23,96 @@ glm::dvec3 inFootprint(const SplatGeometry& g, size_t s, const glm::dvec3& d) {
   return {b0 / g.axis0[s], b1 / g.axis1[s], b2 / g.axis2[s]};
 }
 
-struct Nearest {
-  double distance = kKernelSupport;
-  bool found = false;
-  uint32_t brick = 0, splat = 0;
-  glm::dvec3 centre{0.0}, offset{0.0};
-  NodeRun node;
+/// What is known of a point so far.
+struct Probed {
+  std::optional<ProbeResult> nearest;
+  double weights = 0;
+  std::vector<double> values;  // [variable]: sums by weight
 };
 
-void findIn(const CacheReader& reader, uint32_t brick, const glm::dvec3& point, Nearest& nearest) {
-  SplatGeometry geometry;
-  std::vector<NodeRun> runs;
-  reader.readGeometry(brick, geometry, &runs);
-  const glm::dvec3 corner = reader.manifest().root.cellMin(reader.bricks()[brick].cell);
-  const glm::dvec3 local = point - corner;
-  bool better = false;
-  for (uint32_t s = 0; s < geometry.size(); ++s) {
-    const glm::dvec3 centre(geometry.x[s], geometry.y[s], geometry.z[s]);
-    const glm::dvec3 offset = inFootprint(geometry, s, local - centre);
-    const double distance = glm::length(offset);
-    if (!(distance < nearest.distance)) continue;
-    better = true;
-    nearest = {distance, true, brick, s, corner + centre, offset, {}};
-  }
-  if (!better) return;
+NodeRun nodeOf(std::span<const NodeRun> runs, uint32_t splat) {
   uint64_t first = 0;
   for (const NodeRun& run : runs) {
-    if (nearest.splat < first + run.count) {
-      nearest.node = {run.block, run.i + (nearest.splat - first), run.j, run.k, 1};
-      break;
-    }
+    if (splat < first + run.count) return {run.block, run.i + (splat - first), run.j, run.k, 1};
     first += run.count;
+  }
+  return {};
+}
+
+/// A leaf, decoded.
+struct Leaf {
+  uint32_t number;
+  SplatGeometry geometry;
+  std::vector<NodeRun> runs;
+  std::vector<SplatVariable> variables;
+};
+
+void addSplat(const Leaf& leaf, uint32_t s, const glm::dvec3& centre, const glm::dvec3& point,
+              Probed& probed) {
+  const glm::dvec3 offset = inFootprint(leaf.geometry, s, point - centre);
+  const double distance = glm::length(offset);
+  if (!(distance < kKernelSupport)) return;
+  const double inside = 1 - distance * distance / (kKernelSupport * kKernelSupport), weight = inside * inside;
+  const bool is_nearest = !probed.nearest || distance < probed.nearest->distance;
+  if (is_nearest) {
+    const NodeRun node = nodeOf(leaf.runs, s);
+    probed.nearest = ProbeResult{leaf.number, s, node.block, node.i, node.j, node.k, centre, distance, {}};
+    probed.nearest->variables.resize(leaf.variables.size());
+  }
+  probed.weights += weight;
+  for (size_t v = 0; v < leaf.variables.size(); ++v) {
+    const SplatVariable& values = leaf.variables[v];
+    const glm::dvec3 slope(values.slope0[s], values.slope1[s], values.slope2[s]);
+    probed.values[v] += weight * (values.mean[s] + glm::dot(slope, offset));
+    if (is_nearest) probed.nearest->variables[v].mean = values.mean[s];
   }
 }
 
 }  // namespace
 
+std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader, std::span<const size_t> variables,
+                                                 std::span<const glm::dvec3> points) {
+  std::vector<Probed> probed(points.size());
+  for (Probed& of_point : probed) of_point.values.resize(variables.size());
+  const auto bricks = reader.bricks();
+  Leaf leaf;
+  leaf.variables.resize(variables.size());
+  for (uint32_t n = 0; n < bricks.size(); ++n) {
+    if (!bricks[n].isLeaf()) continue;
+    std::vector<size_t> near;
+    for (size_t p = 0; p < points.size(); ++p)
+      if (reaches(bricks[n], points[p])) near.push_back(p);
+    if (near.empty()) continue;
+    // By x, so that a splat meets those alone that it may reach.
+    std::sort(near.begin(), near.end(), [&](size_t a, size_t b) { return points[a].x < points[b].x; });
+    leaf.number = n;
+    reader.readGeometry(n, leaf.geometry, &leaf.runs);
+    for (size_t v = 0; v < variables.size(); ++v) reader.readVariable(n, variables[v], leaf.variables[v]);
+    const glm::dvec3 corner = reader.manifest().root.cellMin(bricks[n].cell);
+    for (uint32_t s = 0; s < leaf.geometry.size(); ++s) {
+      const SplatGeometry& g = leaf.geometry;
+      const glm::dvec3 centre = corner + glm::dvec3(g.x[s], g.y[s], g.z[s]);
+      const double reach = kKernelSupport * g.axis0[s];
+      auto at = std::lower_bound(near.begin(), near.end(), centre.x - reach,
+                                 [&](size_t p, double x) { return points[p].x < x; });
+      for (; at != near.end() && points[*at].x <= centre.x + reach; ++at)
+        addSplat(leaf, s, centre, points[*at], probed[*at]);
+    }
+  }
+  std::vector<std::optional<ProbeResult>> results;
+  results.reserve(points.size());
+  for (Probed& of_point : probed) {
+    if (of_point.nearest && of_point.weights > 0)
+      for (size_t v = 0; v < variables.size(); ++v)
+        of_point.nearest->variables[v].value = static_cast<float>(of_point.values[v] / of_point.weights);
+    results.push_back(std::move(of_point.nearest));
+  }
+  return results;
+}
+
 std::optional<ProbeResult> probe(const CacheReader& reader, std::span<const size_t> variables,
                                  const glm::dvec3& point) {
-  Nearest nearest;
-  const auto bricks = reader.bricks();
-  for (uint32_t n = 0; n < bricks.size(); ++n)
-    if (bricks[n].isLeaf() && reaches(bricks[n], point)) findIn(reader, n, point, nearest);
-  if (!nearest.found) return std::nullopt;
-
-  const NodeRun& node = nearest.node;
-  ProbeResult result{nearest.brick, nearest.splat,  node.block,       node.i, node.j,
-                     node.k,        nearest.centre, nearest.distance, {}};
-  for (size_t v : variables) {
-    SplatVariable values;
-    reader.readVariable(nearest.brick, v, values);
-    const size_t s = nearest.splat;
-    const glm::dvec3 slope(values.slope0[s], values.slope1[s], values.slope2[s]);
-    result.variables.push_back(
-        {values.mean[s], static_cast<float>(values.mean[s] + glm::dot(slope, nearest.offset))});
-  }
-  return result;
+  return std::move(probeAll(reader, variables, {&point, 1}).front());
 }
 
 }  // namespace curvisplat

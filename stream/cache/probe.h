@@ -1,4 +1,4 @@
-// Finds the sample at a point and its values there. For `info --probe`.
+// Finds the sample at a point, and the values there. For `info --probe`, the window, the server and Python.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,9 @@
 namespace curvisplat {
 
 struct ProbeVariable {
-  float mean = 0;   // of the sample's splat
-  float value = 0;  // at the point, extrapolated with the splat's slope
+  float mean = 0;  // of the sample's splat, at its centre
+  float value =
+      0;  // at the point: what the splats that reach it say by their means and slopes, the nearer the more
 };
 
 struct ProbeResult {
@@ -21,14 +22,16 @@ struct ProbeResult {
   uint32_t splat = 0;
   uint32_t block = 0;  // of the node or cell; block, i, j and k count from 0
   uint64_t i = 0, j = 0, k = 0;
-  glm::dvec3 centre{0.0};  // world units
+  glm::dvec3 centre{0.0};  // of the splat: the middle of the sample's cell, world units
   double distance = 0;     // |A⁻¹(x - μ)|: 0 at the splat's centre, 1.556 at the edge of its support
   std::vector<ProbeVariable> variables;  // in the order of the argument
 };
 
-/// The leaf splat with the smallest `distance` from `point`; nullopt if no splat's support contains the
-/// point. Decodes the leaves whose splats may reach the point. `variables`: indices in manifest().variables.
-/// Throws as CacheReader.
+/// [point]: the leaf splat with the smallest `distance` from it; nullopt if no splat's support contains the point. Where a
+/// scalar is linear, its value is exact. Decodes the leaves whose splats may reach a point, each once. `variables`: indices in
+/// manifest().variables. Throws as CacheReader.
+std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader, std::span<const size_t> variables,
+                                                 std::span<const glm::dvec3> points);
 std::optional<ProbeResult> probe(const CacheReader& reader, std::span<const size_t> variables,
                                  const glm::dvec3& point);
 

@@ -319,7 +319,8 @@ TEST_F(Suggestions, Values) {
               fmt::format("did you mean {}?", file("flow.splats")));
   expectMeant({"generate", "half-anulus", "-o", file("x")}, "did you mean half-annulus?");
   expectMeant({"generate", "wake", "-o", file("x")}, "--size NIxNJxNK is required");
-  expectMeant({"info", file("flow.splats"), "--probe", "1,2"}, "--probe needs 3 values, found 2");
+  expectMeant({"info", file("flow.splats"), "--probe", "1,2"},
+              "--probe 1,2: expected x,y,z, found 2 numbers");
   const auto convert = [](const Words& options, const std::string& meant) {
     expectMeant(Words{"convert", file("a.xyz"), file("a.fun"), "-o", file("b.splats")} + options, meant);
   };

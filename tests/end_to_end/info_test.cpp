@@ -48,7 +48,9 @@ TEST_F(InfoOfACache, ProbesANode) {
   const std::string point = fmt::format("{},{},{}", at.x, at.y, at.z);
   const ProgramResult text = run({"info", folder_ / "b.splats", "--probe=" + point});
   EXPECT_TRUE(text.out.starts_with(point.substr(0, point.find(',')))) << text.out;
-  EXPECT_NE(text.out.substr(0, text.out.find('\n')).find("(counted from 0) at "), std::string::npos)
+  EXPECT_EQ(lineCount(text.out), 3) << "the probe and nothing else: " << text.out;
+  EXPECT_NE(text.out.substr(0, text.out.find('\n')).find("(counted from 0), the middle of whose cell is at "),
+            std::string::npos)
       << text.out;
   const ProgramResult result = runProgram({"info", folder_ / "b.splats", "--json", "--probe=" + point});
   const auto probe = nlohmann::json::parse(result.out)["probe"];
@@ -56,6 +58,25 @@ TEST_F(InfoOfACache, ProbesANode) {
   EXPECT_LT(probe["distance"], 0.1);
   EXPECT_EQ(probe["values"].size(), 2u);
   EXPECT_EQ(probe["values"][1]["name"], "mach");
+}
+
+TEST_F(InfoOfACache, ProbesAFileOfPoints) {
+  SmallCache cache;
+  cache.write(folder_ / "b.splats");
+  const glm::dvec3 at = cache.leaves[4].splats[10].position;
+  overwriteFile(folder_ / "points.csv", fmt::format("x,y,z\n{},{},{}\n900 0 0\n", at.x, at.y, at.z));
+  const ProgramResult table = run({"info", folder_ / "b.splats", "--probe", folder_ / "points.csv"});
+  const ProgramResult one =
+      runProgram({"info", folder_ / "b.splats", "--json", fmt::format("--probe={},{},{}", at.x, at.y, at.z)});
+  const auto values = nlohmann::json::parse(one.out)["probe"]["values"];
+  EXPECT_EQ(lineCount(table.out), 3) << table.out;
+  expectSays(table.out, "x,y,z,density,mach,block,i,j,k\n");
+  expectSays(table.out,
+             fmt::format(",{},{},1,", values[0]["value"].get<float>(), values[1]["value"].get<float>()));
+  expectSays(table.out, "900,0,0,,,,,,\n");
+  overwriteFile(folder_ / "points.csv", "0,0,0\n1,2\n");
+  expectRefused({"info", folder_ / "b.splats", "--probe", folder_ / "points.csv"}, 1,
+                {"points.csv", "line 2"});
 }
 
 TEST_F(InfoOfACache, VerifyFindsDamage) {

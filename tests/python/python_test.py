@@ -463,6 +463,22 @@ class CachesAreDescribed(PythonTest):
             self.assertIn("wake", repr(cache))
 
 
+class Probes(PythonTest):
+    def test_say_what_is_at_the_point_and_in_the_samples_cell(self):
+        """Of a linear scalar on bent cells: it is known everywhere."""
+        x, y, z, _ = bent_duct()
+        at = lambda p: 2 * p[0] + 3 * p[1] - p[2]
+        path = self.folder / "linear.splats"
+        curvisplat.convert_arrays(path, curvisplat.Block(x, y, z, {"t": at((x, y, z))}))
+        near = 2e-3 * np.ptp(at((x, y, z)))
+        with curvisplat.open(path) as cache:
+            for k, j, i in np.random.default_rng(1).integers(2, np.array(x.shape) - 3, (40, 3)):
+                point = [(c[k, j, i] + c[k + 1, j + 1, i + 1]) / 2 for c in (x, y, z)]
+                found = cache.probe(point)
+                self.assertAlmostEqual(found["values"]["t"], at(point), delta=near)
+                self.assertAlmostEqual(found["sample_values"]["t"], at(found["position"]), delta=near)
+
+
 class Arrays(PythonTest):
     def test_become_the_cache_that_the_same_file_becomes(self):
         x, y, z, t = bent_duct()

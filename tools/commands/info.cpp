@@ -24,6 +24,7 @@
 #include "stream/cache/value_histogram.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
+#include "tools/commands/info_probe.h"
 #include "tools/commands/info_steps.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/frame_sequence.h"
@@ -67,7 +68,7 @@ struct InfoOptions {
   bool json = false;
   bool verify = false;
   bool system = false;
-  std::vector<double> point;  // empty, or x, y, z
+  std::string probe;  // empty, x,y,z or the name of a file of points
   StepArguments steps;
 };
 
@@ -130,25 +131,11 @@ void printSpread(const char* of, const std::optional<ValueHistogram>& histogram)
           : "");
 }
 
-Json jsonOf(const ProbeResult& found, const CacheReader& reader) {
-  Json json = {{"block", found.block},
-               {"i", found.i},
-               {"j", found.j},
-               {"k", found.k},
-               {"centre", {found.centre.x, found.centre.y, found.centre.z}},
-               {"distance", found.distance}};
-  json["values"] = Json::array();
-  for (size_t v = 0; v < found.variables.size(); ++v)
-    json["values"].push_back({{"name", reader.manifest().variables[v].name},
-                              {"value", found.variables[v].value},
-                              {"mean", found.variables[v].mean}});
-  return json;
-}
-
 /// Results of --verify and --probe.
 struct Findings {
   CacheVerification verification;
-  std::optional<ProbeResult> probe;
+  ProbedPoints asked;
+  std::vector<std::optional<ProbeResult>> probes;
 };
 
 Findings examine(const CacheReader& reader, const InfoOptions& options) {
@@ -157,10 +144,9 @@ Findings examine(const CacheReader& reader, const InfoOptions& options) {
     Progress progress{progressBar()};
     found.verification = verifySteps(reader, progress);
   }
-  if (!options.point.empty()) {
-    std::vector<size_t> variables(reader.manifest().variables.size());
-    for (size_t v = 0; v < variables.size(); ++v) variables[v] = v;
-    found.probe = probe(reader, variables, {options.point[0], options.point[1], options.point[2]});
+  if (!options.probe.empty()) {
+    found.asked = parseProbe(options.probe);
+    found.probes = probeAll(reader, found.asked.points);
   }
   return found;
 }
@@ -197,29 +183,8 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
     json["findings"] = found.verification.findings;
     json["notes"] = found.verification.notes;
   }
-  if (!options.point.empty()) json["probe"] = found.probe ? jsonOf(*found.probe, reader) : Json(nullptr);
+  if (!options.probe.empty()) json["probe"] = probeAsJson(reader, found.asked, found.probes);
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
-}
-
-/// The answer to --probe, in words that need no knowledge of splats.
-void printProbe(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
-  const std::string point = fmt::format("{}, {}, {}", options.point[0], options.point[1], options.point[2]);
-  if (!found.probe) {
-    fmt::print("{}: outside of the data\n", point);
-    return;
-  }
-  const ProbeResult& probed = *found.probe;
-  const std::string block =
-      reader.manifest().blocks.size() > 1 ? fmt::format("block {}, ", probed.block + 1) : "";
-  const char* const of_refined = reader.manifest().refined > 1 ? " in the refined grid" : "";
-  fmt::print("{}: nearest {} {}i {}, j {}, k {} (counted from 0{}) at {:.6g}, {:.6g}, {:.6g}\n", point,
-             reader.manifest().cells ? "cell" : "node", block, probed.i, probed.j, probed.k, of_refined,
-             probed.centre.x, probed.centre.y, probed.centre.z);
-  for (size_t v = 0; v < probed.variables.size(); ++v) {
-    const VariableInfo& variable = reader.manifest().variables[v];
-    printLine("  {:<20} {:.6g}{} ({:.6g} there)", variable.name, probed.variables[v].value,
-              variable.unit.empty() ? "" : " " + variable.unit, probed.variables[v].mean);
-  }
 }
 
 /// The first ones and the last.
@@ -255,10 +220,6 @@ void printFiles(const CacheReader& reader) {
 
 void printAsText(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& m = reader.manifest();
-  if (!options.point.empty()) {
-    printProbe(reader, options, found);
-    fmt::print("\n");
-  }
   printLine("{}", m.title);
   printLine("written by {} from{}", m.program, sourcesText(m.sources));
   printLine("{}", m.reader);
@@ -307,20 +268,23 @@ void printCacheInfo(const InfoOptions& options) {
   const Findings found = examine(reader, options);
   if (options.json)
     printAsJson(reader, options, found);
-  else
-    printAsText(reader, options, found);
+  else if (!options.probe.empty())
+    printProbe(reader, found.asked, found.probes);
+  if (!options.json && (options.probe.empty() || options.verify)) printAsText(reader, options, found);
   if (hasUnfinished(options.grid.grid))
     printMessage("note: a conversion that replaces this cache is in progress or was interrupted");
   if (!found.verification.findings.empty())
     throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
                 found.verification.findings.size());
-  if (!options.point.empty() && !found.probe)
+  if (!options.probe.empty() && !found.asked.of_file && !found.probes.front()) {
+    const glm::dvec3& point = found.asked.points.front();
     throw Error(
         "{}: the point {}, {}, {} is outside of the data, which lies in x {:.6g} to {:.6g}, y {:.6g} to "
         "{:.6g}, z {:.6g} to {:.6g}",
-        options.grid.grid.string(), options.point[0], options.point[1], options.point[2],
-        reader.manifest().lower.x, reader.manifest().upper.x, reader.manifest().lower.y,
-        reader.manifest().upper.y, reader.manifest().lower.z, reader.manifest().upper.z);
+        options.grid.grid.string(), point.x, point.y, point.z, reader.manifest().lower.x,
+        reader.manifest().upper.x, reader.manifest().lower.y, reader.manifest().upper.y,
+        reader.manifest().lower.z, reader.manifest().upper.z);
+  }
 }
 
 void printInfo(const InfoOptions& options) {
@@ -330,7 +294,7 @@ void printInfo(const InfoOptions& options) {
   const fs::path& path = options.grid.grid;
   const bool is_cache = fs::is_directory(path) && !isGridFolder(path);
   if (is_cache || (!fs::exists(path) && hasUnfinished(path))) return printCacheInfo(options);
-  if (options.verify || !options.point.empty())
+  if (options.verify || !options.probe.empty())
     throw UsageError("{}: is not a splat cache (a directory); --verify and --probe need one",
                      options.grid.grid.string());
   printGridInfo(options.grid, {options.gas, std::nullopt}, options.json);
@@ -347,11 +311,11 @@ void addInfo(CLI::App& app) {
   info->add_flag("--system", options->system, "Print the drawing back ends of this machine instead");
   info->add_flag("--verify", options->verify,
                  "Read the whole cache and check it; exit with status 1 if it is damaged");
-  info->add_option("--probe", options->point,
-                   "Print the values at x,y,z and the nearest node or cell (block, i, j, k) before the rest; "
-                   "exit with status 1 if the point is outside the data")
-      ->delimiter(',')
-      ->expected(3);
+  info->add_option("--probe", options->probe,
+                   "Print the values at x,y,z and the nearest node or cell (block, i, j, k) alone, with exit "
+                   "status 1 if the "
+                   "point is outside the data; or a table of the values at all points of a file, whose lines "
+                   "begin with x,y,z");
   addStepOptions(*info, options->steps, "Time steps");
   addGridOptions(*info, options->grid);
   addGasOptions(*info, options->gas);

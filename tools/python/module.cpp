@@ -129,11 +129,15 @@ py::object probeAt(OpenCache& cache, const std::array<double, 3>& point) {
   for (size_t n = 0; n < reader.manifest().variables.size(); ++n) variables.push_back(n);
   const auto found = probe(reader, variables, vectorOf(point));
   if (!found) return py::none();
-  py::dict values;
-  for (size_t n = 0; n < variables.size(); ++n)
-    values[py::str(reader.manifest().variables[n].name)] = found->variables[n].value;
+  py::dict values, sample_values;
+  for (size_t n = 0; n < variables.size(); ++n) {
+    const py::str name(reader.manifest().variables[n].name);
+    values[name] = found->variables[n].value;
+    sample_values[name] = found->variables[n].mean;
+  }
   py::dict out;
   out["values"] = values;
+  out["sample_values"] = sample_values;
   out["block"] = found->block + 1;
   out["index"] = py::make_tuple(found->i, found->j, found->k);
   out["position"] = arrayOf(found->centre);

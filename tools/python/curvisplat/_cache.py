@@ -234,8 +234,9 @@ class Cache:
 
     @_arguments.in_one_line
     def probe(self, point: Vector) -> Optional[dict]:
-        """The sample that a point (x, y, z) lies in: {"values": {scalar: value}, "block": from 1, "index": (i, j, k) from 0, "position": of
-        the sample's splat, the middle of its cell, where it has these values}. None if the point is outside of the grid."""
+        """What is at a point (x, y, z): {"values": {scalar: value at the point}, "block": from 1, "index": (i, j, k) from 0 of the sample
+        that it lies in, "position": the middle of that sample's cell, "sample_values": {scalar: value there}}. None if the point is outside of
+        the grid."""
         return self._core.probe(_arguments.numbers("point", point, "(x, y, z)", 3))
 
     def _box(self, box: Optional[Vector]) -> Tuple[list, list]:
