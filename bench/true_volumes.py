@@ -1,0 +1,288 @@
+#!/usr/bin/env python3
+"""Draws small generated grids as a uniform medium and compares volumes and optical depths with exact ones.
+
+    bench/true_volumes.py FOLDER [--only REGEX] [--program PROGRAM] [--convert OPTION ...] [--json OUT.json]
+
+Each grid has one trouble of real ones: cells that grow quickly from a wall, closed rows, one layer of cells, joints at an angle,
+steep terrain, poles, separate points. A row has the sum of the splats' weights over the grid's volume (of trilinear cells, exact by
+quadrature), the least and the largest total optical depth of four views over the exact one, how far values go beyond the
+samples, in % of their range, and what is warmer than the middle of the range, over the true volume of that.
+"""
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+
+import numpy as np
+from scipy import ndimage
+
+HERE = pathlib.Path(__file__).resolve().parent
+VIEWS = {"+x": (1, 0, 0), "+y": (0, 1, 0), "+z": (0, 0, 1), "oblique": (0.6, 0.5, 0.62)}  # towards the camera
+PIXELS = 192
+BLOCK = 4  # pixels along the edge of the squares that depths are compared in
+
+
+def cell_corners(xyz):
+    """[cell, corner of 8, 3], the corner's number with bits along i, j, k."""
+    n = [slice(0, -1), slice(1, None)]
+    return np.stack([xyz[n[c & 1], n[c >> 1 & 1], n[c >> 2]].reshape(-1, 3) for c in range(8)], axis=1)
+
+
+def trilinear(corners, u, v, w):
+    """Positions (or values) and the Jacobian's determinant (of positions)."""
+    def shape(c):
+        return (u if c & 1 else 1 - u) * (v if c & 2 else 1 - v) * (w if c & 4 else 1 - w)
+    return sum(shape(c) * corners[:, c] for c in range(8))
+
+
+def determinant(corners, u, v, w):
+    c = corners
+    x_u = ((1 - v) * (1 - w))*(c[:, 1] - c[:, 0]) + (v * (1 - w))*(c[:, 3] - c[:, 2]) + ((1 - v) * w)*(c[:, 5] - c[:, 4]) + v * w * (c[:, 7] - c[:, 6])
+    x_v = ((1 - u) * (1 - w))*(c[:, 2] - c[:, 0]) + (u * (1 - w))*(c[:, 3] - c[:, 1]) + ((1 - u) * w)*(c[:, 6] - c[:, 4]) + u * w * (c[:, 7] - c[:, 5])
+    x_w = ((1 - u) * (1 - v))*(c[:, 4] - c[:, 0]) + (u * (1 - v))*(c[:, 5] - c[:, 1]) + ((1 - u) * v)*(c[:, 6] - c[:, 2]) + u * v * (c[:, 7] - c[:, 3])
+    return np.abs(np.einsum("ni,ni->n", x_u, np.cross(x_v, x_w)))
+
+
+def volumes(blocks, threshold, points):
+    """The volume of the trilinear cells, and of what is above the threshold."""
+    at, weight = np.polynomial.legendre.leggauss(points)
+    at, weight = (at + 1) / 2, weight / 2
+    whole = above = 0.0
+    for xyz, values in blocks:
+        corners = cell_corners(xyz)
+        of_nodes = values.shape == xyz.shape[:3]
+        f = cell_corners(np.repeat(values[..., None], 3, -1))[..., :1] if of_nodes else values.reshape(-1, 1, 1)
+        for u, a in zip(at, weight):
+            for v, b in zip(at, weight):
+                for w, c in zip(at, weight):
+                    part = a * b * c * determinant(corners, u, v, w)
+                    here = trilinear(f, u, v, w)[:, 0] if of_nodes else f[:, 0, 0]
+                    whole += part.sum()
+                    above += part[here > threshold].sum()
+    return whole, above
+
+
+def axes_of(view):
+    """Right, up and back."""
+    back = np.array(VIEWS[view]) / np.linalg.norm(VIEWS[view])
+    right = np.cross((0, 1, 0) if view == "+z" else (0, 0, 1), back)
+    right /= np.linalg.norm(right)
+    return right, np.cross(back, right), back
+
+
+def depths_of(blocks, middle, scale):
+    """The volume that lies behind each square of the picture, of each view: points in all cells, each with its share of the volume."""
+    count = PIXELS // BLOCK
+    sums = {view: np.zeros((count, count)) for view in VIEWS}
+    for xyz, _ in blocks:
+        corners = cell_corners(xyz)
+        along = max(6, int(np.ceil((1.2e7 / len(corners)) ** (1 / 3))))
+        at = (np.arange(along) + 0.5) / along
+        for u in at:
+            for v in at:
+                for w in at:
+                    part = determinant(corners, u, v, w) / along ** 3
+                    here = trilinear(corners, u, v, w) - middle
+                    for view in VIEWS:
+                        right, up, _ = axes_of(view)
+                        x, y = ((here @ axis / scale + 1) / 2 * count for axis in (right, up))
+                        sums[view] += np.histogram2d(y, x, bins=count, range=[[0, count], [0, count]], weights=part)[0]
+    return sums
+
+
+def lattice(i, j, k, to_xyz):
+    return np.stack(to_xyz(*np.meshgrid(i, j, k, indexing="ij")), axis=-1)
+
+
+def growing(first, factor, count):
+    return np.concatenate([[0], np.cumsum(first * factor ** np.arange(count))])
+
+
+def polar(r, t, z):
+    return r * np.cos(t), r * np.sin(t), z
+
+
+def sphere(r, lat, lon):
+    return r * np.cos(lat) * np.cos(lon), r * np.cos(lat) * np.sin(lon), r * np.sin(lat)
+
+
+def nodes(xyz, f):
+    return xyz, f(*np.moveaxis(xyz, -1, 0))
+
+
+def cells(xyz, f):
+    return xyz, f(*cell_corners(xyz).mean(axis=1).T).reshape([n - 1 for n in xyz.shape[:3]])
+
+
+def torus(around, layers):
+    def at(r, t, p):
+        return (3 + r * np.cos(t)) * np.cos(p), (3 + r * np.cos(t)) * np.sin(p), r * np.sin(t)
+    turn = np.linspace(0, 2 * np.pi, around + 1)
+    return lattice(layers, turn, turn, at)
+
+
+def closed(xyz, axis):
+    """Makes the last plane the first one's bits."""
+    xyz = np.moveaxis(xyz, axis, 0).copy()
+    xyz[-1] = xyz[0]
+    return np.moveaxis(xyz, 0, axis)
+
+
+def grids():
+    def height(x, y, z):
+        return z
+    radial = growing(0.01, 1.35, 18)
+    yield "omesh", [nodes(lattice(1 + radial, np.linspace(0, 1.5 * np.pi, 31), np.linspace(0, 3, 5), polar), height)]
+    spheres = lattice(1 + radial, np.linspace(-1.2, 1.2, 17), np.linspace(0, 4.5, 31), sphere)
+    yield "omesh_sphere", [nodes(spheres, height)]
+    yield "omesh_cells", [cells(lattice(1 + radial, np.linspace(0, 1.5 * np.pi, 31), np.linspace(0, 3, 5), polar), height)]
+    ring = lattice(np.linspace(1, 2, 9), np.linspace(0, 2 * np.pi, 37), np.linspace(0, 1, 9), polar)
+    yield "ring", [nodes(closed(ring, 1), height)]
+    yield "torus", [nodes(closed(closed(torus(24, np.linspace(0.5, 1, 7)), 1), 2), lambda x, y, z: np.hypot(np.hypot(x, y) - 3, z))]
+    thin = lattice(6371 + np.arange(9) * 0.02, np.radians(np.arange(-60, 61, 10)), np.radians(np.arange(0, 361, 10)), sphere)
+    yield "thin_layers", [nodes(closed(thin, 2), lambda x, y, z: 10 + 5 * (np.sqrt(x * x + y * y + z * z) - 6371) / 0.16)]
+    for degrees in (2, 5):
+        air = lattice(6371 + np.arange(13) * 30, np.radians(np.arange(-60, 61, degrees)), np.radians(np.arange(0, 361, degrees)), sphere)
+        yield f"sphere_{degrees}", [nodes(closed(air, 2), lambda x, y, z: 307 - 100 * (np.sqrt(x * x + y * y + z * z) - 6371) / 360)]
+    globe = lattice(np.linspace(1, 2, 9), np.radians(np.linspace(-90, 90, 19)), np.radians(np.arange(0, 361, 10)), sphere)
+    globe[:, [0, -1], :, :2] = 0
+    yield "poles", [nodes(closed(globe, 2), height)]
+    plate = lattice(np.linspace(0, 4, 41), np.linspace(0, 3, 31), [0, 0.6], lambda x, y, z: (x + 0.2 * y, y, z))
+    yield "slab_cells", [cells(plate, lambda x, y, z: x)]
+    u = np.linspace(0, 1, 17)
+    chevron = [lattice(u, u, u, lambda x, y, z, s=s: (s * x, y + 0.7 * x, z)) for s in (1, -1)]
+    yield "joint", [nodes(block, height) for block in chevron]
+    corner = [(0, 0), (1, 0), (0.5, 0.9), (-0.8, 0.8), (-1, -0.1), (-0.6, -1), (0.5, -0.9)]
+
+    def patch(a, b, c):
+        return lattice(u, u, u, lambda x, y, z: tuple(x * (1 - y) * a[n] + x * y * b[n] + (1 - x) * y * c[n] for n in (0, 1)) + (z,))
+    yield "corner", [nodes(patch(corner[1 + 2 * n], corner[2 + 2 * n], corner[1 + (2 * n + 2) % 6]), height) for n in range(3)]
+
+    def hill(x, y, s):
+        ground = 3 * np.exp(-((x - 5) ** 2 + (y - 5) ** 2) / 3)
+        return x, y, ground + s * (5 - ground)
+    flat = np.linspace(0, 10, 33)
+    yield "terrain", [nodes(lattice(flat, flat, np.linspace(0, 1, 17) ** 2, hill), height)]
+    sheared = lattice(np.linspace(0, 1, 17), np.linspace(0, 1, 17), np.linspace(0, 1, 17), lambda x, y, z: (x + 6 * z, y, z))
+    yield "sheared", [nodes(sheared, height)]
+    twist = lattice(np.linspace(1, 2, 13), np.linspace(0, 2 * np.pi, 49), np.linspace(0, 1, 9),
+                    lambda r, t, z: polar(r, t + 3 * r * z, 4 * z))
+    yield "field_lines", [nodes(closed(twist, 1), height)]
+
+
+def write_plot3d(path, blocks):
+    with open(path.with_suffix(".xyz"), "wb") as grid, open(path.with_suffix(".fun"), "wb") as function:
+        np.array([len(blocks)], "<i4").tofile(grid)
+        np.array([len(blocks)], "<i4").tofile(function)
+        for xyz, _ in blocks:
+            np.array(xyz.shape[:3], "<i4").tofile(grid)
+            np.array([*xyz.shape[:3], 1], "<i4").tofile(function)
+        for xyz, values in blocks:
+            xyz.transpose(3, 2, 1, 0).astype("<f8").tofile(grid)
+            values.transpose(2, 1, 0).astype("<f8").tofile(function)
+    return [path.with_suffix(".xyz"), path.with_suffix(".fun")]
+
+
+def write_cells(path, xyz, values):
+    extent = " ".join(f"0 {n - 1}" for n in xyz.shape[:3])
+    def text(array, components):
+        array = array.transpose(2, 1, 0, *([3] if components > 1 else [])).reshape(-1)
+        return " ".join(f"{x:.17g}" for x in array)
+    path.with_suffix(".vts").write_text(
+        f'<VTKFile type="StructuredGrid" version="0.1" byte_order="LittleEndian"><StructuredGrid WholeExtent="{extent}">'
+        f'<Piece Extent="{extent}"><CellData><DataArray type="Float64" Name="f" format="ascii">{text(values, 1)}</DataArray></CellData>'
+        f'<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{text(xyz, 3)}</DataArray></Points>'
+        "</Piece></StructuredGrid></VTKFile>")
+    return [path.with_suffix(".vts")]
+
+
+def write(path, blocks):
+    xyz, values = blocks[0]
+    return write_plot3d(path, blocks) if values.shape == xyz.shape[:3] else write_cells(path, xyz, values)
+
+
+def read_pfm(path):
+    with open(path, "rb") as file:
+        kind, size, scale = (file.readline().split() for _ in range(3))
+        channels = 3 if kind[0] == b"PF" else 1
+        return np.frombuffer(file.read(), "<f4" if float(scale[0]) < 0 else ">f4").reshape(int(size[1]), int(size[0]), channels)[..., 0]
+
+
+def measure(arguments, name, blocks):
+    path = arguments.folder / name
+    values = np.concatenate([v.ravel() for _, v in blocks])
+    low, high = values.min(), values.max()
+    middle = 0.5 * (low + high)
+    exact, above = volumes(blocks, middle, 6)
+    cache = path.with_suffix(".splats")
+    def run(*words):
+        return subprocess.run([str(arguments.program), *map(str, words)], check=True, capture_output=True, text=True).stdout
+    run("convert", *write(path, blocks), "-o", cache, "--overwrite", *(arguments.convert or []))
+    facts = json.loads(run("info", cache, "--json"))
+    row = {"grid": name, "weights": facts["volume"] / exact, "splats": facts["splats"]}
+    lower, upper = np.array(facts["lower"]), np.array(facts["upper"])
+    size = np.linalg.norm(upper - lower)
+    opaque = json.dumps([{"Name": "black", "RGBPoints": [low - 1, 0, 0, 0, high + 1, 0, 0, 0],
+                          "Points": [low - 1e9, 0.5, 0.5, 0, high + 1e9, 0.5, 0.5, 0]}])
+    step = json.dumps([{"Name": "step", "RGBPoints": [low - 1, 0, 0, 0, high + 1, 0, 0, 0],
+                        "Points": [low - 1e9, 0, 0.5, 0, middle, 0, 0.5, 0, middle + 1e-6 * (high - low), 0.5, 0.5, 0,
+                                   high + 1e9, 0.5, 0.5, 0]}])
+    totals, ratios, worst, outside = {}, [], 0.0, 0.0
+    scale, centre = 0.52 * size, (lower + upper) / 2
+    truth = depths_of(blocks, centre, scale)
+    for what, preset, volume in (("uniform", opaque, exact), ("above", step, above)):
+        chosen = path.with_suffix(f".{what}.json")
+        chosen.write_text(preset)
+        depths = []
+        for view in VIEWS:
+            picture = path.with_suffix(f".{what}{view}.pfm")
+            def point(p):
+                return ",".join(f"{x:.17g}" for x in p)
+            _, up, back = axes_of(view)
+            run("render", cache, "-o", picture, "--size", f"{PIXELS}x{PIXELS}", "--tf", chosen, f"--opacity-unit={size / 3}",
+                f"--position={point(centre + size * back)}", f"--focal-point={point(centre)}", f"--view-up={point(up)}",
+                "--parallel-scale", scale, "--lod-pixels", 0, "--backend", "cpu")
+            depth = -np.log(np.clip(read_pfm(picture), 1e-12, 1)) * (size / 3) / np.log(2)
+            depths.append(depth.sum() * (2 * scale / PIXELS) ** 2 / volume)
+            if what == "above":
+                continue
+            side = PIXELS // BLOCK
+            drawn = depth.reshape(side, BLOCK, side, BLOCK).mean(axis=(1, 3))
+            true = truth[view] / (2 * scale / side) ** 2
+            is_in = ndimage.minimum_filter(true, 3) > 0.05 * true.max()
+            ratios.append((drawn / np.where(is_in, true, 1))[is_in])
+            worst = max(worst, 255 * np.abs(np.exp2(-3 * drawn / size) - np.exp2(-3 * true / size)).max())
+            outside = max(outside, 100 * drawn[ndimage.maximum_filter(true, 3) == 0].sum() / drawn.sum())
+        totals[what] = depths
+    row |= {what: (min(d), max(d)) for what, d in totals.items()}
+    row |= {"rms_percent": max(100 * np.std(r / r.mean()) for r in ratios if len(r)), "worst_255": worst, "outside_percent": outside,
+            "p98_over_p2": max(np.quantile(r, 0.98) / np.quantile(r, 0.02) for r in ratios if len(r))}
+    return row
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--only", default=".*")
+    parser.add_argument("--program", default=HERE.parent / "build/release/tools/curvisplat")
+    parser.add_argument("--convert", action="append", help="an option for convert")
+    parser.add_argument("--json", type=pathlib.Path)
+    arguments = parser.parse_args()
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    rows = []
+    print(f"{'grid':<14} {'weights':>8} {'uniform, views':>16} {'above middle':>16} {'rms %':>6} {'p98/p2':>6} {'of 255':>6} {'outside %':>9} {'splats':>8}")
+    for name, blocks in grids():
+        if not re.search(arguments.only, name):
+            continue
+        row = measure(arguments, name, blocks)
+        print(f"{name:<14} {row['weights']:8.5f} {row['uniform'][0]:7.4f} {row['uniform'][1]:8.4f} {row['above'][0]:7.3f} "
+              f"{row['above'][1]:8.3f} {row['rms_percent']:6.2f} {row['p98_over_p2']:6.3f} {row['worst_255']:6.1f} {row['outside_percent']:9.3f} "
+              f"{row['splats']:8d}", flush=True)
+        rows.append(row)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
