@@ -121,7 +121,8 @@ class NoSink : public SplatSink {
 
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   const bool first_version = manifest.requirements.empty();
-  return first_version ? UnlikeHalves::kMerged : UnlikeHalves::kApart;
+  if (first_version) return UnlikeHalves::kMerged;
+  return manifest.stretch == kDualCells ? UnlikeHalves::kApart : UnlikeHalves::kApartInCells;
 }
 
 CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
@@ -134,7 +135,8 @@ CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
 
 void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                            const std::filesystem::path& temporary_folder, Progress& progress) {
-  is_steep_ = cache.manifest().stretch == kSteepStretch;
+  is_steep_ = cache.manifest().isSteep();
+  has_dual_cells_ = cache.manifest().stretch == kDualCells;
   cuts_octants_ = cache.manifest().hasFeature(kCellOctants);
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
@@ -146,6 +148,7 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
   NoSink none;
   SlabPass pass(progress);
   pass.steep = is_steep_;
+  pass.dual_cells = has_dual_cells_;
   pass.octants = cuts_octants_;
   streamSplats(
       NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },

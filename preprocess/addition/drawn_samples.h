@@ -80,9 +80,10 @@ class CacheGrid : public GridSource {
   const GridSource* source_;
   std::vector<uint64_t> first_nodes_;  // [block]
   std::unique_ptr<DrawnNodes> drawn_;
-  bool is_steep_ = true;      // of the cache (kSteepStretch)
-  bool cuts_octants_ = true;  // of the cache (kCellOctants)
-  bool all_faces_ = false;    // while merged ones are looked for: nodes of block faces are not restricted
+  bool is_steep_ = true;        // of the cache (isSteep())
+  bool has_dual_cells_ = true;  // of the cache (kDualCells)
+  bool cuts_octants_ = true;    // of the cache (kCellOctants)
+  bool all_faces_ = false;      // while merged ones are looked for: nodes of block faces are not restricted
 };
 
 /// An unstructured grid of which cells, or points, without a splat in the cache are hidden. Points that are

@@ -48,7 +48,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.overlap = splats.overlap;
   manifest.cells = origin.centring() == Centring::kCell;
   if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);
-  if (!manifest.cells && description.pieces.empty()) manifest.stretch = kSteepStretch;
+  if (description.pieces.empty()) manifest.stretch = kDualCells;
   manifest.refined = description.refined;
   manifest.nodes = survey.nodes;
   manifest.blanked_nodes = survey.blanked.total();

@@ -36,6 +36,7 @@ class SplatStream {
         seams_(&seams),
         workers_([this] { return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size()), {}}; }) {
     corrections_.steep = pass.steep;
+    corrections_.dual_cells = pass.dual_cells;
     corrections_.octants = pass.octants;
     corrections_.growth_codes = !pass.values_alone;
     if (pass.notes.from) before_ = *pass.notes.from;

@@ -59,6 +59,7 @@ struct SlabPass {
   ScatterNotes notes;             // of a scatter() without ranks
   bool octants = true;            // NodeSplatCorrections::octants
   bool steep = true;              // NodeSplatCorrections::steep
+  bool dual_cells = true;         // NodeSplatCorrections::dual_cells
   bool values_alone = false;      // are wanted: NodeSplatCorrections::growth_codes
 };
 

@@ -30,11 +30,11 @@ bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind) {
   return false;
 }
 
-void OpenBorders::add(const Splat& part, uint32_t border_code) {
+void OpenBorders::add(const Splat& part, uint32_t border_code, uint32_t closed) {
   const InwardAxes inward = inwardAxes(border_code);
   for (int a = 0; a < inward.count; ++a)
-    inward_.push_back(
-        {part.factor() * glm::dvec3(inward.axis[static_cast<size_t>(a)]), parts_, inward.hasFace(a)});
+    inward_.push_back({part.factor() * glm::dvec3(inward.axis[static_cast<size_t>(a)]), parts_,
+                       inward.hasFace(a), (closed >> a & 1) != 0});
   ++parts_;
 }
 
@@ -49,7 +49,7 @@ LayeredBorder OpenBorders::of(const Splat& merged, std::span<const Layer> layers
   std::vector<Open> open;
   for (size_t n = 0; n < directions.size(); ++n) {
     const glm::dvec3& direction = directions[n];
-    bool closed = false;
+    bool closed = inward_[n].closed;
     for (size_t m = 0; m < directions.size(); ++m)
       closed |= inward_[m].part != inward_[n].part && glm::dot(directions[m], direction) < kOpposite;
     if (closed) continue;
@@ -136,11 +136,11 @@ enum class Neighbourhood {
   kOther,     // of no face
 };
 
-Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
+Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b, JointFrames frames) {
   const InwardAxes of_a = inwardAxes(a.border_code), of_b = inwardAxes(b.border_code);
   int opposite = 0;
   bool unlike = false;
-  forEachOpposite(a, b, [&](int n, int m, double cosine) {
+  forEachOpposite(a, b, frames, [&](int n, int m, double cosine) {
     ++opposite;
     if (!of_a.hasFace(n) || !of_b.hasFace(m)) return;
     const double most = cosine < kStraight ? kMaxJointRatio : kMaxKinkedRatio;
@@ -158,13 +158,13 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
 
 /// The group of each part, numbered by its first part: parts on two sides of an unlike joint are in two. All
 /// zero if no joint is unlike.
-std::vector<size_t> groupsAtJoints(std::span<const NodeSplat> parts) {
+std::vector<size_t> groupsAtJoints(std::span<const NodeSplat> parts, JointFrames frames) {
   std::vector<size_t> group(parts.size());
   std::iota(group.begin(), group.end(), size_t{0});
   bool any_unlike = false;
   for (size_t a = 0; a < parts.size(); ++a)
     for (size_t b = a + 1; b < parts.size(); ++b) {
-      const Neighbourhood lie = neighbourhood(parts[a], parts[b]);
+      const Neighbourhood lie = neighbourhood(parts[a], parts[b], frames);
       any_unlike |= lie == Neighbourhood::kUnlike;
       if (lie == Neighbourhood::kUnlike || lie == Neighbourhood::kDiagonal) continue;
       const size_t to = std::min(group[a], group[b]), from = std::max(group[a], group[b]);
@@ -199,6 +199,7 @@ void MergedParts::begin(const NodeSplat& first, std::span<const SplatScalar> val
   merger_.clear();
   bend_.clear();
   borders_.clear();
+  rows_.clear();
   sides_.clear();
   nodes_.clear();
   add(first, values, sides);
@@ -212,7 +213,12 @@ void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values
   if (!sides.empty()) unstretchHalves(part, sides, half, values_of_half_);
   merger_.add(half.position, half, values_of_half_);
   bend_.add(half, half.position - origin_, values_of_half_);
-  borders_.add(part.splat, part.border_code);
+  uint32_t closed = 0;
+  if (frames_ == JointFrames::kRows) {
+    for (const JointSide& side : sides) closed |= 1u << side.direction;
+    rows_.add({part, half.position - origin_, values, values_of_half_}, sides);
+  }
+  borders_.add(part.splat, part.border_code, closed);
   if (part.node > lowest_.splat.node) return;
   lowest_.splat = part;
   sides_.assign(sides.begin(), sides.end());
@@ -236,13 +242,23 @@ std::vector<OpenBorders::Layer> MergedParts::layersOfLowest() const {
 SplatWithValues MergedParts::finish() const {
   SplatWithValues merged = lowest_;
   if (nodes_.size() == 1) return merged;
-  merger_.finish(merged.splat.splat, merged.values);
-  bend_.correct(merged.values);
+  const bool goes_on = frames_ == JointFrames::kRows && rows_.goOn();
+  if (goes_on) {
+    rows_.finish(origin_, merged.splat.splat, merged.values);
+  } else {
+    merger_.finish(merged.splat.splat, merged.values);
+    bend_.correct(merged.values);
+  }
   const LayeredBorder border = borders_.of(merged.splat.splat, layersOfLowest());
   merged.splat.border_code = border.code;
   merged.splat.layers = border.layers;
   merged.splat.regular = false;
-  stretchWhole(lowest_.splat, sides_, merged.splat, merged.values);
+  const Splat whole = merged.splat.splat;
+  const auto in_merged = [&](const glm::dvec3& direction) {
+    return goes_on ? rows_.inFrame(whole, lowest_.splat.splat, sides_, direction)
+                   : glm::normalize(inFrameOf(whole, lowest_.splat.splat.factor() * direction));
+  };
+  stretchWhole(lowest_.splat, sides_, in_merged, merged.splat, merged.values);
   return merged;
 }
 
@@ -258,7 +274,7 @@ void JointNodes::add(const NodeSplat& splat, std::span<const SplatScalar> values
 }
 
 MergedParts& JointNodes::nextGroup() {
-  if (group_count_ == groups_.size()) groups_.emplace_back(variables_);
+  if (group_count_ == groups_.size()) groups_.emplace_back(variables_, framesOf(unlike_));
   return groups_[group_count_++];
 }
 
@@ -311,8 +327,9 @@ void JointNodes::finishSeveral(const Sink& sink) {
   std::vector<const NodeSplat*> parts;
   for (const NodeSplat& part : parts_.splats()) parts.push_back(&part);
   std::vector<size_t> group(parts_.size(), 0);
-  if (unlike_ == UnlikeHalves::kApart) group = groupsAtJoints(parts_.splats());
-  const std::vector<JointSide> sides = sidesOf(parts, group);
+  const JointFrames frames = framesOf(unlike_);
+  if (unlike_ != UnlikeHalves::kMerged) group = groupsAtJoints(parts_.splats(), frames);
+  const std::vector<JointSide> sides = sidesOf(parts, group, frames);
   if (!all_merged_) mergeGroups(group, sides);
   for (size_t n = 0; n < group_count_; ++n) {
     const SplatWithValues merged = groups_[n].finish();

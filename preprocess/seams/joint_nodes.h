@@ -20,6 +20,7 @@
 #include <span>
 #include <vector>
 
+#include "preprocess/seams/joined_rows.h"
 #include "preprocess/seams/joint_sides.h"
 #include "preprocess/shape/merge.h"
 #include "preprocess/splats/face_layers.h"
@@ -41,7 +42,8 @@ class OpenBorders {
     inward_.clear();
     parts_ = 0;
   }
-  void add(const Splat& part, uint32_t border_code);
+  /// `closed`: bit n, the code's direction n leads to a side that another part is known to lie on.
+  void add(const Splat& part, uint32_t border_code, uint32_t closed = 0);
   /// The half cell of `merged`, the parts' splat. A direction inwards is closed by another part's opposite
   /// one, and several parts' similar ones are one, with a face to be cut at if all have; angles are measured
   /// in the merged cell's own frame, where thin cells are round.
@@ -61,6 +63,7 @@ class OpenBorders {
     glm::dvec3 along;  // world units, as long as the part's cell
     size_t part;
     bool face;
+    bool closed = false;
   };
   std::vector<Inward> inward_;
   size_t parts_ = 0;
@@ -96,8 +99,14 @@ class BendOfParts {
 /// What is done with coincident halves of unlike thickness.
 enum class UnlikeHalves {
   kApart,
-  kMerged,  // caches of version 1
+  kApartInCells,  // the same, by JointFrames::kCells
+  kMerged,        // caches of version 1; in their frames, too
 };
+
+/// How directions are compared.
+inline JointFrames framesOf(UnlikeHalves unlike) {
+  return unlike == UnlikeHalves::kApart ? JointFrames::kRows : JointFrames::kCells;
+}
 
 /// Halves are unlike if one is more than this many times as thick as the other.
 inline constexpr double kMaxJointRatio = 2.5;
@@ -138,7 +147,8 @@ class SplatList {
 /// Some of the nodes at one point as one splat. Made once and used for many points, since its sums allocate.
 class MergedParts {
  public:
-  explicit MergedParts(size_t variables) : merger_(variables), bend_(variables) {}
+  MergedParts(size_t variables, JointFrames frames)
+      : frames_(frames), merger_(variables), bend_(variables), rows_(variables) {}
 
   /// Forgets what it had. `sides`: those of the part.
   void begin(const NodeSplat& first, std::span<const SplatScalar> values, std::span<const JointSide> sides);
@@ -152,10 +162,12 @@ class MergedParts {
  private:
   std::vector<OpenBorders::Layer> layersOfLowest() const;
 
+  JointFrames frames_;
   glm::dvec3 origin_{0.0};
   SplatWithValues lowest_;
   SplatMerger merger_;
   BendOfParts bend_;
+  JoinedRows rows_;
   OpenBorders borders_;
   std::vector<JointSide> sides_;  // of the lowest
   std::vector<uint64_t> nodes_;

@@ -153,13 +153,28 @@ void Reshape::apply(NodeSplat& node, std::span<SplatScalar> values) const {
 
 }  // namespace
 
-std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::span<const size_t> group) {
+bool leaveOneFace(const NodeSplat& a, const glm::dvec3& inward_of_a, const NodeSplat& b,
+                  const glm::dvec3& inward_of_b) {
+  constexpr double kSameFace = -0.9999;  // cosine of normals, in the frame of one of the cells
+  const JointLine *of_a = a.lineAlong(inward_of_a), *of_b = b.lineAlong(inward_of_b);
+  if (of_a == nullptr || of_b == nullptr) return false;
+  const auto seen_in = [](const NodeSplat& cell, const glm::dvec3& inward, const NodeSplat& other,
+                          const glm::dvec3& inward_of_other) {
+    const glm::dvec3 normal = glm::transpose(cell.splat.factor()) * gradientOf(other.splat, inward_of_other);
+    return glm::dot(normal, inward) / glm::length(normal);
+  };
+  const glm::dvec3 p = of_a->exactInward(), q = of_b->exactInward();
+  return seen_in(a, p, b, q) < kSameFace && seen_in(b, q, a, p) < kSameFace;
+}
+
+std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::span<const size_t> group,
+                               JointFrames frames) {
   std::vector<JointSide> sides;
   for (size_t n = 0; n < parts.size(); ++n)
     for (size_t m = 0; m < parts.size(); ++m) {
       if (m == n || group[m] != group[n]) continue;
       const InwardAxes of_n = inwardAxes(parts[n]->border_code), of_m = inwardAxes(parts[m]->border_code);
-      forEachOpposite(*parts[n], *parts[m], [&](int a, int b, double) {
+      forEachOpposite(*parts[n], *parts[m], frames, [&](int a, int b, double) {
         const glm::dvec3 inward(of_n.axis[static_cast<size_t>(a)]), other(of_m.axis[static_cast<size_t>(b)]);
         const JointLine *own = parts[n]->lineAlong(inward), *beyond = parts[m]->lineAlong(other);
         const bool is_known = std::any_of(sides.begin(), sides.end(), [&](const JointSide& side) {
@@ -167,7 +182,15 @@ std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::spa
         });
         if (is_known || own == nullptr || beyond == nullptr) return;
         const CellRow here = own->row(), there = beyond->row();
-        sides.push_back({n, a, inward, {there[4], there[3], own->unit() + beyond->unit(), here[3], here[4]}});
+        const CellRow row{there[4], there[3], own->unit() + beyond->unit(), here[3], here[4]};
+        const NodeSplat& part = *parts[n];
+        if (frames == JointFrames::kRows) {
+          const glm::dvec3 exact = own->exactInward();
+          sides.push_back({n, a, exact, row, own->unit() / glm::length(part.splat.factor() * exact)});
+        } else {
+          const double stretch = stretchAtBorder(static_cast<double>(own->stretch(part.fit).factor));
+          sides.push_back({n, a, inward, row, 1 / (fittedFactor(part, inward) * stretch)});
+        }
       });
     }
   return sides;
@@ -183,20 +206,15 @@ void unstretchHalves(const NodeSplat& half, std::span<const JointSide> sides, Sp
   NodeSplat whole = half;
   Reshape reshape;
   for (const JointSide& side : sides) {
-    const Stretch stretch = half.lineAlong(side.inward)->stretch(half.fit);
-    const double factor =
-        1 / (fittedFactor(half, side.inward) * stretchAtBorder(static_cast<double>(stretch.factor)));
-    reshape.add(side.inward, {factor, kFaceOfHalf * (factor - 1), 0});
+    reshape.add(side.inward, {side.unstretch, kFaceOfHalf * (side.unstretch - 1), 0});
   }
   reshape.apply(whole, values);
   splat = whole.splat;
 }
 
-void stretchWhole(const NodeSplat& part, std::span<const JointSide> sides, NodeSplat& merged,
+void stretchWhole(const NodeSplat& part, std::span<const JointSide> sides,
+                  const std::function<glm::dvec3(const glm::dvec3&)>& in_merged, NodeSplat& merged,
                   std::span<SplatScalar> values) {
-  const auto in_merged = [&](const glm::dvec3& direction) {
-    return glm::normalize(inFrameOf(merged.splat, part.splat.factor() * direction));
-  };
   for (JointLine& line : merged.lines)
     if (line.isThere()) line.setInward(in_merged(line.inward()));
   merged.growth_code = growthAlong(cellGrowth(part.growth_code), in_merged);

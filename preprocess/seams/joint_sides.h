@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -25,10 +26,18 @@ struct JointSide {
   int direction = 0;
   glm::dvec3 inward{0.0};  // in the part's frame
   CellRow row{};           // around the whole cell, towards the part's side
+  double unstretch = 1;    // the length of an unstretched half over the part's
+};
+
+/// How directions of cells are compared at a joint.
+enum class JointFrames : uint8_t {
+  kRows,   // by the faces that they leave, too: thin layers may bend by more than they are thick
+  kCells,  // in the frames of the cells alone: caches without kDualCells (stream/cache/manifest.h)
 };
 
 /// The sides of parts of one group, by part and direction. `group`: [part]. Those without lines have none.
-std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::span<const size_t> group);
+std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::span<const size_t> group,
+                               JointFrames frames);
 
 /// By how much a half was made longer along a direction to fit where it is cut (LayerFit, face_layers.h).
 double fittedFactor(const NodeSplat& half, const glm::dvec3& inward);
@@ -39,8 +48,9 @@ void unstretchHalves(const NodeSplat& half, std::span<const JointSide> sides, Sp
                      std::span<SplatScalar> values);
 
 /// Makes `merged` as long as a whole cell is in the rows of `sides`, which are of `part`, one of those that
-/// it was merged of.
-void stretchWhole(const NodeSplat& part, std::span<const JointSide> sides, NodeSplat& merged,
+/// it was merged of. `in_merged`: the merged splat's frame of a unit vector of the part's.
+void stretchWhole(const NodeSplat& part, std::span<const JointSide> sides,
+                  const std::function<glm::dvec3(const glm::dvec3&)>& in_merged, NodeSplat& merged,
                   std::span<SplatScalar> values);
 
 /// The line of a node one away from the face, which was `line`, if one of the sides leads to the node.
@@ -51,11 +61,15 @@ std::optional<JointLine> lineBehind(std::span<const NodeSplat* const> parts, std
 /// lattice.
 void goOnAcross(size_t axis, const JointLine& joined, NodeSplat& behind, std::span<SplatScalar> values);
 
+/// Whether two cells end at one face, on its two sides, along directions of their codes that have lines.
+bool leaveOneFace(const NodeSplat& a, const glm::dvec3& inward_of_a, const NodeSplat& b,
+                  const glm::dvec3& inward_of_b);
+
 /// Finds which halves of two coincident nodes lie opposite to one another, across a joint: calls visit(n,
 /// m, cosine) for the directions n of a's border code that are opposite to directions m of b's. Directions
 /// on one line have the cosine -1.
 template <typename Visit>
-void forEachOpposite(const NodeSplat& a, const NodeSplat& b, const Visit& visit) {
+void forEachOpposite(const NodeSplat& a, const NodeSplat& b, JointFrames frames, const Visit& visit) {
   constexpr double kOpposite = -0.5;  // cosine of two directions, in the frame of a cell
   const InwardAxes of_a = inwardAxes(a.border_code), of_b = inwardAxes(b.border_code);
   for (int n = 0; n < of_a.count; ++n)
@@ -63,7 +77,10 @@ void forEachOpposite(const NodeSplat& a, const NodeSplat& b, const Visit& visit)
       const glm::dvec3 inward(of_a.axis[static_cast<size_t>(n)]), other(of_b.axis[static_cast<size_t>(m)]);
       const glm::dvec3 seen = inFrameOf(a.splat, b.splat.factor() * other);
       const double cosine = glm::dot(inward, seen) / glm::length(seen);
-      if (!(cosine > kOpposite)) visit(n, m, cosine);
+      if (!(cosine > kOpposite))
+        visit(n, m, cosine);
+      else if (frames == JointFrames::kRows && leaveOneFace(a, inward, b, other))
+        visit(n, m, -1.0);
     }
 }
 

@@ -35,7 +35,7 @@ class SeamSorter {
  public:
   using Visit = std::function<void(const SeamRecord&)>;
 
-  /// Keeps to `memory_bytes`, except that it holds a record (232 bytes with one variable) a run at least: 64
+  /// Keeps to `memory_bytes`, except that it holds a record (264 bytes with one variable) a run at least: 64
   /// MiB serve 10^11 nodes.
   SeamSorter(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -19,6 +20,12 @@ namespace {
 // A hexahedron whose volume is so far from its Jacobian's is folded: its axes stay as they are.
 constexpr double kMaxVolumeRatio = 8;
 
+/// Bit `axis`: the block is one cell thick along it.
+uint32_t singleAxes(const GridBlock& block, const NodeSplatCorrections& corrections) {
+  if (!corrections.dual_cells) return 0;
+  return (block.ni == 2 ? 1u : 0u) | (block.nj == 2 ? 2u : 0u) | (block.nk == 2 ? 4u : 0u);
+}
+
 /// What the cells of a box have in common.
 class Cells {
  public:
@@ -33,6 +40,7 @@ class Cells {
         known_{box.j0 - std::min<uint64_t>(box.j0, kReach), std::min(box.j1 + kReach, in.block.nj - 1),
                box.k0 - std::min<uint64_t>(box.k0, kReach), std::min(box.k1 + kReach, in.block.nk - 1)},
         cells_i_(in.block.ni - 1),
+        single_(singleAxes(in.block, corrections)),
         i0_(in.i0),
         i1_(in.endOfPart(cells_i_)),
         known_i0_(i0_ - std::min(i0_, kReach)),
@@ -49,8 +57,11 @@ class Cells {
 
   void addRow(uint64_t j, uint64_t k) {
     for (uint64_t i = i0_; i < i1_; ++i)
-      if (scratch_.there[cellAt(i, j, k)]) addCell(i, j, k);
+      if (scratch_.there[cellAt(i, j, k)])
+        for (uint32_t half = 0; half < kHalves; ++half)
+          if ((half & ~single_) == 0) addCell({i, j, k}, half);
   }
+  static constexpr uint32_t kHalves = 8;  // bit `axis` of a half's number: the upper one along that axis
   size_t count() const { return count_; }
 
  private:
@@ -68,7 +79,7 @@ class Cells {
   void lookAtRow(uint64_t j, uint64_t k);
   void measureRow(uint64_t j, uint64_t k, int axis);
   Stretch stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const;
-  void addCell(uint64_t i, uint64_t j, uint64_t k);
+  void addCell(const std::array<uint64_t, 3>& index, uint32_t half);
   std::array<glm::dvec3, 8> corners(size_t node) const {
     return cornersAt(in_.nodes->x.data(), in_.nodes->y.data(), in_.nodes->z.data(), node, row_stride_,
                      plane_stride_);
@@ -83,6 +94,7 @@ class Cells {
   const size_t row_stride_, plane_stride_;
   const NodeBox known_;                 // cells that are in the scratch: the box and its neighbours
   const uint64_t cells_i_;              // of a row
+  const uint32_t single_;               // bit `axis`: the block is one cell thick along it
   const uint64_t i0_, i1_;              // its part
   const uint64_t known_i0_, known_i1_;  // with its neighbours
   const NodeSplatCorrections corrections_;
@@ -173,18 +185,29 @@ double smallestAxis(const glm::dvec3& centre) {
   return std::max(kAxisFloor * (length > 0 ? length : 1.0), std::numeric_limits<double>::min());
 }
 
-void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
+/// Of a block that is one cell thick along some axes, each half of a cell along these is a splat of its own, since a
+/// border code has one face across each axis. The upper half has the number of a node on the block's last plane, which
+/// no cell has.
+void Cells::addCell(const std::array<uint64_t, 3>& index, uint32_t half) {
+  const auto [i, j, k] = index;
   const size_t node = nodeAt(i, j, k), cell = cellAt(i, j, k);
-  const Hexahedron hexahedron(corners(node));
+  Hexahedron hexahedron(corners(node));
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    if ((single_ >> axis & 1) == 0) continue;
+    glm::dvec3& column = hexahedron.jacobian[static_cast<int>(axis)];
+    column *= 0.5;
+    hexahedron.centre += ((half >> axis & 1) != 0 ? 0.5 : -0.5) * column;
+    hexahedron.volume_beyond *= 0.5;
+  }
   glm::dmat3 jacobian = hexahedron.jacobian;
 
   NodeSplat& splat = out_.splats[count_];
-  splat.node = in_.first_node + (k * in_.block.nj + j) * in_.block.ni + i;
+  splat.node = in_.first_node + ((k + (half >> 2)) * in_.block.nj + j + (half >> 1 & 1)) * in_.block.ni + i +
+               (half & 1);
   splat.on_block_face = splat.behind_face = false;
   splat.spacing = 0;
   splat.node_position = splat.splat.position = hexahedron.centre;
 
-  const std::array<uint64_t, 3> index{i, j, k};
   const std::array<uint64_t, 3> cells{cells_i_, in_.block.nj - 1, in_.block.nk - 1};
   const std::array<size_t, 3> cell_strides{1, known_i1_ - known_i0_,
                                            (known_i1_ - known_i0_) * (known_.j1 - known_.j0)};
@@ -202,8 +225,9 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const bool has_after = index[axis] + 1 < cells[axis] && scratch_.there[cell + cell_strides[axis]];
     before[axis] = has_before ? node - node_strides[axis] : node;
     after[axis] = has_after ? node + node_strides[axis] : node;
-    const bool open_before = !has_before && isBorder(index, axis, false);
-    const bool open_after = !has_after && isBorder(index, axis, true);
+    const bool is_half = (single_ >> axis & 1) != 0, is_upper = (half >> axis & 1) != 0;
+    const bool open_before = !has_before && !(is_half && is_upper) && isBorder(index, axis, false);
+    const bool open_after = !has_after && !(is_half && !is_upper) && isBorder(index, axis, true);
     if (open_before != open_after) inwards[axis] = open_before ? 1 : -1;
     per_step[axis] = has_before && has_after ? 0.5 : 1.0;
     // Without any neighbour there is no difference along this axis, and the cell's own extent is the step.
@@ -315,7 +339,7 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnd
 
   const uint64_t end = in.endOfPart(block.ni - 1);
   if (in.i0 >= end) return;
-  const size_t most = (end - in.i0) * rowsOf(cells);
+  const size_t most = (end - in.i0) * rowsOf(cells) << std::popcount(singleAxes(block, corrections));
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);

@@ -137,6 +137,50 @@ HWY_INLINE V3 asideOf(const V3& to_before, const V3& to_after, V before, V after
           hn::IfThenElseZero(has_length, aside.z)};
 }
 
+HWY_INLINE V3 cross(const V3& a, const V3& b) {
+  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(b.y, a.z)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(b.z, a.x)),
+          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(b.x, a.y))};
+}
+
+/// As gentleVolume() (dual_cell.cpp), from the same differences along the axes.
+/// `growth`: as widthGrowth() (dual_cell.h).
+HWY_INLINE V gentleVolume(const InnerRow& row, ptrdiff_t at, const V3 (&x)[3], const V3 (&xx)[3],
+                          V (&growth)[3]) {
+  V3 mixed[3], third[3];
+  for (size_t p = 0; p < 3; ++p) third[p] = times(number(-4), x[p]);
+  for (size_t r = 0; r < 3; ++r) {
+    const size_t p = (r + 1) % 3, q = (r + 2) % 3;
+    const ptrdiff_t sum = row.strides[p] + row.strides[q], difference = row.strides[p] - row.strides[q];
+    const V3 after = load(row.positions, at + sum), before = load(row.positions, at - sum),
+             aside = load(row.positions, at + difference), other = load(row.positions, at - difference);
+    const V3 a = after - before, b = aside - other;
+    mixed[r] = times(number(0.25), (after + before) - (aside + other));
+    third[p] = third[p] + times(number(0.5), a + b);
+    third[q] = third[q] + times(number(0.5), a - b);
+  }
+  V correction = hn::Zero(Doubles());
+  const V3 area[3] = {cross(x[1], x[2]), cross(x[2], x[0]), cross(x[0], x[1])};
+  const V volume = dot(x[0], area[0]);
+  for (V& of_axis : growth) of_axis = hn::Zero(Doubles());
+  for (size_t r = 0; r < 3; ++r) {
+    const size_t p = (r + 1) % 3, q = (r + 2) % 3;
+    growth[p] = hn::Add(growth[p], dot(area[q], mixed[r]));
+    growth[q] = hn::Add(growth[q], dot(area[p], mixed[r]));
+  }
+  for (V& of_axis : growth)
+    of_axis = hn::IfThenElseZero(hn::Ne(volume, hn::Zero(Doubles())),
+                                 smaller(larger(hn::Div(of_axis, volume), number(-1)), number(1)));
+  for (size_t p = 0; p < 3; ++p) {
+    const size_t q = (p + 1) % 3, r = (p + 2) % 3;
+    const V3 bent =
+        (cross(mixed[p], xx[r]) + cross(xx[q], mixed[p])) + times(number(0.5), cross(mixed[r], mixed[q]));
+    correction = hn::Add(correction, hn::Add(dot(third[p], area[p]), dot(x[p], bent)));
+  }
+  correction = hn::Mul(correction, number(0.125));
+  const auto is_gentle = hn::Le(hn::Abs(correction), hn::Mul(number(kMaxCorrection), hn::Abs(volume)));
+  return hn::IfThenElseZero(is_gentle, hn::Add(volume, correction));
+}
+
 /// Stages the geometry of nodes `node` and on.
 HWY_INLINE Factors stageGeometry(const InnerRow& row, size_t node, size_t lane, InnerSplats& out,
                                  Cells& cells) {
@@ -144,21 +188,34 @@ HWY_INLINE Factors stageGeometry(const InnerRow& row, size_t node, size_t lane, 
   const V zero = hn::Zero(d);
   const ptrdiff_t at = row.at + static_cast<ptrdiff_t>(node);
   const V3 here = load(row.positions, at);
-  V3 jacobian[3], bend{zero, zero, zero}, aside{zero, zero, zero};
+  V3 jacobian[3], second[3], bend{zero, zero, zero}, aside{zero, zero, zero};
   V stretch[3], middle[3];
+  V distance[3][2];  // to the neighbours along an axis
+  V3 to_neighbours[3][2];
   for (size_t axis = 0; axis < 3; ++axis) {
     const V3 before = load(row.positions, at - row.strides[axis]),
              after = load(row.positions, at + row.strides[axis]);
     jacobian[axis] = times(number(0.5), after - before);
     const V3 to_before = here - before, to_after = after - here;
-    const V a = length(to_before), b = length(to_after), both = hn::Add(a, b);
-    stretch[axis] = load(row.stretch[axis] + node);
+    to_neighbours[axis][0] = to_before;
+    to_neighbours[axis][1] = to_after;
+    second[axis] = to_after - to_before;
+    distance[axis][0] = length(to_before);
+    distance[axis][1] = length(to_after);
+  }
+  V growth[3];
+  hn::Store(hn::Abs(gentleVolume(row, at, jacobian, second, growth)), d, out.weight + lane);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const V a = distance[axis][0], b = distance[axis][1], both = hn::Add(a, b);
+    const V narrower = hn::Sub(number(1), hn::Mul(number(kWidthShare), hn::Mul(growth[axis], growth[axis])));
+    stretch[axis] = hn::Mul(load(row.stretch[axis] + node), narrower);
     cells.stretch2[axis] = hn::Mul(stretch[axis], stretch[axis]);
-    bend = bend + times(cells.stretch2[axis], to_after - to_before);
-    aside = aside + asideOf(to_before, to_after, a, b);
+    bend = bend + times(cells.stretch2[axis], second[axis]);
+    aside = aside + asideOf(to_neighbours[axis][0], to_neighbours[axis][1], a, b);
     const V beside =
         hn::IfThenElseZero(hn::Gt(both, zero), hn::Div(hn::Mul(number(0.5), hn::Sub(b, a)), both));
-    middle[axis] = hn::Add(beside, load(row.drift[axis] + node));
+    middle[axis] =
+        hn::Add(hn::Add(beside, load(row.drift[axis] + node)), hn::Mul(number(kWidthDrift), growth[axis]));
   }
   const V3 moved{sum(hn::Mul(jacobian[0].x, middle[0]), hn::Mul(jacobian[1].x, middle[1]),
                      hn::Mul(jacobian[2].x, middle[2])),
@@ -168,7 +225,6 @@ HWY_INLINE Factors stageGeometry(const InnerRow& row, size_t node, size_t lane, 
                      hn::Mul(jacobian[2].z, middle[2]))};
   put(here + moved + aside, out.position, lane);
   for (size_t axis = 0; axis < 3; ++axis) jacobian[axis] = times(stretch[axis], jacobian[axis]);
-  const V shrink = hn::Div(number(1), hn::Mul(hn::Mul(stretch[0], stretch[1]), stretch[2]));
 
   const Factors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
                    {jacobian[0].y, jacobian[1].y, jacobian[2].y},
@@ -176,7 +232,6 @@ HWY_INLINE Factors stageGeometry(const InnerRow& row, size_t node, size_t lane, 
   put({lq.a00, lq.a11, lq.a22}, out.axis, lane);
   put({hn::Mul(lq.a10, lq.inverse_a00), hn::Mul(lq.a20, lq.inverse_a00), hn::Mul(lq.a21, lq.inverse_a11)},
       out.shear, lane);
-  hn::Store(hn::Mul(hn::Abs(lq.determinant), shrink), d, out.weight + lane);
   hn::Store(lq.determinant, d, out.determinant + lane);
   const V one = number(1);
   put(lq.rotate({one, zero, zero}), out.rotated[0], lane);
@@ -187,8 +242,12 @@ HWY_INLINE Factors stageGeometry(const InnerRow& row, size_t node, size_t lane, 
 
   cells.stretch = {stretch[0], stretch[1], stretch[2]};
   cells.middle = {middle[0], middle[1], middle[2]};
-  cells.bend_in_cells = lq.inFrame(bend);
-  cells.aside_in_cells = lq.inFrame(aside);
+  const V3 in_cells = lq.inFrame(bend);
+  const V limit = number(kMaxBend);
+  const V largest = larger(larger(hn::Abs(in_cells.x), hn::Abs(in_cells.y)), hn::Abs(in_cells.z));
+  const V share = hn::Div(limit, larger(limit, largest));
+  cells.bend_in_cells = times(share, in_cells);
+  cells.aside_in_cells = times(share, lq.inFrame(aside));
   return lq;
 }
 
@@ -231,8 +290,9 @@ void computeInnerNodes(const InnerRow& row, size_t first, InnerSplats& out, Spla
     }
   }
   for (size_t n = 0; n < kAtOnce; ++n)
-    out.is_plain[n] = surelyAboveFloor({out.lower[0][n], out.lower[1][n], out.lower[2][n], out.lower[3][n],
-                                        out.lower[4][n], out.lower[5][n]});
+    out.is_plain[n] =
+        out.weight[n] > 0 && surelyAboveFloor({out.lower[0][n], out.lower[1][n], out.lower[2][n],
+                                               out.lower[3][n], out.lower[4][n], out.lower[5][n]});
 }
 
 }  // namespace HWY_NAMESPACE

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -11,6 +12,7 @@
 #include "preprocess/shape/covered_part.h"
 #include "preprocess/shape/shape.h"
 #include "preprocess/splats/block_window.h"
+#include "preprocess/splats/dual_cell.h"
 #include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/inner_nodes.h"
 #include "preprocess/splats/window_lines.h"
@@ -44,6 +46,13 @@ class Window {
 
  private:
   uint64_t octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const;
+  uint32_t cellsAt(ptrdiff_t at, uint64_t i) const {
+    return cellsAround(lattice_, at, {1, row_stride_, plane_stride_}, {i, row_j_, row_k_},
+                       {ni_, in_.block.nj, in_.block.nk});
+  }
+  bool takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
+                 const std::array<double, 3>& inwards);
+  double weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) const;
   void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
   void takeInnerNode(const InnerSplats& splats, const InnerGrowthCodes& growth, size_t n, uint64_t i,
                      ptrdiff_t at);
@@ -170,6 +179,41 @@ uint64_t Window::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) con
   return points == kAllCovered ? 0 : points;
 }
 
+/// The weight of a node's splat, of which keepPart() takes what reaches into blanked cells. A node without any cell keeps
+/// the piece that its neighbours give it.
+double Window::weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) const {
+  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
+  const uint32_t there = corrections_.dual_cells ? cellsAt(at, i) : 0;
+  if (there == 0) return of_neighbours;
+  const int kept = static_cast<int>(kCellPoints) - std::popcount(octants_of_blanks_);
+  return dualVolume(lattice_, at, strides, there) * static_cast<double>(kCellPoints) / kept;
+}
+
+constexpr double kCollapsed = 1e-9;  // of the distance to the nearest neighbour that is elsewhere
+
+/// Of the last node, whose cell has collapsed. False if its piece has no volume either.
+bool Window::takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
+                       const std::array<double, 3>& inwards) {
+  if (!corrections_.dual_cells || (in_.covered && in_.covered[at] != 0)) return false;
+  double shortest = std::numeric_limits<double>::infinity();  // of the columns: thin cells have not collapsed
+  for (int axis = 0; axis < 3; ++axis)
+    shortest = std::min(shortest, glm::distance(lattice_.position(at + neighbours.after[axis]),
+                                                lattice_.position(at + neighbours.before[axis])));
+  if (shortest > kCollapsed * lattice_.spacing(at, neighbours)) return false;
+  const CollapsedNode collapsed{lattice_,       at,      {1, row_stride_, plane_stride_}, neighbours,
+                                cellsAt(at, i), inwards, smallestAxis(at, neighbours)};
+  const auto piece = splatOfPiece(collapsed, scalars_,
+                                  std::span(out_.values).subspan(count_ * scalars_.size(), scalars_.size()));
+  if (!piece) return false;
+  NodeSplat& node = out_.splats[count_];
+  node.splat = piece->splat;
+  node.border_code = piece->border_code;
+  node.growth_code = kNoGrowth;
+  node.regular = false;
+  node.lines = {};
+  return true;
+}
+
 /// The nodes from i0 to i1 of a row without blanks around it. `row`: the element of its first node.
 void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours) {
   const uint64_t in_part = i0 - i0_, count = i1 - i0;
@@ -257,6 +301,23 @@ glm::dmat3 alongFaces(const std::array<double, 3>& inwards, const Layers& layers
   return along;
 }
 
+/// Makes a half cell that is narrower or wider than its face shorter or longer, for it to be as dense at its border as the
+/// cell is: by its volume, over the one that its columns have at the face.
+void fitToVolume(double volume, double of_columns, const std::array<double, 3>& inwards, glm::dvec3& middle,
+                 glm::dvec3& stretch) {
+  constexpr double kMax = 1.5;
+  const auto halves =
+      std::count_if(inwards.begin(), inwards.end(), [](double inward) { return inward != 0; });
+  if (halves == 0 || !(volume > 0) || !(of_columns > 0) || volume == of_columns) return;
+  const double factor =
+      std::pow(std::clamp(volume / of_columns, 1 / kMax, kMax), 1 / static_cast<double>(halves));
+  for (int axis = 0; axis < 3; ++axis) {
+    if (inwards[static_cast<size_t>(axis)] == 0) continue;
+    middle[axis] *= factor;
+    stretch[axis] *= factor;
+  }
+}
+
 inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face,
                             const Layers& layers) {
   const uint64_t in_part = i - i0_;
@@ -287,6 +348,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   glm::dvec3 aside(0.0);            // from the node to the cell's middle, across the columns
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
   std::array<float, 3> growth{};
+  std::array<double, 3> widths{};
+  if (corrections_.growth && corrections_.dual_cells) widths = widthGrowth(lattice_, at, neighbours);
   double nearest = std::numeric_limits<double>::infinity();  // neighbour that is not at the node's own place
   double weight_factor = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -296,6 +359,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     if (a > 0) nearest = std::min(nearest, a);
     if (b > 0) nearest = std::min(nearest, b);
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
+    const double width = whole ? widths[static_cast<size_t>(axis)] : 0.0;
+    stretch[axis] *= 1 - kWidthShare * (width * width);
     if (whole) {
       bend += stretch[axis] * stretch[axis] * (to_after - to_before);
       if (corrections_.middles) aside += asideOf(to_before, to_after, a, b);
@@ -304,6 +369,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     if (corrections_.growth) growth[axis] = scratch_.growth[axis][in_part];
     if (whole) {
       if (corrections_.growth) middle[axis] += scratch_.drift[axis][in_part];
+      if (corrections_.dual_cells) middle[axis] += kWidthDrift * width;
       continue;
     }
     if (corrections_.border_codes) {
@@ -318,6 +384,9 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       weight_factor *= 0.5;
     }
   }
+  const double of_neighbours = std::abs(glm::determinant(jacobian)) * weight_factor;
+  const double weight = weightOf(at, i, of_neighbours);
+  fitToVolume(weight, of_neighbours, inwards, middle, stretch);
   if (corrections_.fitsLayers() && (on_face || layers != Layers{}))
     node.fits_layers = fitToLayers({inwards, layers, node.lines}, {middle, stretch, growth});
   node.spacing = on_face && std::isfinite(nearest) ? nearest : 0.0;
@@ -332,8 +401,11 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const bool correct_bends = kPlain && corrections_.bends;
     glm::dvec3 bend_in_cells(0.0), aside_in_cells(0.0);
     if constexpr (kPlain) {
-      if (correct_bends) bend_in_cells = frame.inFrame(bend);
-      aside_in_cells = frame.inFrame(aside);
+      const glm::dvec3 in_cells = frame.inFrame(bend), bent = glm::abs(in_cells);
+      const double largest = std::max(std::max(bent.x, bent.y), bent.z);
+      const double share = corrections_.dual_cells ? kMaxBend / std::max(kMaxBend, largest) : 1.0;
+      if (correct_bends) bend_in_cells = share * in_cells;
+      aside_in_cells = share * frame.inFrame(aside);
     }
     SplatScalar* value = out_.values.data() + count_ * scalars_.size();
     for (const float* f : scalars_) {
@@ -359,8 +431,10 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   splatFromJacobian(
       jacobian, node.splat, [&] { return smallestAxis(at, neighbours); },
       [&](const auto& frame) {
+        if (frame.floored() && takePiece(i, at, neighbours, inwards)) return;
         const auto rotate = [&](const glm::dvec3& v) { return frame.rotate(v); };
-        node.splat.weight = std::abs(frame.determinant()) * weight_factor * shrink;
+        node.splat.weight =
+            corrections_.dual_cells ? weight : std::abs(frame.determinant()) * weight_factor * shrink;
         node.regular = !frame.floored() && weight_factor == 1;
         node.border_code = borderCode(inwards, corrections_.faces && !frame.floored(), rotate);
         const bool has_growth =

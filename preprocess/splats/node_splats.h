@@ -144,11 +144,13 @@ struct NodeSplatCorrections {
   bool lines = true;    // else cells at joints know their own block alone; takes growth and stretch
   bool steep = true;    // else stretches are StretchFit::kGentle (kSteepStretch)
   bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
+  // Else weights are |det J|, and the scalars of bent layers follow their slopes however far (kMaxBend).
+  bool dual_cells = true;
   // Else splats that are not for seams have none: values do not depend on them, and they take a sixth of the time.
   bool growth_codes = true;
 
   bool all() const {
-    return border_codes && faces && layers && middles && bends && stretch && growth && lines;
+    return border_codes && faces && layers && middles && bends && stretch && growth && lines && dual_cells;
   }
   StretchFit fit() const { return steep ? StretchFit::kSteep : StretchFit::kGentle; }
   bool fitsLayers() const { return steep && layers && faces && growth && lines; }

@@ -181,8 +181,15 @@ glm::dvec3 JointLine::inward() const {
   return glm::normalize(glm::dvec3(inward_[0], inward_[1], inward_[2]));
 }
 
+glm::dvec3 JointLine::exactInward() const {
+  return glm::normalize(glm::dvec3(exact_inward_[0], exact_inward_[1], exact_inward_[2]));
+}
+
 void JointLine::setInward(const glm::dvec3& unit_vector) {
-  for (int n = 0; n < 3; ++n) inward_[static_cast<size_t>(n)] = rounded(kMax * unit_vector[n]);
+  for (int n = 0; n < 3; ++n) {
+    inward_[static_cast<size_t>(n)] = rounded(kMax * unit_vector[n]);
+    exact_inward_[static_cast<size_t>(n)] = static_cast<float>(unit_vector[n]);
+  }
 }
 
 }  // namespace curvisplat

@@ -242,6 +242,8 @@ class JointLine {
 
   /// Which way the row leads, away from the face, in the frame of the node's splat: to a hundredth.
   glm::dvec3 inward() const;
+  /// The same to 1e-7: thin layers that are bent are many times as wide as they are thick.
+  glm::dvec3 exactInward() const;
   void setInward(const glm::dvec3& unit_vector);
 
  private:
@@ -250,6 +252,7 @@ class JointLine {
   float unit_ = 0;
   std::array<int8_t, 5> logarithms_{};
   std::array<int8_t, 3> inward_{};
+  std::array<float, 3> exact_inward_{};
 };
 
 }  // namespace curvisplat

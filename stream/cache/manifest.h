@@ -77,6 +77,9 @@ inline constexpr const char* kOverlapNone = "none";    // that would have been d
 
 // Manifest::stretch.
 inline constexpr const char* kSteepStretch = "steep";  // by StretchFit::kSteep (preprocess/splats/stretch.h)
+/// The same, and splats weigh as much as their dual cells (preprocess/splats/dual_cell.h), collapsed ones have their
+/// shape, and rows go on across joints (preprocess/seams/joined_rows.h).
+inline constexpr const char* kDualCells = "dual-cells";
 
 struct Manifest {
   std::vector<std::string> requirements;  // "requires"; none: version 1
@@ -98,7 +101,9 @@ struct Manifest {
   /// What was done where the grid's blocks overlap: kOverlapAll, ...; empty if it has one block, or that is
   /// not known.
   std::string overlap;
-  std::string stretch;  // how long splats are where cells grow: kSteepStretch; empty: by StretchFit::kGentle
+  std::string
+      stretch;  // how splats are made where cells grow: kDualCells, kSteepStretch; empty: by StretchFit::kGentle
+  bool isSteep() const { return stretch == kSteepStretch || stretch == kDualCells; }
   std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
                                           // their geometry (preprocess/survey/grid_survey.h)
   std::string time_unit;  // of the steps' times, such as "days since 1900-01-01"; may be empty

@@ -242,7 +242,7 @@ TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "a.splats";
   convertTo(cache, source, {0});
-  ASSERT_EQ(CacheReader(cache).manifest().stretch, kSteepStretch);
+  ASSERT_EQ(CacheReader(cache).manifest().stretch, kDualCells);
   added(source, adding(cache, {1}));
   const Files files = allFilesOf(cache);
   EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));

@@ -167,6 +167,30 @@ TEST(CellSplats, EndAtBordersButNotWhereBlocksAbut) {
   for (const NodeSplat& splat : grid.cellSplats().splats) EXPECT_EQ(splat.border_code, kNoBorder);
 }
 
+TEST(CellSplats, OfOneLayerEndAtBothOfItsFaces) {
+  // Two-dimensional cases are one cell thick. A code has one face an axis: each half of a cell has its own.
+  const glm::dmat3 jacobian(2, 0.3, 0, -0.4, 1, 0.2, 0.1, 0, 3);
+  CellBlock grid(5, 4, 2, [&](double i, double j, double k) { return jacobian * glm::dvec3(i, j, k); });
+  grid.addCellScalar([](const glm::dvec3& p) { return p.x; });
+  const TemporaryFolder folder;
+  AbuttingFaces faces(std::vector{grid.block}, 8, 1 << 20, folder.path());
+  faces.match(Progress());
+  const NodeSplats out = grid.cellSplats({0, &faces});
+  ASSERT_EQ(out.splats.size(), 2u * 4 * 3);
+  EXPECT_NEAR(totalWeight(out) / (12 * glm::determinant(jacobian)), 1, 1e-9);
+  for (const uint64_t half : {0u, 1u}) {
+    const NodeSplat* splat = splatOf(out, grid.at(1, 1, half));
+    ASSERT_NE(splat, nullptr);
+    EXPECT_LT(glm::distance(splat->splat.position, jacobian * glm::dvec3(1.5, 1.5, half == 0 ? 0.25 : 0.75)),
+              1e-12);
+    const InwardAxes inward = inwardAxes(splat->border_code);
+    ASSERT_EQ(inward.count, 1);
+    EXPECT_TRUE(inward.hasFace(0));
+    const glm::dvec3 along = splat->splat.factor() * glm::dvec3(inward.axis[0]);
+    EXPECT_LT(glm::distance(along, (half == 0 ? 0.5 : -0.5) * jacobian[2]), 0.02);
+  }
+}
+
 TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> off(-0.2, 0.2);

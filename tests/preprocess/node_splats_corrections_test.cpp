@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <vector>
 
+#include "preprocess/grid/hexahedron.h"
 #include "preprocess/shape/shape.h"
 #include "preprocess/splats/face_layers.h"
 #include "preprocess/splats/node_splats.h"
@@ -180,6 +181,62 @@ TEST(NodeSplats, BesideABlankAreStretchedAsAtTheEndOfABlock) {
 
 // The weighted mean of tangents x² about the nodes: at a node it must be the node's own value, wherever the
 // cells grow.
+/// The volume of the cells all of whose nodes are there.
+double volumeOf(const MappedBlock& grid) {
+  const GridBlock& block = grid.block;
+  double volume = 0;
+  for (uint64_t k = 0; k + 1 < block.nk; ++k)
+    for (uint64_t j = 0; j + 1 < block.nj; ++j)
+      for (uint64_t i = 0; i + 1 < block.ni; ++i) {
+        const size_t at = grid.at(i, j, k);
+        if (cornerMarks(grid.nodes.blank.data(), at, block.ni, block.ni * block.nj) != 0) continue;
+        volume += Hexahedron(cornersAt(grid.nodes.x.data(), grid.nodes.y.data(), grid.nodes.z.data(), at,
+                                       block.ni, block.ni * block.nj))
+                      .volume();
+      }
+  return std::abs(volume);
+}
+
+TEST(NodeSplats, WeighAsMuchAsTheGrid) {
+  const auto radius = [](double n) { return 1 + 0.01 * std::expm1(0.35 * n) / 0.35; };
+  const std::vector<MappedBlock> grids{
+      // A wall from which cells grow, around a sphere and beyond.
+      {13, 9, 15,
+       [&](double i, double j, double k) {
+         const double a = 0.2 * i, b = 0.25 * (j - 4);
+         return radius(k) * glm::dvec3(std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b));
+       }},
+      // Rows that wind along field lines, with a twist in each cell.
+      {9, 21, 9,
+       [](double i, double j, double k) {
+         const double r = 1 + 0.1 * i, a = 0.3 * j + 0.1 * r * k;
+         return glm::dvec3(r * std::cos(a), r * std::sin(a), 0.5 * k);
+       }},
+      // Layers over a mountain.
+      {12, 11, 10, [](double i, double j, double k) {
+         const double ground = 3 * std::exp(-0.1 * ((i - 5) * (i - 5) + (j - 5) * (j - 5)));
+         return glm::dvec3(i, j, ground + 0.1 * k * (5 - ground));
+       }}};
+  for (MappedBlock grid : grids) {
+    EXPECT_NEAR(totalWeight(grid.splats()) / volumeOf(grid), 1, 1e-4);
+    for (uint64_t k = 3; k < 6; ++k)
+      grid.nodes.blank[grid.at(4, 5, k)] = grid.nodes.blank[grid.at(0, 3, k)] = 1;
+    EXPECT_NEAR(totalWeight(grid.splats()) / volumeOf(grid), 1, 1e-4);
+  }
+}
+
+TEST(NodeSplats, OfThinLayersThatBendKeepTheirValues) {
+  // Layers of 1 km on a sphere, 5 degrees apart: they bend by 24 of their cells along either axis.
+  MappedBlock grid(9, 9, 9, [](double i, double j, double k) {
+    const double a = M_PI / 36 * i, b = M_PI / 36 * (j - 4);
+    return (6371 + k) * glm::dvec3(std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b));
+  });
+  grid.addScalar([](const glm::dvec3& p) { return glm::length(p) - 6371; });
+  const NodeSplats out = grid.splats();
+  for (uint64_t k = 1; k < 8; ++k)
+    EXPECT_NEAR(out.values[grid.at(4, 4, k)].mean, static_cast<double>(k), 0.25) << k;
+}
+
 TEST(NodeSplats, MeansMakeUpForWhatTangentsMiss) {
   for (const double growth : {1.0, 1.1}) {
     const auto x = [&](double i) { return growth == 1 ? i : (std::pow(growth, i) - 1) / (growth - 1); };

@@ -119,7 +119,7 @@ TEST(NodeSplats, BesideBlankedNodesAreHalfCells) {
   // The eight cells around it are not there; older caches kept what is in the pieces of nodes across an edge or a corner.
   EXPECT_NEAR(totalWeight(out), 216 - 8, 1e-12);
   NodeSplatCorrections older;
-  older.octants = false;
+  older.octants = older.dual_cells = false;
   EXPECT_NEAR(totalWeight(grid.splats(older)), 216 - 1 - 6 * 0.5, 1e-12);
 
   const NodeSplat& above = out.splats[grid.at(3, 3, 4) - 1];
@@ -333,12 +333,33 @@ TEST(NodeSplats, OfPartsOfRowsAreThoseOfTheWhole) {
   }
 }
 
-TEST(NodeSplats, OnAPolarAxisAreFlooredAndHaveNoVolume) {
+TEST(NodeSplats, OnAPolarAxisHaveTheVolumeAndShapeOfTheirWedges) {
   MappedBlock grid(13, 5, 4, [](double i, double j, double k) {
     return glm::dvec3(j * std::cos(i * M_PI / 6), j * std::sin(i * M_PI / 6), k);
   });
   grid.addScalar([](const glm::dvec3& p) { return p.x; });
   const NodeSplats out = grid.splats();
+  EXPECT_TRUE(allFinite(out));
+  EXPECT_EQ(out.degenerate, 0u);
+  EXPECT_NEAR(totalWeight(out), 12 * 0.5 * 16 * std::sin(M_PI / 6) * 3, 1e-9);
+  // Between two straight sides and half way along the chord: a triangle of the height 1/2 cos(15 degrees).
+  const NodeSplat& axis = out.splats[grid.at(3, 0, 1)];
+  EXPECT_NEAR(axis.splat.weight, 0.25 * 0.5 * std::sin(M_PI / 6), 1e-9);
+  EXPECT_NEAR(singularValues(axis.splat.factor())[0], 1, 1e-9);
+  EXPECT_NEAR(glm::length(glm::dvec2(axis.splat.position)), 2.0 / 3 * 0.5 * std::cos(M_PI / 12), 0.02);
+  const InwardAxes inward = inwardAxes(out.splats[grid.at(3, 0, 0)].border_code);
+  ASSERT_EQ(inward.count, 1);  // at the block's lower end, but not across the axis
+  EXPECT_GT(glm::normalize(out.splats[grid.at(3, 0, 0)].splat.factor() * glm::dvec3(inward.axis[0])).z, 0.99);
+}
+
+TEST(NodeSplats, OnAPolarAxisWereFlooredAndHadNoVolume) {
+  MappedBlock grid(13, 5, 4, [](double i, double j, double k) {
+    return glm::dvec3(j * std::cos(i * M_PI / 6), j * std::sin(i * M_PI / 6), k);
+  });
+  grid.addScalar([](const glm::dvec3& p) { return p.x; });
+  NodeSplatCorrections older;
+  older.dual_cells = false;
+  const NodeSplats out = grid.splats(older);
   EXPECT_TRUE(allFinite(out));
   EXPECT_EQ(out.degenerate, 13u * 4u);
   for (const NodeSplat& node : out.splats) {

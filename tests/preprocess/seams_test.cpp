@@ -130,12 +130,12 @@ void expectSame(const std::map<std::array<long, 3>, Piece>& found,
     ASSERT_NE(at, found.end());
     const Piece& piece = at->second;
     EXPECT_NEAR(piece.node.splat.weight, whole.node.splat.weight, 1e-9);
-    for (int n = 0; n < 3; ++n) {
-      EXPECT_NEAR(piece.node.splat.axis[n], whole.node.splat.axis[n], 1e-9);
-      EXPECT_NEAR(piece.node.splat.shear[n], whole.node.splat.shear[n], 1e-9);
+    for (int n = 0; n < 3; ++n) {  // directions at seams are kept in single precision
+      EXPECT_NEAR(piece.node.splat.axis[n], whole.node.splat.axis[n], 1e-7);
+      EXPECT_NEAR(piece.node.splat.shear[n], whole.node.splat.shear[n], 1e-7);
     }
     EXPECT_NEAR(piece.value.mean, whole.value.mean, 1e-9);
-    EXPECT_LT(glm::distance(piece.value.slope, whole.value.slope), 1e-9);
+    EXPECT_LT(glm::distance(piece.value.slope, whole.value.slope), 1e-7);
     EXPECT_NEAR(piece.value.variance, 0, 1e-9);
     const InwardAxes open = inwardAxes(piece.node.border_code), border = inwardAxes(whole.node.border_code);
     ASSERT_EQ(open.behind, border.behind);
@@ -261,6 +261,32 @@ TEST_F(Seams, OfAPeriodicAxisCloseThoughRoundedDifferently) {
   for (int n = 0; n < 3; ++n) EXPECT_NEAR(found[n] / expected[n], 1, 2e-3);
 }
 
+TEST_F(Seams, OfAClosedRowOfThinLayersLeaveItAsIfItHadNeverBeenCut) {
+  // Ten degrees apart, and layers of 2 m: moments of the two halves are 10,000 times as thick.
+  constexpr int kAround = 36;
+  MappedBlock block(kAround + 1, 5, 7, [](double i, double j, double k) {
+    const double angle = 2 * M_PI / kAround * std::fmod(i, kAround), r = 6371 + 0.002 * k;
+    return glm::dvec3(r * std::cos(angle), r * std::sin(angle), 100 * j);
+  });
+  block.addScalar([](const glm::dvec3& p) { return 10 + 500 * (std::hypot(p.x, p.y) - 6371); });
+  const std::vector<Piece> out = merge(facesOf(block));
+  EXPECT_EQ(merged_, 5u * 7u);
+  const NodeSplats splats = block.splats();
+  for (const uint64_t k : {2u, 3u, 4u}) {
+    const size_t beside = block.at(5, 2, k);
+    const auto seam = std::find_if(out.begin(), out.end(),
+                                   [&](const Piece& piece) { return piece.node.node == block.at(0, 2, k); });
+    ASSERT_NE(seam, out.end());
+    EXPECT_EQ(seam->node.border_code, kNoBorder);
+    const auto found = singularValues(seam->node.splat.factor()),
+               expected = singularValues(splats.splats[beside].splat.factor());
+    for (int n = 0; n < 3; ++n) EXPECT_NEAR(found[n] / expected[n], 1, 0.02) << n;
+    EXPECT_NEAR(seam->value.mean, splats.values[beside].mean, 0.15);  // of layers that differ by 1
+    EXPECT_NEAR(seam->node.splat.weight / splats.splats[beside].splat.weight, 1, 1e-3);
+    EXPECT_NEAR(glm::length(seam->node.splat.position), glm::length(splats.splats[beside].splat.position), 1);
+  }
+}
+
 TEST_F(Seams, DoNotJoinTheNodesOfAWallLayer) {
   // Eight units in the last place apart: still the seam's 35 pairs and no others.
   merge(facesOf(pipe(1e-6f)), 64 << 20, 4);
@@ -296,11 +322,14 @@ TEST_F(Seams, JoinAPolarAxisIntoOneSplatANode) {
   for (const Piece& piece : out) {
     if (piece.node.node_position.x != 5 || piece.node.node_position.y != 0) continue;
     ++on_axis;
-    EXPECT_EQ(piece.node.splat.weight, 0);
-    EXPECT_NEAR(piece.node.splat.position.x, 5, 2e-3);
+    // The wedges around it are a prism of 24 sides, at half the distance to its neighbours.
+    const bool at_end = piece.node.node_position.z == 0 || piece.node.node_position.z == 1;
+    const double height = at_end ? 0.1 : 0.2;
+    EXPECT_NEAR(piece.node.splat.weight, 12 * 0.05 * 0.05 * std::sin(M_PI / 12) * height, 1e-7);
+    EXPECT_NEAR(piece.node.splat.position.x, 5, 1e-9);
     const auto sigma = singularValues(piece.node.splat.factor());
-    EXPECT_LE(sigma[0], 0.2001);
-    EXPECT_GE(sigma[2], 0.05);
+    EXPECT_NEAR(sigma[0], height, 1e-6);
+    EXPECT_NEAR(sigma[2], std::sqrt(3.0) * 0.05, 1e-3);  // 12 times the variance of a disc
     EXPECT_TRUE(std::isfinite(glm::length(piece.value.slope)));
   }
   EXPECT_EQ(on_axis, 6u);
