@@ -61,7 +61,7 @@ class SplatStream {
       if (!covered.empty()) window.covered = covered.data();
       Worker& worker = workers_.local();
       if (centring_ == Centring::kCell)
-        computeCellSplats(window, task.box, {slab.block, faces_}, worker.cells, worker.splats);
+        computeCellSplats(window, task.box, {slab.block, faces_}, worker.cells, worker.splats, corrections_);
       else
         computeNodeSplats(window, task.box, worker.nodes, worker.splats, corrections_);
       if (what == Send::kAll) {

@@ -189,6 +189,9 @@ TEST(CellSplats, OfOneLayerEndAtBothOfItsFaces) {
     const glm::dvec3 along = splat->splat.factor() * glm::dvec3(inward.axis[0]);
     EXPECT_LT(glm::distance(along, (half == 0 ? 0.5 : -0.5) * jacobian[2]), 0.02);
   }
+  NodeSplatCorrections older;
+  older.dual_cells = false;
+  EXPECT_EQ(grid.cellSplats({0, &faces}, older).splats.size(), 4u * 3);
 }
 
 TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
