@@ -40,7 +40,7 @@ void ValueSample::Adder::flush() {
 void ValueSample::add(std::span<const double> rows) {
   const MutexLock lock(adding_);
   rows_.insert(rows_.end(), rows.begin(), rows.end());
-  if (rows_.size() < 2 * kSplats * columns_) return;
+  if (rows_.size() < 2 * splats_ * columns_) return;
   rows_ = smallest(rows_);
   double largest = 0;
   for (size_t at = 0; at < rows_.size(); at += columns_) largest = std::max(largest, rows_[at + kPriority]);
@@ -54,9 +54,9 @@ std::vector<double> ValueSample::smallest(std::span<const double> rows) const {
     const auto x = rows.subspan(a * columns_, columns_), y = rows.subspan(b * columns_, columns_);
     return x[kPriority] != y[kPriority] ? x[kPriority] < y[kPriority] : x[kNode] < y[kNode];
   };
-  if (order.size() > kSplats) {
-    std::nth_element(order.begin(), order.begin() + kSplats, order.end(), first);
-    order.resize(kSplats);
+  if (order.size() > splats_) {
+    std::nth_element(order.begin(), order.begin() + static_cast<ptrdiff_t>(splats_), order.end(), first);
+    order.resize(splats_);
   }
   std::vector<double> kept;
   kept.reserve(order.size() * columns_);
@@ -80,7 +80,7 @@ std::vector<ValueSample::Weighed> ValueSample::sorted(size_t variable, double& t
   const std::vector<double> rows = this->rows();
   const size_t count = rows.size() / columns_;
   double least_weight = 0;
-  if (count == kSplats)
+  if (count == splats_)
     for (size_t at = 0; at < rows.size(); at += columns_)
       least_weight = std::max(least_weight, rows[at + kPriority]);
   if (least_weight > 0) least_weight = 1 / least_weight;

@@ -8,6 +8,7 @@
 // sums, JACM 2007).
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -26,7 +27,9 @@ class ValueSample {
  public:
   static constexpr size_t kSplats = 32768;
 
-  explicit ValueSample(size_t variables) : columns_(kValues + variables) {}
+  /// Of very many variables the sample has fewer splats, so that it stays below 16 MiB.
+  explicit ValueSample(size_t variables)
+      : columns_(kValues + variables), splats_(std::min(kSplats, kMostNumbers / columns_)) {}
 
   /// What one thread adds.
   class Adder {
@@ -66,7 +69,9 @@ class ValueSample {
   /// The first rows by priority.
   std::vector<double> smallest(std::span<const double> rows) const;
 
-  const size_t columns_;
+  static constexpr size_t kMostNumbers = size_t{1} << 20;
+
+  const size_t columns_, splats_;
   std::atomic<double> threshold_{kNoThreshold};  // no row with a larger priority is in the sample
   static constexpr double kNoThreshold = 1e300;
   mutable Mutex adding_;

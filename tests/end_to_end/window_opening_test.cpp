@@ -168,7 +168,7 @@ TEST_F(WindowOpening, TheGridNeedNotComeFirst) {
   placeOf("curve");
   saveAndCopy();
   const auto command = close().at(0);
-  EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "a.xyz", "a.fun"}));
+  EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "a.fun", "a.xyz"}));
 }
 
 TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {

@@ -32,38 +32,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kMaxFiles = 8;  // whose order gridFirst() tries
-
-/// Whether the first file opens as a grid with the rest as its solutions.
-bool opens(const std::vector<std::filesystem::path>& files) {
-  ConvertArguments arguments;
-  arguments.grid.grid = files.front();
-  arguments.grid.solutions.assign(files.begin() + 1, files.end());
-  try {
-    openSource(arguments, keptFolder().value_or(std::filesystem::temp_directory_path()) / "any.splats");
-    return true;
-  } catch (const Error&) {
-    return false;
-  }
-}
-
-/// Files of a grid that were chosen in a dialog or dropped come in any order. Returns `files` with another
-/// one first that opens as a grid with the rest as its solutions. nullopt if there is none, if there are
-/// more than eight files, or if they open as given: then their order is not what is wrong. Opens files,
-/// which can take long; throws Interrupted once `progress` is stopped.
-std::optional<std::vector<std::filesystem::path>> gridFirst(std::vector<std::filesystem::path> files,
-                                                            const Progress& progress) {
-  if (files.size() < 2 || files.size() > kMaxFiles || opens(files)) return std::nullopt;
-  for (size_t n = 1; n < files.size(); ++n) {
-    progress.throwIfStopped();
-    std::rotate(files.begin(), files.begin() + static_cast<std::ptrdiff_t>(n),
-                files.begin() + static_cast<std::ptrdiff_t>(n) + 1);
-    if (opens(files)) return files;
-    std::rotate(files.begin(), files.begin() + 1, files.begin() + static_cast<std::ptrdiff_t>(n) + 1);
-  }
-  return std::nullopt;
-}
-
 struct ViewArguments {
   std::vector<std::filesystem::path>
       files;  // a cache, or a grid with its solutions; none: chosen in the window
@@ -137,16 +105,7 @@ ConversionServices conversionServices(ValuePrecision precision) {
     kept.preview = [&](const KeptPreview& preview) {
       events.preview({preview.cache, preview.whole, whatOf(preview), preview.folder});
     };
-    try {
-      return keptCacheOf(files, progress, kept, {}, precision);
-    } catch (const Interrupted&) {
-      throw;
-    } catch (const Error&) {
-      const auto ordered = gridFirst(files, progress);
-      if (!ordered) throw;
-      events.reorder(*ordered);
-      return keptCacheOf(*ordered, progress, kept, {}, precision);
-    }
+    return keptCacheOf(files, progress, kept, {}, precision);
   };
   services.sources_of = sourcesOf;
   services.further_scalars = [](const std::filesystem::path& cache, const Paths& files) {

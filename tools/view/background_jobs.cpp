@@ -152,10 +152,6 @@ Opening::Opening(std::string title, Work work, void (*wake)())
               const MutexLock lock(mutex_);
               messages_.push_back(text);
             };
-            events.reorder = [this](const std::vector<std::filesystem::path>& files) {
-              const MutexLock lock(mutex_);
-              files_ = files;
-            };
             events.preview = [this, wake](Preview preview) {
               {
                 const MutexLock lock(mutex_);
@@ -170,11 +166,6 @@ Opening::Opening(std::string title, Work work, void (*wake)())
 std::vector<std::string> Opening::takeMessages() {
   const MutexLock lock(mutex_);
   return std::exchange(messages_, {});
-}
-
-std::vector<std::filesystem::path> Opening::takeFiles() {
-  const MutexLock lock(mutex_);
-  return std::exchange(files_, {});
 }
 
 std::optional<Preview> Opening::takePreview() {

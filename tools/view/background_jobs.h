@@ -36,8 +36,6 @@ struct Preview {
 struct OpeningEvents {
   std::function<void(const std::string&)> say;
   std::function<void(Preview)> preview;
-  /// Passes the files with the grid first, where a desktop or a dialog gave them in another order.
-  std::function<void(const std::vector<std::filesystem::path>&)> reorder;
 };
 
 /// A scalar of a cache's sources that the cache lacks.
@@ -104,8 +102,6 @@ class Opening {
   const BackgroundJob& job() const { return job_; }
   /// Warnings and notes since the last call.
   std::vector<std::string> takeMessages();
-  /// The files in their right order, once, if it was not as given.
-  std::vector<std::filesystem::path> takeFiles();
   /// What can be shown already, once.
   std::optional<Preview> takePreview();
   bool isDone() const { return job_.isDone(); }
@@ -115,7 +111,6 @@ class Opening {
  private:
   Mutex mutex_;
   std::vector<std::string> messages_ GUARDED_BY(mutex_);
-  std::vector<std::filesystem::path> files_ GUARDED_BY(mutex_);
   std::optional<Preview> preview_ GUARDED_BY(mutex_);
   BackgroundJob job_;  // last: its thread uses the others
 };

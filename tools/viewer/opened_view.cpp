@@ -178,7 +178,6 @@ void OpenedView::update() {
 void OpenedView::takeOpened() {
   if (!opening_) return;
   for (const std::string& text : opening_->takeMessages()) surroundings_.reports.say(text);
-  if (auto files = opening_->takeFiles(); !files.empty()) opening_files_ = std::move(files);
   const bool is_done = opening_->isDone();
   if (auto preview = opening_->takePreview(); preview && !is_done) showPreview(*preview);
   if (is_done) takeWhole();

@@ -32,6 +32,7 @@
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/progress.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -154,22 +155,6 @@ std::string namesIn(const GridDescription& description) {
 
 // ---- opening ----
 
-/// The grid may also be named after its solutions.
-std::unique_ptr<DataSource> openPlot3d(const OpenGridOptions& options) {
-  try {
-    return std::make_unique<Plot3dSource>(options);
-  } catch (const Error&) {
-    for (size_t n = 0; n < options.solutions.size(); ++n) try {
-        OpenGridOptions other = options;
-        std::swap(other.grid, other.solutions[n]);
-        return std::make_unique<Plot3dSource>(other);
-      } catch (const Error&) {
-        continue;  // of the order that the user chose is spoken
-      }
-    throw;
-  }
-}
-
 std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options);
 
 /// Opens one of several files that are to be combined.
@@ -210,7 +195,32 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
   requireNoSelection(options);
   for (const std::filesystem::path& path : options.solutions)
     refuseForeign(path, "a PLOT3D Q or function file");
-  return openPlot3d(options);
+  return std::make_unique<Plot3dSource>(options);
+}
+
+/// Files that were chosen in a dialog, dropped or matched by a pattern come in any order: where they do not open as given,
+/// another one may be the grid.
+std::unique_ptr<DataSource> openInAnyOrder(const OpenGridOptions& options) {
+  constexpr size_t kMaxFiles = 8;
+  try {
+    return openUnpacked(options, openFormat);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    if (options.solutions.size() < kMaxFiles)
+      for (const std::filesystem::path& grid : options.solutions) try {
+          OpenGridOptions other = options;
+          other.grid = grid;
+          std::erase(other.solutions, grid);
+          other.solutions.insert(other.solutions.begin(), options.grid);
+          return openUnpacked(other, openFormat);
+        } catch (const Interrupted&) {
+          throw;
+        } catch (const Error&) {
+          continue;  // the message is of the order that was chosen
+        }
+    throw;
+  }
 }
 
 }  // namespace
@@ -218,7 +228,7 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
 std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   OpenGridOptions complete = options;
   if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
-  std::unique_ptr<DataSource> source = openUnpacked(complete, openFormat);
+  std::unique_ptr<DataSource> source = openInAnyOrder(complete);
   chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
   return source;
 }
