@@ -260,7 +260,9 @@ class Conversion {
     if (isFirst()) text = journalText(workspace_->journal());
     const auto sent =
         fromBytes<char>(ranks_->broadcast(toBytes(std::vector<char>(text.begin(), text.end()))));
-    if (!isFirst()) splats_ = journalFrom(std::string(sent.begin(), sent.end()))->splats.value();
+    if (isFirst()) return;
+    splats_ = journalFrom(std::string(sent.begin(), sent.end()))->splats.value();
+    readSample(scratch_, splats_);
   }
 
   /// In the place of all before: the splats of a conversion that was interrupted, which may have had another number

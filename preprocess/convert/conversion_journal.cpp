@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
 #include <limits>
+#include <span>
 
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
@@ -224,30 +224,6 @@ ScatterState stateOf(const JsonField& from) {
   return state;
 }
 
-/// The bits of numbers, 16 digits each: many of them, which JSON would print and parse one by one.
-std::string hexOf(const std::vector<double>& numbers) {
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string text;
-  text.reserve(16 * numbers.size());
-  for (const double number : numbers)
-    for (int shift = 60; shift >= 0; shift -= 4)
-      text += kDigits[std::bit_cast<uint64_t>(number) >> shift & 15];
-  return text;
-}
-
-std::vector<double> numbersOf(const JsonField& field) {
-  const std::string text = field.text();
-  std::vector<double> numbers(text.size() / 16);
-  for (size_t n = 0; n < numbers.size(); ++n) {
-    uint64_t bits = 0;
-    const char* const begin = text.data() + 16 * n;
-    if (std::from_chars(begin, begin + 16, bits, 16).ptr != begin + 16)
-      field.fail("16 digits for each number");
-    numbers[n] = std::bit_cast<double>(bits);
-  }
-  return numbers;
-}
-
 json jsonOf(const ScatteredSplats& splats) {
   json of_ranks = json::array();
   for (const BucketChains& buckets : splats.buckets_of_ranks) of_ranks.push_back(jsonOf(buckets));
@@ -257,7 +233,7 @@ json jsonOf(const ScatteredSplats& splats) {
                     {"inverted", splats.counts.inverted},
                     {"overlap", splats.overlap},
                     {"merged_nodes", splats.merged_nodes},
-                    {"sample", hexOf(splats.sample)},
+                    {"sample", splats.sample_file},
                     {"tree", jsonOf(splats.tree)},
                     {"buckets", jsonOf(splats.buckets)}};
   if (splats.unfinished) of_splats["unfinished"] = jsonOf(*splats.unfinished);
@@ -270,7 +246,7 @@ ScatteredSplats splatsOf(const JsonField& from) {
   splats.counts = {from.at("degenerate").count(), from.at("inverted").count()};
   splats.overlap = from.at("overlap").text();
   splats.merged_nodes = from.at("merged_nodes").count();
-  splats.sample = numbersOf(from.at("sample"));
+  splats.sample_file = from.at("sample").text();
   splats.buckets = bucketsOf(from.at("buckets"));
   if (const auto ranks = from.find("buckets_of_ranks"))
     for (const JsonField& buckets : ranks->elements()) {
@@ -332,6 +308,22 @@ std::string journalText(const ConversionJournal& journal) {
   if (journal.splats) content["splats"] = jsonOf(*journal.splats);
   const std::string text = content.dump() + "\n";
   return text + checksumLine(text);
+}
+
+void writeSample(const std::filesystem::path& scratch, ScatteredSplats& splats) {
+  const auto bytes = std::as_bytes(std::span(splats.sample));
+  // Another name for other contents: until the journal names it, the one before is needed.
+  splats.sample_file = fmt::format("sample.{:016x}.bin", checksumOf(bytes));
+  writeFileAtomically(scratch / splats.sample_file, bytes);
+}
+
+void readSample(const std::filesystem::path& scratch, ScatteredSplats& splats) {
+  const InputFile file(scratch / splats.sample_file);
+  splats.sample.resize(file.size() / sizeof(double));
+  const auto bytes = std::as_writable_bytes(std::span(splats.sample));
+  file.readAt(0, bytes);
+  if (splats.sample_file != fmt::format("sample.{:016x}.bin", checksumOf(bytes)))
+    throw Error("{}: is damaged", file.path().string());
 }
 
 void writeJournal(const std::filesystem::path& folder, const ConversionJournal& journal) {

@@ -36,7 +36,8 @@ struct ScatteredSplats {
   BucketTree tree;       // with contents, as it was scattered by: before any bucket was divided
   BucketChains buckets;  // of the temporary file
   std::vector<BucketChains> buckets_of_ranks = {};  // from rank 1 on, where several have scattered
-  std::vector<double> sample = {};                  // ValueSample::rows()
+  std::vector<double> sample = {};                  // ValueSample::rows(); not in the journal
+  std::string sample_file = {};                     // of it, in the scratch folder: megabytes
   std::optional<ScatterState> unfinished;           // not all splats are there: how far scatter had come
 
   uint64_t temporaryBytes() const {
@@ -57,6 +58,11 @@ ScatterNotes timedNotes(std::chrono::milliseconds interval, const ScatterState* 
 /// damaged, or was made with more memory than `plan` has.
 std::unique_ptr<BucketFile> openScattered(const std::filesystem::path& file, const ScatteredSplats& left,
                                           const MemoryPlan& plan);
+
+/// Writes the sample to a new file in the scratch folder, and names it for the journal.
+void writeSample(const std::filesystem::path& scratch, ScatteredSplats& splats);
+/// Reads the sample that a journal names. Throws Error if it is not as it was written.
+void readSample(const std::filesystem::path& scratch, ScatteredSplats& splats);
 
 inline constexpr const char* kJournalName = "journal";
 

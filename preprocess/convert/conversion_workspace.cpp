@@ -109,6 +109,11 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
     if (isScratch(journal_.scratch, output)) {
       scratch_ = std::make_unique<ScratchFolder>(journal_.scratch, ScratchFolder::Folder::kTakeOver);
       removeDividedBuckets();
+      if (journal_.splats) try {
+          readSample(scratch(), *journal_.splats);
+        } catch (const Error&) {
+          forgetSplats();
+        }
       partial_->leave(false);
       return;
     }
@@ -128,6 +133,7 @@ void ConversionWorkspace::removeDividedBuckets() const {
   const size_t files = journal_.splats ? 1 + journal_.splats->buckets_of_ranks.size() : 0;
   std::set<fs::path> kept;
   for (unsigned rank = 0; rank < files; ++rank) kept.insert(splatsFileOf(scratch(), rank));
+  if (journal_.splats) kept.insert(scratch() / journal_.splats->sample_file);
   for (const auto& entry : fs::directory_iterator(scratch())) {
     if (kept.contains(entry.path())) continue;
     if (entry.is_directory() && !entry.is_symlink())
@@ -142,8 +148,11 @@ bool ConversionWorkspace::worthResuming() const {
 }
 
 void ConversionWorkspace::noteSplats(ScatteredSplats splats) {
+  const fs::path before = journal_.splats ? scratch() / journal_.splats->sample_file : fs::path();
+  writeSample(scratch(), splats);
   journal_.splats = std::move(splats);
   writeJournalNow();
+  if (!before.empty() && before != scratch() / journal_.splats->sample_file) removeFile(before);
 }
 
 void ConversionWorkspace::forgetSplats() {

@@ -4,7 +4,7 @@
 //    NAME.splats.partial/  beside the output, locked: the cache as it grows, and
 //      journal             what is converted, where the scratch folder is, and the splats once all are there
 //      bricks.log          the bricks that have been appended (CacheWriter)
-//    NAME.splats.tmp.<..>/ in the temporary folder: splats.bin, and what buckets are divided into
+//    NAME.splats.tmp.<..>/ in the temporary folder: splats.bin, a sample of them, and what buckets are divided into
 //
 //    begun --noteSplats()--> splats on disk --> bricks appended --CacheWriter::finish()--> in place
 //      ^                          |  ^             | one by one

@@ -107,7 +107,7 @@ TEST_F(ConvertOptionsTest, ADryRunPredictsCostsAndLeavesNothing) {
 }
 
 TEST_F(ConvertOptionsTest, ADryRunOfASeriesCountsItsSteps) {
-  run({"generate", "wake", "--size", "40x30x20", "--steps", "4", "-o", file("s")});
+  run({"generate", "wake", "--size", "56x40x30", "--steps", "4", "-o", file("s")});
   expectForecastHolds({"convert", file("s.xyz"), file("s_*.fun"), "-o", file("out.splats")}, folder_);
 }
 

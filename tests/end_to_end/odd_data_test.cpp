@@ -58,11 +58,12 @@ void along(const GridNode& node, NodeValues& values) {
   values.scalars[0] = static_cast<float>(node.i);
 }
 
-TEST_F(OddDataTest, ACacheOfOneSplatIsDrawn) {
+/// The cell ends at faces on both sides along each axis, so that it is eight splats.
+TEST_F(OddDataTest, ACacheOfOneCellIsDrawn) {
   VtsGrid grid = annulusVtsGrid(2, 2, 2);
   writeFileAtomically(folder_ / "one.vts", vtsFile(grid, VtsEncoding{}));
   const ProgramResult result = run({"convert", file("one.vts"), "-o", file("cube.splats"), "--scalar", "T"});
-  expectSays(result.out, "1 splat in 1 brick, 1 level");
+  expectSays(result.out, "8 splats in 1 brick, 1 level");
   const Image image = render({"--opacity-unit", "0.01", "--parallel-scale", "5"});
   EXPECT_LT(image.pixel(32, 32)[0], 0.9f) << said_;
   EXPECT_EQ(image.pixel(0, 0)[0], 1);

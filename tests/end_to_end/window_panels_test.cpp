@@ -51,7 +51,8 @@ TEST_F(WindowPanels, TheValueUnderTheMouseIsThatOfTheData) {
       << status;
   // `info --probe` finds the same sample there.
   const ProgramResult probed =
-      runProgram({"info", "a.splats", "--probe", parts[2].str(), parts[3].str(), parts[4].str()});
+      runProgram({"info", "a.splats", "--probe",
+                  fmt::format("{},{},{}", parts[2].str(), parts[3].str(), parts[4].str())});
   EXPECT_NE(probed.out.find(fmt::format("i {}, j {}, k {}", parts[5].str(), parts[6].str(), parts[7].str())),
             std::string::npos)
       << status << "\n"

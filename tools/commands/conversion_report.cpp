@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/convert.h"
@@ -210,23 +211,25 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   finish(forecast, options.convert, arguments);
 }
 
-std::unique_ptr<CacheReader> openWritten(const std::filesystem::path& cache, uint64_t step) {
+std::vector<double> printStored(const std::filesystem::path& cache, uint64_t step, std::string_view where) {
+  std::vector<VariableInfo> variables;
+  std::vector<ValueErrors> errors;
   try {
-    return std::make_unique<CacheReader>(cache, step);
+    const CacheReader reader(cache, step);
+    for (size_t n = 0; n < reader.manifest().variables.size(); ++n)
+      errors.push_back(storedErrors(reader, n).means);
+    variables = reader.manifest().variables;
   } catch (const std::exception& error) {
     printMessage("warning: the cache is complete, but it cannot be read back: {}", error.what());
-    return nullptr;
   }
-}
-
-void printStoredPrecision(const CacheReader& cache, std::string_view where) {
-  const auto& variables = cache.manifest().variables;
+  std::vector<double> largest;
   for (size_t n = 0; n < variables.size(); ++n) {
-    const ValueErrors errors = storedErrors(cache, n).means;
-    printLine("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}, typically {:.1e}", variables[n].name, where,
-              variables[n].min, variables[n].max, variables[n].unit.empty() ? "" : " " + variables[n].unit,
-              errors.largest, errors.typical);
+    const auto& [number, name, unit, min, max] = variables[n];
+    printLine("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}, typically {:.1e}", name, where, min, max,
+              unit.empty() ? "" : " " + unit, errors[n].largest, errors[n].typical);
+    largest.push_back(errors[n].largest);
   }
+  return largest;
 }
 
 }  // namespace curvisplat

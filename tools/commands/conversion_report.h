@@ -2,13 +2,13 @@
 // are stored. --dry-run converts a sample of the grid and leaves nothing behind. For the main thread.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string_view>
+#include <vector>
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
-#include "stream/cache/cache_reader.h"
 #include "tools/options/convert_arguments.h"
 
 namespace curvisplat {
@@ -24,12 +24,10 @@ void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
 void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
                     const ConvertArguments& arguments);
 
-/// Opens a complete cache at a step, to print what it holds. Returns null and prints a warning if the cache
-/// cannot be read; that does not undo the conversion.
-std::unique_ptr<CacheReader> openWritten(const std::filesystem::path& cache, uint64_t step = 0);
-
-/// Prints a line for each scalar at the reader's step: "p: 0.1 .. 2.5 Pa, rounded within 1.8e-05". `where`
-/// follows the scalar's name.
-void printStoredPrecision(const CacheReader& cache, std::string_view where = "");
+/// Prints a line for each scalar of a cache that has just been written: "p: 0.1 .. 2.5 Pa, rounded within 1.8e-05, typically
+/// 1.0e-05". `where` follows the scalar's name. Returns the largest errors, by scalar. Prints a warning, and returns none, if the
+/// cache cannot be read; that does not undo the conversion.
+std::vector<double> printStored(const std::filesystem::path& cache, uint64_t step = 0,
+                                std::string_view where = "");
 
 }  // namespace curvisplat

@@ -184,11 +184,7 @@ void runConvert(ConvertArguments arguments) {
   numbers["ranks"] = ranks.count();
   printWarnings(source->description(), arguments.grid.time_step, report);
   printSummary(arguments, report, secondsOf(progress));
-  if (const auto cache = openWritten(options.output)) {
-    for (size_t n = 0; n < cache->manifest().variables.size(); ++n)
-      numbers["stored_within"].push_back(storedErrors(*cache, n).means.largest);
-    printStoredPrecision(*cache);
-  }
+  for (const double largest : printStored(options.output)) numbers["stored_within"].push_back(largest);
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 

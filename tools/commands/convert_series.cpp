@@ -280,8 +280,7 @@ void runConvertSeries(ConvertArguments arguments) {
     fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample and step{}\n", seconds,
                1e-6 * samples / seconds, mebibytes(log.bytes()), static_cast<double>(log.bytes()) / samples,
                peakMemoryText());
-  if (const auto cache = report.steps > 0 ? openWritten(options.convert.output, report.steps - 1) : nullptr)
-    printStoredPrecision(*cache, " at the last step");
+  if (report.steps > 0) printStored(options.convert.output, report.steps - 1, " at the last step");
   writeSeriesStatistics(arguments, report, log, progress);
 }
 
