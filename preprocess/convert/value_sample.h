@@ -29,7 +29,7 @@ class ValueSample {
 
   /// Of very many variables the sample has fewer splats, so that it stays below 16 MiB.
   explicit ValueSample(size_t variables)
-      : columns_(kValues + variables), splats_(std::min(kSplats, kMostNumbers / columns_)) {}
+      : columns_(kValues + variables), splats_(std::min(kSplats, kMaxNumbers / columns_)) {}
 
   /// What one thread adds.
   class Adder {
@@ -69,7 +69,7 @@ class ValueSample {
   /// The first rows by priority.
   std::vector<double> smallest(std::span<const double> rows) const;
 
-  static constexpr size_t kMostNumbers = size_t{1} << 20;
+  static constexpr size_t kMaxNumbers = size_t{1} << 20;
 
   const size_t columns_, splats_;
   std::atomic<double> threshold_{kNoThreshold};  // no row with a larger priority is in the sample

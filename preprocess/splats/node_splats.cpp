@@ -306,11 +306,11 @@ glm::dmat3 alongFaces(const std::array<double, 3>& inwards, const Layers& layers
 void fitToVolume(double volume, double of_columns, const std::array<double, 3>& inwards, glm::dvec3& middle,
                  glm::dvec3& stretch) {
   // Beyond, the cell has collapsed at its other end, such as in a triangle between three blocks.
-  constexpr double kMost = 1.25;
+  constexpr double kMax = 1.25;
   const auto halves =
       std::count_if(inwards.begin(), inwards.end(), [](double inward) { return inward != 0; });
   if (halves == 0 || !(volume > 0) || !(of_columns > 0) || volume == of_columns) return;
-  if (volume > kMost * of_columns || of_columns > kMost * volume) return;
+  if (volume > kMax * of_columns || of_columns > kMax * volume) return;
   const double factor = std::pow(volume / of_columns, 1 / static_cast<double>(halves));
   for (int axis = 0; axis < 3; ++axis) {
     if (inwards[static_cast<size_t>(axis)] == 0) continue;

@@ -63,19 +63,19 @@ std::vector<AxisTick> logTicks(double low, double high, int wanted) {
 std::vector<AxisTick> asinhTicks(const ScalarAxis& axis, int wanted) {
   constexpr double kReach =
       20;  // multiples of a power on either side of the centre: those further out have no room
-  constexpr double kLeastStep = 0.1, kLeastDistance = 0.7;
+  constexpr double kMinStep = 0.1, kMinDistance = 0.7;
   const auto [low, high] = axis.range;
   std::vector<double> places;
   std::vector<AxisTick> ticks;
   const auto add = [&](double value) {
     const double place = axis.fractionOf(value);
     for (const double other : places)
-      if (std::abs(place - other) * wanted < kLeastDistance) return;
+      if (std::abs(place - other) * wanted < kMinDistance) return;
     places.push_back(place);
     ticks.push_back({value, fmt::format("{:g}", value)});
   };
   for (double step = std::pow(10, std::floor(std::log10(std::max(std::abs(low), std::abs(high)))));
-       step > kLeastStep * axis.asinh->width; step /= 10) {
+       step > kMinStep * axis.asinh->width; step /= 10) {
     const double first = std::ceil(std::max(low, axis.asinh->centre - kReach * step) / step - 1e-9);
     const double last = std::floor(std::min(high, axis.asinh->centre + kReach * step) / step + 1e-9);
     std::vector<double> multiples;
