@@ -100,7 +100,7 @@ TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
   press("z");  // from another side: the plane is seen edge on
   const Image cut = saveAndCopy();
   const Place handle = placeOf("handle 1");
-  drag(1, handle, {handle.first, handle.second + pictureSize().height / 10});
+  drag(1, handle, {handle.first + pictureSize().width / 10, handle.second});
   const Image moved = saveAndCopy();
   EXPECT_LT(difference(cut, moved), 40);
   EXPECT_LT(difference(whole, cut), 40);
