@@ -198,8 +198,19 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
   return std::make_unique<Plot3dSource>(options);
 }
 
-/// Files that were chosen in a dialog, dropped or matched by a pattern come in any order: where they do not open as given,
-/// another one may be the grid.
+/// Null where the files do not open.
+std::unique_ptr<DataSource> tryOpen(const OpenGridOptions& options) {
+  try {
+    return openUnpacked(options, openFormat);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
+/// Files that were chosen in a dialog, dropped or matched by a pattern come in any order: where the first one is no grid,
+/// another one may be. Messages are of the order that was chosen.
 std::unique_ptr<DataSource> openInAnyOrder(const OpenGridOptions& options) {
   constexpr size_t kMaxFiles = 8;
   try {
@@ -207,18 +218,17 @@ std::unique_ptr<DataSource> openInAnyOrder(const OpenGridOptions& options) {
   } catch (const Interrupted&) {
     throw;
   } catch (const Error&) {
-    if (options.solutions.size() < kMaxFiles)
-      for (const std::filesystem::path& grid : options.solutions) try {
-          OpenGridOptions other = options;
-          other.grid = grid;
-          std::erase(other.solutions, grid);
-          other.solutions.insert(other.solutions.begin(), options.grid);
-          return openUnpacked(other, openFormat);
-        } catch (const Interrupted&) {
-          throw;
-        } catch (const Error&) {
-          continue;  // the message is of the order that was chosen
-        }
+    if (options.solutions.empty() || options.solutions.size() >= kMaxFiles) throw;
+    OpenGridOptions other = options;
+    other.solutions.clear();
+    if (tryOpen(other)) throw;
+    for (const std::filesystem::path& grid : options.solutions) {
+      other.grid = grid;
+      other.solutions = options.solutions;
+      std::erase(other.solutions, grid);
+      other.solutions.insert(other.solutions.begin(), options.grid);
+      if (auto source = tryOpen(other)) return source;
+    }
     throw;
   }
 }
