@@ -14,7 +14,8 @@ namespace {
 
 /// The corners of the octant at a node of a cell, from the node. `corner`: of the cell, from the node, which is number 0.
 std::array<glm::dvec3, 8> octantOf(const std::array<glm::dvec3, 8>& corner) {
-  const glm::dvec3 ij = corner[1] + corner[2], k = corner[4];
+  const glm::dvec3 ij = corner[1] + corner[2];
+  const glm::dvec3& k = corner[4];
   return {glm::dvec3(0.0),
           0.5 * corner[1],
           0.5 * corner[2],
