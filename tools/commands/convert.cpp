@@ -304,12 +304,11 @@ void addConvert(CLI::App& app) {
                    "Cut each cell into N x N x N by its own trilinear map: for grids of few cells that grow "
                    "or bend steeply from one to the next (default 1: as they are)")
       ->check(CLI::Range(1u, kMaxRefinement));
-  command->add_option("--value-precision", arguments->precision,
-                      "Precision of stored values: normal (16 bits over the local range of values), auto (as "
-                      "normal, and where long "
-                      "tails make that coarse by the scale of each value) or fine (24 bits, as in a float). "
-                      "info CACHE prints "
-                      "the rounding errors (default: auto)");
+  command->add_option(
+      "--value-precision", arguments->precision,
+      "Precision of stored values: normal (16 bits over the local range of values), auto (as normal, "
+      "and where long tails make that coarse by the scale of each value) or fine (24 bits, as in a "
+      "float). info CACHE prints the rounding errors (default: auto)");
   command->add_option(
       "--memory", arguments->memory,
       "Memory limit of this process, such as 512M (default: 2G, at most 1/4 of the machine's)");

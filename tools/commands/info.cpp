@@ -311,11 +311,11 @@ void addInfo(CLI::App& app) {
   info->add_flag("--system", options->system, "Print the drawing back ends of this machine instead");
   info->add_flag("--verify", options->verify,
                  "Read the whole cache and check it; exit with status 1 if it is damaged");
-  info->add_option("--probe", options->probe,
-                   "Print the values at x,y,z and the nearest node or cell (block, i, j, k) alone, with exit "
-                   "status 1 if the "
-                   "point is outside the data; or a table of the values at all points of a file, whose lines "
-                   "begin with x,y,z");
+  info->add_option(
+      "--probe", options->probe,
+      "Print the values at x,y,z and the nearest node or cell (block, i, j, k) alone, with exit status "
+      "1 if the point is outside the data; or a table of the values at all points of a file, whose "
+      "lines begin with x,y,z");
   addStepOptions(*info, options->steps, "Time steps");
   addGridOptions(*info, options->grid);
   addGasOptions(*info, options->gas);

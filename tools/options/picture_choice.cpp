@@ -247,9 +247,9 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
   add("--range", exact(parts.range.first) + "," + exact(parts.range.second));
   if (parts.asinh) add("--asinh", exact(parts.asinh->centre) + "," + exact(parts.asinh->width));
   add("--opacity", textOf(parts.opacities));
-  if (arguments.opacity_unit) return withUnit(definition, nullptr, arguments);
-  add("--opacity-unit", exact(parts.opacity_unit));
-  return TransferFunction(definition, nullptr, parts.opacity_unit);
+  if (!arguments.opacity_unit) add("--opacity-unit", exact(parts.opacity_unit));
+  definition.opacity_unit = parts.opacity_unit;
+  return withUnit(definition, nullptr, arguments);
 }
 
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,

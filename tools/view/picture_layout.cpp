@@ -21,7 +21,7 @@ std::string titleOf(const Manifest& manifest, const std::string& name) {
 ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
     : colours_(state.function.function()),
       title_(titleOf(manifest, state.variable)),
-      shows_opacities_(!state.opacity_by && (state.volume || !state.hasSheets())) {
+      shows_opacities_(!state.opacity_by && state.drawsVolume()) {
   if (!state.faces.empty() && state.faces_by && state.faces_by->variable != state.variable) {
     of_faces_ = state.faces_by->function.function();
     faces_title_ = titleOf(manifest, state.faces_by->variable);

@@ -252,7 +252,7 @@ void addSurfaces(const ViewState& state, Words& words) {
     words.add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
     if (!state.iso_opacity.opaque()) words.add("--iso-opacity", text(state.iso_opacity));
   }
-  if (!state.volume && state.hasSheets()) words.add("--volume", "off");
+  if (!state.drawsVolume()) words.add("--volume", "off");
 }
 
 }  // namespace

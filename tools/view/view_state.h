@@ -88,10 +88,12 @@ struct ViewState {
   glm::vec4 background() const { return dark ? glm::vec4(0, 0, 0, 1) : glm::vec4(1); }
   /// The scalar of isosurfaces and of opacities.
   const std::string& isoScalar() const { return opacity_by ? opacity_by->variable : variable; }
-  /// Whether there is anything but the volume; without it the volume is drawn, whatever `volume` says.
+  /// Whether there is anything but the volume.
   bool hasSheets() const {
     return !(surfaces.empty() && faces.empty() && slices.empty() && isovalues.empty());
   }
+  /// Without anything else the volume is drawn, whatever `volume` says.
+  bool drawsVolume() const { return volume || !hasSheets(); }
   /// As it is drawn: without a scalar there is no function.
   SheetOpacity opacityOf(const NamedFaces& named) const;
   FaceNames faceNames() const;
