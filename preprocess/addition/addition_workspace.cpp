@@ -24,7 +24,7 @@ AdditionWorkspace::AdditionWorkspace(const std::filesystem::path& cache,
   }
   if (!ranks) return;
   shared_ = sharedFolder(shared_, *ranks);
-  own_ = makeFolderOfRank(shared_, ranks->rank());
+  own_ = makeFolderOfRank(shared_, *ranks);
 }
 
 AdditionWorkspace::~AdditionWorkspace() {

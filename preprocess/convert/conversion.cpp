@@ -128,7 +128,7 @@ class Conversion {
     if (!ranks_) return;
     scratch_ = sharedFolder(scratch_, *ranks_);
     partial_ = sharedFolder(partial_, *ranks_);
-    own_scratch_ = makeFolderOfRank(scratch_, rank());
+    own_scratch_ = makeFolderOfRank(scratch_, *ranks_);
   }
 
   /// Whether an interrupted conversion has left splats that are all there.

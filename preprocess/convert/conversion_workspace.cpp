@@ -54,10 +54,11 @@ std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& r
   return shared;
 }
 
-std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, unsigned rank) {
-  const std::filesystem::path own = shared / fmt::format("rank{}", rank);
+std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Ranks& ranks) {
+  const std::filesystem::path own = shared / fmt::format("rank{}", ranks.rank());
   removeAll(own);
   makeFolder(own);
+  ranks.barrier();  // before one may fail, and remove the shared folder as empty
   return own;
 }
 

@@ -62,8 +62,9 @@ class ScratchFolder {
 /// call it. Throws Error at a rank that does not see it.
 std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& ranks);
 
-/// Makes an empty folder for a rank's own temporary files in `shared`. Throws Error if it cannot.
-std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, unsigned rank);
+/// Makes an empty folder for this rank's own temporary files in `shared`; returns when all ranks have theirs.
+/// All have to call it. Throws Error if it cannot.
+std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Ranks& ranks);
 
 /// What to do about an unfinished conversion to the same output.
 enum class Unfinished {
