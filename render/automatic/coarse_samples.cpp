@@ -1,19 +1,12 @@
 #include "render/automatic/coarse_samples.h"
 
 #include <glm/common.hpp>
-#include <glm/mat4x4.hpp>
-#include <glm/vec4.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <span>
-#include <string_view>
 #include <vector>
-
-#include "render/camera/camera.h"
 
 namespace curvisplat {
 namespace {
@@ -142,108 +135,6 @@ CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm
     addSamples(at_step, bricksAtALevel(at_step, kMinSplats / steps), sampling, places, samples);
   }
   return samples;
-}
-
-namespace {
-
-struct Bounds {
-  glm::dvec3 lower{std::numeric_limits<double>::max()}, upper{-std::numeric_limits<double>::max()};
-
-  explicit Bounds(const CoarseSamples& samples) {
-    for (const glm::dvec3& position : samples.positions) {
-      lower = glm::min(lower, position);
-      upper = glm::max(upper, position);
-    }
-  }
-};
-
-/// Coarse samples as seen from one side, sorted into square pixels: what areas are measured with. Borrows the samples.
-class PixelSums {
- public:
-  /// Of the longer side: some 50 samples for each pixel.
-  static constexpr int kPixels = 80;
-
-  /// `view`: as Camera::named() knows it. `bounds`: of the samples, of which there are some.
-  PixelSums(const CoarseSamples& samples, const Bounds& bounds, std::string_view view)
-      : samples_(samples),
-        view_from_world_(
-            Camera::named(view, bounds.lower, bounds.upper, {kPixels, kPixels}, Projection::kOrthographic)
-                .viewFromWorld()) {
-    glm::dvec2 lowest(std::numeric_limits<double>::max()), highest(-std::numeric_limits<double>::max());
-    for (const glm::dvec3& position : samples.positions) {
-      const glm::dvec2 place = placeOf(position);
-      lowest = glm::min(lowest, place);
-      highest = glm::max(highest, place);
-    }
-    lowest_ = lowest;
-    width_ = std::max(highest.x - lowest.x, highest.y - lowest.y) / kPixels;
-  }
-
-  /// [pixel]: the sum of weightOf(n) over its samples n. All are 0 if the samples are one point.
-  template <typename WeightOf>
-  std::vector<double> of(const WeightOf& weightOf) const {
-    std::vector<double> sums(size_t{kPixels} * kPixels, 0);
-    if (!(width_ > 0)) return sums;
-    for (size_t n = 0; n < samples_.size(); ++n) {
-      const glm::dvec2 place = (placeOf(samples_.positions[n]) - lowest_) / width_;
-      const auto column = static_cast<size_t>(std::min(kPixels - 1, static_cast<int>(place.x)));
-      const auto row = static_cast<size_t>(std::min(kPixels - 1, static_cast<int>(place.y)));
-      sums[row * kPixels + column] += weightOf(n);
-    }
-    return sums;
-  }
-  /// The area of the pixels whose sum is over `least`, world units squared.
-  double areaOver(double least, const std::vector<double>& sums) const {
-    return width_ * width_ * static_cast<double>(std::count_if(sums.begin(), sums.end(), [&](double sum) {
-             return sum > least;
-           }));
-  }
-  /// Of the pixels with samples.
-  double coveredArea() const {
-    return areaOver(0, of([](size_t) { return 1.0; }));
-  }
-  double pixelArea() const { return width_ * width_; }
-
- private:
-  glm::dvec2 placeOf(const glm::dvec3& p) const {
-    const glm::dmat4& m = view_from_world_;
-    return {m[0].x * p.x + m[1].x * p.y + (m[2].x * p.z + m[3].x),
-            m[0].y * p.x + m[1].y * p.y + (m[2].y * p.z + m[3].y)};
-  }
-
-  const CoarseSamples& samples_;
-  const glm::dmat4 view_from_world_;
-  glm::dvec2 lowest_{0};
-  double width_ = 0;
-};
-
-constexpr double kPreferIso = 1.15, kPreferEarlier = 1.03;
-// From the other side, a silhouette is as large.
-constexpr std::string_view kViews[] = {"iso", "+x", "+y", "+z"};
-
-}  // namespace
-
-Silhouette widestSilhouette(const CoarseSamples& samples) {
-  if (samples.size() == 0) return {"iso", 0};
-  const Bounds bounds(samples);
-  Silhouette best{"iso", 0};
-  for (const std::string_view view : kViews) {
-    const double area = PixelSums(samples, bounds, view).coveredArea();
-    if (view == "iso" || area > best.area * (best.view == "iso" ? kPreferIso : kPreferEarlier))
-      best = {view, area};
-  }
-  return best;
-}
-
-double seenArea(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths) {
-  constexpr double kSeenPart = 0.01;  // of the mean depth
-  if (samples.size() == 0) return 0;
-  const PixelSums pixels(samples, Bounds(samples), view);
-  const double covered = pixels.coveredArea();
-  if (!(covered > 0)) return 0;
-  const auto sums = pixels.of([&](size_t n) { return depths[n]; });
-  const double mean = std::accumulate(sums.begin(), sums.end(), 0.0) * pixels.pixelArea() / covered;
-  return pixels.areaOver(kSeenPart * mean, sums);
 }
 
 }  // namespace curvisplat

@@ -13,7 +13,7 @@
 
 #include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
-#include "render/camera/camera.h"
+#include "render/automatic/view_rule.h"
 #include "render/colour/function_parts.h"
 
 namespace curvisplat {
@@ -23,28 +23,21 @@ bool isNearlyConstant(const VariableInfo& variable);
 /// The position of the first variable that is not nearly constant; 0 if all are. Requires one or more.
 size_t firstVaryingVariable(const Manifest& manifest);
 
-/// A named view, perhaps of a part of the data.
-struct ViewChoice {
-  std::string view = "iso";
-  std::optional<glm::dvec3> focal_point = std::nullopt;  // nullopt: the whole data is shown
-  double parallel_scale = 0;                             // with a focal point
-};
-
 class FirstChoice {
  public:
   /// `scale`: factors that the data's positions are multiplied with. Throws Error as reading does.
   FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
               ChosenFor what = ChosenFor::kStep);
 
-  /// Range, opacities and opacity unit; `map`: a preset, or empty to have one chosen.
-  FunctionParts function(const std::string& map = "") const;
+  /// Range, opacities and opacity unit; `map`: a preset, or empty to have one of `maps` chosen.
+  FunctionParts function(const std::string& map = "", const DefaultMaps& maps = kMapsOnDark) const;
   /// The opacity unit at which the function absorbs 65 % on the average over what it shows (seenArea()). Its
   /// own unit does not matter. A function that is transparent for the data gets 1/100 of its diagonal.
   double opacityUnitOf(const TransferFunction& function) const;
   /// The value below which `part` (0..1) of the volume lies.
   double percentile(double part) const;
-  /// The view for a picture of `size`: of all the data, unless what can be seen lies in a small part of it.
-  ViewChoice view(const TransferFunction& function, ImageSize size) const;
+  /// The view for a picture of `size` (chooseView()).
+  ViewChoice view(const TransferFunction& function, ImageSize size, Framed framed = Framed::kSeen) const;
 
  private:
   FunctionParts constantFunction() const;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <string>
 #include <utility>
 
@@ -25,6 +27,12 @@ std::optional<double> parseUnit(std::string_view text) {
 }
 
 }  // namespace
+
+DefaultMaps mapsOn(const glm::vec4& background) {
+  constexpr glm::vec3 kLuminance{0.2126f, 0.7152f, 0.0722f};
+  const bool is_dark = background.a > 0.5f && glm::dot(kLuminance, glm::vec3(background)) < 0.5f;
+  return is_dark ? kMapsOnDark : kMapsOnLight;
+}
 
 TransferFunctionDefinition FunctionParts::definition() const {
   TransferFunctionDefinition preset = presetDefinition(map);

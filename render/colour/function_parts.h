@@ -4,6 +4,7 @@
 // thread.
 #pragma once
 
+#include <glm/vec4.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,8 +21,21 @@ namespace curvisplat {
 TransferFunctionDefinition spreadOver(TransferFunctionDefinition definition, std::pair<double, double> range,
                                       const std::optional<AsinhScale>& asinh);
 
+/// The colour maps of a picture that names none. Rare values are mostly the highest, or those at both ends: these stand
+/// out against the background.
+struct DefaultMaps {
+  const char* sequential;
+  const char* diverging;
+};
+constexpr DefaultMaps kMapsOnDark{"glow", "cool-warm"};
+constexpr DefaultMaps kMapsOnLight{"matter", "cool-warm-extended"};
+/// `background`: premultiplied. A transparent one counts as light: such pictures are for pages.
+DefaultMaps mapsOn(const glm::vec4& background);
+/// #15171c, the background of pictures that name none.
+constexpr glm::vec4 kDefaultBackground{0x15 / 255.0f, 0x17 / 255.0f, 0x1c / 255.0f, 1};
+
 struct FunctionParts {
-  std::string map = "viridis";  // a preset
+  std::string map = kMapsOnDark.sequential;  // a preset
   std::pair<double, double> range{0, 1};
   std::optional<AsinhScale> asinh;
   std::vector<OpacityPoint> opacities;  // x: 0..1 along the range; empty: those of the preset

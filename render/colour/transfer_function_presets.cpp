@@ -46,6 +46,15 @@ std::vector<ColourPoint> fromTable(const MatplotlibTable& table) {
   return points;
 }
 
+/// Inferno without its darkest quarter, which cannot be told from a dark background.
+std::vector<ColourPoint> glow() {
+  std::vector<ColourPoint> points = fromTable(kInferno);
+  points.erase(points.begin(), points.begin() + 8);
+  const double begin = points.front().x;
+  for (ColourPoint& point : points) point.x = (point.x - begin) / (1 - begin);
+  return points;
+}
+
 // Diverging data is about both ends, so the middle is transparent.
 const std::vector<OpacityPoint> kDivergingOpacities{{0, 0.4},      {0.125, 0.2}, {0.25, 0.08},
                                                     {0.375, 0.02}, {0.5, 0},     {0.625, 0.02},
@@ -62,6 +71,7 @@ const std::vector<Preset>& presets() {
   static const std::vector<Preset> all{
       {"viridis", ColourSpace::kRgb, fromTable(kViridis), defaultOpacityRamp(0, 1)},
       {"inferno", ColourSpace::kRgb, fromTable(kInferno), defaultOpacityRamp(0, 1)},
+      {"glow", ColourSpace::kRgb, glow(), defaultOpacityRamp(0, 1)},
       {"plasma", ColourSpace::kRgb, fromTable(kPlasma), defaultOpacityRamp(0, 1)},
       {"cool-warm",
        ColourSpace::kDiverging,
@@ -120,6 +130,7 @@ std::span<const PublishedMap> builtInMaps() {
   static const std::vector<PublishedMap> all = [] {
     std::vector<PublishedMap> maps{{"viridis", "matplotlib", MapCategory::kSequential, true},
                                    {"inferno", "matplotlib", MapCategory::kSequential, true},
+                                   {"glow", "inferno's upper part", MapCategory::kSequential, true},
                                    {"plasma", "matplotlib", MapCategory::kSequential, true},
                                    {"cool-warm", "ParaView", MapCategory::kDiverging, true},
                                    {"grey", "-", MapCategory::kSequential, true}};

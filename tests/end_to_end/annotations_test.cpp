@@ -45,8 +45,8 @@ TEST_F(Annotations, EachIsDrawnInItsPlace) {
 TEST_F(Annotations, TheScalarBarStandsBesideTheData) {
   // All of the picture is data, but for the bar's strip, which the outline and the axes do not enter either.
   const std::vector<std::string> close{
-      "--parallel-scale", "0.1",    "--position", "3,0,0.5",      "--focal-point",
-      "-0.4,-0.2,0.5",    "--axes", "--outline",  "--lod-pixels", "8"};
+      "--parallel-scale", "0.1",       "--position",   "3,0,0.5", "--focal-point", "-0.4,-0.2,0.5",
+      "--axes",           "--outline", "--lod-pixels", "8",       "--background",  "white"};
   std::vector<std::string> options = close;
   options.push_back("--scalar-bar");
   const Image with = render(options);
@@ -145,8 +145,8 @@ TEST_F(Annotations, InkStandsOutFromTheBackground) {
         least = std::min(least, std::max({image.pixel(x, y)[0], image.pixel(x, y)[1], image.pixel(x, y)[2]}));
     return least;
   };
-  EXPECT_LT(darkest(render({"--axes", "--background", "white"})), 0.3f);
-  const Image black = render({"--axes", "--background", "black"});
+  EXPECT_LT(darkest(render({"--axes", "--view", "iso", "--background", "white"})), 0.3f);
+  const Image black = render({"--axes", "--view", "iso", "--background", "black"});
   float lightest = 0;
   for (int y = 100; y < 160; ++y)
     for (int x = 0; x < 60; ++x)

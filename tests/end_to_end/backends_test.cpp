@@ -86,7 +86,8 @@ class AroundBackends : public ProgramTest, public testing::WithParamInterface<st
     std::ofstream(file("sheet.obj")) << "v -3 -2 1\nv 6 -2 2.5\nv 6 2 3\nv -3 2 1.5\nf 1 2 3 4\n";
   }
   Image drawn(const std::string& backend, const Words& view, const Words& more) const {
-    Words words = Words{"--backend", backend, "--range", "0,1", "--view", "iso"} + view;
+    Words words =
+        Words{"--backend", backend, "--range", "0,1", "--view", "iso", "--background", "white"} + view;
     for (const std::string& option : more) words.push_back(option == "sheet.obj" ? file(option) : option);
     return pictureOf(file("wake.splats"), file("a.pfm"), words, "160x120");
   }

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/colour/function_parts.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
@@ -47,7 +48,7 @@ TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
   convert(GetParam(), "48x32x24");
   const ProgramResult result = render({});
   EXPECT_EQ(result.err, "");
-  const PictureContrast contrast = contrastOf(readImage(file("a.png")), glm::vec4(1));
+  const PictureContrast contrast = contrastOf(readImage(file("a.png")), kDefaultBackground);
   // The shell is a thin layer of nearly one colour in a clear far field, which hid it when it was drawn as fog.
   const double least = std::string_view(GetParam()) == "shell" ? 0.01 : 0.05;
   EXPECT_GE(contrast.seen, 0.05) << result.out;
@@ -84,7 +85,7 @@ TEST_P(DefaultPictures, HoldTheWholeData) {
     for (const char* const size : {"160x160", "240x80", "80x240"})
       for (const bool outline : {false, true}) {
         if (!faults::isTried(combination++, 5)) continue;
-        Words words{"--size", size, "--scale", stretched, "--backend", "cpu"};
+        Words words{"--size", size, "--scale", stretched, "--backend", "cpu", "--background", "white"};
         if (outline) words.push_back("--outline");
         words.insert(words.begin(), {"render", file("a.splats"), "-o", file("a.png")});
         const ProgramResult result = run(words);
@@ -151,7 +152,7 @@ TEST_P(DefaultPicturesOfRealGrids, ShowSomething) {
     const std::string picture = (folder / "a.png").string();
     const ProgramResult drawn = run(
         {"render", (folder / "a.splats").string(), "-o", picture, "--size", "240x240", "--scalar", scalar});
-    EXPECT_GE(contrastOf(readImage(picture), glm::vec4(1)).other, 0.05) << scalar << ": " << drawn.out;
+    EXPECT_GE(contrastOf(readImage(picture), kDefaultBackground).other, 0.02) << scalar << ": " << drawn.out;
   }
 }
 INSTANTIATE_TEST_SUITE_P(Grids, DefaultPicturesOfRealGrids, testing::ValuesIn(realGrids()),

@@ -82,7 +82,7 @@ TEST_F(SharedGridFormats, TheDeltaWingHasItsVortex) {
                          "Points": [0.86, 0.9, 0.5, 0, 0.94, 0.5, 0.5, 0, 0.96, 0, 0.5, 0, 1.02, 0, 0.5, 0]}])"));
   picture(cache, {"--scalar", "Density", "--tf", file("vortex.json"), "--opacity-unit", "0.02", "--clip-box",
                   "0.7,0.9,0,0.6,-0.3,0.5", "--position", "4,0.2,0.1", "--focal-point", "0.8,0.2,0.1",
-                  "--view-up", "0,0,1", "--parallel-scale", "0.3"});
+                  "--view-up", "0,0,1", "--parallel-scale", "0.3", "--background", "white"});
   const Image image = readImage(file("picture.pfm"));
   double red_weight = 0, y = 0, z = 0;
   for (int row = 0; row < image.size.height; ++row)

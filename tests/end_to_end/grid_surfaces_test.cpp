@@ -164,7 +164,9 @@ class GridSurfaceOptions : public ProgramSuite<GridSurfaceOptions> {
   }
 
   static Words render(const Words& more, const std::string& cache = "wake.splats") {
-    return Words{"render", file(cache), "-o", file("a.pfm"), "--size", "200x150", "--view", "iso"} + more;
+    return Words{"render",  file(cache), "-o",  file("a.pfm"),  "--size",
+                 "200x150", "--view",    "iso", "--background", "white"} +
+           more;
   }
   static Image picture(const Words& more) {
     run(render(more));

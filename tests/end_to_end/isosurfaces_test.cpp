@@ -91,7 +91,9 @@ TEST_F(Isosurfaces, EveryPainterDrawsTheSame) {
 TEST_F(Isosurfaces, TheProgramDrawsThemAndRefusesWrongUsage) {
   const std::string output = file("a.pfm");
   const auto render = [&](const Words& more) {
-    return Words{"render", file("a.splats"), "-o", output, "--size", "150x150", "--view", "iso"} + more;
+    return Words{"render",  file("a.splats"), "-o",  output,         "--size",
+                 "150x150", "--view",         "iso", "--background", "white"} +
+           more;
   };
   run(render({"--iso", "0.4,0.6", "--volume", "off"}));
   const Image once = readImage(output);

@@ -213,8 +213,8 @@ TEST_F(LimitsTest, APictureMayBeOnePixel) {
   for (const char* backend : {"cpu", "osmesa"})
     for (const char* name : {"one.png", "one.exr", "one.pfm"}) {
       SCOPED_TRACE(fmt::format("{} {}", backend, name));
-      rendered(name,
-               {"--size", "1x1", "--backend", backend, "--parallel-scale", "2", "--opacity-unit", "0.1"});
+      rendered(name, {"--size", "1x1", "--backend", backend, "--parallel-scale", "2", "--opacity-unit", "0.1",
+                      "--background", "white"});
       const Image image = readImage(file(name));
       ASSERT_EQ(image.size.width, 1);
       ASSERT_EQ(image.size.height, 1);

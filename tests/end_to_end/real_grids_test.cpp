@@ -121,7 +121,8 @@ TEST_P(RealGrids, MakeAWholeCacheAndAPictureThatRepeats) {
   for (const std::string view : {"iso", "+z", "-y"}) {
     const std::string picture = folder_ / "picture.pfm", again = folder_ / "again.pfm";
     const auto draw = [&](const std::string& output, const std::string& threads) {
-      run({"render", cache(), "--view", view, "--size", "300x300", "-o", output, "--threads", threads});
+      run({"render", cache(), "--view", view, "--size", "300x300", "-o", output, "--threads", threads,
+           "--background", "white"});
       return readTextFile(output);
     };
     const std::string drawn_by_one = draw(picture, "1");

@@ -12,6 +12,7 @@
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
+#include "render/colour/function_parts.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/progress.h"
@@ -90,8 +91,8 @@ TEST_F(RenderOptions, DefaultsGiveAPictureAndTheOptionsThatWereChosen) {
   const Image image = render({}, "a.png");
   EXPECT_EQ(last_.err, "");
   EXPECT_EQ(lineCount(last_.out), 2) << last_.out;
-  expectSays(last_.out, "chosen from the data: --tf viridis --range");
-  EXPECT_GT(pixelsOtherThan(image, {1, 1, 1, 1}), 96u * 96 / 10);
+  expectSays(last_.out, "chosen from the data: --tf glow --range");
+  EXPECT_GT(pixelsOtherThan(image, kDefaultBackground), 96u * 96 / 10);
 }
 
 TEST_F(RenderOptions, SizeIsThatOfThePicture) {
@@ -107,8 +108,8 @@ TEST_F(RenderOptions, BackgroundShowsWhereNothingIs) {
 }
 
 TEST_F(RenderOptions, TransparentPngHasTheDatasAlpha) {
-  const Image transparent = render({"--background", "transparent"}, "a.png");
-  const Image black = render({"--background", "black"}, "b.png");
+  const Image transparent = render({"--tf", "viridis", "--background", "transparent"}, "a.png");
+  const Image black = render({"--tf", "viridis", "--background", "black"}, "b.png");
   expectPixel(transparent, 0, 0, {0, 0, 0, 0});
   bool translucent = false;
   for (size_t n = 0; n < transparent.rgba.size(); n += 4) {
@@ -122,7 +123,7 @@ TEST_F(RenderOptions, TransparentPngHasTheDatasAlpha) {
 }
 
 TEST_F(RenderOptions, ClipBoxLeavesTheRestEmpty) {
-  const Words camera{"--view", "+z", "--parallel-scale", "1.2"};
+  const Words camera{"--view", "+z", "--parallel-scale", "1.2", "--background", "white"};
   const Image whole = render(camera), half = render(camera + Words{"--clip-box", "-2,2,-2,0,-2,2"});
   // Seen along z with y up and its centre, 0, in the middle: what is left is in the lower half. The scalar of cells at the
   // grid's borders is another where the box cuts them.
@@ -175,7 +176,7 @@ TEST_F(RenderOptions, APlacedCameraIsTheNamedOne) {
 }
 
 TEST_F(RenderOptions, AClipPlaneLeavesWhatABoxWithThatFaceLeaves) {
-  const Words camera{"--view", "+z", "--parallel-scale", "1.2"};
+  const Words camera{"--view", "+z", "--parallel-scale", "1.2", "--background", "white"};
   const Image box = render(camera + Words{"--clip-box", "-9,9,-9,0.25,-9,9"}),
               plane = render(camera + Words{"--clip-plane", "3,0.25,7,0,-2,0"}),
               two = render(camera + Words{"--clip-plane", "0,0.25,0,0,-1,0", "--clip-plane=0,0,0,1,0,0"});
@@ -223,13 +224,13 @@ TEST_F(RenderOptions, ARangeThatMissesTheScalarIsWarnedOf) {
 }
 
 TEST_F(RenderOptions, AnEmptyPictureIsExplained) {
-  EXPECT_EQ(pixelsOtherThan(render({"--clip-box", "5,6,5,6,5,6"}), {1, 1, 1, 1}), 0u);
+  EXPECT_EQ(pixelsOtherThan(render({"--clip-box", "5,6,5,6,5,6"}), kDefaultBackground), 0u);
   expectSays(last_.err, "--clip-box contains none of the data");
-  EXPECT_EQ(pixelsOtherThan(render({"--clip-plane", "9,0,0,1,0,0"}), {1, 1, 1, 1}), 0u);
+  EXPECT_EQ(pixelsOtherThan(render({"--clip-plane", "9,0,0,1,0,0"}), kDefaultBackground), 0u);
   expectSays(last_.err, "--clip-plane and --clip-box leave none of the data");
   EXPECT_EQ(
       pixelsOtherThan(render({"--position", "9,0,0", "--focal-point", "9,9,0", "--parallel-scale", "1"}),
-                      {1, 1, 1, 1}),
+                      kDefaultBackground),
       0u);
   expectSays(last_.err, "does not see the data's box");
   render({"--opacity-unit", "1e12"}, "a.png");
@@ -393,7 +394,7 @@ TEST_F(RenderOptions, StatisticsReportWhatWasDone) {
   EXPECT_EQ(frame["camera"]["projection"], "perspective");
   EXPECT_EQ(frame["camera"]["view_angle_deg"], 25);
   EXPECT_EQ(json["scale"][2], 2);
-  EXPECT_EQ(json["transfer_function"]["name"], "viridis");
+  EXPECT_EQ(json["transfer_function"]["name"], "glow");
   EXPECT_GT(json["peak_memory_bytes"], 1 << 20);
   EXPECT_GT(frame["splats_drawn"], 0);
   EXPECT_GT(frame["bytes_read"], 0);

@@ -212,7 +212,9 @@ TEST_F(SurfaceOptions, RefusesWrongUsage) {
       {{"--volume", "off", "--shade=2"}, 2, "--shade: takes no value (found '2')"},
       {{"--volume", "maybe"}, 2, "--volume maybe: expected on or off"},
       {{"--surface-colour", "#ff0000"}, 2, "--surface-colour needs a surface: --surface FILE"},
-      {{"--surface", sphere, "--surface-colour", "red"}, 2, "--surface-colour red: expected white, black"},
+      {{"--surface", sphere, "--surface-colour", "red"},
+       2,
+       "--surface-colour red: expected dark, white, black"},
       {{"--surface", cut}, 1, cut + ": is truncated"},
       {{"--surface", file("none.stl")}, 1, file("none.stl")}};
   for (const auto& [options, status, words] : refused) {

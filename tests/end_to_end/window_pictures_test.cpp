@@ -5,6 +5,7 @@
 #include <csignal>
 #include <functional>
 
+#include "render/colour/function_parts.h"
 #include "render/image/image_file.h"
 #include "tests/end_to_end/window_fixture.h"
 
@@ -110,7 +111,7 @@ TEST_F(WindowPictures, HaveTheNameThatWasTypedBeforeTheDialogOpened) {
   close();
 }
 
-/// A narrower picture has all that the window shows: the outline's box was whole in it, so nothing reaches the border.
+/// A narrower picture has all that the window shows, which was whole in it, so nothing reaches the border.
 TEST_F(WindowPictures, ThatAreNarrowerHoldWhatIsShown) {
   open();
   save();
@@ -125,8 +126,8 @@ TEST_F(WindowPictures, ThatAreNarrowerHoldWhatIsShown) {
   EXPECT_EQ(narrow.size.width, 200);
   EXPECT_EQ(narrow.size.height, shown.height);
   for (int y = 0; y < narrow.size.height; ++y) {
-    EXPECT_EQ(narrow.pixel(0, y)[0], 1) << y;
-    EXPECT_EQ(narrow.pixel(199, y)[0], 1) << y;
+    EXPECT_EQ(narrow.pixel(0, y)[0], kDefaultBackground.r) << y;
+    EXPECT_EQ(narrow.pixel(199, y)[0], kDefaultBackground.r) << y;
   }
   close();
 }

@@ -62,22 +62,23 @@ TEST_F(WindowTest, ShowsEachChange) {
   const Image rotated = save();
   EXPECT_LT(difference(first, rotated), 30);
   press("o");
-  const Image perspective = save();
-  EXPECT_LT(difference(rotated, perspective), 45);
+  const Image orthographic = save();
+  EXPECT_LT(difference(rotated, orthographic), 45);
   addPoint();
   // The edit is on the screen, without anything else that would make it draw.
-  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), perspective) < 35; }));
+  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), orthographic) < 35; }));
   const Image edited = saveAndCopy();
-  EXPECT_LT(difference(perspective, edited), 35);
+  EXPECT_LT(difference(orthographic, edited), 35);
 
   const auto commands = close();
   ASSERT_EQ(commands.size(), 1u);
-  EXPECT_NE(valueOf(commands[0], "--view-angle"), "");
+  EXPECT_NE(valueOf(commands[0], "--parallel-scale"), "");
   expectDraws(commands[0], edited);
 }
 
 TEST_F(WindowsCamera, DragsAndTheWheelMoveIt) {
   open();
+  press("o");
   const Image first = saveAndCopy();
   dragPicture(1, 0.1, 0);
   const Image rotated = saveAndCopy();
@@ -145,9 +146,10 @@ TEST_F(WindowsCamera, KeysLookAlongTheAxes) {
   ASSERT_EQ(seen.size(), keys.size() + 2);
   for (size_t n = 0; n < keys.size(); ++n)
     EXPECT_LE(glm::length(seen[n].forward() - keys[n].second), kRounded) << keys[n].first;
-  EXPECT_GT(seen[6].view_angle, 0);
-  EXPECT_EQ(seen[7].view_angle, 0);
-  EXPECT_NEAR(seen[7].parallel_scale, seen[5].parallel_scale, kRounded);
+  EXPECT_EQ(seen[6].view_angle, 0);
+  EXPECT_EQ(seen[7].view_angle, seen[5].view_angle);
+  EXPECT_GT(seen[7].view_angle, 0);
+  EXPECT_NEAR(glm::length(seen[7].position - seen[5].position), 0, kRounded);
 }
 
 TEST_F(WindowsCamera, FliesThroughTheData) {
@@ -250,7 +252,7 @@ TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
   ASSERT_EQ(commands.size(), 1u);
   EXPECT_EQ(valueOf(commands[0], "--scalar"), "volume");
   EXPECT_NE(valueOf(commands[0], "--clip-box"), "");
-  EXPECT_EQ(valueOf(commands[0], "--background"), "black");
+  EXPECT_EQ(valueOf(commands[0], "--background"), "white");
   const std::string text = bytesOfFile(valueOf(commands[0], "--tf"));
   expectSays(text, "\"UseLogScale\": 1");
   expectSays(text, "2e-05");
@@ -260,9 +262,18 @@ TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
 TEST_F(WindowTest, SavesAndLoadsAFunction) {
   open();
   const Image chosen = save();
-  click("reset points");
+  click("ramp");
   const Image preset = save();
   EXPECT_LT(difference(chosen, preset), 35);
+  click("clear");
+  const Image nothing = save();
+  EXPECT_LT(difference(nothing, preset), 35);
+  click("band");
+  EXPECT_LT(difference(save(), nothing), 35);
+  click("automatic");
+  EXPECT_TRUE(eventually([&] { return difference(save(), chosen) >= 50; }));
+  click("ramp");
+  save();
   addPoint();
   const Image edited = save();
   EXPECT_LT(difference(preset, edited), 35);
@@ -270,7 +281,7 @@ TEST_F(WindowTest, SavesAndLoadsAFunction) {
   placeOf("file name");
   press("Return");  // function.json is offered
   EXPECT_TRUE(eventually([&] { return fs::exists("function.json"); }));
-  click("reset points");
+  click("ramp");
   EXPECT_GE(difference(save(), preset), 50);
   click("load");
   click("file function.json");

@@ -6,10 +6,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/vec4.hpp>
 #include <numbers>
 
 #include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
+#include "render/automatic/view_rule.h"
+#include "render/camera/camera.h"
 #include "render/colour/function_parts.h"
 #include "render/image/image.h"
 #include "stream/base/error.h"
@@ -135,6 +140,42 @@ TEST(FirstChoice, WhatIsSeenMayBeASmallPartOfTheSilhouette) {
   std::fill(depths.begin(), depths.end(), 0);
   EXPECT_EQ(seenArea(samples, "+z", depths), 0);
   EXPECT_EQ(seenArea(CoarseSamples(), "+z", {}), 0);
+}
+
+/// A cube of haze, with a dense ball in one of its corners: it is looked at from that corner, unless that is below, and the
+/// whole cube is in the picture, hardly smaller than it can be.
+TEST(FirstChoice, LooksFromWhereRareValuesAreSeen) {
+  for (const glm::dvec3& corner : {glm::dvec3(0, 0, 1), {1, 1, 1}}) {
+    CoarseSamples samples;
+    std::vector<double> depths;
+    constexpr int kAlong = 40;
+    for (int n = 0; n < kAlong * kAlong * kAlong; ++n) {
+      const glm::dvec3 place =
+          (glm::dvec3(n % kAlong, n / kAlong % kAlong, n / kAlong / kAlong) + 0.5) / double{kAlong};
+      const double volume = 1.0 / (kAlong * kAlong * kAlong);
+      add(samples, 1, volume);
+      samples.positions.back() = place;
+      depths.push_back(volume * (glm::distance(place, 0.2 + 0.6 * corner) < 0.15 ? 60 : 6));
+    }
+    const Silhouette widest = widestSilhouette(samples);
+    ASSERT_EQ(widest.view, "iso");
+    constexpr ImageSize kSize{300, 200};
+    const glm::dvec3 lower(0), upper(1);
+    const ViewChoice choice = chooseView({samples, depths, widest, lower, upper}, kSize, Framed::kSeen);
+    ASSERT_TRUE(choice.position);
+    const Camera camera = cameraOf(choice, lower, upper, kSize);
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_EQ(camera.position[axis] > 0.5, corner[axis] > 0.5)
+          << axis << " " << corner.x << corner.y << corner.z;
+    double reach = 0;
+    for (const glm::dvec3& place : samples.positions) {
+      const glm::dvec3 seen(camera.viewFromWorld() * glm::dvec4(place, 1));
+      const double half = -seen.z * std::tan(camera.view_angle_deg * std::numbers::pi / 360);
+      reach = std::max({reach, std::abs(seen.y) / half, std::abs(seen.x) / half / 1.5});
+    }
+    EXPECT_GT(reach, 0.85);
+    EXPECT_LT(reach, 0.9);
+  }
 }
 
 TEST(FirstChoice, ConstantScalarsAreRecognised) {

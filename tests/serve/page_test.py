@@ -89,8 +89,9 @@ def is_the_commands_picture(tab, server_caches):
         numbers = lambda p: ",".join(repr(x) for x in p)  # noqa: E731
         command = [program, "render", server_caches[0], "-o", f"{folder}/p.png", "--size", f"{width}x{height}", "--scalar", state["variable"],
                    "--tf", f"{folder}/f.json", f"--position={numbers(camera['position'])}", f"--focal-point={numbers(camera['focal_point'])}",
-                   f"--view-up={numbers(camera['view_up'])}", "--parallel-scale", repr(camera["parallel_scale"]),
-                   "--scalar-bar", "--axes", "--outline", "--background", "white"]
+                   f"--view-up={numbers(camera['view_up'])}", "--scalar-bar", "--axes",
+                   *(["--view-angle", repr(camera["view_angle"])] if camera["perspective"] else
+                     ["--parallel-scale", repr(camera["parallel_scale"])])]
         subprocess.run(command, check=True, capture_output=True)
         png = base64.b64encode(pathlib.Path(folder, "p.png").read_bytes()).decode()
         differing = tab.run(f"""(async () => {{
@@ -108,6 +109,9 @@ def navigation(browser, server, caches):
     tab = opened(browser, server.url)
     shot(tab, "first")
     is_the_commands_picture(tab, caches)
+    tab.run("document.getElementById('picture').focus()")
+    changes(tab, lambda: tab.key("o"), "the key o")
+    expect(not tab.run(f"{PAGE}.state.camera.perspective"), "the first view is in perspective")
     before = tab.run(f"{PAGE}.pictures")
     changes(tab, lambda: drag_until(tab, lambda: tab.run(f"{PAGE}.pictures") - before > 3), "dragging", "rotated")
     camera = tab.run(f"{PAGE}.state.camera")

@@ -64,16 +64,16 @@ TEST(History, GoesBackAndForth) {
   History history(state);
   history.record(state);  // unchanged
   EXPECT_FALSE(history.canUndo());
-  state.dark = true;
+  state.dark = false;
   history.record(state);
   state.lit = true;
   history.record(state);
   ASSERT_TRUE(history.canUndo());
   EXPECT_FALSE(history.undo()->lit);
-  EXPECT_FALSE(history.undo()->dark);
+  EXPECT_TRUE(history.undo()->dark);
   EXPECT_EQ(history.undo(), nullptr);
   const ViewState again = *history.redo();
-  EXPECT_TRUE(again.dark);
+  EXPECT_FALSE(again.dark);
   ViewState other = again;
   other.lod_pixels = 3;
   history.record(other);  // what could be redone is gone

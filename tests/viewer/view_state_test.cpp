@@ -83,7 +83,7 @@ TEST(ViewState, APresetStaysOne) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   state.function.setRange(1, 2);
   const ViewState again = viewStateFromJson(toJson(state), "a.json", manifest());
-  EXPECT_EQ(again.function.preset(), "viridis");
+  EXPECT_EQ(again.function.preset(), "glow");
   EXPECT_EQ(again.function.range(), std::pair(1.0, 2.0));
 }
 
@@ -185,7 +185,7 @@ TEST(RenderCommand, LeavesDefaultsOut) {
   state.annotations = {};
   state.camera = {{3, 1.0 / 3, 2}, {1, 0.5, 0.5}, {0, 0, 1}, Projection::kOrthographic, 0.7, 30};
   EXPECT_EQ(commandText(state, "a b.splats"),
-            "curvisplat render 'a b.splats' -o picture.png --size 300x200 --scalar density --tf viridis "
+            "curvisplat render 'a b.splats' -o picture.png --size 300x200 --scalar density --tf glow "
             "--range 0.5,3 --opacity-unit 0.0244949 --position 3,0.333333,2 --focal-point 1,0.5,0.5 "
             "--parallel-scale 0.7");
 }
@@ -207,13 +207,14 @@ TEST(RenderCommand, HasEveryOption) {
   state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
   state.slice_opacity = {0.5, true};
   state.volume = false;
-  state.lit = state.dark = true;
-  state.annotations.axes = false;
+  state.lit = true;
+  state.dark = false;
+  state.annotations = {.scalar_bar = true, .outline = true};
   state.classification = Classification::kFlat;
   expectParts(commandText(state, "it's\x1b[2J \\\u009b.splats"), {R"($'it\'s\033[2J \\\302\233.splats')"});
   expectParts(commandText(state, "it's.splats"), {"'it'\\''s.splats'",
                                                   "--scalar 'u v'",
-                                                  "--tf viridis",
+                                                  "--tf glow",
                                                   "--range=-1,1",
                                                   "--opacity 0:",
                                                   "0.3:0.7",
@@ -222,7 +223,7 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--clip-plane 0,0.5,0,1,0,-2",
                                                   "--clip-plane 0.25,0,0,0,1,0",
                                                   "--shade",
-                                                  "--background black",
+                                                  "--background white",
                                                   "--classify flat",
                                                   "--lod-pixels 2.5",
                                                   "--scalar-bar --outline",
@@ -245,7 +246,7 @@ TEST(RenderCommand, OfTwoScalarsHasBothFunctions) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   state.opacity_by = OpacityScalar{"u v", EditedFunction("grey", -1, 0.5, 0.25)};
   state.opacity_by->function.addPoint(0.5, 0.25);
-  expectParts(commandText(state), {"--tf viridis", "--range 0.5,3", "--opacity-by 'u v'",
+  expectParts(commandText(state), {"--tf glow", "--range 0.5,3", "--opacity-by 'u v'",
                                    "--opacity-range=-1,0.5", "0.5:0.25", "--opacity-unit 0.25"});
 }
 

@@ -134,8 +134,7 @@ void render(const RenderArguments& given) {
   const Manifest manifest = cache.manifest();  // of the first step
   const size_t shown = chooseVariable(cache, arguments.scalar);
   const ChosenFor drawn = drawnSteps(arguments);
-  ScalarChoice choice =
-      chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options.scale, drawn);
+  ScalarChoice choice = chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options, drawn);
   const DrawnScalars& scalars = choice.scalars;
   const size_t variable = scalars.opacity.variable;
   const TransferFunction& transfer_function = scalars.opacity.function;
@@ -151,7 +150,7 @@ void render(const RenderArguments& given) {
 
   options.scene = sceneOf(arguments.surfaces, cache,
                           {shown, variable, isoOfColours(arguments.opacity, arguments.scalar),
-                           !arguments.opacity.by.scalar.empty()});
+                           !arguments.opacity.by.scalar.empty(), mapsOn(options.background)});
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 
@@ -294,8 +293,10 @@ void addRender(CLI::App& app) {
                    "Direction x,y,z towards the light, after --scale (default: the viewer); implies --shade")
       ->group(what);
   command
-      ->add_option("--background", arguments->frame.background,
-                   "Background colour: white, black, transparent or #rrggbb")
+      ->add_option(
+          "--background", arguments->frame.background,
+          "Background colour: dark (#15171c), white (for papers), black, transparent or #rrggbb. Colour maps "
+          "that are chosen suit it")
       ->capture_default_str()
       ->group(what);
 

@@ -16,7 +16,7 @@ namespace curvisplat {
 
 /// Command-line arguments as given; checked and parsed by frameOptions().
 struct FrameArguments {
-  std::string size = "600x600", background = "white";
+  std::string size = "600x600", background = "dark";
   std::string classify = "pixel", scale = "1,1,1", memory = "512M";
   std::string lod_pixels = "1";
   std::optional<std::string> clip_box, max_splats;

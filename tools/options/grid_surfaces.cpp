@@ -372,13 +372,13 @@ void takeOpacities(GridSurface& surface, const std::string& name, const CacheRea
 }
 
 void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache,
-                    std::optional<size_t> drawn) {
+                    std::optional<size_t> drawn, const DefaultMaps& maps) {
   const size_t variable = variableOf(name, cache);
   surface.scalar = scalarOfFaces(*surface.faces, name, cache);
   if (variable == drawn) return;
   ScalarArguments arguments;
   arguments.scalar = name;
-  PictureChoice choice(cache, variable, glm::dvec3(1.0));
+  PictureChoice choice(cache, variable, glm::dvec3(1.0), ChosenFor::kStep, maps);
   surface.function = std::make_shared<TransferFunction>(choice.function(arguments));
   surface.colours = std::make_shared<ColourTable>(*surface.function);
 }

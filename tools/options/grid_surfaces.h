@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/colour/function_parts.h"
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
 
@@ -59,9 +60,9 @@ std::vector<GridSurface> gridSurfacesNamed(const std::vector<WantedFaces>& wante
 std::vector<std::string> faceNamesOf(const CacheReader& cache);
 
 /// Colours the surface by the scalar `name`, which its faces have: with the picture's colours if it is the
-/// scalar `drawn`, else with colours that are chosen from its own data.
+/// scalar `drawn`, else with colours that are chosen from its own data, in one of `maps`.
 void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache,
-                    std::optional<size_t> drawn);
+                    std::optional<size_t> drawn, const DefaultMaps& maps);
 
 /// Takes the surface's opacities from the scalar `name`, at the cache's step.
 void takeOpacities(GridSurface& surface, const std::string& name, const CacheReader& cache);

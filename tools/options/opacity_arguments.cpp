@@ -104,9 +104,11 @@ std::string ScalarChoice::chosenOptions() const {
 }
 
 ScalarChoice chooseScalars(const OpacityArguments& arguments, const ScalarArguments& scalar,
-                           const CacheReader& cache, size_t shown, const glm::dvec3& scale, ChosenFor what) {
+                           const CacheReader& cache, size_t shown, const FrameOptions& frame,
+                           ChosenFor what) {
+  const DefaultMaps maps = mapsOn(frame.background);
   if (nameOf(arguments).empty()) {
-    PictureChoice picture(cache, shown, scale, what);
+    PictureChoice picture(cache, shown, frame.scale, what, maps);
     DrawnScalars scalars(shown, picture.function(scalar));
     return {std::move(scalars), std::move(picture), {}};
   }
@@ -114,9 +116,9 @@ ScalarChoice chooseScalars(const OpacityArguments& arguments, const ScalarArgume
   ScalarArguments colours = scalar;
   colours.opacity.reset();
   colours.opacity_unit.reset();
-  PictureChoice of_colours(cache, shown, scale, what);
+  PictureChoice of_colours(cache, shown, frame.scale, what, maps);
   DrawnScalar colour{shown, of_colours.colours(colours)};
-  PictureChoice picture(cache, variable, scale, what);
+  PictureChoice picture(cache, variable, frame.scale, what, maps);
   DrawnScalar opacity{variable, picture.opacities(opacitiesOf(arguments, scalar))};
   return {DrawnScalars(std::move(opacity), std::move(colour)), std::move(picture),
           of_colours.chosenOptions()};

@@ -39,8 +39,8 @@ struct ScalarChoice {
   std::string chosenOptions() const;
 };
 
-/// `shown`: the variable of --scalar. Throws as PictureChoice.
+/// `shown`: the variable of --scalar; the scale and the background are those of `frame`. Throws as PictureChoice.
 ScalarChoice chooseScalars(const OpacityArguments& arguments, const ScalarArguments& scalar,
-                           const CacheReader& cache, size_t shown, const glm::dvec3& scale, ChosenFor what);
+                           const CacheReader& cache, size_t shown, const FrameOptions& frame, ChosenFor what);
 
 }  // namespace curvisplat

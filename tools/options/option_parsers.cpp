@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "preprocess/convert/memory_plan.h"
+#include "render/colour/function_parts.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -136,6 +137,7 @@ uint64_t parseCount(std::string_view option, std::string_view text) {
 }
 
 glm::vec4 parseBackground(std::string_view option, std::string_view text) {
+  if (text == "dark") return kDefaultBackground;
   if (text == "white") return {1, 1, 1, 1};
   if (text == "black") return {0, 0, 0, 1};
   if (text == "transparent") return {0, 0, 0, 0};
@@ -146,8 +148,8 @@ glm::vec4 parseBackground(std::string_view option, std::string_view text) {
       return {static_cast<float>(rgb >> 16 & 255) / 255, static_cast<float>(rgb >> 8 & 255) / 255,
               static_cast<float>(rgb & 255) / 255, 1};
   }
-  const std::vector<std::string> names{"white", "black", "transparent"};
-  throw UsageError("{} {}: expected white, black, transparent or #rrggbb{}", option, text,
+  const std::vector<std::string> names{"dark", "white", "black", "transparent"};
+  throw UsageError("{} {}: expected dark, white, black, transparent or #rrggbb{}", option, text,
                    didYouMean(text, names));
 }
 

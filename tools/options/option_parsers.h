@@ -37,7 +37,7 @@ uint64_t parseByteSize(std::string_view option, std::string_view text);
 uint64_t parseMemory(std::string_view option, std::string_view text);
 /// A whole number above zero, optionally with a suffix K, M or G (powers of 1000): "8M".
 uint64_t parseCount(std::string_view option, std::string_view text);
-/// "white", "black", "transparent" or "#rrggbb". Returns premultiplied red, green, blue, alpha.
+/// "dark" (kDefaultBackground), "white", "black", "transparent" or "#rrggbb". Returns premultiplied red, green, blue, alpha.
 glm::vec4 parseBackground(std::string_view option, std::string_view text);
 
 /// The value of --backend: "auto", "osmesa", "egl" or "cpu".

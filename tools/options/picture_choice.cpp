@@ -185,6 +185,7 @@ TransferFunction PictureChoice::function(const ScalarArguments& arguments) {
   if (isFile(arguments)) return fromFile(arguments);
   if (isAutomatic(arguments)) return automatic(arguments);
   FunctionParts parts;
+  parts.map = maps_.sequential;
   if (arguments.transfer_function) parts.map = *arguments.transfer_function;
   parts.range = arguments.range ? parseRange(*arguments.range) : std::pair(info().min, info().max);
   if (arguments.asinh) parts.asinh = parseAsinh(*arguments.asinh);
@@ -238,7 +239,7 @@ TransferFunction PictureChoice::fromParts(FunctionParts parts, const ScalarArgum
 }
 
 TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
-  FunctionParts parts = data().function(arguments.transfer_function.value_or(""));
+  FunctionParts parts = data().function(arguments.transfer_function.value_or(""), maps_);
   TransferFunctionDefinition definition = parts.definition();
   if (isNearlyConstant(info()))
     definition.notes.push_back(
@@ -257,15 +258,23 @@ CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferF
   if (arguments.view || arguments.position || arguments.focal_point || arguments.view_up ||
       arguments.parallel_scale || arguments.view_angle || arguments.moves())
     return arguments;
-  const ViewChoice choice = data().view(function, size);
-  add("--view", choice.view);
-  arguments.view = choice.view;
-  if (whole || !choice.focal_point) return arguments;
-  const glm::dvec3& point = *choice.focal_point;
-  arguments.focal_point = fmt::format("{},{},{}", point.x, point.y, point.z);
-  arguments.parallel_scale = exact(choice.parallel_scale);
-  add("--focal-point", *arguments.focal_point);
-  add("--parallel-scale", *arguments.parallel_scale);
+  const ViewChoice choice = data().view(function, size, whole ? Framed::kBox : Framed::kSeen);
+  const auto take = [&](const char* option, std::optional<std::string>& argument, std::string value) {
+    add(option, value);
+    argument = std::move(value);
+  };
+  const auto text = [](const glm::dvec3& point) {
+    return fmt::format("{},{},{}", point.x, point.y, point.z);
+  };
+  if (choice.position)
+    take("--position", arguments.position, text(*choice.position));
+  else
+    take("--view", arguments.view, choice.view);
+  if (choice.focal_point) take("--focal-point", arguments.focal_point, text(*choice.focal_point));
+  if (choice.position)
+    take("--view-angle", arguments.view_angle, exact(kChosenViewAngle));
+  else if (choice.focal_point)
+    take("--parallel-scale", arguments.parallel_scale, exact(choice.parallel_scale));
   return arguments;
 }
 

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "render/automatic/first_choice.h"
+#include "render/colour/function_parts.h"
 #include "render/colour/transfer_function.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/options/frame_sequence.h"
@@ -42,11 +43,11 @@ void checkFunctionArguments(const ScalarArguments& arguments);
 /// Chooses the transfer function and the camera of a picture, and collects what it has chosen.
 class PictureChoice {
  public:
-  /// `cache` must outlive this; `scale` as in FrameOptions; `what` is drawn with one function. Reads
-  /// nothing.
+  /// `cache` must outlive this; `scale` as in FrameOptions; `what` is drawn with one function, in one of
+  /// `maps` where no colour map is given. Reads nothing.
   PictureChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
-                ChosenFor what = ChosenFor::kStep)
-      : cache_(cache), variable_(variable), scale_(scale), what_(what) {}
+                ChosenFor what = ChosenFor::kStep, const DefaultMaps& maps = kMapsOnDark)
+      : cache_(cache), variable_(variable), scale_(scale), what_(what), maps_(maps) {}
 
   /// Fills in the options that are not given. Throws UsageError, or Error if reading fails or a file does
   /// not hold a transfer function.
@@ -80,6 +81,7 @@ class PictureChoice {
   const size_t variable_;
   const glm::dvec3 scale_;
   const ChosenFor what_;
+  const DefaultMaps maps_;
   enum class Part { kAll, kColours, kOpacities };
   Part part_ = Part::kAll;  // of a function: what is said of it
   std::optional<FirstChoice> data_;

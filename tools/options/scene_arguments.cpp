@@ -269,7 +269,8 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
         scene->grid_surfaces.emplace_back(gridSurfaceNamed(arguments.surfaces[n], cache, faces));
     surface.colour = colour;
     surface.opacity = surfaceOpacity(arguments, n);
-    if (!arguments.surface_by.empty()) colourByScalar(surface, arguments.surface_by, cache, scalars.colours);
+    if (!arguments.surface_by.empty())
+      colourByScalar(surface, arguments.surface_by, cache, scalars.colours, scalars.maps);
     if (surface.opacity.by_function && scalars.opacity_by && scalars.areTwo())
       takeOpacities(surface, cache.manifest().variables[*scalars.opacities].name, cache);
   }

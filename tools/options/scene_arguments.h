@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "render/annotate/annotations.h"
+#include "render/colour/function_parts.h"
 #include "render/frame/frame_options.h"
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
@@ -57,7 +58,8 @@ bool hasFaces(const SurfaceArguments& arguments);
 struct SceneScalars {
   std::optional<size_t> colours, opacities;  // none: of a window, which may show any
   bool iso_of_colours = false;               // of two: isosurfaces are those of the colours
-  bool opacity_by = false;  // whether the opacities are those of --opacity-by, also for faces
+  bool opacity_by = false;         // whether the opacities are those of --opacity-by, also for faces
+  DefaultMaps maps = kMapsOnDark;  // for faces that show another scalar
 
   bool areTwo() const { return colours && opacities && colours != opacities; }
 };

@@ -222,7 +222,10 @@ void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   actions.changed |= ImGui::Checkbox("lighting", &state.lit);
   nameWidget("light");
   ImGui::SameLine(column);
-  actions.changed |= ImGui::Checkbox("dark background", &state.dark);
+  if (ImGui::Checkbox("dark background", &state.dark)) {
+    state.suitBackground();
+    actions.changed = actions.function_changed = true;
+  }
   nameWidget("dark");
   actions.changed |= option("scalar bar", state.annotations.scalar_bar);
   ImGui::SameLine(column);

@@ -203,7 +203,7 @@ std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) co
   constexpr size_t kMaxBins = 1 << 20;
   if (arguments.bins == 0 || arguments.bins > kMaxBins)
     throw UsageError("a histogram of {} bins: expected from 1 to {}", arguments.bins, kMaxBins);
-  EditedFunction function("viridis", arguments.low, arguments.high, 1);
+  EditedFunction function(kMapsOnDark.sequential, arguments.low, arguments.high, 1);
   function.setLogScale(arguments.log);
   return histogramOf(reader_, variable, function, arguments.bins);
 }
@@ -227,12 +227,12 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     FrameOptions frame = arguments.frame;
     const size_t shown = chooseVariable(reader_, arguments.scalar);
     ScalarChoice choice =
-        chooseScalars(arguments.opacity, arguments.scalar, reader_, shown, frame.scale, ChosenFor::kStep);
+        chooseScalars(arguments.opacity, arguments.scalar, reader_, shown, frame, ChosenFor::kStep);
     const DrawnScalars& scalars = choice.scalars;
     const TransferFunction& function = scalars.opacity.function;
-    frame.scene = sceneOf(
-        arguments.surfaces, reader_,
-        {shown, scalars.opacity.variable, isoOfColours(arguments.opacity, arguments.scalar), has_opacities});
+    frame.scene = sceneOf(arguments.surfaces, reader_,
+                          {shown, scalars.opacity.variable, isoOfColours(arguments.opacity, arguments.scalar),
+                           has_opacities, mapsOn(frame.background)});
     const Annotations& annotations = arguments.annotations.shown;
     const std::vector<ShownFunction> functions = shownFunctions(
         arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);

@@ -131,7 +131,7 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
   const MutexLock lock(reading_);
   Json json = {{"type", "histogram"}, {"cache", request.cache}, {"scalar", request.scalar},
                {"low", request.low},  {"high", request.high},   {"log", request.log}};
-  EditedFunction function("viridis", request.low, request.high, 1);
+  EditedFunction function(kMapsOnDark.sequential, request.low, request.high, 1);
   function.setLogScale(request.log);
   json["bins"] = histogramOf(cache.reader, variable, function, kBins);
   return textOf(json);

@@ -25,14 +25,10 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
   const FirstChoice choice = choiceOf(cache, state.variable);
   state.function = EditedFunction::automatic(choice.function());
   const ImageSize size = dataSize(state.annotations, picture, state.function.function());
-  const ViewChoice view = choice.view(state.function.function(), size);
-  state.camera = Camera::named(view.view, manifest.lower, manifest.upper, size, Projection::kOrthographic);
   // The outline is to be seen whole.
-  if (view.focal_point && !state.annotations.outline) {
-    state.camera.position += *view.focal_point - state.camera.focal_point;
-    state.camera.focal_point = *view.focal_point;
-    state.camera.parallel_scale = view.parallel_scale;
-  }
+  const Framed framed = state.annotations.outline ? Framed::kBox : Framed::kSeen;
+  state.camera =
+      cameraOf(choice.view(state.function.function(), size, framed), manifest.lower, manifest.upper, size);
   return state;
 }
 
@@ -45,6 +41,7 @@ void chooseVariable(ViewState& state, const CacheReader& cache, const std::strin
   if (state.function.isAutomatic()) chosen = automaticFunction(cache, name);
   chooseVariable(state, cache.manifest(), name);
   if (chosen) state.function = *std::move(chosen);
+  state.suitBackground();
 }
 
 void FunctionChooser::ask(const Question& question) {

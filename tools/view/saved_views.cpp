@@ -296,7 +296,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   for (const ClipPlane& plane : state.clip_planes) words.add("--clip-plane", text(plane));
   if (state.lit) words.add("--shade");
   addSurfaces(state, words);
-  if (state.dark) words.add("--background", "black");
+  if (!state.dark) words.add("--background", "white");
   if (state.annotations.scalar_bar) words.add("--scalar-bar");
   if (state.annotations.axes) words.add("--axes");
   if (state.annotations.axes_grid) words.add("--axes-grid");

@@ -294,14 +294,28 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   return options;
 }
 
+void ViewState::suitBackground() {
+  const DefaultMaps& wanted = dark ? kMapsOnDark : kMapsOnLight;
+  const DefaultMaps& other = dark ? kMapsOnLight : kMapsOnDark;
+  const auto suit = [&](EditedFunction& chosen) {
+    if (!chosen.isAutomatic()) return;
+    const bool sequential = chosen.map() == other.sequential;
+    if (!sequential && chosen.map() != other.diverging) return;
+    chosen.setColours(sequential ? wanted.sequential : wanted.diverging);
+    chosen.setAutomatic();
+  };
+  suit(function);
+  if (faces_by) suit(faces_by->function);
+}
+
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
   if (manifest.variables.empty())
     throw Error("{}: the cache contains no scalar; convert the grid again with a scalar", manifest.title);
   const VariableInfo& variable = manifest.variables[firstVaryingVariable(manifest)];
-  ViewState state{
-      variable.name,
-      {},
-      EditedFunction("viridis", variable.min, variable.max, defaultOpacityUnit(manifest, glm::dvec3(1)))};
+  ViewState state{variable.name,
+                  {},
+                  EditedFunction(kMapsOnDark.sequential, variable.min, variable.max,
+                                 defaultOpacityUnit(manifest, glm::dvec3(1)))};
   state.camera = Camera::named("iso", manifest.lower, manifest.upper,
                                dataSize(state.annotations, picture, state.function.function()),
                                Projection::kOrthographic);

@@ -80,12 +80,15 @@ struct ViewState {
   SheetOpacity iso_opacity = {};
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
-  bool dark = false;  // background
-  Annotations annotations{true, true, true};
+  bool dark = true;  // background
+  Annotations annotations{.scalar_bar = true, .axes = true};
   std::optional<OpacityScalar> opacity_by = std::nullopt;
   std::vector<Marker> markers = {};
 
-  glm::vec4 background() const { return dark ? glm::vec4(0, 0, 0, 1) : glm::vec4(1); }
+  glm::vec4 background() const { return dark ? kDefaultBackground : glm::vec4(1); }
+  /// Gives functions that were chosen from the data the map that suits the background, where their map is that of
+  /// the other one.
+  void suitBackground();
   /// The scalar of isosurfaces and of opacities.
   const std::string& isoScalar() const { return opacity_by ? opacity_by->variable : variable; }
   /// Whether there is anything but the volume.

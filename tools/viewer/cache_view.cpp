@@ -116,6 +116,7 @@ ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOption
   if (!state.function.isAutomatic()) return state;
   state.function =
       state.variable == prepared.scalar ? prepared.automatic : automaticFunction(cache_, state.variable);
+  state.suitBackground();
   return state;
 }
 
@@ -325,7 +326,10 @@ void CacheView::run(Command command) {
     case Command::kLight:
       return toggle(state_.lit);
     case Command::kDarkBackground:
-      return toggle(state_.dark);
+      toggle(state_.dark);
+      state_.suitBackground();
+      ++function_version_;
+      return;
     case Command::kScalarBar:
       return toggle(state_.annotations.scalar_bar);
     case Command::kAxes:

@@ -448,6 +448,7 @@ void CacheView::takeFunction() {
       const bool is_automatic = state_.function.isAutomatic();
       showScalar(question.scalar);
       if (is_automatic) state_.function = function;
+      state_.suitBackground();
       return;
     }
     case FunctionChooser::For::kOpacities:
@@ -464,6 +465,7 @@ void CacheView::takeFunction() {
       if (question.scalar == state_.variable) state_.function = function;
       break;
   }
+  state_.suitBackground();
   ++function_version_;
   changed_ = true;
 }

@@ -317,7 +317,7 @@ class Cache:
                slice_opacity: Union[float, str] = 1, isovalues: Sequence[float] = (),
                iso_opacity: Union[float, str, None] = None, iso_by: str = "",
                volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
-               light_direction: Optional[Vector] = None, background: str = "white", scalar_bar: bool = False,
+               light_direction: Optional[Vector] = None, background: str = "dark", scalar_bar: bool = False,
                scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
                axes_titles: Optional[Sequence[str]] = None, outline: bool = False,
                channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
@@ -355,7 +355,7 @@ class Cache:
         isovalues: of the scalar, or of iso_by. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
         function.
 
-        volume: False leaves the volume out. background: a colour, or "transparent".
+        volume: False leaves the volume out. background: "dark" (#15171c), "white", another colour, or "transparent"; colours that are chosen suit it.
 
         shade: light level surfaces from the viewer; light: (ambient, diffuse, specular), and light_direction turn it on,
         too.
