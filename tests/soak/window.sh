@@ -126,7 +126,7 @@ show() {
 resize() { do_ search --onlyvisible --name curvisplat windowsize "$1" "$2"; }
 # presets_points: the function as it began; a button of the panel's.
 presets_points() {
-  press "reset points"
+  press "ramp"
   asked > /dev/null
 }
 # home: everything as it was first. An "o" too few or too many is put right.

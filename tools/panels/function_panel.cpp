@@ -7,7 +7,9 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <map>
+#include <span>
 
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
@@ -22,6 +24,8 @@ constexpr size_t kBins = 128;
 constexpr float kGrabRadius = 0.6f;  // around a point, in lines of text
 constexpr float kPointRadius = 0.38f;
 constexpr float kCurveLines = 9;  // height in lines of text
+constexpr OpacityPoint kBand[] = {{0, 0}, {0.4, 0}, {0.5, 0.5}, {0.6, 0}, {1, 0}};
+constexpr OpacityPoint kClear[] = {{0, 0}, {1, 0}};
 
 ImU32 toImGui(const glm::dvec3& rgb) {
   return ImGui::ColorConvertFloat4ToU32(
@@ -201,7 +205,10 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
   if (left > 0) ImGui::Unindent(left);
   if (shows != Shows::kOpacities) result.changed |= drawMaps(function, result);
   drawRange(function, variable, step, result);
-  if (shows != Shows::kColours) result.changed |= drawUnit(function);
+  if (shows != Shows::kColours) {
+    drawOpacities(function, shows, result);
+    drawUnit(function, result);
+  }
   if (shows != Shows::kColours && ImGui::TreeNode("opacity points")) {
     nameWidget("opacity points");
     result.changed |= drawPoints(function);
@@ -422,30 +429,64 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
   ImGui::SameLine();
   if (ImGui::Button("full range")) set(all.min, all.max);
   nameWidget("full range");
-  ImGui::SameLine();
   if (steps.size() > 1) {
+    ImGui::SameLine();
     const StepValues& of = steps[step].values[variable];
     if (ImGui::Button("range of this step")) set(of.min, of.max);
     nameWidget("range of this step");
   }
-  const bool resets = ImGui::Button("reset points");
-  nameWidget("reset points");
-  hint("the colour map with its own opacities");
-  if (resets) {
-    const std::string name = function.map().empty() ? "viridis" : function.map();
+}
+
+void FunctionPanel::drawOpacities(EditedFunction& function, Shows shows, Result& result) {
+  label("opacities");
+  const auto button = [](const char* name, const char* what) {
+    const bool pressed = ImGui::Button(name);
+    nameWidget(name);
+    hint(what);
+    return pressed;
+  };
+  if (shows == Shows::kAll) {
+    result.automatic |= button("automatic", "range and opacities as they are chosen from the data");
+    ImGui::SameLine();
+  }
+  if (button("ramp", "the colour map with its own opacities, which rise with the values")) {
+    const std::string name = function.map().empty() ? kMapsOnDark.sequential : function.map();
     function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
     result.changed = true;
   }
+  const auto set = [&](const char* name, const char* what, std::span<const OpacityPoint> points) {
+    ImGui::SameLine();
+    if (!button(name, what)) return;
+    function.setOpacities({points.begin(), points.end()});
+    result.changed = true;
+  };
+  set("band", "values in the middle of the range alone; drag it where it is wanted", kBand);
+  set("clear", "nothing; add points for what is to be seen", kClear);
 }
 
-bool FunctionPanel::drawUnit(EditedFunction& function) {
+void FunctionPanel::drawUnit(EditedFunction& function, Result& result) {
   const double unit = function.opacityUnit();
   label("opacity unit");
-  const auto typed = typed_.draw("##opacity unit", {&unit, 1}, "%.4g");
-  if (typed) function.setOpacityUnit(typed->front());
+  if (const auto typed = typed_.draw("##opacity unit", {&unit, 1}, "%.4g")) {
+    function.setOpacityUnit(typed->front());
+    result.changed = true;
+  }
   nameWidget("opacity unit");
   hint("the length over which the opacity accumulates: smaller is more opaque");
-  return typed.has_value();
+  const Manifest& manifest = cache_.manifest();
+  const double usual = std::max(0.01 * glm::distance(manifest.lower, manifest.upper), 1e-300);
+  constexpr double kThinnest = 0.01, kDensest = 10'000;
+  double density = usual / unit;
+  label("density");
+  if (ImGui::SliderScalar("##density", ImGuiDataType_Double, &density, &kThinnest, &kDensest, "%.3g",
+                          ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+    constexpr int kDigits = 3;
+    function.setOpacityUnit(roundedTo(usual / density, usual / density, kDigits));
+    result.changed = true;
+  }
+  result.dragging |= ImGui::IsItemActive();
+  nameWidget("density");
+  hint("a hundredth of the data's size, over the opacity unit");
 }
 
 }  // namespace curvisplat

@@ -138,6 +138,12 @@ size_t EditedFunction::addPoint(double x, double opacity) {
   return static_cast<size_t>(added - points.begin());
 }
 
+void EditedFunction::setOpacities(std::vector<OpacityPoint> points) {
+  CURVISPLAT_CHECK(points.size() >= 2);
+  definition_.opacities = std::move(points);
+  edited();
+}
+
 void EditedFunction::movePoint(size_t point, double x, double opacity) {
   auto& points = definition_.opacities;
   CURVISPLAT_CHECK_OP(point, <, points.size());

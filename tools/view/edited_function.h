@@ -67,6 +67,8 @@ class EditedFunction {
   void setOpacityUnit(double unit);
 
   const std::vector<OpacityPoint>& points() const { return definition_.opacities; }
+  /// Two or more points, the first at 0 and the last at 1.
+  void setOpacities(std::vector<OpacityPoint> points);
   /// Returns the new point's index. A point with the x of an existing one is inserted after it.
   size_t addPoint(double x, double opacity);
   /// Clamps x between the neighbours (0 and 1 for the first and last point) and opacity to 0..1.
