@@ -32,8 +32,8 @@ packages=(
   libopenmpi-dev openmpi-bin
   # the Python package
   pybind11-dev python3-dev python3-numpy
-  # tests and benchmarks
-  libgtest-dev libbenchmark-dev python3 man-db
+  # tests and benchmarks; the bundle
+  libgtest-dev libbenchmark-dev python3 man-db patchelf zstd
   # window tests: a virtual display, simulated input, screenshots
   xvfb xdotool x11-apps libgl1-mesa-dri
   "$@"

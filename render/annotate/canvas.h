@@ -26,6 +26,10 @@
 
 namespace curvisplat {
 
+/// Chooses the font of texts: the bundle's, where the program is part of one (unless FONTCONFIG_FILE is set), else the system's sans.
+/// Any thread.
+void selectFont(cairo_t* cairo, cairo_font_weight_t weight = CAIRO_FONT_WEIGHT_NORMAL);
+
 /// A picture in memory, and Cairo's context that draws on it.
 class CairoSurface {
  public:
@@ -57,7 +61,7 @@ class CairoSurface {
 class Canvas {
  public:
   explicit Canvas(ImageSize size) : surface_(CAIRO_FORMAT_ARGB32, size.width, size.height) {
-    cairo_select_font_face(get(), "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    selectFont(get());
     cairo_set_line_cap(get(), CAIRO_LINE_CAP_ROUND);
   }
 

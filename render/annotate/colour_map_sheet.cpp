@@ -1,4 +1,5 @@
 #include "render/annotate/annotations.h"
+#include "render/annotate/canvas.h"
 
 #include <cairo/cairo.h>
 
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "render/annotate/canvas.h"
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
 
@@ -71,8 +73,7 @@ Image colourMapSheet() {
   };
   for (size_t n = 0; n < list.size(); ++n) {
     const auto [x, y] = cornerOf(n);
-    cairo_select_font_face(cairo.get(), "sans", CAIRO_FONT_SLANT_NORMAL,
-                           list[n].heading ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    selectFont(cairo.get(), list[n].heading ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
     cairo_move_to(cairo.get(), x, y + kBarHeight - 3);
     cairo_show_text(cairo.get(), list[n].text.c_str());
   }

@@ -36,4 +36,12 @@ void* openPlugin(const char* name, int flags, std::string& why_not) {
   return nullptr;
 }
 
+fs::path bundledFile(const char* name) {
+  std::error_code error;
+  const fs::path folder = thisFile().parent_path();
+  for (const fs::path& candidate : {folder / name, folder / "../share/curvisplat" / name})
+    if (fs::is_regular_file(candidate, error)) return candidate;
+  return {};
+}
+
 }  // namespace curvisplat

@@ -1,6 +1,8 @@
-// Plug-ins of the program, which are loaded only when they are needed: the libraries that they link would delay each start.
+// What lies beside the program: plug-ins, which are loaded only when they are needed since the libraries that they link would delay
+// each start, and files of a bundle (tools/packaging/bundle.sh).
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 namespace curvisplat {
@@ -9,5 +11,9 @@ namespace curvisplat {
 /// function, as in the Python package), then where packages put plug-ins, then where the dynamic linker looks for libraries.
 /// Returns nullptr, with the reason in `why_not`, if there is none or it cannot be loaded. Any thread.
 void* openPlugin(const char* name, int flags, std::string& why_not);
+
+/// A file that a bundle carries, since it must not rely on the system's: share/curvisplat/NAME beside the program's folder, or NAME
+/// beside the Python module. Empty outside of bundles. Any thread.
+std::filesystem::path bundledFile(const char* name);
 
 }  // namespace curvisplat

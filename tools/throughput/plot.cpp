@@ -47,8 +47,7 @@ class PlotCanvas {
 
   void ink(const Colour& colour) { cairo_set_source_rgb(get(), colour.r, colour.g, colour.b); }
   void font(double size, bool bold = false) {
-    cairo_select_font_face(get(), "sans", CAIRO_FONT_SLANT_NORMAL,
-                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    selectFont(get(), bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(get(), size);
   }
   double widthOf(const std::string& text) const {

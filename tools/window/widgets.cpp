@@ -14,9 +14,11 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/plugin.h"
 
 namespace curvisplat {
 namespace {
@@ -50,10 +52,11 @@ uint64_t appearanceOf(const ImDrawData& frame) {
 
 namespace {
 
-// Where distributions put it; the first is where the build found it.
-constexpr std::array kFiles{CURVISPLAT_FONT, "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
-                            "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
-                            "/usr/share/fonts/dejavu/DejaVuSans.ttf", "/usr/share/fonts/TTF/DejaVuSans.ttf"};
+// Where distributions put DejaVu Sans; the first is where the build found it.
+constexpr std::array kSystemFiles{CURVISPLAT_FONT, "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
+                                  "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
+                                  "/usr/share/fonts/dejavu/DejaVuSans.ttf",
+                                  "/usr/share/fonts/TTF/DejaVuSans.ttf"};
 // Latin, Greek, super- and subscripts, arrows, mathematical and geometric signs.
 constexpr ImWchar kLetters[] = {0x20,   0x17f,  0x370,  0x3ff,  0x2010, 0x2027, 0x2030, 0x205e, 0x2070,
                                 0x209f, 0x2190, 0x21ff, 0x2200, 0x22ff, 0x25a0, 0x25ff, 0};
@@ -64,10 +67,12 @@ constexpr float kBuiltInPixels = 13;
 bool loadFont(float pixels, float pixels_per_unit) {
   ImGuiIO& io = ImGui::GetIO();
   io.Fonts->Clear();
-  for (const char* file : kFiles) {
+  std::vector<std::filesystem::path> files{bundledFile("DejaVuSans.ttf")};
+  files.insert(files.end(), kSystemFiles.begin(), kSystemFiles.end());
+  for (const std::filesystem::path& file : files) {
     std::error_code ignored;
-    if (!*file || !std::filesystem::exists(file, ignored)) continue;
-    if (!io.Fonts->AddFontFromFileTTF(file, pixels, nullptr, kLetters)) continue;
+    if (!std::filesystem::exists(file, ignored)) continue;
+    if (!io.Fonts->AddFontFromFileTTF(file.c_str(), pixels, nullptr, kLetters)) continue;
     io.FontGlobalScale = 1 / pixels_per_unit;
     return true;
   }

@@ -119,6 +119,8 @@ struct MapProjection::Proj {
   explicit Proj(const std::string& text) {
     context = proj_context_create();
     proj_log_level(context, PJ_LOG_NONE);
+    // Whatever its level, it prints that proj.db is missing, as it may be in a bundle. These definitions do not need it.
+    proj_log_func(context, nullptr, [](void*, int, const char*) {});
     proj_context_set_enable_network(context, 0);
     projection = proj_create(context, text.c_str());
   }

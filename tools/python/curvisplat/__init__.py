@@ -10,6 +10,7 @@ Positions and lengths are in the grid's own unit. Colours are premultiplied by a
 """
 
 from . import _threads  # Before the libraries are loaded: see there.
+from . import _libraries  # Before _core: see there.
 from ._arrays import Block, from_xarray
 from ._cache import Cache, Picture, Points, Samples, Scalar, open
 from ._camera import Camera, orbit

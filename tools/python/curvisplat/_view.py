@@ -16,12 +16,12 @@ from . import _core
 
 
 def program() -> str:
-    """The path of the program `curvisplat` that belongs to this package: beside it in a build tree, or the one in PATH. Raises Error
-    if there is none."""
+    """The path of the program `curvisplat` that belongs to this package: in it as a wheel has it, beside it in a build tree, or the one
+    in PATH. Raises Error if there is none."""
     here = pathlib.Path(__file__).resolve()
-    beside = here.parents[2] / "curvisplat"
-    if os.access(beside, os.X_OK) and beside.is_file():
-        return str(beside)
+    for beside in (here.parent / "curvisplat", here.parents[2] / "curvisplat"):
+        if os.access(beside, os.X_OK) and beside.is_file():
+            return str(beside)
     found = shutil.which("curvisplat")
     if found is None:
         raise _core.Error("the program curvisplat is neither beside the package nor in PATH; install it")
