@@ -282,6 +282,42 @@ TEST_F(Frames, AMovieIsRawFramesToFfmpeg) {
   }
 }
 
+TEST_F(Frames, APageHasThePicturesInIt) {
+  expectDrawn(
+      {"-o", file("a<b.html"), "--orbit", "90", "--frames", "3", "--frame-rate", "12.5", "--size", "65x47"});
+  expectDrawn({"-o", file("page_%d.png"), "--orbit", "90", "--frames", "3", "--size", "65x47"});
+  const std::string page = bytes("a<b.html");
+  for (const char* text : {"<title>a&#60;b</title>", "1000 / 12.5", "width=\"65\" height=\"47\""})
+    expectSays(page, text);
+  size_t at = 0;
+  for (int frame = 0; frame < 3; ++frame) {
+    const std::string_view before = "data:image/png;base64,";
+    at = page.find(before, at);
+    ASSERT_NE(at, std::string::npos) << frame;
+    std::string picture;
+    uint32_t bits = 0;
+    int count = 0;
+    for (at += before.size(); page[at] != '"' && page[at] != '='; ++at) {
+      const char c = page[at];
+      const int six = c == '/'   ? 63
+                      : c == '+' ? 62
+                      : c <= '9' ? c - '0' + 52
+                      : c <= 'Z' ? c - 'A'
+                                 : c - 'a' + 26;
+      bits = bits << 6 | static_cast<uint32_t>(six);
+      if ((count += 6) >= 8) picture += static_cast<char>(bits >> (count -= 8));
+    }
+    EXPECT_TRUE(picture == bytes(fmt::format("page_{}.png", frame))) << frame;
+  }
+  EXPECT_EQ(page.find("data:", at), std::string::npos);
+  // It loads nothing.
+  for (const char* other : {"http", "src=\"/", "@import", "url("})
+    EXPECT_EQ(page.find(other), std::string::npos) << other;
+  expectRefused(cached({"-o", file("b.html")}), 2, {"--orbit, --path or --steps"});
+  expectRefused(cached({"-o", file("none/b.html"), "--orbit", "90", "--frames", "2"}), 1, {"none"});
+  EXPECT_FALSE(fs::exists(file("b.html")));
+}
+
 TEST_F(Frames, StoppedByASignalAreReportedAndLeaveNothingUnfinished) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     const fs::path out = folder_->path() / fmt::format("stopped{}", signal);

@@ -315,7 +315,7 @@ TEST_F(RenderOptions, WrongOptionsAreUsageErrors) {
                {{"--orbit", "90", "--frames", "0"}, "1 to 100000"},
                {{"--orbit", "90", "--frames", "-3"}, "1 to 100000"},
                {{"--orbit", "90", "--frames", "3"}, "all frames would have the same name"},
-               {{"--frame-rate", "24"}, "NAME.mp4"},
+               {{"--frame-rate", "24"}, "NAME.mp4, NAME.gif or NAME.html"},
                {{"--tf", "virdis"}, "did you mean viridis?"}};
   for (const auto& c : cases) {
     SCOPED_TRACE(c.options[0] + " " + c.options[1]);

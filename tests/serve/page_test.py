@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Drives the server's page in Chromium: navigation, the function's editor, cuts, time, sizes, lost connections.
+"""Drives the server's page in Chromium: navigation, the function's editor, cuts, time, sizes, lost connections; and pages of `render`.
 
     page_test.py PROGRAM [FOLDER]    FOLDER: keeps the screenshots there
 """
@@ -348,6 +348,29 @@ def ten_clients(browser, caches):
         wait_for(lambda: server.threads() < 12, "the viewers to end")
 
 
+def page_without_server(browser, folder):
+    """What `render -o NAME.html` writes: dragged, by keys, by its slider, and played; and that it loads nothing."""
+    page = pathlib.Path(folder, "turntable.html")
+    subprocess.run([program, "render", f"{folder}/annulus.splats", "-o", page, "--orbit", "360", "--frames", "8", "--size", "400x300"],
+                   check=True, capture_output=True)
+    tab = browser.tab(page.as_uri(), (800, 600))
+    shown = "[...document.images].findIndex(i => getComputedStyle(i).display !== 'none')"
+    tab.wait("document.readyState === 'complete' && document.images.length === 8", "the page's pictures")
+    expect(tab.run("[...document.images].every(i => i.naturalWidth === 400 && i.naturalHeight === 300)"), "all pictures are decoded")
+    expect(tab.run(shown) == 0 and tab.run("[...document.images].filter(i => getComputedStyle(i).display !== 'none').length") == 1,
+           "the first picture is shown, alone")
+    tab.drag((400, 150), (500, 150))  # a quarter of the picture's width
+    expect(tab.run(shown) == 2, f"dragging turns by two of eight pictures: {tab.run(shown)}")
+    tab.drag((500, 150), (250, 150))
+    expect(tab.run(shown) == 5, f"dragging back goes beyond the first: {tab.run(shown)}")
+    set_value(tab, "#frame", "3")
+    expect(tab.run(shown) == 3 and tab.run("document.getElementById('number').value") == "4 / 8", "the slider chooses")
+    tab.run("document.getElementById('play').click()")
+    tab.wait(f"{shown} !== 3", "the page to play")
+    expect(tab.run("performance.getEntriesByType('resource').filter(r => !r.name.startsWith('data:')).length") == 0, "the page loads nothing")
+    shot(tab, "turntable")
+
+
 with tempfile.TemporaryDirectory() as folder:
     subprocess.run([program, "generate", "half-annulus", "--size", "48x32x24", "-o", f"{folder}/g"], check=True, capture_output=True)
     subprocess.run([program, "convert", f"{folder}/g.xyz", f"{folder}/g.fun", "-o", f"{folder}/annulus.splats"], check=True, capture_output=True)
@@ -381,6 +404,8 @@ with tempfile.TemporaryDirectory() as folder:
         lost_connection(browser, caches, folder)
         print("lost connection done")
         ten_clients(browser, caches)
+        page_without_server(browser, folder)
+        print("page without a server done")
     finally:
         browser.close()
 

@@ -33,6 +33,7 @@
 #include "tools/output/empty_picture.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/launched_ranks.h"
+#include "tools/output/picture_page.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
 
@@ -49,7 +50,9 @@ ChosenFor drawnSteps(const RenderArguments& arguments) {
 /// Memory, in bytes, that annotating and writing a picture take.
 uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
   uint64_t bytes = 0;
-  if (isMovieName(arguments.output))
+  if (isPageName(arguments.output))
+    bytes = 2 * writingBytes("frame.png", picture);  // and as text
+  else if (isMovieName(arguments.output))
     bytes = 3 * picture.pixels();
   else
     bytes = writingBytes(arguments.output, picture);
@@ -235,9 +238,10 @@ void addRender(CLI::App& app) {
                       "Precision of the values stored when CACHE is a grid: auto, normal or fine, as for "
                       "convert (default: auto)");
   command
-      ->add_option("-o,--output", arguments->output,
-                   "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "
-                   ".gif (by ffmpeg)")
+      ->add_option(
+          "-o,--output", arguments->output,
+          "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, NAME.mp4 or .gif (by "
+          "ffmpeg), or NAME.html, a web page with the pictures in it")
       ->required();
   command->add_option("--size", arguments->frame.size, "Size of the picture, WIDTHxHEIGHT in pixels")
       ->capture_default_str();

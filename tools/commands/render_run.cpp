@@ -71,7 +71,7 @@ void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
     throw UsageError("--first-image {}: one process draws it; start curvisplat without mpirun",
                      arguments.first_image.string());
   if (arguments.frame_rate && !isMovieName(arguments.output))
-    throw UsageError("--frame-rate needs a movie: -o NAME.mp4 or NAME.gif");
+    throw UsageError("--frame-rate needs a movie: -o NAME.mp4, NAME.gif or NAME.html");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
       arguments.output.extension() != ".exr")
     throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",

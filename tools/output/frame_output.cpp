@@ -22,6 +22,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/trace.h"
+#include "tools/output/picture_page.h"
 
 extern char** environ;
 
@@ -82,7 +83,7 @@ std::vector<std::string> encoderOf(bool is_gif) {
 }  // namespace
 
 bool isMovieName(const std::filesystem::path& path) {
-  return extensionOf(path) == ".mp4" || isGifName(path);
+  return extensionOf(path) == ".mp4" || isGifName(path) || isPageName(path);
 }
 
 bool isGifName(const std::filesystem::path& path) {
@@ -218,6 +219,7 @@ class NumberedFiles : public FrameOutput {
   const FrameNames names_;
 };
 
+template <class Writer>
 class Movie : public FrameOutput {
  public:
   Movie(const std::filesystem::path& path, ImageSize size, double frames_per_s)
@@ -226,11 +228,12 @@ class Movie : public FrameOutput {
   void finish() override { writer_.finish(); }
 
  private:
-  MovieWriter writer_;
+  Writer writer_;
 };
 
 [[noreturn]] void refusePattern(const std::string& pattern, std::string_view why) {
-  throw UsageError("-o {}: {}; use a name such as frame_%04d.png, or a movie: .mp4 or .gif", pattern, why);
+  throw UsageError("-o {}: {}; use a name such as frame_%04d.png, or a movie: .mp4, .gif or .html", pattern,
+                   why);
 }
 
 }  // namespace
@@ -289,13 +292,14 @@ void checkOutputName(const std::filesystem::path& path, bool frames, ImageSize s
     return;
   }
   if (!frames) throw UsageError("-o {}: a movie needs --orbit, --path or --steps", path.string());
-  if (!isGifName(path) && (size.width % 2 != 0 || size.height % 2 != 0))
+  if (extensionOf(path) == ".mp4" && (size.width % 2 != 0 || size.height % 2 != 0))
     throw UsageError("--size {}x{}: the width and height of an .mp4 must be even", size.width, size.height);
 }
 
 std::unique_ptr<FrameOutput> makeFrameOutput(const std::filesystem::path& path, bool frames, ImageSize size,
                                              double frames_per_s) {
-  if (isMovieName(path)) return std::make_unique<Movie>(path, size, frames_per_s);
+  if (isPageName(path)) return std::make_unique<Movie<PicturePage>>(path, size, frames_per_s);
+  if (isMovieName(path)) return std::make_unique<Movie<MovieWriter>>(path, size, frames_per_s);
   if (frames) return std::make_unique<NumberedFiles>(path);
   return std::make_unique<SingleFile>(path);
 }

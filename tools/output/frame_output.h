@@ -1,4 +1,4 @@
-// Writes the pictures of a command: to one file, to one file per frame (frame_%04d.png), or to a movie. A
+// Writes the pictures of a command: to one file, to one file per frame (frame_%04d.png), or to a movie, which may be a web page. A
 // file appears complete or not at all. ffmpeg, without a shell, encodes movies from raw pictures on its
 // standard input. One thread at a time may use an object; writing a picture waits for its encoding and for
 // the disk, or for ffmpeg.
@@ -18,7 +18,7 @@
 
 namespace curvisplat {
 
-/// Whether the name ends in .mp4 or .gif, in letters of any case.
+/// Whether the name ends in .mp4, .gif or .html, in letters of any case: one file of all frames.
 bool isMovieName(const std::filesystem::path& path);
 bool isGifName(const std::filesystem::path& path);
 
