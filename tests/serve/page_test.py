@@ -348,6 +348,26 @@ def ten_clients(browser, caches):
         wait_for(lambda: server.threads() < 12, "the viewers to end")
 
 
+def thumbnails(browser, caches):
+    """The list of caches has a picture of each, while the view stays; a click opens one."""
+    with serving(program, caches) as server:
+        tab = opened(browser, server.url)
+        before = rest(tab)
+        pixels = """[...document.querySelectorAll('#thumbnails canvas')].map(c =>
+          c.getContext('2d').getImageData(0, 0, 240, 150).data.reduce((a, b) => (a * 31 + b) % 1000003, 0))"""
+        expect(tab.run(pixels) == [0, 0], "no thumbnail is drawn before the list is open")
+        tab.run("document.querySelector('#gallery summary').click()")
+        tab.wait("withoutThumbnail.size === 0", "two thumbnails")
+        expect(rest(tab) == before, "the view is as it was")
+        expect(tab.run("document.getElementById('title').textContent") == "annulus", "its cache, too")
+        first, second = tab.run(pixels)
+        expect(first != second and first and second, f"two caches have two pictures: {first}, {second}")
+        shot(tab, "thumbnails")
+        changes(tab, lambda: tab.run("document.querySelectorAll('#thumbnails button')[1].click()"), "the other cache")
+        expect(tab.run("document.getElementById('title').textContent") == "wake", "a click opens the other cache")
+        expect(server.stop() == 130, "Ctrl-C ends the server")
+
+
 def page_without_server(browser, folder):
     """What `render -o NAME.html` writes: dragged, by keys, by its slider, and played; and that it loads nothing."""
     page = pathlib.Path(folder, "turntable.html")
@@ -404,6 +424,8 @@ with tempfile.TemporaryDirectory() as folder:
         lost_connection(browser, caches, folder)
         print("lost connection done")
         ten_clients(browser, caches)
+        thumbnails(browser, caches)
+        print("thumbnails done")
         page_without_server(browser, folder)
         print("page without a server done")
     finally:
