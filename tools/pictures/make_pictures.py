@@ -3,11 +3,10 @@
 
     tools/pictures/make_pictures.py DATA [--program build/release/tools/curvisplat] [--only NAME,...]
 
-DATA has the grids: bluntfinxyz.bin and bluntfinq.bin, delta_vertex.cgns, nemo_northsea_u.xyz and .fun, anywhere below
-it. The window is drawn on a virtual display (Xvfb, xwd).
+DATA has the grids: bluntfinxyz.bin and bluntfinq.bin, delta_vertex.cgns, nemo_northsea_u.xyz and .fun, face1_*.vts to face6_*.vts,
+anywhere below it. The window is drawn on a virtual display (Xvfb, xwd).
 """
 import argparse
-import json
 import os
 import pathlib
 import re
@@ -24,24 +23,31 @@ LINES = ["--scalar-bar", "--axes"]
 
 # cache: (files, options of convert)
 CACHES = {
-    "fin": (["bluntfinxyz.bin", "bluntfinq.bin"], ["--scalar", "density"]),
+    "fin": (["bluntfinxyz.bin", "bluntfinq.bin"], ["--scalar", "density,mach_number,pressure_gradient_magnitude"]),
     "wing": (["delta_vertex.cgns"], ["--scalar", "entropy"]),
     "currents": (["nemo_northsea_u.xyz", "nemo_northsea_u.fun"], ["--scalar", "uo"]),
+    "globe": ([f"face{n}_*.vts" for n in range(1, 7)], ["--scalar", "T"]),
     "wake": (["wake.xyz", "wake.fun"], []),
 }
 # picture: (cache, options of render)
 PICTURES = {
-    "fin": ("fin", ["--tf", HERE / "fin.json", "--size", "960x540", *FIN_CAMERA, "--view-angle", "26", *LINES, "--outline"]),
+    "fin": ("fin", ["--scalar", "mach_number", "--opacity-by", "pressure_gradient_magnitude", "--size", "960x540", "--surface",
+                    "kmin,jmin", "--surface-colour", "#8a8f98", "--position=-16,-18,13", "--focal-point", "2.6,2.6,1.9",
+                    "--view-angle", "28", "--scalar-bar"]),
     "fin_default": ("fin", ["--size", "480x360"]),
     "fin_range": ("fin", ["--range", "1.1,4", "--opacity-unit", "0.05", "--size", "480x360", *FIN_CAMERA,
                           "--view-angle", "36", *LINES, "--outline"]),
-    "wing": ("wing", ["--tf", HERE / "wing.json", "--size", "960x540", "--position=-0.9,1.5,1.25", "--focal-point",
-                      "0.85,0.4,0.1", "--view-angle", "34", *LINES]),
-    "currents": ("currents", ["--tf", HERE / "currents.json", "--size", "960x540", "--position", "5230,-630,9150",
-                              "--focal-point", "3000,-380,5250", "--view-up=-0.85,0.1,0.5", "--view-angle", "30",
-                              "--scalar-bar", "--background", "#202830"]),
-    "wake": ("wake", ["--tf", "inferno", "--background", "black", "--opacity-unit", "0.034", "--position", "7.2,-10,8",
-                      "--focal-point", "3.2,0,2", "--view-angle", "34", "--size", "960x600"]),
+    "wing": ("wing", ["--tf", "glow", "--range", "0.002,0.06", "--opacity", "0:0,0.2:0.1,1:0.6", "--opacity-unit", "0.05", "--size",
+                      "960x540", "--surface", "kmin", "--surface-colour", "#8a95a3", "--position=-0.9,1.5,1.25", "--focal-point",
+                      "0.75,0.35,0.05", "--view-angle", "30"]),
+    "currents": ("currents", ["--tf", "cool-warm", "--range=-0.4,0.4", "--opacity", "0:0.9,0.3:0.35,0.5:0.12,0.7:0.35,1:0.9",
+                              "--opacity-unit", "2", "--size", "960x540", "--position", "6000,-760,10500", "--focal-point",
+                              "3000,-380,5250", "--view-up", "0,0,1", "--view-angle", "16", "--scalar-bar"]),
+    "globe": ("globe", ["--tf", "thermal", "--range=-2,30", "--opacity", "0:0.9,1:0.9", "--opacity-unit", "30", "--size", "960x540",
+                        "--position", "14000,-12000,8000", "--focal-point", "0,0,0", "--view-angle", "40", "--light", "0.5,0.5,0",
+                        "--light-direction", "1,-0.2,0.8", "--scalar-bar"]),
+    "wake": ("wake", ["--tf", "glow", "--opacity-unit", "0.034", "--position", "7.2,-10,8", "--focal-point", "3.2,0,2",
+                      "--view-angle", "34", "--size", "960x600"]),
 }
 
 
@@ -65,14 +71,7 @@ def png_of_xwd(xwd):
 
 
 def draw_window(program, cache, folder):
-    """A screenshot of `view`, with the camera and the function of the picture "fin"."""
-    state = {"curvisplat_view": 1, "variable": "density", "preset": "",
-             "function": json.loads((HERE / "fin.json").read_text())[0],
-             "camera": {"position": [-14, -24, 17], "focal_point": [3.6, 3.6, 2], "view_up": [0, 0, 1],
-                        "perspective": True, "parallel_scale": 8, "view_angle": 36},
-             "lod_pixels": 0.5, "memory_bytes": 512 << 20, "flat": False, "scale": [1, 1, 1], "clip_box": None,
-             "dark": False, "scalar_bar": True, "axes": True, "outline": True}
-    (folder / "state.json").write_text(json.dumps(state))
+    """A screenshot of `view` as it opens."""
     size = "%dx%d" % WINDOW
     read, write = os.pipe()
     server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size}x24", "-nolisten", "tcp"],
@@ -81,7 +80,7 @@ def draw_window(program, cache, folder):
     try:
         with os.fdopen(read) as number:
             environment = dict(os.environ, DISPLAY=":" + number.readline().strip(), XDG_CONFIG_HOME=str(folder))
-        window = subprocess.Popen([program, "view", cache, "--size", size, "--state", folder / "state.json"],
+        window = subprocess.Popen([program, "view", cache, "--size", size],
                                   env=environment, stderr=subprocess.DEVNULL)
         time.sleep(20)  # until the picture is final
         xwd = subprocess.run(["xwd", "-root", "-silent"], env=environment, check=True, capture_output=True).stdout
