@@ -114,13 +114,17 @@ TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
 
 TEST_F(WindowPanels, WhatTheMenuAddsIsUnfolded) {
   open();
+  save();  // it hears
+  for (const auto& [above, within] :
+       {std::pair{"Colours and opacities", "curve"}, {"Picture", "light"}, {"View", "Fly"}}) {
+    click(above);  // what is below needs not be scrolled to
+    EXPECT_TRUE(gone(within));
+  }
   widget("Clip planes");
   EXPECT_FALSE(hasWidget("remove clip plane"));
   choose("Picture", "Add a clip plane");
   EXPECT_EQ(widget("remove clip plane"), "remove clip plane 1");
   EXPECT_FALSE(hasWidget("remove slice"));
-  for (const char* const above : {"Colours and opacities", "Picture", "View"})
-    click(above);        // out of the way
   click("Clip planes");  // what the user folds stays folded
   EXPECT_TRUE(gone("remove clip plane"));
   close();

@@ -114,7 +114,11 @@ TEST(ClientMessage, IsReadWithEachType) {
   EXPECT_EQ(view.step, 3u);
   EXPECT_EQ(view.next, 4u);
   EXPECT_EQ(view.state, R"({"a":[1.5]})");
-  EXPECT_EQ(parsed<FunctionRequest>(R"({"type": "choose", "cache": 0, "scalar": "rho"})").scalar, "rho");
+  const auto choose =
+      parsed<FunctionRequest>(R"({"type": "choose", "cache": 0, "scalar": "rho", "dark": false})");
+  EXPECT_EQ(choose.scalar, "rho");
+  EXPECT_FALSE(choose.dark);
+  EXPECT_TRUE(parsed<FunctionRequest>(R"({"type": "choose", "cache": 0, "scalar": "rho"})").dark);
   const auto histogram = parsed<HistogramRequest>(
       R"({"type": "histogram", "cache": 0, "scalar": "rho", "low": -1, "high": 2, "log": false})");
   EXPECT_EQ(histogram.low, -1);

@@ -148,6 +148,11 @@ ViewRequest viewIn(const JsonField& message, size_t caches) {
   return view;
 }
 
+FunctionRequest functionIn(const JsonField& message, size_t caches) {
+  const auto dark = message.find("dark");
+  return {cacheIn(message, caches), nameIn(message, "scalar"), !dark || dark->flag()};
+}
+
 HistogramRequest histogramIn(const JsonField& message, size_t caches) {
   HistogramRequest histogram{cacheIn(message, caches), nameIn(message, "scalar"), message.at("low").number(),
                              message.at("high").number(), message.at("log").flag()};
@@ -168,7 +173,7 @@ ClientMessage parseClientMessage(std::string_view text, size_t caches) {
   const std::string name = type.text();
   if (name == "open") return OpenRequest{cacheIn(message, caches), sizeIn(message)};
   if (name == "view") return viewIn(message, caches);
-  if (name == "choose") return FunctionRequest{cacheIn(message, caches), nameIn(message, "scalar")};
+  if (name == "choose") return functionIn(message, caches);
   if (name == "histogram") return histogramIn(message, caches);
   if (name == "colours") return ColoursRequest{nameIn(message, "map")};
   if (name == "pick") return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1)};

@@ -13,8 +13,8 @@
 //   {"type": "view", "number": 7, "cache": 0,    asks for a picture; `state` is ViewState's JSON, `next` the
 //    "size": [800, 600], "moving": true,         step that is wanted after this one
 //    "step": 0, "next": 1, "state": {...}}
-//   {"type": "choose", "cache": 0,               asks for the automatic function of a scalar
-//    "scalar": "density"}
+//   {"type": "choose", "cache": 0,               asks for the automatic function of a scalar on a dark or
+//    "scalar": "density", "dark": true}          a white background
 //   {"type": "histogram", "cache": 0,            asks for a scalar's histogram
 //    "scalar": "density", "low": 0, "high": 1,
 //    "log": false}
@@ -85,6 +85,7 @@ struct ViewRequest {
 struct FunctionRequest {
   size_t cache = 0;
   std::string scalar;
+  bool dark = true;  // the background
 };
 struct HistogramRequest {
   size_t cache = 0;

@@ -121,7 +121,9 @@ std::string ServedCaches::functionText(const FunctionRequest& request) const {
   variableOf(cache.reader, cache.name, request.scalar);
   const MutexLock lock(reading_);
   Json json = {{"type", "function"}, {"cache", request.cache}, {"scalar", request.scalar}};
-  addFunction(json, automaticFunction(cache.reader, request.scalar));
+  EditedFunction function = automaticFunction(cache.reader, request.scalar);
+  function.suitBackground(request.dark);
+  addFunction(json, function);
   return textOf(json);
 }
 

@@ -138,6 +138,15 @@ size_t EditedFunction::addPoint(double x, double opacity) {
   return static_cast<size_t>(added - points.begin());
 }
 
+void EditedFunction::suitBackground(bool dark) {
+  const DefaultMaps& wanted = dark ? kMapsOnDark : kMapsOnLight;
+  const DefaultMaps& other = dark ? kMapsOnLight : kMapsOnDark;
+  const bool sequential = map_ == other.sequential;
+  if (!isAutomatic() || (!sequential && map_ != other.diverging)) return;
+  setColours(sequential ? wanted.sequential : wanted.diverging);
+  setAutomatic();
+}
+
 void EditedFunction::setOpacities(std::vector<OpacityPoint> points) {
   CURVISPLAT_CHECK(points.size() >= 2);
   definition_.opacities = std::move(points);

@@ -34,6 +34,10 @@ class EditedFunction {
   static EditedFunction automatic(const FunctionParts& parts);
   static constexpr const char* kAutomatic = "automatic";
 
+  /// Gives a function that was chosen from the data the map that suits the background, where its map is that of the
+  /// other one.
+  void suitBackground(bool dark);
+
   /// The same function as options state it.
   explicit EditedFunction(const FunctionParts& parts);
   /// The function as options state it; nullopt if options cannot: colours were edited, the scale is

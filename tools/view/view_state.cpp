@@ -295,17 +295,8 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
 }
 
 void ViewState::suitBackground() {
-  const DefaultMaps& wanted = dark ? kMapsOnDark : kMapsOnLight;
-  const DefaultMaps& other = dark ? kMapsOnLight : kMapsOnDark;
-  const auto suit = [&](EditedFunction& chosen) {
-    if (!chosen.isAutomatic()) return;
-    const bool sequential = chosen.map() == other.sequential;
-    if (!sequential && chosen.map() != other.diverging) return;
-    chosen.setColours(sequential ? wanted.sequential : wanted.diverging);
-    chosen.setAutomatic();
-  };
-  suit(function);
-  if (faces_by) suit(faces_by->function);
+  function.suitBackground(dark);
+  if (faces_by) faces_by->function.suitBackground(dark);
 }
 
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {

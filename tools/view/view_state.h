@@ -86,8 +86,7 @@ struct ViewState {
   std::vector<Marker> markers = {};
 
   glm::vec4 background() const { return dark ? kDefaultBackground : glm::vec4(1); }
-  /// Gives functions that were chosen from the data the map that suits the background, where their map is that of
-  /// the other one.
+  /// As EditedFunction::suitBackground(), all functions.
   void suitBackground();
   /// The scalar of isosurfaces and of opacities.
   const std::string& isoScalar() const { return opacity_by ? opacity_by->variable : variable; }
