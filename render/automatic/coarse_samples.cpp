@@ -1,6 +1,7 @@
 #include "render/automatic/coarse_samples.h"
 
 #include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 #include <algorithm>
 #include <array>
@@ -135,6 +136,20 @@ CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm
     addSamples(at_step, bricksAtALevel(at_step, kMinSplats / steps), sampling, places, samples);
   }
   return samples;
+}
+
+CoarseSamples samplesIn(const CoarseSamples& samples, const glm::dvec3& lower, const glm::dvec3& upper) {
+  CoarseSamples inside;
+  for (size_t n = 0; n < samples.size(); ++n) {
+    const glm::dvec3& position = samples.positions[n];
+    if (!glm::all(glm::lessThanEqual(lower, position)) || !glm::all(glm::lessThanEqual(position, upper)))
+      continue;
+    inside.positions.push_back(position);
+    inside.values.push_back(samples.values[n]);
+    inside.volumes.push_back(samples.volumes[n]);
+    inside.volume += samples.volumes[n];
+  }
+  return inside;
 }
 
 }  // namespace curvisplat

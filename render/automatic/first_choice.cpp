@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -112,11 +113,18 @@ double FirstChoice::percentile(double part) const {
   return distribution_ ? distribution_->percentile(part) : variable_.min;
 }
 
-ViewChoice FirstChoice::view(const TransferFunction& function, ImageSize size, Framed framed) const {
-  std::vector<double> depths(samples_.size());
-  for (size_t n = 0; n < depths.size(); ++n)
-    depths[n] = samples_.volumes[n] * function.extinctionAt(samples_.values[n]);
-  return chooseView({samples_, depths, silhouette_, lower_, upper_}, size, framed);
+ViewChoice FirstChoice::view(const TransferFunction& function, ImageSize size, Framed framed,
+                             const glm::dvec3& lower, const glm::dvec3& upper) const {
+  const auto chosen = [&](const CoarseSamples& samples, const Silhouette& silhouette) {
+    std::vector<double> depths(samples.size());
+    for (size_t n = 0; n < depths.size(); ++n)
+      depths[n] = samples.volumes[n] * function.extinctionAt(samples.values[n]);
+    return chooseView({samples, depths, silhouette, lower, upper}, size, framed);
+  };
+  if (glm::all(glm::lessThanEqual(lower, lower_)) && glm::all(glm::lessThanEqual(upper_, upper)))
+    return chosen(samples_, silhouette_);
+  const CoarseSamples inside = samplesIn(samples_, lower, upper);
+  return chosen(inside, widestSilhouette(inside));
 }
 
 }  // namespace curvisplat

@@ -36,8 +36,9 @@ class FirstChoice {
   double opacityUnitOf(const TransferFunction& function) const;
   /// The value below which `part` (0..1) of the volume lies.
   double percentile(double part) const;
-  /// The view for a picture of `size` (chooseView()).
-  ViewChoice view(const TransferFunction& function, ImageSize size, Framed framed = Framed::kSeen) const;
+  /// The view for a picture of `size` (chooseView()), in which what is in the box [lower, upper] is drawn.
+  ViewChoice view(const TransferFunction& function, ImageSize size, Framed framed, const glm::dvec3& lower,
+                  const glm::dvec3& upper) const;
 
  private:
   FunctionParts constantFunction() const;

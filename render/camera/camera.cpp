@@ -79,6 +79,26 @@ std::string meantBy(std::string_view view) {
   return didYouMean(view, names);
 }
 
+/// Camera::fit(), for a camera that is to look from this direction, a unit vector.
+void fitFrom(Camera& camera, const glm::dvec3& from, const glm::dvec3& lower, const glm::dvec3& upper,
+             ImageSize size) {
+  double diagonal = glm::length(upper - lower);
+  if (!(diagonal > 0)) diagonal = 1;
+  camera.position = camera.focal_point + diagonal * from;
+  camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
+  if (camera.projection == Projection::kOrthographic) return;
+  // The smallest distance at which every corner is in the image. In view space corners lie at depths around
+  // -diagonal.
+  const double slope = std::tan(camera.view_angle_deg * std::numbers::pi / 360);
+  double distance = 0;
+  for (const glm::dvec3& corner : cornersInView(camera, lower, upper)) {
+    const double nearer = corner.z + diagonal;
+    distance = std::max(
+        {distance, nearer + kMargin * halfHeight(corner, size) / slope, nearer + (kMargin - 1) * diagonal});
+  }
+  camera.position = camera.focal_point + distance * from;
+}
+
 }  // namespace
 
 Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size,
@@ -88,29 +108,17 @@ Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::
   if (found == kNamedViews.end())
     throw UsageError("unknown view '{}'{}; expected iso, +x, -x, +y, -y, +z or -z", view, meantBy(view));
 
-  double diagonal = glm::length(upper - lower);
-  if (!(diagonal > 0)) diagonal = 1;
-  const glm::dvec3 from = glm::normalize(found->from);
   Camera camera;
   camera.focal_point = 0.5 * (lower + upper);
-  camera.position = camera.focal_point + diagonal * from;
   camera.view_up = found->up;
   camera.projection = projection;
   camera.view_angle_deg = view_angle_deg;
-  camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
-  if (projection == Projection::kPerspective) {
-    // The smallest distance at which every corner is in the image. In view space corners lie at depths around
-    // -diagonal.
-    const double slope = std::tan(view_angle_deg * std::numbers::pi / 360);
-    double distance = 0;
-    for (const glm::dvec3& corner : cornersInView(camera, lower, upper)) {
-      const double nearer = corner.z + diagonal;
-      distance = std::max(
-          {distance, nearer + kMargin * halfHeight(corner, size) / slope, nearer + (kMargin - 1) * diagonal});
-    }
-    camera.position = camera.focal_point + distance * from;
-  }
+  fitFrom(camera, glm::normalize(found->from), lower, upper, size);
   return camera;
+}
+
+void Camera::fit(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) {
+  fitFrom(*this, -directionOf(*this), lower, upper, size);
 }
 
 double Camera::parallelScaleFor(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) const {

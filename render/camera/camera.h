@@ -31,6 +31,10 @@ struct Camera {
   /// the margin of named().
   double parallelScaleFor(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) const;
 
+  /// Keeps the direction that it looks in, and shows the whole box as named() does: orthographic by the scale,
+  /// perspective by the distance from the focal point. The position is outside the box.
+  void fit(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size);
+
   /// The up vector that viewFromWorld() uses: view_up, or its replacement.
   glm::dvec3 usableViewUp() const;
 

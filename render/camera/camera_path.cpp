@@ -81,6 +81,38 @@ Camera orbited(const Camera& camera, double degrees) {
   return moved;
 }
 
+Camera elevated(const Camera& camera, double degrees) {
+  const double angle = glm::radians(std::remainder(degrees, 360.0));
+  if (angle == 0) return camera;
+  const double nearest = std::cos(glm::radians(1.0));
+  Camera moved = camera;
+  const glm::dvec3 up = camera.usableViewUp(), arm = camera.position - camera.focal_point;
+  const glm::dvec3 left = glm::normalize(glm::cross(arm, up));
+  const glm::dvec3 moved_arm = turned(arm, left, angle);
+  moved.position = camera.focal_point + moved_arm;
+  const bool over = glm::dot(glm::cross(moved_arm, up), left) <= 0;
+  const bool along = std::abs(glm::dot(moved_arm, up)) > nearest * glm::length(arm) * glm::length(up);
+  moved.view_up = over || along ? turned(up, left, angle) : up;
+  return moved;
+}
+
+Camera rolled(const Camera& camera, double degrees) {
+  const double angle = glm::radians(std::remainder(degrees, 360.0));
+  if (angle == 0) return camera;
+  Camera moved = camera;
+  moved.view_up = turned(camera.usableViewUp(), glm::normalize(camera.focal_point - camera.position), angle);
+  return moved;
+}
+
+Camera magnified(const Camera& camera, double factor) {
+  Camera nearer = camera;
+  if (camera.projection == Projection::kOrthographic)
+    nearer.parallel_scale /= factor;
+  else
+    nearer.view_angle_deg /= factor;
+  return nearer;
+}
+
 CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
     : key_frames_(std::move(key_frames)), name_(std::move(name)) {
   if (key_frames_.empty()) throw Error("{}: a camera path needs at least one key frame, found none", name_);

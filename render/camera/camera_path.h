@@ -15,6 +15,18 @@ namespace curvisplat {
 /// bit. A view_up parallel to the view is replaced first, as for drawing.
 Camera orbited(const Camera& camera, double degrees);
 
+/// `camera` raised by `degrees` towards view_up, about the axis to its right through the focal point, as by
+/// VTK's Elevation(). view_up stays, unless the camera comes within a degree of looking along it or passes
+/// over it: then it is turned as well, so that the picture does not turn over.
+Camera elevated(const Camera& camera, double degrees);
+
+/// `camera` rolled by `degrees` about its line of sight, as by VTK's Roll(): the picture turns anticlockwise.
+Camera rolled(const Camera& camera, double degrees);
+
+/// `camera` with everything `factor` times as large in the picture, as by VTK's Zoom(): the parallel scale,
+/// or the view angle, is divided by it.
+Camera magnified(const Camera& camera, double factor);
+
 /// A camera at one time.
 struct KeyFrame {
   double time = 0;

@@ -1,6 +1,8 @@
 #include "render/project/plane_cuts.h"
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -38,6 +40,12 @@ std::vector<ClipPlane> clipPlanesOf(std::span<const ClipPlane> planes, const std
     all.push_back({box->upper, -normal});
   }
   return all;
+}
+
+WorldBox leftBy(const std::optional<WorldBox>& clip_box, const WorldBox& box) {
+  if (!clip_box) return box;
+  const WorldBox left{glm::max(box.lower, clip_box->lower), glm::min(box.upper, clip_box->upper)};
+  return glm::all(glm::lessThanEqual(left.lower, left.upper)) ? left : box;
 }
 
 LocalClipPlanes::LocalClipPlanes(std::span<const ClipPlane> planes, const glm::dvec3& origin) {

@@ -42,6 +42,9 @@ bool isUsable(const ClipPlane& plane);
 /// The planes, and the six faces of the box if there is one, with normals that point inwards.
 std::vector<ClipPlane> clipPlanesOf(std::span<const ClipPlane> planes, const std::optional<WorldBox>& box);
 
+/// What a clip box leaves of a box; all of it where that is nothing, or there is none.
+WorldBox leftBy(const std::optional<WorldBox>& clip_box, const WorldBox& box);
+
 /// On which side of the clip planes a splat lies.
 enum class ClipSide : uint8_t { kInside, kAcross, kOutside };
 

@@ -123,7 +123,9 @@ TEST_F(RenderOptions, TransparentPngHasTheDatasAlpha) {
 }
 
 TEST_F(RenderOptions, ClipBoxLeavesTheRestEmpty) {
-  const Words camera{"--view", "+z", "--parallel-scale", "1.2", "--background", "white"};
+  const Words camera{
+      "--position",       "-0.5,0,9", "--view-up",    "0,1,0", "--focal-point", "-0.5,0,0.5",
+      "--parallel-scale", "1.2",      "--background", "white"};  // views fit what the box leaves
   const Image whole = render(camera), half = render(camera + Words{"--clip-box", "-2,2,-2,0,-2,2"});
   // Seen along z with y up and its centre, 0, in the middle: what is left is in the lower half. The scalar of cells at the
   // grid's borders is another where the box cuts them.
@@ -176,7 +178,9 @@ TEST_F(RenderOptions, APlacedCameraIsTheNamedOne) {
 }
 
 TEST_F(RenderOptions, AClipPlaneLeavesWhatABoxWithThatFaceLeaves) {
-  const Words camera{"--view", "+z", "--parallel-scale", "1.2", "--background", "white"};
+  const Words camera{
+      "--position",       "-0.5,0,9", "--view-up",    "0,1,0", "--focal-point", "-0.5,0,0.5",
+      "--parallel-scale", "1.2",      "--background", "white"};  // views fit what the box leaves
   const Image box = render(camera + Words{"--clip-box", "-9,9,-9,0.25,-9,9"}),
               plane = render(camera + Words{"--clip-plane", "3,0.25,7,0,-2,0"}),
               two = render(camera + Words{"--clip-plane", "0,0.25,0,0,-1,0", "--clip-plane=0,0,0,1,0,0"});

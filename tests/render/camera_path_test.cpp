@@ -65,6 +65,40 @@ TEST(Orbit, ViewUpAlongTheViewIsReplaced) {
   EXPECT_NEAR(glm::length(moved.position), 5, 1e-12);
 }
 
+/// VTK 9.1, of vtkCamera's Azimuth(), Elevation(), Roll() and Zoom() in this order.
+TEST(Turns, AreVtks) {
+  const Camera camera = cameraAt({5, 1, 2}, {1, 1, 1});
+  const Camera aside = orbited(camera, 40), up = elevated(aside, 30), tilted = rolled(up, 25);
+  expectNear(aside.position, {4.0641777724759125, 3.571150438746157, 2.0});
+  expectNear(up.position, {3.270633571116265, 2.905287792062408, 3.8660254037844393});
+  EXPECT_EQ(up.view_up, camera.view_up);
+  EXPECT_EQ(tilted.position, up.position);
+  expectNear(tilted.view_up, {-0.15942607428718542, 0.26283496408270157, 0.9515782198500667});
+  Camera seen = camera;
+  seen.parallel_scale = 3;
+  EXPECT_EQ(magnified(seen, 1.5).parallel_scale, 2);
+  seen.projection = Projection::kPerspective;
+  EXPECT_EQ(magnified(seen, 1.5).view_angle_deg, 20);
+  EXPECT_EQ(magnified(seen, 1.5).position, seen.position);
+}
+
+TEST(Turns, APictureDoesNotTurnOverWhereTheCameraPassesAboveItsFocalPoint) {
+  const auto rightOf = [](const Camera& camera) {
+    const glm::dmat4 view = camera.viewFromWorld();
+    return glm::dvec3(view[0].x, view[1].x, view[2].x);
+  };
+  for (const glm::dvec3& from : {glm::dvec3(3, 0, 0), {0, -3, 0}, {1, 2, 0.5}}) {
+    const Camera camera = cameraAt(from);
+    for (const double degrees : {-120.0, -90.0, -30.0, 60.0, 89.9, 90.0, 150.0, 200.0}) {
+      const Camera up = elevated(camera, degrees);
+      EXPECT_NEAR(glm::length(up.position), glm::length(from), 1e-12);
+      expectNear(rightOf(up), rightOf(camera), 1e-9);
+    }
+    expectSame(elevated(camera, 720), camera);
+    expectSame(rolled(camera, -360), camera);
+  }
+}
+
 /// Key frames along a curve.
 CameraPath pathAlong(const std::function<glm::dvec3(double)>& curve, const std::vector<double>& times) {
   std::vector<KeyFrame> keys;

@@ -54,6 +54,29 @@ TEST(Camera, NamedViewsHoldTheBoxAndFillTheImage) {
         }
 }
 
+/// From any direction as named views do, and from a named view's direction as that view.
+TEST(Camera, FitsTheBoxFromWhereItLooks) {
+  const ImageSize size{300, 200};
+  for (const auto projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    const Camera iso = Camera::named("iso", kLower, kUpper, size, projection, 30);
+    Camera camera = iso;
+    camera.position = iso.focal_point + 7.0 * (iso.position - iso.focal_point);
+    camera.parallel_scale = 17;
+    camera.fit(kLower, kUpper, size);
+    expectNear(camera.position, iso.position, 1e-9);
+    EXPECT_NEAR(camera.parallel_scale, iso.parallel_scale, 1e-9);
+    camera.position = camera.focal_point + glm::dvec3(0.1, -3, 0.4);
+    camera.fit(kLower, kUpper, size);
+    double furthest = 0;
+    for (int n = 0; n < 8; ++n) {
+      const glm::dvec2 at = inImage(camera, corner(n), size);
+      furthest = std::max({furthest, std::abs(at.x), std::abs(at.y)});
+    }
+    EXPECT_LT(furthest, 0.999);
+    EXPECT_GT(furthest, 0.9);
+  }
+}
+
 TEST(Camera, NamedViewsLookFromWhereTheySay) {
   const struct {
     const char* view;

@@ -171,7 +171,7 @@ void benchRanks(const BenchArguments& arguments) {
   const size_t variable = chooseVariable(cache, arguments.scalar);
   const TransferFunction function = PictureChoice(cache, variable, glm::dvec3(1)).function(arguments.scalar);
   const Camera camera =
-      chooseCameraMotion(arguments.camera, manifest.lower, manifest.upper, options.size).camera(0);
+      chooseCameraMotion(arguments.camera, {manifest.lower, manifest.upper}, options.size).camera(0);
   const RankSimulation simulated = simulateRanks({cache, variable, function, options}, camera, counts);
   printLine("{}: {} samples in {} bricks; scalar {}", arguments.cache.string(), manifest.nodes,
             manifest.bricks, manifest.variables[variable].name);
@@ -204,7 +204,7 @@ void benchCache(const BenchArguments& arguments) {
     CameraArguments camera = arguments.camera;
     camera.orbit = "360";
     camera.frames = frames;
-    const CameraMotion motion = chooseCameraMotion(camera, manifest.lower, manifest.upper, options.size);
+    const CameraMotion motion = chooseCameraMotion(camera, {manifest.lower, manifest.upper}, options.size);
     std::vector<Camera> cameras;
     for (uint64_t frame = 0; frame < motion.frames; ++frame) cameras.push_back(motion.camera(frame));
     return cameras;
@@ -342,6 +342,7 @@ void addBench(CLI::App& app) {
       ->add_option("--view-angle", arguments->camera.view_angle,
                    "Perspective with this vertical view angle, in degrees (default: orthographic)")
       ->group(what);
+  addTurnOptions(*command, arguments->camera, what);
   command
       ->add_option("--backend", arguments->backend,
                    "Drawing back end of whole frames: auto, osmesa, egl or cpu")
@@ -353,8 +354,9 @@ void addBench(CLI::App& app) {
       command
           ->add_flag("--convert", arguments->converts, "Convert a generated grid instead of drawing a cache")
           ->group(how);
-  for (const char* drawing : {"--scalar", "--tf", "--range", "--opacity", "--asinh", "--opacity-unit",
-                              "--size", "--lod-pixels", "--view", "--view-angle", "--backend"})
+  for (const char* drawing :
+       {"--scalar", "--tf", "--range", "--opacity", "--asinh", "--opacity-unit", "--size", "--lod-pixels",
+        "--view", "--view-angle", "--azimuth", "--elevation", "--roll", "--zoom", "--backend"})
     convert->excludes(command->get_option(drawing));
   command
       ->add_option(

@@ -164,13 +164,12 @@ void render(const RenderArguments& given) {
   options.output_bytes = outputBytes(arguments, picture);
   const bool has_grid = arguments.annotations.shown.axes_grid;
   const bool has_box = has_grid || arguments.annotations.shown.outline;
-  const CameraArguments camera =
-      choice.picture.camera(arguments.camera, transfer_function, options.size, has_box);
   const Series series = cache.series();
-  const ShownBox box = shownBox(manifest, options.scale, arguments.annotations.shown);
-  const MotionInTime motion =
-      inTime(chooseCameraMotion(framesOf(camera, steps), box.lower, box.upper, options.size), series,
-             arguments.steps, steps, arguments.camera.frames);
+  const ShownBox box = shownBox(manifest, options.scale, options.clip_box, arguments.annotations.shown);
+  const CameraArguments camera = choice.picture.camera(
+      arguments.camera, transfer_function, {box, options.size, has_box || options.clip_box.has_value()});
+  const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), box, options.size), series,
+                                     arguments.steps, steps, arguments.camera.frames);
   const std::vector<uint64_t> numbers =
       (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
   // A rank has a picture to itself where there are enough of them.
@@ -323,10 +322,14 @@ void addRender(CLI::App& app) {
   command
       ->add_option(
           "--view", camera->view,
-          "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z (default: chosen from the data; iso for "
-          "a camera that moves)")
+          "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z; it fits the data, or what --clip-box "
+          "leaves of them (default: chosen from the data; iso for a camera that moves)")
       ->group(where);
-  command->add_option("--position", camera->position, "Camera position x,y,z, in coordinates after --scale")
+  command
+      ->add_option(
+          "--position", camera->position,
+          "Camera position x,y,z, in coordinates after --scale. Alone it looks at the data's centre, "
+          "z up, and fits the data into the picture")
       ->group(where);
   command
       ->add_option("--focal-point", camera->focal_point,
@@ -342,6 +345,7 @@ void addRender(CLI::App& app) {
       ->add_option("--view-angle", camera->view_angle,
                    "Perspective with this vertical view angle, in degrees (default: orthographic)")
       ->group(where);
+  addTurnOptions(*command, *camera, where);
 
   command
       ->add_option("--orbit", camera->orbit,

@@ -18,26 +18,43 @@
 namespace curvisplat {
 namespace {
 
-Camera placedCamera(const CameraArguments& arguments, const glm::dvec3& lower, const glm::dvec3& upper,
-                    ImageSize size) {
+double numberOr(const std::string& option, const std::optional<std::string>& text, double otherwise) {
+  return text ? parseNumber(option, *text) : otherwise;
+}
+
+/// Before --roll and --zoom. Rolling counts for what fits.
+Camera placedCamera(const CameraArguments& arguments, const ShownBox& box, ImageSize size) {
   const auto projection = arguments.view_angle ? Projection::kPerspective : Projection::kOrthographic;
   const double angle = arguments.view_angle ? parsePositive("--view-angle", *arguments.view_angle) : 30;
   if (angle >= 180)
     throw UsageError("--view-angle {}: expected fewer than 180 degrees", *arguments.view_angle);
+  const auto turned = [&](const Camera& camera) {
+    return elevated(orbited(camera, numberOr("--azimuth", arguments.azimuth, 0)),
+                    numberOr("--elevation", arguments.elevation, 0));
+  };
+  const double roll = numberOr("--roll", arguments.roll, 0);
 
   Camera camera;
   if (arguments.position) {
     camera.position = parsePoint("--position", *arguments.position);
-    camera.focal_point =
-        arguments.focal_point ? parsePoint("--focal-point", *arguments.focal_point) : 0.5 * (lower + upper);
+    camera.focal_point = arguments.focal_point ? parsePoint("--focal-point", *arguments.focal_point)
+                                               : 0.5 * (box.lower + box.upper);
     camera.view_up = arguments.view_up ? parsePoint("--view-up", *arguments.view_up) : glm::dvec3(0, 0, 1);
     if (glm::length(camera.view_up) == 0)
       throw UsageError("--view-up {}: expected a direction other than 0,0,0", *arguments.view_up);
     camera.projection = projection;
     camera.view_angle_deg = angle;
-    camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
+    camera = turned(camera);
+    camera.parallel_scale = rolled(camera, roll).parallelScaleFor(box.lower, box.upper, size);
   } else {
-    camera = Camera::named(arguments.view.value_or("iso"), lower, upper, size, projection, angle);
+    camera = Camera::named(arguments.view.value_or("iso"), box.lower, box.upper, size, projection, angle);
+    if (arguments.turn()) {
+      camera = turned(camera);
+      Camera fitted = rolled(camera, roll);
+      fitted.fit(box.lower, box.upper, size);
+      camera.position = fitted.position;
+      camera.parallel_scale = fitted.parallel_scale;
+    }
     if (arguments.focal_point) {
       const glm::dvec3 moved = parsePoint("--focal-point", *arguments.focal_point) - camera.focal_point;
       camera.position += moved;
@@ -51,6 +68,17 @@ Camera placedCamera(const CameraArguments& arguments, const glm::dvec3& lower, c
 
 }  // namespace
 
+void addTurnOptions(CLI::App& command, CameraArguments& arguments, const std::string& group) {
+  const auto add = [&](const char* name, std::optional<std::string>& value, const char* help) {
+    command.add_option(name, value, help)->group(group);
+  };
+  add("--azimuth", arguments.azimuth,
+      "Turn the camera, given or chosen, by this angle about the up direction, to its right, in degrees");
+  add("--elevation", arguments.elevation, "Raise it by this angle about the focal point, in degrees");
+  add("--roll", arguments.roll, "Roll it by this angle about its line of sight, in degrees");
+  add("--zoom", arguments.zoom, "Show everything this many times as large; below 1, smaller");
+}
+
 void checkCameraArguments(const CameraArguments& arguments) {
   if (arguments.view && (arguments.position || arguments.view_up))
     throw UsageError("--view cannot be combined with --position or --view-up");
@@ -61,6 +89,15 @@ void checkCameraArguments(const CameraArguments& arguments) {
     throw UsageError("--parallel-scale (orthographic) cannot be combined with --view-angle (perspective)");
   if (arguments.orbit && !arguments.path.empty())
     throw UsageError("--orbit cannot be combined with --path; both move the camera");
+  for (const auto& [name, value] : {std::pair("--azimuth", &arguments.azimuth),
+                                    {"--elevation", &arguments.elevation},
+                                    {"--roll", &arguments.roll}})
+    numberOr(name, *value, 0);
+  if (arguments.zoom) parsePositive("--zoom", *arguments.zoom);
+  if (!arguments.path.empty() && (arguments.turn() || arguments.zoom))
+    throw UsageError(
+        "--path {}: its key frames place the camera; remove --azimuth, --elevation, --roll and --zoom",
+        arguments.path.string());
   if (!arguments.path.empty() &&
       (arguments.view || arguments.position || arguments.parallel_scale || arguments.view_angle))
     throw UsageError(
@@ -70,8 +107,7 @@ void checkCameraArguments(const CameraArguments& arguments) {
   if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
 }
 
-CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
-                                const glm::dvec3& upper, ImageSize size) {
+CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox& box, ImageSize size) {
   const uint64_t frames = arguments.frameCount();
   if (!arguments.path.empty()) {
     const auto path = std::make_shared<CameraPath>(CameraPath::fromFile(arguments.path));
@@ -85,17 +121,23 @@ CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dve
       motion.series_time = [=](uint64_t frame) { return path->seriesTimeAt(time(frame)); };
     return motion;
   }
-  Camera first = placedCamera(arguments, lower, upper, size);
-  if (!arguments.orbit) return {1, [=](uint64_t) { return first; }, {}};
-  const double degrees = parseNumber("--orbit", *arguments.orbit);
-  const auto turn = [=](uint64_t frame) {
-    return degrees * static_cast<double>(frame) / static_cast<double>(frames);
+  Camera first = placedCamera(arguments, box, size);
+  const double degrees = numberOr("--orbit", arguments.orbit, 0),
+               roll = numberOr("--roll", arguments.roll, 0);
+  const double zoom = arguments.zoom ? parsePositive("--zoom", *arguments.zoom) : 1;
+  if (first.projection == Projection::kPerspective && !(first.view_angle_deg / zoom < 180))
+    throw UsageError("--zoom {}: the view angle of {:g} degrees becomes {:g}; expected fewer than 180",
+                     *arguments.zoom, first.view_angle_deg, first.view_angle_deg / zoom);
+  const auto rolledAt = [=](const Camera& placed, uint64_t frame) {
+    return rolled(orbited(placed, degrees * static_cast<double>(frame) / static_cast<double>(frames)), roll);
   };
-  if (!arguments.parallel_scale && first.projection == Projection::kOrthographic)
+  if (arguments.orbit && !arguments.parallel_scale && first.projection == Projection::kOrthographic)
     for (uint64_t frame = 0; frame < frames; ++frame)  // one scale that fits the data into every frame
       first.parallel_scale =
-          std::max(first.parallel_scale, orbited(first, turn(frame)).parallelScaleFor(lower, upper, size));
-  return {frames, [=](uint64_t frame) { return orbited(first, turn(frame)); }, {}};
+          std::max(first.parallel_scale, rolledAt(first, frame).parallelScaleFor(box.lower, box.upper, size));
+  const auto at = [=](uint64_t frame) { return magnified(rolledAt(first, frame), zoom); };
+  if (!arguments.orbit) return {1, [camera = at(0)](uint64_t) { return camera; }, {}};
+  return {frames, at, {}};
 }
 
 namespace {

@@ -1,9 +1,9 @@
 // The frames of a command: the camera and the time step of each, and which of them one process draws. Shared
 // by the subcommands and the Python package.
 //
-//   CameraArguments   --view or --position, --orbit, --path   --> CameraMotion --+
-//   StepArguments     --step, --time, --steps, --interpolate  --> chosenSteps() -+-> inTime(): MotionInTime
-//   FramePart         --part, or ranks                        --> the frames that this process draws
+//   CameraArguments   --view or --position, --azimuth, --orbit, --path, ...   --> CameraMotion --+
+//   StepArguments     --step, --time, --steps, --interpolate                  --> chosenSteps() -+-> inTime(): MotionInTime
+//   FramePart         --part, or ranks                                        --> the frames that this process draws
 //
 // The arguments hold values as given; they are checked before a cache is opened. Motions keep no state: any
 // thread may ask for any frame.
@@ -31,15 +31,29 @@ inline constexpr unsigned kDefaultFrames = 90;   // of an orbit or a path
 /// Options that choose cameras, as given; checked and parsed later.
 struct CameraArguments {
   std::optional<std::string> view, position, focal_point, view_up, parallel_scale, view_angle, orbit;
+  std::optional<std::string> azimuth, elevation, roll, zoom;  // on top of the others
   std::optional<uint64_t> frames;
   std::filesystem::path path;
 
+  /// Whether they place the camera, rather than change the place that is chosen from the data.
+  bool place() const {
+    return view || position || focal_point || view_up || parallel_scale || view_angle || moves();
+  }
+  bool turn() const { return azimuth || elevation || roll; }
   bool moves() const { return orbit || !path.empty(); }
   uint64_t frameCount() const { return frames.value_or(moves() ? kDefaultFrames : 1); }
 };
 
+/// Adds --azimuth, --elevation, --roll and --zoom under the heading `group`.
+void addTurnOptions(CLI::App& command, CameraArguments& arguments, const std::string& group);
+
 /// Throws UsageError if options contradict each other; needs no cache.
 void checkCameraArguments(const CameraArguments& arguments);
+
+/// The box that a picture has to show, after --scale.
+struct ShownBox {
+  glm::dvec3 lower{0.0}, upper{0.0};
+};
 
 /// One camera per frame.
 struct CameraMotion {
@@ -49,11 +63,10 @@ struct CameraMotion {
   std::function<double(uint64_t frame)> series_time;
 };
 
-/// Requires that checkCameraArguments() accepted the arguments. [lower, upper] is the data's bounding box
-/// after --scale. An orbit of 360 degrees is a loop: its last frame is one step before the first. A path's
+/// Requires that checkCameraArguments() accepted the arguments. What the arguments do not say of the camera
+/// shows the whole box. They change it in the order azimuth, elevation, orbit, roll, zoom. An orbit of 360 degrees is a loop: its last frame is one step before the first. A path's
 /// last frame is at its last key frame. Throws UsageError, or Error if the path file is invalid.
-CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
-                                const glm::dvec3& upper, ImageSize size);
+CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox& box, ImageSize size);
 
 /// Options that choose time steps of a cache, as given; checked and parsed later.
 struct StepArguments {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render/automatic/first_choice.h"
+#include "render/camera/camera.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 #include "stream/cache/value_histogram.h"
@@ -254,27 +255,26 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
 }
 
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
-                                      ImageSize size, bool whole) {
-  if (arguments.view || arguments.position || arguments.focal_point || arguments.view_up ||
-      arguments.parallel_scale || arguments.view_angle || arguments.moves())
-    return arguments;
-  const ViewChoice choice = data().view(function, size, whole ? Framed::kBox : Framed::kSeen);
-  const auto take = [&](const char* option, std::optional<std::string>& argument, std::string value) {
-    add(option, value);
-    argument = std::move(value);
-  };
-  const auto text = [](const glm::dvec3& point) {
+                                      const Framing& framing) {
+  if (arguments.place()) return arguments;
+  const auto& [box, size, whole] = framing;
+  const ViewChoice choice =
+      data().view(function, size, whole ? Framed::kBox : Framed::kSeen, box.lower, box.upper);
+  const auto exactPoint = [](const glm::dvec3& point) {
     return fmt::format("{},{},{}", point.x, point.y, point.z);
   };
+  const auto say = [&](const char* option, std::optional<std::string>& argument, const std::string& value) {
+    argument = value;
+    add(option, value);
+  };
+  const Camera camera = cameraOf(choice, box.lower, box.upper, size);
+  say("--position", arguments.position, exactPoint(camera.position));
+  if (camera.view_up != glm::dvec3(0, 0, 1)) say("--view-up", arguments.view_up, exactPoint(camera.view_up));
+  if (choice.focal_point) say("--focal-point", arguments.focal_point, exactPoint(*choice.focal_point));
   if (choice.position)
-    take("--position", arguments.position, text(*choice.position));
-  else
-    take("--view", arguments.view, choice.view);
-  if (choice.focal_point) take("--focal-point", arguments.focal_point, text(*choice.focal_point));
-  if (choice.position)
-    take("--view-angle", arguments.view_angle, exact(kChosenViewAngle));
+    say("--view-angle", arguments.view_angle, exact(kChosenViewAngle));
   else if (choice.focal_point)
-    take("--parallel-scale", arguments.parallel_scale, exact(choice.parallel_scale));
+    say("--parallel-scale", arguments.parallel_scale, exact(choice.parallel_scale));
   return arguments;
 }
 

@@ -56,10 +56,13 @@ class PictureChoice {
   /// the opacities.
   TransferFunction colours(const ScalarArguments& arguments);
   TransferFunction opacities(const ScalarArguments& arguments);
-  /// The arguments, with a view if they have no camera at all. `function`: that of the picture.
-  /// `whole`: never of a part of the data.
-  CameraArguments camera(CameraArguments arguments, const TransferFunction& function, ImageSize size,
-                         bool whole = false);
+  struct Framing {
+    ShownBox box;
+    ImageSize size;
+    bool whole = false;  // shows all of the box: never a part of the data
+  };
+  /// The arguments, with a position if they do not place the camera. `function`: that of the picture.
+  CameraArguments camera(CameraArguments arguments, const TransferFunction& function, const Framing& framing);
 
   /// What was filled in, for a shell: "--tf viridis --range 0,1"; empty if nothing was.
   const std::string& chosenOptions() const { return chosen_; }

@@ -347,11 +347,15 @@ std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments) {
   return titles;
 }
 
-ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const Annotations& annotations) {
+ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const std::optional<WorldBox>& clip_box,
+                  const Annotations& annotations) {
   constexpr double kAxesRoom = 0.17;  // of the box
-  const glm::dvec3 lower = manifest.lower * scale, upper = manifest.upper * scale;
-  const glm::dvec3 room = (annotations.axes_grid ? kAxesRoom : 0.0) * (upper - lower);
-  return {lower - room, upper + room};
+  const bool whole = annotations.outline || annotations.axes_grid;
+  WorldBox box = leftBy(whole ? std::nullopt : clip_box, {manifest.lower, manifest.upper});
+  box.lower *= scale;
+  box.upper *= scale;
+  const glm::dvec3 room = (annotations.axes_grid ? kAxesRoom : 0.0) * (box.upper - box.lower);
+  return {box.lower - room, box.upper + room};
 }
 
 std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, const DrawnScalars& scalars,

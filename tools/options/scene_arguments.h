@@ -22,6 +22,7 @@
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/manifest.h"
+#include "tools/options/frame_sequence.h"
 
 namespace curvisplat {
 
@@ -98,12 +99,10 @@ void checkAnnotationArguments(const AnnotationArguments& arguments);
 /// The titles of the axes grid: "x", "y" and "z" unless --axes-titles says otherwise.
 std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments);
 
-/// The box that a picture has to show, after `scale`: the data's, and space for the coordinates of the axes
-/// grid around it.
-struct ShownBox {
-  glm::dvec3 lower{0.0}, upper{0.0};
-};
-ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const Annotations& annotations);
+/// The box that a picture has to show, after --scale: the data's, or what a clip box leaves of it; and the
+/// whole data's with an outline or the axes grid, with space for its coordinates.
+ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const std::optional<WorldBox>& clip_box,
+                  const Annotations& annotations);
 
 /// The functions that a picture shows, each once: of its colours, of its opacities if these are another
 /// scalar's, and of surfaces that are coloured by a scalar of their own, `surface_by`. They are borrowed

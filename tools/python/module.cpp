@@ -99,8 +99,8 @@ py::list camerasOf(const OpenCache& cache, const Options& camera, const std::str
     throw UsageError("{} frames: expected from 1 to {}", frames, kMaxFrames);
   const Manifest& manifest = cache.reader().manifest();
   const glm::dvec3 factors = parsePoint("scale", scale);
-  const CameraMotion motion = chooseCameraMotion(arguments, manifest.lower * factors,
-                                                 manifest.upper * factors, parseImageSize("size", size));
+  const CameraMotion motion = chooseCameraMotion(
+      arguments, {manifest.lower * factors, manifest.upper * factors}, parseImageSize("size", size));
   py::list out;
   for (uint64_t frame = 0; frame < motion.frames; ++frame) {
     const Camera at = motion.camera(frame);

@@ -113,6 +113,10 @@ CameraArguments cameraArguments(const Options& camera) {
   arguments.parallel_scale = given(camera, "parallel_scale");
   arguments.view_angle = given(camera, "view_angle");
   arguments.orbit = given(camera, "orbit");
+  arguments.azimuth = given(camera, "azimuth");
+  arguments.elevation = given(camera, "elevation");
+  arguments.roll = given(camera, "roll");
+  arguments.zoom = given(camera, "zoom");
   return arguments;
 }
 
@@ -238,10 +242,11 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);
     frame.size = dataSize(annotations, size, functions);
     if (!(annotations == Annotations{})) frame.output_bytes += annotatedBytes(size);
-    const CameraArguments camera = choice.picture.camera(arguments.camera, function, frame.size,
-                                                         annotations.outline || annotations.axes_grid);
-    const ShownBox box = shownBox(manifest, frame.scale, annotations);
-    const Camera at = chooseCameraMotion(camera, box.lower, box.upper, frame.size).camera(0);
+    const ShownBox box = shownBox(manifest, frame.scale, frame.clip_box, annotations);
+    const bool whole = annotations.outline || annotations.axes_grid || frame.clip_box;
+    const CameraArguments camera =
+        choice.picture.camera(arguments.camera, function, {box, frame.size, whole});
+    const Camera at = chooseCameraMotion(camera, box, frame.size).camera(0);
     // The grid of the axes lies behind the data, before the background.
     if (annotations.axes_grid) frame.background = glm::vec4(0);
     FrameRenderer& renderer = rendererOf(scalars, arguments.backend);

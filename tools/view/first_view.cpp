@@ -28,7 +28,8 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
   // The outline is to be seen whole.
   const Framed framed = state.annotations.outline ? Framed::kBox : Framed::kSeen;
   state.camera =
-      cameraOf(choice.view(state.function.function(), size, framed), manifest.lower, manifest.upper, size);
+      cameraOf(choice.view(state.function.function(), size, framed, manifest.lower, manifest.upper),
+               manifest.lower, manifest.upper, size);
   return state;
 }
 

@@ -81,7 +81,13 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       chooser_(cache_, Window::wake) {
   frames_.emplace(cache_, backend_, Window::wake, std::move(after));
   playback_.goTo(cache_.step());
-  navigation_.setBounds(state_.scale * manifest().lower, state_.scale * manifest().upper);
+  setBounds();
+}
+
+/// Keys show what the clip box leaves.
+void CacheView::setBounds() {
+  const WorldBox box = leftBy(state_.clip_box, {manifest().lower, manifest().upper});
+  navigation_.setBounds(state_.scale * box.lower, state_.scale * box.upper);
 }
 
 void CacheView::releasePictures() {
@@ -230,7 +236,7 @@ void CacheView::react(const WindowLayout& layout) {
   if (layout.shows_panels) drawPanels(layout);
   if (isShown()) changed_ |= playback_.tick(clockSeconds());
   dragging_ |= handles_.isDragging();
-  navigation_.setBounds(state_.scale * manifest().lower, state_.scale * manifest().upper);
+  setBounds();
 }
 
 void CacheView::drawPanels(const WindowLayout& layout) {

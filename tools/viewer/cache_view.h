@@ -94,6 +94,7 @@ class CacheView {
 
  private:
   ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
+  void setBounds();
   void takeFrame();
   void takeFunction();
   void reportDamage();

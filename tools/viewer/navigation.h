@@ -47,7 +47,7 @@ double unitsPerPixel(const Camera& camera, ImageSize size);
 /// The camera's mode and what moves it.
 class Navigation {
  public:
-  /// Sets the data's bounding box, after --scale, which `r`, `x`, `y` and `z` fit into the window.
+  /// Sets the box, after --scale, that `r`, `x`, `y` and `z` fit into the window.
   void setBounds(const glm::dvec3& lower, const glm::dvec3& upper) { lower_ = lower, upper_ = upper; }
 
   /// Applies the input since the last frame of Dear ImGui. Returns true if the camera moved. Call within a

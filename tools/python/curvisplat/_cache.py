@@ -310,7 +310,9 @@ class Cache:
                opacity_asinh: Optional[Tuple[float, float]] = None, opacity_tf: Union[str, os.PathLike, None] = None,
                classify: str = "pixel", view: Optional[str] = None, position: Optional[Vector] = None, focal_point: Optional[Vector] = None,
                view_up: Optional[Vector] = None, parallel_scale: Optional[float] = None,
-               view_angle: Optional[float] = None, scale: Vector = (1, 1, 1), clip_box: Optional[Vector] = None,
+               view_angle: Optional[float] = None, azimuth: Optional[float] = None, elevation: Optional[float] = None,
+               roll: Optional[float] = None, zoom: Optional[float] = None, scale: Vector = (1, 1, 1),
+               clip_box: Optional[Vector] = None,
                clip_planes: Sequence[Vector] = (), step: Optional[int] = None, time: Optional[float] = None,
                interpolate: bool = False, surfaces: Union[str, Sequence[str]] = (), surface_colours: Union[str, Sequence[str]] = (),
                surface_by: str = "", surface_opacity: Union[float, str, Sequence[Union[float, str]]] = (), slices: Sequence[Vector] = (),
@@ -340,7 +342,8 @@ class Cache:
         the path of a ParaView preset. classify: "pixel", or "flat": one colour for each splat.
 
         view: iso, +x, -x, +y, -y, +z or -z; or a camera by position, focal_point, view_up and parallel_scale (half the
-        picture's height) or view_angle (perspective, degrees).
+        picture's height) or view_angle (perspective, degrees). azimuth, elevation and roll (degrees) turn it, whether given
+        or chosen, and zoom magnifies.
 
         scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny,
         nz) each; nothing is drawn where n does not point.
@@ -375,6 +378,8 @@ class Cache:
                                opacity_unit=opacity_unit)
         of_camera = _instead(camera, "camera", view=view, position=position, focal_point=focal_point, view_up=view_up,
                              parallel_scale=parallel_scale, view_angle=view_angle)
+        of_camera |= {name: value for name, value in (("azimuth", azimuth), ("elevation", elevation), ("roll", roll), ("zoom", zoom))
+                      if value is not None}
         of_two = _given(opacity_by=opacity_by or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh,
                         opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf), iso_by=iso_by or None)
         frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
