@@ -59,6 +59,8 @@ struct FrameOptions {
   std::optional<WorldBox> clip_box;    // nothing outside it is drawn
   std::vector<ClipPlane> clip_planes;  // nothing on their outer sides is drawn
   std::optional<Light> light;          // none: unlit, the colours of the transfer function
+  // Over the share of the volume whose gradient is less steep, factors of the extinction; empty: none.
+  std::vector<OpacityPoint> gradient_opacity;
   std::shared_ptr<const SurfaceScene> scene;  // surfaces and slices; null: none
   glm::vec4 background{1, 1, 1, 1};           // premultiplied
   double low_pass_px2 = kLowPass;             // added to the diagonal of S2, pixels squared

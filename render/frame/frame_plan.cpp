@@ -121,12 +121,22 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
   return ScreenView::of(camera, size, options.scale, options.low_pass_px2, near);
 }
 
+std::shared_ptr<const GradientOpacity> FramePlanner::gradientOf(const FrameOptions& options) const {
+  if (options.gradient_opacity.empty()) return nullptr;
+  const MutexLock lock(mutex_);
+  if (!gradients_.percentiles || gradients_.scale != options.scale)
+    gradients_ = {options.scale,
+                  std::make_unique<const GradientPercentiles>(cache_, variable_, options.scale)};
+  return std::make_shared<const GradientOpacity>(options.gradient_opacity, *gradients_.percentiles);
+}
+
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
   ProjectionSettings settings{screenView(camera, options, size),
                               options.classification == Classification::kPixel,
                               clipPlanesOf(options.clip_planes, options.clip_box), options.light};
   settings.borders = borderStyleOf(cache_.manifest());
+  settings.gradient = gradientOf(options);
   const double diagonal = glm::length(options.scale * (cache_.manifest().upper - cache_.manifest().lower));
   const double range = std::abs(scalar_range_.second - scalar_range_.first);
   if (diagonal > 0 && range > 0) settings.light_g0 = range / diagonal;
@@ -187,11 +197,11 @@ void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions
             [](const BrickPart& a, const BrickPart& b) { return a.brick < b.brick; });
 }
 
-/// Null where all errors count: light shows the splats themselves.
+/// Null where all errors count: light and the gradient's opacity show the splats themselves.
 std::function<double(uint32_t)> FramePlanner::errorWeightIn(const ProjectionSettings& settings,
                                                             const CutView& view, double lod_pixels) const {
   const double least = leastErrorWeight(lod_pixels);
-  if (least >= 1 || settings.lit() || !settings.per_pixel) return nullptr;
+  if (least >= 1 || settings.lit() || settings.gradient || !settings.per_pixel) return nullptr;
   const double scale = std::max({view.scale.x, view.scale.y, view.scale.z});
   const double whole = glm::length(view.scale * (cache_.manifest().upper - cache_.manifest().lower));
   return [this, view, least, scale, whole](uint32_t id) {

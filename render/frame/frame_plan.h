@@ -1,5 +1,6 @@
 // The stage "plan" of a frame: which parts of which bricks the view needs, the order in which they are
-// swept, and how their splats are projected. It reads the octree only, and no bricks.
+// swept, and how their splats are projected. It reads the octree only, and no bricks but those that
+// gradients are measured in, once.
 //
 // The cut is chosen by the error that bricks have on the screen, weighted by what the transfer function
 // shows of it (errorWeight()). The same cache, view and options give the same plan. Any number of threads
@@ -19,10 +20,12 @@
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
 #include "render/project/depth_sort.h"
+#include "render/project/gradient_opacity.h"
 #include "render/project/projection.h"
 #include "render/project/tile_set.h"
 #include "render/ranks/splat_exchange.h"
 #include "render/sweep/sweep_buffer.h"
+#include "stream/base/mutex.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/model/octree.h"
 #include "stream/paging/cut.h"
@@ -114,6 +117,7 @@ class FramePlanner {
   std::function<double(uint32_t)> errorWeightIn(const ProjectionSettings& settings, const CutView& view,
                                                 double lod_pixels) const;
   void planIsosurfaces(const FrameOptions& options, const CutOptions& limits, FramePlan& plan) const;
+  std::shared_ptr<const GradientOpacity> gradientOf(const FrameOptions& options) const;
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
   CutView cutViewOf(const ProjectionSettings& settings) const;
   Cut chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
@@ -134,6 +138,14 @@ class FramePlanner {
   std::pair<double, double> scalar_range_;             // of the transfer function
   std::vector<ValueBounds> subtrees_;
   std::vector<ValueBounds> colour_subtrees_;  // of the scalar of the colours, if there is one
+
+  /// The last ones, which cost much.
+  struct Gradients {
+    glm::dvec3 scale{1.0};
+    std::unique_ptr<const GradientPercentiles> percentiles;
+  };
+  mutable Mutex mutex_;
+  mutable Gradients gradients_ GUARDED_BY(mutex_);
 };
 
 /// The least weight, for this error allowed on the screen. The detail of bricks that count least is at most

@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "render/project/gradient_opacity.h"
+
 namespace curvisplat {
 namespace {
 
@@ -38,10 +40,7 @@ LocalLight::LocalLight(const Light& light, double g0, const ScreenView& view, co
 }
 
 Lit LocalLight::of(float x, float y, float z, const Shape& s, const Slope& w) const {
-  // Aᵀ g = w, from the last row up.
-  const float gz = w.w2 / s.axis2, gy = w.w1 / s.axis1 - s.shear21 * gz;
-  const float gx = w.w0 / s.axis0 - s.shear10 * gy - s.shear20 * gz;
-  const glm::vec3 g = glm::vec3(gx, gy, gz) * per_scale_;
+  const glm::vec3 g = gradientOf(s, w, per_scale_);
   const float squared = glm::dot(g, g);
   constexpr float kLargest = 1e36f;
   if (!(squared > 0 && squared < kLargest)) return {};

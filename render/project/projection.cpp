@@ -187,7 +187,7 @@ SplatPiece wholeOf(const GeometryArrays<const float>& geometry, const VariableAr
 struct BrickPass {
   const BrickArrays& brick;
   const Cutting& cutting;
-  const std::optional<LocalLight>& light;
+  const SlopeRules& rules;
   SplatChooser& chooser;
   ProjectionCounts& counts;
   CutBudget left = {};
@@ -207,7 +207,7 @@ struct SplatCutting {
 /// Nothing if that takes more than what the pass has left, which it counts down.
 template <typename Map>
 std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, size_t i,
-                                               const SplatCutting& how, const Lit& lit) {
+                                               const SplatCutting& how, const BySlope& by_slope) {
   const BrickArrays& brick = pass.brick;
   const Cutting& cutting = pass.cutting;
   SplatChooser& chooser = pass.chooser;
@@ -242,6 +242,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     const size_t records = least + (faces ? 1u : 0u) + (across ? 1u : 0u);
     if (left.pieces + own < records) return false;
     ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean, how.plane);
+    splat.amplitude *= by_slope.opacity;
     if (piece.growth.count > 0) splat.skew = skewOf(at.rows, piece.growth, ellipse);
     const bool whole_part = piece.position == part->position;  // perspective has not cut it up
     if (faces && whole_part && !across && !how.clipped && !brick.colours) {
@@ -262,10 +263,10 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     if (coloured)
       colour = colourOf(map, at, withScalarOf(*coloured, piece), brick.colours->variance[i], faces, across);
     const auto fate = records == 1
-                          ? chooser.choose(splat, at.order, lit)
+                          ? chooser.choose(splat, at.order, by_slope.lit)
                           : chooser.chooseWith({faces ? &cut : nullptr, across ? &along_ray : nullptr,
                                                 coloured ? &colour : nullptr},
-                                               splat, at.order, lit);
+                                               splat, at.order, by_slope.lit);
     if (fate == SplatChooser::Fate::kKept) {
       left.pieces -= records - own;
       own = 0;
@@ -331,24 +332,26 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
         }
         in_pieces = how.layered = side == LayerSide::kAcross;
       }
-      Lit lit;
-      if (pass.light)
-        lit = pass.light->of(geometry.x[i], geometry.y[i], geometry.z[i], shapeOf(geometry, i),
-                             slopeOf(variable, i));
+      const BySlope by_slope = pass.rules.of(geometry, variable, i);
+      if (!(by_slope.opacity > 0)) {
+        ++counts.transparent;
+        continue;
+      }
       SplatChooser::Fate fate;
       if (in_pieces) {
-        const auto best = choosePieces(map, pass, i, how, lit);
+        const auto best = choosePieces(map, pass, i, how, by_slope);
         if (!best) return false;
         fate = *best;
       } else {
         const Ellipse ellipse = block.ellipse(n);
         ScreenSplat splat = screenSplat(block.x[n], block.y[n], ellipse, variable.mean[i], how.plane);
+        splat.amplitude *= by_slope.opacity;
         splat.skew = block.skew[n];
         if (brick.colours) {
           const ScreenColour colour = colourOf(map, geometry, *brick.colours, i);
-          fate = pass.chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.order[n], lit);
+          fate = pass.chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.order[n], by_slope.lit);
         } else {
-          fate = pass.chooser.choose(splat, block.order[n], lit);
+          fate = pass.chooser.choose(splat, block.order[n], by_slope.lit);
         }
       }
       counts.off_screen += fate == SplatChooser::Fate::kOffScreen;
@@ -393,12 +396,12 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   Cutting cutting{nullptr, LocalClipPlanes(settings.clip_planes, cell_min),
                   LocalLayers(settings.layers, settings.view, cell_min)};
   const BrickArrays brick{geometry, values.scalar, values.colours ? &*values.colours : nullptr};
-  std::optional<LocalLight> light;
-  if (settings.light) light.emplace(*settings.light, settings.light_g0, settings.view, cell_min);
+  SlopeRules rules{{}, settings.gradient.get(), glm::vec3(1.0 / settings.view.scale)};
+  if (settings.light) rules.light.emplace(*settings.light, settings.light_g0, settings.view, cell_min);
   SplatChooser chooser(settings.view, largestReach(settings.view.low_pass_px2),
                        {settings.per_pixel, settings.lit()}, table, {splats_, depths_});
   const auto projectAll = [&](const auto& map) {
-    BrickPass pass{brick, cutting, light, chooser, counts_};
+    BrickPass pass{brick, cutting, rules, chooser, counts_};
     return std::all_of(ranges.begin(), ranges.end(),
                        [&](const SplatRange& range) { return projectRange(map, pass, range); });
   };

@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -28,6 +29,8 @@
 #include "stream/model/splats.h"
 
 namespace curvisplat {
+
+class GradientOpacity;
 
 /// What became of the splats; these counts explain an empty picture.
 struct ProjectionCounts {
@@ -50,6 +53,7 @@ struct ProjectionSettings {
   double light_g0 = 1;                   // LocalLight's
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
   const PixelLayers* layers = nullptr;   // surfaces and slices in the picture, which splats are cut at
+  std::shared_ptr<const GradientOpacity> gradient = nullptr;  // factor of extinctions; null: 1
 
   /// Whether splats have light: painters must know.
   bool lit() const { return light.has_value(); }

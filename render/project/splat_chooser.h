@@ -17,10 +17,12 @@
 #include <cstdint>
 #include <cstring>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "render/colour/classification.h"
 #include "render/project/footprint.h"
+#include "render/project/gradient_opacity.h"
 #include "render/project/light.h"
 #include "render/project/painter.h"
 #include "render/project/pixel_layers.h"
@@ -30,6 +32,30 @@
 #include "render/project/splat_pieces.h"
 
 namespace curvisplat {
+
+/// What the gradient of a splat's scalar gives it.
+struct BySlope {
+  Lit lit;
+  float opacity = 1;  // factor of the extinction
+};
+
+/// How it gives that.
+struct SlopeRules {
+  std::optional<LocalLight> light;
+  const GradientOpacity* gradient;  // null: 1
+  glm::vec3 per_scale;
+
+  BySlope of(const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+             size_t i) const {
+    BySlope by_slope;
+    if (!light && !gradient) return by_slope;
+    const Shape shape = shapeOf(geometry, i);
+    const Slope slope = slopeOf(variable, i);
+    if (gradient) by_slope.opacity = gradient->of(glm::length(gradientOf(shape, slope, per_scale)));
+    if (light) by_slope.lit = light->of(geometry.x[i], geometry.y[i], geometry.z[i], shape, slope);
+    return by_slope;
+  }
+};
 
 /// Decides for each projected splat whether it can be seen, and keeps those that can.
 class SplatChooser {

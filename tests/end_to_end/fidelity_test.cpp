@@ -11,6 +11,8 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
@@ -347,6 +349,68 @@ TEST_F(AroundTheVolume, LightIsFromEachSplatsGradient) {
       fmt::print("light, {}, level {}: {:.1f} dB, unlit {:.1f} dB\n", name, level, lit, unlit);
       EXPECT_GE(lit, least_db[level]) << name << ", level " << level;
       EXPECT_LT(unlit, least_db[level]) << name << ", level " << level;
+    }
+  }
+}
+
+/// Magnitudes of a field's gradient, from the least steep part of its volume, by central differences at points that fill
+/// its box evenly.
+std::vector<double> steepnessOf(const ReferenceField& field) {
+  constexpr int kAlong = 60;
+  constexpr double kStep = 1e-4;
+  const auto [lower, upper] = field.bounds();
+  const auto probe = field.probe();
+  std::vector<double> found;
+  for (int n = 0; n < kAlong * kAlong * kAlong; ++n) {
+    const glm::dvec3 part(n % kAlong, n / kAlong % kAlong, n / kAlong / kAlong);
+    const glm::dvec3 at = lower + (part + 0.5) / static_cast<double>(kAlong) * (upper - lower);
+    glm::dvec3 gradient(0.0);
+    bool inside = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 step(0.0);
+      step[axis] = kStep;
+      const auto before = probe->at(at - step), after = probe->at(at + step);
+      inside = inside && before && after;
+      if (inside) gradient[axis] = (*after - *before) / (2 * kStep);
+    }
+    if (inside) found.push_back(glm::length(gradient));
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+TEST_F(Fidelity, GradientOpacityIsThatOfEachSplatsGradient) {
+  const auto scene = makeScene("half-annulus");
+  const SceneField field(*scene);
+  const std::vector<double> steepness = steepnessOf(field);
+  // Linear over the share of the volume that is less steep.
+  const auto factor = [&](double magnitude) {
+    const auto below = std::lower_bound(steepness.begin(), steepness.end(), magnitude) - steepness.begin();
+    const double share = static_cast<double>(below) / static_cast<double>(steepness.size());
+    return std::clamp((share - 0.3) / 0.4, 0.0, 1.0);
+  };
+  ReferenceExtras extras;
+  extras.gradient_opacity = factor;
+  const KnownFunction function = KnownFunction::of("smooth");
+  const Image reference =
+      toImage(referenceMarch(field, function.exact, halfAnnulusCamera(), kSize, stepsFor(field), extras));
+  for (const auto& [lod_pixels, least_db] : {std::pair(0.0, 67.0), {8.0, 60.0}}) {
+    FrameOptions options = knownFrame(kSize);
+    options.lod_pixels = lod_pixels;
+    const auto draw = [&](Backend backend) {
+      return drawCache(cacheOf("half-annulus"), function.table, halfAnnulusCamera(), options, nullptr,
+                       backend);
+    };
+    const double off_db = compareImages(draw(Backend::kCpu), reference).psnr_db;
+    options.gradient_opacity = {{0, 0}, {0.3, 0}, {0.7, 1}, {1, 1}};
+    const Image drawn = draw(Backend::kCpu);
+    const double on_db = compareImages(drawn, reference).psnr_db;
+    fmt::print("gradient opacity at {} pixels: {:.1f} dB, without {:.1f} dB\n", lod_pixels, on_db, off_db);
+    EXPECT_GE(on_db, least_db) << lod_pixels;
+    EXPECT_LT(off_db, 30) << lod_pixels;
+    if (on_db < least_db) leavePictures("gradient", drawn, reference);
+    if (lod_pixels > 0) {
+      EXPECT_GE(compareImages(draw(Backend::kOsmesa), drawn).psnr_db, 60);
     }
   }
 }

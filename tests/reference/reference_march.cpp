@@ -65,6 +65,7 @@ struct Surroundings {
   const ReferenceLight* light = nullptr;
   const ReferenceLayers& layers;
   const PointColour* colour = nullptr;
+  const std::function<double(double)>* gradient_opacity = nullptr;
 };
 
 class Marcher {
@@ -73,12 +74,13 @@ class Marcher {
           const MarchSteps& steps, const Surroundings& around)
       : field_(field),
         probe_(field.probe()),
-        gradient_probe_(around.light ? field.probe() : nullptr),
+        gradient_probe_(around.light || around.gradient_opacity ? field.probe() : nullptr),
         function_(function),
         ray_(ray),
         steps_(steps),
         light_(around.light),
-        colour_at_(around.colour) {}
+        colour_at_(around.colour),
+        gradient_opacity_(around.gradient_opacity) {}
 
   /// `layers`: from the nearest.
   ReferencePixel march(double begin, double end, const std::vector<ReferenceLayer>& layers) {
@@ -186,6 +188,8 @@ class Marcher {
     // unless the field said that it is there.
     if (!scalar) return first_ ? held_ : Sample{};
     Sample found{true, function_(*scalar)};
+    if (gradient_opacity_ && found.optical.extinction > 0)
+      found.optical.extinction *= (*gradient_opacity_)(glm::length(gradient(at, *scalar)));
     if (found.optical.extinction > 0) {
       glm::dvec3& colour = found.optical.colour;
       if (colour_at_) colour = (*colour_at_)(at);
@@ -273,6 +277,7 @@ class Marcher {
   const MarchSteps& steps_;
   const ReferenceLight* light_;
   const PointColour* colour_at_;
+  const std::function<double(double)>* gradient_opacity_;
   std::optional<double> first_;  // between first_ and last_ the field is there
   double last_ = 0;
   Sample held_;  // the last one found since first_ was set
@@ -461,8 +466,13 @@ ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
                               const ReferenceExtras& extras) {
   ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
-  marchPixels({field, function, camera, steps, {extras.light, extras.layers}},
-              std::vector<uint8_t>(size.pixels(), 1), image);
+  marchPixels(
+      {field,
+       function,
+       camera,
+       steps,
+       {extras.light, extras.layers, nullptr, extras.gradient_opacity ? &extras.gradient_opacity : nullptr}},
+      std::vector<uint8_t>(size.pixels(), 1), image);
   return image;
 }
 

@@ -94,10 +94,12 @@ struct ReferenceIsosurface {
 ReferenceLayers isoLayer(const Scene& scene, const ReferenceIsosurface& surface);
 ReferenceLayers isoLayer(const Scene& scene, double value, const glm::dvec3& colour, double opacity = 1);
 
-/// What a picture has besides the field: light on it, and layers in it.
+/// What a picture has besides the field: light on it, layers in it, and a factor of its extinction, by the
+/// magnitude of its gradient.
 struct ReferenceExtras {
   const ReferenceLight* light = nullptr;
   ReferenceLayers layers = {};
+  std::function<double(double magnitude)> gradient_opacity = {};
 };
 
 /// Marches every pixel, from the plane of the viewer on. Where the field does not know its crossings, a part

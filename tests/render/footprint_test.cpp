@@ -13,6 +13,7 @@
 
 #include "render/camera/camera.h"
 #include "render/project/footprint.h"
+#include "render/project/gradient_opacity.h"
 #include "render/project/light.h"
 #include "stream/model/growth_code.h"
 
@@ -264,6 +265,40 @@ TEST(Light, LeavesWhatHasNoGradient) {
     EXPECT_EQ(lit.diffuse, 1);
     EXPECT_EQ(lit.specular, 0);
   }
+}
+
+/// Of 1000 magnitudes the squares of their ranks, each with a volume of its own.
+TEST(GradientOpacity, IsLinearOverTheShareOfTheVolumeThatIsLessSteep) {
+  std::vector<float> magnitudes, volumes;
+  std::vector<double> below;  // share of the volume, of each
+  double volume = 0;
+  for (int n = 1000; n-- > 0;) {
+    magnitudes.push_back(static_cast<float>(n * n));
+    volumes.push_back(n < 500 ? 1 : 3);
+  }
+  for (int n = 0; n < 1000; ++n) {
+    below.push_back(volume / 2000);
+    volume += n < 500 ? 1 : 3;
+  }
+  const GradientPercentiles percentiles(magnitudes, volumes);
+  const std::vector<OpacityPoint> points{{0, 0.25}, {0.25, 0.75}, {0.25, 0}, {0.5, 1}, {1, 0}};
+  const GradientOpacity opacity(points, percentiles);
+  for (int n = 0; n < 1000; ++n) {
+    const double share = below[n];
+    const double expected = share <= 0.25 ? 0.25 + 2 * share
+                            : share < 0.5 ? 4 * (share - 0.25)
+                                          : 2 * (1 - share);
+    EXPECT_NEAR(opacity.of(static_cast<float>(n * n)), expected, share > 0.25 && share < 0.254 ? 0.76 : 0.006)
+        << n;
+  }
+  EXPECT_EQ(opacity.of(1e9f), 0);
+  EXPECT_EQ(opacity.of(-1), 0.25f);
+  // Of equal magnitudes the lowest share counts.
+  const GradientPercentiles flat({2, 0, 0, 0, 0, 0, 0, 1}, std::vector<float>(8, 1.0f));
+  const GradientOpacity of_flat(std::vector<OpacityPoint>{{0, 0}, {0.2, 1}, {1, 1}}, flat);
+  EXPECT_EQ(of_flat.of(0), 0);
+  EXPECT_EQ(of_flat.of(1), 1);
+  EXPECT_EQ(GradientOpacity(points, GradientPercentiles({}, {})).of(3), 0);
 }
 
 }  // namespace

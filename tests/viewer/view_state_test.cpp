@@ -40,6 +40,7 @@ ViewState changedState() {
   state.slice_opacity = {0.5, true};
   state.volume = false;
   state.lit = true;
+  state.gradient_opacity = {{0, 0.25}, {0.5, 1}, {1, 0}};
   state.dark = true;
   state.annotations.axes = false;
   state.classification = Classification::kFlat;
@@ -68,6 +69,7 @@ TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
         "slices", "slice_opacity", "slices_by_function", "volume"})
     json.erase(field);
   json.erase("lit");
+  json.erase("gradient_opacity");
   const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
   EXPECT_TRUE(state.clip_planes.empty());
   EXPECT_TRUE(state.surfaces.empty());
@@ -77,6 +79,7 @@ TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   EXPECT_TRUE(state.slices.empty());
   EXPECT_TRUE(state.volume);
   EXPECT_FALSE(state.lit);
+  EXPECT_TRUE(state.gradient_opacity.empty());
 }
 
 TEST(ViewState, APresetStaysOne) {
@@ -100,6 +103,7 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/camera/view_angle", 180, "camera.view_angle");
   expectError("/camera/parallel_scale", -1, "camera.parallel_scale");
   expectError("/camera", nullptr, "camera");
+  expectError("/gradient_opacity", "0.5", "gradient_opacity");
   expectError("/scale", nlohmann::json::array({1, 1, 0}), "scale");
   expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
   expectError("/clip_planes", 3, "clip_planes");
@@ -209,6 +213,7 @@ TEST(RenderCommand, HasEveryOption) {
   state.volume = false;
   state.lit = true;
   state.dark = false;
+  state.gradient_opacity = {{0, 0.25}, {0.5, 1}, {1, 0}};
   state.annotations = {.scalar_bar = true, .outline = true};
   state.classification = Classification::kFlat;
   expectParts(commandText(state, "it's\x1b[2J \\\u009b.splats"), {R"($'it\'s\033[2J \\\302\233.splats')"});
@@ -223,6 +228,7 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--clip-plane 0,0.5,0,1,0,-2",
                                                   "--clip-plane 0.25,0,0,0,1,0",
                                                   "--shade",
+                                                  "--gradient-opacity 0:0.25,0.5:1,1:0",
                                                   "--background white",
                                                   "--classify flat",
                                                   "--lod-pixels 2.5",

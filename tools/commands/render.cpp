@@ -297,6 +297,13 @@ void addRender(CLI::App& app) {
       ->group(what);
   command
       ->add_option(
+          "--gradient-opacity", arguments->frame.gradient_opacity,
+          "Factors of the opacity by how steep the scalar is, SHARE:FACTOR,... from 0 to 1, over the "
+          "share of the volume that is less steep. 0:0,0.2:1 hides the flattest fifth little by little, "
+          "0.8:0,0.9:1 all but the steepest fifth")
+      ->group(what);
+  command
+      ->add_option(
           "--background", arguments->frame.background,
           "Background colour: dark (#15171c), white (for papers), black, transparent or #rrggbb. Colour maps "
           "that are chosen suit it")

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "render/colour/function_parts.h"
 #include "render/project/light.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
@@ -87,6 +88,8 @@ FrameOptions frameOptions(const FrameArguments& arguments) {
   if (arguments.clip_box) options.clip_box = parseClipBox(*arguments.clip_box);
   options.clip_planes = parseClipPlanes(arguments.clip_planes);
   options.light = parseLight(arguments);
+  if (arguments.gradient_opacity)
+    options.gradient_opacity = parseOpacities("--gradient-opacity", *arguments.gradient_opacity);
   options.background = parseBackground("--background", arguments.background);
   options.threads = arguments.threads;
   options.memory_bytes = parseMemory("--memory", arguments.memory);

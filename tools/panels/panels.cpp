@@ -216,6 +216,34 @@ void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string
   }
 }
 
+namespace {
+
+/// Opacity by steepness: none up to a share of the volume that is less steep, all of it from another on.
+bool editGradient(std::vector<OpacityPoint>& points) {
+  bool on = !points.empty();
+  bool changed = ImGui::Checkbox("opacity by gradient", &on);
+  nameWidget("gradient opacity");
+  hint("hides where the scalar hardly changes");
+  const auto set = [&](double from, double to) { points = {{0, 0}, {from, 0}, {to, 1}, {1, 1}}; };
+  if (changed && on) set(0.5, 0.8);
+  if (!on) points.clear();
+  if (points.empty()) return changed;
+  float from = 0, to = 1;
+  for (const OpacityPoint& point : points)
+    if (point.opacity <= points.front().opacity) from = static_cast<float>(point.x);
+  for (size_t n = points.size(); n-- > 0;)
+    if (points[n].opacity >= points.back().opacity) to = static_cast<float>(points[n].x);
+  if (ImGui::DragFloatRange2("##gradient", &from, &to, 0.003f, 0, 1, "from %.2f", "to %.2f")) {
+    set(std::clamp(from, 0.0f, 1.0f), std::clamp(std::max(from, to), 0.0f, 1.0f));
+    changed = true;
+  }
+  nameWidget("gradient shares");
+  hint("shares of the volume that is less steep");
+  return changed;
+}
+
+}  // namespace
+
 void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   const float column = 0.5f * ImGui::GetContentRegionAvail().x;
   // Not "light" beside "dark", which reads as a choice of two.
@@ -235,6 +263,7 @@ void Panels::drawPicture(ViewState& state, PanelActions& actions) {
   ImGui::SameLine(column);
   actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
   nameWidget("axes grid");
+  actions.changed |= editGradient(state.gradient_opacity);
   ImGui::BeginDisabled(!state.hasSheets());  // there would be nothing to see
   actions.changed |= option("volume", state.volume);
   ImGui::EndDisabled();

@@ -295,6 +295,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   }
   for (const ClipPlane& plane : state.clip_planes) words.add("--clip-plane", text(plane));
   if (state.lit) words.add("--shade");
+  if (!state.gradient_opacity.empty()) words.add("--gradient-opacity", textOf(state.gradient_opacity));
   addSurfaces(state, words);
   if (!state.dark) words.add("--background", "white");
   if (state.annotations.scalar_bar) words.add("--scalar-bar");

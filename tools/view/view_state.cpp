@@ -85,6 +85,14 @@ std::pair<double, double> pairFrom(const JsonField& field) {
   return {both[0].number(-1e300, 1e300), both[1].number(-1e300, 1e300)};
 }
 
+std::vector<OpacityPoint> opacitiesFrom(const JsonField& field) {
+  try {
+    return parseOpacities("", field.text());
+  } catch (const UsageError&) {
+    field.fail("opacities such as 0:0,0.5:0.8,1:1");
+  }
+}
+
 FunctionParts partsFrom(const JsonField& fields) {
   FunctionParts parts{fields.at("map").text(), pairFrom(fields.at("range")), {}, {}, 1};
   if (!(parts.range.first < parts.range.second)) fields.at("range").fail("an increasing range");
@@ -93,8 +101,7 @@ FunctionParts partsFrom(const JsonField& fields) {
     if (!(width > 0)) asinh->fail("a width above zero");
     parts.asinh = AsinhScale{centre, width};
   }
-  if (const auto opacities = fields.find("opacities"))
-    parts.opacities = parseOpacities("opacities", opacities->text());
+  if (const auto opacities = fields.find("opacities")) parts.opacities = opacitiesFrom(*opacities);
   parts.opacity_unit = positive(fields.at("opacity_unit"));
   return parts;
 }
@@ -263,6 +270,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.clip_box = clip_box;
   options.clip_planes = clip_planes;
   if (lit) options.light = Light{};
+  options.gradient_opacity = gradient_opacity;
   if (hasSheets()) {
     auto scene = std::make_shared<SurfaceScene>();
     for (const SurfaceFile& surface : surfaces)
@@ -347,6 +355,7 @@ std::string toJson(const ViewState& state) {
   json["clip_planes"] = jsonOf(state.clip_planes);
   putSurfaces(json, state);
   json["lit"] = state.lit;
+  json["gradient_opacity"] = textOf(state.gradient_opacity);
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
   json["axes"] = state.annotations.axes;
@@ -378,6 +387,8 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   state.clip_planes = planesFrom(fields, "clip_planes", kMaxClipPlanes);
   takeSurfaces(fields, path, manifest, state);
   if (const auto lit = fields.find("lit")) state.lit = lit->flag();
+  if (const auto gradient = fields.find("gradient_opacity"); gradient && !gradient->text().empty())
+    state.gradient_opacity = opacitiesFrom(*gradient);
   state.dark = fields.at("dark").flag();
   state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};
   if (const auto grid = fields.find("axes_grid")) state.annotations.axes_grid = grid->flag();

@@ -80,7 +80,8 @@ struct ViewState {
   SheetOpacity iso_opacity = {};
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
-  bool dark = true;  // background
+  std::vector<OpacityPoint> gradient_opacity = {};  // FrameOptions'
+  bool dark = true;                                 // background
   Annotations annotations{.scalar_bar = true, .axes = true};
   std::optional<OpacityScalar> opacity_by = std::nullopt;
   std::vector<Marker> markers = {};

@@ -319,7 +319,8 @@ class Cache:
                slice_opacity: Union[float, str] = 1, isovalues: Sequence[float] = (),
                iso_opacity: Union[float, str, None] = None, iso_by: str = "",
                volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
-               light_direction: Optional[Vector] = None, background: str = "dark", scalar_bar: bool = False,
+               light_direction: Optional[Vector] = None,
+               gradient_opacity: Union[str, Sequence[Tuple[float, float]], None] = None, background: str = "dark", scalar_bar: bool = False,
                scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
                axes_titles: Optional[Sequence[str]] = None, outline: bool = False,
                channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
@@ -361,7 +362,7 @@ class Cache:
         volume: False leaves the volume out. background: "dark" (#15171c), "white", another colour, or "transparent"; colours that are chosen suit it.
 
         shade: light level surfaces from the viewer; light: (ambient, diffuse, specular), and light_direction turn it on,
-        too.
+        too. gradient_opacity: points (share of the volume that is less steep 0..1, factor of the opacity 0..1).
 
         scalar_bar, scalar_bar_titles, axes, axes_grid, axes_titles (of x, y and z) and outline are drawn into the
         picture. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
@@ -385,6 +386,7 @@ class Cache:
         frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
                        scale=scale, memory=str(memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
+                       gradient_opacity=None if gradient_opacity is None else _opacities(gradient_opacity),
                        max_splats=None if max_splats is None else str(max_splats),
                        channels=",".join(_arguments.several(channels)) or "none",
                        axes_titles=None if axes_titles is None else ",".join(axes_titles))
