@@ -34,8 +34,11 @@ std::vector<AxisTick> linearTicks(double low, double high, int wanted) {
   // The step is below the numbers' precision: adding it would not change them.
   if (!(high - low > 1e-12 * largest)) return {{low, fmt::format("{:g}", low)}};
   const double step = roundStep(high - low, wanted);
-  std::vector<AxisTick> ticks;
   const double slack = 1e-9 * step;  // accepts a tick at an end in spite of rounding
+  // One tick does not say how long the axis is.
+  if (std::floor((high + slack) / step) - std::ceil((low - slack) / step) < 1)
+    return linearTicks(low, high, wanted + 1);
+  std::vector<AxisTick> ticks;
   for (double n = std::ceil((low - slack) / step); n * step <= high + slack; ++n) {
     const double value = n == 0 ? 0 : n * step;  // no -0
     ticks.push_back({value, labelOf(value, step, largest)});

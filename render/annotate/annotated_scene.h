@@ -40,6 +40,7 @@ struct AnnotatedScene {
   glm::dvec3 lower{0.0}, upper{0.0};  // the box around the data, before --scale
   glm::vec4 background{1, 1, 1, 1};   // text and lines are black if it is light, else white
   std::array<std::string, 3> axis_titles{"x", "y", "z"};  // of the axes grid
+  std::string title = {}, label = {};                     // above the data, and in its upper left corner
 };
 
 /// A round number on a scale.
@@ -48,7 +49,7 @@ struct AxisTick {
   std::string label;
 };
 
-/// Chooses about `wanted` (2 or more) ticks in the axis' range, at multiples of 1, 2 or 5 times a power of ten.
+/// Chooses about `wanted` (2 or more) ticks, on a linear scale at least two, in the axis' range, at multiples of 1, 2 or 5 times a power of ten.
 /// On a logarithmic scale they are at powers of ten, with 2 and 5 times them if there are few; on that of asinh at
 /// the roundest numbers that have room. All labels of a linear scale have the same number of decimals. If both ends
 /// are equal there is one tick. Requires finite ends that do not decrease, and above zero on a logarithmic scale.

@@ -1,6 +1,7 @@
 #include "render/annotate/annotations.h"
 
 #include <cairo/cairo.h>
+#include <sys/mman.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <span>
 #include <utility>
@@ -97,6 +99,7 @@ constexpr double kBarLeft = 0.6, kBarWidth = 1.3, kLabelGap = 0.7;
 constexpr double kCurveWidth = 1.1;  // of opacities, left of the colours
 // Offset from its right edge.
 constexpr double kTitleWidth = 1.4, kTitleGap = 0.4;
+constexpr double kLongestTitle = 0.96;  // of the picture's height
 
 struct ScalarBar {
   double top, height;  // of the colours
@@ -178,8 +181,9 @@ void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, doub
     cairo_show_text(cairo, tick.label.c_str());
   }
   // The title runs along the bar, from below, so that a long name takes no width.
-  cairo_text_extents(cairo, shown.title.c_str(), &extents);
   cairo_save(cairo);
+  fitFont(cairo, font, shown.title, kLongestTitle * picture.height);
+  cairo_text_extents(cairo, shown.title.c_str(), &extents);
   cairo_translate(cairo, right - (kTitleWidth - 1) * font, bar.top + bar.height / 2);
   cairo_rotate(cairo, -std::numbers::pi / 2);
   cairo_move_to(cairo, -extents.x_advance / 2, 0);
@@ -203,6 +207,41 @@ void drawScalarBars(cairo_t* cairo, ImageSize picture, std::span<const ShownFunc
   }
 }
 
+// --------------------------------------------------------------------------------------- title, label
+
+/// From `at`, the left end of its baseline; on a rim of the other ink, since it lies over the data.
+void drawOverData(cairo_t* cairo, const glm::dvec2& at, const std::string& text, double font,
+                  const glm::dvec3& ink) {
+  cairo_move_to(cairo, at.x, at.y);
+  cairo_text_path(cairo, text.c_str());
+  cairo_set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
+  cairo_set_line_width(cairo, font / 4);
+  setInk(cairo, 1.0 - ink, 0.7);
+  cairo_stroke_preserve(cairo);
+  setInk(cairo, ink);
+  cairo_fill(cairo);
+}
+
+void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+  constexpr double kTitle = 1.4;  // of the font's size
+  const double font = fontSize(scene.picture), width = scene.view.size.width, room = width - 2 * font;
+  double top = 0.5 * font;
+  cairo_save(cairo);
+  if (!scene.title.empty()) {
+    const double large = fitFont(cairo, kTitle * font, scene.title, room);
+    cairo_text_extents_t extents;
+    cairo_text_extents(cairo, scene.title.c_str(), &extents);
+    top += kTitle * font;
+    drawOverData(cairo, {0.5 * (width - extents.x_advance), top}, scene.title, large, ink);
+    top += 0.5 * font;
+  }
+  if (!scene.label.empty()) {
+    const double fitted = fitFont(cairo, font, scene.label, room);
+    drawOverData(cairo, {font, top + font}, scene.label, fitted, ink);
+  }
+  cairo_restore(cairo);
+}
+
 // -------------------------------------------------------------------------------------- all together
 
 /// `lines`: with the grid's lines, which lie over the data then.
@@ -218,6 +257,7 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool l
   if (annotations.axes_grid && lines) drawAxesGrid(cairo, scene, ink);
   if (annotations.axes_grid) drawAxesLabels(cairo, scene, ink);
   if (annotations.axes) drawAxes(cairo, scene.view, ink);
+  if (annotations.texts) drawTexts(cairo, scene, ink);
   cairo_restore(cairo);
   if (annotations.scalar_bar) drawScalarBars(cairo, scene.picture, scene.functions, ink);
   return canvas;
@@ -239,6 +279,29 @@ void putBehind(Image& picture, const Annotations& annotations, const AnnotatedSc
   canvas.forEachPixel<true>([&](int x, int y, const glm::vec4& over) {
     put(picture.pixel(x, y), over + (1 - over.a) * background);
   });
+}
+
+/// The data with clear pixels at their right. Pages of what has been copied go back to the system at once: two large pictures would
+/// need the memory twice.
+Image widened(Image data, ImageSize size) {
+  constexpr size_t kPage = 4096, kAtOnce = size_t{1} << 20;
+  Image wide;
+  wide.size = size;
+  wide.rgba.reserve(4 * size.pixels());
+  auto* const begin = reinterpret_cast<std::byte*>(data.rgba.data());
+  size_t given_back = (kPage - reinterpret_cast<uintptr_t>(begin) % kPage) % kPage;  // the first whole page
+  const size_t row = 4 * static_cast<size_t>(data.size.width);
+  for (int y = 0; y < size.height; ++y) {
+    const float* const from = data.pixel(0, y);
+    wide.rgba.insert(wide.rgba.end(), from, from + row);
+    wide.rgba.resize(4 * static_cast<size_t>(y + 1) * static_cast<size_t>(size.width));
+    const size_t copied = static_cast<size_t>(y + 1) * row * sizeof(float);
+    if (copied < given_back + kAtOnce) continue;
+    const size_t bytes = (copied - given_back) / kPage * kPage;
+    ::madvise(begin + given_back, bytes, MADV_DONTNEED);
+    given_back += bytes;
+  }
+  return wide;
 }
 
 }  // namespace
@@ -263,10 +326,7 @@ Image annotated(Image data, const Annotations& annotations, const AnnotatedScene
   const bool is_narrower = data.size.width < scene.picture.width;
   Image picture;
   if (is_narrower) {
-    picture = Image(scene.picture);
-    for (int y = 0; y < picture.size.height; ++y)
-      std::copy_n(data.pixel(0, y), 4 * static_cast<size_t>(data.size.width), picture.pixel(0, y));
-    data = Image();
+    picture = widened(std::move(data), scene.picture);
   } else {
     picture = std::move(data);
   }
@@ -279,9 +339,9 @@ Image annotated(Image data, const Annotations& annotations, const AnnotatedScene
   return picture;
 }
 
-uint64_t annotatedBytes(ImageSize picture) {
-  // Of an Image and a Canvas.
-  return (4 * sizeof(float) + sizeof(uint32_t)) * picture.pixels();
+uint64_t annotatedBytes(ImageSize picture, ImageSize data) {
+  // Of the Image's further pixels, and of a Canvas.
+  return 4 * sizeof(float) * (picture.pixels() - data.pixels()) + sizeof(uint32_t) * picture.pixels();
 }
 
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene) {

@@ -1,8 +1,8 @@
 // Annotations drawn over a picture: scalar bars, the directions of the axes, the box around the data, a grid
 // with coordinates; and a picture of the built-in colour maps. `render` and the window share them.
 //
-// Scalar bars have a strip of their own at the right, so that they never cover data. Drawing takes up to 20
-// bytes a pixel (annotatedBytes()). Pure; any thread. In a build without Cairo asking for an annotation is a
+// Scalar bars have a strip of their own at the right, so that they never cover data. Drawing takes 4
+// bytes a pixel, and 16 a pixel of the bars (annotatedBytes()). Pure; any thread. In a build without Cairo asking for an annotation is a
 // UsageError.
 #pragma once
 
@@ -22,6 +22,7 @@ struct Annotations {
   bool axes = false;
   bool outline = false;
   bool axes_grid = false;  // its lines lie behind the data if that is over a transparent background
+  bool texts = false;      // the scene's title and label
   bool operator==(const Annotations&) const = default;
 };
 
@@ -39,8 +40,9 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture, const Tran
 /// (32,767 pixels a side).
 Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& scene);
 
-/// Memory that annotated() needs beside `data`, its result included.
-uint64_t annotatedBytes(ImageSize picture);
+/// Memory that annotated() needs beside that of `data`, of this size, which it gives back meanwhile. Its result
+/// is included.
+uint64_t annotatedBytes(ImageSize picture, ImageSize data);
 
 /// The annotations alone, for the whole picture: four bytes a pixel (red, green, blue, alpha; not
 /// premultiplied). Throws as annotated() does.

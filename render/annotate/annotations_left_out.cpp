@@ -30,7 +30,7 @@ Image annotated(Image data, const Annotations& annotations, const AnnotatedScene
   return data;
 }
 
-uint64_t annotatedBytes(ImageSize /*picture*/) {
+uint64_t annotatedBytes(ImageSize /*picture*/, ImageSize /*data*/) {
   return 0;
 }
 

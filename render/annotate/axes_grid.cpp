@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <optional>
 #include <string>
@@ -136,6 +137,18 @@ void drawLabels(cairo_t* cairo, const AnnotatedScene& scene, const Box& box, int
       scene.view.pixelFromView(scene.view.viewFromData(0.5 * (scene.lower + scene.upper)));
   const glm::dvec2 middle = 0.5 * (line->first + line->second);
   if (glm::dot(outward, middle - centre) < 0) outward = -outward;
+  // Text that would be cut off at the picture's edge is moved into it, and made smaller if it is too long.
+  const auto drawInside = [&](glm::dvec2 at, const std::string& text) {
+    const glm::dvec2 image(scene.view.size.width, scene.view.size.height);
+    cairo_save(cairo);
+    fitFont(cairo, font, text, image.x - 2);
+    cairo_text_extents_t of;
+    cairo_text_extents(cairo, text.c_str(), &of);
+    const glm::dvec2 half = 0.5 * glm::dvec2(of.width, of.height) + 1.0;
+    at = glm::max(half, glm::min(at, image - half));
+    drawText(cairo, at, text);
+    cairo_restore(cairo);
+  };
   const auto extents = [&](const std::string& text) {
     cairo_text_extents_t of;
     cairo_text_extents(cairo, text.c_str(), &of);
@@ -158,13 +171,13 @@ void drawLabels(cairo_t* cairo, const AnnotatedScene& scene, const Box& box, int
     const glm::dvec2 size = extents(tick.label);
     deepest = std::max(deepest, depth(size));
     cairo_stroke(cairo);
-    drawText(cairo, end + (kGap * font + 0.5 * depth(size)) * outward, tick.label);
+    drawInside(end + (kGap * font + 0.5 * depth(size)) * outward, tick.label);
   }
   cairo_stroke(cairo);
   const std::string& title = scene.axis_titles[static_cast<size_t>(axis)];
   if (title.empty()) return;
   const double away = (kTick + 3 * kGap) * font + deepest + 0.5 * depth(extents(title));
-  drawText(cairo, middle + away * outward, title);
+  drawInside(middle + away * outward, title);
 }
 
 }  // namespace

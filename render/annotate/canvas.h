@@ -106,6 +106,20 @@ inline double fontSize(ImageSize size) {
   return std::clamp(size.height / 42.0, 9.0, 96.0);
 }
 
+/// Makes the font, which is of this size, smaller where text would be longer than `length`, and returns its size.
+inline double fitFont(cairo_t* cairo, double font, const std::string& text, double length) {
+  // Again, since glyphs' widths are whole pixels.
+  constexpr int kMaxTimes = 8;
+  for (int n = 0; n < kMaxTimes; ++n) {
+    cairo_set_font_size(cairo, font);
+    cairo_text_extents_t extents;
+    cairo_text_extents(cairo, text.c_str(), &extents);
+    if (!(extents.x_advance > length) || !(length > 0)) break;
+    font *= std::min(length / extents.x_advance, 0.97);
+  }
+  return font;
+}
+
 /// Draws text centred on `centre`.
 inline void drawText(cairo_t* cairo, const glm::dvec2& centre, const std::string& text) {
   cairo_text_extents_t extents;

@@ -120,6 +120,79 @@ TEST_F(Annotations, EachFunctionHasABarWithATitleOfItsOwn) {
   expectSays(wrong.err, "--scalar-bar-title: given 2 times; the picture shows 1 function");
 }
 
+TEST_F(Annotations, TextsSayWhatIsShown) {
+  const Image plain = render({});
+  const Image title = render({"--title", "a {scalar} at {{t}}"}),
+              label = render({"--label", "t = {time:.2f} s"});
+  EXPECT_GT(changed(plain, title, 0, 200, 0, 20), 60);
+  EXPECT_EQ(changed(plain, title, 0, 200, 20, 160), 0);
+  EXPECT_GT(changed(plain, label, 0, 100, 0, 20), 60);
+  EXPECT_EQ(changed(plain, label, 100, 200, 0, 160), 0);
+  // Fields are those of the picture: the same pixels as text that says so.
+  EXPECT_EQ(render({"--label", "{scalar}|{units}|{time}|{step}|{frame:03d}"}).rgba,
+            render({"--label", "f||0|0|000"}).rgba);
+  // Too long a title is made smaller, and keeps both ends.
+  const Image longest = render({"--title", "|" + std::string(40, 'm') + "|", "--background", "white"});
+  EXPECT_EQ(changed(plain, longest, 0, 200, 20, 160), 0);
+  EXPECT_GT(changed(plain, longest, 3, 40, 0, 20), 0);
+  EXPECT_GT(changed(plain, longest, 160, 197, 0, 20), 0);
+  EXPECT_EQ(changed(plain, longest, 197, 200, 0, 20), 0);
+  EXPECT_EQ(changed(plain, longest, 0, 3, 0, 20), 0);
+  const auto refused = [](const char* option, const char* text, const char* words) {
+    const ProgramResult result = runProgram({"render", file("a.splats"), "-o", file("b.png"), option, text});
+    EXPECT_EQ(result.status, 2) << text;
+    expectSays(result.err, words);
+  };
+  refused("--label", "{tmie}",
+          "--label {tmie}: unknown field {tmie} (did you mean time?); expected time, step, frame, scalar");
+  refused("--title", "{time:s}", "'s' is not a format of time; expected one such as .2f");
+  refused("--title", "{step:.2f}", "'.2f' is not a format of step; expected one such as 04d");
+  refused("--title", "{frame:99999999}", "is not a format of frame");
+  refused("--title", "{scalar:d}", "scalar is no number and has no format");
+  refused("--label", "t = {time", "has a { without its }");
+}
+
+/// Each frame of a film says its own step and time, though the next one's is read while it is written.
+TEST_F(Annotations, TextsFollowTheFrames) {
+  run({"generate", "wake", "--size", "16x12x8", "--steps", "3", "-o", file("w")});
+  run({"convert", file("w.xyz"), file("w_*.fun"), "-o", file("w.splats")});
+  const auto draw = [](const Words& more) {
+    run(sized(
+        Words{"render", file("w.splats"), "--view", "iso", "--range", "0,1", "--opacity-unit", "0.1"} + more,
+        "120x90"));
+  };
+  draw({"-o", file("w%d.exr"), "--steps", "all", "--label", "{step} {time} {frame}"});
+  for (int n = 0; n < 3; ++n) {
+    const std::string step = fmt::format("{}", n);
+    draw({"-o", file("still.exr"), "--step", step, "--label", fmt::format("{0} {{time}} {0}", n)});
+    EXPECT_EQ(readImage(file(fmt::format("w{}.exr", n))).rgba, readImage(file("still.exr")).rgba) << n;
+  }
+  EXPECT_NE(readImage(file("w0.exr")).rgba, readImage(file("w1.exr")).rgba);
+}
+
+/// Coordinates and titles of the axes that have no room are moved into the picture, and made smaller.
+TEST_F(Annotations, TitlesAreNotCutOff) {
+  const std::string title(60, 'w');
+  const auto edges = [](const Image& image) {
+    int dark = 0;
+    for (int x = 0; x < image.size.width; ++x)
+      for (const int y : {0, image.size.height - 1}) dark += image.pixel(x, y)[1] < 0.9f;
+    for (int y = 0; y < image.size.height; ++y)
+      for (const int x : {0, image.size.width - 1}) dark += image.pixel(x, y)[1] < 0.9f;
+    return dark;
+  };
+  const Words view{"--view", "iso", "--opacity", "0:0,1:0.001"};
+  EXPECT_EQ(edges(render(view + Words{"--axes-titles", title + "," + title + "," + title})), 0);
+  EXPECT_EQ(edges(render(view + Words{"--scalar-bar-title", title})), 0);
+}
+
+TEST_F(Annotations, AScalarBarIsDrawnAtFourTimesTheSizeOfAScreenInTheDefaultMemory) {
+  const ProgramResult result =
+      runProgram({"render", file("a.splats"), "-o", file("large.png"), "--size", "3840x2160", "--scalar-bar",
+                  "--axes-grid", "--title", "large", "--view", "iso"});
+  EXPECT_EQ(result.status, 0) << result.err;
+}
+
 TEST_F(Annotations, TheScalarBarHasTheFunctionsColoursTheHighestOnTop) {
   const Image grey = render({"--scalar-bar", "--tf", "grey", "--background", "#ff0000"});
   // Down the first column that is all grey and not the frame.

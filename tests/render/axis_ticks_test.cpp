@@ -23,6 +23,15 @@ TEST(AxisTicks, StandAtRoundNumbers) {
   EXPECT_EQ(labels(1e7, 1.0003e7, 4), (Labels{"1.0000e+07", "1.0001e+07", "1.0002e+07", "1.0003e+07"}));
 }
 
+TEST(AxisTicks, AreTwoAtLeast) {
+  EXPECT_EQ(labels(0.1, 0.9, 3), (Labels{"0.2", "0.4", "0.6", "0.8"}));
+  EXPECT_EQ(labels(-0.4, 0.4, 2), (Labels{"-0.4", "-0.2", "0.0", "0.2", "0.4"}));
+  for (int n = 0; n < 500; ++n) {
+    const double low = 0.137 * n - 20, high = low + std::pow(1.05, n % 97);
+    EXPECT_GE(axisTicks({{low, high}}, 2 + n % 7).size(), 2u) << low << " to " << high;
+  }
+}
+
 TEST(AxisTicks, KeepTheirEndsThoughRoundingMovesThem) {
   const auto ticks = axisTicks({{0.1, 0.3}}, 3);
   ASSERT_EQ(ticks.size(), 3u);

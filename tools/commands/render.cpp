@@ -47,8 +47,8 @@ ChosenFor drawnSteps(const RenderArguments& arguments) {
   return steps.severalSteps() || may_follow_path ? ChosenFor::kSeries : ChosenFor::kStep;
 }
 
-/// Memory, in bytes, that annotating and writing a picture take.
-uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
+/// Memory, in bytes, that annotating and writing a picture take. `data`: the part beside the scalar bars.
+uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture, ImageSize data) {
   uint64_t bytes = 0;
   if (isPageName(arguments.output))
     bytes = 2 * writingBytes("frame.png", picture);  // and as text
@@ -62,7 +62,10 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
   if (!arguments.first_image.empty()) bytes = std::max(bytes, writingBytes(arguments.first_image, picture));
   // Tiles or pictures of other ranks, as they come and as they are put in their places.
   if (!launchedRanks().alone()) bytes = std::max(bytes, 2 * 4 * sizeof(float) * picture.pixels());
-  if (!(arguments.annotations.shown == Annotations{})) bytes += annotatedBytes(picture);
+  if (!(arguments.annotations.shown == Annotations{})) {
+    bytes += annotatedBytes(picture, data);
+    if (!arguments.first_image.empty()) bytes += 4 * sizeof(float) * data.pixels();  // a copy of the first
+  }
   return bytes;
 }
 
@@ -121,8 +124,7 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
 
 void render(const RenderArguments& given) {
   RenderArguments arguments = given;
-  arguments.annotations.shown.scalar_bar |= !arguments.annotations.bar_titles.empty();
-  arguments.annotations.shown.axes_grid |= arguments.annotations.axis_titles.has_value();
+  arguments.annotations.showTitles();
   Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
   checkRenderArguments(arguments, options.size);
@@ -161,7 +163,7 @@ void render(const RenderArguments& given) {
   const std::vector<ShownFunction> functions = shownFunctions(
       arguments.annotations, scalars, manifest, options.scene.get(), arguments.surfaces.surface_by);
   options.size = dataSize(arguments.annotations.shown, picture, functions);
-  options.output_bytes = outputBytes(arguments, picture);
+  options.output_bytes = outputBytes(arguments, picture, options.size);
   const bool has_grid = arguments.annotations.shown.axes_grid;
   const bool has_box = has_grid || arguments.annotations.shown.outline;
   const Series series = cache.series();

@@ -207,24 +207,26 @@ class FrameRun {
 
   void draw(uint64_t number, const uint64_t* next, const MotionInTime& motion, Progress& progress) {
     goTo(motion.position(number));
+    drawn_step_ = *step_;
     const double time = player_.time();
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (channels_.any()) {
-      const Image image =
+      Image image =
           player_.renderer().renderWithValues(camera, report_.options, statistics, values_, &progress);
-      finish({number, time, camera, statistics}, image);
+      finish({number, time, camera, statistics}, std::move(image));
       return;
     }
     if (number > 0 || arguments_.first_image.empty()) {
-      const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
+      Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
       if (next && !report_.options.ranks) prefetch(motion, *next);
-      finish({number, time, camera, statistics}, image);
+      finish({number, time, camera, statistics}, std::move(image));
       return;
     }
     const auto show = [&](const Image& image, bool is_final) {
       if (!report_.first_image) {
-        annotate(image, camera, [&](const Image& picture) { writeImage(picture, arguments_.first_image); });
+        annotate(image, {number, time, camera, statistics},
+                 [&](const Image& picture) { writeImage(picture, arguments_.first_image); });
         report_.time_to_first_image_s = secondsSinceStart();
         report_.first_image = statistics;
       }
@@ -243,7 +245,7 @@ class FrameRun {
     }
   }
 
-  void finish(FrameReport frame, const Image& image) {
+  void finish(FrameReport frame, Image image) {
     if (report_.options.ranks) {
       for (const Ranks::Bytes& bytes : ranks_.gather(packStatistics({frame})))
         frame.of_ranks.push_back(unpackStatistics(bytes).front().statistics);
@@ -253,9 +255,15 @@ class FrameRun {
     // Bricks of the next picture are prepared meanwhile.
     const Computing computing(player_.renderer().permits(), Urgency::kUrgent);
     const uint64_t number = frame.number;
-    const Camera& camera = frame.camera;
     const FrameStatistics& statistics = frame.statistics;
-    annotate(image, camera, [&](const Image& picture) {
+    const RenderedScene scene{manifest_,    report_.variable, report_.function(),
+                              frame.camera, report_.options,  statistics};
+    // Before the picture gives its memory to the annotated one.
+    const bool empty = isEmpty(image, report_.options.background);
+    std::string poor;
+    if (report_.frames.empty() && !empty)
+      poor = poorPictureWarning(image, scene, givenFunctionOptions(arguments_.scalar));
+    annotate(std::move(image), frame, [&](const Image& picture) {
       if (isMovieName(arguments_.output) && !ranks_.alone() && !report_.options.ranks)
         picture_ = picture;  // for rank 0
       else if (channels_.any())
@@ -267,34 +275,29 @@ class FrameRun {
     report_.frames.push_back(frame);
     const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
-    const RenderedScene scene{manifest_, report_.variable, report_.function(),
-                              camera,    report_.options,  statistics};
-    if (report_.frames.size() == 1) warnOfPoorPicture(image, scene);
-    if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
+    if (!poor.empty()) {
+      progress_.end();
+      printMessage("warning: {}", poor);
+    }
+    if (reported_empty_ || !empty) return;
     reported_empty_ = true;
     progress_.end();
     for (const std::string& reason : whyEmpty(scene))
       printMessage("warning: the picture{} is empty: {}", which, reason);
   }
 
-  void warnOfPoorPicture(const Image& image, const RenderedScene& scene) {
-    if (isEmpty(image, report_.options.background)) return;  // said with its reasons
-    const std::string warning = poorPictureWarning(image, scene, givenFunctionOptions(arguments_.scalar));
-    if (warning.empty()) return;
-    progress_.end();
-    printMessage("warning: {}", warning);
-  }
-
   /// Calls write() with the picture, annotated if annotations were requested.
   template <typename Write>
-  void annotate(const Image& data, const Camera& camera, const Write& write) const {
-    const Annotations& annotations = arguments_.annotations.shown;
-    if (annotations == Annotations{}) return write(data);
-    const FrameOptions& options = report_.options;
-    write(annotated(
-        data, annotations,
-        {report_.picture, player_.renderer().screenView(camera, options), report_.shown, manifest_.lower,
-         manifest_.upper, report_.background, axisTitles(arguments_.annotations)}));
+  void annotate(Image data, const FrameReport& frame, const Write& write) const {
+    const AnnotationArguments& annotations = arguments_.annotations;
+    if (annotations.shown == Annotations{}) return write(data);
+    AnnotatedScene scene{report_.picture,        player_.renderer().screenView(frame.camera, report_.options),
+                         report_.shown,          manifest_.lower,
+                         manifest_.upper,        report_.background,
+                         axisTitles(annotations)};
+    const VariableInfo& shown = report_.colour_variable ? *report_.colour_variable : report_.variable;
+    annotations.fill({frame.time, drawn_step_, frame.number, shown.name, shown.unit}, scene);
+    write(annotated(std::move(data), annotations.shown, scene));
   }
 
   /// Prints one warning for a frame with unreadable bricks that no earlier frame reported; it names the
@@ -315,7 +318,8 @@ class FrameRun {
   FrameOutput* output_;  // null at ranks that write nothing
   RenderReport& report_;
   const std::function<void()> step_changed_;
-  std::optional<uint64_t> step_;
+  std::optional<uint64_t> step_;  // that the player is at
+  uint64_t drawn_step_ = 0;       // of the frame, while the player goes to the next
   Progress& progress_;
   Ranks& ranks_;
   const ValueChannels channels_;

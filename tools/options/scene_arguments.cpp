@@ -326,10 +326,26 @@ void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, con
           "--axes-grid")
       ->group(group);
   command.add_flag("--outline", arguments.shown.outline, "Draw the bounding box of the data")->group(group);
+  command
+      .add_option(
+          "--title", arguments.title,
+          "Title above the data; {time}, {step}, {frame}, {scalar} and {units} stand for what is shown")
+      ->group(group);
+  command
+      .add_option("--label", arguments.label,
+                  "Text in the upper left corner, with the same fields: \"t = {time:.2f} s\", \"{scalar}\"")
+      ->group(group);
 }
 
 void checkAnnotationArguments(const AnnotationArguments& arguments) {
   axisTitles(arguments);
+  AnnotatedScene scene;
+  arguments.fill({}, scene);
+}
+
+void AnnotationArguments::fill(const TextFields& fields, AnnotatedScene& scene) const {
+  if (title) scene.title = filledText("--title", *title, fields);
+  if (label) scene.label = filledText("--label", *label, fields);
 }
 
 std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments) {

@@ -23,6 +23,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/manifest.h"
 #include "tools/options/frame_sequence.h"
+#include "tools/options/picture_texts.h"
 
 namespace curvisplat {
 
@@ -86,11 +87,20 @@ std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const
 struct AnnotationArguments {
   Annotations shown;
   std::vector<std::string> bar_titles;
-  std::optional<std::string> axis_titles;
+  std::optional<std::string> axis_titles, title, label;
+
+  /// Shows what the titles need.
+  void showTitles() {
+    shown.scalar_bar |= !bar_titles.empty();
+    shown.axes_grid |= axis_titles.has_value();
+    shown.texts = title || label;
+  }
+  /// The scene's texts, with their fields filled in.
+  void fill(const TextFields& fields, AnnotatedScene& scene) const;
 };
 
-/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles and --outline under the heading
-/// `group`.
+/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles, --outline, --title and --label under the
+/// heading `group`.
 void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group);
 
 /// Throws UsageError if options contradict each other.

@@ -88,10 +88,13 @@ AnnotationArguments annotationArguments(const Options& frame, const py::dict& ot
   AnnotationArguments arguments;
   arguments.bar_titles = of<Texts>(others, "scalar_bar_titles");
   arguments.axis_titles = given(frame, "axes_titles");
-  arguments.shown.scalar_bar = of<bool>(others, "scalar_bar") || !arguments.bar_titles.empty();
+  arguments.title = given(frame, "title");
+  arguments.label = given(frame, "label");
+  arguments.shown.scalar_bar = of<bool>(others, "scalar_bar");
   arguments.shown.axes = of<bool>(others, "axes");
-  arguments.shown.axes_grid = of<bool>(others, "axes_grid") || arguments.axis_titles;
+  arguments.shown.axes_grid = of<bool>(others, "axes_grid");
   arguments.shown.outline = of<bool>(others, "outline");
+  arguments.showTitles();
   return arguments;
 }
 
@@ -242,7 +245,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     const std::vector<ShownFunction> functions = shownFunctions(
         arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);
     frame.size = dataSize(annotations, size, functions);
-    if (!(annotations == Annotations{})) frame.output_bytes += annotatedBytes(size);
+    if (!(annotations == Annotations{})) frame.output_bytes += annotatedBytes(size, frame.size);
     const ShownBox box = shownBox(manifest, frame.scale, frame.clip_box, annotations);
     const bool whole = annotations.outline || annotations.axes_grid || frame.clip_box;
     const CameraArguments camera =
@@ -257,10 +260,18 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     picture.warnings = warningsOf(
         arguments, image,
         {manifest, manifest.variables[scalars.opacity.variable], function, at, frame, picture.statistics});
-    if (!(annotations == Annotations{}))
-      image = annotated(std::move(image), annotations,
-                        {size, renderer.screenView(at, frame), functions, manifest.lower, manifest.upper,
-                         arguments.frame.background, axisTitles(arguments.annotations)});
+    if (!(annotations == Annotations{})) {
+      AnnotatedScene scene{size,
+                           renderer.screenView(at, frame),
+                           functions,
+                           manifest.lower,
+                           manifest.upper,
+                           arguments.frame.background,
+                           axisTitles(arguments.annotations)};
+      const VariableInfo& of_texts = manifest.variables[shown];
+      arguments.annotations.fill({reader_.time(), reader_.step(), 0, of_texts.name, of_texts.unit}, scene);
+      image = annotated(std::move(image), annotations, scene);
+    }
     picture.chosen = choice.chosenOptions();
     picture.notes = function.notes();
     if (scalars.colour)

@@ -322,7 +322,8 @@ class Cache:
                light_direction: Optional[Vector] = None,
                gradient_opacity: Union[str, Sequence[Tuple[float, float]], None] = None, background: str = "dark", scalar_bar: bool = False,
                scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
-               axes_titles: Optional[Sequence[str]] = None, outline: bool = False,
+               axes_titles: Optional[Sequence[str]] = None, outline: bool = False, title: Optional[str] = None,
+               label: Optional[str] = None,
                channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
                backend: str = "auto", keep_going: bool = False, progress: Optional[Progress] = None) -> Picture:
@@ -365,7 +366,7 @@ class Cache:
         too. gradient_opacity: points (share of the volume that is less steep 0..1, factor of the opacity 0..1).
 
         scalar_bar, scalar_bar_titles, axes, axes_grid, axes_titles (of x, y and z) and outline are drawn into the
-        picture. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
+        picture, and title and label, texts with the fields {time}, {step}, {frame}, {scalar} and {units}. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
 
         lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws
         the best that has no more. memory: the limit, in bytes or as "512M"; threads: 0 for all cores; backend: "auto",
@@ -389,7 +390,7 @@ class Cache:
                        gradient_opacity=None if gradient_opacity is None else _opacities(gradient_opacity),
                        max_splats=None if max_splats is None else str(max_splats),
                        channels=",".join(_arguments.several(channels)) or "none",
-                       axes_titles=None if axes_titles is None else ",".join(axes_titles))
+                       axes_titles=None if axes_titles is None else ",".join(axes_titles), title=title, label=label)
         others = {"clip_planes": _arguments.planes("clip_planes", clip_planes, _numbers),
                   "step": None if step is None else _arguments.whole("step", step),
                   "interpolate": _arguments.flag("interpolate", interpolate),
