@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "render/frame/frame_workers.h"
+#include "render/surface/curve_meshes.h"
 #include "render/surface/scene_layers.h"
 #include "render/surface/slice_sampler.h"
 #include "stream/base/compute_permits.h"
@@ -53,7 +55,9 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) {
   const auto is_translucent = [](const auto& surface) { return !surface.opacity.opaque(); };
   const bool peels =
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
-      std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
+      std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent) ||
+      std::any_of(options.scene->curves.begin(), options.scene->curves.end(),
+                  [](const Curves& curves) { return curves.opacity < 1; });
   constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8;
   uint64_t bytes =
       kSampleTileBytes * (peels ? PixelLayers::kMaxLayers : 1) * threadsOrCores(options.threads) +
@@ -61,6 +65,7 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) {
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
              kTriangleBytes * surface.mesh->triangles.size();
+  bytes += curveBytes(*options.scene);
   if (!options.scene->isovalues.empty())
     bytes += isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels();
   if (!options.scene->grid_surfaces.empty())
@@ -111,7 +116,8 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
                        isosurfaces ? &*isosurfaces : nullptr};
   std::shared_ptr<const PixelLayers> layers;
   arenaOf(options).execute([&] {
-    const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
+    SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
+    for (Surface& surface : curveSurfaces(scene, view)) scene.surfaces.push_back(std::move(surface));
     layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, &surface_memory_));
   });
   planner_.addLayers(plan, std::move(layers), options);

@@ -75,6 +75,20 @@ struct GridSurface {
   }
 };
 
+struct CurveSet;
+
+/// Lines and points, drawn as tubes and spheres: as a Surface that depends on the view (curve_meshes.h).
+struct Curves {
+  std::shared_ptr<const CurveSet> set;  // render/mesh/curve_set.h
+  double width = 3;
+  bool in_pixels = true;               // else `width` is in world units, after the scale factors
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};  // where the set has no value
+  std::shared_ptr<const ColourTable> colours = nullptr;        // of its values, as Surface
+  std::shared_ptr<const TransferFunction> function = nullptr;  // that `colours` are of
+  std::string title = {};                                      // of the values
+  double opacity = 1;
+};
+
 struct SurfaceScene {
   std::vector<Surface> surfaces;
   std::vector<GridSurface> grid_surfaces;
@@ -84,11 +98,12 @@ struct SurfaceScene {
   std::vector<double> isovalues;    // of the picture's scalar; of two, of that of the opacities
   bool iso_of_colours = false;      // of two scalars: of that of the colours
   SheetOpacity iso_opacity = {};    // by_function: the picture's opacities
-  bool volume = true;               // false: surfaces, slices and isosurfaces alone
+  bool volume = true;               // false: what else there is alone
+  std::vector<Curves> curves = {};
 
   /// Whether it has nothing that makes layers.
   bool empty() const {
-    return surfaces.empty() && grid_surfaces.empty() && slices.empty() && isovalues.empty();
+    return surfaces.empty() && grid_surfaces.empty() && slices.empty() && isovalues.empty() && curves.empty();
   }
   /// Whether any opacity is that of the picture's function.
   bool usesOpacities() const {

@@ -14,6 +14,9 @@
 
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
+#include "render/mesh/curve_set.h"
+#include "render/project/screen_view.h"
+#include "render/surface/curve_meshes.h"
 #include "tests/reference/direct_picture.h"
 #include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
@@ -124,6 +127,45 @@ TEST_F(Surfaces, ASphereIsLitAndCutsTheSplats) {
   const auto scene = sphereScene();
   const auto layers = sphereLayer(kCentre, kRadius, glm::dvec3(kGrey));
   expectWorth("sphere", "smooth", layers, scene, {48.5, 46, 44}, 2);
+}
+
+/// As surfaces in the view of `camera`.
+std::shared_ptr<SurfaceScene> curveScene(const std::vector<glm::dvec3>& points, double width,
+                                         const Camera& camera) {
+  SurfaceScene curves;
+  Curves& one = curves.curves.emplace_back();
+  one.set = std::make_shared<CurveSet>(curveSetOf(points, {0, static_cast<uint32_t>(points.size())}, {}));
+  one.width = width;
+  one.in_pixels = false;
+  one.colour = kGrey;
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->surfaces = curveSurfaces(curves, ScreenView::of(camera, kSize, glm::dvec3(1), kLowPass, 1e-3));
+  return scene;
+}
+
+/// The nearer side of an endless cylinder, as planeLayer() lights it.
+ReferenceLayers cylinderLayer(const glm::dvec3& point, const glm::dvec3& axis, double radius) {
+  return [=, along = glm::normalize(axis)](const glm::dvec3& origin,
+                                           const glm::dvec3& direction) -> std::vector<ReferenceLayer> {
+    const auto across = [&](const glm::dvec3& v) { return v - glm::dot(v, along) * along; };
+    const glm::dvec3 d = across(direction), o = across(origin - point);
+    const double a = glm::dot(d, d), b = glm::dot(d, o), c = glm::dot(o, o) - radius * radius;
+    if (!(b * b > a * c)) return {};
+    const double distance = (-b - std::sqrt(b * b - a * c)) / a;
+    const glm::dvec3 normal = (o + distance * d) / radius;
+    return planeLayer(origin + distance * direction, normal, glm::dvec3(kGrey))(origin, direction);
+  };
+}
+
+TEST_F(Surfaces, APointIsALitSphereAndALineATube) {
+  const auto sphere = curveScene({kCentre}, 2 * kRadius, camera_);
+  expectWorth("point", "smooth", sphereLayer(kCentre, kRadius, glm::dvec3(kGrey)), sphere, {46, 45.5, 44.5},
+              2);
+  const glm::dvec3 axis(3, -2, 2.4);
+  std::vector<glm::dvec3> points;
+  for (int n = 0; n <= 20; ++n) points.push_back(kCentre + (n - 10) / 10.0 * axis);
+  const auto tube = curveScene(points, 0.2, camera_);
+  expectWorth("line", "smooth", cylinderLayer(kCentre, axis, 0.1), tube, {43.5, 43, 42.5}, 2);
 }
 
 /// The root of the mean squared difference of pixels around which the slice goes on for `margin` pixels.

@@ -188,6 +188,97 @@ TEST_F(SurfaceOptions, SaysWhyNoIsosurfaceIsSeen) {
   expectSays(nothing.err, "f goes from 0 to 0.99859");
 }
 
+/// A helix and a straight line, with the height and a number of the line as scalars, in every format.
+TEST_F(SurfaceOptions, LinesAreTheSameFromEveryFormat) {
+  std::string csv = "x,y,z,height,id\n", points, heights, cells;
+  for (int n = 0; n < 60; ++n) {
+    const bool helix = n < 50;
+    const double angle = 0.3 * n, x = helix ? 3 + 1.5 * std::cos(angle) : n - 52.0,
+                 y = helix ? 1.5 * std::sin(angle) : 1, z = helix ? 0.03 * n : 0.5;
+    const std::string at = fmt::format("{} {} {}", x, y, z);
+    csv += fmt::format("{},{},{},{},{}\n", x, y, z, z, helix ? "a" : "b");
+    points += at + "\n";
+    heights += fmt::format("{}\n", z);
+    cells += fmt::format("{} ", n);
+  }
+  writeFileAtomically(file("lines.csv"), csv);
+  const auto array = [](const char* type, const char* name, int components, const std::string& numbers) {
+    return fmt::format(
+        "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"ascii\">{}</DataArray>\n",
+        type, name, components, numbers);
+  };
+  const std::string data = "<PointData>" + array("Float64", "height", 1, heights) + "</PointData><CellData>" +
+                           array("Float64", "line", 1, "1 2") + "</CellData><Points>" +
+                           array("Float64", "points", 3, points) + "</Points>",
+                    lines = array("Int64", "connectivity", 1, cells) + array("Int64", "offsets", 1, "50 60");
+  const auto xml = [&](const char* type, const std::string& counts, const std::string& of_cells) {
+    return fmt::format(
+        "<VTKFile type=\"{0}\" version=\"0.1\" byte_order=\"LittleEndian\"><{0}><Piece NumberOfPoints=\"60\" "
+        "{1}>{2}{3}</Piece></{0}></VTKFile>\n",
+        type, counts, data, of_cells);
+  };
+  writeFileAtomically(file("lines.vtp"),
+                      xml("PolyData", "NumberOfLines=\"2\"", "<Lines>" + lines + "</Lines>"));
+  writeFileAtomically(file("lines.vtu"),
+                      xml("UnstructuredGrid", "NumberOfCells=\"2\"",
+                          "<Cells>" + lines + array("UInt8", "types", 1, "4 4") + "</Cells>"));
+  const std::string legacy =
+      "# vtk DataFile Version 3.0\nlines\nASCII\nDATASET POLYDATA\nPOINTS 60 double\n" + points +
+      "VERTICES 1 2\n1 0\nLINES 2 62\n50 ";
+  std::string counted = cells;
+  counted.insert(counted.find("50 51"), "10 ");
+  writeFileAtomically(file("lines.vtk"),
+                      legacy + counted + "\nPOINT_DATA 60\nSCALARS height double\nLOOKUP_TABLE default\n" +
+                          heights + "CELL_DATA 3\nSCALARS line double\nLOOKUP_TABLE default\n9 1 2\n");
+  const Words look{"--lines-by", "height", "--scalar-bar", "--line-width", "4px"};
+  const Image plain = picture({}), csv_lines = picture(Words{"--lines", file("lines.csv")} + look);
+  EXPECT_LT(compareImages(plain, csv_lines).psnr_db, 35);
+  for (const char* name : {"lines.vtp", "lines.vtu", "lines.vtk"})
+    EXPECT_EQ(picture(Words{"--lines", file(name)} + look).rgba, csv_lines.rgba) << name;
+  // The cells' array, of which vertices come first.
+  const Words by_cell{"--lines-by", "line"};
+  const Image of_cells = picture(Words{"--lines", file("lines.vtp")} + by_cell);
+  EXPECT_EQ(picture(Words{"--lines", file("lines.vtk")} + by_cell).rgba, of_cells.rgba);
+  EXPECT_NE(picture(Words{"--lines", file("lines.vtp")}).rgba, of_cells.rgba);
+  const Image spheres = picture({"--points", file("lines.csv"), "--point-size", "0.2"});
+  EXPECT_EQ(picture({"--points", file("lines.vtk"), "--point-size", "0.2"}).rgba, spheres.rgba);
+  EXPECT_LT(compareImages(spheres, plain).psnr_db, 35);
+
+  // Hidden and dimmed as surfaces are, by both painters, and with any threads.
+  const Words both{"--lines", file("lines.vtp"), "--points", file("lines.csv"), "--lines-opacity",
+                   "0.6",     "--view-angle",    "40"};
+  const Image cpu = picture(both + Words{"--backend", "cpu"});
+  EXPECT_GT(compareImages(cpu, picture(both + Words{"--backend", "osmesa"})).psnr_db, 70);
+  EXPECT_EQ(picture(both + Words{"--backend", "cpu", "--threads", "1", "--memory", "96M"}).rgba, cpu.rgba);
+  const auto isRed = [&](const Words& more) {
+    const Image image = picture(Words{"--lines", file("lines.csv"), "--lines-colour", "#ff0000"} + more);
+    int red = 0;
+    for (size_t n = 0; n < image.rgba.size(); n += 4)
+      red += image.rgba[n] > 0.5f && image.rgba[n + 1] < 0.15f;
+    return red;
+  };
+  const int alone = isRed({"--volume", "off"});
+  EXPECT_GT(alone, 300);
+  EXPECT_LT(isRed({"--opacity", "0:1,1:1", "--opacity-unit", "1e-4"}), alone / 10);
+
+  const auto refusal = [&](const Words& more) { return runProgram(render(more)).err; };
+  expectSays(refusal({"--lines", file("lines.vtp"), "--lines-by", "heigth"}),
+             "has no scalar 'heigth' (did you mean height?)");
+  expectSays(refusal({"--lines", file("sphere.obj")}), "is no file of lines or points by its ending");
+  expectSays(refusal({"--lines", file("none.csv")}), "none.csv: ");
+  expectSays(refusal({"--lines", file("lines.csv"), "--line-width", "thin"}), "--line-width");
+  expectSays(refusal({"--lines-by", "height"}), "--lines-by needs lines or points: --lines FILE");
+  const auto damaged = [&](const std::string& from, const std::string& to) {
+    std::string text = readTextFile(file("lines.vtp"));
+    text.replace(text.find(from), from.size(), to);
+    writeFileAtomically(file("wrong.vtp"), text);
+    return refusal({"--lines", file("wrong.vtp")});
+  };
+  expectSays(damaged("ascii\">0 1 2", "ascii\">99 1 2"), "a cell refers to a point that does not exist");
+  expectSays(damaged("50 60", "60 50"), "the offsets of its cells do not increase");
+  expectSays(damaged("NumberOfLines=\"2\"", ""), "has no lines; --points draws the points of a file");
+}
+
 TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
   const ProgramResult result = run(render({"--slice", "0,0,900,0,0,1"}));
   EXPECT_TRUE(result.err.find("warning: --slice 0,0,900,0,0,1 misses the data, which lies in x ") !=
@@ -208,7 +299,7 @@ TEST_F(SurfaceOptions, RefusesWrongUsage) {
       {{"--slice", "0,0,0,0,0,1", "--slice-opacity", "0"}, 2, "--slice-opacity 0: expected a number above 0"},
       {{"--volume", "off"},
        2,
-       "--volume off leaves nothing to draw; give a --slice, a --surface or an --iso"},
+       "--volume off leaves nothing to draw; give a --slice, a --surface, an --iso or --lines"},
       {{"--volume", "off", "--shade=2"}, 2, "--shade: takes no value (found '2')"},
       {{"--volume", "maybe"}, 2, "--volume maybe: expected on or off"},
       {{"--surface-colour", "#ff0000"}, 2, "--surface-colour needs a surface: --surface FILE"},

@@ -84,6 +84,16 @@ class Pictures(PythonTest):
                 "--scalar", name, "--range", "1%,99%", "--opacity", "0:0,0.5:0.8,1:0.1", "--opacity-unit", 0.25,
                 "--position", "20,-9,8", "--focal-point", "4,0,2", "--view-angle", 35, "--background", "black",
                 "--lod-pixels", 2, "--shade", "--light-direction", "1,0,1")
+            self.expect_same(cache.render(size=size, azimuth=30, elevation=-10.5, roll=5, zoom=1.5, gradient_opacity=[(0, 0), (0.5, 1)]),
+                             "--azimuth", 30, "--elevation=-10.5", "--roll", 5, "--zoom", 1.5, "--gradient-opacity", "0:0,0.5:1")
+            lines = self.folder / "lines.csv"
+            lines.write_text("x,y,z,speed\n0,0,0,1\n6,0.5,2,3\n")
+            self.expect_same(cache.render(size=size, lines=lines, points=[str(lines)], lines_by="speed", line_width=0.1, point_size="9px",
+                                          lines_opacity=0.5, title="{scalar} {step}", label="t = {time:.1f}"),
+                             "--lines", lines, "--points", lines, "--lines-by", "speed", "--line-width", 0.1, "--point-size", "9px",
+                             "--lines-opacity", 0.5, "--title", "{scalar} {step}", "--label", "t = {time:.1f}")
+            self.expect_same(cache.render(size=size, camera=curvisplat.Camera((20, -9, 8)), zoom=2), "--position", "20,-9,8",
+                             "--focal-point", "0,0,0", "--zoom", 2)
             self.expect_same(
                 cache.render(size=size, view="iso", clip_planes=[(4, 0, 0, 1, 0, 0), (0, 0, 1, 0, 0, 1)],
                              clip_box=(0, 9, -9, 9, -9, 9), scale=(1, 1, 2), memory=256 << 20, threads=1),

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <string>
 
+#include "render/mesh/curve_set.h"
 #include "stream/base/error.h"
 #include "tests/support/expect_error.h"
 
@@ -174,6 +175,47 @@ TEST(TriangleMesh, SmoothsWhatIsCurved) {
       EXPECT_GT(std::abs(glm::dot(at, glm::dvec3(mesh.normals[n]))), 0.99) << n;
     }
   }
+}
+
+CurveSet curves(const std::string& text, const std::string& scalar = "", bool as_points = false) {
+  return parseCurveText(text, "a.csv", scalar, as_points);
+}
+std::string refusalOfCurves(const std::string& text, const std::string& scalar = "") {
+  return curvisplat::errorOf([&] { curves(text, scalar); });
+}
+
+TEST(CurveText, LinesEndAtAnotherIdOrAnEmptyLine) {
+  const std::string text =
+      "# of a tracer\nid,x,y,z,speed\n7,1,2,3,0.5\r\n7,1,2,4,\n8,5,5,5,1e1\n\n8,6,5,5,2\n";
+  const CurveSet set = curves(text, "speed");
+  EXPECT_EQ(set.begins, (std::vector<uint32_t>{0, 2, 3, 4}));
+  EXPECT_EQ(set.origin, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(set.positions[3], glm::vec3(5, 3, 2));
+  EXPECT_EQ(set.values[2], 10);
+  EXPECT_TRUE(std::isnan(set.values[1]));
+  EXPECT_EQ(set.range(), std::pair(0.5f, 10.0f));
+  EXPECT_EQ(curves(text, "", true).begins.size(), 5u);
+  EXPECT_TRUE(curves(text).values.empty());
+  // Without names, and with spaces.
+  EXPECT_EQ(curves("1 2 3\n 4\t5 6 \n\n\n7 8 9\n").begins, (std::vector<uint32_t>{0, 2, 3}));
+  EXPECT_EQ(curves("Z;Y;X\n1;2;3").origin, glm::dvec3(3, 2, 1));
+}
+
+TEST(CurveText, RefusesWhatItCannotRead) {
+  const std::string head = "x,y,z,speed\n";
+  EXPECT_EQ(refusalOfCurves(head + "1,2,3,4\n1,2,3\n"), "a.csv: line 3: has 3 columns; expected 4");
+  EXPECT_EQ(refusalOfCurves(head + "1,2,three,4"), "a.csv: line 2: found 'three' for z; expected a number");
+  EXPECT_EQ(refusalOfCurves(head + "1,nan,3,4"), "a.csv: line 2: found 'nan' for y; expected a number");
+  EXPECT_EQ(refusalOfCurves(head + "1,2,3,fast", "speed"),
+            "a.csv: line 2: found 'fast' for speed; expected a number");
+  EXPECT_EQ(refusalOfCurves(head + "1,2,3,4", "sped"),
+            "a.csv: line 1: has no column 'sped' (did you mean speed?); it has speed");
+  EXPECT_EQ(refusalOfCurves("lon,lat\n1,2"),
+            "a.csv: line 1: has no columns x, y and z among lon, lat; name them so");
+  EXPECT_EQ(refusalOfCurves("1,2,3,4", "speed"),
+            "a.csv: line 1: has no names of its columns; a first line such as x,y,z,speed names them");
+  EXPECT_EQ(refusalOfCurves(head), "a.csv: has no points; expected lines of x,y,z");
+  EXPECT_EQ(refusalOfCurves("1,2"), "a.csv: line 1: has 2 columns; expected x, y and z");
 }
 
 }  // namespace

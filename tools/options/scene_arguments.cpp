@@ -177,6 +177,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
                   "Draw the volume: on, or off for surfaces, slices and isosurfaces alone")
       ->capture_default_str()
       ->group(group);
+  addCurveOptions(command, arguments.curves, group);
 }
 
 void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities) {
@@ -198,9 +199,10 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
   const SheetOpacity of_isosurfaces = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   if (!of_isosurfaces.opaque() && arguments.isovalues.empty())
     throw UsageError("--iso-opacity needs an isosurface: --iso VALUE");
+  checkCurveArguments(arguments.curves);
   if (arguments.volume == "off" && arguments.surfaces.empty() && arguments.slices.empty() &&
-      arguments.isovalues.empty())
-    throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface or an --iso");
+      arguments.isovalues.empty() && !arguments.curves.given())
+    throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface, an --iso or --lines");
 }
 
 bool isVtp(const std::filesystem::path& path) {
@@ -282,6 +284,8 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   scene->iso_opacity = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   scene->iso_of_colours = scalars.iso_of_colours;
   scene->volume = arguments.volume == "on";
+  scene->curves =
+      curvesOf(arguments.curves, scalars.colours ? cache.manifest().variables[*scalars.colours].name : "");
   requireIsovalues(*scene, cache, scalars);
   return scene;
 }
@@ -399,6 +403,8 @@ std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, 
                        info == manifest.variables.end() ? surface_by : scalarTitle(info->name, info->unit)});
       break;
     }
+  if (scene && !scene->curves.empty() && scene->curves.front().function)
+    shown.push_back({scene->curves.front().function.get(), scene->curves.front().title});
   if (arguments.bar_titles.size() > shown.size())
     throw UsageError("--scalar-bar-title: given {} times; the picture shows {}", arguments.bar_titles.size(),
                      countText(shown.size(), "function"));

@@ -22,6 +22,7 @@
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/manifest.h"
+#include "tools/options/curve_arguments.h"
 #include "tools/options/frame_sequence.h"
 #include "tools/options/picture_texts.h"
 
@@ -35,12 +36,15 @@ struct SurfaceArguments {
   std::string surface_by;
   std::vector<std::string> isovalues;
   std::string iso_opacity = "1";
+  CurveArguments curves;
 
-  bool given() const { return !surfaces.empty() || !slices.empty() || !isovalues.empty() || volume != "on"; }
+  bool given() const {
+    return !surfaces.empty() || !slices.empty() || !isovalues.empty() || curves.given() || volume != "on";
+  }
 };
 
-/// Adds --surface, --surface-colour, --surface-by, --slice, --slice-opacity and --volume under the heading
-/// `group`.
+/// Adds --surface, --surface-colour, --surface-by, --slice, --slice-opacity, --volume and those of curves under the
+/// heading `group`.
 void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std::string& group);
 
 /// Throws UsageError if options are invalid or contradict each other; reads no file. `has_opacities`: the

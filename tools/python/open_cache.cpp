@@ -81,6 +81,14 @@ SurfaceArguments surfaceArguments(const py::dict& others) {
   arguments.isovalues = of<Texts>(others, "isovalues");
   if (others.contains("iso_opacity")) arguments.iso_opacity = of<std::string>(others, "iso_opacity");
   arguments.volume = of<bool>(others, "volume") ? "on" : "off";
+  CurveArguments& curves = arguments.curves;
+  curves.lines = of<Texts>(others, "lines");
+  curves.points = of<Texts>(others, "points");
+  curves.colours = of<Texts>(others, "lines_colour");
+  curves.by = of<std::string>(others, "lines_by");
+  curves.line_width = of<std::string>(others, "line_width");
+  curves.point_size = of<std::string>(others, "point_size");
+  curves.opacity = of<std::string>(others, "lines_opacity");
   return arguments;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/vtk/vtk_legacy_file.h"
@@ -23,6 +24,14 @@ constexpr uint64_t kMaxAlongAxis = uint64_t{1} << 30;
 class LegacyReader : VtkLegacyFile {
  public:
   using VtkLegacyFile::VtkLegacyFile;
+
+  VtkLines readLines() {
+    wants_lines_ = true;
+    readHead();
+    for (std::string word = nextWord(); !word.empty(); word = nextWord()) readPart(word);
+    if (!std::get<VtkPoints>(piece_.nodes).bytes) fail("has no POINTS; the file is truncated");
+    return {std::move(piece_), std::move(cells_), first_line_};
+  }
 
   std::unique_ptr<DataSource> read() {
     readHead();
@@ -74,6 +83,13 @@ class LegacyReader : VtkLegacyFile {
                    [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
     uniform_ = dataset_ == "STRUCTURED_POINTS";
     unstructured_ = dataset_ == "UNSTRUCTURED_GRID";
+    if (wants_lines_ && (unstructured_ || dataset_ == "POLYDATA")) {
+      polygonal_ = !unstructured_;
+      unstructured_ = true;
+      return;
+    }
+    if (wants_lines_)
+      fail("is a {}; lines and points are in POLYDATA or UNSTRUCTURED_GRID", dataset_.substr(0, 30));
     if (!uniform_ && !unstructured_ && dataset_ != "STRUCTURED_GRID" && dataset_ != "RECTILINEAR_GRID")
       fail("is a {}; expected STRUCTURED_GRID, RECTILINEAR_GRID, STRUCTURED_POINTS or UNSTRUCTURED_GRID",
            dataset_.substr(0, 30));
@@ -166,6 +182,9 @@ class LegacyReader : VtkLegacyFile {
     if (word == "points") {
       const uint64_t points = nextCount();
       piece_.nodes = readNumbers("POINTS", lineOfType(), 3, points);
+    } else if (polygonal_ &&
+               (word == "vertices" || word == "lines" || word == "polygons" || word == "triangle_strips")) {
+      readPolygonalCells(word == "lines");
     } else if (word == "cells") {
       const uint64_t first = nextCount(), second = nextCount();
       restOfLine();
@@ -179,6 +198,20 @@ class LegacyReader : VtkLegacyFile {
     } else {
       fail("found \"{}\"; expected POINTS, CELLS or CELL_TYPES", word.substr(0, 30));
     }
+  }
+
+  /// The cells' arrays count all kinds in the file's order; only lines are kept.
+  void readPolygonalCells(bool lines) {
+    VtkCells kept = std::exchange(cells_, {});
+    const uint64_t first = nextCount(), second = nextCount();
+    restOfLine();
+    wordFollows("offsets") ? readOffsets(first, second) : readCountedCells(first, second);
+    if (lines) {
+      first_line_ = polygonal_cells_;
+      kept = cells_;
+    }
+    polygonal_cells_ += cells_.cells;
+    cells_ = std::move(kept);
   }
 
   /// Since version 5 of the format: where each cell begins, and the end of the last; then the points of all.
@@ -249,7 +282,8 @@ class LegacyReader : VtkLegacyFile {
   }
 
   void beginMeshData(bool of_cells) {
-    const uint64_t expected = of_cells ? cells_.cells : std::get<VtkPoints>(piece_.nodes).tuples;
+    const uint64_t all_cells = polygonal_ ? polygonal_cells_ : cells_.cells;
+    const uint64_t expected = of_cells ? all_cells : std::get<VtkPoints>(piece_.nodes).tuples;
     tuples_ = nextCount();
     if (tuples_ != expected)
       fail("has {} {}; expected {}", of_cells ? "CELL_DATA" : "POINT_DATA", tuples_, expected);
@@ -369,6 +403,8 @@ class LegacyReader : VtkLegacyFile {
 
   std::string dataset_;
   bool uniform_ = false, unstructured_ = false, has_extent_ = false;
+  bool wants_lines_ = false, polygonal_ = false;
+  uint64_t polygonal_cells_ = 0, first_line_ = 0;
   Owner owner_ = Owner::kGrid;
   uint64_t tuples_ = 0;  // number of tuples of the owner's arrays
   VtkPiece piece_;
@@ -387,6 +423,10 @@ bool isVtkLegacy(const InputFile& file) {
 
 std::unique_ptr<DataSource> openVtkLegacy(const OpenGridOptions& options) {
   return LegacyReader(VtkFiles(options.temporary_folder), options.grid).read();
+}
+
+VtkLines readVtkLegacyLines(const VtkFiles& files, const std::filesystem::path& path) {
+  return LegacyReader(files, path).readLines();
 }
 
 }  // namespace curvisplat

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/formats/vtk/vtk_mesh_source.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/file.h"
 
@@ -14,5 +15,8 @@ bool isVtkLegacy(const InputFile& file);
 
 /// Numbers in text are spooled to a temporary file first. Throws Error.
 std::unique_ptr<DataSource> openVtkLegacy(const OpenGridOptions& options);
+
+/// The lines of polygonal data or an unstructured grid. Throws Error.
+VtkLines readVtkLegacyLines(const VtkFiles& files, const std::filesystem::path& path);
 
 }  // namespace curvisplat

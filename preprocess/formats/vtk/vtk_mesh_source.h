@@ -23,6 +23,13 @@ struct VtkCells {
   bool faces_inline = false;          // legacy: the points of a polyhedron are its faces
 };
 
+/// A piece with polylines: those of polygonal data, or all cells of an unstructured grid, which have types.
+struct VtkLines {
+  VtkPiece piece;
+  VtkCells cells;
+  uint64_t first_cell = 0;  // among the tuples of the cells' arrays
+};
+
 /// Pieces have points in VtkPiece::nodes, and no extent.
 struct VtkMesh {
   std::string format;

@@ -37,6 +37,9 @@ bool hasXmlMeshPieces(std::string_view type);
 /// Pieces without cells are left out. Throws Error if the file is damaged.
 VtkXmlMeshPieces readXmlMeshPieces(const VtkXmlFile& file, std::vector<std::string>& warnings);
 
+/// The pieces of a .vtp or .vtu file with their lines. Throws Error if it is neither, or damaged.
+std::vector<VtkLines> readXmlLines(const VtkXmlFile& file);
+
 /// Opens a file of any of these formats, at one time step. In a collection structured grids come first:
 /// unstructured ones are drawn where there is no other. Throws Error.
 std::unique_ptr<DataSource> openVtkXml(const OpenGridOptions& options);

@@ -148,6 +148,47 @@ VtkXmlMeshPieces readXmlMeshPieces(const VtkXmlFile& file, std::vector<std::stri
   return read;
 }
 
+std::vector<VtkLines> readXmlLines(const VtkXmlFile& file) {
+  std::vector<VtkLines> read;
+  std::vector<std::string> warnings;  // of arrays that no one asks for
+  if (hasXmlMeshPieces(file.type())) {
+    VtkXmlMeshPieces mesh = readXmlMeshPieces(file, warnings);
+    for (size_t n = 0; n < mesh.pieces.size(); ++n)
+      read.push_back({std::move(mesh.pieces[n]), std::move(mesh.cells[n])});
+    return read;
+  }
+  if (file.type() != "PolyData")
+    file.fail(
+        fmt::format("is a VTK file of type {}; lines and points are in .vtp files (PolyData) and .vtu files "
+                    "(UnstructuredGrid)",
+                    file.type()));
+  for (const Node& node : file.content().children("Piece")) {
+    const uint64_t points = countIn(file, node, "NumberOfPoints");
+    if (points == 0) continue;
+    const auto cellsIn = [&](const char* attribute) {
+      return node.attribute(attribute) ? countIn(file, node, attribute) : uint64_t{0};
+    };
+    VtkLines& lines = read.emplace_back();
+    lines.piece.nodes = pointsOf(file, node, points);
+    lines.first_cell = cellsIn("NumberOfVerts");
+    lines.cells.cells = cellsIn("NumberOfLines");
+    addArrays(file, node.child("PointData"), {false, points}, lines.piece, warnings);
+    addArrays(
+        file, node.child("CellData"),
+        {true, lines.first_cell + lines.cells.cells + cellsIn("NumberOfPolys") + cellsIn("NumberOfStrips")},
+        lines.piece, warnings);
+    if (lines.cells.cells == 0) continue;
+    const auto named = [&](const char* name) {
+      const Node array = node.child("Lines").find_child_by_attribute("DataArray", "Name", name);
+      if (!array) file.fail(fmt::format("has a piece without {} in its <Lines>", name));
+      return array;
+    };
+    lines.cells.ends = file.array(named("offsets"), lines.cells.cells);
+    lines.cells.connectivity = file.array(named("connectivity"), largestOf(lines.cells.ends));
+  }
+  return read;
+}
+
 bool hasXmlPieces(std::string_view type) {
   return type == "StructuredGrid" || type == "RectilinearGrid" || type == "ImageData";
 }

@@ -323,7 +323,9 @@ class Cache:
                gradient_opacity: Union[str, Sequence[Tuple[float, float]], None] = None, background: str = "dark", scalar_bar: bool = False,
                scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
                axes_titles: Optional[Sequence[str]] = None, outline: bool = False, title: Optional[str] = None,
-               label: Optional[str] = None,
+               label: Optional[str] = None, lines: Union[str, Sequence[str]] = (), points: Union[str, Sequence[str]] = (),
+               lines_by: str = "", lines_colour: Union[str, Sequence[str]] = (), line_width: Union[str, float] = "3px",
+               point_size: Union[str, float] = "6px", lines_opacity: float = 1,
                channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
                backend: str = "auto", keep_going: bool = False, progress: Optional[Progress] = None) -> Picture:
@@ -356,6 +358,9 @@ class Cache:
         surface_colours; surface_opacity: of all, or of each.
 
         slices: (px, py, pz, nx, ny, nz) each.
+
+        lines, points: files, drawn as tubes and spheres of line_width and point_size (a length, or pixels as "3px"), in
+        lines_colour or coloured by their scalar lines_by.
 
         isovalues: of the scalar, or of iso_by. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
         function.
@@ -397,6 +402,10 @@ class Cache:
                   "surfaces": [os.fspath(surface) for surface in _arguments.several(surfaces, (str, os.PathLike))],
                   "surface_colours": _arguments.several(surface_colours), "surface_by": surface_by,
                   "surface_opacity": [_text(value) for value in _arguments.several(surface_opacity, (str, int, float))],
+                  "lines": [os.fspath(path) for path in _arguments.several(lines, (str, os.PathLike))],
+                  "points": [os.fspath(path) for path in _arguments.several(points, (str, os.PathLike))],
+                  "lines_colour": _arguments.several(lines_colour), "lines_by": lines_by, "line_width": _text(line_width),
+                  "point_size": _text(point_size), "lines_opacity": _text(lines_opacity),
                   "slices": _arguments.planes("slices", slices, _numbers), "slice_opacity": _text(slice_opacity),
                   "isovalues": [_number(value) for value in _arguments.several(isovalues, (int, float))],
                   "volume": _arguments.flag("volume", volume), "shade": _arguments.flag("shade", shade),
