@@ -15,19 +15,13 @@ try:
     import numpy as np
     import vtk
     from vtk.util.numpy_support import vtk_to_numpy
+
+    from amr_sets import pulse
 except ModuleNotFoundError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
 
 PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
-
-
-def pulse():
-    source = vtk.vtkAMRGaussianPulseSource()
-    source.SetDimension(3)
-    source.SetRootSpacing(0.25)
-    source.Update()
-    return source.GetOutputDataObject(0)
 
 
 def leaf_cells(amr, name):

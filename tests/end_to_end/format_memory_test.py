@@ -277,6 +277,17 @@ class FormatMemory(StructuredFormats):
             f'<Attribute Name="p"><DataItem Dimensions="{size}" Format="HDF">a.h5:/p</DataItem></Attribute></Grid></Domain></Xdmf>')
         self.expect_within("XDMF, HDF5 deflated", path)
 
+    def test_vtkhdf(self):
+        path = self.folder / "a.vtkhdf"
+        with h5py.File(path, "w") as file:
+            group = file.create_group("VTKHDF")
+            group.attrs["Version"] = (2, 0)
+            group.attrs["Type"] = "ImageData"
+            group.attrs["WholeExtent"] = [end for n in self.SHAPE[::-1] for end in (0, n - 1)]
+            group.attrs["Origin"], group.attrs["Spacing"] = (0.0,) * 3, (1.0,) * 3
+            group.create_dataset("PointData/p", data=self.block.p, chunks=self.chunks(8, 64, 64), compression="gzip", compression_opts=1)
+        self.expect_within("VTKHDF, deflated", path)
+
 
 class LongRows(FormatMemory):
     """A row has 100,000 nodes: the four rows take more than the memory of a slab."""
@@ -307,7 +318,7 @@ class LongestRows(FormatMemory):
 
     SHAPE = SMALL = (2, 2, 1_000_000)
     USUAL = None
-    test_plot3d = test_vtk = test_tiles = test_several_blocks = test_tecplot = test_ensight = test_xdmf = None
+    test_plot3d = test_vtk = test_tiles = test_several_blocks = test_tecplot = test_ensight = test_xdmf = test_vtkhdf = None
     test_compressed_files = test_compressed_tiles = None
 
     def expect_within(self, what, *paths, scalar="p"):

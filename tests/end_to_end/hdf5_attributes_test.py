@@ -25,7 +25,8 @@ TEXT = "a text that is longer than any buffer " * 30
 NAMES = ["type", "name", "label", "version", "format", "Conventions", "units", "standard_name", "coordinates", "formula_terms",
          "flag_values", "flag_meanings", "_FillValue", "missing_value", "valid_range", "scale_factor", "add_offset", "positive",
          "grid_mapping", "cf_role", "calendar", "CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties",
-         "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict", "_NCCOPY", "api_version", "floating_point_word_size", "title"]
+         "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict", "_NCCOPY", "api_version", "floating_point_word_size", "title",
+         "Version", "Type", "WholeExtent", "Origin", "Direction", "Scalars", "Attribute"]
 
 
 def put(holder, name, kind):
@@ -116,6 +117,17 @@ class HostileAttributes(StructuredFormats):
                        f'</Geometry><Attribute Name="p">{item}</Attribute></Grid></Domain></Xdmf>')
         return path, holders, xmf
 
+    def vtkhdf(self):
+        path = self.folder / "image.vtkhdf"
+        with h5py.File(path, "w") as f:
+            group = f.create_group("VTKHDF")
+            group.attrs["Version"] = (2, 0)
+            group.attrs["Type"] = "ImageData"
+            for name, values in (("WholeExtent", (0, 4, 0, 3, 0, 2)), ("Origin", (0.0,) * 3), ("Spacing", (1.0,) * 3)):
+                group.attrs[name] = values
+            group["PointData/p"] = RANDOM.random((3, 4, 5))
+        return path, ["/VTKHDF", "/VTKHDF/PointData", "/VTKHDF/PointData/p"]
+
     def attack(self, make):
         path, holders, *opened = make()
         whole = path.read_bytes()
@@ -149,6 +161,9 @@ class HostileAttributes(StructuredFormats):
 
     def test_xdmf(self):
         self.attack(self.xdmf)
+
+    def test_vtkhdf(self):
+        self.attack(self.vtkhdf)
 
     def test_every_kind_under_the_name_that_overflowed(self):
         """`type` of the root, whatever it holds."""

@@ -21,6 +21,7 @@ import mesh_files_test
 import mesh_foam_test
 import mesh_formats_test
 import mesh_su2_test
+import vtkhdf_test
 from sweep import IS_WHOLE, ONLY_WHOLE, some_of
 
 CELLS_OF_A_CHUNK = 16384  # preprocess/gather/mesh_reader.cpp
@@ -89,6 +90,14 @@ class MeshBytes(MeshFormats):
         writer = self.writer(mesh_files_test.MeshFiles)
         writer.write_exodus(self.folder / "mesh.e", n=20)
         self.expect_same_bytes(self.folder / "mesh.e", scalars=("pressure", "density"))
+
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
+    def test_vtkhdf(self):
+        writer = self.writer(vtkhdf_test.VtkHdf)
+        for count, faces in ((3, False), (1, True)):
+            with writer.file() as f:
+                vtkhdf_test.write_mesh(f.create_group("VTKHDF"), vtkhdf_test.parts_of(Mesh(20), count), faces)
+            self.expect_same_bytes(writer.path, scalars=("p", "c"))
 
     def columns(self):
         """A writer of 60 x 40 quadrangles, or triangles, in 8 layers."""

@@ -227,17 +227,32 @@ class MeshFiles(MeshCase):
         for scalar in ("p", "c", "v:x"):
             self.assertAlmostEqual(self.volume(path, scalar), 1, delta=1e-3)
 
-    def test_polyhedra_of_vtk_9_4_are_refused(self):
+    def test_polyhedra_of_vtk_9_4(self):
         """VTK 9.4 writes the arrays face_connectivity, face_offsets, polyhedron_to_faces and polyhedron_offsets."""
-        path = self.folder / "mesh.vtu"
+        path, newer = self.folder / "mesh.vtu", self.folder / "newer.vtu"
         write_xml(cube(8), path, mode="Ascii")
-        text = path.read_text().replace('Name="faces"', 'Name="polyhedron_to_faces"').replace('Name="faceoffsets"', 'Name="polyhedron_offsets"')
-        self.assertIn("polyhedron_to_faces", text)
-        path.write_text(text)
-        result = self.run_program("info", path)
-        self.assertEqual(result.returncode, 1)
-        self.assertIn("polyhedra as VTK 9.4 writes them, which are not read; write them with an earlier version", result.stderr)
-        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        text = path.read_text()
+        array = lambda name: re.search(f'<DataArray[^>]*Name="{name}"[^>]*>([^<]*)<', text)
+        stream, ends = ([int(word) for word in array(name)[1].split()] for name in ("faces", "faceoffsets"))
+        faces, of_cells, counts, begin = [], [], [], 0
+        for end in ends:
+            if end >= 0:
+                at = begin + 1
+                while at < end:
+                    of_cells.append(len(faces))
+                    faces.append(stream[at + 1:at + 1 + stream[at]])
+                    at += stream[at] + 1
+                begin = end
+            counts.append(len(of_cells))
+        lists = {"face_connectivity": sum(faces, []), "face_offsets": np.cumsum([len(face) for face in faces]),
+                 "polyhedron_to_faces": of_cells, "polyhedron_offsets": counts}
+        added = "".join(f'<DataArray type="Int64" Name="{name}" format="ascii">{" ".join(map(str, values))}</DataArray>'
+                        for name, values in lists.items())
+        for name in ("faces", "faceoffsets"):
+            text = text.replace(array(name)[0] + "/DataArray>", "")
+        newer.write_text(text.replace("</Cells>", added + "</Cells>"))
+        self.assertNotIn('"faces"', newer.read_text())
+        self.assertEqual(self.cache([newer], "c"), self.cache([path], "c"))
 
     def test_prisms_over_polygons(self):
         for sides, kind in ((5, vtk.VTK_PENTAGONAL_PRISM), (6, vtk.VTK_HEXAGONAL_PRISM)):

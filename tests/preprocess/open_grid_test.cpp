@@ -367,12 +367,8 @@ TEST_F(ForeignFormats, PlainHdf5IsNamed) {
   }
   expectNamed("plain.h5",
               "an HDF5 file, but neither NetCDF-4 nor CGNS; describe its arrays in an XDMF file (.xmf)");
-  Hdf5Editor(file).group("/VTKHDF");
-  Hdf5Editor(file).group("/VTKHDF/PointData");
-  expectNamed("plain.h5", "a VTKHDF file (save it as .vts, .vti or .vtu)");
   for (const char* group : {"/settings", "/settings/a", "/meshes", "/meshes/1"})
     Hdf5Editor(file).group(group);
-  Hdf5Editor(file).remove("/VTKHDF");
   expectNamed("plain.h5", "a Fluent case or its data (save it as CGNS or EnSight Gold)");
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <exception>
 #include <optional>
 
 #include "preprocess/formats/common/byte_source.h"
@@ -24,33 +23,6 @@ constexpr int kMaxLinks = 100;
 constexpr uint64_t kMinNodeBytes = 32;
 constexpr uint64_t kSmallFileNodes = 4096;
 constexpr size_t kTriedNodes = 5000;
-
-struct NodeLink {
-  std::string name;
-  bool external = false;
-};
-
-/// The links of a group to nodes, in order of creation if the file tracks it. nullopt if the group cannot be
-/// read.
-std::optional<std::vector<NodeLink>> nodeLinksOf(const Hdf5Group& group) {
-  if (!linksAreWhole(group.id())) return std::nullopt;
-  std::vector<NodeLink> links;
-  const auto add = [](hid_t, const char* name, const H5L_info_t* info, void* to) -> herr_t {
-    try {
-      if (*name != ' ')
-        static_cast<std::vector<NodeLink>*>(to)->push_back({name, info->type == H5L_TYPE_EXTERNAL});
-      return 0;
-    } catch (const std::exception&) {
-      return -1;
-    }
-  };
-  for (const H5_index_t order : {H5_INDEX_CRT_ORDER, H5_INDEX_NAME}) {
-    links.clear();
-    hsize_t position = 0;
-    if (H5Literate(group.id(), order, H5_ITER_INC, &position, add, &links) >= 0) return links;
-  }
-  return std::nullopt;
-}
 
 std::string placeOf(const std::string& node_path) {
   return node_path.empty() ? "the root" : node_path;
@@ -179,12 +151,13 @@ void CgnsHdf5::count(const Hdf5Group& group, size_t nodes, const std::string& no
 std::vector<CgnsNode> CgnsHdf5::children(const CgnsNode& node) const {
   const QuietHdf5 quiet;
   const Hdf5Group group = open(node.path);
-  const std::optional<std::vector<NodeLink>> links = nodeLinksOf(group);
+  std::optional<std::vector<Hdf5Link>> links = linksOf(group.id());
   if (!links) unreadable(node.path, "the list of its child nodes");
+  std::erase_if(*links, [](const Hdf5Link& link) { return link.name.starts_with(' '); });
   count(group, links->size(), node.path);
 
   std::vector<CgnsNode> nodes;
-  for (const NodeLink& link : *links) {
+  for (const Hdf5Link& link : *links) {
     CgnsNode child{node.path + "/" + link.name, link.name, "", node.linked || link.external};
     Hdf5Group own(H5Gopen2(group.id(), link.name.c_str(), H5P_DEFAULT));
     if (!own) unreadable(child.path, "the node");

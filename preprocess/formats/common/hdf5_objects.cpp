@@ -89,6 +89,25 @@ bool linksAreWhole(hid_t group) {
          found == info.nlinks;
 }
 
+std::optional<std::vector<Hdf5Link>> linksOf(hid_t group) {
+  if (!linksAreWhole(group)) return std::nullopt;
+  std::vector<Hdf5Link> links;
+  const auto add = [](hid_t, const char* name, const H5L_info_t* info, void* to) -> herr_t {
+    try {
+      static_cast<std::vector<Hdf5Link>*>(to)->push_back({name, info->type == H5L_TYPE_EXTERNAL});
+      return 0;
+    } catch (const std::exception&) {
+      return -1;
+    }
+  };
+  for (const H5_index_t order : {H5_INDEX_CRT_ORDER, H5_INDEX_NAME}) {
+    links.clear();
+    hsize_t position = 0;
+    if (H5Literate(group, order, H5_ITER_INC, &position, add, &links) >= 0) return links;
+  }
+  return std::nullopt;
+}
+
 bool attributesAreWhole(hid_t object) {
   H5O_info_t info;
   hsize_t found = 0;

@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "stream/base/mutex.h"
 
@@ -94,12 +95,21 @@ std::optional<Hdf5AttributeShape> shapeOf(const Hdf5Attribute& attribute);
 
 // HDF5 (1.10) sorts the links and attributes of an object if they are read in another order than the file's.
 // If a stored list is damaged, or its length is not the one that the object states, HDF5 then frees entries
-// of the sorted list that it has not set, and writes beyond its end. The two functions below read in the
+// of the sorted list that it has not set, and writes beyond its end. linksAreWhole() and attributesAreWhole() read in the
 // file's own order, which sorts nothing.
 
 /// Whether the links of `group` can be read, and their number is the one that it states. The caller holds
 /// dataLibraryMutex().
 bool linksAreWhole(hid_t group);
+
+struct Hdf5Link {
+  std::string name;
+  bool external = false;
+};
+
+/// The links of a group, in order of creation if the file tracks it, else by name. nullopt if the group
+/// cannot be read. The caller holds dataLibraryMutex().
+std::optional<std::vector<Hdf5Link>> linksOf(hid_t group);
 
 /// Whether the attributes of `object` can be read, and their number is the one that it states. The caller
 /// holds dataLibraryMutex().

@@ -255,8 +255,6 @@ std::optional<std::string> foreignNetcdf(const NetcdfFiles& file) {
                                                        : "an unstructured grid";
   if (hasDimensions(file, {"nCells", "nVertices"})) return "an unstructured mesh (MPAS)";
   const std::vector<std::string>& groups = file.groups();
-  if (file.plainHdf5() && std::find(groups.begin(), groups.end(), "VTKHDF") != groups.end())
-    return "a VTKHDF file (save it as .vts, .vti or .vtu)";
   const auto has = [&](const char* group) {
     return std::find(groups.begin(), groups.end(), group) != groups.end();
   };

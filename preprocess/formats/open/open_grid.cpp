@@ -26,6 +26,7 @@
 #include "preprocess/formats/plot3d/plot3d_source.h"
 #include "preprocess/formats/su2/su2_source.h"
 #include "preprocess/formats/tecplot/tecplot_source.h"
+#include "preprocess/formats/vtk/vtk_hdf.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "preprocess/formats/xdmf/xdmf_source.h"
@@ -72,6 +73,7 @@ constexpr GridFormat kFormats[] = {
     {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
     {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
     {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
+    {isVtkHdf, openVtkHdf, MoreFiles::kCombined},            // before NetCDF, which takes all HDF5 files
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
     {isExodus, openAs<ExodusSource>, MoreFiles::kNone},      // before NetCDF, which they are
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},

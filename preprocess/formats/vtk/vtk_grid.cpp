@@ -54,6 +54,23 @@ std::string VtkExtent::describe() const {
   return fmt::format("{}x{}x{}", nodesAlong(0), nodesAlong(1), nodesAlong(2));
 }
 
+std::optional<VtkExtent> extentWith(std::span<const double> ends) {
+  // Sums and products of a few of them stay below 2^63.
+  constexpr double kMaxIndex = 0x1p30, kMaxNodes = 1e14;
+  VtkExtent extent;
+  double nodes = 1;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double lower = ends[2 * axis], upper = ends[2 * axis + 1];
+    if (!(std::abs(lower) < kMaxIndex && std::abs(upper) < kMaxIndex && lower <= upper) ||
+        lower != std::trunc(lower) || upper != std::trunc(upper))
+      return std::nullopt;
+    extent.lower[axis] = static_cast<int64_t>(lower);
+    extent.upper[axis] = static_cast<int64_t>(upper);
+    nodes *= upper - lower + 1;
+  }
+  return nodes <= kMaxNodes ? std::optional(extent) : std::nullopt;
+}
+
 std::vector<std::vector<VtkExtent>> ownedParts(const std::vector<VtkExtent>& pieces) {
   std::vector<std::vector<VtkExtent>> owned;
   for (size_t n = 0; n < pieces.size(); ++n) {
@@ -96,6 +113,16 @@ VtkExtent coarsened(const VtkExtent& fine, const std::array<int64_t, 3>& ratio) 
 }
 
 }  // namespace
+
+std::array<int64_t, 3> refinementOf(const std::string& file, size_t level, std::span<const double> ratio) {
+  std::array<int64_t, 3> whole{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (!(ratio[axis] >= 1 && ratio[axis] < 1e6) || std::abs(ratio[axis] - std::round(ratio[axis])) > 1e-3)
+      throw Error("{}: refines level {} by {}; expected a whole number", file, level, ratio[axis]);
+    whole[axis] = static_cast<int64_t>(std::round(ratio[axis]));
+  }
+  return whole;
+}
 
 std::vector<std::vector<VtkExtent>> refinedCellsOf(const std::vector<AmrPatch>& patches,
                                                    const std::vector<std::array<int64_t, 3>>& ratios) {

@@ -43,6 +43,11 @@ struct VtkExtent {
   bool operator==(const VtkExtent&) const = default;
 };
 
+inline constexpr size_t kMaxVtkPieces = 100'000;
+
+/// The extent with these ends (i0 i1 j0 j1 k0 k1); nullopt if they are none, or of an unreasonable size.
+std::optional<VtkExtent> extentWith(std::span<const double> ends);
+
 /// Cuts pieces that may overlap (by ghost levels) into parts that cover each cell once: a cell in several
 /// pieces belongs to the first of them. Returns [piece] -> its parts, none if other pieces own all its
 /// cells. Throws Error if a piece would be cut into unreasonably many parts.
@@ -54,6 +59,11 @@ struct AmrPatch {
   size_t level = 0;
   VtkExtent cells;  // in the lattice of its level, both ends inclusive
 };
+
+inline constexpr size_t kMaxAmrPatches = 20'000, kMaxAmrLevels = 64;
+
+/// How many cells of the next level lie along a cell of `level`. Throws Error unless these are whole numbers.
+std::array<int64_t, 3> refinementOf(const std::string& file, size_t level, std::span<const double> ratio);
 
 /// Returns for each patch the cells that patches of the next level cover, with indices from the patch's
 /// first cell. `ratios[level]` is the number of cells of the next level along a cell. A cell that is covered

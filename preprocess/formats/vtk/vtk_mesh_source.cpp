@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/formats/common/cells_of_faces.h"
 #include "preprocess/formats/vtk/vtk_fields.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/error.h"
@@ -119,6 +120,28 @@ std::vector<uint64_t> beginsOf(const VtkArray& ends, uint64_t first, uint64_t co
       throw Error("{}: cell {} ends at place {} of the connectivity; expected {} to {}; the file is damaged",
                   piece.file, first + n, static_cast<int64_t>(begins[n + 1]), begins[n], length);
   return begins;
+}
+
+/// Cells [first, first + count), all of them polyhedra.
+void appendPolyhedra(const VtkSharedFaces& shared, uint64_t first, uint64_t count, const MeshPiece& piece,
+                     MeshCells& out) {
+  const std::vector<uint64_t> begins = beginsOf(shared.cell_ends, first, count, shared.faces.tuples, piece);
+  std::vector<uint64_t> faces;
+  readIntegers(shared.faces, begins.front(), begins.back() - begins.front(), faces);
+  const auto read = [](const VtkArray& array) {
+    return [&array](uint64_t from, std::span<uint64_t> to) {
+      std::vector<uint64_t> values;
+      readIntegers(array, from, to.size(), values);
+      std::copy(values.begin(), values.end(), to.begin());
+    };
+  };
+  const auto face_begins = [&](uint64_t from, std::span<uint64_t> to) {
+    if (from > 0) return read(shared.ends)(from - 1, to);
+    to[0] = 0;
+    read(shared.ends)(0, to.subspan(1));
+  };
+  appendCellsOfFaces({face_begins, read(shared.points), shared.ends.tuples, shared.points.tuples},
+                     {begins, faces, piece.file, first}, out);
 }
 
 }  // namespace
@@ -267,6 +290,13 @@ void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t co
           groupOf(static_cast<uint8_t>(types[n])) != VtkCellGroup::kNotSolid)
         throw Error("{}: cell {} of type {} has {} points, too few; the file is damaged", piece.file,
                     first + n, types[n], of_cell.size());
+      continue;
+    }
+    if (cells.shared_faces) {
+      size_t end = n + 1;
+      while (end < count && types[end] == kVtkPolyhedron) ++end;
+      appendPolyhedra(*cells.shared_faces, first + n, end - n, piece, out);
+      n = end - 1;
       continue;
     }
     if (!cells.faces_inline) {

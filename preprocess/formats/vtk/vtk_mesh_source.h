@@ -11,6 +11,12 @@
 
 namespace curvisplat {
 
+/// Faces that polyhedra share, and the faces of each cell: faces[end of n - 1, end of n), as points[...] of a face.
+struct VtkSharedFaces {
+  VtkArray ends, points;
+  VtkArray cell_ends, faces;
+};
+
 /// The cells of a piece. The points of cell n are connectivity[end of n - 1, end of n).
 struct VtkCells {
   uint64_t cells = 0;
@@ -19,8 +25,9 @@ struct VtkCells {
   VtkArray connectivity;
   std::optional<VtkArray> faces;      // of polyhedra: of each the number of its faces; of these their points
   std::optional<VtkArray> face_ends;  // one a cell; -1 of others
-  bool counted = false;               // legacy: the points of a cell follow their number
-  bool faces_inline = false;          // legacy: the points of a polyhedron are its faces
+  std::optional<VtkSharedFaces> shared_faces;  // in place of these two
+  bool counted = false;                        // legacy: the points of a cell follow their number
+  bool faces_inline = false;                   // legacy: the points of a polyhedron are its faces
 };
 
 /// A piece with polylines: those of polygonal data, or all cells of an unstructured grid, which have types.

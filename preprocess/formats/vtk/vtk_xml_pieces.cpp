@@ -113,8 +113,20 @@ VtkCells cellsOf(const VtkXmlFile& file, const Node& piece, uint64_t count) {
   const uint64_t points = largestOf(cells.ends);
   if (points == 0) file.fail("has cells without points");
   cells.connectivity = file.array(required("connectivity"), points);
-  if (named("polyhedron_to_faces"))
-    file.fail("has polyhedra as VTK 9.4 writes them, which are not read; write them with an earlier version");
+  if (named("polyhedron_to_faces")) {  // since VTK 9.4
+    const auto list = [&](const char* lists, const VtkArray& ends) {
+      return file.array(required(lists), largestOf(ends));
+    };
+    VtkSharedFaces shared;
+    shared.cell_ends = file.array(required("polyhedron_offsets"), count);
+    shared.faces = list("polyhedron_to_faces", shared.cell_ends);
+    uint64_t faces = 0;
+    faces = largestOf(shared.faces) + 1;
+    shared.ends = file.array(required("face_offsets"), faces);
+    shared.points = list("face_connectivity", shared.ends);
+    cells.shared_faces = std::move(shared);
+    return cells;
+  }
   if (!named("faces") || !named("faceoffsets")) return cells;
   VtkArray ends = file.array(named("faceoffsets"), count);
   const uint64_t faces = largestOf(ends);

@@ -21,8 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using Node = pugi::xml_node;
 
-constexpr size_t kMaxPieces = 100'000, kMaxFiles = 100'000;
-constexpr size_t kMaxPatches = 20'000, kMaxLevels = 64;  // of an AMR set
+constexpr size_t kMaxFiles = 100'000;
 
 /// Returns a checksum of the first and the last points of each piece or block, and of how many there are.
 uint64_t checksumOfFirstAndLast(const DataSource& source) {
@@ -156,8 +155,8 @@ class Gatherer {
     for (const VtkPiece& piece : pieces) extents.push_back(piece.extent);
     const std::vector<std::vector<VtkExtent>> parts = ownedParts(extents);
     for (size_t n = 0; n < pieces.size(); ++n) {
-      if (grid_.pieces.size() == kMaxPieces)
-        throw Error("{}: has more than {} pieces", grid_.files.front(), kMaxPieces);
+      if (grid_.pieces.size() == kMaxVtkPieces)
+        throw Error("{}: has more than {} pieces", grid_.files.front(), kMaxVtkPieces);
       for (size_t part = 0; part < parts[n].size(); ++part)
         grid_.blocks.push_back({part == 0 ? names[n] : fmt::format("{}.{}", names[n], part + 1),
                                 grid_.pieces.size(), parts[n][part]});
@@ -193,8 +192,8 @@ class Gatherer {
     }
     if (grid_.times.empty() && read.time) grid_.times = {*read.time};
     for (size_t n = 0; n < read.pieces.size(); ++n) {
-      if (mesh_.pieces.size() == kMaxPieces)
-        throw Error("{}: has more than {} pieces", grid_.files.front(), kMaxPieces);
+      if (mesh_.pieces.size() == kMaxVtkPieces)
+        throw Error("{}: has more than {} pieces", grid_.files.front(), kMaxVtkPieces);
       mesh_.names.push_back({name.empty()              ? fmt::format("piece {}", mesh_.pieces.size() + 1)
                              : read.pieces.size() == 1 ? name
                                                        : fmt::format("{}.{}", name, n + 1),
@@ -262,15 +261,16 @@ class Gatherer {
     std::map<size_t, Node> levels;
     for (const Node& node : file.content().children("Block")) {
       const double level = file.numbers(node, "level", 1)[0];
-      if (!(level >= 0 && level < kMaxLevels) || level != std::floor(level))
-        file.fail(fmt::format("has a level {}; expected 0 to {}", level, kMaxLevels - 1));
+      if (!(level >= 0 && level < kMaxAmrLevels) || level != std::floor(level))
+        file.fail(fmt::format("has a level {}; expected 0 to {}", level, kMaxAmrLevels - 1));
       if (!levels.emplace(static_cast<size_t>(level), node).second)
         file.fail(fmt::format("has two levels {}", level));
     }
     for (const auto& [level, block] : levels)
       for (const Node& node : block.children("DataSet")) {
         if (!node.attribute("file")) continue;
-        if (patches.size() == kMaxPatches) file.fail(fmt::format("has more than {} patches", kMaxPatches));
+        if (patches.size() == kMaxAmrPatches)
+          file.fail(fmt::format("has more than {} patches", kMaxAmrPatches));
         const fs::path path = pathOf(file, node, "file");
         const size_t before = grid_.pieces.size();
         add(path, name + (name.empty() ? "" : "/") + path.stem().string());
@@ -291,21 +291,14 @@ class Gatherer {
 
   static VtkExtent boxOf(const VtkXmlFile& file, const Node& node) {
     const std::vector<double> numbers = file.numbers(node, "amr_box", 6);
-    VtkExtent box;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const double lower = numbers[2 * axis], upper = numbers[2 * axis + 1];
-      if (!(std::abs(lower) < 1e9 && std::abs(upper) < 1e9 && lower <= upper))
-        file.fail(fmt::format("has an amr_box from {} to {}", lower, upper));
-      box.lower[axis] = static_cast<int64_t>(lower);
-      box.upper[axis] = static_cast<int64_t>(upper);
-    }
-    return box;
+    if (const auto box = extentWith(numbers)) return *box;
+    file.fail(fmt::format("has an amr_box of {}", fmt::join(numbers, " ")));
   }
 
   /// [level]: cells of the next level along a cell, from the levels' spacing or as version 1.0 states it.
   static std::vector<std::array<int64_t, 3>> ratiosOf(const VtkXmlFile& file,
                                                       const std::map<size_t, Node>& levels) {
-    std::vector<std::array<int64_t, 3>> ratios(kMaxLevels, {2, 2, 2});
+    std::vector<std::array<int64_t, 3>> ratios(kMaxAmrLevels, {2, 2, 2});
     for (const auto& [level, block] : levels) {
       const auto next = levels.find(level + 1);
       if (next == levels.end()) continue;
@@ -317,12 +310,7 @@ class Gatherer {
                                   fine = file.numbers(next->second, "spacing", 3);
         for (size_t axis = 0; axis < 3; ++axis) ratio[axis] = coarse[axis] / fine[axis];
       }
-      for (size_t axis = 0; axis < 3; ++axis) {
-        if (!(ratio[axis] >= 1 && ratio[axis] < 1e6) ||
-            std::abs(ratio[axis] - std::round(ratio[axis])) > 1e-3)
-          file.fail(fmt::format("refines level {} by {}; expected a whole number", level, ratio[axis]));
-        ratios[level][axis] = static_cast<int64_t>(std::round(ratio[axis]));
-      }
+      ratios[level] = refinementOf(file.name(), level, ratio);
     }
     return ratios;
   }

@@ -1,52 +1,24 @@
 // The arrays that an XDMF file names: data items in its XML, in HDF5 or in binary files, and HyperSlabs and
 // joins of others.
 //
-// XdmfItems gives an XdmfValues for each item; numbers are read later, by position. A file of many grids
-// names thousands of HDF5 data sets, and an open one costs a chunk cache of 1 MiB and often a file
-// descriptor, so that XdmfHdf5Sets keeps only the last 16 open. XdmfItems is for one thread; any number of
-// threads may read the arrays, and reads from HDF5 wait for one another.
+// XdmfItems gives an XdmfValues for each item; numbers are read later, by position. XdmfItems is for one
+// thread; any number of threads may read the arrays, and reads from HDF5 wait for one another.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
-#include <functional>
-#include <list>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
-#include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/common/hdf5_arrays.h"
 #include "preprocess/formats/xdmf/xdmf_document.h"
 #include "preprocess/formats/xdmf/xdmf_values.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
-
-/// The open data sets, most recently used first. Guarded by dataLibraryMutex(), closing included.
-class XdmfHdf5Sets {
- public:
-  XdmfHdf5Sets() = default;
-  ~XdmfHdf5Sets();
-  XdmfHdf5Sets(const XdmfHdf5Sets&) = delete;
-  XdmfHdf5Sets& operator=(const XdmfHdf5Sets&) = delete;
-
-  /// Calls use(identifier) with the mutex held; opens the data set unless it is open. Throws Error.
-  void with(const std::filesystem::path& path, const std::string& name,
-            const std::function<void(hid_t)>& use);
-
- private:
-  struct Open {
-    std::filesystem::path path;
-    std::string name;
-    Hdf5File file;
-    Hdf5DataSet set;
-  };
-  bool moveToFront(const std::filesystem::path& path, const std::string& name);
-
-  std::list<Open> open_;
-};
 
 /// An item whose numbers would have to be computed.
 class XdmfComputedItem : public Error {
@@ -83,7 +55,7 @@ class XdmfItems {
   const XdmfDocument& document_;
   const std::filesystem::path folder_;
   const std::shared_ptr<OpenFiles> pool_ = std::make_shared<OpenFiles>();
-  const std::shared_ptr<XdmfHdf5Sets> hdf5_sets_ = std::make_shared<XdmfHdf5Sets>();
+  const std::shared_ptr<Hdf5Sets> hdf5_sets_ = std::make_shared<Hdf5Sets>();
   std::map<pugi::xml_node, std::shared_ptr<const XdmfValues>> items_;
   std::vector<std::string> files_;
 };

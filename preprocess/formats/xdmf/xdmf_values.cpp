@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
-#include <numeric>
 
+#include "preprocess/formats/common/array_boxes.h"
 #include "preprocess/formats/common/byte_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr size_t kMaxDimensions = 32;  // as HDF5
 // Strided numbers: runs this long, or this far apart, are read one by one; others through a window.
 constexpr size_t kDirect = 4 << 10, kWindow = 32 << 10;
 
@@ -89,15 +87,15 @@ class SlabValues final : public XdmfValues {
 
   void read(uint64_t first, std::span<double> to) const override {
     size_t done = 0;
-    forEachXdmfBox(dims(), first, to.size(),
-                   [&](std::span<const uint64_t> from, std::span<const uint64_t> count) {
-                     const auto values = static_cast<size_t>(xdmfProduct(count));
-                     readPart({{from.begin(), from.end()},
-                               std::vector<uint64_t>(from.size(), 1),
-                               {count.begin(), count.end()}},
-                              to.subspan(done, values));
-                     done += values;
-                   });
+    forEachArrayBox(dims(), first, to.size(),
+                    [&](std::span<const uint64_t> from, std::span<const uint64_t> count) {
+                      const auto values = static_cast<size_t>(arrayProduct(count));
+                      readPart({{from.begin(), from.end()},
+                                std::vector<uint64_t>(from.size(), 1),
+                                {count.begin(), count.end()}},
+                               to.subspan(done, values));
+                      done += values;
+                    });
   }
 
   void readPart(const XdmfSlab& part, std::span<double> to) const override {
@@ -162,48 +160,18 @@ class JoinedValues final : public XdmfValues {
 
 XdmfValues::XdmfValues(std::vector<uint64_t> dims, const std::string& where) : dims_(std::move(dims)) {
   for (const uint64_t n : dims_) {
-    if (n == 0 || size_ > kMaxXdmfValues / n)
+    if (n == 0 || size_ > kMaxArrayValues / n)
       throw Error("{}: has impossible dimensions; the file is damaged", where);
     size_ *= n;
   }
-  if (dims_.empty() || dims_.size() > kMaxDimensions)
+  if (dims_.empty() || dims_.size() > kMaxArrayRank)
     throw Error("{}: has {} dimensions; expected one or more", where, dims_.size());
-}
-
-uint64_t xdmfProduct(std::span<const uint64_t> counts) {
-  return std::accumulate(counts.begin(), counts.end(), uint64_t{1}, std::multiplies<>());
-}
-
-void forEachXdmfBox(std::span<const uint64_t> dims, uint64_t begin, uint64_t count, const UseXdmfBox& use) {
-  const size_t rank = dims.size();
-  std::array<uint64_t, kMaxDimensions> first{}, along{};
-  while (count > 0) {
-    uint64_t rest = begin;
-    for (size_t d = rank; d-- > 0;) {
-      first[d] = rest % dims[d];
-      rest /= dims[d];
-      along[d] = 1;
-    }
-    // The largest box that begins here: whole rows, whole planes, ... as far as the range goes.
-    uint64_t block = 1;
-    for (size_t d = rank; d-- > 0;) {
-      const uint64_t most = std::min<uint64_t>(dims[d] - first[d], count / block);
-      if (most == 0) break;
-      along[d] = most;
-      const bool whole = most == dims[d];
-      block *= most;
-      if (!whole) break;
-    }
-    use(std::span(first).first(rank), std::span(along).first(rank));
-    begin += block;
-    count -= block;
-  }
 }
 
 /// Numbers that follow one another are read into place; others through a window on the array, which moves forward only.
 void XdmfValues::readPart(const XdmfSlab& part, std::span<double> to) const {
   const size_t rank = dims_.size();
-  std::array<uint64_t, kMaxDimensions> index{}, pitch{};
+  std::array<uint64_t, kMaxArrayRank> index{}, pitch{};
   uint64_t source = 0, along = 1;
   for (size_t d = rank; d-- > 0; along *= dims_[d]) {
     pitch[d] = along;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -41,15 +40,6 @@ class XdmfValues {
   std::vector<uint64_t> dims_;
   uint64_t size_ = 1;
 };
-
-constexpr uint64_t kMaxXdmfValues = uint64_t{1} << 48;
-
-uint64_t xdmfProduct(std::span<const uint64_t> counts);
-
-/// Splits a range of numbers into boxes of an array of the given dimensions, as few as possible, and calls
-/// use(first, count) for each, in their order.
-using UseXdmfBox = std::function<void(std::span<const uint64_t> first, std::span<const uint64_t> count)>;
-void forEachXdmfBox(std::span<const uint64_t> dims, uint64_t begin, uint64_t count, const UseXdmfBox& use);
 
 struct XdmfBinary {
   std::shared_ptr<const PooledFile> file;
