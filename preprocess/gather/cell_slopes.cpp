@@ -170,6 +170,8 @@ void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<C
     if (cells.shapes[n] != CellKind::kNone) out[n] = bodyOf(cells.view(n, 0));
     ++n;
   }
+  for (size_t n = begin; n < end; ++n)
+    if (const double volume = cells.volumeOf(n); volume > 0 && out[n].volume > 0) out[n].volume = volume;
 }
 
 }  // namespace

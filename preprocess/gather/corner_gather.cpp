@@ -95,6 +95,7 @@ void GatheredCells::clear() {
   face_begin.assign(1, 0);
   faces.clear();
   cell_values.clear();
+  volumes.clear();
 }
 
 uint64_t halfBesideChunks(uint64_t memory_bytes, uint64_t chunk_bytes) {
@@ -136,6 +137,7 @@ size_t CornerGather::take(const LoadedCells& loaded, size_t begin, GatheredCells
     out.faces.insert(out.faces.end(), faces.begin(), faces.end());
     out.face_begin.push_back(out.faces.size());
     for (const std::vector<float>& values : cells.scalars) out.cell_values.push_back(values[n]);
+    if (!cells.volumes.empty()) out.volumes.push_back(cells.volumes[n]);
   }
   out.corners.resize(corners);
   out.at.resize(corners);

@@ -34,10 +34,13 @@ struct GatheredCells {
   std::vector<size_t> face_begin{0};    // [cell + 1], in faces
   std::vector<uint32_t> faces;          // as MeshCells'
   std::vector<float> cell_values;       // [cell * fields + field], of cell-centred scalars
+  std::vector<float> volumes;           // [cell]: MeshCells'; empty: of all 0
 
   static constexpr size_t kMaxCorners = size_t{1} << 17;
 
   size_t size() const { return shapes.size(); }
+  /// Of a part of a curved cell; 0: that of the linear cell.
+  float volumeOf(size_t n) const { return volumes.empty() ? 0.0f : volumes[n]; }
   CellView view(size_t n, size_t corner_fields) const;
   /// Whether the four cells from n on come before `end`, and have one shape that isTakenAtOnce().
   bool areFourAlike(size_t n, size_t end, size_t corner_fields) const;

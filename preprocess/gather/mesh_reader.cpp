@@ -42,7 +42,7 @@ uint64_t bytesOf(const MeshCells& cells) {
   return cells.shapes.size() + cells.hidden.size() +
          (cells.corner_begin.size() + cells.face_begin.size()) * sizeof(size_t) +
          cells.corners.size() * sizeof(uint64_t) + cells.faces.size() * sizeof(uint32_t) +
-         cells.scalars.size() * cells.size() * sizeof(float);
+         (cells.scalars.size() * cells.size() + cells.volumes.size()) * sizeof(float);
 }
 
 MeshReader::MeshReader(const MeshSource& source, std::vector<uint32_t> scalars,

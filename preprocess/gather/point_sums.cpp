@@ -26,7 +26,7 @@ struct CellRecord {
   uint64_t number;
   uint32_t corners, faces;
   uint32_t shape;
-  uint32_t reserved = 0;
+  float volume;
 };
 
 void appendBytes(std::vector<std::byte>& out, const void* from, size_t bytes) {
@@ -41,6 +41,14 @@ const std::byte* takeBytes(const std::byte* from, size_t count, std::vector<T>& 
   out.resize(at + count);
   if (count > 0) std::memcpy(static_cast<void*>(out.data() + at), from, count * sizeof(T));
   return from + count * sizeof(T);
+}
+
+/// Makes moments those of a cell of this volume: all of them are sums over it.
+void scaleTo(double volume, size_t stride, std::span<double> moments) {
+  double flat = 0;
+  for (size_t corner = 0; corner < moments.size(); corner += stride) flat += moments[corner];
+  if (flat > 0)
+    for (double& moment : moments) moment *= volume / flat;
 }
 
 /// The moments of cells [begin, end); `out`: [corner of the first cell ...][moment].
@@ -63,6 +71,8 @@ void momentsOf(const GatheredCells& cells, size_t begin, size_t end, size_t fiel
       dualMoments(cells.view(n, fields), fields, scratch, outOf(n, n + 1));
     ++n;
   }
+  for (size_t n = begin; n < end; ++n)
+    if (const double volume = cells.volumeOf(n); volume > 0) scaleTo(volume, stride, outOf(n, n + 1));
 }
 
 }  // namespace
@@ -121,7 +131,8 @@ void PointSums::write(const GatheredCells& cells) {
     const CellView view = cells.view(n, fields_);
     const std::span<const uint64_t> corners = cells.cornersOfCell(n);
     const CellRecord head{cells.numbers[n], static_cast<uint32_t>(corners.size()),
-                          static_cast<uint32_t>(view.faces.size()), static_cast<uint32_t>(view.shape)};
+                          static_cast<uint32_t>(view.faces.size()), static_cast<uint32_t>(view.shape),
+                          cells.volumeOf(n)};
     record.clear();
     appendBytes(record, &head, sizeof head);
     appendBytes(record, corners.data(), corners.size_bytes());
@@ -221,6 +232,7 @@ void PointSums::sumWaiting(size_t stream, const PointRange& range, const Progres
       at += sizeof head;
       cells.numbers.push_back(head.number);
       cells.shapes.push_back(static_cast<CellKind>(head.shape));
+      cells.volumes.push_back(head.volume);
       at = takeBytes(at, head.corners, cells.corners);
       at = takeBytes(at, head.corners, cells.at);
       at = takeBytes(at, head.corners * fields_, cells.corner_values);

@@ -58,6 +58,18 @@ void MeshCells::clear() {
   face_begin.assign(1, 0);
   faces.clear();
   hidden.clear();
+  curved.clear();
+  volumes.clear();
+}
+
+void MeshCells::appendCurved(CellKind shape, CellCurve curve, std::span<const uint64_t> nodes) {
+  append(shape, nodes);
+  if (shapes.back() == CellKind::kNone) return;
+  curved.emplace_back(shapes.size() - 1, curve);
+  if (curve.order == 0) return;
+  const std::span<const uint64_t> further = nodes.subspan(cornersOf(shape));
+  corners.insert(corners.end(), further.begin(), further.end());
+  corner_begin.back() = corners.size();
 }
 
 void MeshCells::append(CellKind shape, std::span<const uint64_t> of_cell) {
@@ -65,6 +77,18 @@ void MeshCells::append(CellKind shape, std::span<const uint64_t> of_cell) {
   const std::span<const uint64_t> used = of_cell.first(cornersOf(shape));
   shapes.push_back(shape);
   corners.insert(corners.end(), used.begin(), used.end());
+  corner_begin.push_back(corners.size());
+  face_begin.push_back(faces.size());
+  hidden.push_back(0);
+}
+
+void MeshCells::appendOf(const MeshCells& others, size_t n) {
+  if (others.shapes[n] != CellKind::kPolyhedron) return append(others.shapes[n], others.cornersOfCell(n));
+  const std::span<const uint64_t> points = others.cornersOfCell(n);
+  const std::span<const uint32_t> of_faces = others.facesOfCell(n);
+  corners.insert(corners.end(), points.begin(), points.end());
+  faces.insert(faces.end(), of_faces.begin(), of_faces.end());
+  shapes.push_back(CellKind::kPolyhedron);
   corner_begin.push_back(corners.size());
   face_begin.push_back(faces.size());
   hidden.push_back(0);

@@ -22,6 +22,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -41,6 +42,13 @@ enum class CellKind : uint8_t {
 /// Corners of a shape; 0 for kNone and kPolyhedron.
 size_t cornersOf(CellKind shape);
 
+/// The polynomial of a cell of higher order, by its nodes in VTK's order of Lagrange cells (curved_cells.h).
+struct CellCurve {
+  uint8_t order = 0;     // 0: not known; the cell is drawn by its corners
+  uint8_t layers = 0;    // the order along the third axis
+  bool complete = true;  // false: nodes at the corners and the middles of the edges alone
+};
+
 /// Cells that follow one another in a piece. Readers begin with clear() and append.
 struct MeshCells {
   std::vector<CellKind> shapes;
@@ -51,6 +59,11 @@ struct MeshCells {
                                         // places among the cell's corners
   std::vector<uint8_t> hidden;          // 1: blanked by the file, or another piece's
   std::vector<std::vector<float>> scalars;  // [requested scalar][cell]
+  // Of cells of higher order, which have all their nodes as corners: the cell, and its polynomial. Only from readers of files:
+  // what follows them sees linear cells (cutCurved(), preprocess/formats/common/cut_source.h).
+  std::vector<std::pair<size_t, CellCurve>> curved;
+  std::vector<float>
+      volumes;  // [cell] of parts of curved cells; 0: that of the linear cell. Empty: of all cells
 
   size_t size() const { return shapes.size(); }
   std::span<const uint64_t> cornersOfCell(size_t n) const {
@@ -61,8 +74,12 @@ struct MeshCells {
   }
 
   void clear();
-  /// A cell of any shape but kPolyhedron; further corners (of quadratic cells) are left out.
+  /// A cell of any shape but kPolyhedron; further corners are left out.
   void append(CellKind shape, std::span<const uint64_t> of_cell);
+  /// A cell of higher order, with all its nodes; of order 0 with its corners alone.
+  void appendCurved(CellKind shape, CellCurve curve, std::span<const uint64_t> nodes);
+  /// Cell n of others; of a curved one the corners. Neither its scalars nor whether it is hidden.
+  void appendOf(const MeshCells& others, size_t n);
   /// A prism over a polygon: the points of its bottom, then those of its top. kNone with fewer than 6 or an
   /// odd number.
   void appendPrism(std::span<const uint64_t> points);
@@ -97,6 +114,9 @@ class MeshSource : public DataSource {
   /// checkCells() refuses those that do not exist.
   virtual void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                          MeshCells& out) const = 0;
+
+  /// Whether some of its cells are curved (MeshCells::curved).
+  virtual bool hasCurvedCells() const { return false; }
 
   /// To be called before these scalars are read, in one thread: computes those that are made of the whole
   /// mesh, within `memory_bytes`. May be called again. Throws Interrupted once `progress` is stopped.

@@ -78,6 +78,10 @@ void addGridOptions(CLI::App& app, OpenGridOptions& options) {
       ->type_name("DIMENSION=VALUE")
       ->take_all()
       ->allow_extra_args(false);
+  addChoice<bool>(app, "--order",
+                  "own: cells of higher order are cut by their polynomials; 1: they are drawn by their "
+                  "corners (default own)",
+                  {{"own", true}, {"1", false}}, options.cut_curved);
   addGlobeOptions(app, options.globe);
   Plot3dForce& force = options.force;
   addChoice<ByteOrder>(app, "--byte-order", "Byte order of binary files",

@@ -32,6 +32,7 @@ namespace curvisplat {
 ///   options.time_step   --time-step
 ///   options.force       --byte-order, --records, --precision, --blocks, --iblank, --ascii, --binary
 ///   options.select      --select
+///   options.cut_curved  --order
 ///   options.globe       --sphere, --flat, --vertical-scale
 void addGridOptions(CLI::App& app, OpenGridOptions& options);
 

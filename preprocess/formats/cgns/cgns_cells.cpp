@@ -1,4 +1,5 @@
 #include "preprocess/formats/cgns/cgns_cells.h"
+#include "preprocess/mesh/curved_cells.h"
 
 #include <algorithm>
 #include <array>
@@ -186,7 +187,7 @@ void CgnsCells::readFixed(const CgnsSection& section, uint64_t first, uint64_t c
   std::array<uint64_t, kMaxNumbers> points{};
   for (uint64_t n = 0; n < count; ++n) {
     for (size_t node = 0; node < kind.nodes; ++node) points[node] = pointOf(nodes[n * kind.nodes + node]);
-    out.append(kind.cell, std::span(points).first(kind.nodes));
+    appendCurvedAsExodus(kind.cell, true, std::span(points).first(kind.nodes), out);
   }
 }
 
@@ -200,7 +201,7 @@ void CgnsCells::readMixed(const CgnsSection& section, uint64_t first, uint64_t c
     const auto from = static_cast<size_t>(begins[n]) - base;
     const CgnsElementKind kind = section.kindOf(numbers[from]);  // checked when the zone was opened
     for (size_t node = 0; node < kind.nodes; ++node) points[node] = pointOf(numbers[from + 1 + node]);
-    out.append(kind.cell, std::span(points).first(kind.nodes));
+    appendCurvedAsExodus(kind.cell, true, std::span(points).first(kind.nodes), out);
   }
 }
 

@@ -185,10 +185,7 @@ void CgnsMeshSource::warnOfKinds() {
     throw Error(
         "{}: its unstructured zones have no solid element; expected TETRA, PYRA, PENTA, HEXA or NFACE",
         file_->path().string());
-  if (all.curved > 0)
-    description_.warnings.push_back(
-        fmt::format("{} of {} solid elements are of higher order; they are drawn by their corners",
-                    all.curved, all.solid));
+  has_curved_cells_ = all.curved > 0;
   if (all.others > 0)
     description_.warnings.push_back(
         fmt::format("{} elements are nodes, lines or faces and are left out", all.others));

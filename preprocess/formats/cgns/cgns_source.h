@@ -37,6 +37,7 @@ class CgnsMeshSource final : public MeshSource {
                  const std::filesystem::path& folder);
 
   const GridDescription& description() const override { return description_; }
+  bool hasCurvedCells() const override { return has_curved_cells_; }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
@@ -52,6 +53,7 @@ class CgnsMeshSource final : public MeshSource {
   CgnsTree tree_;
   std::vector<CgnsCells> cells_;  // [zone]
   GridDescription description_;
+  bool has_curved_cells_ = false;
   std::vector<std::vector<CgnsArrays>> arrays_;  // [scalar][zone]
 };
 

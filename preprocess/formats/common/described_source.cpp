@@ -51,6 +51,7 @@ class DescribedMesh final : public MeshSource {
       : source_(std::move(source)), description_(std::move(description)), text_(std::move(text)) {}
 
   const GridDescription& description() const override { return description_; }
+  bool hasCurvedCells() const override { return source_->hasCurvedCells(); }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override {
     withText(text_, [&] { source_->readPoints(piece, first, count, scalars, out); });

@@ -41,7 +41,8 @@ struct OpenGridOptions {
   std::vector<std::string> function_names = {};  // variables of function files; override their .nam files
   GlobeOptions globe = {};                       // for grids in degrees
   std::vector<std::string> scalars = {};         // requested; select one of several grids in a file
-  std::vector<std::string> select = {};          // "month=3": of a dimension of NetCDF, the one value to read
+  std::optional<bool> cut_curved = {};   // cells of higher order (default); false: drawn by their corners
+  std::vector<std::string> select = {};  // "month=3": of a dimension of NetCDF, the one value to read
   std::optional<std::filesystem::path> names_folder = {};  // of the files that `grid` names; nullopt: its own
 
   /// What names in `grid` are relative to.

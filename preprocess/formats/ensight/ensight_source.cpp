@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -31,7 +32,8 @@ std::vector<uint64_t> pointsOf(const EnsightList& nodes, uint64_t first, uint64_
 void appendElements(const EnsightElements& elements, uint64_t first, uint64_t count, MeshCells& out) {
   const uint64_t each = elements.nodes_each;
   const std::vector<uint64_t> points = pointsOf(elements.nodes, first * each, count * each);
-  for (uint64_t n = 0; n < count; ++n) out.append(elements.kind, std::span(points).subspan(n * each, each));
+  for (uint64_t n = 0; n < count; ++n)
+    appendCurved(elements.kind, std::span(points).subspan(n * each, each), out);
 }
 
 void appendPolyhedra(const EnsightElements& elements, uint64_t first, uint64_t count, MeshCells& out) {
@@ -101,7 +103,7 @@ void EnsightData::chooseParts() {
 }
 
 void EnsightData::describeParts() {
-  uint64_t solid = 0, curved = 0, flat = 0;
+  uint64_t flat = 0;
   for (const EnsightPart& part : geometry_.parts) {
     const std::string name = part.name.empty() ? fmt::format("part {}", part.number) : part.name;
     if (structured_)
@@ -110,15 +112,11 @@ void EnsightData::describeParts() {
     else
       description_.pieces.push_back({name, description_.files[1], part.points, part.cells});
     for (const EnsightElements& elements : part.elements) {
-      const bool is_solid = elements.kind != CellKind::kNone;
-      (is_solid ? solid : flat) += elements.count;
-      if (is_solid && elements.nodes_each > cornersOf(elements.kind) && elements.nodes_each > 0)
-        curved += elements.kind == CellKind::kPolyhedron ? 0 : elements.count;
+      const size_t corners = cornersOf(elements.kind);
+      if (elements.kind == CellKind::kNone) flat += elements.count;
+      has_curved_cells_ |= corners > 0 && elements.nodes_each > corners;
     }
   }
-  if (curved > 0)
-    description_.warnings.push_back(
-        fmt::format("{} of {} solid elements are quadratic; they are drawn by their corners", curved, solid));
   if (flat > 0)
     description_.warnings.push_back(fmt::format("{} without volumes (points, lines, faces) {} left out",
                                                 countText(flat, "element"), isOrAre(flat)));

@@ -18,6 +18,7 @@ class EnsightData {
 
   bool structured() const { return structured_; }
   const std::vector<EnsightPart>& parts() const { return geometry_.parts; }
+  bool hasCurvedCells() const { return has_curved_cells_; }
   /// Blocks or pieces, and scalars: variable NAME; vectors NAME:mag, NAME:x, NAME:y, NAME:z.
   const GridDescription& description() const { return description_; }
   /// Values [first, first + to.size()) of a scalar in list `list` of a part, which has `count` values of each
@@ -36,7 +37,7 @@ class EnsightData {
     int component = 0;  // -1: the magnitude
   };
   EnsightGeometry geometry_;
-  bool structured_ = false;
+  bool structured_ = false, has_curved_cells_ = false;
   std::vector<std::vector<EnsightValues>> values_;  // [variable][part]
   std::vector<Scalar> scalars_;
   GridDescription description_;
@@ -46,6 +47,7 @@ class EnsightMeshSource final : public MeshSource {
  public:
   explicit EnsightMeshSource(EnsightData data) : data_(std::move(data)) {}
   const GridDescription& description() const override { return data_.description(); }
+  bool hasCurvedCells() const override { return data_.hasCurvedCells(); }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,

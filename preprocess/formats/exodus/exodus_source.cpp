@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -96,7 +97,7 @@ ExodusSource::ExodusSource(const OpenGridOptions& options)
 
 void ExodusSource::findBlocks() {
   const std::string name = file_->path().string();
-  uint64_t solid = 0, curved = 0, others = 0;
+  uint64_t solid = 0, others = 0;
   for (const size_t number : blocksIn(*file_)) {
     const NetcdfVariable* const connect = file_->find(fmt::format("connect{}", number));
     if (connect->dims.size() != 2)
@@ -118,7 +119,7 @@ void ExodusSource::findBlocks() {
       throw Error("{}: {} is of {} with {} nodes each; expected at most {}; the file is damaged", name,
                   connect->name, type, block.nodes_each, kMaxNodes);
     (block.kind == CellKind::kNone ? others : solid) += block.elements;
-    if (block.nodes_each > cornersOf(block.kind) && block.kind != CellKind::kNone) curved += block.elements;
+    has_curved_cells_ |= block.nodes_each > cornersOf(block.kind) && block.kind != CellKind::kNone;
     elements_ += block.elements;
     blocks_.push_back(block);
   }
@@ -127,9 +128,6 @@ void ExodusSource::findBlocks() {
         "{}: is a finite-element mesh (Exodus) without solid elements ({} others); expected HEX, TET, WEDGE "
         "or PYRAMID",
         name, others);
-  if (curved > 0)
-    description_.warnings.push_back(fmt::format(
-        "{} of {} solid elements are of higher order; they are drawn by their corners", curved, solid));
   if (others > 0)
     description_.warnings.push_back(
         fmt::format("{} elements are not HEX, TET, WEDGE or PYRAMID and are left out", others));
@@ -242,7 +240,7 @@ void ExodusSource::readCells(uint32_t, uint64_t first, uint64_t count, std::span
         points[n] = node >= 1 && node <= 0x1p53 ? static_cast<uint64_t>(node) - 1
                                                 : std::numeric_limits<uint64_t>::max();
       }
-      out.append(block.kind, points);
+      appendCurvedAsExodus(block.kind, false, points, out);
     }
     for (size_t n = 0; n < scalars.size(); ++n)
       readValues(

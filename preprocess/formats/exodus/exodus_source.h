@@ -23,6 +23,7 @@ class ExodusSource final : public MeshSource {
   explicit ExodusSource(const OpenGridOptions& options);
 
   const GridDescription& description() const override { return description_; }
+  bool hasCurvedCells() const override { return has_curved_cells_; }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
@@ -46,6 +47,7 @@ class ExodusSource final : public MeshSource {
   std::vector<Block> blocks_;
   std::vector<size_t> number_of_scalar_;  // [description_.scalars], from 1
   uint64_t nodes_ = 0, elements_ = 0;
+  bool has_curved_cells_ = false;
   GridDescription description_;
 };
 

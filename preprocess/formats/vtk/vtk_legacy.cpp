@@ -67,7 +67,10 @@ class LegacyReader : VtkLegacyFile {
   enum class Owner { kGrid, kPoints, kCells };
 
   void readHead() {
-    text_.line();  // "# vtk DataFile Version 3.0"
+    const std::string_view first = text_.line().value_or("");  // "# vtk DataFile Version 3.0"
+    double version = 0;
+    parseNumber(first.substr(std::min(first.size(), first.rfind(' ') + 1)), version);
+    cells_.older_edges = version < 5.1;
     text_.line();  // the title
     const std::string encoding = nextWord();
     if (encoding != "ascii" && encoding != "binary")

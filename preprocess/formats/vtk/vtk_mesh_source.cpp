@@ -12,6 +12,7 @@
 
 #include "preprocess/formats/common/cells_of_faces.h"
 #include "preprocess/formats/vtk/vtk_fields.h"
+#include "preprocess/mesh/curved_cells.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/error.h"
 
@@ -21,12 +22,12 @@ namespace {
 /// What becomes of VTK's cell types as cells of MeshSource.
 enum class VtkCellGroup : uint8_t {
   kLinear,
-  kCurved,    // quadratic, Lagrange, Bezier: drawn by their corners
+  kCurved,    // quadratic, Lagrange, Bezier
   kNotSolid,  // vertices, lines, faces
   kUnknown,
 };
 
-constexpr uint8_t kVtkPolyhedron = 42;
+constexpr uint8_t kVtkPolyhedron = 42, kVtkLagrangeHexahedron = 72, kVtkLagrangePyramid = 74;
 
 /// The solid that has the type's corners; kNone: another, or none.
 CellKind kindOf(uint8_t type) {
@@ -76,8 +77,9 @@ VtkCellGroup groupOf(uint8_t type) {
   return VtkCellGroup::kUnknown;
 }
 
-/// Appends a cell of any type but kVtkPolyhedron; kNone if it has fewer points than its type needs.
-void appendVtkCell(uint8_t type, std::span<const uint64_t> points, MeshCells& out) {
+/// Appends a cell of any type but kVtkPolyhedron; kNone if it has fewer points than its type needs. `older`: two edges of
+/// Lagrange's hexahedra are in each other's place, as before VTK 9.1.
+void appendVtkCell(uint8_t type, std::span<const uint64_t> points, bool older, MeshCells& out) {
   constexpr uint8_t kVoxel = 11, kPentagonalPrism = 15, kHexagonalPrism = 16;
   if (type == kVoxel && points.size() >= 8) {
     const std::array<uint64_t, 8> round{points[0], points[1], points[3], points[2],
@@ -86,7 +88,18 @@ void appendVtkCell(uint8_t type, std::span<const uint64_t> points, MeshCells& ou
   }
   if (type == kPentagonalPrism) return appendPrism(5, points, out);
   if (type == kHexagonalPrism) return appendPrism(6, points, out);
-  out.append(kindOf(type), points);
+  if (groupOf(type) != VtkCellGroup::kCurved) return out.append(kindOf(type), points);
+  // The control points of Bezier's cells, but their corners, lie outside. Pyramids of Lagrange have no order of nodes in VTK.
+  if (type >= kVtkLagrangePyramid) return out.appendCurved(kindOf(type), CellCurve{}, points);
+  if (type != kVtkLagrangeHexahedron || !older) return appendCurved(kindOf(type), points, out);
+  std::vector<uint64_t> nodes(points.begin(), points.end());
+  const size_t along = curveOf(CellKind::kHexahedron, points.size()).order;
+  if (along > 1) {
+    const auto edge = nodes.begin() + static_cast<ptrdiff_t>(8 + 10 * (along - 1));
+    std::rotate(edge, edge + static_cast<ptrdiff_t>(along - 1),
+                edge + static_cast<ptrdiff_t>(2 * (along - 1)));
+  }
+  appendCurved(CellKind::kHexahedron, nodes, out);
 }
 
 // Bits of vtkGhostType (vtkDataSetAttributes). Another piece has a duplicate cell; a duplicate point may
@@ -96,6 +109,7 @@ constexpr int kDuplicateCell = 1;
 constexpr int kHiddenCell = kDuplicateCell | 8 | 32;  // refined, hidden
 
 constexpr uint64_t kChunk = 65536;
+constexpr uint64_t kMaxPoints = uint64_t{1} << 24;  // of cells that are read together
 // Numbers of points are read as doubles, which hold them up to this.
 constexpr double kLargestInteger = 0x1p53;
 
@@ -224,10 +238,7 @@ void VtkMeshSource::checkTypes() {
     throw Error(
         "{}: has no solid cell ({} vertices, lines or faces); expected tetrahedra, hexahedra or others",
         mesh_.files.empty() ? "" : mesh_.files.front(), of(VtkCellGroup::kNotSolid));
-  if (of(VtkCellGroup::kCurved) > 0)
-    description_.warnings.push_back(
-        fmt::format("{} of {} solid cells are quadratic or of higher order; they are drawn by their corners",
-                    of(VtkCellGroup::kCurved), solid));
+  has_curved_cells_ = of(VtkCellGroup::kCurved) > 0;
   if (of(VtkCellGroup::kNotSolid) > 0)
     description_.warnings.push_back(
         fmt::format("{} cells are vertices, lines or faces and are left out", of(VtkCellGroup::kNotSolid)));
@@ -266,6 +277,9 @@ void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t co
   std::vector<uint64_t> types, points, faces;
   readIntegers(cells.types, first, count, types);
   const std::vector<uint64_t> begins = beginsOf(cells.ends, first, count, cells.connectivity.tuples, piece);
+  if (begins.back() - begins.front() > kMaxPoints)
+    throw Error("{}: cells {} to {} have {} points; expected at most {}; the file is damaged", piece.file,
+                first, first + count - 1, begins.back() - begins.front(), kMaxPoints);
   readIntegers(cells.connectivity, begins.front(), begins.back() - begins.front(), points);
   std::vector<uint64_t> face_ends;
   if (cells.face_ends) readIntegers(*cells.face_ends, first, count, face_ends);
@@ -285,7 +299,7 @@ void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t co
         std::span<const uint64_t>(points).subspan(begins[n] - begins.front(), begins[n + 1] - begins[n]);
     if (cells.counted && !of_cell.empty()) of_cell = of_cell.subspan(1);
     if (types[n] != kVtkPolyhedron) {
-      appendVtkCell(static_cast<uint8_t>(types[n]), of_cell, out);
+      appendVtkCell(static_cast<uint8_t>(types[n]), of_cell, cells.older_edges, out);
       if (out.shapes.back() == CellKind::kNone &&
           groupOf(static_cast<uint8_t>(types[n])) != VtkCellGroup::kNotSolid)
         throw Error("{}: cell {} of type {} has {} points, too few; the file is damaged", piece.file,

@@ -27,6 +27,7 @@ struct VtkCells {
   std::optional<VtkArray> face_ends;  // one a cell; -1 of others
   std::optional<VtkSharedFaces> shared_faces;  // in place of these two
   bool counted = false;                        // legacy: the points of a cell follow their number
+  bool older_edges = false;                    // of Lagrange's hexahedra: as before VTK 9.1
   bool faces_inline = false;                   // legacy: the points of a polyhedron are its faces
 };
 
@@ -57,6 +58,7 @@ class VtkMeshSource final : public MeshSource {
   explicit VtkMeshSource(VtkMesh mesh);
 
   const GridDescription& description() const override { return description_; }
+  bool hasCurvedCells() const override { return has_curved_cells_; }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
@@ -71,6 +73,7 @@ class VtkMeshSource final : public MeshSource {
   VtkMesh mesh_;
   GridDescription description_;
   VtkFields fields_;
+  bool has_curved_cells_ = false;
 };
 
 /// The integers of an array; negative ones and those that are none become the largest.

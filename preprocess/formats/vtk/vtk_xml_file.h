@@ -20,6 +20,8 @@ class VtkXmlFile {
 
   std::string name() const { return file_->name(); }
   const std::filesystem::path& path() const { return file_->path(); }
+  /// Of the format: 2.2.
+  double version() const { return root_.attribute("version").as_double(); }
   /// "StructuredGrid".
   const std::string& type() const { return type_; }
   /// The element with the name of the type. Throws Error if there is none.

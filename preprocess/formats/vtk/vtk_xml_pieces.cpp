@@ -108,6 +108,7 @@ VtkCells cellsOf(const VtkXmlFile& file, const Node& piece, uint64_t count) {
   };
   VtkCells cells;
   cells.cells = count;
+  cells.older_edges = file.version() < 2.1;
   cells.types = file.array(required("types"), count);
   cells.ends = file.array(required("offsets"), count);
   const uint64_t points = largestOf(cells.ends);
