@@ -62,11 +62,12 @@ class Binary:
         self.head += self.real(899) + self.ints(0) + self.text("name") + self.ints(0) + self.text("value")
 
     OPTIONS = {"strand": -1, "time": 0.0, "centrings": None, "shared": None, "passive": None, "point": False, "zone_type": 0,
-               "auxiliary": ()}
+               "auxiliary": (), "elements": None, "elements_of": -1, "face_neighbours": False}
 
     def zone(self, shape, arrays, name="", **options):
-        """`shape`: of the nodes, (k, j, i). `arrays`: of each variable, None if it is shared or passive. `options`: of OPTIONS."""
-        strand, time, centrings, shared, passive, point, zone_type, auxiliary = {**self.OPTIONS, **options}.values()
+        """`shape`: of the nodes, (k, j, i). `arrays`: of each variable, None if it is shared or passive. `options`: of OPTIONS.
+        Of finite elements `shape` is the number of nodes, `elements` their nodes, from 0."""
+        strand, time, centrings, shared, passive, point, zone_type, auxiliary, elements, elements_of, face_neighbours = {**self.OPTIONS, **options}.values()
         count = len(self.variables)
         self.head += self.real(299) + self.text(name)
         if self.version >= 107:
@@ -75,8 +76,8 @@ class Binary:
         if self.has_packing:
             self.head += self.ints(int(point))
         self.head += self.ints(1, *centrings) if centrings else self.ints(0)
-        self.head += self.ints(0, 0) if self.version >= 108 else self.ints(0)
-        self.head += self.ints(*shape[::-1])
+        self.head += self.ints(int(face_neighbours), 0) if self.version >= 108 else self.ints(int(face_neighbours))
+        self.head += self.ints(*shape[::-1]) if elements is None else self.ints(shape, len(elements), 0, 0, 0)
         for key, value in auxiliary:
             self.head += self.ints(1) + self.text(key) + self.ints(0) + self.text(value)
         self.head += self.ints(0)
@@ -85,7 +86,7 @@ class Binary:
         self.data += self.ints(*[1 if a is None else TYPES[a.dtype.str[1:]] for a in arrays])
         self.data += self.ints(1, *passive) if passive else self.ints(0)
         self.data += self.ints(1, *shared) if shared else self.ints(0)
-        self.data += self.ints(-1)
+        self.data += self.ints(elements_of)
         stored = [a for a in arrays if a is not None]
         for a in stored:
             self.data += struct.pack(self.order + "2d", a.min(), a.max())
@@ -95,6 +96,10 @@ class Binary:
         else:
             for a in stored:
                 self.data += flat(a).astype(a.dtype.newbyteorder(self.order)).tobytes()
+        if elements is not None and elements_of < 0:
+            self.data += self.ints(*np.ravel(elements))
+            if face_neighbours:
+                self.data += self.ints(*[-1] * (len(elements) * {4: 4, 8: 6}[len(elements[0])]))
         self.zones += 1
         assert len(arrays) == count
 

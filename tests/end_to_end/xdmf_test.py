@@ -300,7 +300,7 @@ class Xdmf(StructuredFormats):
         writer = self.new()
         text = grid(writer, block)
         shape = dims(block.shape)
-        for damaged, told in ((text.replace("3DSMesh", "Tetrahedron"), "unstructured grid"), (text.replace("3DSMesh", "Mixed"), "unstructured grid"),
+        for damaged, told in ((text.replace("3DSMesh", "Tetrahedron"), "has no DataItem"), (text.replace("3DSMesh", "Tesseract"), "has the topology Tesseract"),
                               (text.replace(f'3DSMesh" Dimensions="{shape}"', '3DSMesh" Dimensions="1 30 7"'), "is flat"),
                               (text.replace(f'3DSMesh" Dimensions="{shape}"', '3DSMesh" Dimensions="9 9 9"'), "expected 2187"),
                               (text.replace("a.h5", "b.h5"), "does not exist"), (text.replace("/group/1", "/group/9"), "no such data set"),

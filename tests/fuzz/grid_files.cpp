@@ -21,7 +21,7 @@ void fuzzTecplot(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.plt", bytes);
   options.temporary_folder = fuzzFolder();
-  if (isTecplot(InputFile(options.grid))) readGrid(TecplotSource(options));
+  if (isTecplot(InputFile(options.grid))) readData(*openTecplot(options));
 }
 
 const RegisteredFuzzTarget tecplot_target("tecplot", fuzzTecplot);
@@ -42,7 +42,7 @@ void fuzzXdmf(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.xmf", bytes);
   options.temporary_folder = fuzzFolder();
-  if (isXdmf(InputFile(options.grid))) readGrid(XdmfSource(options));
+  if (isXdmf(InputFile(options.grid))) readData(*openXdmf(options));
 }
 
 const RegisteredFuzzTarget xdmf_target("xdmf", fuzzXdmf);

@@ -80,8 +80,8 @@ constexpr GridFormat kFormats[] = {
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
     {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
-    {isTecplot, openAs<TecplotSource>, MoreFiles::kCombined},
-    {isXdmf, openAs<XdmfSource>, MoreFiles::kCombined},
+    {isTecplot, openTecplot, MoreFiles::kCombined},
+    {isXdmf, openXdmf, MoreFiles::kCombined},
 };
 
 // ---- scalars by name ----

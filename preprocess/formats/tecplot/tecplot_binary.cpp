@@ -99,6 +99,7 @@ class Words {
 struct ZoneLayout {
   bool point = false;  // packing
   uint64_t neighbours = 0;
+  bool has_face_neighbours = false;  // of all faces of its elements
 };
 
 bool isOfCells(const TecplotValues& values) {
@@ -182,8 +183,10 @@ class Reader {
     words_.integer();  // colour
     const int32_t type = words_.integer();
     if (type > 0 && static_cast<size_t>(type) < std::size(kTypeNames))
+      zone.element_nodes = tecplotElementNodes(kTypeNames[type]);
+    if (type > 0 && static_cast<size_t>(type) < std::size(kTypeNames) && zone.element_nodes == 0)
       refuseTecplotZone(words_.name(), zone, number, kTypeNames[type]);
-    if (type != 0) words_.damaged("the type of a zone", type, "0 to 7");
+    if (type != 0 && zone.element_nodes == 0) words_.damaged("the type of a zone", type, "0 to 7");
     if (has_packing_) layout.point = words_.flag("the packing of a zone");
     checkTecplotCounts(words_.name(), number + 1, data_.variables.size());
     // Each has a type in the data.
@@ -195,12 +198,22 @@ class Reader {
         values.centring = words_.flag("the centring of a variable") ? Centring::kCell : Centring::kNode;
     if (layout.point && std::any_of(zone.values.begin(), zone.values.end(), isOfCells))
       words_.damaged("the packing of a zone with values of cells", "by points", "by blocks");
-    if (words_.flag("the mark of face neighbours")) words_.damaged("the mark of face neighbours", 1, "0");
+    layout.has_face_neighbours = words_.flag("the mark of face neighbours");
+    if (layout.has_face_neighbours && zone.element_nodes == 0)
+      words_.damaged("the mark of face neighbours", 1, "0");
     if (version_ >= 108) {
       layout.neighbours = words_.count("the number of face neighbours");
-      if (layout.neighbours > 0) words_.integer();  // their mode
+      if (layout.neighbours > 0) words_.integer();                            // their mode
+      if (layout.neighbours > 0 && zone.element_nodes > 0) words_.integer();  // whether they are all
     }
-    for (uint64_t& nodes : zone.nodes) nodes = words_.count("a dimension of a zone");
+    if (zone.element_nodes > 0) {
+      zone.nodes[0] = words_.count("the number of nodes");
+      zone.elements = words_.count("the number of elements");
+      if (zone.elements == 0) words_.damaged("the number of elements", 0, "1 or more");
+      words_.skip(3 * 4);
+    } else {
+      for (uint64_t& nodes : zone.nodes) nodes = words_.count("a dimension of a zone");
+    }
     checkTecplotZone(words_.name(), zone, number, words_.size());
     while (words_.flag("the mark of auxiliary data")) skipAuxiliary();
     data_.zones.push_back(std::move(zone));
@@ -266,7 +279,7 @@ class Reader {
     words_.skip(16 * stored.size());  // minimum and maximum
     const uint64_t begin = words_.offset();
     uint64_t end = placeValues(zone, layouts_[number], stored, begin, false);
-    if (!endsWell(number, end, connectivity) && hasCells(stored)) {
+    if (zone.elements == 0 && !endsWell(number, end, connectivity) && hasCells(stored)) {
       // Some writers keep the last plane of cells.
       end = placeValues(zone, layouts_[number], stored, begin, true);
     }
@@ -274,7 +287,21 @@ class Reader {
       throw Error("{}: {} ends beyond the file's {} bytes; the file is truncated", words_.name(),
                   zone.describe(number), words_.size());
     words_.seek(end);
+    if (zone.elements > 0) placeElements(zone, number, connectivity);
     if (connectivity == -1) skipNeighbours(layouts_[number].neighbours, number);
+  }
+
+  void placeElements(TecplotZone& zone, size_t number, int32_t shared) {
+    if (shared >= 0) return shareTecplotElements(words_.name(), data_, static_cast<size_t>(shared), number);
+    TecplotValues& values = zone.connectivity;
+    values.type = TecplotType::kInt32;
+    values.swap = words_.swap();
+    values.bytes = std::make_shared<FileBytes>(words_.file(), 0, words_.size());
+    values.begin = words_.offset();
+    values.stride = 4;
+    words_.skip(4 * zone.elements * zone.element_nodes);
+    if (layouts_[number].has_face_neighbours)
+      words_.skip(4 * zone.elements * (zone.element_nodes == 4 ? 4 : 6));
   }
 
   static bool hasCells(const std::vector<TecplotValues*>& stored) {
@@ -295,8 +322,10 @@ class Reader {
       values->columns = zone.nodes[1];
       values->stride = layout.point ? node_bytes : bytesOf(values->type);
       const bool cells = values->centring == Centring::kCell && !last_plane;
-      const uint64_t count =
-          cells ? zone.nodes[0] * zone.nodes[1] * std::max<uint64_t>(1, zone.nodes[2] - 1) : zone.nodeCount();
+      const uint64_t count = zone.elements > 0 && isOfCells(*values) ? zone.elements
+                             : cells
+                                 ? zone.nodes[0] * zone.nodes[1] * std::max<uint64_t>(1, zone.nodes[2] - 1)
+                                 : zone.nodeCount();
       // No overflow: both are at most a few times the file's size.
       end += layout.point ? bytesOf(values->type) : count * bytesOf(values->type);
       if (end > words_.size()) return kNoEnd;

@@ -96,8 +96,28 @@ void shareTecplotValues(const std::string& file, TecplotData& data, size_t from,
   data.zones[to].values[variable] = data.zones[from].values[variable];
 }
 
+void shareTecplotElements(const std::string& file, TecplotData& data, size_t from, size_t to) {
+  TecplotZone& zone = data.zones[to];
+  if (from >= to || data.zones[from].elements != zone.elements ||
+      data.zones[from].element_nodes != zone.element_nodes)
+    throw Error(
+        "{}: {} shares the elements of zone {}; expected one of the zones before it, with as many of the "
+        "same kind",
+        file, zone.describe(to), from + 1);
+  zone.connectivity = data.zones[from].connectivity;
+}
+
+uint64_t tecplotElementNodes(std::string_view type) {
+  if (type == "FETETRAHEDRON" || type == "TETRAHEDRON") return 4;
+  return type == "FEBRICK" || type == "BRICK" ? 8 : 0;
+}
+
 void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most) {
   const auto [ni, nj, nk] = zone.nodes;
+  if (zone.elements > most)
+    throw Error(
+        "{}: {} declares {} elements, more than a file of this size can hold; it is truncated or damaged",
+        file, zone.describe(number), zone.elements);
   if (ni > 0 && nj > 0 && nk > 0 && ni <= most && nj <= most / ni && nk <= most / ni / nj) return;
   throw Error(
       "{}: {} declares {}x{}x{} nodes, more than a file of this size can hold; it is truncated or damaged",
@@ -107,7 +127,8 @@ void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t n
 void refuseTecplotZone(const std::string& file, const TecplotZone& zone, size_t number,
                        const std::string& type) {
   throw Error(
-      "{}: is a Tecplot file whose {} is {}, an unstructured zone, which is not read; expected ORDERED zones",
+      "{}: is a Tecplot file whose {} is {}, a kind of elements that is not read; expected ORDERED, "
+      "FETETRAHEDRON or FEBRICK",
       file, zone.describe(number), printable(type));
 }
 

@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
@@ -49,9 +50,13 @@ struct TecplotZone {
   std::array<uint64_t, 3> nodes{1, 1, 1};
   std::optional<double> time;         // of a zone that belongs to a series; nullopt: it belongs to every step
   std::vector<TecplotValues> values;  // [variable]
+  // Of finite elements, which have nodes[0] nodes: tetrahedra or bricks.
+  uint64_t elements = 0, element_nodes = 0;  // 0: the zone is ordered
+  TecplotValues connectivity;                // element_nodes numbers of nodes for each
+  uint64_t first_node = 0;                   // the lowest of these
 
   uint64_t nodeCount() const { return nodes[0] * nodes[1] * nodes[2]; }
-  bool flat() const { return nodes[0] < 2 || nodes[1] < 2 || nodes[2] < 2; }
+  bool flat() const { return elements == 0 && (nodes[0] < 2 || nodes[1] < 2 || nodes[2] < 2); }
   /// "zone 2 (wing)", for messages; `number` from 0.
   std::string describe(size_t number) const;
 };
@@ -70,10 +75,16 @@ void shareTecplotValues(const std::string& file, TecplotData& data, size_t from,
 /// each has a place in memory, whatever a damaged file says.
 void checkTecplotCounts(const std::string& file, size_t zones, uint64_t variables);
 
+/// The same for the elements of a zone.
+void shareTecplotElements(const std::string& file, TecplotData& data, size_t from, size_t to);
+
+/// Nodes of an element of this type of zone ("FEBRICK"); 0 if it is not of tetrahedra or bricks.
+uint64_t tecplotElementNodes(std::string_view type);
+
 /// Throws Error if the zone's dimensions are not positive, or if it has more than `most` nodes.
 void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most);
 
-/// Refuses a zone of finite elements by its name.
+/// Refuses a zone of other finite elements by its name.
 [[noreturn]] void refuseTecplotZone(const std::string& file, const TecplotZone& zone, size_t number,
                                     const std::string& type);
 

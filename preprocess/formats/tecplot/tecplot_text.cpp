@@ -115,6 +115,7 @@ struct TextZone {
   std::optional<double> time;
   std::optional<int64_t> strand;
   std::vector<int64_t> shared;  // [variable]: the zone, from 0; -1: none
+  int64_t elements_of = -1;     // the same of the elements
 };
 
 class Reader {
@@ -224,6 +225,9 @@ class Reader {
     }
     if (text.time && text.strand.value_or(1) != 0) zone.time = text.time;
     checkTecplotZone(file_->name(), zone, data_.zones.size() - 1, kMaxDimension);
+    zone.first_node = 1;
+    if ((zone.elements > 0) != (zone.element_nodes > 0))
+      fail("has a zone of finite elements without NODES, ELEMENTS and ZONETYPE");
   }
 
   void setKey(const std::string& key, const std::vector<TecplotToken>& value, TecplotZone& zone,
@@ -242,19 +246,25 @@ class Reader {
     const size_t index = data_.zones.size() - 1;
     if (key == "T") {
       zone.name = value.empty() ? "" : value.front().raw;
-    } else if (key == "I" || key == "J" || key == "K") {
-      zone.nodes[static_cast<size_t>(key[0] - 'I')] = count();
-    } else if (key == "IMAX" || key == "JMAX" || key == "KMAX") {
+    } else if (key == "I" || key == "J" || key == "K" || key == "IMAX" || key == "JMAX" || key == "KMAX") {
       zone.nodes[static_cast<size_t>(key[0] - 'I')] = count();
     } else if (key == "F" || key == "DATAPACKING") {
-      if (word.starts_with("FE")) refuseTecplotZone(file_->name(), zone, index, word);
-      if (word != "POINT" && word != "BLOCK") badValue(key, value);
-      text.point = word == "POINT";
+      if (!word.ends_with("POINT") && !word.ends_with("BLOCK")) badValue(key, value);
+      text.point = word.ends_with("POINT");
       text.has_packing = true;
     } else if (key == "ZONETYPE") {
-      if (word != "ORDERED") refuseTecplotZone(file_->name(), zone, index, word);
-    } else if (key == "ET" || key == "ELEMENTS" || key == "NODES" || key == "E" || key == "N") {
-      refuseTecplotZone(file_->name(), zone, index, "of finite elements");
+      zone.element_nodes = tecplotElementNodes(word);
+      if (word != "ORDERED" && zone.element_nodes == 0) refuseTecplotZone(file_->name(), zone, index, word);
+    } else if (key == "ET") {
+      zone.element_nodes = tecplotElementNodes(word);
+      if (zone.element_nodes == 0) refuseTecplotZone(file_->name(), zone, index, word);
+    } else if (key == "NODES" || key == "N") {
+      zone.nodes[0] = count();
+    } else if (key == "ELEMENTS" || key == "E") {
+      zone.elements = count();
+    } else if (key == "CONNECTIVITYSHAREZONE") {
+      if (count() > index) badValue(key, value);
+      text.elements_of = static_cast<int64_t>(count()) - 1;
     } else if (key == "SOLUTIONTIME") {
       text.time = number();
     } else if (key == "STRANDID") {
@@ -299,8 +309,10 @@ class Reader {
   }
 
   void setShared(const std::string& key, std::vector<TecplotToken> value, TextZone& text) {
-    std::erase_if(value, [](const TecplotToken& token) { return token.text == "FECONNECT"; });
     const size_t index = data_.zones.size() - 1;
+    if (std::erase_if(value, [](const TecplotToken& token) { return token.text == "FECONNECT"; }) > 0 &&
+        index > 0)
+      text.elements_of = static_cast<int64_t>(index) - 1;
     for (const auto& [numbers, word] : sets(key, value)) {
       size_t from = index;  // from 1: without a number the previous zone
       if (!word.empty()) {
@@ -347,11 +359,21 @@ class Reader {
       const uint64_t less = values->centring == Centring::kCell ? 1 : 0;
       std::array<uint64_t, 3> along = zone.nodes;
       for (uint64_t& n : along) n = std::max<uint64_t>(1, n - less);
+      if (zone.elements > 0) along = {less > 0 ? zone.elements : zone.nodes[0], 1, 1};
       values->row_pitch = along[0];
       values->columns = along[1];
       expected += point ? 1 : along[0] * along[1] * along[2];
     }
     if (point) expected = stored.size() * nodes;
+    if (text.elements_of >= 0) {
+      shareTecplotElements(file_->name(), data_, static_cast<size_t>(text.elements_of), index);
+    } else if (zone.elements > 0) {
+      stored.push_back(&zone.connectivity);
+      zone.connectivity.type = TecplotType::kDouble;
+      zone.connectivity.begin = 8 * expected;
+      zone.connectivity.stride = 8;
+      expected += zone.elements * zone.element_nodes;
+    }
     if (count < expected) failAtWord(count, expected);
     if (count != expected)
       throw Error("{}: {} has {} numbers; expected {}, for {} variables of {}x{}x{} nodes; {}", file_->name(),

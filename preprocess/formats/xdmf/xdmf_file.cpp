@@ -19,21 +19,61 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kLooked = 2048;
+// The words that a cell of a Mixed topology may have: a polyhedron's.
+constexpr uint64_t kMaxWords = 100'000;
+
+constexpr XdmfCellType kCellTypes[] = {{"polyvertex", 1, CellKind::kNone, 0, true},
+                                       {"polyline", 2, CellKind::kNone, 0, true},
+                                       {"polygon", 3, CellKind::kNone, 0, true},
+                                       {"triangle", 4, CellKind::kNone, 3},
+                                       {"quadrilateral", 5, CellKind::kNone, 4},
+                                       {"tetrahedron", 6, CellKind::kTetrahedron, 4},
+                                       {"pyramid", 7, CellKind::kPyramid, 5},
+                                       {"wedge", 8, CellKind::kWedge, 6},
+                                       {"hexahedron", 9, CellKind::kHexahedron, 8},
+                                       {"polyhedron", 16, CellKind::kPolyhedron, 0, true},
+                                       {"edge_3", 34, CellKind::kNone, 3},
+                                       {"quadrilateral_9", 35, CellKind::kNone, 9},
+                                       {"triangle_6", 36, CellKind::kNone, 6},
+                                       {"quadrilateral_8", 37, CellKind::kNone, 8},
+                                       {"tetrahedron_10", 38, CellKind::kTetrahedron, 10},
+                                       {"pyramid_13", 39, CellKind::kPyramid, 13},
+                                       {"wedge_15", 40, CellKind::kWedge, 15},
+                                       {"wedge_18", 41, CellKind::kWedge, 18},
+                                       {"hexahedron_20", 48, CellKind::kHexahedron, 20},
+                                       {"hexahedron_24", 49, CellKind::kHexahedron, 24},
+                                       {"hexahedron_27", 50, CellKind::kHexahedron, 27}};
+
+/// The type that a topology names; short forms (Tet_10, Hex_20) are known, too.
+const XdmfCellType* typeNamed(std::string name) {
+  for (const auto& [brief, full] : {std::pair("tet_", "tetrahedron_"), std::pair("hex_", "hexahedron_"),
+                                    std::pair("tri_", "triangle_"), std::pair("quad_", "quadrilateral_")})
+    if (name.starts_with(brief)) name = full + name.substr(std::string_view(brief).size());
+  const auto found = std::find_if(std::begin(kCellTypes), std::end(kCellTypes),
+                                  [&](const XdmfCellType& type) { return name == type.name; });
+  return found == std::end(kCellTypes) ? nullptr : found;
+}
 
 class Reader {
  public:
   explicit Reader(const OpenGridOptions& options)
-      : document_(options.grid), items_(document_, options.namesFolder()) {
+      : document_(options.grid), items_(document_, options.namesFolder()), folder_(options.temporary_folder) {
     for (const pugi::xml_node grid : document_.domain().children("Grid")) findLeaves(grid, std::nullopt, 0);
-    if (leaves_.empty()) throw Error("{}: has no Grid; expected a structured grid", name());
+    if (leaves_.empty()) throw Error("{}: has no Grid", name());
     chooseStep(options);
   }
 
   XdmfFile run() {
     std::string flat;
     size_t flat_count = 0;
+    std::vector<XdmfGrid> meshes;
     for (const Leaf& leaf : leaves_) {
       XdmfGrid grid = readGrid(leaf.node);
+      if (grid.cells.count > 0) {
+        meshes.push_back(std::move(grid));
+        continue;
+      }
+      if (grid.nodes[0] == 0) continue;  // without solid cells
       if (std::all_of(grid.nodes.begin(), grid.nodes.end(), [](uint64_t n) { return n > 1; })) {
         file_.grids.push_back(std::move(grid));
         continue;
@@ -42,8 +82,14 @@ class Reader {
       if (flat.empty())
         flat = fmt::format("{} of {}x{}x{} nodes", grid.name, grid.nodes[0], grid.nodes[1], grid.nodes[2]);
     }
+    if (file_.grids.empty() && meshes.empty())
+      throw Error("{}: has no grid with volume{}; expected a three-dimensional grid", name(),
+                  flat.empty() ? "" : ": " + flat + " is flat");
     if (file_.grids.empty())
-      throw Error("{}: has no grid with volume: {} is flat; expected a three-dimensional grid", name(), flat);
+      file_.grids = std::move(meshes);
+    else if (!meshes.empty())
+      warn(fmt::format("{} of {} grids are unstructured and left out, such as {}", meshes.size(),
+                       leaves_.size(), meshes.front().name));
     if (flat_count > 0)
       file_.warnings.push_back(
           fmt::format("{} of {} grids are flat and left out, such as {}", flat_count, leaves_.size(), flat));
@@ -141,11 +187,15 @@ class Reader {
       throw Error("{} has no Topology; expected 3DSMesh, 3DRectMesh or 3DCoRectMesh",
                   document_.describe(node));
     const std::string type = xdmfAttribute(topology, {"TopologyType", "Type"}), small = lowerCase(type);
-    if (!small.ends_with("smesh") && !small.ends_with("rectmesh"))
-      throw Error(
-          "{} has the topology {}, an unstructured grid, which is not read; expected 3DSMesh, 3DRectMesh or "
-          "3DCoRectMesh",
-          document_.describe(node), printable(type.substr(0, 40)));
+    if (!small.ends_with("smesh") && !small.ends_with("rectmesh")) {
+      if (small != "mixed" && !typeNamed(small))
+        throw Error(
+            "{} has the topology {}, which is not read; expected 3DSMesh, 3DRectMesh, 3DCoRectMesh, Mixed, "
+            "Tetrahedron, Hexahedron or the like",
+            document_.describe(node), printable(type.substr(0, 40)));
+      readMesh(node, topology, typeNamed(small), grid);
+      return grid;
+    }
     const std::vector<uint64_t> counts =
         document_.countsIn(topology, xdmfAttribute(topology, {"Dimensions", "NumberOfElements"}));
     if (counts.empty() || counts.size() > 3)
@@ -163,6 +213,94 @@ class Reader {
     for (const pugi::xml_node attribute : node.children("Attribute"))
       readAttribute(document_.resolved(attribute), grid);
     return grid;
+  }
+
+  /// `type`: null for Mixed. Without solid cells the grid stays without points.
+  void readMesh(const pugi::xml_node& node, const pugi::xml_node& topology, const XdmfCellType* type,
+                XdmfGrid& grid) {
+    const pugi::xml_node geometry = document_.resolved(node.child("Geometry")),
+                         first = geometry.child("DataItem");
+    if (type && type->shape == CellKind::kNone) {
+      warn(fmt::format("grids of the topology {} have no volume and are left out", type->name));
+      return;
+    }
+    if (!first) throw Error("{} has no Geometry with a DataItem", document_.describe(node));
+    const std::string kind = lowerCase(xdmfAttribute(geometry, {"GeometryType", "Type"}));
+    const uint64_t numbers = items_.read(first)->size();
+    grid.nodes = {kind == "x_y_z" ? numbers : numbers / 3, 1, 1};
+    readGeometry(geometry, grid, document_.describe(node));
+    if (grid.kind != XdmfGrid::Kind::kPoints && grid.kind != XdmfGrid::Kind::kSeparate)
+      throw Error("{}: its Geometry is {}; expected XYZ or X_Y_Z", document_.describe(node),
+                  printable(kind.substr(0, 40)));
+    const pugi::xml_node item = topology.child("DataItem");
+    if (!item) throw Error("{} has no DataItem", document_.describe(topology));
+    XdmfCells& cells = grid.cells;
+    cells.connectivity = items_.read(item);
+    const std::string stated = xdmfAttribute(topology, {"NumberOfElements", "Dimensions"});
+    const std::vector<uint64_t> counts =
+        stated.empty() ? std::vector<uint64_t>() : document_.countsIn(topology, stated);
+    const uint64_t expected = counts.empty() ? 0 : counts[0];
+    if (type && !type->counted) {
+      cells.shape = type->shape;
+      cells.nodes_each = type->nodes;
+      cells.curved = type->nodes > cornersOf(type->shape);
+      cells.count = cells.connectivity->size() / type->nodes;
+    } else {
+      indexMixed(type, document_.describe(topology), cells);
+    }
+    if ((expected > 0 && cells.count != expected) ||
+        (cells.nodes_each > 0 && cells.connectivity->size() % cells.nodes_each != 0))
+      throw Error("{} has {} numbers, which are {} cells; expected {}", document_.describe(topology),
+                  cells.connectivity->size(), cells.count, expected);
+    for (const pugi::xml_node attribute : node.children("Attribute"))
+      readAttribute(document_.resolved(attribute), grid);
+  }
+
+  /// Finds where each cell begins. `only`: the type of all, which then does not stand before them.
+  void indexMixed(const XdmfCellType* only, const std::string& where, XdmfCells& cells) {
+    constexpr uint64_t kAtOnce = 32 << 10;
+    NumberSpool<uint64_t> begins(folder_);
+    const uint64_t all = cells.connectivity->size();
+    std::vector<double> window;
+    uint64_t window_begin = 0, at = 0;
+    const auto next = [&] {
+      if (at >= all) throw Error("{} ends within cell {}; the file is truncated", where, begins.size());
+      if (at - window_begin >= window.size()) {
+        window_begin = at;
+        window.resize(static_cast<size_t>(std::min(kAtOnce, all - at)));
+        cells.connectivity->read(at, window);
+      }
+      const double number = window[static_cast<size_t>(at++ - window_begin)];
+      if (!(number >= 0 && number < 0x1p53))
+        throw Error("{} has the number {} in cell {}", where, number, begins.size());
+      return static_cast<uint64_t>(number);
+    };
+    const auto skip = [&](uint64_t numbers) {
+      if (numbers > std::min(kMaxWords, all - at))
+        throw Error("{}: cell {} has {} points; expected {} at most", where, begins.size(), numbers,
+                    std::min(kMaxWords, all - at));
+      at += numbers;
+    };
+    while (at < all) {
+      const uint64_t begin = at, number = only ? only->number : next();
+      const XdmfCellType* const type = xdmfCellType(number);
+      if (!type)
+        throw Error("{}: cell {} is of type {}, which XDMF does not have", where, begins.size(), number);
+      begins.add(begin);
+      cells.curved |= type->shape != CellKind::kNone && type->nodes > cornersOf(type->shape);
+      if (type->shape == CellKind::kPolyhedron) {
+        for (uint64_t faces = next(); faces > 0; --faces) {
+          skip(next());
+          if (at - begin > kMaxWords) throw Error("{}: cell {} has too many faces", where, begins.size() - 1);
+        }
+      } else {
+        skip(type->counted ? next() : type->nodes);
+      }
+    }
+    cells.count = begins.size();
+    begins.add(all);
+    cells.begins = begins.finish();
+    cells.shape = only ? only->shape : CellKind::kNone;
   }
 
   void readGeometry(const pugi::xml_node& geometry, XdmfGrid& grid, const std::string& where) {
@@ -230,8 +368,10 @@ class Reader {
       warn(fmt::format("attribute {} is left out: {}", attribute.name, error.what()));
       return;
     }
-    const uint64_t less = attribute.centring == Centring::kCell ? 1 : 0;
-    const uint64_t samples = (grid.nodes[0] - less) * (grid.nodes[1] - less) * (grid.nodes[2] - less);
+    const uint64_t less = attribute.centring == Centring::kCell && grid.cells.count == 0 ? 1 : 0;
+    const uint64_t samples = attribute.centring == Centring::kCell && less == 0
+                                 ? grid.cells.count
+                                 : (grid.nodes[0] - less) * (grid.nodes[1] - less) * (grid.nodes[2] - less);
     attribute.components = attribute.values->size() / samples;
     constexpr uint64_t kMaxComponents = 4096;
     if (attribute.values->size() % samples != 0 || attribute.components == 0 ||
@@ -256,6 +396,7 @@ class Reader {
 
   XdmfDocument document_;
   XdmfItems items_;
+  const std::filesystem::path folder_;     // of temporary files
   std::map<pugi::xml_node, Times> times_;  // of temporal collections
   std::vector<Leaf> leaves_;
   size_t visited_ = 0;
@@ -263,6 +404,12 @@ class Reader {
 };
 
 }  // namespace
+
+const XdmfCellType* xdmfCellType(uint64_t number) {
+  const auto found = std::find_if(std::begin(kCellTypes), std::end(kCellTypes),
+                                  [&](const XdmfCellType& type) { return number == type.number; });
+  return found == std::end(kCellTypes) ? nullptr : found;
+}
 
 bool isXdmf(const InputFile& file) {
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');

@@ -17,8 +17,10 @@
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/xdmf/xdmf_values.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
 
@@ -29,6 +31,16 @@ struct XdmfAttribute {
   std::shared_ptr<const XdmfValues> values;  // null: not in this grid
 };
 
+/// The cells of an unstructured grid: all of one kind, or each with its type before its points (Mixed).
+struct XdmfCells {
+  uint64_t count = 0;  // 0: the grid is structured
+  CellKind shape = CellKind::kNone;
+  uint64_t nodes_each = 0;  // 0: Mixed
+  bool curved = false;      // some have more nodes than corners
+  std::shared_ptr<const XdmfValues> connectivity;
+  SpooledNumbers begins;  // of Mixed: where each cell begins among the numbers, and the end of the last
+};
+
 struct XdmfGrid {
   enum class Kind { kPoints, kSeparate, kAxes, kUniform };
   std::string name;
@@ -37,15 +49,28 @@ struct XdmfGrid {
   /// kPoints: one array of x, y, z; kSeparate: x, y and z of the nodes; kAxes: along i, j and k.
   std::array<std::shared_ptr<const XdmfValues>, 3> places;
   std::array<double, 3> origin{}, spacing{};  // kUniform: x, y, z
+  XdmfCells cells;                            // of an unstructured grid, with nodes[0] points
   std::vector<XdmfAttribute> attributes;
 };
 
 struct XdmfFile {
-  std::vector<XdmfGrid> grids;  // of the chosen time step, with volume
+  std::vector<XdmfGrid> grids;  // of the chosen time step, with volume: all structured, or all unstructured
   std::vector<double> times;
   uint32_t time_step = 0;
   std::vector<std::string> files, warnings;
 };
+
+/// What a type of a Mixed topology stands for. `counted`: of polygons and the like the number of points comes before them, of
+/// polyhedra that of faces, and before each face that of its points.
+struct XdmfCellType {
+  const char* name;  // of a topology of this type alone, in lower case
+  uint64_t number;
+  CellKind shape;
+  uint64_t nodes;
+  bool counted = false;
+};
+/// Null if there is no such type.
+const XdmfCellType* xdmfCellType(uint64_t number);
 
 /// Whether the file is XML with the element Xdmf.
 bool isXdmf(const InputFile& file);

@@ -6,11 +6,16 @@
 #include <cmath>
 #include <limits>
 
+#include "preprocess/mesh/curved_cells.h"
+#include "stream/base/error.h"
+#include "stream/base/text.h"
+
 namespace curvisplat {
 namespace {
 
 constexpr int kMagnitude = -1;
 constexpr size_t kBufferNumbers = 64 << 10;
+constexpr uint64_t kMaxNumbers = uint64_t{1} << 24;  // of cells that are read together
 
 /// Calls use(tuple number, its components) for the tuples [first, first + count), a buffer at a time.
 template <typename Use>
@@ -43,57 +48,54 @@ const XdmfAttribute* attributeNamed(const XdmfGrid& grid, const std::string& nam
   return nullptr;
 }
 
-}  // namespace
-
-XdmfSource::XdmfSource(const OpenGridOptions& options) : file_(readXdmf(options)) {
-  description_.files = file_.files;
-  description_.times = file_.times;
-  description_.time_step = file_.time_step;
-  description_.warnings = file_.warnings;
-  description_.coordinate_bytes = 4;
-  for (const XdmfGrid& grid : file_.grids) {
-    description_.blocks.push_back({grid.name, grid.nodes[0], grid.nodes[1], grid.nodes[2], false});
-    for (const auto& places : grid.places)
-      if (grid.kind == XdmfGrid::Kind::kUniform || (places && places->valueBytes() == 8))
-        description_.coordinate_bytes = 8;
-  }
-  const size_t grids = file_.grids.size();
-  description_.format = fmt::format("XDMF, {} structured grid{}", grids, grids == 1 ? "" : "s");
-  addScalars();
+/// What is no number of a point becomes the largest, which is refused.
+uint64_t pointOf(double number) {
+  return number >= 0 && number <= 0x1p53 ? static_cast<uint64_t>(number)
+                                         : std::numeric_limits<uint64_t>::max();
 }
 
-void XdmfSource::addScalars() {
-  std::vector<Scalar> attributes;
-  for (const XdmfGrid& grid : file_.grids)
+/// Files, times, warnings and scalars.
+std::vector<XdmfScalar> describe(const XdmfFile& file, GridDescription& description) {
+  description.files = file.files;
+  description.times = file.times;
+  description.time_step = file.time_step;
+  description.warnings = file.warnings;
+  description.coordinate_bytes = 4;
+  for (const XdmfGrid& grid : file.grids)
+    for (const auto& places : grid.places)
+      if (grid.kind == XdmfGrid::Kind::kUniform || (places && places->valueBytes() == 8))
+        description.coordinate_bytes = 8;
+  std::vector<XdmfScalar> attributes, scalars;
+  for (const XdmfGrid& grid : file.grids)
     for (const XdmfAttribute& attribute : grid.attributes) {
-      const auto same = [&](const Scalar& other) {
+      const auto same = [&](const XdmfScalar& other) {
         return other.name == attribute.name && other.centring == attribute.centring &&
                other.components == attribute.components;
       };
       if (std::none_of(attributes.begin(), attributes.end(), same))
         attributes.push_back({attribute.name, attribute.centring, attribute.components, 0});
     }
-  for (const Scalar& attribute : attributes) {
+  for (const XdmfScalar& attribute : attributes) {
     const auto lacks = [&](const XdmfGrid& grid) {
       return !attributeNamed(grid, attribute.name, attribute.centring, attribute.components);
     };
-    const auto without = std::count_if(file_.grids.begin(), file_.grids.end(), lacks);
+    const auto without = std::count_if(file.grids.begin(), file.grids.end(), lacks);
     if (without > 0)
-      description_.warnings.push_back(
+      description.warnings.push_back(
           fmt::format("{} of {} grids have no attribute {}; they are not drawn with it", without,
-                      file_.grids.size(), attribute.name));
+                      file.grids.size(), attribute.name));
     const auto add = [&](const std::string& suffix, int component) {
       GridScalar scalar;
       scalar.centring = attribute.centring;
       scalar.name = attribute.name + suffix;
       const auto taken = [&](const GridScalar& other) { return other.name == scalar.name; };
-      const std::vector<GridScalar>& known = description_.scalars;
+      const std::vector<GridScalar>& known = description.scalars;
       if (std::any_of(known.begin(), known.end(), taken) && scalar.centring == Centring::kCell)
         scalar.name = attribute.name + ":cell" + suffix;
       if (std::any_of(known.begin(), known.end(), taken))
-        scalar.name += fmt::format(":{}", scalars_.size() + 1);
-      description_.scalars.push_back(std::move(scalar));
-      scalars_.push_back({attribute.name, attribute.centring, attribute.components, component});
+        scalar.name += fmt::format(":{}", scalars.size() + 1);
+      description.scalars.push_back(std::move(scalar));
+      scalars.push_back({attribute.name, attribute.centring, attribute.components, component});
     };
     if (attribute.components == 1) {
       add("", 0);
@@ -103,6 +105,109 @@ void XdmfSource::addScalars() {
     if (vector) add(":mag", kMagnitude);
     for (uint64_t c = 0; c < attribute.components; ++c)
       add(vector ? fmt::format(":{}", "xyz"[c]) : fmt::format(":{}", c), static_cast<int>(c));
+  }
+  return scalars;
+}
+
+}  // namespace
+
+std::unique_ptr<DataSource> openXdmf(const OpenGridOptions& options) {
+  XdmfFile file = readXdmf(options);
+  if (file.grids.front().cells.count > 0) return std::make_unique<XdmfMeshSource>(std::move(file));
+  return std::make_unique<XdmfSource>(std::move(file));
+}
+
+XdmfSource::XdmfSource(XdmfFile file) : file_(std::move(file)), scalars_(describe(file_, description_)) {
+  for (const XdmfGrid& grid : file_.grids)
+    description_.blocks.push_back({grid.name, grid.nodes[0], grid.nodes[1], grid.nodes[2], false});
+  description_.format = fmt::format("XDMF, {}", countText(file_.grids.size(), "structured grid"));
+}
+
+XdmfMeshSource::XdmfMeshSource(XdmfFile file)
+    : file_(std::move(file)), scalars_(describe(file_, description_)) {
+  for (const XdmfGrid& grid : file_.grids)
+    description_.pieces.push_back({grid.name, file_.files.front(), grid.nodes[0], grid.cells.count});
+  description_.format = fmt::format("XDMF, {}", countText(file_.grids.size(), "unstructured grid"));
+}
+
+bool XdmfMeshSource::hasCurvedCells() const {
+  return std::any_of(file_.grids.begin(), file_.grids.end(),
+                     [](const XdmfGrid& grid) { return grid.cells.curved; });
+}
+
+void XdmfMeshSource::readScalars(const XdmfGrid& grid, uint64_t first, uint64_t count,
+                                 std::span<const uint32_t> scalars,
+                                 std::vector<std::vector<float>>& out) const {
+  out.resize(scalars.size());
+  for (size_t n = 0; n < scalars.size(); ++n) {
+    const XdmfScalar& scalar = scalars_.at(scalars[n]);
+    out[n].assign(count, std::numeric_limits<float>::quiet_NaN());
+    if (const XdmfAttribute* const attribute =
+            attributeNamed(grid, scalar.name, scalar.centring, scalar.components))
+      forEachTuple(*attribute->values, scalar.components, first, count,
+                   [&](uint64_t tuple, std::span<const double> values) {
+                     out[n][tuple] = pick<float>(values, scalar.component);
+                   });
+  }
+}
+
+void XdmfMeshSource::readPoints(uint32_t piece, uint64_t first, uint64_t count,
+                                std::span<const uint32_t> scalars, MeshPoints& out) const {
+  const XdmfGrid& grid = file_.grids.at(piece);
+  const std::array<std::vector<double>*, 3> axes{&out.x, &out.y, &out.z};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    axes[axis]->resize(count);
+    if (grid.kind == XdmfGrid::Kind::kSeparate) grid.places[axis]->read(first, *axes[axis]);
+  }
+  if (grid.kind == XdmfGrid::Kind::kPoints)
+    forEachTuple(*grid.places[0], 3, first, count, [&](uint64_t n, std::span<const double> place) {
+      for (size_t axis = 0; axis < 3; ++axis) (*axes[axis])[n] = place[axis];
+    });
+  out.hidden.assign(count, 0);
+  readScalars(grid, first, count, scalars, out.scalars);
+}
+
+void XdmfMeshSource::readCells(uint32_t piece, uint64_t first, uint64_t count,
+                               std::span<const uint32_t> scalars, MeshCells& out) const {
+  const XdmfGrid& grid = file_.grids.at(piece);
+  const uint64_t each = grid.cells.nodes_each;
+  out.clear();
+  if (each == 0) {
+    readMixed(grid, first, count, out);
+  } else {
+    std::vector<double> numbers(count * each);
+    if (count > 0) grid.cells.connectivity->read(first * each, numbers);
+    std::vector<uint64_t> points(each);
+    for (uint64_t n = 0; n < count; ++n) {
+      for (uint64_t node = 0; node < each; ++node) points[node] = pointOf(numbers[n * each + node]);
+      appendCurved(grid.cells.shape, points, out);
+    }
+  }
+  readScalars(grid, first, count, scalars, out.scalars);
+}
+
+void XdmfMeshSource::readMixed(const XdmfGrid& grid, uint64_t first, uint64_t count, MeshCells& out) const {
+  if (count == 0) return;
+  std::vector<uint64_t> begins(count + 1);
+  grid.cells.begins.read(first, std::span(begins));
+  if (begins.back() - begins.front() > kMaxNumbers)
+    throw Error("{}: {}: cells {} to {} have {} numbers; expected at most {}", file_.files.front(), grid.name,
+                first, first + count - 1, begins.back() - begins.front(), kMaxNumbers);
+  std::vector<double> numbers(begins.back() - begins.front());
+  grid.cells.connectivity->read(begins.front(), numbers);
+  std::vector<uint64_t> words;
+  for (uint64_t n = 0; n < count; ++n) {
+    words.clear();
+    for (uint64_t at = begins[n]; at < begins[n + 1]; ++at)
+      words.push_back(pointOf(numbers[at - begins.front()]));
+    const bool has_type = grid.cells.shape == CellKind::kNone;  // else all are polyhedra
+    const CellKind shape = has_type ? xdmfCellType(words[0])->shape : grid.cells.shape;
+    const std::span<const uint64_t> rest = std::span<const uint64_t>(words).subspan(has_type ? 1 : 0);
+    if (shape != CellKind::kPolyhedron)
+      appendCurved(shape, shape == CellKind::kNone ? std::span<const uint64_t>() : rest, out);
+    else if (rest.empty() || !out.appendPolyhedron(rest[0], rest.subspan(1)))
+      throw Error("{}: {}: polyhedron {} has faces that do not add up; the file is damaged",
+                  file_.files.front(), grid.name, first + n);
   }
 }
 
@@ -154,7 +259,7 @@ void XdmfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
   for (size_t n = 0; n < scalars.size(); ++n) {
     std::vector<float>& to = out.scalars[n];
     to.assign(nodes, std::numeric_limits<float>::quiet_NaN());
-    const Scalar& scalar = scalars_.at(scalars[n]);
+    const XdmfScalar& scalar = scalars_.at(scalars[n]);
     const XdmfAttribute* const attribute =
         attributeNamed(grid, scalar.name, scalar.centring, scalar.components);
     if (!attribute) continue;

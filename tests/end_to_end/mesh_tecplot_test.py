@@ -1,0 +1,98 @@
+#!/usr/bin/python3
+"""mesh_tecplot_test.py CURVISPLAT
+
+Tecplot's zones of finite elements, text and binary, written from its Data Format Guide: mesh_formats.py says how. Exit status 77
+(skipped) without python3-vtk9.
+"""
+import unittest
+
+from mesh_formats import Mesh, MeshFormats, np
+from tecplot_files import Binary
+
+NAMES = {4: ("FETETRAHEDRON", "TETRAHEDRON", 4), 8: ("FEBRICK", "BRICK", 5)}
+
+
+class TecplotMeshes(MeshFormats):
+    def setUp(self):
+        super().setUp()
+        self.path = self.folder / "a.dat"
+
+    def write_text(self, zones):
+        """Of (words of the header, rows of numbers)."""
+        lines = ['VARIABLES = "X" "Y" "Z" "p" "c"']
+        for words, rows in zones:
+            lines += [f"ZONE {words}", *(" ".join(map(repr, np.asarray(row).tolist())) for row in rows)]
+        self.path.write_text("\n".join(lines) + "\n")
+        return self.path
+
+    def blocks(self, mesh, elements=True):
+        return [*mesh.points.T, mesh.p, mesh.c, *((np.array(mesh.cells) + 1) if elements else [])]
+
+    def words(self, mesh, kind):
+        return f"N={len(mesh.points)}, E={len(mesh.cells)}, ZONETYPE={NAMES[kind][0]}, DATAPACKING=BLOCK, VARLOCATION=([5]=CELLCENTERED)"
+
+    def test_text(self):
+        for kind in (4, 8):
+            mesh = Mesh(2, (kind,))
+            self.expect_same([self.write_text([(self.words(mesh, kind), self.blocks(mesh))])], mesh.vtk())
+            # By points, in the words of older files; c is a variable of nodes then.
+            rows = [*np.column_stack([mesh.points, mesh.p, mesh.p]), *(np.array(mesh.cells) + 1)]
+            self.write_text([(f"T=\"a\", N={len(mesh.points)}, E={len(mesh.cells)}, F=FEPOINT, ET={NAMES[kind][1]}", rows)])
+            self.expect_same([self.path], mesh.vtk(), {"c": None})
+
+    def test_shared_elements(self):
+        mesh, words = Mesh(2, (8,)), None
+        words = self.words(mesh, 8)
+        zones = [(words + ", SOLUTIONTIME=1, STRANDID=1", self.blocks(mesh))]
+        first = mesh.p
+        mesh.p = mesh.p[::-1].copy()
+        zones.append((words + ", SOLUTIONTIME=2, STRANDID=1, VARSHARELIST=([1-3]=1), CONNECTIVITYSHAREZONE=1", [mesh.p, mesh.c]))
+        self.write_text(zones)
+        self.expect_same([self.path], mesh.vtk(), options=["--time-step", 1])
+        mesh.p = first
+        self.expect_same([self.path], mesh.vtk(), options=["--time-step", 0])
+        file = Binary(["X", "Y", "Z", "p", "c"])
+        arrays = [*mesh.points.T.copy(), mesh.p, mesh.c]
+        options = {"centrings": [0, 0, 0, 0, 1], "zone_type": 5, "elements": mesh.cells, "strand": 0}
+        file.zone(len(mesh.points), arrays, time=1.0, **options)
+        file.zone(len(mesh.points), [None] * 3 + [first[::-1].copy(), mesh.c], time=2.0, shared=[0, 0, 0, -1, -1], elements_of=0, **options)
+        file.write(self.path)
+        mesh.p = first[::-1].copy()
+        self.expect_same([self.path], mesh.vtk(), options=["--time-step", 1])
+
+    def test_binary(self):
+        for kind in (4, 8):
+            for order, version, neighbours in (("<", 112, False), (">", 107, True)):
+                mesh = Mesh(2, (kind,))
+                file = Binary(["X", "Y", "Z", "p", "c"], version=version, order=order)
+                file.zone(len(mesh.points), [*mesh.points.T.copy(), mesh.p, mesh.c], centrings=[0, 0, 0, 0, 1], zone_type=NAMES[kind][2],
+                          elements=mesh.cells, face_neighbours=neighbours)
+                file.zone(len(mesh.points), [*mesh.points.T.copy() + 7, mesh.p, mesh.c], centrings=[0, 0, 0, 0, 1], zone_type=NAMES[kind][2],
+                          elements=mesh.cells)
+                file.write(self.path)
+                info = self.info(self.path)
+                self.assertEqual(len(info["pieces"]), 2)
+                self.assertIn("2 zones of finite elements", info["format"])
+                self.assertAlmostEqual(self.volume([self.path], "c"), 2, delta=4e-3)
+
+    def test_what_is_refused(self):
+        mesh = Mesh(2, (8,))
+        words, rows = self.words(mesh, 8), self.blocks(mesh)
+        for changed, told in (((words.replace("E=8", "E=9"), rows), "numbers; expected"), ((words.replace("E=8", "E=99999999999999"), rows), "unknown value"),
+                              ((words.replace("FEBRICK", "FEQUADRILATERAL"), rows), "a kind of elements"), ((words.replace("E=8, ", ""), rows), "without NODES"),
+                              ((words, rows[:-1] + [[1, 2, 3, 4, 5, 6, 7, 99]]), "refers to point 98"), ((words, rows[:-1] + [[0, 2, 3, 4, 5, 6, 7, 8]]), "refers to point"),
+                              ((words + ", CONNECTIVITYSHAREZONE=3", rows[:-8]), "unknown value")):
+            self.expect_line(self.write_text([changed]), words=told)
+
+    def test_damage(self):
+        mesh = Mesh(2, (8,))
+        self.write_text([(self.words(mesh, 8), self.blocks(mesh))])
+        self.assertGreater(self.expect_harmless(self.path), 0.3)
+        file = Binary(["X", "Y", "Z", "p", "c"])
+        file.zone(len(mesh.points), [*mesh.points.T.copy(), mesh.p, mesh.c], centrings=[0, 0, 0, 0, 1], zone_type=5, elements=mesh.cells)
+        file.write(self.path)
+        self.assertGreater(self.expect_harmless(self.path), 0.3)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,127 @@
+#!/usr/bin/python3
+"""mesh_xdmf_test.py CURVISPLAT
+
+XDMF's unstructured grids, by h5py, in binary files and in the XML, and as meshio writes them: mesh_formats.py says how. Exit status
+77 (skipped) without python3-vtk9 or python3-h5py.
+"""
+import sys
+import unittest
+
+from mesh_formats import HEXAHEDRON_FACES, Mesh, MeshFormats, np, vtk
+
+try:
+    import h5py
+except ModuleNotFoundError as error:
+    print(f"skipped: {error}; install python3-h5py")
+    sys.exit(77)
+try:
+    import meshio
+except ModuleNotFoundError:
+    meshio = None
+
+TYPES = {4: ("Tetrahedron", 6), 5: ("Pyramid", 7), 6: ("Wedge", 8), 8: ("Hexahedron", 9)}
+
+
+class XdmfMeshes(MeshFormats):
+    def setUp(self):
+        super().setUp()
+        self.path, self.count = self.folder / "a.xmf", 0
+
+    def item(self, values, kind="HDF"):
+        values = np.asarray(values)
+        number = {"f": "Float", "i": "Int"}[values.dtype.kind]
+        head = f'<DataItem Dimensions="{" ".join(map(str, values.shape))}" NumberType="{number}" Precision="8" Format="{kind}"'
+        if kind == "XML":
+            return head + ">" + " ".join(map(repr, values.ravel().tolist())) + "</DataItem>"
+        with h5py.File(self.folder / "a.h5", "a") as f:
+            self.count += 1
+            f[str(self.count)] = values
+        return f"{head}>a.h5:/{self.count}</DataItem>"
+
+    def grid(self, mesh, topology, kind="HDF", separate=False):
+        """`topology`: the name, the number of elements and the numbers."""
+        name, elements, numbers = topology
+        places = "".join(self.item(axis.copy(), kind) for axis in mesh.points.T) if separate else self.item(mesh.points, kind)
+        fields = "".join(f'<Attribute Name="{n}" Center="{c}">{self.item(v, kind)}</Attribute>' for n, c, v in (("p", "Node", mesh.p), ("c", "Cell", mesh.c)))
+        return (f'<Grid><Topology TopologyType="{name}" NumberOfElements="{elements}">{self.item(numbers, kind)}</Topology>'
+                f'<Geometry GeometryType="{"X_Y_Z" if separate else "XYZ"}">{places}</Geometry>{fields}</Grid>')
+
+    def write(self, text):
+        self.path.write_text(f'<Xdmf Version="3.0"><Domain>{text}</Domain></Xdmf>')
+        return self.path
+
+    def mixed(self, mesh, faces=False):
+        numbers = []
+        for cell in mesh.cells:
+            of_cell = [16, 6, *(w for face in HEXAHEDRON_FACES for w in (4, *cell[list(face)]))] if faces else [TYPES[len(cell)][1], *cell]
+            numbers += map(int, of_cell)
+        return "Mixed", len(mesh.cells), np.array(numbers)
+
+    def test_mixed_cells(self):
+        mesh = Mesh()
+        for kind, separate in (("HDF", True), ("XML", False)):
+            self.expect_same([self.write(self.grid(mesh, self.mixed(mesh), kind, separate))], mesh.vtk())
+        # Vertices, lines and polygons have no volume.
+        name, elements, numbers = self.mixed(mesh)
+        more = np.array([1, 2, 5, 6, 2, 3, 7, 8, 9, 3, 4, 0, 1, 2, 3, 4, 0, 1, 2])
+        mesh.c = np.concatenate([[0.1, 0.2, 0.3, 0.4], mesh.c])
+        text = self.grid(mesh, (name, elements + 4, np.concatenate([more, numbers])))
+        self.assertAlmostEqual(self.volume([self.write(text)], "c"), 1, delta=2e-3)
+
+    def test_cells_of_one_kind(self):
+        for kind in TYPES:
+            mesh = Mesh(2, (kind,))
+            text = self.grid(mesh, (TYPES[kind][0], len(mesh.cells), np.array(mesh.cells)))
+            self.expect_same([self.write(text)], mesh.vtk())
+
+    def test_polyhedra(self):
+        mesh = Mesh(3, (8,))
+        faces = [[cell[list(face)] for face in HEXAHEDRON_FACES] for cell in mesh.cells]
+        self.expect_same([self.write(self.grid(mesh, self.mixed(mesh, faces=True)))], mesh.vtk(faces))
+
+    def test_several_grids_and_times(self):
+        meshes = [Mesh(2), Mesh(3)]
+        grids = [self.grid(mesh, self.mixed(mesh)).replace("<Grid>", f'<Grid><Time Value="{n}"/>') for n, mesh in enumerate(meshes)]
+        self.write(f'<Grid GridType="Collection" CollectionType="Temporal">{"".join(grids)}</Grid>')
+        self.assertEqual(self.info(self.path)["times"], [0, 1])
+        for n, mesh in enumerate(meshes):
+            self.expect_same([self.path], mesh.vtk(), options=["--time-step", n])
+        self.write("".join(self.grid(mesh, self.mixed(mesh)) for mesh in meshes))
+        self.assertEqual(len(self.info(self.path)["pieces"]), 2)
+
+    @unittest.skipUnless(meshio, "no meshio")
+    def test_meshio_agrees(self):
+        mesh = Mesh(2, (8, 4))
+        path = self.folder / "m.xdmf"
+        names = {4: "tetra", 8: "hexahedron"}
+        runs = [(names[run.shape[1]], run) for run in mesh.runs()]
+        ends = np.cumsum([0] + [len(run) for _, run in runs])
+        meshio.write(path, meshio.Mesh(mesh.points, runs, {"p": mesh.p}, {"c": [mesh.c[a:b] for a, b in zip(ends, ends[1:])]}))
+        self.expect_same([path], mesh.vtk())
+
+    def test_quadratic_cells(self):
+        points = np.array(vtk.vtkGenericCell.InstantiateCell(vtk.VTK_QUADRATIC_HEXAHEDRON).GetParametricCoords()[:60]).reshape(-1, 3)
+        mesh = Mesh(1, (8,))
+        mesh.points, mesh.p = points, points[:, 0].copy()
+        info = self.info(self.write(self.grid(mesh, ("Hexahedron_20", 1, np.arange(20)[None]))))
+        self.assertEqual(info["cells"]["count"], 9)
+
+    def test_what_is_refused(self):
+        mesh = Mesh(2, (8,))
+        name, elements, numbers = self.mixed(mesh)
+        changed = lambda at, value: (name, elements, np.concatenate([numbers[:at], [value], numbers[at + 1:]]))
+        for topology, told in ((("Hexahedron", 9, np.array(mesh.cells)), "expected 9"), ((name, elements + 1, numbers), "expected 9"),
+                               (changed(0, 77), "is of type 77"), (changed(3, 99), "refers to point 99"), (changed(0, -1), "the number -1"),
+                               (changed(63, 3), "points; expected"), ((name, elements, numbers[:-1]), "expected"),
+                               (("Triangle", 4, np.arange(12).reshape(4, 3)), "no grid with volume")):
+            with self.subTest(told=told):
+                self.expect_line(self.write(self.grid(mesh, topology)), words=told)
+
+    def test_damage(self):
+        mesh = Mesh(2)
+        self.write(self.grid(mesh, self.mixed(mesh), "XML"))
+        self.assertGreater(self.expect_harmless(self.path), 0.3)
+
+
+if __name__ == "__main__":
+    unittest.main()
