@@ -12,15 +12,18 @@ import shutil
 import subprocess
 import unittest
 
-from mesh_formats import PROGRAM, Mesh, MeshFormats, np
+from mesh_formats import PROGRAM, Mesh, MeshFormats, np, vtk, write_xml
 
 import cgns_library as cg
 import mesh_cgns_test
+import mesh_curved_test
 import mesh_ensight_test
 import mesh_files_test
 import mesh_foam_test
 import mesh_formats_test
 import mesh_su2_test
+import mesh_tecplot_test
+import mesh_xdmf_test
 import vtkhdf_test
 from sweep import IS_WHOLE, ONLY_WHOLE, some_of
 
@@ -98,6 +101,25 @@ class MeshBytes(MeshFormats):
             with writer.file() as f:
                 vtkhdf_test.write_mesh(f.create_group("VTKHDF"), vtkhdf_test.parts_of(Mesh(20), count), faces)
             self.expect_same_bytes(writer.path, scalars=("p", "c"))
+
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
+    def test_xdmf(self):
+        writer = self.writer(mesh_xdmf_test.XdmfMeshes)
+        mesh = Mesh(20)
+        self.expect_same_bytes(writer.write(writer.grid(mesh, writer.mixed(mesh))), scalars=("p", "c"))
+
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
+    def test_tecplot(self):
+        writer = self.writer(mesh_tecplot_test.TecplotMeshes)
+        mesh = Mesh(SIDE, (8,))
+        self.expect_same_bytes(writer.write_text([(writer.words(mesh, 8), writer.blocks(mesh))]), scalars=("p", "c"))
+
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
+    def test_curved_cells(self):
+        path = self.folder / "shell.vtu"
+        points, cells = mesh_curved_test.shell(7, 3)
+        write_xml(mesh_curved_test.grid_of(vtk.VTK_LAGRANGE_HEXAHEDRON, points, cells), path)
+        self.expect_same_bytes(path, scalars=("p", "c"))
 
     def columns(self):
         """A writer of 60 x 40 quadrangles, or triangles, in 8 layers."""
