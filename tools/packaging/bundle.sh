@@ -136,7 +136,8 @@ mkdir -p "$licences"
   realpath "$font"
 } | sort -u | while read -r file; do
   # dpkg may know a file by its place before /lib became a link to /usr/lib.
-  package_of=$(dpkg-query --search "$file" 2> /dev/null || dpkg-query --search "${file#/usr}")
+  package_of=$(dpkg-query --search "$file" 2> /dev/null || dpkg-query --search "${file#/usr}" 2> /dev/null) ||
+    { echo "bundle: $file is of no Debian package, so that its licence is not known" >&2 && exit 1; }
   package_of=${package_of%%:*}
   cp -L "/usr/share/doc/$package_of/copyright" "$licences/$package_of"
 done
@@ -144,7 +145,7 @@ done
 rm -rf "$bundle"
 mkdir -p "$bundle"
 cp -r "$program"/{bin,share,lib} "$bundle/"
-cp -r "$lib/." "$bundle/lib/"
+cp -rl "$lib/." "$bundle/lib/" 2> /dev/null || cp -r "$lib/." "$bundle/lib/"  # links, where both folders are of one file system
 doc=$bundle/share/doc/curvisplat
 cp -r "$licences" "$doc/licences"
 cp "$root"/{GLOSSARY.md,tools/REFERENCE.md,tools/cluster.md} "$doc/"
@@ -171,5 +172,5 @@ if [[ $wheel ]]; then
   cp "$root/LICENSE" "$work/wheel/licences/curvisplat"
   cp "$program/bin/curvisplat" "$modules"/*.so "$font" "$package/"
   search_in lib "$package"/curvisplat "$package"/*.so
-  "$root/tools/packaging/pack_wheel.py" "$work/wheel" "$version" "$out" ${fast:+0}
+  "$root/tools/packaging/pack_wheel.py" "$work/wheel" "$version" "$out" ${fast:+1}
 fi
