@@ -239,14 +239,18 @@ TEST_F(ExportSweep, AFileIsRightOrNotThere) {
 }
 
 TEST_F(ExportSweep, FramesAreRightOrNotThere) {
-  const auto job = [&] { drawFrames(made_ / "a%d.png"); };
-  writeFiles(made_, {});
-  job();
-  const Files expected = made();
-  ASSERT_EQ(expected.size(), size_t{kFrames});
-  for (const Fault& fault : kFaults) {
-    EXPECT_GE(writing(job, expected, {{"a1.png", "an old picture"}}).run(fault), 1) << fault.name;
-    if (HasFailure()) return;
+  for (const std::string name : {"a%d.png", "a.html"}) {
+    const auto job = [&] { drawFrames(made_ / name); };
+    writeFiles(made_, {});
+    job();
+    const Files expected = made();
+    ASSERT_EQ(expected.size(), name == "a.html" ? size_t{1} : size_t{kFrames});
+    for (const Fault& fault : kFaults) {
+      EXPECT_GE(writing(job, expected, {{name == "a.html" ? "a.html" : "a1.png", "an old file"}}).run(fault),
+                1)
+          << name << ": " << fault.name;
+      if (HasFailure()) return;
+    }
   }
 }
 
