@@ -25,7 +25,7 @@ root=$(realpath "$here/../..")
 expect "the package names no file of the source" test -z "$(grep -rlF "$root" "$prefix" --include='*.cmake')"
 quietly "$folder/build/example" "$folder"
 "$program" info "$folder/bent.splats" --json > "$folder/info.json"
-"$program" render "$folder/bent.splats" -o "$folder/again.png" --size 320x240 --tf inferno --range data --opacity ramp --opacity-unit 0.1 --view iso > /dev/null
+"$program" render "$folder/bent.splats" -o "$folder/again.png" --size 320x240 --tf inferno --range data --opacity ramp --opacity-unit 0.1 --view iso --background white > /dev/null
 python3 - "$folder" <<'END'
 import json, pathlib, sys
 folder = pathlib.Path(sys.argv[1])
