@@ -251,7 +251,8 @@ TEST_F(SurfaceOptions, LinesAreTheSameFromEveryFormat) {
   EXPECT_GT(compareImages(cpu, picture(both + Words{"--backend", "osmesa"})).psnr_db, 70);
   EXPECT_EQ(picture(both + Words{"--backend", "cpu", "--threads", "1", "--memory", "96M"}).rgba, cpu.rgba);
   const auto isRed = [&](const Words& more) {
-    const Image image = picture(Words{"--lines", file("lines.csv"), "--lines-colour", "#ff0000"} + more);
+    const Image image =
+        picture(Words{"--lines", file("lines.csv"), "--lines-colour", "#ff0000", "--tf", "viridis"} + more);
     int red = 0;
     for (size_t n = 0; n < image.rgba.size(); n += 4)
       red += image.rgba[n] > 0.5f && image.rgba[n + 1] < 0.15f;
