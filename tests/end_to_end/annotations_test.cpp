@@ -121,19 +121,20 @@ TEST_F(Annotations, EachFunctionHasABarWithATitleOfItsOwn) {
 }
 
 TEST_F(Annotations, TextsSayWhatIsShown) {
-  const Image plain = render({});
-  const Image title = render({"--title", "a {scalar} at {{t}}"}),
-              label = render({"--label", "t = {time:.2f} s"});
+  const auto onWhite = [](const Words& options) { return render(Words{"--background", "white"} + options); };
+  const Image plain = onWhite({});
+  const Image title = onWhite({"--title", "a {scalar} at {{t}}"}),
+              label = onWhite({"--label", "t = {time:.2f} s"});
   EXPECT_GT(changed(plain, title, 0, 200, 0, 20), 60);
-  EXPECT_EQ(changed(plain, title, 0, 200, 20, 160), 0);
+  EXPECT_EQ(changed(plain, title, 0, 200, 24, 160), 0);
   EXPECT_GT(changed(plain, label, 0, 100, 0, 20), 60);
   EXPECT_EQ(changed(plain, label, 100, 200, 0, 160), 0);
   // Fields are those of the picture: the same pixels as text that says so.
   EXPECT_EQ(render({"--label", "{scalar}|{units}|{time}|{step}|{frame:03d}"}).rgba,
             render({"--label", "f||0|0|000"}).rgba);
   // Too long a title is made smaller, and keeps both ends.
-  const Image longest = render({"--title", "|" + std::string(40, 'm') + "|", "--background", "white"});
-  EXPECT_EQ(changed(plain, longest, 0, 200, 20, 160), 0);
+  const Image longest = onWhite({"--title", "|" + std::string(40, 'm') + "|"});
+  EXPECT_EQ(changed(plain, longest, 0, 200, 24, 160), 0);
   EXPECT_GT(changed(plain, longest, 3, 40, 0, 20), 0);
   EXPECT_GT(changed(plain, longest, 160, 197, 0, 20), 0);
   EXPECT_EQ(changed(plain, longest, 197, 200, 0, 20), 0);
@@ -181,7 +182,7 @@ TEST_F(Annotations, TitlesAreNotCutOff) {
       for (const int x : {0, image.size.width - 1}) dark += image.pixel(x, y)[1] < 0.9f;
     return dark;
   };
-  const Words view{"--view", "iso", "--opacity", "0:0,1:0.001"};
+  const Words view{"--view", "iso", "--background", "white", "--opacity", "0:0,1:0.001"};
   EXPECT_EQ(edges(render(view + Words{"--axes-titles", title + "," + title + "," + title})), 0);
   EXPECT_EQ(edges(render(view + Words{"--scalar-bar-title", title})), 0);
 }

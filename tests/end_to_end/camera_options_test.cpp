@@ -19,7 +19,8 @@ class CameraOptions : public ProgramSuite<CameraOptions> {
   static void prepare() { madeCache(file("a"), "half-annulus", "48x24x24"); }
 
   static Image render(const Words& options, const std::string& output = "a.exr") {
-    last_ = run(sized(Words{"render", file("a.splats"), "-o", file(output)} + options, "96x96"));
+    last_ = run(sized(
+        Words{"render", file("a.splats"), "-o", file(output), "--background", "white"} + options, "96x96"));
     return readImage(file(output));
   }
   static nlohmann::json cameraOf(const Words& options) {
