@@ -225,15 +225,36 @@ struct SeenBoxes {
   }
 };
 
+/// Some of the samples, standing for all: enough to compare sides.
+struct FewSamples {
+  static constexpr size_t kSamples = 30'000;
+  CoarseSamples samples;       // positions alone
+  std::vector<double> depths;  // of what each stands for
+  std::vector<double> rare;    // extinction over the largest, 0..1
+
+  FewSamples(const CoarseSamples& all, const std::vector<double>& all_depths) {
+    const size_t stride = std::max<size_t>(1, all.size() / kSamples);
+    double largest = 0;
+    for (size_t n = 0; n < all.size(); n += stride) {
+      if (!(all.volumes[n] > 0)) continue;
+      samples.positions.push_back(all.positions[n]);
+      depths.push_back(all_depths[n] * static_cast<double>(stride));
+      rare.push_back(all_depths[n] / all.volumes[n]);
+      largest = std::max(largest, rare.back());
+    }
+    for (double& one : rare) one /= largest > 0 ? largest : 1;
+    samples.values.resize(samples.positions.size());
+  }
+};
+
 /// What is seen of rare values from the side of a camera: over all pixels, the light that each sample takes of what
-/// comes through to it, times its extinction. Of every `stride`-th sample.
-double rareSeen(const CoarseSamples& samples, const std::vector<double>& depths, const SeenSamples& seen) {
-  constexpr int kPixels = 48;          // of the longer side
-  constexpr size_t kSamples = 30'000;  // a dozen for each pixel
-  const size_t stride = std::max<size_t>(1, samples.size() / kSamples);
-  double largest = 0;
+/// comes through to it, times its extinction.
+double rareSeen(const FewSamples& few, const Camera& camera) {
+  constexpr int kPixels = 48;  // of the longer side: a dozen samples for each
+  const SeenSamples seen(few.samples, camera);
   std::array<double, 3> low, reach;
   for (size_t axis = 0; axis < 3; ++axis) {
+    if (seen.places[axis].empty()) return 0;
     const auto [least, most] = std::minmax_element(seen.places[axis].begin(), seen.places[axis].end());
     low[axis] = *least;
     reach[axis] = *most - *least;
@@ -241,24 +262,21 @@ double rareSeen(const CoarseSamples& samples, const std::vector<double>& depths,
   const double width = std::max(reach[0], reach[1]) / kPixels;
   if (!(width > 0)) return 0;
   std::vector<uint64_t> order;  // the nearest first
-  for (size_t n = 0; n < samples.size(); n += stride) {
+  for (size_t n = 0; n < few.depths.size(); ++n) {
     const double away = reach[2] > 0 ? 1 - (seen.places[2][n] - low[2]) / reach[2] : 0;
     order.push_back(static_cast<uint64_t>(away * 0xffffffff) << 32 | n);
-    if (samples.volumes[n] > 0) largest = std::max(largest, depths[n] / samples.volumes[n]);
   }
-  if (!(largest > 0)) return 0;
   hwy::Sorter()(order.data(), order.size(), hwy::SortAscending());
   std::vector<double> through(size_t{kPixels} * kPixels, 1);
   double sum = 0;
   for (const uint64_t key : order) {
     const auto n = static_cast<uint32_t>(key);
-    if (!(samples.volumes[n] > 0)) continue;
     const auto pixel = [&](size_t axis) {
       return std::min<size_t>(kPixels - 1, static_cast<size_t>((seen.places[axis][n] - low[axis]) / width));
     };
     double& left = through[pixel(1) * kPixels + pixel(0)];
-    const double passed = std::exp(-depths[n] * static_cast<double>(stride) / (width * width));
-    sum += left * (1 - passed) * depths[n] / samples.volumes[n] / largest;
+    const double passed = std::exp(-few.depths[n] / (width * width));
+    sum += left * (1 - passed) * few.rare[n];
     left *= passed;
   }
   return sum * width * width;
@@ -352,12 +370,12 @@ ViewChoice chooseView(const DrawnSamples& drawn, ImageSize size, Framed framed) 
     const Camera whole = Camera::named(choice.view, lower, upper, size, Projection::kOrthographic);
     return alongAxis(samples, depths, choice, whole, aspect);
   }
+  const FewSamples few(samples, depths);
   double best = 0;
   glm::dvec3 from = kOctants[0];
   for (const glm::dvec3& octant : kOctants) {
     const double worth =
-        rareSeen(samples, depths, SeenSamples(samples, obliqueCamera(octant, lower, upper))) /
-        (octant.z < 0 ? kPreferAbove : 1);
+        rareSeen(few, obliqueCamera(octant, lower, upper)) / (octant.z < 0 ? kPreferAbove : 1);
     if (!(worth > best * (best > 0 ? kPreferFirst : 1))) continue;
     best = worth;
     from = octant;
