@@ -20,7 +20,7 @@ constexpr const char* kHead = R"(<!doctype html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{0}</title>
 <style>
-body {{ margin: 0; font: 15px system-ui, sans-serif; background: #fff; color: #222; text-align: center; }}
+body {{ margin: 0; font: 15px system-ui, sans-serif; background: #15171c; color: #ccd; text-align: center; }}
 #frames {{ display: inline-block; touch-action: pan-y; cursor: ew-resize; user-select: none; outline-offset: -2px; }}
 #frames img {{ display: none; max-width: 100%; max-height: calc(100vh - 3em); margin: auto; }}
 #frames img.shown {{ display: block; }}
