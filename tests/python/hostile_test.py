@@ -188,7 +188,7 @@ class HostileTest(unittest.TestCase):
             def change():
                 while not end:
                     x[:] = 1e300; s[:] = np.nan; y[::2] = np.nan; x[:] = np.random.random(x.shape); y[:] = x[::-1]; s[::2] = 1e30
-            thread = threading.Thread(target=change)
+            thread = threading.Thread(target=change, daemon=True)
             thread.start()
             for _ in range(4):
                 try:

@@ -91,7 +91,13 @@ std::vector<std::byte> fileOf(const RootCube& root, std::span<const Brick> brick
 }  // namespace
 
 std::vector<std::byte> vdb_plugin::brickGridsFile(const RootCube& root, std::span<const Brick> bricks) {
-  return fileOf(root, bricks, kCompression);
+  try {
+    return fileOf(root, bricks, kCompression);
+  } catch (const openvdb::Exception& refused) {  // of cells that it takes for empty
+    throw Error(
+        "bricks of {:g} in a root of {:g} cannot be written by OpenVDB ({}); are the coordinates right?",
+        root.cellSize(bricks.back().cell.level), root.cellSize(0), refused.what());
+  }
 }
 
 uint64_t vdb_plugin::brickGridsMemory(std::span<const Brick> bricks) {
