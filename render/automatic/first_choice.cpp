@@ -28,6 +28,14 @@ bool isDiverging(const std::string& map) {
   });
 }
 
+/// [sample]: its volume times the function's extinction.
+std::vector<double> depthsOf(const CoarseSamples& samples, const TransferFunction& function) {
+  std::vector<double> depths(samples.size());
+  for (size_t n = 0; n < depths.size(); ++n)
+    depths[n] = samples.volumes[n] * function.extinctionAt(samples.values[n]);
+  return depths;
+}
+
 }  // namespace
 
 bool isNearlyConstant(const VariableInfo& variable) {
@@ -98,9 +106,7 @@ FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& m
 }
 
 double FirstChoice::opacityUnitOf(const TransferFunction& function) const {
-  std::vector<double> depths(samples_.size());
-  for (size_t n = 0; n < samples_.size(); ++n)
-    depths[n] = samples_.volumes[n] * function.extinctionAt(samples_.values[n]);
+  const std::vector<double> depths = depthsOf(samples_, function);
   const double depth = std::accumulate(depths.begin(), depths.end(), 0.0);
   const double area = seenArea(samples_, silhouette_.view, depths);
   const double unit = area > 0 ? function.opacityUnit() * depth / (kMeanDepth * area) : 0;
@@ -116,10 +122,7 @@ double FirstChoice::percentile(double part) const {
 ViewChoice FirstChoice::view(const TransferFunction& function, ImageSize size, Framed framed,
                              const glm::dvec3& lower, const glm::dvec3& upper) const {
   const auto chosen = [&](const CoarseSamples& samples, const Silhouette& silhouette) {
-    std::vector<double> depths(samples.size());
-    for (size_t n = 0; n < depths.size(); ++n)
-      depths[n] = samples.volumes[n] * function.extinctionAt(samples.values[n]);
-    return chooseView({samples, depths, silhouette, lower, upper}, size, framed);
+    return chooseView({samples, depthsOf(samples, function), silhouette, lower, upper}, size, framed);
   };
   if (glm::all(glm::lessThanEqual(lower, lower_)) && glm::all(glm::lessThanEqual(upper_, upper)))
     return chosen(samples_, silhouette_);
