@@ -3,6 +3,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "preprocess/convert/shared_passes.h"
@@ -10,6 +11,7 @@
 #include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/cell_splats.h"
+#include "stream/base/error.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -188,6 +190,10 @@ class RecordSink : public SplatSink {
         sample_(*target.sample) {}
 
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) override {
+    if (!isOfRoot(splat.splat) || !std::ranges::all_of(values, isNumber))
+      throw Error(
+          "positions or values are others than when the grid was measured: something changes it while it is "
+          "converted; start again when it is complete");
     const RootPosition position = root_.fromWorld(splat.splat.position);
     record_.clear();
     packRecord(splat, values, position, record_);
@@ -204,6 +210,22 @@ class RecordSink : public SplatSink {
   }
 
  private:
+  /// Whether a splat can be one of the grid that was measured. Fits may move it beyond the nodes, and their axes
+  /// reach further, but not by several times the grid.
+  bool isOfRoot(const Splat& splat) const {
+    const double reach = kReachOfRoot * root_.size;
+    bool is_of_root = splat.weight >= 0 && splat.weight <= reach * reach * reach;
+    for (int axis = 0; axis < 3; ++axis)
+      is_of_root &= std::abs(splat.position[axis] - root_.min[axis]) <= reach && splat.axis[axis] <= reach &&
+                    !std::isnan(splat.shear[axis]);
+    return is_of_root;
+  }
+  /// Slopes and variances beyond a float's range become its largest.
+  static bool isNumber(const SplatScalar& value) {
+    return std::isfinite(value.mean) && !glm::any(glm::isnan(value.slope)) && !std::isnan(value.variance);
+  }
+
+  static constexpr double kReachOfRoot = 8;
   const RootCube root_;
   RecordRouter router_;
   std::vector<CellContents>* contents_;
