@@ -130,7 +130,7 @@ ProgramResult RunningProgram::wait() {
 }
 
 ProgramResult runProgram(const std::vector<std::string>& arguments) {
-  return RunningProgram(arguments).wait();
+  return RunningProgram(arguments, CURVISPLAT_PROGRAM_BY_FORK).wait();
 }
 
 int lineCount(const std::string& text) {
