@@ -4,8 +4,8 @@ that members are only touched while their mutex is held (stream/base/mutex.h). W
 by clang-tidy (.clang-tidy) as well. Takes the commands of build/release, which tools/build.sh configures.
 
     tools/check_clang.py [--tidy] [FILE ...]    these; without any, all sources
-    tools/check_clang.py [--tidy] --since REV   those that have changed since this commit
-    tools/check_clang.py --tidy-since REV       all sources; of those that have changed since this commit, by clang-tidy
+    tools/check_clang.py [--tidy] --since REV   those that have changed since this commit, or include a header that has; by clang-tidy
+                                                only those that have changed themselves
 
 Headers take most of the time. So sources with the same macros are checked several at a time, as one that includes them, and
 what most include (tools/cmake/common_headers.h, and GoogleTest) is parsed once. Names that two of them have for themselves
@@ -18,6 +18,7 @@ import concurrent.futures
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
@@ -34,15 +35,15 @@ FLAGS = ["-Wthread-safety", "-Werror", "-Wno-unknown-warning-option", "-Wno-bitw
 AT_A_TIME = 16
 
 
-def commands(chosen, named):
-    """(file, its compiler's arguments) of each source of ours, or of those chosen. A build must have those that were named."""
+def commands(named):
+    """(file, its compiler's arguments) of each source of ours, or of those named, which a build must have."""
     path = BUILD / "compile_commands.json"
     if not path.exists():
         sys.exit("check_clang: build/release is not configured; run tools/build.sh first")
     ours = {}
     for entry in json.loads(path.read_text()):
         file = pathlib.Path(entry["file"])
-        if not file.is_relative_to(ROOT / "build") and (not chosen or file in chosen):
+        if not file.is_relative_to(ROOT / "build") and (not named or file in named):
             ours[file] = shlex.split(entry["command"])
     missing = named - ours.keys()
     if missing:
@@ -51,12 +52,20 @@ def commands(chosen, named):
 
 
 def changed_since(revision):
-    """The sources that have changed since a commit, in the working tree as well, and still exist."""
-    run = subprocess.run(["git", "diff", "--name-only", "--diff-filter=d", revision, "--", "*.cpp"], cwd=ROOT, text=True,
+    """What has changed since a commit, in the working tree as well, and still exists."""
+    run = subprocess.run(["git", "diff", "--name-only", "--diff-filter=d", revision, "--", "*.cpp", "*.h"], cwd=ROOT, text=True,
                          capture_output=True)
     if run.returncode:
         sys.exit(f"check_clang: --since {revision}: {run.stderr.strip()}; name a commit of this repository")
-    return {ROOT / line for line in run.stdout.splitlines()}
+    return set(run.stdout.splitlines())
+
+
+def affected(sources, changed):
+    """Those of the sources that have changed, or that include a header that has."""
+    def is_affected(file):
+        included = re.findall(r'^#include "([^"]+)"', file.read_text(encoding="utf-8"), re.MULTILINE)
+        return not changed.isdisjoint([str(file.relative_to(ROOT)), *included])
+    return [(file, arguments) for file, arguments in sources if is_affected(file)]
 
 
 class Group:
@@ -119,22 +128,19 @@ def groups(folder, sources, tidied):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tidy", action="store_true", help="run clang-tidy, too")
-    parser.add_argument("--since", metavar="REV", help="check the sources that have changed since this commit")
-    parser.add_argument("--tidy-since", metavar="REV", help="run clang-tidy on the sources that have changed since this commit")
+    parser.add_argument("--since", metavar="REV", help="check what has changed since this commit, or includes a header that has")
     parser.add_argument("files", nargs="*", type=pathlib.Path)
     options = parser.parse_args()
     named = {file.resolve() for file in options.files}
-    chosen = set(named)
-    if options.since:
-        chosen |= changed_since(options.since)
-        if not chosen:
-            print(f"check_clang: no source has changed since {options.since}")
-            return 0
-    packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy or options.tidy_since else [])
+    packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy else [])
     subprocess.run([ROOT / "tools/setup.sh", *packages], check=True)
 
-    sources = commands(chosen, named)
-    tidied = {file for file, _ in sources} if options.tidy else changed_since(options.tidy_since) if options.tidy_since else set()
+    sources = commands(named)
+    tidied = {file for file, _ in sources} if options.tidy else set()
+    if options.since:
+        changed = changed_since(options.since)
+        sources = affected(sources, changed)
+        tidied &= {ROOT / name for name in changed}
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         alike = groups(pathlib.Path(folder), sources, tidied)
         list(pool.map(Group.precompile, [group for group in alike if len(group.files) > AT_A_TIME]))
