@@ -119,7 +119,7 @@ class ResumeScatter : public ::testing::Test {
     const int64_t writes = convertWhole(source);
     int within = 0;
     for (int64_t at = 0; at < writes / 2;
-         at += faults::isWholeSweep() ? 1 : std::max<int64_t>(1, writes / 50)) {
+         at += faults::isWholeSweep() ? 1 : std::max<int64_t>(1, writes / 20)) {
       SCOPED_TRACE(at);
       within += interruptedInScatter(source, at);
       const ConvertReport report = finish(source);
