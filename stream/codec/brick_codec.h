@@ -4,7 +4,7 @@
 //              most 0.05 of the smallest standard deviation in the brick (σ_K times the smallest singular
 //              value of A; σ_K = 0.447 is the kernel's standard deviation)
 //   shape      2 log axes, the log volume and 3 shears: ‖S^-½ S' S^-½ - I‖ <= 0.05 at any aspect ratio
-//   weight     relative to the decoded a0 a1 a2: error at most 1e-3
+//   weight     relative to the decoded a0 a1 a2: error at most 2e-3, and of their sum 1e-5
 //   mean       16 bits over the brick's range, or 24, or by its own scale
 //   slope      error at most 2^-11 of the brick's span; √variance: 2^-13 of it; or by their own scale (values_codec.h)
 //

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kPositionError = 0.05;  // as a fraction of the smallest standard deviation
 constexpr double kLargestShearCode = 1e9;
+constexpr double kLargestMissingWeight = 1e-5;  // of the sum of a brick's weights
 
 /// std::nearbyint() of numbers below 2^51, in two additions; larger ones stay large.
 double nearestInteger(double x) {
@@ -199,28 +200,63 @@ class GeometryEncoder {
 
   void encodeWeights() {
     bool fits = true;
+    steps_.assign(count_, 0);
+    targets_.assign(count_, 0);  // in steps, before rounding
+    double missing = 0, sum = 0;
     for (size_t n = 0; n < count_ && fits; ++n) {
-      const double volume = decoded_.axis[0][n] * decoded_.axis[1][n] * decoded_.axis[2][n];
-      const double ratio = brick_.splats[n].weight / volume;
-      if (std::abs(ratio - 1) < 0.5 * kWeightStep) {
-        codes_[n] = kVolumeWeight;
-        decoded_.weight[n] = volume;
-      } else if (brick_.splats[n].weight == 0) {
-        codes_[n] = kZeroWeight;
-        decoded_.weight[n] = 0;
-      } else {
-        const double steps = std::nearbyint(std::log(ratio) / kWeightStep);
-        fits = std::abs(steps) <= kLargestWeightCode;
-        const int kept = fits ? static_cast<int>(steps) : 0;
-        codes_[n] = kept == 0 ? kVolumeWeight : zigzag(static_cast<uint32_t>(kept)) + 1;
-        decoded_.weight[n] = kept == 0 ? volume : volume * ratioTable()[kept + kLargestWeightCode];
+      const double weight = brick_.splats[n].weight, ratio = weight / decodedVolume(n);
+      if (weight > 0 && std::abs(ratio - 1) < 0.5 * kWeightStep) {
+        targets_[n] = (ratio - 1) / kWeightStep;
+      } else if (weight > 0) {
+        targets_[n] = std::log(ratio) / kWeightStep;
+        fits = std::abs(targets_[n]) <= kLargestWeightCode - 1;
+        steps_[n] = fits ? static_cast<int>(std::nearbyint(targets_[n])) : 0;
       }
+      decoded_.weight[n] = weight > 0 ? decodedWeight(n) : 0;
+      missing += weight - decoded_.weight[n];
+      sum += weight;
     }
-    if (fits) {
-      header_.arrays[arrays_++] = {Predictor::kNone, planes_.add(codes_)};
-    } else {
+    if (!fits) {
       header_.raw |= kRawWeights;
-      addRaw(decoded_.weight, [](const Splat& s) { return s.weight; });
+      return addRaw(decoded_.weight, [](const Splat& s) { return s.weight; });
+    }
+    if (std::abs(missing) > kLargestMissingWeight * sum) spread(missing);
+    for (size_t n = 0; n < count_; ++n)
+      codes_[n] = steps_[n] != 0                 ? zigzag(static_cast<uint32_t>(steps_[n])) + 1
+                  : brick_.splats[n].weight == 0 ? kZeroWeight
+                                                 : kVolumeWeight;
+    header_.arrays[arrays_++] = {Predictor::kNone, planes_.add(codes_)};
+  }
+
+  double decodedVolume(size_t n) const {
+    return decoded_.axis[0][n] * decoded_.axis[1][n] * decoded_.axis[2][n];
+  }
+  double decodedWeight(size_t n) const {
+    return steps_[n] == 0 ? decodedVolume(n)
+                          : decodedVolume(n) * ratioTable()[steps_[n] + kLargestWeightCode];
+  }
+
+  /// Rounds weights the other way until their sum lacks nothing: those first that change least by it, and of equal ones the
+  /// first, so that codes stay in runs. Cells that are all alike have all been rounded in one direction.
+  void spread(double missing) {
+    const int more = missing > 0 ? 1 : -1;
+    std::vector<uint32_t> order;
+    for (uint32_t n = 0; n < count_; ++n)
+      if (brick_.splats[n].weight > 0 && (targets_[n] - steps_[n]) * more > 0) order.push_back(n);
+    // In 1/64 of a step: equal cells differ by the rounding of their numbers.
+    const auto gain = [&](uint32_t n) { return std::nearbyint((targets_[n] - steps_[n]) * more * 64); };
+    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return gain(a) > gain(b); });
+    for (const uint32_t n : order) {
+      const double before = decoded_.weight[n];
+      steps_[n] += more;
+      decoded_.weight[n] = decodedWeight(n);
+      const double left = missing - (decoded_.weight[n] - before);
+      if (std::abs(left) < std::abs(missing)) {
+        missing = left;
+      } else {
+        steps_[n] -= more;
+        decoded_.weight[n] = before;
+      }
     }
   }
 
@@ -280,6 +316,7 @@ class GeometryEncoder {
   std::vector<Row> sample_;
   std::vector<uint32_t> codes_, residuals_;
   std::vector<double> targets_;
+  std::vector<int> steps_;  // of weights
 };
 
 }  // namespace
