@@ -63,13 +63,15 @@ constexpr Fields<PrepareStatistics, 19> kPrepare{{
     {"sweep_peak_bytes", &PrepareStatistics::sweep_peak_bytes},
 }};
 
-constexpr Fields<DrawStatistics, 6> kDraw{{
+constexpr Fields<DrawStatistics, 8> kDraw{{
     {"upload", &DrawStatistics::upload_s, Combined::kSum, kSeconds},
     {"draw", &DrawStatistics::draw_s, Combined::kSum, kSeconds},
     {"gl_draw", &DrawStatistics::gl_draw_s, Combined::kSum, kSeconds},
     {"painter_waited", &DrawStatistics::painter_waited_s, Combined::kSum, kSeconds},
     {"splats_hidden", &DrawStatistics::splats_hidden},
     {"surfaces", &DrawStatistics::surfaces_s, Combined::kSum, kSeconds},
+    {"iso_splats", &DrawStatistics::iso_splats, Combined::kLargest},
+    {"iso_bricks", &DrawStatistics::iso_bricks, Combined::kLargest},
 }};
 
 constexpr Fields<FrameStatistics, 2> kFrame{{

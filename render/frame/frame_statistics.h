@@ -60,6 +60,7 @@ struct DrawStatistics {
   double painter_waited_s = 0;  // for the workers
   uint64_t splats_hidden = 0;   // left out behind others that are opaque; how many varies, as bricks_hidden
   double surfaces_s = 0;        // surfaces and slices, without reading and sampling bricks for slices
+  uint64_t iso_splats = 0, iso_bricks = 0;  // that isosurfaces may lie in; in whole or in part
 };
 
 struct FrameStatistics : PlanStatistics, FetchStatistics, PrepareStatistics, DrawStatistics {

@@ -136,12 +136,23 @@ std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const F
                              {opacity.factor, opacity.by_function ? input.opacities : nullptr, of_colours},
                              coloured_by_ && !of_colours};
   IsoLayers layers(settings.view.size);
+  std::vector<uint32_t> bricks;
+  for (const BrickPart& part : plan.iso_parts) bricks.push_back(part.brick);
+  std::sort(bricks.begin(), bricks.end());
+  statistics.iso_bricks = static_cast<uint64_t>(std::unique(bricks.begin(), bricks.end()) - bricks.begin());
   std::vector<TileRange> left{{0, layers.tiles()}};
   while (!left.empty()) {
     const TileRange tiles = left.back();
     left.pop_back();
-    IsoSplats splats({settings.view, options.scene->isovalues, settings.borders, settings.clip_planes,
-                      input.depth_origin, tiles, isoSplatBytes(options)},
+    IsoSplats splats({settings.view,
+                      options.scene->isovalues,
+                      settings.borders,
+                      settings.clip_planes,
+                      input.depth_origin,
+                      tiles,
+                      isoSplatBytes(options),
+                      {},
+                      coloured_by_.has_value()},
                      plan.iso_parts.size());
     const auto take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& of_part) {
       const auto& values = of_colours ? *of_part.second : of_part.values;
@@ -161,6 +172,7 @@ std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const F
       left.push_back({tiles.begin, middle});
       continue;
     }
+    statistics.iso_splats += splats.count();
     const StageTimer timer(statistics.surfaces_s, "draw isosurfaces");
     arenaOf(options).execute([&] {
       splats.sort();

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <numeric>
 
 #include "render/project/tile_set.h"
 #include "render/surface/surface_shader.h"
@@ -20,9 +21,15 @@ namespace {
 constexpr int kPixels = kTileSide * kTileSide;
 constexpr int kSeenSide = kTileSide + 2;  // with the pixels around the tile
 constexpr int kBlock = 4, kBlocks = kTileSide / kBlock;
-// Rays of a pixel at an outline, from its middle.
-constexpr std::array<std::array<float, 2>, 4> kOffsets{
-    {{-0.125f, -0.375f}, {0.375f, -0.125f}, {-0.375f, 0.125f}, {0.125f, 0.375f}}};
+// Rays of a pixel at an outline, from its middle: // no two in a row or a column of eight.
+constexpr std::array<std::array<float, 2>, 8> kOffsets{{{0.0625f, -0.1875f},
+                                                        {-0.0625f, 0.1875f},
+                                                        {0.3125f, 0.0625f},
+                                                        {-0.1875f, -0.3125f},
+                                                        {-0.3125f, 0.3125f},
+                                                        {-0.4375f, -0.0625f},
+                                                        {0.1875f, 0.4375f},
+                                                        {0.4375f, -0.4375f}}};
 constexpr double kFold = 4;          // pixels, between the depths of neighbours
 constexpr float kGrazing = 0.25f;    // the cosine between ray and normal
 constexpr double kSameLayer = 8;     // pixels, between the rays of one pixel
@@ -49,19 +56,12 @@ class IsoLayers::Tracer {
         light_(look.light, view_),
         rays_(splats.settings()) {}
 
-  /// What draw() takes for a tile's splats. No packet is larger than a block of 4x4 pixels.
+  /// What draw() takes for a tile's splats.
   static uint64_t bytes(std::span<const IsoSplats::Placed> splats, int x0, int y0) {
-    uint64_t rows = 0;
-    std::array<size_t, kBlocks * kBlocks> counts{};
-    for (const IsoSplats::Placed& placed : splats) {
-      const IsoSplat& splat = *placed.splat;
-      const BlockRange across = blocksOf(splat.x0, splat.x1, x0), down = blocksOf(splat.y0, splat.y1, y0);
-      rows += down.last - down.first + 1;
-      for (size_t row = down.first; row <= down.last; ++row)
-        for (size_t column = across.first; column <= across.last; ++column) ++counts[row * kBlocks + column];
-    }
-    return kOwnBytes + rows * sizeof(IsoSplats::Placed) +
-           IsoRays::bytes(*std::max_element(counts.begin(), counts.end()));
+    const auto counts = countRows(splats, y0);
+    return kOwnBytes +
+           std::accumulate(counts.begin(), counts.end(), uint64_t{0}) * sizeof(IsoSplats::Placed) +
+           IsoRays::bytes(mostOfPackets(splats, x0, y0));
   }
 
   void draw(size_t number, int x0, int y0, Tile& tile) {
@@ -114,8 +114,27 @@ class IsoLayers::Tracer {
     return counts;
   }
 
+  /// The most splats that touch a packet: a block of 4x4 pixels, or a half of the row above or below the tile.
+  static size_t mostOfPackets(std::span<const IsoSplats::Placed> splats, int x0, int y0) {
+    std::array<size_t, kBlocks * kBlocks> counts{};
+    std::array<size_t, 4> of_halves{};
+    for (const IsoSplats::Placed& placed : splats) {
+      const IsoSplat& splat = *placed.splat;
+      const BlockRange across = blocksOf(splat.x0, splat.x1, x0), down = blocksOf(splat.y0, splat.y1, y0);
+      for (size_t row = down.first; row <= down.last; ++row)
+        for (size_t column = across.first; column <= across.last; ++column) ++counts[row * kBlocks + column];
+      for (size_t half = 2 * across.first / kBlocks; half <= 2 * across.last / kBlocks; ++half) {
+        of_halves[half] += down.first == 0;
+        of_halves[2 + half] += down.last == kBlocks - 1;
+      }
+    }
+    return std::max(*std::max_element(counts.begin(), counts.end()),
+                    *std::max_element(of_halves.begin(), of_halves.end()));
+  }
+
   void sortRows(size_t number) {
     const auto splats = splats_.inTile(number);
+    rays_.makeRoom(mostOfPackets(splats, x0_, y0_));
     const std::array<size_t, kBlocks> counts = countRows(splats, y0_);
     for (size_t row = 0; row < rows_.size(); ++row) {
       if (counts[row] > rows_[row].capacity()) rows_[row] = {};  // not beside the new one
@@ -136,8 +155,10 @@ class IsoLayers::Tracer {
   /// What the neighbours' outermost pixels see, so that an outline on the edge of two tiles is found by both. Their
   /// splats are this tile's, too.
   void traceAround() {
+    constexpr int kLong = kTileSide / 2;
+    static_assert(kLong == int{IsoPacket::kRays});
     for (const int y : {-1, kTileSide})
-      for (int x = 0; x < kTileSide; x += kBlock) trace({x, y, x + kBlock, y + 1});
+      for (int x = 0; x < kTileSide; x += kLong) trace({x, y, x + kLong, y + 1});
     for (const int x : {-1, kTileSide})
       for (int y = 0; y < kTileSide; y += kBlock) trace({x, y, x + 1, y + kBlock});
   }
@@ -224,7 +245,7 @@ class IsoLayers::Tracer {
       }
       if (!std::isfinite(nearest) || left < kOwnLayers) return;
       PixelLayer layer{0, glm::vec4(0.0f), 0};
-      double depth = 0;
+      double depth = 0, scalar = 0;
       float count = 0;
       for (size_t n = 0; n < rays.size(); ++n) {
         const auto hits = rays_.hits(rays[n]).all();
@@ -234,13 +255,13 @@ class IsoLayers::Tracer {
         layer.colour +=
             through[n] * alpha * glm::vec4(colourOf(hit, packet.x[rays[n]], packet.y[rays[n]]), 1.0f);
         through[n] *= 1 - alpha;
-        layer.scalar += look_.colours_of_other ? hit.other_scalar : hit.scalar;
+        scalar += double{look_.colours_of_other ? hit.other_scalar : hit.scalar};
         depth += depthOf(hit.depth, packet.x[rays[n]], packet.y[rays[n]]);
         ++count;
       }
       layer.colour /= left;
       layer.colour.w = std::min(layer.colour.w, 1.0f);
-      layer.scalar /= count;
+      layer.scalar = static_cast<float>(scalar / double{count});
       layer.depth = static_cast<float>(depth / double{count});
       layers.push_back(layer);
     }

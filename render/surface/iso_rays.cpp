@@ -1,35 +1,27 @@
 #include "render/surface/iso_rays.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
-#include <numeric>
-
-#include "render/project/footprint.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr auto kSupport = static_cast<float>(kKernelSupport);
-// K in x = 1 - (r / support)²: x² times this, fitted by least squares.
-constexpr float kKernel[] = {0.0451566f, 0.2057787f, -0.2786960f, 0.7582452f, -0.1769623f};
-constexpr float kStep = 0.35f;       // of half the support of the shortest splat
 constexpr size_t kMaxSteps = 4096;   // of a packet
 constexpr float kMinWeight = 0.02f;  // below it there is no field
 // Inside the data the weights add up to about 1, less what the neighbours have that do not hold the value.
 constexpr float kMinInside = 0.15f;
 constexpr float kHidden = 1.0f / 4096, kClear = 1.0f / 1024;
 constexpr int kRefinements = 4;
-
-float kernelOf(float x) {
-  return x * x * (kKernel[0] + x * (kKernel[1] + x * (kKernel[2] + x * (kKernel[3] + x * kKernel[4]))));
-}
+constexpr float kNearTurn =
+    0.25f;  // of the nearest place's distance to the value: nearer turns are looked at
 
 }  // namespace
 
-IsoRays::IsoRays(const IsoSplats::Settings& settings)
-    : settings_(settings), perspective_(settings.view.projection == Projection::kPerspective) {}
+IsoRays::IsoRays(const IsoSplats::Settings& settings) : settings_(settings) {
+  fan_.perspective = settings.view.projection == Projection::kPerspective;
+}
 
 /// Of a ray: where it is in view axes; in perspective at the depth 1.
 glm::dvec2 IsoRays::acrossAt(const IsoPacket& packet, size_t ray) const {
@@ -38,124 +30,97 @@ glm::dvec2 IsoRays::acrossAt(const IsoPacket& packet, size_t ray) const {
           (double{packet.y[ray]} - 0.5 * view.size.height) / view.focal_px};
 }
 
-bool IsoRays::crossOne(const IsoSplats::Placed& placed, Crossed& out) const {
-  const IsoSplat& splat = *placed.splat;
-  out.weight = splat.weight;
-  const glm::vec3 r = splat.by_right, d = splat.by_down, f = splat.by_forward;
-  const glm::dvec2 centre(splat.centre);
-  const double distance = perspective_ ? splat.centre.z : 1;
-  const float s_r = glm::dot(splat.slope, r), s_d = glm::dot(splat.slope, d), s_f = glm::dot(splat.slope, f);
-  const float from_base = static_cast<float>(splat.centre.z - base_depth_);
-  // Of perspective alone: how much a ray leans.
-  const float leans = perspective_ ? 1.0f : 0.0f;
-  Row nearest;
-  for (size_t ray = 0; ray < kRays; ++ray) {
-    // At the centre's depth the ray is at `base` in the frame of A, and it moves by `along`.
-    const auto x = static_cast<float>(across_x_[ray] * distance - centre.x);
-    const auto y = static_cast<float>(across_y_[ray] * distance - centre.y);
-    const float lean_x = leans * static_cast<float>(across_x_[ray]);
-    const float lean_y = leans * static_cast<float>(across_y_[ray]);
-    const float base0 = x * r.x + y * d.x, base1 = x * r.y + y * d.y, base2 = x * r.z + y * d.z;
-    const float along0 = f.x + lean_x * r.x + lean_y * d.x, along1 = f.y + lean_x * r.y + lean_y * d.y,
-                along2 = f.z + lean_x * r.z + lean_y * d.z;
-    const float apart0 = base1 * along2 - base2 * along1, apart1 = base2 * along0 - base0 * along2,
-                apart2 = base0 * along1 - base1 * along0;
-    const float length2 = along0 * along0 + along1 * along1 + along2 * along2;
-    constexpr float kPerSupport2 = 1 / (kSupport * kSupport);
-    const float to_nearest = -(base0 * along0 + base1 * along1 + base2 * along2) / length2;
-    const float change = s_f + lean_x * s_r + lean_y * s_d;
-    out.by[ray] = length2 * kPerSupport2;
-    out.from[ray] = 1 - (apart0 * apart0 + apart1 * apart1 + apart2 * apart2) / length2 * kPerSupport2;
-    nearest[ray] = to_nearest;
-    out.mean[ray] = splat.mean + x * s_r + y * s_d + to_nearest * change;
-    out.change[ray] = change;
-  }
-  float shortest = out.by[0], longest = out.by[0], most = out.from[0];
-  float begin = nearest[0], end = nearest[0];
-  for (size_t ray = 0; ray < kRays; ++ray) {
-    out.middle[ray] = from_base + nearest[ray];
-    shortest = std::max(shortest, out.by[ray]);
-    longest = std::min(longest, out.by[ray]);
-    most = std::max(most, out.from[ray]);
-    begin = std::min(begin, nearest[ray]);
-    end = std::max(end, nearest[ray]);
-  }
-  if (!(most > 0)) return false;
-  const float half = std::sqrt(most / longest);
-  out.begin = from_base + begin - half;
-  out.end = from_base + end + half;
-  out.step = kStep / std::sqrt(shortest);
-  out.splat = &placed;
-  return out.begin < out.end && std::isfinite(out.end - out.begin) && out.step > 0;
-}
-
-/// Without the old memory beside the new.
 void IsoRays::makeRoom(size_t splats) {
   if (splats <= crossed_.capacity()) return;
-  crossed_ = {};
-  order_ = {};
+  crossed_ = {};  // not beside the new one
+  waiting_ = {};
   active_ = {};
   crossed_.reserve(splats);
-  order_.reserve(splats);
+  waiting_.reserve(splats);
   active_.reserve(splats);
 }
 
-void IsoRays::cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats) {
+void IsoRays::begin(const IsoPacket& packet, Ahead& ahead) {
+  for (size_t ray = 0; ray < kRays; ++ray) {
+    hits_[ray].count = 0;
+    through_[ray] = ray < packet.count ? 1.0f : 0.0f;
+  }
   const auto x = std::minmax_element(packet.x.begin(), packet.x.begin() + packet.count);
   const auto y = std::minmax_element(packet.y.begin(), packet.y.begin() + packet.count);
+  ahead.x0 = *x.first;
+  ahead.x1 = *x.second;
+  ahead.y0 = *y.first;
+  ahead.y1 = *y.second;
+  fan_.corner = acrossAt(packet, 0);
   for (size_t ray = 0; ray < kRays; ++ray) {
-    const glm::dvec2 across = acrossAt(packet, std::min(ray, packet.count - 1));
-    across_x_[ray] = across.x;
-    across_y_[ray] = across.y;
+    const glm::dvec2 off = acrossAt(packet, std::min(ray, packet.count - 1)) - fan_.corner;
+    fan_.x[ray] = static_cast<float>(off.x);
+    fan_.y[ray] = static_cast<float>(off.y);
   }
-  const auto touches = [&](const IsoSplats::Placed& placed) {
-    const IsoSplat& s = *placed.splat;
-    return s.x1 >= *x.first && s.x0 <= *x.second && s.y1 >= *y.first && s.y0 <= *y.second;
-  };
   crossed_.clear();
-  makeRoom(static_cast<size_t>(std::count_if(splats.begin(), splats.end(), touches)));
-  for (const IsoSplats::Placed& placed : splats) {
-    if (!touches(placed)) continue;
-    if (crossed_.empty()) base_depth_ = placed.splat->centre.z;
-    crossed_.emplace_back();
-    if (!crossOne(placed, crossed_.back())) crossed_.pop_back();
+  waiting_.clear();
+  active_.clear();
+  fan_.base_depth = ahead.splats.empty() ? 0 : double{ahead.splats[0].splat->near};
+  first_ = INFINITY;
+  least_step_ = 0;
+}
+
+/// Those that may begin before a depth.
+void IsoRays::crossBefore(Ahead& ahead, float depth) {
+  const double before = fan_.base_depth + double{depth};
+  while (!ahead.splats.empty() && double{ahead.splats[0].splat->near} < before) crossNext(ahead);
+}
+
+void IsoRays::crossNext(Ahead& ahead) {
+  const IsoSplats::Placed& placed = ahead.splats[0];
+  ahead.splats = ahead.splats.subspan(1);
+  const IsoSplat& s = *placed.splat;
+  if (!(s.x1 >= ahead.x0 && s.x0 <= ahead.x1 && s.y1 >= ahead.y0 && s.y0 <= ahead.y1)) return;
+  crossed_.emplace_back();
+  if (crossSplat(placed, fan_, crossed_.back()))
+    waiting_.push_back(&crossed_.back());
+  else
+    crossed_.pop_back();
+}
+
+float IsoRays::firstBegin() const {
+  float first = INFINITY;
+  for (const IsoCrossed* const s : waiting_) first = std::min(first, s->begin);
+  return first;
+}
+
+/// Those that begin within a step from `at`; where it ends, so that none is stepped over.
+float IsoRays::activate(float at, float step) {
+  float to = at + std::max(step, least_step_);
+  size_t kept = 0;
+  for (const IsoCrossed* const s : waiting_) {
+    if (!(s->begin < to)) {
+      waiting_[kept++] = s;
+      continue;
+    }
+    active_.push_back(s);
+    least_step_ = std::max(least_step_, (s->end - first_) / kMaxSteps);
+    to = std::min(to, std::max(s->begin + s->step, at + least_step_));
   }
-  order_.resize(crossed_.size());
-  std::iota(order_.begin(), order_.end(), 0u);
-  std::sort(order_.begin(), order_.end(), [this](uint32_t a, uint32_t b) {
-    return crossed_[a].begin < crossed_[b].begin || (crossed_[a].begin == crossed_[b].begin && a < b);
-  });
+  waiting_.resize(kept);
+  return to;
 }
 
 /// Without the common field: of each ray the splat that weighs most there.
-void IsoRays::heaviestAt(const Row& z, Field& field) const {
-  field = {};
-  for (const Crossed* splat : active_)
+void IsoRays::heaviestAt(Place& place) const {
+  place.field = {};
+  for (const IsoCrossed* splat : active_)
     for (size_t ray = 0; ray < kRays; ++ray) {
-      const float t = z[ray] - splat->middle[ray];
-      const float w = splat->weight * kernelOf(std::max(splat->from[ray] - splat->by[ray] * t * t, 0.0f));
-      if (w <= field.weight[ray]) continue;
-      field.weight[ray] = w;
-      field.value[ray] = splat->mean[ray] + splat->change[ray] * t;
+      const float w = isoWeight(*splat, ray, place.z[ray]);
+      if (w <= place.field.weight[ray]) continue;
+      place.field.weight[ray] = w;
+      place.field.value[ray] = splat->mean[ray] + splat->change[ray] * (place.z[ray] - splat->middle[ray]);
     }
 }
 
-void IsoRays::fieldAt(const Row& z, Field& field) const {
-  if (!settings_.corrections.common_field) return heaviestAt(z, field);
-  Row weight{}, sum{};
-  for (const Crossed* splat : active_) {
-    const Crossed& s = *splat;
-    for (size_t ray = 0; ray < kRays; ++ray) {
-      const float t = z[ray] - s.middle[ray];
-      const float inside = s.from[ray] - s.by[ray] * t * t;
-      const float x = inside > 0 ? inside : 0.0f;
-      const float w = s.weight * kernelOf(x);
-      weight[ray] += w;
-      sum[ray] += w * (s.mean[ray] + s.change[ray] * t);
-    }
-  }
-  field.weight = weight;
-  for (size_t ray = 0; ray < kRays; ++ray) field.value[ray] = sum[ray] / std::max(weight[ray], 1e-20f);
+void IsoRays::fieldAt(Place& place) const {
+  if (!settings_.corrections.common_field) return heaviestAt(place);
+  sumField(active_, place.z, place.field);
 }
 
 /// Between begin and end, where the field is on either side of the value. `rays`: bits.
@@ -166,7 +131,7 @@ void IsoRays::refine(float value, const Place& begin, const Place& end, unsigned
     above[ray] = end.field.value[ray] - value;
   }
   std::array<int8_t, kRays> kept{};  // which end has stayed
-  Field field;
+  Place at_guess;
   const auto guess = [&] {
     for (size_t ray = 0; ray < kRays; ++ray) {
       const float change = below[ray] - above[ray];
@@ -176,9 +141,10 @@ void IsoRays::refine(float value, const Place& begin, const Place& end, unsigned
   };
   for (int n = 0; n < kRefinements; ++n) {
     guess();
-    fieldAt(z, field);
+    at_guess.z = z;
+    fieldAt(at_guess);
     for (size_t ray = 0; ray < kRays; ++ray) {
-      const float at = field.value[ray] - value;
+      const float at = at_guess.field.value[ray] - value;
       if ((at < 0) == (below[ray] < 0)) {
         low[ray] = z[ray];
         below[ray] = at;
@@ -199,50 +165,61 @@ void IsoRays::refine(float value, const Place& begin, const Place& end, unsigned
 bool IsoRays::isClipped(const glm::dvec3& at) const {
   if (settings_.clip_planes.empty()) return false;
   const ScreenView& view = settings_.view;
-  const double along = at.z + (perspective_ ? 0 : settings_.depth_origin);
+  const double along = at.z + (fan_.perspective ? 0 : settings_.depth_origin);
   const glm::dvec3 world =
       (view.eye + at.x * view.right + at.y * view.down + along * view.forward) / view.scale;
   return std::any_of(settings_.clip_planes.begin(), settings_.clip_planes.end(),
                      [&](const ClipPlane& plane) { return glm::dot(plane.normal, world - plane.point) < 0; });
 }
 
-/// What the splats have at a crossing.
-struct IsoRays::Point {
-  glm::vec3 gradient{0.0f};
-  float weight = 0, other = 0, outside = 0;
-};
+/// The other scalar at a point.
+float IsoRays::otherAt(size_t ray, float z, const glm::dvec3& at) const {
+  float sum = 0, weights = 0;
+  for (const IsoCrossed* crossed : active_) {
+    const float w = isoWeight(*crossed, ray, z);
+    if (!(w > 0)) continue;
+    const IsoSplat& s = *crossed->splat->splat;
+    const glm::vec3 off(at - s.centre);
+    const glm::vec3 u = off.x * s.by_right + off.y * s.by_down + off.z * s.by_forward;
+    sum += w * (s.other_mean + glm::dot(s.other_slope, u));
+    weights += w;
+  }
+  return sum / weights;
+}
+
+/// Whether most of the weight at a point is behind borders' faces.
+bool IsoRays::isOutside(size_t ray, float z, const glm::dvec3& at, float weight) const {
+  if (!settings_.corrections.ended) return false;
+  float outside = 0;
+  for (const IsoCrossed* crossed : active_) {
+    if (crossed->splat->faces.empty()) continue;
+    const float w = isoWeight(*crossed, ray, z);
+    if (!(w > 0)) continue;
+    const IsoSplat& s = *crossed->splat->splat;
+    const glm::vec3 off(at - s.centre);
+    const glm::vec3 u = off.x * s.by_right + off.y * s.by_down + off.z * s.by_forward;
+    if (std::any_of(crossed->splat->faces.begin(), crossed->splat->faces.end(),
+                    [&](const CutFace& face) { return glm::dot(face.inward, u) + face.distance < 0; }))
+      outside += w;
+  }
+  return outside > 0.5f * weight;
+}
 
 void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned rays) {
+  IsoSlopes slopes;
+  sumSlopes(active_, z, slopes);
   for (size_t ray = 0; ray < packet.count; ++ray) {
-    if ((rays >> ray & 1) == 0) continue;
-    const glm::dvec2 across = acrossAt(packet, ray);
-    const double depth = base_depth_ + double{z[ray]};
-    if (perspective_ && depth < settings_.view.near) continue;
-    const glm::dvec3 at(across * (perspective_ ? depth : 1.0), depth);
-    if (isClipped(at)) continue;
-    Point point;
-    for (const Crossed* crossed : active_) {
-      const IsoSplat& s = *crossed->splat->splat;
-      const float t = z[ray] - crossed->middle[ray];
-      const float x = crossed->from[ray] - crossed->by[ray] * t * t;
-      if (!(x > 0)) continue;
-      const float w = s.weight * kernelOf(x);
-      const glm::vec3 off(at - s.centre);
-      const glm::vec3 u = off.x * s.by_right + off.y * s.by_down + off.z * s.by_forward;
-      point.weight += w;
-      point.gradient += w * glm::vec3(glm::dot(s.slope, s.by_right), glm::dot(s.slope, s.by_down),
-                                      glm::dot(s.slope, s.by_forward));
-      point.other += w * (s.other_mean + glm::dot(s.other_slope, u));
-      const bool outside =
-          settings_.corrections.ended &&
-          std::any_of(crossed->splat->faces.begin(), crossed->splat->faces.end(),
-                      [&](const CutFace& face) { return glm::dot(face.inward, u) + face.distance < 0; });
-      if (outside) point.outside += w;
-    }
-    if (!(point.weight > kMinInside) || point.outside > 0.5f * point.weight) continue;
+    if ((rays >> ray & 1) == 0 || !(slopes.weight[ray] > kMinInside)) continue;
+    const double depth = fan_.base_depth + double{z[ray]};
+    if (fan_.perspective && depth < settings_.view.near) continue;
+    const glm::dvec3 at(acrossAt(packet, ray) * (fan_.perspective ? depth : 1.0), depth);
+    if (isClipped(at) || isOutside(ray, z[ray], at, slopes.weight[ray])) continue;
+    const auto scalar = static_cast<float>(settings_.values[value]);
     addHit(ray,
-           {depth, point.gradient / point.weight, static_cast<float>(settings_.values[value]),
-            point.other / point.weight},
+           {depth,
+            {slopes.x[ray], slopes.y[ray], slopes.z[ray]},
+            scalar,
+            settings_.two_scalars ? otherAt(ray, z[ray], at) : scalar},
            packet.opacity);
   }
 }
@@ -258,62 +235,101 @@ void IsoRays::addHit(size_t ray, const IsoHit& hit, const IsoOpacity& opacity) {
   if (hits.count == kMaxHits) through_[ray] = 0;
 }
 
+/// Bits of the rays that see what lies ahead.
+unsigned IsoRays::openRays() const {
+  unsigned open = 0;
+  for (size_t ray = 0; ray < kRays; ++ray) open |= static_cast<unsigned>(through_[ray] > kHidden) << ray;
+  return open;
+}
+
+void IsoRays::takeBetween(const IsoPacket& packet, const Place& begin, const Place& end, size_t value,
+                          unsigned rays) {
+  Row found{};
+  refine(wanted(value), begin, end, rays, found);
+  take(packet, found, value, rays);
+}
+
+void IsoRays::findCrossings(const IsoPacket& packet, const Place& begin, const Place& end) {
+  for (size_t value = 0; value < settings_.values.size(); ++value) {
+    const unsigned rays = openRays() & crossedRays(begin.field, end.field, wanted(value), kMinWeight);
+    if (rays != 0) takeBetween(packet, begin, end, value, rays);
+  }
+}
+
+/// Where the field comes near a value and turns back, it may have crossed it twice: by the parabola through three places.
+void IsoRays::findTurns(const IsoPacket& packet, const Place& first, const Place& second,
+                        const Place& third) {
+  for (size_t value = 0; value < settings_.values.size(); ++value) {
+    const unsigned candidates =
+        openRays() & turnedRays({&first.field, &second.field, &third.field}, wanted(value), kMinWeight);
+    if (candidates == 0) continue;
+    Place turn = second, begin = second, end = second;
+    unsigned rays = 0;
+    for (unsigned left = candidates; left != 0; left &= left - 1) {
+      const auto ray = static_cast<size_t>(std::countr_zero(left));
+      const float a = first.field.value[ray] - wanted(value), b = second.field.value[ray] - wanted(value),
+                  c = third.field.value[ray] - wanted(value);
+      const float before = second.z[ray] - first.z[ray], after = third.z[ray] - second.z[ray];
+      const float to = (b - a) / before, from = (c - b) / after;
+      const float bend = (from - to) / (before + after);
+      const float slope = (to * after + from * before) / (before + after);
+      const float move = -0.5f * slope / bend, side = b < 0 ? -1.0f : 1.0f;
+      if (!(side * (b + 0.5f * slope * move) < kNearTurn * side * b)) continue;
+      rays |= 1u << ray;
+      turn.z[ray] = second.z[ray] + std::clamp(move, -before, after);
+      const bool sooner = turn.z[ray] < second.z[ray];
+      const Place &from_place = sooner ? first : second, &to_place = sooner ? second : third;
+      begin.z[ray] = from_place.z[ray];
+      begin.field.value[ray] = from_place.field.value[ray];
+      end.z[ray] = to_place.z[ray];
+      end.field.value[ray] = to_place.field.value[ray];
+    }
+    if (rays == 0) continue;
+    fieldAt(turn);
+    rays &= crossedRays(second.field, turn.field, wanted(value), kMinWeight);
+    if (rays == 0) continue;
+    takeBetween(packet, begin, turn, value, rays);
+    takeBetween(packet, turn, end, value, rays);
+  }
+}
+
 void IsoRays::trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats) {
-  for (size_t ray = 0; ray < kRays; ++ray) {
-    hits_[ray].count = 0;
-    through_[ray] = ray < packet.count ? 1.0f : 0.0f;
-  }
-  cross(packet, splats);
-  active_.clear();
-  Place now, before;
-  size_t next = 0;
-  bool fresh = true;  // nothing is known of what lies before
-  float least_step = 0;
-  if (!order_.empty()) {
-    now.z.fill(crossed_[order_[0]].begin);
-    for (const Crossed& s : crossed_) least_step = std::max(least_step, (s.end - now.z[0]) / kMaxSteps);
-  }
-  while (true) {
-    float at = now.z[0];
-    std::erase_if(active_, [&](const Crossed* s) { return s->end < at; });
-    float step = std::numeric_limits<float>::infinity();
-    for (const Crossed* s : active_) step = std::min(step, s->step);
-    if (active_.empty()) {
-      if (next == order_.size()) break;
-      at = crossed_[order_[next]].begin;
-      fresh = true;
-      step = crossed_[order_[next]].step;
-    }
-    float to = at + std::max(step, least_step);
-    for (; next < order_.size() && crossed_[order_[next]].begin < to; ++next) {
-      const Crossed& s = crossed_[order_[next]];
-      active_.push_back(&s);
-      to = std::min(to, std::max(s.begin + s.step, at + least_step));
-    }
-    before = now;
-    now.z.fill(std::max(to, std::nextafter(at, std::numeric_limits<float>::infinity())));
-    fieldAt(now.z, now.field);
-    if (!fresh) {
-      unsigned open = 0;
-      for (size_t ray = 0; ray < packet.count; ++ray)
-        open |= static_cast<unsigned>(through_[ray] > kHidden && before.field.weight[ray] > kMinWeight &&
-                                      now.field.weight[ray] > kMinWeight)
-                << ray;
-      for (size_t value = 0; value < settings_.values.size(); ++value) {
-        const auto wanted = static_cast<float>(settings_.values[value] - settings_.values.front());
-        unsigned rays = 0;
-        for (size_t ray = 0; ray < packet.count; ++ray)
-          rays |= static_cast<unsigned>((before.field.value[ray] < wanted) != (now.field.value[ray] < wanted))
-                  << ray;
-        rays &= open;
-        if (rays == 0) continue;
-        Row found{};
-        refine(wanted, before, now, rays, found);
-        take(packet, found, value, rays);
+  Ahead ahead{splats, 0, 0, 0, 0};
+  begin(packet, ahead);
+  std::array<Place, 3> places;  // the last ones, in turn
+  size_t known = 0;             // of them
+  float at = 0, last = 0;
+  while (openRays() != 0) {
+    // Those that end after the place before the last one: what turns there is found in the next step.
+    float step = INFINITY;
+    size_t kept = 0;
+    for (const IsoCrossed* const s : active_)
+      if (!(s->end < last)) {
+        active_[kept++] = s;
+        if (!(s->end < at)) step = std::min(step, s->step);
       }
-      if (std::none_of(through_.begin(), through_.end(), [](float part) { return part > kHidden; })) break;
+    active_.resize(kept);
+    if (step == INFINITY) {  // all have ended
+      active_.clear();
+      known = 0;
+      while (!ahead.splats.empty() && waiting_.empty()) crossNext(ahead);
+      crossBefore(ahead, firstBegin());
+      if (waiting_.empty()) break;
+      at = firstBegin();
+      first_ = std::min(first_, at);
+      step = 0;
+      for (const IsoCrossed* const s : waiting_)
+        if (s->begin == at) step = s->step;
     }
-    fresh = false;
+    crossBefore(ahead, at + std::max(step, least_step_));
+    std::rotate(places.begin(), places.begin() + 1, places.end());
+    last = at;
+    at = std::max(activate(at, step), std::nextafter(at, INFINITY));
+    places[2].z.fill(at);
+    fieldAt(places[2]);
+    if (known >= 2) findTurns(packet, places[0], places[1], places[2]);
+    if (known >= 1) findCrossings(packet, places[1], places[2]);
+    known = std::min<size_t>(known + 1, 2);
   }
 }
 

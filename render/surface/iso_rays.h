@@ -6,18 +6,19 @@
 // at in steps that are short beside the splats; where it passes an isovalue, the crossing is found by false position,
 // and the gradient there is Σ w ∇f / Σ w. DESIGN.md, "Isosurfaces".
 //
+// Where it comes near and turns back between two steps, as at outlines, the place where it turns is looked at as well.
 // Sixteen rays at a time, in the order of the splats: the bits depend on nothing else. K is a polynomial in
 // 1 - (|u| / support)², within 0.004: weights need no more.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
 #include "render/colour/classification.h"
+#include "render/surface/iso_field.h"
 #include "render/surface/iso_splats.h"
 
 namespace curvisplat {
@@ -44,9 +45,9 @@ struct IsoOpacity {
 
 /// Rays that lie close together: points of the picture.
 struct IsoPacket {
-  static constexpr size_t kRays = 16;
+  static constexpr size_t kRays = kIsoRays;
 
-  std::array<float, kRays> x{}, y{};
+  IsoRow x{}, y{};
   size_t count = 0;
   IsoOpacity opacity;  // what lies behind crossings that hide it need not be found
 };
@@ -64,56 +65,61 @@ class IsoRays {
   /// For one thread; `settings` as the splats'.
   explicit IsoRays(const IsoSplats::Settings& settings);
 
-  /// Traces the rays through `splats`, each of which has to touch one of them; others do no harm. Overwrites hits()
-  /// of the packet's rays, from the nearest on.
+  /// Makes room for packets that at most so many splats touch, by their pixels.
+  void makeRoom(size_t splats);
+  /// Traces the rays through `splats`, in the order of IsoSplats::inTile(); those that touch none of the rays do no harm.
+  /// Overwrites hits() of the packet's rays, from the nearest on.
   void trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats);
   const Hits& hits(size_t ray) const { return hits_[ray]; }
 
-  /// The most memory that trace() takes for `splats` splats, in bytes.
+  /// What makeRoom() takes, in bytes.
   static constexpr uint64_t bytes(size_t splats) {
-    return splats * (sizeof(Crossed) + sizeof(uint32_t) + sizeof(const Crossed*));
+    return splats * (sizeof(IsoCrossed) + 2 * sizeof(const IsoCrossed*));
   }
 
  private:
   static constexpr size_t kRays = IsoPacket::kRays;
-  using Row = std::array<float, kRays>;
+  using Row = IsoRow;
 
-  /// A splat along the rays, with t = z - middle: 1 - (|u| / support)² = from - by t², f = mean + change t.
-  struct alignas(64) Crossed {
-    Row middle, from, by, mean, change;
-    float weight;
-    float begin, end;  // what any ray has of its support lies between them
-    float step;        // half its length along the rays
-    const IsoSplats::Placed* splat;
-  };
-  struct Field {
-    Row weight{}, value{};  // Σ w, and F
-  };
   /// A point of each ray.
   struct Place {
     Row z{};
-    Field field;
+    IsoField field;
   };
-  struct Point;
+  /// Splats that are yet to be crossed, and the pixels of the packet.
+  struct Ahead {
+    std::span<const IsoSplats::Placed> splats;
+    float x0, y0, x1, y1;
+  };
 
-  void makeRoom(size_t splats);
-  void cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats);
-  bool crossOne(const IsoSplats::Placed& placed, Crossed& out) const;
+  void begin(const IsoPacket& packet, Ahead& ahead);
+  void crossNext(Ahead& ahead);
+  void crossBefore(Ahead& ahead, float depth);
+  float firstBegin() const;
+  float activate(float at, float step);
   glm::dvec2 acrossAt(const IsoPacket& packet, size_t ray) const;
-  void fieldAt(const Row& z, Field& field) const;
-  void heaviestAt(const Row& z, Field& field) const;
+  void fieldAt(Place& place) const;
+  void heaviestAt(Place& place) const;
+  void findCrossings(const IsoPacket& packet, const Place& begin, const Place& end);
+  void findTurns(const IsoPacket& packet, const Place& first, const Place& second, const Place& third);
+  void takeBetween(const IsoPacket& packet, const Place& begin, const Place& end, size_t value,
+                   unsigned rays);
   void refine(float value, const Place& begin, const Place& end, unsigned rays, Row& z) const;
   void take(const IsoPacket& packet, const Row& z, size_t value, unsigned rays);
+  float otherAt(size_t ray, float z, const glm::dvec3& at) const;
+  bool isOutside(size_t ray, float z, const glm::dvec3& at, float weight) const;
   void addHit(size_t ray, const IsoHit& hit, const IsoOpacity& opacity);
   bool isClipped(const glm::dvec3& at) const;
+  float wanted(size_t value) const {
+    return static_cast<float>(settings_.values[value] - settings_.values.front());
+  }
+  unsigned openRays() const;
 
   const IsoSplats::Settings settings_;
-  const bool perspective_;
-  double base_depth_ = 0;
-  std::array<double, kRays> across_x_{}, across_y_{};  // in view axes; perspective: at the depth 1
-  std::vector<Crossed> crossed_;
-  std::vector<uint32_t> order_;  // of crossed_, by begin
-  std::vector<const Crossed*> active_;
+  IsoFan fan_;
+  std::vector<IsoCrossed> crossed_;
+  std::vector<const IsoCrossed*> waiting_, active_;  // that begin ahead; that the last two places may touch
+  float first_ = 0, least_step_ = 0;                 // where the packet begins; of kMaxSteps steps
   std::array<Hits, kRays> hits_;
   Row through_{};
 };

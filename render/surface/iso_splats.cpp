@@ -1,9 +1,12 @@
 #include "render/surface/iso_splats.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <numeric>
 
 #include "render/project/footprint.h"
 #include "render/project/splat_pieces.h"
@@ -131,6 +134,7 @@ bool IsoSplats::place(const glm::dvec3& centre, const Shape& shape, IsoSplat& sp
   }
   if (!(upper.x >= 0 && upper.y >= 0 && lower.x <= view.size.width && lower.y <= view.size.height))
     return false;
+  splat.near = static_cast<float>(splat.centre.z - reach.z);
   splat.x0 = static_cast<float>(lower.x);
   splat.y0 = static_cast<float>(lower.y);
   splat.x1 = static_cast<float>(upper.x);
@@ -173,6 +177,17 @@ void IsoSplats::sort() {
       forTiles(splat, [&](size_t tile) {
         placed_[ends[tile]++] = {&splat, std::span(part.faces).subspan(splat.first_face, splat.faces)};
       });
+  tbb::parallel_for(size_t{0}, settings_.tiles.count(), [&](size_t n) {
+    const auto at = [&](size_t place) { return placed_.begin() + static_cast<std::ptrdiff_t>(place); };
+    // By their places where they are equal: those of a part lie one after the other.
+    std::stable_sort(at(begins_[n]), at(begins_[n + 1]),
+                     [](const Placed& a, const Placed& b) { return a.splat->near < b.splat->near; });
+  });
+}
+
+uint64_t IsoSplats::count() const {
+  return std::accumulate(parts_.begin(), parts_.end(), uint64_t{0},
+                         [](uint64_t sum, const Part& part) { return sum + part.splats.size(); });
 }
 
 std::span<const IsoSplats::Placed> IsoSplats::inTile(size_t tile) const {

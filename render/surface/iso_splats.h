@@ -37,6 +37,7 @@ struct IsoSplat {
   float other_mean;                         // of the picture's other scalar; else those of the scalar
   glm::vec3 other_slope;
   float x0, y0, x1, y1;        // pixels that it may touch
+  float near;                  // where along the view it may begin
   uint32_t first_face, faces;  // of its brick's
 };
 
@@ -58,6 +59,7 @@ class IsoSplats {
     TileRange tiles;
     uint64_t most_bytes = 0;
     IsoCorrections corrections = {};
+    bool two_scalars = false;  // the picture's
   };
   /// Of `parts` parts of bricks. What `settings` refers to outlives it.
   IsoSplats(const Settings& settings, size_t parts);
@@ -77,9 +79,11 @@ class IsoSplats {
     const IsoSplat* splat;
     std::span<const CutFace> faces;
   };
-  /// After the last add(): sorts them into the tiles.
+  /// How many splats were added.
+  uint64_t count() const;
+  /// After the last add(): sorts them into the tiles. Parallel on the caller's TBB arena.
   void sort();
-  /// The splats of a tile of the range, and of the pixels around it, in the order of parts.
+  /// The splats of a tile of the range, and of the pixels around it, by `near`, then in the order of parts.
   std::span<const Placed> inTile(size_t tile) const;
 
  private:

@@ -83,6 +83,16 @@ std::string howFar(const RenderReport& report, uint64_t frames, bool several) {
                      isMovieName(output) ? output + " was not written" : "the pictures of these are kept");
 }
 
+/// The splats of a picture: the volume's, and those among which isosurfaces lie.
+std::string splatsText(const FrameStatistics& frame, const std::string& scalar) {
+  const std::string volume = fmt::format("{} of {} in {}", countText(frame.splats_drawn, "splat"), scalar,
+                                         countText(frame.bricks_drawn, "brick"));
+  if (frame.iso_bricks == 0) return volume;
+  const std::string isosurfaces = fmt::format("isosurfaces in {} of {}", countText(frame.iso_splats, "splat"),
+                                              countText(frame.iso_bricks, "brick"));
+  return frame.splats_drawn == 0 ? isosurfaces : volume + ", " + isosurfaces;
+}
+
 void printResult(const RenderReport& report) {
   if (report.frames.empty()) {
     printLine("{}: no frames in this part", report.output.string());
@@ -90,9 +100,8 @@ void printResult(const RenderReport& report) {
   }
   const FrameStatistics& last = report.frames.back().statistics;
   if (report.frames.size() == 1) {
-    printLine("{}: {} of {} in {}, {:.2f} s, {}", report.output.string(),
-              countText(last.splats_drawn, "splat"), report.variable.name,
-              countText(last.bricks_drawn, "brick"), last.total_s, report.backend);
+    printLine("{}: {}, {:.2f} s, {}", report.output.string(), splatsText(last, report.variable.name),
+              last.total_s, report.backend);
     return;
   }
   double total_s = 0;
