@@ -5,6 +5,7 @@
 #include "render/cpu/cpu_painter.h"
 #include "render/gl/gl_context.h"
 #include "render/gl/gl_painter.h"
+#include "render/gl/gl_tile_painter.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -12,8 +13,11 @@ namespace {
 
 class GlBackend final : public PaintingBackend {
  public:
-  explicit GlBackend(GlLibrary library) : gl_(library) {
-    gl_.run([this](const GlContext& context) { painter_ = std::make_unique<GlPainter>(context); });
+  enum class Way { kQuads, kTilesOrQuads };
+
+  GlBackend(GlLibrary library, Way way)
+      : gl_(library), capacity_(GlTilePainter::Capacity::of(gl_.isSoftware())) {
+    gl_.run([&](const GlContext& context) { makePainter(context, way); });
   }
   ~GlBackend() override {
     gl_.run([this](const GlContext&) { painter_.reset(); });
@@ -21,15 +25,33 @@ class GlBackend final : public PaintingBackend {
   void run(const Job& job) override {
     gl_.run([&](const GlContext&) { job(*painter_); });
   }
-  const std::string& name() const override { return gl_.contextName(); }
+  const std::string& name() const override { return name_; }
   bool isSoftware() const override { return gl_.isSoftware(); }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
-    return GlPainter::bytes(size, resources);
+    return tiles_ ? GlTilePainter::bytes(size, resources, capacity_) : GlPainter::bytes(size, resources);
   }
 
  private:
+  void makePainter(const GlContext& context, Way way) {
+    name_ = context.name();
+    if (way == Way::kTilesOrQuads) try {
+        painter_ = std::make_unique<GlTilePainter>(context, capacity_);
+        tiles_ = true;
+        name_ += ", compute shaders";
+        return;
+      } catch (const Error& error) {
+        name_ += fmt::format(", quads ({})", error.what());
+      }
+    else
+      name_ += ", quads";
+    painter_ = std::make_unique<GlPainter>(context);
+  }
+
   GlThread gl_;
-  std::unique_ptr<GlPainter> painter_;  // made, used and destroyed on the GL thread
+  const GlTilePainter::Capacity capacity_;
+  bool tiles_ = false;
+  std::string name_;
+  std::unique_ptr<Painter> painter_;  // made, used and destroyed on the GL thread
 };
 
 /// Paints on the caller's thread and on TBB's threads.
@@ -54,7 +76,7 @@ std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
       why_not = "EGL finds no graphics card";
       return nullptr;
     }
-    auto card = std::make_unique<GlBackend>(GlLibrary::kEgl);
+    auto card = std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kTilesOrQuads);
     if (!card->isSoftware()) return card;
     why_not = card->name() + " is software";
   } catch (const Error& error) {
@@ -68,9 +90,11 @@ std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
 std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
   switch (backend) {
     case Backend::kOsmesa:
-      return std::make_unique<GlBackend>(GlLibrary::kOsmesa);
+      return std::make_unique<GlBackend>(GlLibrary::kOsmesa, GlBackend::Way::kQuads);
     case Backend::kEgl:
-      return std::make_unique<GlBackend>(GlLibrary::kEgl);
+      return std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kTilesOrQuads);
+    case Backend::kEglQuads:
+      return std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kQuads);
     case Backend::kCpu:
       return std::make_unique<CpuBackend>();
     case Backend::kAutomatic:
@@ -83,8 +107,10 @@ std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
 
 SystemReport examineBackends() {
   SystemReport report;
-  const std::pair<const char*, Backend> backends[] = {
-      {"egl", Backend::kEgl}, {"osmesa", Backend::kOsmesa}, {"cpu", Backend::kCpu}};
+  const std::pair<const char*, Backend> backends[] = {{"egl", Backend::kEgl},
+                                                      {"egl-quads", Backend::kEglQuads},
+                                                      {"osmesa", Backend::kOsmesa},
+                                                      {"cpu", Backend::kCpu}};
   for (const auto& [word, backend] : backends) {
     BackendReport& found = report.backends.emplace_back();
     found.word = word;

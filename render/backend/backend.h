@@ -19,7 +19,8 @@ namespace curvisplat {
 enum class Backend {
   kAutomatic,  // OpenGL if a graphics card draws, otherwise the processor
   kOsmesa,     // OpenGL in software
-  kEgl,        // OpenGL on a graphics card, or Mesa's software renderer if there is none
+  kEgl,  // OpenGL on a graphics card, or Mesa's software renderer if there is none: in compute shaders if it has them
+  kEglQuads,  // the same, but with quads
   kCpu
 };
 
@@ -32,7 +33,8 @@ class PaintingBackend {
   /// Runs `job` on the painter's thread and waits until it ends. Rethrows what `job` throws. One caller at a
   /// time.
   virtual void run(const Job& job) = 0;
-  /// The name shown to users: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  /// The name shown to users: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5, quads"; and why it is no better
+  /// way of drawing, where one was asked for.
   virtual const std::string& name() const = 0;
   /// Whether the processor draws, either directly or through a software OpenGL.
   virtual bool isSoftware() const = 0;

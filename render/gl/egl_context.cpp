@@ -157,14 +157,19 @@ class CurrentContext {
     if (!has(extensions, "EGL_KHR_no_config_context") &&
         (!egl_.choose_config(display, kConfig, &config, 1, &configs) || configs == 0))
       return failed("has no configuration for OpenGL");
-    static constexpr EGLint kAttributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                                             3,
-                                             EGL_CONTEXT_MINOR_VERSION,
-                                             3,
-                                             EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                             EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                             EGL_NONE};
-    const EGLContext context = egl_.create_context(display, config, EGL_NO_CONTEXT, kAttributes);
+    // Compute shaders come with 4.3.
+    EGLContext context = EGL_NO_CONTEXT;
+    for (const EGLint major : {4, 3}) {
+      const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                   major,
+                                   EGL_CONTEXT_MINOR_VERSION,
+                                   3,
+                                   EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                   EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                   EGL_NONE};
+      context = egl_.create_context(display, config, EGL_NO_CONTEXT, attributes);
+      if (context != EGL_NO_CONTEXT) break;
+    }
     if (context == EGL_NO_CONTEXT) return failed("no context");
     if (!egl_.make_current(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) {
       std::string failure = failed("its context cannot be made current");

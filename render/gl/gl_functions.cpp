@@ -33,20 +33,20 @@ GlFunctions::GlFunctions(const Lookup& lookup) {
   CURVISPLAT_GL_FUNCTIONS(CURVISPLAT_GL_FETCH)
 #undef CURVISPLAT_GL_FETCH
 #define CURVISPLAT_GL_FETCH(name, type) name = reinterpret_cast<type>(lookup("gl" #name));
-  CURVISPLAT_GL_4_4_FUNCTIONS(CURVISPLAT_GL_FETCH)
+  CURVISPLAT_GL_4_3_FUNCTIONS(CURVISPLAT_GL_FETCH)
 #undef CURVISPLAT_GL_FETCH
 }
 
-bool GlFunctions::has44() const {
+std::string GlFunctions::whyNoCompute() const {
   GLint major = 0, minor = 0;
   GetIntegerv(GL_MAJOR_VERSION, &major);
   GetIntegerv(GL_MINOR_VERSION, &minor);
-  if (major < 4 || (major == 4 && minor < 4)) return false;
+  if (major < 4 || (major == 4 && minor < 3)) return "compute shaders need OpenGL 4.3";
 #define CURVISPLAT_GL_HAS(name, type) \
-  if (!name) return false;
-  CURVISPLAT_GL_4_4_FUNCTIONS(CURVISPLAT_GL_HAS)
+  if (!name) return "this OpenGL has no gl" #name;
+  CURVISPLAT_GL_4_3_FUNCTIONS(CURVISPLAT_GL_HAS)
 #undef CURVISPLAT_GL_HAS
-  return true;
+  return {};
 }
 
 void GlFunctions::check(std::string_view doing) const {
@@ -55,6 +55,16 @@ void GlFunctions::check(std::string_view doing) const {
 }
 
 namespace {
+
+/// Of what a driver says, which may be pages.
+template <typename GetLog>
+std::string firstLine(const GetLog& get_log, GLuint name) {
+  std::string said(4096, '\0');
+  GLsizei length = 0;
+  get_log(name, static_cast<GLsizei>(said.size()), &length, said.data());
+  said.resize(static_cast<size_t>(length));
+  return said.substr(0, said.find('\n'));
+}
 
 class Shader {
  public:
@@ -67,13 +77,12 @@ class Shader {
     GLint compiled = 0;
     gl_.GetShaderiv(name_, GL_COMPILE_STATUS, &compiled);
     if (compiled) return;
-    std::string said(4096, '\0');
-    GLsizei said_length = 0;
-    gl_.GetShaderInfoLog(name_, static_cast<GLsizei>(said.size()), &said_length, said.data());
-    said.resize(static_cast<size_t>(said_length));
+    const std::string said = firstLine(gl_.GetShaderInfoLog, name_);
     gl_.DeleteShader(name_);
-    throw Error("OpenGL cannot compile the {} shader: {}", kind == GL_VERTEX_SHADER ? "vertex" : "fragment",
-                said);
+    const char* const word = kind == GL_VERTEX_SHADER     ? "vertex"
+                             : kind == GL_FRAGMENT_SHADER ? "fragment"
+                                                          : "compute";
+    throw Error("OpenGL cannot compile the {} shader: {}", word, said);
   }
   ~Shader() { gl_.DeleteShader(name_); }
   Shader(const Shader&) = delete;
@@ -93,15 +102,23 @@ GlProgram::GlProgram(const GlFunctions& gl, std::string_view vertex_source, std:
   name_ = gl.CreateProgram();
   gl.AttachShader(name_, vertex.name());
   gl.AttachShader(name_, fragment.name());
-  gl.LinkProgram(name_);
+  link();
+}
+
+GlProgram::GlProgram(const GlFunctions& gl, std::string_view compute_source) : gl_(&gl) {
+  const Shader compute(gl, GL_COMPUTE_SHADER, compute_source);
+  name_ = gl.CreateProgram();
+  gl.AttachShader(name_, compute.name());
+  link();
+}
+
+void GlProgram::link() {
+  gl_->LinkProgram(name_);
   GLint linked = 0;
-  gl.GetProgramiv(name_, GL_LINK_STATUS, &linked);
+  gl_->GetProgramiv(name_, GL_LINK_STATUS, &linked);
   if (linked) return;
-  std::string said(4096, '\0');
-  GLsizei length = 0;
-  gl.GetProgramInfoLog(name_, static_cast<GLsizei>(said.size()), &length, said.data());
-  said.resize(static_cast<size_t>(length));
-  gl.DeleteProgram(name_);
+  const std::string said = firstLine(gl_->GetProgramInfoLog, name_);
+  gl_->DeleteProgram(name_);
   throw Error("OpenGL cannot link the shaders: {}", said);
 }
 

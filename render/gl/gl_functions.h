@@ -9,6 +9,7 @@
 #include <GL/glcorearb.h>
 
 #include <functional>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -50,6 +51,7 @@ namespace curvisplat {
   X(EndQuery, PFNGLENDQUERYPROC)                               \
   X(FenceSync, PFNGLFENCESYNCPROC)                             \
   X(FramebufferRenderbuffer, PFNGLFRAMEBUFFERRENDERBUFFERPROC) \
+  X(FramebufferTextureLayer, PFNGLFRAMEBUFFERTEXTURELAYERPROC) \
   X(GenBuffers, PFNGLGENBUFFERSPROC)                           \
   X(GenFramebuffers, PFNGLGENFRAMEBUFFERSPROC)                 \
   X(GenQueries, PFNGLGENQUERIESPROC)                           \
@@ -84,25 +86,34 @@ namespace curvisplat {
   X(VertexAttribPointer, PFNGLVERTEXATTRIBPOINTERPROC)         \
   X(Viewport, PFNGLVIEWPORTPROC)
 
-// Null, or refused, where the context is older: see has44().
-#define CURVISPLAT_GL_4_4_FUNCTIONS(X)                                         \
-  X(BufferStorage, PFNGLBUFFERSTORAGEPROC)                                     \
-  X(DrawArraysInstancedBaseInstance, PFNGLDRAWARRAYSINSTANCEDBASEINSTANCEPROC) \
-  X(MapBufferRange, PFNGLMAPBUFFERRANGEPROC)
+// Null, or refused, where the context is older: see whyNoCompute().
+#define CURVISPLAT_GL_4_3_FUNCTIONS(X)           \
+  X(BindBufferBase, PFNGLBINDBUFFERBASEPROC)     \
+  X(BindImageTexture, PFNGLBINDIMAGETEXTUREPROC) \
+  X(ClearBufferData, PFNGLCLEARBUFFERDATAPROC)   \
+  X(DispatchCompute, PFNGLDISPATCHCOMPUTEPROC)   \
+  X(GetBufferSubData, PFNGLGETBUFFERSUBDATAPROC) \
+  X(GetInteger64v, PFNGLGETINTEGER64VPROC)       \
+  X(GetTexImage, PFNGLGETTEXIMAGEPROC)           \
+  X(MemoryBarrier, PFNGLMEMORYBARRIERPROC)       \
+  X(TexStorage3D, PFNGLTEXSTORAGE3DPROC)         \
+  X(Uniform1ui, PFNGLUNIFORM1UIPROC)             \
+  X(Uniform2i, PFNGLUNIFORM2IPROC)               \
+  X(Uniform3i, PFNGLUNIFORM3IPROC)               \
+  X(Uniform4i, PFNGLUNIFORM4IPROC)
 
 struct GlFunctions {
 #define CURVISPLAT_GL_MEMBER(name, type) type name = nullptr;
   CURVISPLAT_GL_FUNCTIONS(CURVISPLAT_GL_MEMBER)
-  CURVISPLAT_GL_4_4_FUNCTIONS(CURVISPLAT_GL_MEMBER)
+  CURVISPLAT_GL_4_3_FUNCTIONS(CURVISPLAT_GL_MEMBER)
 #undef CURVISPLAT_GL_MEMBER
 
   using Lookup = std::function<void*(const char* name)>;
   /// Throws Error naming the first function that `lookup` does not know.
   explicit GlFunctions(const Lookup& lookup);
 
-  /// Whether the functions of OpenGL 4.4 can be called. Some libraries have functions that their contexts
-  /// refuse.
-  bool has44() const;
+  /// Empty if compute shaders can be used; else why not. Some libraries have functions that their contexts refuse.
+  std::string whyNoCompute() const;
 
   /// Throws Error if a call has failed since the last check: "OpenGL failed while <doing>: <error>".
   void check(std::string_view doing) const;
@@ -151,11 +162,12 @@ inline GlObject makeQuery(const GlFunctions& gl) {
   return {gl.GenQueries, gl.DeleteQueries};
 }
 
-/// A linked program of a vertex and a fragment shader.
+/// A linked program: of a vertex and a fragment shader, or of a compute shader.
 class GlProgram {
  public:
-  /// Throws Error with the compiler's or the linker's words.
+  /// Throws Error with the first line of the compiler's or the linker's words.
   GlProgram(const GlFunctions& gl, std::string_view vertex_source, std::string_view fragment_source);
+  GlProgram(const GlFunctions& gl, std::string_view compute_source);
   ~GlProgram();
   GlProgram(GlProgram&& other) noexcept : gl_(other.gl_), name_(std::exchange(other.name_, 0)) {}
   GlProgram& operator=(GlProgram&&) = delete;
@@ -165,6 +177,8 @@ class GlProgram {
   GLint uniform(const char* name) const { return gl_->GetUniformLocation(name_, name); }
 
  private:
+  void link();
+
   const GlFunctions* gl_;
   GLuint name_ = 0;
 };

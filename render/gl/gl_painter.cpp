@@ -1,18 +1,15 @@
 #include "render/gl/gl_painter.h"
 
 #include <algorithm>
-#include <array>
 #include <deque>
-#include <functional>
 #include <map>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "render/gl/gl_functions.h"
 #include "render/gl/splat_shader.h"
-#include "render/project/footprint.h"
+#include "render/gl/splat_tables.h"
 #include "render/tiles/splat_bins.h"
 #include "render/tiles/tile_queues.h"
 #include "stream/base/compute_permits.h"
@@ -21,31 +18,11 @@
 namespace curvisplat {
 namespace {
 
-constexpr int kFootprintSteps = 1024;
 // llvmpipe sets up triangles far ahead of drawing them, at 640 bytes a splat: unbounded, half a million
 // splats took 330 MiB. Two draws under way keep all its threads busy.
 constexpr size_t kSplatsPerDraw = 16384;
 constexpr size_t kDrawsInFlight = 2;
 constexpr size_t kBatchSplats = 65536, kEntriesASplat = 4;
-constexpr GLint kFootprintUnit = 0, kClassesUnit = 1, kLayersUnit = 2, kColoursUnit = 3;
-
-/// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
-struct TableTexture {
-  GlObject buffer, texture;
-
-  explicit TableTexture(const GlFunctions& gl) : buffer(makeBuffer(gl)), texture(makeTexture(gl)) {}
-
-  template <typename T>
-  void fill(const GlFunctions& gl, GLint unit, GLenum format, std::span<const T> values) {
-    gl.BindBuffer(GL_TEXTURE_BUFFER, buffer.name());
-    gl.BufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(values.size_bytes()), values.data(),
-                  GL_STATIC_DRAW);
-    gl.ActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
-    gl.BindTexture(GL_TEXTURE_BUFFER, texture.name());
-    gl.TexBuffer(GL_TEXTURE_BUFFER, format, buffer.name());
-  }
-};
-
 /// How many records of a splat may come before it.
 constexpr size_t kMaxRecords = 3;
 
@@ -109,38 +86,15 @@ struct ClipBox {
   }
 };
 
-float mostExtinction(const ClassificationTable& table) {
-  float most = std::max(table.below().w, table.above().w);
-  const auto cumulative = table.cumulative();
-  for (size_t n = 0; n + 1 < cumulative.size(); ++n)
-    most = std::max(most, cumulative[n + 1].w - cumulative[n].w);
-  return most;
-}
-
-/// Value and step to the next value, so that linear interpolation needs one fetch.
-std::vector<std::array<float, 2>> footprintTexels() {
-  const auto table = footprintTable(kFootprintSteps);
-  std::vector<std::array<float, 2>> texels;
-  for (size_t step = 0; step + 1 < table.size(); ++step)
-    texels.push_back({static_cast<float>(table[step]), static_cast<float>(table[step + 1] - table[step])});
-  return texels;
-}
-
 }  // namespace
 
 struct GlPainter::State {
   explicit State(const GlFunctions& functions)
-      : gl(functions),
-        footprint(gl),
-        classes(gl),
-        colour_classes(gl),
-        instances(gl),
-        framebuffer(makeFramebuffer(gl)),
-        layers_texture(makeTexture(gl)) {}
+      : gl(functions), tables(gl), instances(gl), framebuffer(makeFramebuffer(gl)) {}
 
   const GlFunctions& gl;
-  std::map<int, GlProgram> programs;  // by their kinds, each compiled when it is first needed
-  TableTexture footprint, classes, colour_classes;
+  std::map<SplatShaderKind, GlProgram> programs;  // each compiled when it is first needed
+  SplatTables tables;
   bool coloured = false;  // splats have ScreenColours
   InstanceBuffer instances;
   std::vector<ScreenSplat> staged;  // the next draw
@@ -148,11 +102,10 @@ struct GlPainter::State {
   std::optional<TileQueues> queues;
   size_t waiting_splats = 0;
   PaintLoop loop{1, nullptr};
-  GlObject framebuffer, layers_texture;
+  GlObject framebuffer;
   std::vector<GlObject> colours;  // an attachment for each window of depth
   ImageSize size{0, 0};
   glm::vec4 background{0};
-  const PixelLayers* layers = nullptr;
   struct InFlight {
     GlFence fence;
     GlObject timer;  // a query, done when the fence is passed
@@ -161,24 +114,18 @@ struct GlPainter::State {
   double upload_s = 0, draw_s = 0, gl_draw_s = 0;
 
   void allocate(ImageSize wanted, int windows);
-  void loadLayers();
   void useRecords(bool with_colours);
   const GlProgram& program(const SplatShaderKind& kind);
-  int windows() const { return layers ? layers->windows() : 1; }
   void paintBatch(bool last);
   void stageTile(size_t number, const OrderedTile& ordered);
   void stage(std::span<const ScreenSplat> splats, uint32_t splat, const ClipBox& clip);
   void drawStaged();
   void finishDraws();
   void finishOldest();
-  void use(const GlProgram& program, const ClassificationTable& table, const PixelShading& shading) const;
 };
 
 GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(context.functions())) {
   const GlFunctions& gl = state_->gl;
-  const auto texels = footprintTexels();
-  state_->footprint.fill<std::array<float, 2>>(gl, kFootprintUnit, GL_RG32F, texels);
-
   gl.Enable(GL_BLEND);
   gl.Enable(GL_SCISSOR_TEST);
   gl.BlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);  // nearest first
@@ -188,11 +135,9 @@ GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(
 GlPainter::~GlPainter() = default;
 
 const GlProgram& GlPainter::State::program(const SplatShaderKind& kind) {
-  const int key = 32 * kind.windows + 16 * kind.coloured + 8 * kind.colour_log_scale + 4 * kind.layered +
-                  2 * kind.log_scale + kind.per_pixel;
-  auto found = programs.find(key);
+  auto found = programs.find(kind);
   if (found == programs.end())
-    found = programs.emplace(key, GlProgram(gl, splatVertexShader(), splatFragmentShader(kind))).first;
+    found = programs.emplace(kind, GlProgram(gl, splatVertexShader(), splatFragmentShader(kind))).first;
   return found->second;
 }
 
@@ -241,55 +186,6 @@ void GlPainter::State::useRecords(bool with_colours) {
   instances.setUp(gl, coloured);
 }
 
-/// The depths of the pixels' layers, as the shader reads them.
-void GlPainter::State::loadLayers() {
-  static_assert(PixelLayers::kMaxLayers == 4);
-  std::vector<float> depths(4 * size.pixels(), PixelLayers::kNowhere);
-  for (int y = 0; y < size.height; ++y)
-    for (int x = 0; x < size.width; ++x) {
-      float* at =
-          &depths[4 * (static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x))];
-      for (const PixelLayer& layer : layers->at(x, y)) *at++ = layer.depth;
-    }
-  gl.ActiveTexture(GL_TEXTURE0 + kLayersUnit);
-  gl.BindTexture(GL_TEXTURE_2D, layers_texture.name());
-  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, size.width, size.height, 0, GL_RGBA, GL_FLOAT, depths.data());
-  gl.check("loading the depths of surfaces");
-}
-
-void GlPainter::State::use(const GlProgram& program, const ClassificationTable& table,
-                           const PixelShading& shading) const {
-  gl.UseProgram(program.name());
-  gl.Uniform2f(program.uniform("clip_from_pixel"), 2.0f / static_cast<float>(size.width),
-               2.0f / static_cast<float>(size.height));
-  gl.Uniform1i(program.uniform("lit"), shading.lit ? 1 : 0);
-  gl.Uniform1i(program.uniform("footprint"), kFootprintUnit);
-  gl.Uniform1i(program.uniform("classes"), kClassesUnit);
-  gl.Uniform1i(program.uniform("layers"), kLayersUnit);
-  gl.Uniform1f(program.uniform("support"), static_cast<float>(kKernelSupport));
-  gl.Uniform1f(program.uniform("deviation"), static_cast<float>(kKernelSigma));
-  gl.Uniform1f(program.uniform("footprint_steps"),
-               static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
-  gl.Uniform1i(program.uniform("cells"), ClassificationTable::kCells);
-  gl.Uniform1f(program.uniform("low_pass"), shading.low_pass_px2);
-  gl.Uniform1i(program.uniform("log_scale"), table.logScale() ? 1 : 0);
-  gl.Uniform1f(program.uniform("most_extinction"), mostExtinction(table));
-  gl.Uniform1f(program.uniform("least_logarithmic"), ClassificationTable::kMinLogarithmic);
-  const auto set = [&](const char* cells, const char* low, const char* high, const ClassificationTable& of) {
-    const glm::vec4 below = of.below(), above = of.above();
-    gl.Uniform2f(program.uniform(cells), of.scale(), of.bias());
-    gl.Uniform4f(program.uniform(low), below.x, below.y, below.z, below.w);
-    gl.Uniform4f(program.uniform(high), above.x, above.y, above.z, above.w);
-  };
-  set("cells_from_scalar", "below", "above", table);
-  if (!shading.colours) return;
-  gl.Uniform1i(program.uniform("colours"), kColoursUnit);
-  gl.Uniform1i(program.uniform("colour_log_scale"), shading.colours->logScale() ? 1 : 0);
-  set("cells_from_colour", "colours_below", "colours_above", *shading.colours);
-}
-
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                       PixelShading shading, const PaintResources& resources) {
   const GlFunctions& gl = state_->gl;
@@ -297,9 +193,8 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   state_->staged.assign(kMaxRecords, {});
   const bool same_size = size == state_->size;
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
-  state_->layers = shading.layers && !shading.layers->empty() ? shading.layers : nullptr;
-  const int windows = state_->windows();
-  state_->allocate(size, windows);
+  state_->tables.load(size, table, shading);
+  state_->allocate(size, state_->tables.windows());
   if (!same_size || !state_->bins || resources.waiting_splats != state_->waiting_splats) {
     state_->bins.emplace(size, kBatchSplats, kEntriesASplat * kBatchSplats, 1);
     state_->queues.emplace(size, resources.waiting_splats);
@@ -308,18 +203,11 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   state_->bins->clear();
   state_->bins->open();
   state_->queues->clear();
-  if (state_->layers) state_->loadLayers();
-  state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
   state_->useRecords(shading.colours != nullptr);
-  if (shading.colours)
-    state_->colour_classes.fill(gl, kColoursUnit, GL_RGBA32F, shading.colours->cumulative());
-  state_->use(state_->program({.per_pixel = shading.per_pixel,
-                               .log_scale = table.logScale(),
-                               .layered = state_->layers != nullptr,
-                               .coloured = shading.colours != nullptr,
-                               .colour_log_scale = shading.colours && shading.colours->logScale(),
-                               .windows = windows}),
-              table, shading);
+  const GlProgram& program = state_->program(state_->tables.kind());
+  state_->tables.use(program);
+  gl.Uniform2f(program.uniform("clip_from_pixel"), 2.0f / static_cast<float>(size.width),
+               2.0f / static_cast<float>(size.height));
   gl.Viewport(0, 0, size.width, size.height);
   gl.Scissor(0, 0, size.width, size.height);
   state_->background = background;
@@ -442,30 +330,14 @@ Image GlPainter::end() {
   state_->finishDraws();
   const StageTimer timer(state_->draw_s, "draw (OpenGL)");
   const State& state = *state_;
-  std::vector<Image> windows;
-  for (int n = 0; n < state.windows(); ++n) {
-    windows.emplace_back(state.size);
+  std::vector<float> drawn(4 * state.size.pixels() * state.colours.size());
+  for (size_t n = 0; n < state.colours.size(); ++n) {
     gl.ReadBuffer(GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(n));
-    gl.ReadPixels(0, 0, state.size.width, state.size.height, GL_RGBA, GL_FLOAT, windows.back().rgba.data());
+    gl.ReadPixels(0, 0, state.size.width, state.size.height, GL_RGBA, GL_FLOAT,
+                  &drawn[4 * state.size.pixels() * n]);
   }
   gl.check("reading the picture");
-  Image image(state.size);
-  for (int y = 0; y < image.size.height; ++y)
-    for (int x = 0; x < image.size.width; ++x) {
-      PixelResult result;
-      const auto add = [&](const float* c) { result.add({c[0], c[1], c[2]}, 1 - c[3]); };
-      add(windows[0].pixel(x, y));
-      size_t window = 1;
-      for (const PixelLayer& layer : state.layers ? state.layers->at(x, y) : std::span<const PixelLayer>()) {
-        result.add(glm::vec3(layer.colour), 1 - layer.colour.w);
-        if (layer.colour.w >= 1) break;
-        add(windows[window++].pixel(x, y));
-      }
-      float* to = image.pixel(x, y);
-      for (int c = 0; c < 3; ++c) to[c] = result.colour[c] + result.through * state.background[c];
-      to[3] = 1 - result.through * (1 - state.background[3]);
-    }
-  return image;
+  return state.tables.composite(drawn, true, state.background);
 }
 
 double GlPainter::uploadSeconds() const {

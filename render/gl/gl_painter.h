@@ -1,4 +1,4 @@
-// Draws screen splats with OpenGL: an instanced quad a splat, the footprint and the classification as tables
+// Draws screen splats with OpenGL 3.3: an instanced quad a splat, the footprint and the classification as tables
 // in textures, blended over what was drawn before in 32-bit floats.
 //
 // The image's top row is the framebuffer's first, so that nothing is ever flipped.

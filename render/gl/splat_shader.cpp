@@ -5,14 +5,111 @@
 namespace curvisplat {
 namespace {
 
-constexpr const char* kVertexShader = R"(#version 330 core
-layout(location = 0) in vec4 part0;  // x, y, l11, l21
-layout(location = 1) in vec4 part1;  // l22, amplitude, mean, slope0
-layout(location = 2) in vec2 part2;  // slope1, half_width
-layout(location = 3) in vec4 next0;  // the record before it: its ScreenCut or ScreenDepth, if its amplitude is negative
+constexpr const char* kUniforms = R"(
+uniform float support;
+uniform bool lit;
+uniform float low_pass;           // pixels squared
+uniform float deviation;          // of the kernel, in u
+uniform samplerBuffer footprint;  // F and the step to the next, over rho squared
+uniform float footprint_steps;    // per unit of rho squared
+uniform samplerBuffer classes;    // cumulative: colour times extinction, extinction
+uniform int cells;
+uniform vec2 cells_from_scalar;   // factor, offset
+uniform vec4 below;
+uniform vec4 above;
+uniform float most_extinction;    // of the table
+uniform bool log_scale;
+uniform float least_logarithmic;
+uniform samplerBuffer colours;    // those of the colours' scalar, with extinction 1, and so for the rest
+uniform vec2 cells_from_colour;
+uniform vec4 colours_below;
+uniform vec4 colours_above;
+uniform bool colour_log_scale;
+uniform sampler2D layers;  // depths of the pixel's layers, nearest first; infinite beyond the last
+)";
+
+// What the pixels of a splat share: from the vertices to the fragments, or variables of a compute shader.
+constexpr const char* kPerSplat = R"(
+PER_SPLAT vec2 centre;
+PER_SPLAT vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
+PER_SPLAT float amplitude;
+PER_SPLAT vec4 scalar;   // mean, slope0, slope1, half_width
+PER_SPLAT vec4 colour;   // the same of the scalar of the colours
+PER_SPLAT float colour_correlation;
+PER_SPLAT mat3 faces;    // a face a column; of the splats that are cut
+PER_SPLAT vec2 cut;      // far_sides, correlation
+PER_SPLAT vec3 hiding;   // along, that of the colours' scalar, the cell's depth; paint_visits-inl.h
+PER_SPLAT vec2 light;    // diffuse, specular
+PER_SPLAT vec4 skew;       // t30, t21, t12, t03: footprint.h
+PER_SPLAT vec4 depth_line;  // of the splats that meet layers: the middle, by u, deviations per depth; else no more than 0
+)";
+
+// The floats of a ScreenSplat, of its ScreenColour, and of the two records before those.
+constexpr const char* kSetUp = R"(
+const float kNoFace = 4.0;
+
+vec4 skewOf(int bits) {
+  return 0.01 * vec4(ivec4(bits << 24, bits << 16, bits << 8, bits) >> 24);
+}
+
+struct Record {
+  vec4 part0;  // x, y, l11, l21
+  vec4 part1;  // l22, amplitude, mean, slope0
+  vec2 part2;  // slope1, half_width
+};
+
+struct ColourRecord {
+  vec4 part0;  // mean, slope0, minus the correlation and a mark, slope1
+  vec2 part1;  // half_width, along
+};
+
+// next: its ScreenCut or ScreenDepth, if its amplitude is negative; beyond: the ScreenCut of one with a ScreenDepth
+void setUp(Record splat, int packed_skew, float along_ray, ColourRecord of_colours, Record next, Record beyond) {
+  faces = mat3(next.part0.xyw, next.part1.xyz, vec3(next.part1.w, next.part2));
+  cut.x = floor(-0.25 * next.part0.z);
+  cut.y = -next.part0.z - 4.0 * cut.x - 2.0;
+  depth_line = vec4(0.0);
+  if (splat.part1.y < 0.0 && next.part0.z < -32.0) {
+    depth_line = vec4(next.part0.xyw, next.part1.x);
+    bool has_cut = next.part0.z < -96.0;
+    faces = has_cut ? mat3(beyond.part0.xyw, beyond.part1.xyz, vec3(beyond.part1.w, beyond.part2)) : mat3(kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0);
+    cut.x = has_cut ? floor(-0.25 * beyond.part0.z) : 0.0;
+    cut.y = -next.part0.z - (has_cut ? 98.0 : 34.0);
+  }
+  centre = splat.part0.xy;
+  u_from_d = vec3(1.0 / splat.part0.z, -splat.part0.w / (splat.part0.z * splat.part1.x), 1.0 / splat.part1.x);
+  amplitude = splat.part1.y;
+  scalar = vec4(splat.part1.zw, splat.part2);
+  colour = vec4(of_colours.part0.xyw, of_colours.part1.x);
+  colour_correlation = -of_colours.part0.z - 194.0;
+  skew = skewOf(packed_skew);
+  light = vec2(1.0, 0.0);
+  if (lit) {  // light.h
+    uint bits = floatBitsToUint(splat.part2.y);
+    scalar.w = uintBitsToFloat(bits & 0xffff0000u);
+    light = vec2(float(bits >> 7 & 511u) / 511.0, float(bits & 127u) / 127.0);
+  }
+  // What the cell has along the ray: the amplitude without the low-pass.
+  float passed = splat.part0.z * splat.part1.x, s01 = splat.part0.z * splat.part0.w;
+  float determinant = (splat.part0.z * splat.part0.z - low_pass) * (splat.part0.w * splat.part0.w + splat.part1.x * splat.part1.x - low_pass) - s01 * s01;
+  float cell_depth = abs(amplitude) * passed / sqrt(max(determinant, 1e-4 * passed * passed));
+  float nearer = 1.7320508 * abs(along_ray) * min(1.0, cell_depth * most_extinction / 6.0);
+  float cells_a_scalar = abs(cells_from_scalar.x) / (log_scale ? max(abs(scalar.x), 1e-37) : 1.0);
+  float of_colour = 1.7320508 * abs(of_colours.part1.y) * min(1.0, cell_depth * most_extinction / 6.0);
+  float cells_a_colour = abs(cells_from_colour.x) / (colour_log_scale ? max(abs(colour.x), 1e-37) : 1.0);
+  hiding = vec3(nearer * cells_a_scalar > 16.0 ? along_ray : 0.0, of_colour * cells_a_colour > 16.0 ? of_colours.part1.y : 0.0,
+                cell_depth);
+}
+)";
+
+constexpr const char* kVertexShader = R"(
+layout(location = 0) in vec4 part0;  // Record
+layout(location = 1) in vec4 part1;
+layout(location = 2) in vec2 part2;
+layout(location = 3) in vec4 next0;
 layout(location = 4) in vec4 next1;
 layout(location = 5) in vec2 next2;
-layout(location = 6) in vec4 beyond0;  // the record before that, which is the ScreenCut of one with a ScreenDepth
+layout(location = 6) in vec4 beyond0;
 layout(location = 7) in vec4 beyond1;
 layout(location = 8) in vec2 beyond2;
 layout(location = 9) in int packed_skew;
@@ -20,84 +117,15 @@ layout(location = 10) in ivec2 clip;    // the pixels that it is drawn in: x and
 layout(location = 11) in float along_ray;
 layout(location = 12) in vec4 colour0;  // its ScreenColour, which then lies between it and those
 layout(location = 13) in vec2 colour1;
-uniform float low_pass;         // pixels squared
-uniform float most_extinction;  // of the table
-uniform vec2 cells_from_scalar;
-uniform bool log_scale;
-uniform vec2 cells_from_colour;
-uniform bool colour_log_scale;
 uniform vec2 clip_from_pixel;
-uniform float support;
-uniform bool lit;
-const float kNoFace = 4.0;
-flat out vec2 centre;
-flat out vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
-flat out float amplitude;
-flat out vec4 scalar;   // mean, slope0, slope1, half_width
-flat out vec4 colour;   // the same of the scalar of the colours
-flat out float colour_correlation;
-flat out mat3 faces;    // a face a column; of the splats that are cut
-flat out vec2 cut;      // far_sides, correlation
-flat out vec3 hiding;   // along, that of the colours' scalar, the cell's depth; paint_visits-inl.h
-flat out vec2 light;    // diffuse, specular
-flat out vec4 skew;       // t30, t21, t12, t03: footprint.h
-flat out vec4 depth_line;  // of the splats that meet layers: the middle, by u, deviations per depth; else no more than 0
-
-vec4 skewOf(int bits) {
-  return 0.01 * vec4(ivec4(bits << 24, bits << 16, bits << 8, bits) >> 24);
-}
 
 void main() {
-  if (part0.z < 0.0) {  // a ScreenCut
-    centre = vec2(0.0);
-    u_from_d = vec3(0.0);
-    amplitude = 0.0;
-    scalar = vec4(0.0);
-    colour = vec4(0.0);
-    colour_correlation = 0.0;
-    hiding = vec3(0.0);
-    faces = mat3(0.0);
-    cut = vec2(0.0);
-    light = vec2(0.0);
-    depth_line = vec4(0.0);
-    skew = vec4(0.0);
+  if (part0.z < 0.0) {  // a record, of which nothing is drawn
     gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
     return;
   }
-  faces = mat3(next0.xyw, next1.xyz, vec3(next1.w, next2));
-  cut.x = floor(-0.25 * next0.z);
-  cut.y = -next0.z - 4.0 * cut.x - 2.0;
-  depth_line = vec4(0.0);
-  if (part1.y < 0.0 && next0.z < -32.0) {
-    depth_line = vec4(next0.xyw, next1.x);
-    bool has_cut = next0.z < -96.0;
-    faces = has_cut ? mat3(beyond0.xyw, beyond1.xyz, vec3(beyond1.w, beyond2)) : mat3(kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0);
-    cut.x = has_cut ? floor(-0.25 * beyond0.z) : 0.0;
-    cut.y = -next0.z - (has_cut ? 98.0 : 34.0);
-  }
-  centre = part0.xy;
-  u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
-  amplitude = part1.y;
-  scalar = vec4(part1.zw, part2);
-  colour = vec4(colour0.xyw, colour1.x);
-  colour_correlation = -colour0.z - 194.0;
-  skew = skewOf(packed_skew);
-  light = vec2(1.0, 0.0);
-  if (lit) {  // light.h
-    uint bits = floatBitsToUint(part2.y);
-    scalar.w = uintBitsToFloat(bits & 0xffff0000u);
-    light = vec2(float(bits >> 7 & 511u) / 511.0, float(bits & 127u) / 127.0);
-  }
-  // What the cell has along the ray: the amplitude without the low-pass.
-  float passed = part0.z * part1.x, s01 = part0.z * part0.w;
-  float determinant = (part0.z * part0.z - low_pass) * (part0.w * part0.w + part1.x * part1.x - low_pass) - s01 * s01;
-  float cell_depth = abs(amplitude) * passed / sqrt(max(determinant, 1e-4 * passed * passed));
-  float nearer = 1.7320508 * abs(along_ray) * min(1.0, cell_depth * most_extinction / 6.0);
-  float cells_a_scalar = abs(cells_from_scalar.x) / (log_scale ? max(abs(scalar.x), 1e-37) : 1.0);
-  float of_colour = 1.7320508 * abs(colour1.y) * min(1.0, cell_depth * most_extinction / 6.0);
-  float cells_a_colour = abs(cells_from_colour.x) / (colour_log_scale ? max(abs(colour.x), 1e-37) : 1.0);
-  hiding = vec3(nearer * cells_a_scalar > 16.0 ? along_ray : 0.0, of_colour * cells_a_colour > 16.0 ? colour1.y : 0.0,
-                cell_depth);
+  setUp(Record(part0, part1, part2), packed_skew, along_ray, ColourRecord(colour0, colour1),
+        Record(next0, next1, next2), Record(beyond0, beyond1, beyond2));
   // The ellipse's own rectangle, within the pixels that it is clipped to.
   vec2 reach = support * vec2(part0.z, length(vec2(part0.w, part1.x)));
   vec2 first = vec2(clip.x & 0xffff, clip.x >> 16 & 0xffff);
@@ -108,48 +136,7 @@ void main() {
 )";
 
 // Look-ups interpolate by hand: filtering in hardware has 8 bits of fraction.
-constexpr const char* kFragmentShader = R"(
-uniform samplerBuffer footprint;  // F and the step to the next, over rho squared
-uniform samplerBuffer classes;    // cumulative: colour times extinction, extinction
-uniform float support;
-uniform float deviation;          // of the kernel, in u
-uniform float footprint_steps;    // per unit of rho squared
-uniform int cells;
-uniform vec2 cells_from_scalar;   // factor, offset
-uniform samplerBuffer colours;    // those of the colours' scalar, with extinction 1, and so for the rest
-uniform vec2 cells_from_colour;
-uniform vec4 colours_below;
-uniform vec4 colours_above;
-uniform float least_logarithmic;
-uniform vec4 below;
-uniform vec4 above;
-flat in vec2 centre;
-flat in vec3 u_from_d;
-flat in float amplitude;
-flat in vec4 scalar;
-flat in vec4 colour;
-flat in float colour_correlation;
-flat in mat3 faces;
-flat in vec2 cut;
-flat in vec3 hiding;
-flat in vec2 light;
-flat in vec4 skew;
-flat in vec4 depth_line;
-uniform sampler2D layers;  // depths of the pixel's layers, nearest first; infinite beyond the last
-layout(location = 0) out vec4 blended0;
-#if WINDOWS > 1
-layout(location = 1) out vec4 blended1;
-#endif
-#if WINDOWS > 2
-layout(location = 2) out vec4 blended2;
-#endif
-#if WINDOWS > 3
-layout(location = 3) out vec4 blended3;
-#endif
-#if WINDOWS > 4
-layout(location = 4) out vec4 blended4;
-#endif
-
+constexpr const char* kSeen = R"(
 float cellsOf(float value, bool log_scale, vec2 cells_from) {
   float v = log_scale ? log(max(value, least_logarithmic)) : value;
   return v * cells_from.x + cells_from.y;
@@ -269,12 +256,9 @@ vec4 seenIn(int n, vec2 u, float depth, vec4 ends) {
 }
 #endif
 
-void main() {
-  vec2 d = gl_FragCoord.xy - centre;
-  vec2 u = vec2(u_from_d.x * d.x, u_from_d.y * d.x + u_from_d.z * d.y);
-  float rho2 = dot(u, u);
-  if (rho2 >= support * support) discard;
 
+// The splat's optical depth per extinction.
+float depthAt(vec2 u, float rho2) {
   float at = rho2 * footprint_steps;
   vec2 texel = texelFetch(footprint, int(at)).xy;
   float depth = abs(amplitude) * (texel.x + texel.y * fract(at));
@@ -283,6 +267,32 @@ void main() {
     float cubic = skew.x * v.x * v.x * v.x + 3.0 * v.x * v.y * (skew.y * v.x + skew.z * v.y) + skew.w * v.y * v.y * v.y;
     depth *= max(0.0, 1.0 + (cubic - 3.0 * ((skew.x + skew.z) * v.x + (skew.y + skew.w) * v.y)) / 6.0);
   }
+  return depth;
+}
+)";
+
+constexpr const char* kFragmentShader = R"(
+layout(location = 0) out vec4 blended0;
+#if WINDOWS > 1
+layout(location = 1) out vec4 blended1;
+#endif
+#if WINDOWS > 2
+layout(location = 2) out vec4 blended2;
+#endif
+#if WINDOWS > 3
+layout(location = 3) out vec4 blended3;
+#endif
+#if WINDOWS > 4
+layout(location = 4) out vec4 blended4;
+#endif
+
+void main() {
+  vec2 d = gl_FragCoord.xy - centre;
+  vec2 u = vec2(u_from_d.x * d.x, u_from_d.y * d.x + u_from_d.z * d.y);
+  float rho2 = dot(u, u);
+  if (rho2 >= support * support) discard;
+
+  float depth = depthAt(u, rho2);
 #if WINDOWS > 1 || LAYERED
   vec4 ends = vec4(1.0);
   if (depth_line.w > 0.0) {
@@ -308,18 +318,99 @@ void main() {
 }
 )";
 
+// A pixel a thread, 8x8 pixels a work group; each goes through the list of its own tile. `kSaturated` as on the processor,
+// where blocks of 4x4 pixels end together: less than 1/4096 is left out.
+constexpr const char* kTileShader = R"(
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(std430, binding = 0) readonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
+layout(std430, binding = 1) readonly buffer Numbers { uint numbers[]; };  // of splats, tile after tile
+layout(std430, binding = 2) readonly buffer Ranges { uvec2 ranges[]; };   // [tile of the box] in numbers
+layout(std430, binding = 3) buffer Closed { uint closed[]; };  // [tile of the picture] its pixels that take no more
+layout(rgba32f, binding = 0) uniform image2DArray windows;     // [window of depth]: colour and transmittance
+uniform ivec4 clip;    // pixels that may be drawn
+uniform ivec2 origin;  // of the box, in pixels
+uniform int side;      // of the tiles
+uniform int columns;   // of the box
+uniform ivec3 closed_places;  // columns of the picture's small tiles, and of its large ones; where those begin
+const float kSaturated = 1.0 / 4096.0;
+
+Record recordOf(int n) {
+  return Record(uintBitsToFloat(splats[4 * n]), uintBitsToFloat(splats[4 * n + 1]), uintBitsToFloat(splats[4 * n + 2].xy));
+}
+
+void main() {
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy), pixel = origin + place, tile = place / side;
+  if (any(lessThan(pixel, clip.xy)) || any(greaterThanEqual(pixel, clip.zw))) return;
+  uvec2 range = ranges[tile.y * columns + tile.x];
+  if (range.x == range.y) return;
+  vec4 seen[WINDOWS];  // transmittances last
+  for (int n = 0; n < WINDOWS; ++n) seen[n] = imageLoad(windows, ivec3(pixel, n));
+  if (seen[0].w < kSaturated) return;
+#if LAYERED
+  vec4 depths = texelFetch(layers, pixel, 0);
+#endif
+  for (uint at = range.x; at < range.y && seen[0].w >= kSaturated; ++at) {
+    int n = int(numbers[at]);
+    Record splat = recordOf(n);
+    vec2 d = vec2(pixel) + 0.5 - splat.part0.xy;
+    vec2 u = vec2(d.x / splat.part0.z, (d.y - splat.part0.w * (d.x / splat.part0.z)) / splat.part1.x);
+    float rho2 = dot(u, u);
+    if (rho2 >= support * support) continue;
+    uvec2 tail = splats[4 * n + 2].zw;  // skew, along
+    Record next, beyond;
+    if (splat.part1.y < 0.0) {
+      next = recordOf(n - 1 - COLOURED);
+      beyond = recordOf(n - 2 - COLOURED);
+    }
+    ColourRecord of_colours = ColourRecord(vec4(0.0), vec2(0.0));
+#if COLOURED
+    of_colours = ColourRecord(uintBitsToFloat(splats[4 * n - 4]), uintBitsToFloat(splats[4 * n - 3].xy));
+#endif
+    setUp(splat, int(tail.x), uintBitsToFloat(tail.y), of_colours, next, beyond);
+    float depth = depthAt(u, rho2);
+#if LAYERED
+    vec4 ends = vec4(1.0);
+    if (depth_line.w > 0.0) ends = (depths - (depth_line.x + dot(depth_line.yz, u))) * (depth_line.w / kReach);
+    for (int window = 0; window < WINDOWS; ++window) {
+      vec4 adds = seenIn(window, u, depth, ends);
+      seen[window] = vec4(seen[window].rgb + seen[window].w * adds.rgb, seen[window].w * (1.0 - adds.w));
+    }
+#else
+    vec4 adds = seenBetween(u, depth, -1.0, 1.0);
+    seen[0] = vec4(seen[0].rgb + seen[0].w * adds.rgb, seen[0].w * (1.0 - adds.w));
+#endif
+  }
+  for (int n = 0; n < WINDOWS; ++n) imageStore(windows, ivec3(pixel, n), seen[n]);
+  if (seen[0].w >= kSaturated) return;
+  atomicAdd(closed[pixel.y / SMALL_TILE * closed_places.x + pixel.x / SMALL_TILE], 1u);
+  atomicAdd(closed[closed_places.z + pixel.y / LARGE_TILE * closed_places.y + pixel.x / LARGE_TILE], 1u);
+}
+)";
+
+std::string kindOf(const SplatShaderKind& kind) {
+  return fmt::format(
+      "#define PER_PIXEL {}\n#define LOG_SCALE {}\n#define LAYERED {:d}\n#define WINDOWS {}\n#define "
+      "COLOURED "
+      "{:d}\n#define COLOUR_LOG_SCALE {}\n",
+      kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kind.coloured, kind.colour_log_scale);
+}
+
 }  // namespace
 
 std::string splatVertexShader() {
-  return kVertexShader;
+  return fmt::format("#version 330 core\n#define PER_SPLAT flat out\n{}{}{}{}", kUniforms, kPerSplat, kSetUp,
+                     kVertexShader);
 }
 
 std::string splatFragmentShader(SplatShaderKind kind) {
+  return fmt::format("#version 330 core\n#define PER_SPLAT flat in\n{}{}{}{}{}", kindOf(kind), kUniforms,
+                     kPerSplat, kSeen, kFragmentShader);
+}
+
+std::string splatTileShader(SplatShaderKind kind) {
   return fmt::format(
-      "#version 330 core\n#define PER_PIXEL {}\n#define LOG_SCALE {}\n#define LAYERED {:d}\n#define WINDOWS "
-      "{}\n#define COLOURED {:d}\n#define COLOUR_LOG_SCALE {}\n{}",
-      kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kind.coloured, kind.colour_log_scale,
-      kFragmentShader);
+      "#version 430 core\n#define PER_SPLAT\n#define SMALL_TILE {}\n#define LARGE_TILE {}\n{}{}{}{}{}{}",
+      kSmallTile, kLargeTile, kindOf(kind), kUniforms, kPerSplat, kSetUp, kSeen, kTileShader);
 }
 
 }  // namespace curvisplat

@@ -312,7 +312,7 @@ TEST_F(RenderOptions, WrongOptionsAreUsageErrors) {
                {{"--light-direction", "0,0,0"}, "not 0,0,0"},
                {{"--background", "pink"}, "#rrggbb"},
                {{"--background", "#12345g"}, "#rrggbb"},
-               {{"--backend", "metal"}, "auto, osmesa, egl or cpu"},
+               {{"--backend", "metal"}, "auto, osmesa, egl, egl-quads or cpu"},
                {{"--memory", "lots"}, "512M"},
                {{"--max-splats", "10"}, "--max-splats"},
                {{"--max-splats", "-1"}, "above zero"},

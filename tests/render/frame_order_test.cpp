@@ -141,7 +141,6 @@ TEST_P(FrameOrderTest, IsThatOfOneSortAtAnyLevelAndWithPartsOfBricks) {
 }
 
 TEST_P(FrameOrderTest, IsThatOfOneSortInAnyMemoryWithAnyThreads) {
-  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
   uint64_t most_slabs = 0, again = 0;
   for (const CacheReader* cache : {scene_.get(), slabbed()}) {
     const TransferFunction transfer_function = function(*cache);
@@ -172,7 +171,6 @@ TEST_P(FrameOrderTest, IsThatOfOneSortInAnyMemoryWithAnyThreads) {
 
 // A splat and the record of its cut follow one another, wherever a slab ends.
 TEST_P(FrameOrderTest, IsThatOfOneSortWithClipPlanesAndLight) {
-  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
   uint64_t most_slabs = 0;
   for (const CacheReader* cache : {scene_.get(), slabbed()}) {
     const TransferFunction transfer_function = function(*cache);

@@ -10,8 +10,11 @@
 #include "render/backend/backend.h"
 #include "render/gl/gl_context.h"
 #include "render/gl/gl_painter.h"
+#include "render/gl/gl_tile_lists.h"
+#include "render/gl/gl_tile_painter.h"
 #include "render/project/footprint.h"
 #include "render/project/painter.h"
+#include "render/project/tile_key.h"
 #include "stream/base/error.h"
 #include "tests/reference/splat_compositor.h"
 #include "tests/support/expect_error.h"
@@ -40,8 +43,13 @@ class PainterTest : public testing::TestWithParam<Backend> {
   const ClassificationTable lively_ = lively();
 };
 
-INSTANTIATE_TEST_SUITE_P(Painters, PainterTest, testing::Values(Backend::kCpu, Backend::kOsmesa),
-                         [](const auto& with) { return with.param == Backend::kCpu ? "Cpu" : "OsMesa"; });
+INSTANTIATE_TEST_SUITE_P(Painters, PainterTest,
+                         testing::Values(Backend::kCpu, Backend::kOsmesa, Backend::kEgl),
+                         [](const auto& with) {
+                           return with.param == Backend::kCpu      ? "Cpu"
+                                  : with.param == Backend::kOsmesa ? "OsMesa"
+                                                                   : "Egl";
+                         });
 
 TEST_P(PainterTest, DrawsOneSplatAsSpecified) {
   const ImageSize size{48, 40};
@@ -317,6 +325,122 @@ TEST(GlPainter, RefusesAnImageBeyondTheLimitAndGoesOn) {
     GlPainter painter(context);
     expectError([&] { painter.begin({1 << 20, 8}, glm::vec4(1), table, {}); }, {"1048576x8"});
     painter.begin({8, 8}, glm::vec4(1), table, {});
+    EXPECT_EQ(painter.end().pixel(4, 4)[0], 1.0f);
+  });
+}
+
+/// Splats that lean, some cut, in the order of their first keys.
+std::vector<ScreenSplat> leaning(int count, ImageSize size) {
+  std::vector<std::vector<ScreenSplat>> placed;  // each behind its records, which cutSome() has behind it
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> around(-1, 1);
+  for (const ScreenSplat& element : cutSome(randomSplats(count, 7, size), 4)) {
+    if (isRecord(element)) {
+      placed.back().insert(placed.back().begin(), element);
+      continue;
+    }
+    ScreenSplat splat = element;
+    splat.key = 20000 + static_cast<uint32_t>(random() % 3000);
+    splat.key_slope0 = random() % 3 == 0 ? 0 : 90 * around(random);
+    splat.key_slope1 = splat.key_slope0 == 0 ? 0 : 90 * around(random);
+    setFirst(splat);
+    placed.push_back({splat});
+  }
+  std::stable_sort(placed.begin(), placed.end(),
+                   [](const auto& a, const auto& b) { return a.back().first < b.back().first; });
+  std::vector<ScreenSplat> splats;
+  for (const auto& one : placed) splats.insert(splats.end(), one.begin(), one.end());
+  return splats;
+}
+
+Image drawn(Painter& painter, std::span<const ScreenSplat> nearest_first, const ClassificationTable& table,
+            ImageSize size) {
+  painter.begin(size, kWhite, table, {});
+  painter.draw(nearest_first);
+  return painter.end();
+}
+
+TEST(GlTilePainter, HasTheSameBitsInAnyBatchesAndBoxes) {
+  const ImageSize size{70, 50};
+  const auto table = lively();
+  const auto splats = leaning(250, size);
+  Image expected;
+  makeBackend(Backend::kCpu)->run([&](Painter& painter) { expected = drawn(painter, splats, table, size); });
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    GlTilePainter whole(context);
+    const Image image = drawn(whole, splats, table, size);
+    EXPECT_GT(compareImages(image, expected).psnr_db, 60);
+    // Less than a batch's splats have in one box, and a box of one tile that has more than there is space for.
+    for (const GlTilePainter::Capacity& capacity :
+         {GlTilePainter::Capacity{64, 1 << 19}, {200, 1000}, {1000, 200}}) {
+      GlTilePainter painter(context, capacity);
+      for (const size_t piece : {size_t{3}, splats.size()}) {
+        if (capacity.entries == 200 && piece == 3) continue;
+        painter.begin(size, kWhite, table, {});
+        for (size_t n = 0; n < splats.size(); n += piece)
+          painter.draw(std::span(splats).subspan(n, std::min(piece, splats.size() - n)));
+        EXPECT_EQ(painter.end().rgba, image.rgba) << capacity.splats << ' ' << piece;
+        EXPECT_FALSE(painter.isOverfull());
+      }
+    }
+    GlTilePainter painter(context, {16, 1000});
+    painter.begin(size, kWhite, table, {}, {.waiting_splats = 20});
+    painter.draw(splats);
+    painter.end();
+    EXPECT_TRUE(painter.isOverfull());
+    EXPECT_TRUE(painter.hides({0, 0, 1, 1}));
+  });
+}
+
+TEST(GlTilePainter, DrawsRegionsAsTheWhole) {
+  const ImageSize size{70, 50};
+  const auto table = lively();
+  const auto splats = leaning(300, size);
+  std::vector<uint32_t> owners(TileSet::tilesOf(size, kSharedTileSide), 1);
+  for (size_t n = 0; n < owners.size(); ++n) owners[n] = n % 9 >= 5;  // 40 of 70 pixels
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    GlTilePainter painter(context, {100, 1000});
+    const Image whole = drawn(painter, splats, table, size);
+    painter.begin(size, kWhite, table, {});
+    for (const uint32_t owner : {0u, 1u}) {
+      painter.drawOnly(TileSet(size, owners, owner));
+      painter.draw(splats);
+    }
+    EXPECT_EQ(painter.end().rgba, whole.rgba);
+  });
+}
+
+TEST(GlTilePainter, HidesOnlyWhatNothingShinesThroughTo) {
+  const ImageSize size{64, 40};
+  const auto table = lively();
+  std::vector<ScreenSplat> splats;
+  for (int n = 0; n < 40; ++n)  // over the left half
+    splats.push_back({14, 20, 16, 0, 40, 500, 0.55f, 0, 0, 0.3f, 0, 0, 0, 0, 0, 0});
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    GlTilePainter painter(context, {8, 1000});
+    painter.begin(size, kWhite, table, {});
+    EXPECT_FALSE(painter.hides({2, 2, 20, 20}));
+    painter.draw(splats);
+    EXPECT_TRUE(painter.hides({2, 2, 20, 20}));
+    EXPECT_TRUE(painter.hides({-50, 2, 20, 20}));
+    EXPECT_FALSE(painter.hides({2, 2, 50, 20}));
+    EXPECT_FALSE(painter.hides({NAN, 2, 20, 20}));
+    const Image opaque = painter.end();
+    EXPECT_GT(opaque.pixel(10, 10)[3], 0.999f);
+  });
+}
+
+TEST(GlTilePainter, RefusesWhatTheCardCannotHoldAndGoesOn) {
+  const auto table = lively();
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    GlTilePainter painter(context);
+    expectError([&] { painter.begin({1 << 20, 8}, kWhite, table, {}); }, {"1048576x8", "--size"});
+    expectError([&] { CardBuffer(context.functions()).reserve(uint64_t{1} << 50); }, {"MiB", "egl-quads"});
+    painter.begin({8, 8}, kWhite, table, {});
     EXPECT_EQ(painter.end().pixel(4, 4)[0], 1.0f);
   });
 }

@@ -141,6 +141,7 @@ std::vector<double> parseErrors(const std::string& text) {
 /// Name of the drawing measurement that applies to this back end, and whether a graphics card draws.
 std::pair<std::string, bool> drawingOf(Backend backend, bool card_draws, unsigned threads) {
   if (backend == Backend::kOsmesa) return {"stages/draw/osmesa", false};
+  if (backend == Backend::kEglQuads) return {"stages/draw/egl-quads", card_draws};
   if (backend == Backend::kEgl || (backend == Backend::kAutomatic && card_draws))
     return {"stages/draw/egl", card_draws};
   return {stageName("draw/cpu", threads), false};
@@ -345,7 +346,7 @@ void addBench(CLI::App& app) {
   addTurnOptions(*command, arguments->camera, what);
   command
       ->add_option("--backend", arguments->backend,
-                   "Drawing back end of whole frames: auto, osmesa, egl or cpu")
+                   "Drawing back end of whole frames: auto, osmesa, egl, egl-quads or cpu")
       ->capture_default_str()
       ->group(what);
 

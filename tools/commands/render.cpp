@@ -389,7 +389,7 @@ void addRender(CLI::App& app) {
   const std::string how = "Resources";
   command
       ->add_option("--backend", arguments->backend,
-                   "Drawing back end: auto, osmesa, egl or cpu; see info --system")
+                   "Drawing back end: auto, osmesa, egl, egl-quads or cpu; see info --system")
       ->capture_default_str()
       ->group(how);
   command->add_option("--memory", arguments->frame.memory, "Memory limit for drawing, such as 512M or 2G")

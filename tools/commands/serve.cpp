@@ -113,7 +113,7 @@ void addServe(CLI::App& app) {
       ->capture_default_str();
   command
       ->add_option("--backend", arguments->backend,
-                   "Drawing back end: auto, osmesa, egl or cpu; see info --system")
+                   "Drawing back end: auto, osmesa, egl, egl-quads or cpu; see info --system")
       ->capture_default_str();
   command->add_option("--frame-time", arguments->frame_time,
                       "Time budget of a picture while the camera moves, in ms (default 40)");

@@ -175,7 +175,7 @@ void addView(CLI::App& app) {
       "Restore camera, transfer function and settings from this JSON file (default: as last time)");
   command
       ->add_option("--backend", arguments->backend,
-                   "Drawing back end: auto, osmesa, egl or cpu; see info --system")
+                   "Drawing back end: auto, osmesa, egl, egl-quads or cpu; see info --system")
       ->capture_default_str();
   command->add_option("--memory", arguments->memory,
                       "Memory limit for drawing, such as 512M or 2G (default: as last time, initially 512M)");

@@ -157,8 +157,9 @@ Backend parseBackend(std::string_view text) {
   if (text == "auto") return Backend::kAutomatic;
   if (text == "osmesa") return Backend::kOsmesa;
   if (text == "egl") return Backend::kEgl;
+  if (text == "egl-quads") return Backend::kEglQuads;
   if (text == "cpu") return Backend::kCpu;
-  requireChoice("--backend", text, {"auto", "osmesa", "egl", "cpu"});
+  requireChoice("--backend", text, {"auto", "osmesa", "egl", "egl-quads", "cpu"});
   return Backend::kAutomatic;
 }
 

@@ -40,7 +40,7 @@ uint64_t parseCount(std::string_view option, std::string_view text);
 /// "dark" (kDefaultBackground), "white", "black", "transparent" or "#rrggbb". Returns premultiplied red, green, blue, alpha.
 glm::vec4 parseBackground(std::string_view option, std::string_view text);
 
-/// The value of --backend: "auto", "osmesa", "egl" or "cpu".
+/// The value of --backend: "auto", "osmesa", "egl", "egl-quads" or "cpu".
 Backend parseBackend(std::string_view text);
 
 /// Throws UsageError unless `text` is one of the choices: "--volume of: expected on or off (did you mean

@@ -22,7 +22,7 @@ constexpr DiskWay kDiskWays[] = {{DiskRun::Way::kDirect, "direct"},
                                  {DiskRun::Way::kBufferedCold, "buffered, cold"},
                                  {DiskRun::Way::kBufferedWarm, "buffered, warm"}};
 constexpr const char* kWorkerStages[] = {"verify", "decode", "project", "sort", "prepare"};
-constexpr const char* kBackends[] = {"cpu", "osmesa", "egl"};
+constexpr const char* kBackends[] = {"cpu", "osmesa", "egl-quads", "egl"};
 
 std::string sizeText(double bytes) {
   return bytes >= 1 << 20 ? fmt::format("{:.0f} MiB", bytes / (1 << 20))

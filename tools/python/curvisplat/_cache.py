@@ -375,7 +375,7 @@ class Cache:
 
         lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws
         the best that has no more. memory: the limit, in bytes or as "512M"; threads: 0 for all cores; backend: "auto",
-        "cpu", "egl" or "osmesa". keep_going: draw coarser where bricks are damaged. progress: called with (phase, done,
+        "cpu", "egl", "egl-quads" or "osmesa". keep_going: draw coarser where bricks are damaged. progress: called with (phase, done,
         total, unit).
 
         Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after

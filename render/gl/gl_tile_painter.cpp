@@ -1,0 +1,395 @@
+#include "render/gl/gl_tile_painter.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <map>
+#include <vector>
+
+#include "render/gl/gl_functions.h"
+#include "render/gl/gl_tile_lists.h"
+#include "render/gl/splat_shader.h"
+#include "render/gl/splat_tables.h"
+#include "render/project/tile_key.h"
+#include "stream/base/error.h"
+#include "stream/base/trace.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint32_t kLastKey = INT32_MAX;
+// Before a batch's first element: records of a splat are looked for before it.
+constexpr size_t kMaxRecords = 3;
+constexpr int kGroupSide = 8;  // of splatTileShader()
+
+/// The last key that the splat has in any tile, or a later one.
+uint64_t lastKeyOf(const ScreenSplat& splat) {
+  return leans(splat) ? uint64_t{splat.key} + static_cast<uint64_t>(std::min(mostBefore(splat), kMaxSteps))
+                      : splat.key;
+}
+
+TileBox intersectionOf(const TileBox& a, const TileBox& b) {
+  return {std::max(a.x0, b.x0), std::max(a.y0, b.y0), std::min(a.x1, b.x1), std::min(a.y1, b.y1)};
+}
+
+/// The tiles of `side` pixels in which some of these pixels lie.
+TileBox tilesOver(const TileBox& pixels, int side) {
+  return {pixels.x0 / side, pixels.y0 / side, (pixels.x1 + side - 1) / side, (pixels.y1 + side - 1) / side};
+}
+
+}  // namespace
+
+struct GlTilePainter::State {
+  State(const GlFunctions& functions, const Capacity& capacity_)
+      : gl(functions),
+        capacity(capacity_),
+        tables(gl),
+        lists(gl),
+        splats(gl),
+        closed(gl),
+        windows(makeTexture(gl)),
+        framebuffer(makeFramebuffer(gl)) {}
+
+  const GlFunctions& gl;
+  const Capacity capacity;
+  std::map<SplatShaderKind, GlProgram> programs;  // each compiled when it is first needed
+  SplatTables tables;
+  GlTileLists lists;
+  CardBuffer splats, closed;  // closed: pixels of each small tile, then of each large one, that take no more
+  GlObject windows, framebuffer;
+  ImageSize size{0, 0};
+  int window_count = 0;
+  glm::vec4 background{0};
+  std::stop_token stop;
+
+  TileBox clip{};                  // pixels
+  std::vector<ScreenSplat> batch;  // behind kMaxRecords elements: what waits, then what is new
+  size_t waiting = 0;              // elements of the batch
+  size_t most_waiting = 0;
+  uint32_t before = 0;  // the front up to which was painted
+  std::atomic<bool> overfull = false;
+  std::unique_ptr<std::atomic<uint8_t>[]> hidden;  // [large tile]
+  double upload_s = 0, draw_s = 0, gl_draw_s = 0;
+  std::vector<GlObject> timers;
+
+  const GlProgram& program();
+  void allocate(ImageSize wanted, int count);
+  void openTiles();
+  CardTiles tilesOf(bool small) const;
+  size_t largeTiles() const { return TileSet::tilesOf(size, kLargeTile); }
+  void paintBatch(bool last);
+  ListedSplats listedSplats(bool last) const;
+  void upload();
+  void paintBox(const ListedSplats& listed, const CardTiles& tiles, const TileBox& box);
+  void paintLists(const CardTiles& tiles, const TileBox& box);
+  void keepWaiting(uint32_t front);
+  void lookAtClosed();
+  void finishTimers();
+};
+
+GlTilePainter::GlTilePainter(const GlContext& context)
+    : GlTilePainter(context, Capacity::of(context.isSoftware())) {}
+
+GlTilePainter::GlTilePainter(const GlContext& context, const Capacity& capacity) {
+  if (const std::string why = context.functions().whyNoCompute(); !why.empty()) throw Error("{}", why);
+  state_ = std::make_unique<State>(context.functions(), capacity);
+  // A driver that refuses the most demanding shader is to be known of now.
+  const SplatShaderKind all{true, true, true, true, true, PixelLayers::kMaxWindows};
+  state_->programs.emplace(all, GlProgram(state_->gl, splatTileShader(all)));
+  state_->gl.check("setting up the painter");
+}
+
+GlTilePainter::~GlTilePainter() = default;
+
+const GlProgram& GlTilePainter::State::program() {
+  const SplatShaderKind kind = tables.kind();
+  auto found = programs.find(kind);
+  if (found == programs.end()) found = programs.emplace(kind, GlProgram(gl, splatTileShader(kind))).first;
+  return found->second;
+}
+
+void GlTilePainter::State::allocate(ImageSize wanted, int count) {
+  if (wanted == size && count == window_count) return;
+  GLint most = 0;
+  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  if (wanted.width > most || wanted.height > most)
+    throw Error(
+        "an image of {}x{} pixels is larger than this OpenGL draws (at most {}x{}); ask for a smaller --size",
+        wanted.width, wanted.height, most, most);
+  size = {0, 0};
+  windows = makeTexture(gl);
+  gl.BindTexture(GL_TEXTURE_2D_ARRAY, windows.name());
+  gl.TexStorage3D(GL_TEXTURE_2D_ARRAY, 1, GL_RGBA32F, wanted.width, wanted.height, count);
+  closed.reserve((TileSet::tilesOf(wanted, kSmallTile) + TileSet::tilesOf(wanted, kLargeTile)) *
+                 sizeof(uint32_t));
+  gl.check("allocating the image");
+  hidden = std::make_unique<std::atomic<uint8_t>[]>(TileSet::tilesOf(wanted, kLargeTile));
+  size = wanted;
+  window_count = count;
+}
+
+/// Nothing is painted, and every pixel lets everything through.
+void GlTilePainter::State::openTiles() {
+  gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
+  gl.ClearColor(0, 0, 0, 1);
+  for (int n = 0; n < window_count; ++n) {
+    gl.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, windows.name(), 0, n);
+    gl.Clear(GL_COLOR_BUFFER_BIT);
+  }
+  closed.clear();
+  gl.check("beginning a frame");
+  for (size_t tile = 0; tile < largeTiles(); ++tile) hidden[tile].store(0, std::memory_order_relaxed);
+}
+
+void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
+                          PixelShading shading, const PaintResources& resources) {
+  State& state = *state_;
+  state.finishTimers();
+  state.upload_s = state.draw_s = state.gl_draw_s = 0;
+  state.tables.load(size, table, shading);
+  state.allocate(size, state.tables.windows());
+  state.openTiles();
+  state.background = background;
+  state.stop = resources.stop;
+  state.clip = {0, 0, size.width, size.height};
+  state.batch.assign(kMaxRecords, {});
+  state.waiting = 0;
+  state.most_waiting = resources.waiting_splats;
+  state.before = 0;
+  state.overfull = false;
+}
+
+void GlTilePainter::drawOnly(const TileSet& tiles) {
+  State& state = *state_;
+  state.paintBatch(true);
+  const TileBox box = tiles.box();
+  constexpr int kSide = kSharedTileSide;
+  state.clip = intersectionOf({box.x0 * kSide, box.y0 * kSide, box.x1 * kSide, box.y1 * kSide},
+                              {0, 0, state.size.width, state.size.height});
+  state.before = 0;
+}
+
+void GlTilePainter::draw(std::span<const ScreenSplat> splats) {
+  State& state = *state_;
+  while (!splats.empty()) {
+    // As many new ones as wait: what waits is looked at each time.
+    const size_t most = std::max(state.capacity.splats, state.waiting);
+    const size_t fresh = state.batch.size() - kMaxRecords - state.waiting;
+    const size_t some = std::min(splats.size(), most - std::min(fresh, most));
+    if (some == 0) {
+      state.paintBatch(false);
+      continue;
+    }
+    state.batch.insert(state.batch.end(), splats.begin(), splats.begin() + static_cast<std::ptrdiff_t>(some));
+    splats = splats.subspan(some);
+  }
+}
+
+/// `last`: all that was drawn is painted, whatever its keys.
+void GlTilePainter::State::paintBatch(bool last) {
+  // Records whose splat has not come yet stay behind it.
+  std::vector<ScreenSplat> records;
+  while (batch.size() > kMaxRecords + waiting && isRecord(batch.back())) {
+    records.insert(records.begin(), batch.back());
+    batch.pop_back();
+  }
+  const size_t count = batch.size() - kMaxRecords;
+  if (count > 0 && !stop.stop_requested() && !overfull) {
+    const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
+    lookAtClosed();
+    upload();
+    GlObject query = makeQuery(gl);
+    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
+    const ListedSplats listed = listedSplats(last);
+    const CardTiles tiles = tilesOf(listed.key_bits > 0);
+    if (clip.x0 < clip.x1 && clip.y0 < clip.y1) paintBox(listed, tiles, tilesOver(clip, tiles.side));
+    gl.EndQuery(GL_TIME_ELAPSED);
+    timers.push_back(std::move(query));
+    if (last)
+      batch.resize(kMaxRecords);
+    else
+      keepWaiting(listed.front);
+    before = listed.front;
+  } else {
+    batch.resize(kMaxRecords);
+  }
+  waiting = batch.size() - kMaxRecords;
+  batch.insert(batch.end(), records.begin(), records.end());
+}
+
+/// The batch, which ends with a splat.
+ListedSplats GlTilePainter::State::listedSplats(bool last) const {
+  const std::span<const ScreenSplat> all = std::span(batch).subspan(kMaxRecords);
+  ListedSplats listed{&splats,
+                      kMaxRecords,
+                      static_cast<uint32_t>(all.size()),
+                      static_cast<uint32_t>(waiting),
+                      before,
+                      last ? kLastKey : all.back().first,
+                      before,
+                      0};
+  if (waiting == 0 && std::none_of(all.begin(), all.end(), leans)) return listed;
+  if (waiting == 0) listed.least_key = std::find_if_not(all.begin(), all.end(), isRecord)->first;
+  uint64_t latest = listed.least_key;
+  for (const ScreenSplat& splat : all)
+    if (!isRecord(splat)) latest = std::max(latest, lastKeyOf(splat));
+  const uint64_t range =
+      std::min<uint64_t>(latest, std::max(listed.front, listed.least_key)) - listed.least_key;
+  listed.key_bits = std::max(1u, static_cast<uint32_t>(std::bit_width(range)));
+  return listed;
+}
+
+CardTiles GlTilePainter::State::tilesOf(bool small) const {
+  const auto small_tiles = static_cast<uint32_t>(TileSet::tilesOf(size, kSmallTile));
+  return {small ? kSmallTile : kLargeTile, size, &closed, small ? 0 : small_tiles};
+}
+
+void GlTilePainter::State::upload() {
+  const StageTimer timer(upload_s, "upload splats");
+  const std::span<const ScreenSplat> all = batch;
+  splats.reserve(std::max(all.size(), capacity.splats + kMaxRecords) * sizeof(ScreenSplat));
+  splats.bind();
+  gl.BufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(all.size_bytes()), all.data());
+  gl.check("sending splats");
+}
+
+/// In halves, if there are more entries than there is space for.
+void GlTilePainter::State::paintBox(const ListedSplats& listed, const CardTiles& tiles, const TileBox& box) {
+  const uint64_t entries = lists.count(listed, tiles, box);
+  if (entries == 0) return;
+  if (entries > capacity.entries && box.tiles() > 1) {
+    TileBox first = box, second = box;
+    if (box.columns() > box.rows())
+      first.x1 = second.x0 = box.x0 + box.columns() / 2;
+    else
+      first.y1 = second.y0 = box.y0 + box.rows() / 2;
+    paintBox(listed, tiles, first);
+    paintBox(listed, tiles, second);
+    return;
+  }
+  lists.make(listed, tiles, box, entries);
+  paintLists(tiles, box);
+}
+
+void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box) {
+  const GlProgram& painting = program();
+  tables.use(painting);
+  const TileBox pixels{box.x0 * tiles.side, box.y0 * tiles.side, box.x1 * tiles.side, box.y1 * tiles.side};
+  const TileBox open = intersectionOf(clip, pixels);  // groups reach beyond both
+  gl.Uniform4i(painting.uniform("clip"), open.x0, open.y0, open.x1, open.y1);
+  gl.Uniform2i(painting.uniform("origin"), pixels.x0, pixels.y0);
+  gl.Uniform1i(painting.uniform("side"), tiles.side);
+  gl.Uniform1i(painting.uniform("columns"), box.columns());
+  const CardTiles small = tilesOf(true), large = tilesOf(false);
+  gl.Uniform3i(painting.uniform("closed_places"), small.columns(), large.columns(),
+               static_cast<GLint>(large.closed_begin));
+  splats.bind(0);
+  lists.numbers().bind(1);
+  lists.ranges().bind(2);
+  closed.bind(3);
+  gl.BindImageTexture(0, windows.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_RGBA32F);
+  const auto groups = [&](int count) {
+    return static_cast<GLuint>((count * tiles.side + kGroupSide - 1) / kGroupSide);
+  };
+  gl.DispatchCompute(groups(box.columns()), groups(box.rows()), 1);
+  gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
+                   GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_FRAMEBUFFER_BARRIER_BIT);
+  gl.check("painting tiles");
+}
+
+/// Moves what has more behind the front to the beginning of the batch.
+void GlTilePainter::State::keepWaiting(uint32_t front) {
+  size_t kept = kMaxRecords, records = 0;
+  for (size_t n = kMaxRecords; n < batch.size(); ++n) {
+    if (isRecord(batch[n])) {
+      ++records;
+      continue;
+    }
+    if (lastKeyOf(batch[n]) > front) {
+      std::copy(&batch[n - records], &batch[n] + 1, &batch[kept]);
+      kept += records + 1;
+    }
+    records = 0;
+  }
+  batch.resize(kept);
+  if (kept - kMaxRecords <= most_waiting) return;
+  overfull = true;
+  batch.resize(kMaxRecords);
+}
+
+/// Which large tiles take no more, for hides(). By what was painted before: nothing has to be waited for.
+void GlTilePainter::State::lookAtClosed() {
+  std::vector<uint32_t> pixels(largeTiles());
+  closed.bind();
+  gl.GetBufferSubData(GL_SHADER_STORAGE_BUFFER,
+                      static_cast<GLintptr>(tilesOf(false).closed_begin * sizeof(uint32_t)),
+                      static_cast<GLsizeiptr>(std::span(pixels).size_bytes()), pixels.data());
+  const int columns = TileSet::tilesAlong(size.width, kLargeTile);
+  for (size_t tile = 0; tile < pixels.size(); ++tile) {
+    const int x = static_cast<int>(tile) % columns * kLargeTile,
+              y = static_cast<int>(tile) / columns * kLargeTile;
+    const int all = std::min(kLargeTile, size.width - x) * std::min(kLargeTile, size.height - y);
+    hidden[tile].store(pixels[tile] == static_cast<uint32_t>(all), std::memory_order_relaxed);
+  }
+}
+
+bool GlTilePainter::hides(const ScreenBox& box) const {
+  const State& state = *state_;
+  if (state.overfull.load(std::memory_order_relaxed)) return true;  // the picture will be drawn again
+  if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return false;
+  const auto at = [](float pixel, int pixels) {
+    return static_cast<int>(std::clamp(pixel, 0.0f, static_cast<float>(pixels - 1))) / kLargeTile;
+  };
+  const ImageSize size = state.size;
+  const int columns = TileSet::tilesAlong(size.width, kLargeTile);
+  for (int row = at(box.y0, size.height); row <= at(box.y1, size.height); ++row)
+    for (int column = at(box.x0, size.width); column <= at(box.x1, size.width); ++column)
+      if (!state.hidden[static_cast<size_t>(row * columns + column)].load(std::memory_order_relaxed))
+        return false;
+  return true;
+}
+
+void GlTilePainter::State::finishTimers() {
+  for (const GlObject& timer : timers) {
+    GLuint64 nanoseconds = 0;
+    gl.GetQueryObjectui64v(timer.name(), GL_QUERY_RESULT, &nanoseconds);
+    gl_draw_s += 1e-9 * static_cast<double>(nanoseconds);
+  }
+  timers.clear();
+}
+
+Image GlTilePainter::end() {
+  State& state = *state_;
+  state.paintBatch(true);
+  const StageTimer timer(state.draw_s, "draw (OpenGL)");
+  std::vector<float> drawn(4 * state.size.pixels() * static_cast<size_t>(state.window_count));
+  state.gl.BindTexture(GL_TEXTURE_2D_ARRAY, state.windows.name());
+  state.gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, drawn.data());
+  state.gl.check("reading the picture");
+  state.finishTimers();
+  return state.tables.composite(drawn, false, state.background);
+}
+
+bool GlTilePainter::isOverfull() const {
+  return state_->overfull;
+}
+
+double GlTilePainter::uploadSeconds() const {
+  return state_->upload_s;
+}
+
+double GlTilePainter::drawSeconds() const {
+  return state_->draw_s;
+}
+
+double GlTilePainter::glSeconds() const {
+  return state_->gl_draw_s;
+}
+
+uint64_t GlTilePainter::bytes(ImageSize size, const PaintResources& resources, const Capacity& capacity) {
+  return 4 * sizeof(float) * size.pixels() +  // what is read at the end
+         (capacity.splats + 2 * resources.waiting_splats) * sizeof(ScreenSplat) +
+         TileSet::tilesOf(size, kLargeTile) * (sizeof(uint32_t) + 1);
+}
+
+}  // namespace curvisplat

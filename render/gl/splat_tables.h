@@ -1,0 +1,56 @@
+// What the painters by OpenGL have in common: the tables and the layers that their shaders read, as textures, and what
+// becomes of a picture's windows of depth at the end.
+//
+// On the context's thread.
+#pragma once
+
+#include <glm/vec4.hpp>
+
+#include <span>
+#include <vector>
+
+#include "render/gl/gl_functions.h"
+#include "render/gl/splat_shader.h"
+#include "render/image/image.h"
+#include "render/project/painter.h"
+
+namespace curvisplat {
+
+/// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
+struct TableTexture {
+  GlObject buffer, texture;
+
+  explicit TableTexture(const GlFunctions& gl) : buffer(makeBuffer(gl)), texture(makeTexture(gl)) {}
+
+  void fill(const GlFunctions& gl, GLint unit, GLenum format, std::span<const float> values);
+};
+
+class SplatTables {
+ public:
+  explicit SplatTables(const GlFunctions& gl);
+
+  /// Of a frame. `table` and what `shading` borrows are borrowed until the frame ends.
+  void load(ImageSize size, const ClassificationTable& table, const PixelShading& shading);
+  /// What the frame's splats are drawn by.
+  SplatShaderKind kind() const;
+  int windows() const { return layers_ ? layers_->windows() : 1; }
+  /// Of the frame, for a program of that kind, which is then in use.
+  void use(const GlProgram& program) const;
+
+  /// The frame's picture. `drawn` [windows() pictures, one after the other]: colours, and transmittances or, by
+  /// `opacities`, one minus those.
+  Image composite(std::span<const float> drawn, bool opacities, const glm::vec4& background) const;
+
+ private:
+  void loadLayers();
+
+  const GlFunctions& gl_;
+  TableTexture footprint_, classes_, colours_;
+  GlObject layers_texture_;
+  ImageSize size_{0, 0};
+  const ClassificationTable* table_ = nullptr;
+  const PixelLayers* layers_ = nullptr;  // null: none
+  PixelShading shading_;
+};
+
+}  // namespace curvisplat
