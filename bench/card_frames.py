@@ -1,8 +1,16 @@
 #!/usr/bin/env python3
-"""Times frames of many splats in large pictures: OpenGL's upload and drawing apart, beside the processor's painter.
+"""On a graphics card: whether its pictures are the processor's; then frames of many splats in large pictures, stage by stage, beside
+the processor's painter with all cores, and the conversions that they need.
 
-    bench/card_frames.py FOLDER [--sizes 1M,10M,50M] [--pictures 1920x1080,3840x2160] [--backends egl,osmesa,cpu]
-                         [--software] [--frames 5] [--threads N] [--json OUT.json]
+    bench/card_frames.py FOLDER [--sizes 1M,10M,50M] [--pictures 1920x1080,3840x2160] [--backends egl,egl-quads,cpu]
+                         [--software] [--frames 5] [--threads N] [--json OUT.json] [--program BUNDLE/bin/curvisplat]
+    bench/card_frames.py FOLDER --quick     # tiny sizes, OpenGL in software: a minute
+
+It needs Python alone and the program, which tools/packaging/bundle.sh brings with its libraries to a machine that has neither. It
+prints as it goes and begins with what matters most, so that little is lost where its time ends early.
+
+First, for each backend but the processor's, pictures of a small scene with light, cuts, surfaces, slices, isosurfaces and two scalars:
+the PSNR beside the processor's picture, and whether a second run has the same bits. It ends with status 1 where one is below 60 dB.
 
 The half-annulus scene is generated in FOLDER with a node for each splat, and drawn at the finest level with one opacity everywhere, so
 that no splat is left out as transparent and none as hidden: every backend draws the same ones. 50 M nodes need 4 GB of FOLDER's disk
@@ -18,12 +26,18 @@ them, of which medians are printed, from the program's own --stats:
     OpenGL's   by OpenGL's own clock, without waiting for splats; says little where it draws in software
     x cpu      the frame, divided by the one of the processor's painter
 
+and below a row in compute shaders, of one frame: the parts of OpenGL's time; splats in tiles (entries), how often sorting moved one, and
+the bytes of memory that these take on paper: 12 to write an entry, 32 to move it, 28 to find the tiles' lists and read them; 64 a splat to
+send it, and twice to read it. Each entry is looked at by the pixels of its tile, 16 where splats lean.
+
 A backend that cannot be had is left out, and so is one that draws in software, unless --software is given.
 """
 import argparse
 import json
 import pathlib
+import re
 import statistics
+import time
 
 import results
 from scaling import count_of
@@ -34,6 +48,7 @@ WARM_UP = 2
 SOFTWARE = ("llvmpipe", "softpipe", "SWR", "SwiftShader", "Software")  # as render/gl/gl_context.cpp
 # What is measured, as sums of fields of --stats: of OpenGL alone, and of all backends.
 OF_GL = {"upload": ["upload"], "gl_draw": ["gl_draw"]}
+PARTS = {"list": ["gl_list"], "sort": ["gl_sort"], "paint": ["gl_paint"]}  # in compute shaders
 OF_ALL = {"frame": ["total"], "draw": ["draw"], "workers": ["project", "sort"]}
 
 
@@ -58,14 +73,65 @@ def usable_backends(arguments, out):
     return usable
 
 
-def cache_of(arguments, splats):
+# What a picture may have, each with what makes it different from the plain one.
+FEATURES = {"plain": [], "perspective": ["--view-angle", 40], "light": ["--shade"], "opaque": ["--opacity-unit", 0.02],
+            "clip planes": ["--clip-plane=2,0,2,1,0.3,0.2", "--clip-plane=2,0,2,0,-0.4,1"],
+            "surfaces": ["--surface", "kmin,jmax", "--surface-opacity", 0.4], "slices": ["--slice=2,0,2,0.3,1,0.2", "--slice-opacity", 0.5],
+            "isosurfaces": ["--iso", "0.3,0.6", "--iso-opacity", 0.5],
+            "two scalars": ["--scalar", "jacobian", "--opacity-by", "f", "--opacity-range", "0,1"]}
+LEAST_DB = 60
+
+
+def compared(arguments, a, b):
+    said = results.run([arguments.program, "compare", a, b])
+    found = re.search(r"PSNR (\S+) dB", said)
+    return float(found[1]) if found else float("inf")
+
+
+def check_pictures(arguments, backends, out):
+    """Prints how like the processor's pictures those of the backends are. Returns whether all are like enough."""
+    size = "48x32x24" if arguments.quick else "128x96x64"
+    wake = arguments.folder / f"wake_{size}"
+    cache = wake.with_suffix(".splats")
+    if not (cache / "manifest.json").exists():
+        results.run([arguments.program, "generate", "wake", "--size", size, "-o", wake])
+        results.run([arguments.program, "convert", f"{wake}.xyz", f"{wake}.fun", "-o", cache, "--overwrite", "--scalar", "f,jacobian"])
+    picture = "160x120" if arguments.quick else "1920x1080"
+
+    def draw(backend, name, options):
+        file = arguments.folder / f"{name}.pfm"
+        results.run([arguments.program, "render", cache, "-o", file, "--backend", backend, "--size", picture, "--range", "0,1", "--view",
+                     "iso", "--background", "white", *options])
+        return file
+
+    good = True
+    print("| picture | " + " | ".join(backends) + " |\n|---|" + "---|" * len(backends))
+    for name, options in FEATURES.items():
+        truth, cells = draw("cpu", "cpu", options), []
+        for backend in backends:
+            once, again = draw(backend, "once", options), draw(backend, "again", options)
+            db, same = compared(arguments, truth, once), once.read_bytes() == again.read_bytes()
+            good &= db >= LEAST_DB and same
+            cells.append(f"{db:.1f} dB" + ("" if same else ", NOT THE SAME BITS") + ("" if db >= LEAST_DB else ", TOO FEW"))
+            if db != float("inf"):
+                out.add(f"card_frames/pictures/{name}/backend:{backend}", "dB", [db])
+        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+    print()
+    return good
+
+
+def cache_of(arguments, splats, out):
     edge = round(splats ** (1 / 3))
     grid = arguments.folder / f"half_annulus_{edge}"
     cache = grid.with_suffix(".splats")
     if not (cache / "manifest.json").exists():
         print(f"making {cache}", flush=True)
         results.run([arguments.program, "generate", "half-annulus", "--size", f"{edge}x{edge}x{edge}", "-o", grid])
+        began = time.monotonic()
         results.run([arguments.program, "convert", f"{grid}.xyz", f"{grid}.fun", "-o", cache, "--overwrite"])
+        took = time.monotonic() - began
+        print(f"converted: {edge**3} nodes in {took:.2f} s, {results.three_digits(1e-6 * edge**3 / took)} M/s", flush=True)
+        out.add(f"card_frames/convert/nodes:{edge**3}", "s", [took])
         for ending in (".xyz", ".fun", ".nam"):
             grid.with_suffix(ending).unlink(missing_ok=True)
     return cache
@@ -86,11 +152,21 @@ def frames_of(arguments, cache, splats, picture, backend):
     return frames
 
 
+def print_work(frame, median):
+    entries, moved, splats = frame["card_entries"], frame["card_moved_entries"], frame["splats_drawn"]
+    gigabytes = 1e-9 * (40 * entries + 32 * moved + 192 * splats)
+    parts = ", ".join(f"{name} {1e3 * median[name]:.1f} ms" for name in PARTS)
+    print(f"  {parts}; {entries} entries, moved {moved / entries:.1f} times, {results.three_digits(gigabytes)} GB on paper; "
+          f"{frame['card_peak_bytes'] / MIB:.0f} MiB of the card", flush=True)
+
+
 def measure(arguments, size, picture, backend, cpu_s, out):
     """Prints a row. Returns the median time of a frame."""
-    frames = frames_of(arguments, cache_of(arguments, count_of(size)), count_of(size), picture, backend)
+    frames = frames_of(arguments, cache_of(arguments, count_of(size), out), count_of(size), picture, backend)
     median = {}
-    for name, fields in (OF_ALL if backend == "cpu" else OF_ALL | OF_GL).items():
+    in_tiles = frames[0]["card_entries"] > 0
+    of_backend = OF_ALL if backend == "cpu" else OF_ALL | OF_GL | (PARTS if in_tiles else {})
+    for name, fields in of_backend.items():
         samples = [sum(frame["seconds"][field] for field in fields) for frame in frames]
         median[name] = statistics.median(samples)
         out.add(f"card_frames/{name}/splats:{size}/picture:{picture}/backend:{backend}", "s", samples)
@@ -103,6 +179,10 @@ def measure(arguments, size, picture, backend, cpu_s, out):
     times = [f"{1e3 * median[name]:.1f} ms" if name in median else "" for name in ("frame", "workers", "upload", "draw", "gl_draw")]
     factor = "" if cpu_s is None else results.three_digits(median["frame"] / cpu_s)
     print(f"| {splats} | {picture} | {backend} | {' | '.join(times)} | {rate(splats)} | {rate(width * height)} | {factor} |", flush=True)
+    if in_tiles:
+        print_work(frames[-1], median)
+        for name in ("card_entries", "card_moved_entries", "card_peak_bytes"):
+            out.add(f"card_frames/{name}/splats:{size}/picture:{picture}/backend:{backend}", "1", [frames[-1][name]])
     if any(frame["bricks_read"] for frame in frames):
         print("note: bricks were read again: the times of this row include it", flush=True)
     return median["frame"]
@@ -111,19 +191,27 @@ def measure(arguments, size, picture, backend, cpu_s, out):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
-    parser.add_argument("--sizes", default="1M,10M,50M", help="numbers of splats")
-    parser.add_argument("--pictures", default="1920x1080,3840x2160")
-    parser.add_argument("--backends", default="egl,osmesa,cpu")
+    parser.add_argument("--sizes", help="numbers of splats (1M,10M,50M)")
+    parser.add_argument("--pictures", help="(1920x1080,3840x2160)")
+    parser.add_argument("--backends", default="egl,egl-quads,cpu")
     parser.add_argument("--software", action="store_true", help="measure OpenGL that draws in software, too")
-    parser.add_argument("--frames", type=int, default=5, help="frames that are measured, after two that are not")
+    parser.add_argument("--frames", type=int, help="frames that are measured, after two that are not (5)")
     parser.add_argument("--threads", type=int)
     parser.add_argument("--program", default=HERE.parent / "build/release/tools/curvisplat")
     parser.add_argument("--json")
+    parser.add_argument("--quick", action="store_true", help="tiny sizes, in software, too")
     arguments = parser.parse_args()
+    quick = arguments.quick
+    arguments.software |= quick
+    arguments.sizes = arguments.sizes or ("8K,60K" if quick else "1M,10M,50M")
+    arguments.pictures = arguments.pictures or ("320x180" if quick else "1920x1080,3840x2160")
+    arguments.frames = arguments.frames or (2 if quick else 5)
     arguments.folder.mkdir(parents=True, exist_ok=True)
     out = results.Results()
     # The processor's painter first, since the others are compared with it.
     backends = sorted(usable_backends(arguments, out), key=lambda backend: backend != "cpu")
+    beside = [backend for backend in backends if backend != "cpu"]
+    good = not beside or check_pictures(arguments, beside, out)
     print("| splats | picture | backend | frame | workers | upload | draw | OpenGL's | M splats/s | megapixels/s | x cpu |\n"
           "|---|---|---|---|---|---|---|---|---|---|---|")
     for size in arguments.sizes.split(","):
@@ -134,6 +222,8 @@ def main():
                 cpu_s = frame_s if backend == "cpu" else cpu_s
     if arguments.json:
         out.write(arguments.json, "card_frames", results.version_of(arguments.program))
+    if not good:
+        raise SystemExit(f"pictures differ: from the processor's, with less than {LEAST_DB} dB, or from run to run")
 
 
 if __name__ == "__main__":

@@ -372,7 +372,14 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
     statistics.draw_s = painter.drawSeconds();
-    statistics.gl_draw_s = painter.glSeconds();
+    const CardWork card = painter.cardWork();
+    statistics.gl_draw_s = card.draw_s;
+    statistics.gl_list_s = card.list_s;
+    statistics.gl_sort_s = card.sort_s;
+    statistics.gl_paint_s = card.paint_s;
+    statistics.card_entries = card.entries;
+    statistics.card_moved_entries = card.moved_entries;
+    statistics.card_peak_bytes = card.bytes;
   });
   return image;
 }

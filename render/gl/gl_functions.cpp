@@ -17,8 +17,8 @@ std::string_view errorName(GLenum error) {
       return "GL_INVALID_OPERATION";
     case GL_INVALID_FRAMEBUFFER_OPERATION:
       return "GL_INVALID_FRAMEBUFFER_OPERATION";
-    case GL_OUT_OF_MEMORY:
-      return "GL_OUT_OF_MEMORY";
+    case GL_CONTEXT_LOST:
+      return "the driver gave the context up";
     default:
       return "an unknown error";
   }
@@ -50,7 +50,12 @@ std::string GlFunctions::whyNoCompute() const {
 }
 
 void GlFunctions::check(std::string_view doing) const {
-  if (const GLenum error = GetError(); error != GL_NO_ERROR)
+  const GLenum error = GetError();
+  if (error == GL_OUT_OF_MEMORY)
+    throw Error(
+        "OpenGL has no memory left for {}; give --backend cpu, or end what else uses the graphics card",
+        doing);
+  if (error != GL_NO_ERROR)
     throw Error("OpenGL failed while {}: {} (0x{:04x})", doing, errorName(error), error);
 }
 
@@ -124,6 +129,20 @@ void GlProgram::link() {
 
 GlProgram::~GlProgram() {
   if (name_) gl_->DeleteProgram(name_);
+}
+
+void GlTimers::finish() {
+  for (const Running& running : running_) {
+    GLuint64 nanoseconds = 0;
+    gl_.GetQueryObjectui64v(running.query.name(), GL_QUERY_RESULT, &nanoseconds);
+    seconds_[running.kind] += 1e-9 * static_cast<double>(nanoseconds);
+  }
+  running_.clear();
+}
+
+void GlTimers::reset() {
+  running_.clear();
+  seconds_.assign(seconds_.size(), 0);
 }
 
 void GlFence::wait() const {

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace curvisplat {
 
@@ -199,6 +200,38 @@ class GlFence {
  private:
   const GlFunctions* gl_;
   GLsync sync_;
+};
+
+/// Measures pieces of work by OpenGL's own clock, each of one of a few kinds.
+class GlTimers {
+ public:
+  GlTimers(const GlFunctions& gl, size_t kinds) : gl_(gl), seconds_(kinds) {}
+
+  /// run(), which does not measure anything itself.
+  template <typename Run>
+  void measure(size_t kind, const Run& run) {
+    running_.push_back({kind, makeQuery(gl_)});
+    gl_.BeginQuery(GL_TIME_ELAPSED, running_.back().query.name());
+    const struct End {  // where run() throws, too
+      const GlFunctions& gl;
+      ~End() { gl.EndQuery(GL_TIME_ELAPSED); }
+    } end{gl_};
+    run();
+  }
+  /// Waits until all is done that was measured.
+  void finish();
+  void reset();
+  /// Since reset(), of what is done.
+  double seconds(size_t kind) const { return seconds_[kind]; }
+
+ private:
+  struct Running {
+    size_t kind;
+    GlObject query;
+  };
+  const GlFunctions& gl_;
+  std::vector<double> seconds_;
+  std::vector<Running> running_;
 };
 
 }  // namespace curvisplat

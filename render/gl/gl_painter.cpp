@@ -348,8 +348,8 @@ double GlPainter::drawSeconds() const {
   return state_->draw_s;
 }
 
-double GlPainter::glSeconds() const {
-  return state_->gl_draw_s;
+CardWork GlPainter::cardWork() const {
+  return {.draw_s = state_->gl_draw_s};
 }
 
 }  // namespace curvisplat

@@ -26,7 +26,7 @@ class GlPainter final : public Painter {
 
   double uploadSeconds() const override;
   double drawSeconds() const override;
-  double glSeconds() const override;
+  CardWork cardWork() const override;
   bool isOverfull() const override;
 
   /// What it takes for a frame beside the picture itself.

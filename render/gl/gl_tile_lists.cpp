@@ -30,7 +30,7 @@ void CardBuffer::reserve(uint64_t bytes) {
   bytes_ = 0;
   bind();
   gl_.BufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_COPY);
-  gl_.check("taking memory of the graphics card");
+  gl_.check("splats and the lists of tiles");
   bytes_ = bytes;
 }
 
@@ -39,8 +39,9 @@ void CardBuffer::clear() const {
   gl_.ClearBufferData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
 
-GlTileLists::GlTileLists(const GlFunctions& gl)
+GlTileLists::GlTileLists(const GlFunctions& gl, GlTimers& timers)
     : gl_(gl),
+      timers_(timers),
       programs_{programOf(gl, TileListStep::kCount),   programOf(gl, TileListStep::kScan),
                 programOf(gl, TileListStep::kEmit),    programOf(gl, TileListStep::kHistogram),
                 programOf(gl, TileListStep::kScatter), programOf(gl, TileListStep::kRanges)},
@@ -97,9 +98,11 @@ uint64_t GlTileLists::count(const ListedSplats& splats, const CardTiles& tiles, 
   const uint32_t groups = groupsOf(splats.count, kListThreads);
   counts_.reserve(splats.count * sizeof(uint32_t));
   sums_.reserve(groups * sizeof(uint32_t));
-  setInputs(use(TileListStep::kCount), splats, tiles, box);
-  dispatch(groups);
-  scan(1, groups);
+  timers_.measure(kList, [&] {
+    setInputs(use(TileListStep::kCount), splats, tiles, box);
+    dispatch(groups);
+    scan(1, groups);
+  });
   uint32_t total = 0;
   totals_.bind();
   gl_.GetBufferSubData(GL_SHADER_STORAGE_BUFFER, 0, sizeof(total), &total);
@@ -111,26 +114,33 @@ void GlTileLists::make(const ListedSplats& splats, const CardTiles& tiles, const
                        uint64_t entries) {
   for (CardBuffer& keys : keys_) keys.reserve(entries * kKeyBytes);
   for (CardBuffer& numbers : numbers_) numbers.reserve(entries * kNumberBytes);
-  const uint32_t groups = groupsOf(splats.count, kListThreads);
+  timers_.measure(kList, [&] { emit(splats, tiles, box); });
+  sums_.reserve(uint64_t{kDigits} * groupsOf(entries, kSortedAGroup) * sizeof(uint32_t));
+  timers_.measure(kSort, [&] {
+    const auto bits = splats.key_bits + static_cast<uint32_t>(std::bit_width(box.tiles() - 1));
+    for (uint32_t shift = 0; shift < bits; shift += kDigitBits) sortDigit(entries, shift);
+  });
+  ranges_.reserve(box.tiles() * 2 * sizeof(uint32_t));
+  timers_.measure(kList, [&] { findRanges(splats.key_bits, entries); });
+  listed_entries_ += entries;
+}
+
+void GlTileLists::emit(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box) {
   sorted_ = 0;
   setInputs(use(TileListStep::kEmit), splats, tiles, box);
   keys_[0].bind(4);
   numbers_[0].bind(5);
-  dispatch(groups);
+  dispatch(groupsOf(splats.count, kListThreads));
+}
 
-  sums_.reserve(uint64_t{kDigits} * groupsOf(entries, kSortedAGroup) * sizeof(uint32_t));
-  const auto bits = splats.key_bits + static_cast<uint32_t>(std::bit_width(box.tiles() - 1));
-  for (uint32_t shift = 0; shift < bits; shift += kDigitBits) sortDigit(entries, shift);
-
-  ranges_.reserve(box.tiles() * 2 * sizeof(uint32_t));
+void GlTileLists::findRanges(uint32_t key_bits, uint64_t entries) {
   ranges_.clear();
   const GlProgram& program = use(TileListStep::kRanges);
   gl_.Uniform1ui(program.uniform("entry_count"), static_cast<uint32_t>(entries));
-  gl_.Uniform1ui(program.uniform("shift"), splats.key_bits);
+  gl_.Uniform1ui(program.uniform("shift"), key_bits);
   keys_[sorted_].bind(0);
   ranges_.bind(2);
   dispatch(groupsOf(entries, kListThreads));
-  listed_entries_ += entries;
 }
 
 void GlTileLists::sortDigit(uint64_t entries, uint32_t shift) {

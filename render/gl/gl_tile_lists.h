@@ -56,7 +56,11 @@ struct CardTiles {
 
 class GlTileLists {
  public:
-  explicit GlTileLists(const GlFunctions& gl);
+  /// Kinds of its timers.
+  enum Stage : size_t { kList, kSort, kOtherStages };
+
+  /// `timers`: of at least those stages; outlive the lists.
+  GlTileLists(const GlFunctions& gl, GlTimers& timers);
 
   /// How many entries the lists of the tiles in `box` have, which are not closed.
   uint64_t count(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box);
@@ -67,9 +71,10 @@ class GlTileLists {
   const CardBuffer& numbers() const { return numbers_[sorted_]; }
   const CardBuffer& ranges() const { return ranges_; }
   uint64_t cardBytes() const;
-  /// Since it was made: entries times passes.
-  uint64_t movedEntries() const { return moved_entries_; }
+  /// Since resetCounts(): entries, and times the digits that they were sorted by.
   uint64_t listedEntries() const { return listed_entries_; }
+  uint64_t movedEntries() const { return moved_entries_; }
+  void resetCounts() { listed_entries_ = moved_entries_ = 0; }
 
  private:
   const GlProgram& use(TileListStep step) const;
@@ -79,7 +84,11 @@ class GlTileLists {
   void scan(uint32_t rows, uint32_t length);
   void sortDigit(uint64_t entries, uint32_t shift);
 
+  void emit(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box);
+  void findRanges(uint32_t key_bits, uint64_t entries);
+
   const GlFunctions& gl_;
+  GlTimers& timers_;
   const std::array<GlProgram, 6> programs_;  // [TileListStep]
   CardBuffer counts_, sums_, totals_, ranges_;
   std::array<CardBuffer, 2> keys_, numbers_;  // as they are, and sorted by the next digit

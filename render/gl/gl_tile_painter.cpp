@@ -20,6 +20,7 @@ namespace {
 constexpr uint32_t kLastKey = INT32_MAX;
 // Before a batch's first element: records of a splat are looked for before it.
 constexpr size_t kMaxRecords = 3;
+enum : size_t { kPaint = GlTileLists::kOtherStages, kStages };
 constexpr int kGroupSide = 8;  // of splatTileShader()
 
 /// The last key that the splat has in any tile, or a later one.
@@ -44,7 +45,7 @@ struct GlTilePainter::State {
       : gl(functions),
         capacity(capacity_),
         tables(gl),
-        lists(gl),
+        lists(gl, timers),
         splats(gl),
         closed(gl),
         windows(makeTexture(gl)),
@@ -54,6 +55,7 @@ struct GlTilePainter::State {
   const Capacity capacity;
   std::map<SplatShaderKind, GlProgram> programs;  // each compiled when it is first needed
   SplatTables tables;
+  GlTimers timers{gl, kStages};
   GlTileLists lists;
   CardBuffer splats, closed;  // closed: pixels of each small tile, then of each large one, that take no more
   GlObject windows, framebuffer;
@@ -69,8 +71,8 @@ struct GlTilePainter::State {
   uint32_t before = 0;  // the front up to which was painted
   std::atomic<bool> overfull = false;
   std::unique_ptr<std::atomic<uint8_t>[]> hidden;  // [large tile]
-  double upload_s = 0, draw_s = 0, gl_draw_s = 0;
-  std::vector<GlObject> timers;
+  double upload_s = 0, draw_s = 0;
+  uint64_t window_bytes = 0, most_bytes = 0;  // on the card
 
   const GlProgram& program();
   void allocate(ImageSize wanted, int count);
@@ -84,7 +86,6 @@ struct GlTilePainter::State {
   void paintLists(const CardTiles& tiles, const TileBox& box);
   void keepWaiting(uint32_t front);
   void lookAtClosed();
-  void finishTimers();
 };
 
 GlTilePainter::GlTilePainter(const GlContext& context)
@@ -122,7 +123,8 @@ void GlTilePainter::State::allocate(ImageSize wanted, int count) {
   gl.TexStorage3D(GL_TEXTURE_2D_ARRAY, 1, GL_RGBA32F, wanted.width, wanted.height, count);
   closed.reserve((TileSet::tilesOf(wanted, kSmallTile) + TileSet::tilesOf(wanted, kLargeTile)) *
                  sizeof(uint32_t));
-  gl.check("allocating the image");
+  gl.check("the picture");
+  window_bytes = 4 * sizeof(float) * wanted.pixels() * static_cast<uint64_t>(count);
   hidden = std::make_unique<std::atomic<uint8_t>[]>(TileSet::tilesOf(wanted, kLargeTile));
   size = wanted;
   window_count = count;
@@ -144,8 +146,9 @@ void GlTilePainter::State::openTiles() {
 void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                           PixelShading shading, const PaintResources& resources) {
   State& state = *state_;
-  state.finishTimers();
-  state.upload_s = state.draw_s = state.gl_draw_s = 0;
+  state.timers.reset();
+  state.lists.resetCounts();
+  state.upload_s = state.draw_s = 0;
   state.tables.load(size, table, shading);
   state.allocate(size, state.tables.windows());
   state.openTiles();
@@ -198,13 +201,9 @@ void GlTilePainter::State::paintBatch(bool last) {
     const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
     lookAtClosed();
     upload();
-    GlObject query = makeQuery(gl);
-    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
     const ListedSplats listed = listedSplats(last);
     const CardTiles tiles = tilesOf(listed.key_bits > 0);
     if (clip.x0 < clip.x1 && clip.y0 < clip.y1) paintBox(listed, tiles, tilesOver(clip, tiles.side));
-    gl.EndQuery(GL_TIME_ELAPSED);
-    timers.push_back(std::move(query));
     if (last)
       batch.resize(kMaxRecords);
     else
@@ -230,12 +229,14 @@ ListedSplats GlTilePainter::State::listedSplats(bool last) const {
                       0};
   if (waiting == 0 && std::none_of(all.begin(), all.end(), leans)) return listed;
   if (waiting == 0) listed.least_key = std::find_if_not(all.begin(), all.end(), isRecord)->first;
-  uint64_t latest = listed.least_key;
-  for (const ScreenSplat& splat : all)
-    if (!isRecord(splat)) latest = std::max(latest, lastKeyOf(splat));
-  const uint64_t range =
-      std::min<uint64_t>(latest, std::max(listed.front, listed.least_key)) - listed.least_key;
-  listed.key_bits = std::max(1u, static_cast<uint32_t>(std::bit_width(range)));
+  uint64_t latest = std::max(listed.front, listed.least_key);
+  if (last) {  // the front is behind all there are
+    latest = listed.least_key;
+    for (const ScreenSplat& splat : all)
+      if (!isRecord(splat)) latest = std::max(latest, lastKeyOf(splat));
+    latest = std::min<uint64_t>(latest, kLastKey);
+  }
+  listed.key_bits = std::max(1u, static_cast<uint32_t>(std::bit_width(latest - listed.least_key)));
   return listed;
 }
 
@@ -268,7 +269,8 @@ void GlTilePainter::State::paintBox(const ListedSplats& listed, const CardTiles&
     return;
   }
   lists.make(listed, tiles, box, entries);
-  paintLists(tiles, box);
+  timers.measure(kPaint, [&] { paintLists(tiles, box); });
+  most_bytes = std::max(most_bytes, window_bytes + splats.bytes() + closed.bytes() + lists.cardBytes());
 }
 
 void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box) {
@@ -349,15 +351,6 @@ bool GlTilePainter::hides(const ScreenBox& box) const {
   return true;
 }
 
-void GlTilePainter::State::finishTimers() {
-  for (const GlObject& timer : timers) {
-    GLuint64 nanoseconds = 0;
-    gl.GetQueryObjectui64v(timer.name(), GL_QUERY_RESULT, &nanoseconds);
-    gl_draw_s += 1e-9 * static_cast<double>(nanoseconds);
-  }
-  timers.clear();
-}
-
 Image GlTilePainter::end() {
   State& state = *state_;
   state.paintBatch(true);
@@ -366,7 +359,7 @@ Image GlTilePainter::end() {
   state.gl.BindTexture(GL_TEXTURE_2D_ARRAY, state.windows.name());
   state.gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, drawn.data());
   state.gl.check("reading the picture");
-  state.finishTimers();
+  state.timers.finish();
   return state.tables.composite(drawn, false, state.background);
 }
 
@@ -382,8 +375,17 @@ double GlTilePainter::drawSeconds() const {
   return state_->draw_s;
 }
 
-double GlTilePainter::glSeconds() const {
-  return state_->gl_draw_s;
+CardWork GlTilePainter::cardWork() const {
+  const GlTimers& timers = state_->timers;
+  const double list_s = timers.seconds(GlTileLists::kList), sort_s = timers.seconds(GlTileLists::kSort),
+               paint_s = timers.seconds(kPaint);
+  return {list_s + sort_s + paint_s,
+          list_s,
+          sort_s,
+          paint_s,
+          state_->lists.listedEntries(),
+          state_->lists.movedEntries(),
+          state_->most_bytes};
 }
 
 uint64_t GlTilePainter::bytes(ImageSize size, const PaintResources& resources, const Capacity& capacity) {

@@ -43,7 +43,7 @@ class GlTilePainter final : public Painter {
 
   double uploadSeconds() const override;
   double drawSeconds() const override;
-  double glSeconds() const override;
+  CardWork cardWork() const override;
   bool isOverfull() const override;
 
   /// What it takes for a frame beside the picture itself.

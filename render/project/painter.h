@@ -43,6 +43,15 @@ struct PixelShading {
   float low_pass_px2 = static_cast<float>(kLowPass);  // ScreenView's
 };
 
+/// What OpenGL did for a frame, by its own clock, without waits for splats. The parts are those of compute shaders.
+struct CardWork {
+  double draw_s = 0;  // all of it
+  double list_s = 0, sort_s = 0, paint_s = 0;
+  uint64_t entries = 0;        // splats in tiles, each once in every tile
+  uint64_t moved_entries = 0;  // by sorting: once a digit
+  uint64_t bytes = 0;          // the most that was taken of its memory so far
+};
+
 class Painter {
  public:
   virtual ~Painter() = default;
@@ -68,9 +77,8 @@ class Painter {
   /// OpenGL may draw later than the call; end() waits for it, and this wait counts as drawing.
   virtual double uploadSeconds() const = 0;
   virtual double drawSeconds() const = 0;
-  /// Seconds of drawing by OpenGL's own clock, without waits for splats; 0 if OpenGL does not draw. Complete
-  /// after end().
-  virtual double glSeconds() const { return 0; }
+  /// Nothing if OpenGL does not draw. Complete after end().
+  virtual CardWork cardWork() const { return {}; }
   /// After end(): more splats waited for others than PaintResources allow, and the picture is wrong. Smaller
   /// regions of it need fewer.
   virtual bool isOverfull() const { return false; }

@@ -430,6 +430,14 @@ TEST(GlTilePainter, HidesOnlyWhatNothingShinesThroughTo) {
     EXPECT_FALSE(painter.hides({NAN, 2, 20, 20}));
     const Image opaque = painter.end();
     EXPECT_GT(opaque.pixel(10, 10)[3], 0.999f);
+    // Each of some of the splats lies in 2 x 3 or 3 x 3 tiles of 16 pixels; the tiles that are closed take no more.
+    const CardWork work = painter.cardWork();
+    EXPECT_GE(work.entries, 8u * 6);
+    EXPECT_LT(work.entries, 40u * 6);
+    EXPECT_EQ(work.moved_entries, work.entries);  // sorted by one digit
+    EXPECT_GE(work.bytes, 16 * size.pixels());
+    EXPECT_GT(work.paint_s, 0);
+    EXPECT_DOUBLE_EQ(work.draw_s, work.list_s + work.sort_s + work.paint_s);
   });
 }
 
@@ -442,6 +450,15 @@ TEST(GlTilePainter, RefusesWhatTheCardCannotHoldAndGoesOn) {
     expectError([&] { CardBuffer(context.functions()).reserve(uint64_t{1} << 50); }, {"MiB", "egl-quads"});
     painter.begin({8, 8}, kWhite, table, {});
     EXPECT_EQ(painter.end().pixel(4, 4)[0], 1.0f);
+  });
+}
+
+TEST(GlFunctions, SaysWhatToDoWhereThereIsNoMemory) {
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    GlFunctions full = context.functions();
+    full.GetError = [] { return GLenum{GL_OUT_OF_MEMORY}; };
+    expectError([&] { CardBuffer(full).reserve(1 << 20); }, {"memory", "lists of tiles", "--backend cpu"});
   });
 }
 

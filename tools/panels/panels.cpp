@@ -9,6 +9,7 @@
 
 #include "stream/base/calendar.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "tools/panels/labels.h"
 #include "tools/panels/picture_signs.h"
 #include "tools/window/widgets.h"
@@ -337,6 +338,7 @@ void drawStatistics(const ViewState& state, const ShownStatistics& shown) {
     row("project, sort", fmt::format("{}, {}", milliseconds(s->project_s), milliseconds(s->sort_s)));
     row("upload, draw", fmt::format("{}, {}", milliseconds(s->upload_s), milliseconds(s->draw_s)));
     if (s->gl_draw_s > 0) row("OpenGL", milliseconds(s->gl_draw_s));
+    if (s->card_peak_bytes > 0) row("card memory", byteText(s->card_peak_bytes));
     row("splats", fmt::format("{} drawn of {}", count(s->splats_drawn), count(s->splats_read)));
     row("error", fmt::format("{:.2f} pixels", s->largest_error_px));
     row("bricks", fmt::format("{} resident", count(s->bricks_resident)));
