@@ -134,9 +134,10 @@ TEST_F(ThroughputOfACache, EveryStageIsMeasuredOrLeftOut) {
     }
   std::string left_out;
   for (const auto& one : measurements.leftOut()) left_out += one.name + " ";
-  for (const std::string name : {"stages/read", "stages/draw/osmesa", "stages/draw/egl"})
+  for (const std::string name :
+       {"stages/read", "stages/draw/osmesa", "stages/draw/egl", "stages/draw/egl-quads"})
     EXPECT_TRUE(measurements.find(name) || left_out.find(name) != std::string::npos) << name;
-  EXPECT_EQ(report.backends.size(), 3u);
+  EXPECT_EQ(report.backends.size(), 4u);
 }
 
 TEST_F(ThroughputOfACache, AnEmptyPictureIsReported) {

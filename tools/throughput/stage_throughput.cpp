@@ -341,7 +341,10 @@ class Stages {
   }
 
   static Backend parsedBackend(const std::string& word) {
-    return word == "cpu" ? Backend::kCpu : word == "egl" ? Backend::kEgl : Backend::kOsmesa;
+    return word == "cpu"         ? Backend::kCpu
+           : word == "egl"       ? Backend::kEgl
+           : word == "egl-quads" ? Backend::kEglQuads
+                                 : Backend::kOsmesa;
   }
 
   const ThroughputScene& scene_;
