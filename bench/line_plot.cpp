@@ -13,10 +13,10 @@
 #include <iostream>
 #include <iterator>
 
+#include "render/annotate/plot.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/json_document.h"
-#include "tools/throughput/plot.h"
 
 namespace {
 

@@ -26,6 +26,7 @@ glm::dvec3 inFootprint(const SplatGeometry& g, size_t s, const glm::dvec3& d) {
 /// What is known of a point so far.
 struct Probed {
   std::optional<ProbeResult> nearest;
+  std::vector<ReachingSample> near;  // [block that has a splat there]
   double weights = 0;
   std::vector<double> values;  // [variable]: sums by weight
 };
@@ -54,9 +55,17 @@ void addSplat(const Leaf& leaf, uint32_t s, const glm::dvec3& centre, const glm:
   if (!(distance < kKernelSupport)) return;
   const double inside = 1 - distance * distance / (kKernelSupport * kKernelSupport), weight = inside * inside;
   const bool is_nearest = !probed.nearest || distance < probed.nearest->distance;
+  const NodeRun node = nodeOf(leaf.runs, s);
+  const ReachingSample sample{node.block, node.i, node.j, node.k, distance};
+  const auto of_block = std::find_if(probed.near.begin(), probed.near.end(),
+                                     [&](const ReachingSample& other) { return other.block == node.block; });
+  if (of_block == probed.near.end())
+    probed.near.push_back(sample);
+  else if (distance < of_block->distance)
+    *of_block = sample;
   if (is_nearest) {
-    const NodeRun node = nodeOf(leaf.runs, s);
-    probed.nearest = ProbeResult{leaf.number, s, node.block, node.i, node.j, node.k, centre, distance, {}};
+    probed.nearest =
+        ProbeResult{leaf.number, s, node.block, node.i, node.j, node.k, centre, distance, {}, {}};
     probed.nearest->variables.resize(leaf.variables.size());
   }
   probed.weights += weight;
@@ -102,6 +111,9 @@ std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader, std:
   std::vector<std::optional<ProbeResult>> results;
   results.reserve(points.size());
   for (Probed& of_point : probed) {
+    std::sort(of_point.near.begin(), of_point.near.end(),
+              [](const ReachingSample& a, const ReachingSample& b) { return a.distance < b.distance; });
+    if (of_point.nearest) of_point.nearest->near = std::move(of_point.near);
     if (of_point.nearest && of_point.weights > 0)
       for (size_t v = 0; v < variables.size(); ++v)
         of_point.nearest->variables[v].value = static_cast<float>(of_point.values[v] / of_point.weights);

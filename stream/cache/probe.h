@@ -17,6 +17,13 @@ struct ProbeVariable {
       0;  // at the point: what the splats that reach it say by their means and slopes, the nearer the more
 };
 
+/// A sample of a block whose splat reaches a point.
+struct ReachingSample {
+  uint32_t block = 0;
+  uint64_t i = 0, j = 0, k = 0;
+  double distance = 0;
+};
+
 struct ProbeResult {
   uint32_t brick = 0;  // index in reader.bricks(); a leaf
   uint32_t splat = 0;
@@ -25,6 +32,7 @@ struct ProbeResult {
   glm::dvec3 centre{0.0};  // of the splat: the middle of the sample's cell, world units
   double distance = 0;     // |A⁻¹(x - μ)|: 0 at the splat's centre, 1.556 at the edge of its support
   std::vector<ProbeVariable> variables;  // in the order of the argument
+  std::vector<ReachingSample> near;      // the nearest of each block, the nearest block first
 };
 
 /// [point]: the leaf splat with the smallest `distance` from it; nullopt if no splat's support contains the point. Where a

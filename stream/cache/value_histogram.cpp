@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -19,6 +20,7 @@ namespace curvisplat {
 namespace {
 
 constexpr int kPartBits = 40;
+constexpr float kLargest = std::numeric_limits<float>::max();
 constexpr double kWholesOfRoot = 0x1p40;
 /// The largest sum, of cells that overlap 4 million times.
 constexpr double kMaxWholes = 0x1p62;
@@ -260,7 +262,10 @@ std::vector<float> HistogramSums::percentilesOf(const Range& range) const {
     while (percentiles.size() < kPercentiles) {
       const double wanted = static_cast<double>(percentiles.size()) / kPercentiles * total;
       if (!(here > 0 && below + here >= wanted)) break;
-      percentiles.push_back(static_cast<float>(std::lerp(lower, upper, (wanted - below) / here)));
+      // Of a bin of one value that is it, not the next float: of 0 that would be 1.4e-45.
+      const bool is_one = std::nextafter(static_cast<float>(lower), kLargest) >= static_cast<float>(upper);
+      percentiles.push_back(
+          static_cast<float>(is_one ? lower : std::lerp(lower, upper, (wanted - below) / here)));
     }
     below += here;
   }

@@ -70,13 +70,91 @@ TEST_F(InfoOfACache, ProbesAFileOfPoints) {
       runProgram({"info", folder_ / "b.splats", "--json", fmt::format("--probe={},{},{}", at.x, at.y, at.z)});
   const auto values = nlohmann::json::parse(one.out)["probe"]["values"];
   EXPECT_EQ(lineCount(table.out), 3) << table.out;
-  expectSays(table.out, "x,y,z,density,mach,block,i,j,k\n");
+  expectSays(table.out,
+             "x,y,z,density,mach,block,i,j,k,sample_x,sample_y,sample_z,sample_density,sample_mach\n");
   expectSays(table.out,
              fmt::format(",{},{},1,", values[0]["value"].get<float>(), values[1]["value"].get<float>()));
-  expectSays(table.out, "900,0,0,,,,,,\n");
+  expectSays(table.out, "900,0,0,,,,,,,,,,,\n");
   overwriteFile(folder_ / "points.csv", "0,0,0\n1,2\n");
   expectRefused({"info", folder_ / "b.splats", "--probe", folder_ / "points.csv"}, 1,
                 {"points.csv", "line 2"});
+}
+
+/// Nodes of a sheared, bent lattice, and a scalar that is linear in i, j and k: trilinear in the cells, exactly.
+TEST_F(InfoOfACache, ProbesTheFilesCells) {
+  const auto place = [](double i, double j, double k) {
+    return glm::dvec3(i + 0.2 * j * k, 0.7 * j + 0.05 * i * k, 0.3 * k + 0.02 * i * j);
+  };
+  std::string vts =
+      "<VTKFile type=\"StructuredGrid\"><StructuredGrid WholeExtent=\"0 9 0 7 0 5\"><Piece Extent=\"0 9 0 7 "
+      "0 "
+      "5\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">";
+  std::string values;
+  for (int k = 0; k < 6; ++k)
+    for (int j = 0; j < 8; ++j)
+      for (int i = 0; i < 10; ++i) {
+        const glm::dvec3 at = place(i, j, k);
+        vts += fmt::format("{} {} {}\n", at.x, at.y, at.z);
+        values += fmt::format("{}\n", i + 10 * j + 100 * k + 50 * i * j * k);
+      }
+  vts += "</DataArray></Points><PointData><DataArray type=\"Float64\" Name=\"f\" format=\"ascii\">" + values +
+         "</DataArray></PointData></Piece></StructuredGrid></VTKFile>";
+  overwriteFile(folder_ / "bent.vts", vts);
+  run({"convert", folder_ / "bent.vts", "-o", folder_ / "bent.splats"});
+  const double i = 3.3, j = 4.1, k = 2.9;
+  // Where the cell's map takes these local coordinates: products of the three are trilinear, too.
+  const glm::dvec3 at = place(i, j, k);
+  const std::string point = fmt::format("{},{},{}", at.x, at.y, at.z);
+  const auto probe = nlohmann::json::parse(
+      run({"info", folder_ / "bent.splats", "--json", "--probe=" + point, "--source"}).out)["probe"];
+  EXPECT_NEAR(probe["values"][0]["value"], i + 10 * j + 100 * k + 50 * i * j * k, 1e-6);
+  EXPECT_EQ(probe["values"][0]["mean"], 3 + 40 + 300 + 50 * 36);
+  EXPECT_EQ(probe["i"], 3);
+  EXPECT_EQ(probe["j"], 4);
+  EXPECT_EQ(probe["k"], 3);
+  EXPECT_NEAR(probe["place"][0], place(3, 4, 3).x, 1e-9);
+
+  const ProgramResult line = run({"info", folder_ / "bent.splats", "--probe-line", "-9,2,1", point, "5",
+                                  "--source", folder_ / "bent.vts", "-o", folder_ / "line.png"});
+  EXPECT_EQ(lineCount(line.out), 6) << line.out;
+  expectSays(line.out, "-9,2,1,,,,,,,,,,0\n");
+  EXPECT_TRUE(bytesOfFile(folder_ / "line.png").starts_with("\x89PNG"));
+
+  SmallCache().write(folder_ / "other.splats");
+  expectRefused({"info", folder_ / "other.splats", "--probe=" + point, "--source", folder_ / "bent.vts"}, 1,
+                {"bent.vts"});
+  std::filesystem::remove(folder_ / "bent.vts");
+  expectRefused({"info", folder_ / "bent.splats", "--probe=" + point, "--source"}, 1,
+                {"bent.splats", "name them after --source"});
+}
+
+/// A long tail, at the precision of which values between 0 and 1 are rounded to a few numbers.
+TEST_F(InfoOfACache, StepsThatAreTooWideAreWarnedOf) {
+  std::string vts =
+      "<VTKFile type=\"StructuredGrid\"><StructuredGrid WholeExtent=\"0 19 0 19 0 19\"><Piece Extent=\"0 19 "
+      "0 19 0 "
+      "19\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">";
+  std::string values;
+  for (int n = 0; n < 8000; ++n) {
+    vts += fmt::format("{} {} {}\n", n % 20, n / 20 % 20, n / 400);
+    values += fmt::format("{}\n", n == 4210 ? 1e5 : 0.05 * (n % 20) + 0.001 * (n / 400));
+  }
+  vts += "</DataArray></Points><PointData><DataArray type=\"Float64\" Name=\"f\" format=\"ascii\">" + values +
+         "</DataArray></PointData></Piece></StructuredGrid></VTKFile>";
+  overwriteFile(folder_ / "tail.vts", vts);
+  for (const std::string precision : {"normal", "auto"}) {
+    run({"convert", folder_ / "tail.vts", "-o", folder_ / (precision + ".splats"), "--value-precision",
+         precision});
+    for (const std::vector<std::string>& asked :
+         {std::vector<std::string>{"--iso", "0.5"}, std::vector<std::string>{"--range", "0.2,0.8"}}) {
+      const ProgramResult picture = run({"render", folder_ / (precision + ".splats"), "-o", folder_ / "p.png",
+                                         "--size", "32x32", "--tf", "viridis", asked[0], asked[1]});
+      const bool warned =
+          picture.err.find("its stored values, ") != std::string::npos &&
+          picture.err.find("convert again, with --value-precision auto or fine") != std::string::npos;
+      EXPECT_EQ(warned, precision == "normal") << picture.err;
+    }
+  }
 }
 
 TEST_F(InfoOfACache, VerifyFindsDamage) {

@@ -26,7 +26,7 @@ quietly cmake --build "$folder/build" --target \
   render/annotate/CMakeFiles/curvisplat_render_annotate.dir/annotations_left_out.cpp.o
 
 quietly cmake -S "$root" -B "$folder/build" -DCURVISPLAT_THROUGHPUT=ON
-quietly cmake --build "$folder/build" --target tools/throughput/CMakeFiles/curvisplat_throughput.dir/plot_left_out.cpp.o
+quietly cmake --build "$folder/build" --target render/annotate/CMakeFiles/curvisplat_render_annotate.dir/plot_left_out.cpp.o
 
 # That they are hidden here is seen where they are asked for.
 if cmake -S "$root" -B "$folder/build" -DCURVISPLAT_ANNOTATIONS=ON > "$folder/log" 2>&1; then

@@ -470,6 +470,12 @@ class CachesAreDescribed(PythonTest):
             self.assertEqual(set(inside["values"]), {scalar.name for scalar in cache.scalars})
             self.assertEqual(inside["block"], 1)
             self.assertIsNone(cache.probe(upper + 100))
+            both = cache.probe(np.array([(lower + upper) / 2, upper + 100]))
+            self.assertEqual(list(both["block"]), [inside["block"], 0])
+            self.assertEqual(tuple(both["index"][0]), inside["index"])
+            for name, values in both["values"].items():
+                self.assertEqual(values[0], inside["values"][name])
+                self.assertTrue(np.isnan(values[1]))
             self.assertIn("wake", repr(cache))
 
 

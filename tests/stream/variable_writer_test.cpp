@@ -259,6 +259,16 @@ TEST(ValueHistogram, DependsOnNoOrder) {
   EXPECT_EQ(one.of(0)->volume, other.of(0)->volume);
 }
 
+/// Bins of one value have it as their percentiles, not the next float.
+TEST(ValueHistogram, HasPercentilesOfOneValueExactly) {
+  BrickSplats leaf = leafOf(1000);
+  for (size_t n = 0; n < leaf.size(); ++n) leaf.variables[0][n].mean = n % 4 == 0 ? 1 : 0;
+  HistogramSums sums(kRoot, {{0, "f", "", 0, 1}});
+  sums.divide(0, {{0, std::nextafter(0.0F, 1.0F), 1}, {0, 0.75, 0, 0.25}, {}});
+  sums.add(leaf);
+  EXPECT_EQ(sums.of(0)->percentile(0.5), 0);
+}
+
 TEST(ValueHistogram, TakesThinDataAndOneValueAndRefusesAbsurdWeights) {
   HistogramSums thin(kRoot, {{0, "f", "", 0, 4}});
   thin.add(leafOf(10'000, 1e-15));

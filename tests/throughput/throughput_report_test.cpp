@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/annotate/plot.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
@@ -13,7 +14,6 @@
 #include "tests/support/temporary_folder.h"
 #include "tools/throughput/disk_throughput.h"
 #include "tools/throughput/measurements.h"
-#include "tools/throughput/plot.h"
 #include "tools/throughput/stage_throughput.h"
 #include "tools/throughput/throughput_report.h"
 

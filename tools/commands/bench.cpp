@@ -13,6 +13,7 @@
 #include <string>
 #include <system_error>
 
+#include "render/annotate/plot.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
@@ -30,7 +31,6 @@
 #include "tools/throughput/frame_throughput.h"
 #include "tools/throughput/machine.h"
 #include "tools/throughput/measurements.h"
-#include "tools/throughput/plot.h"
 #include "tools/throughput/rank_simulation.h"
 #include "tools/throughput/stage_throughput.h"
 #include "tools/throughput/throughput_report.h"

@@ -26,6 +26,7 @@
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
+#include "tools/output/stored_steps.h"
 
 namespace curvisplat {
 namespace {
@@ -138,6 +139,8 @@ void exportCache(const ExportArguments& arguments) {
   PictureChoice choice(cache, variable, glm::dvec3(1));
   const TransferFunction function = choice.function(arguments.scalar);
   for (const std::string& note : function.notes()) printMessage("note: {}", note);
+  const std::string finer = rangeFinerThanStored(cache, variable, function.range());
+  if (!finer.empty()) printMessage("warning: {}", finer);
 
   if (!arguments.no_comparison) requireThreads();  // before the file is written
   Progress progress{progressBar()};

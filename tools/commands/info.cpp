@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "render/automatic/first_choice.h"
 #include "render/backend/backend.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
@@ -20,8 +22,8 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
-#include "stream/cache/probe.h"
 #include "stream/cache/value_histogram.h"
+#include "stream/model/kernel.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
 #include "tools/commands/info_probe.h"
@@ -68,7 +70,7 @@ struct InfoOptions {
   bool json = false;
   bool verify = false;
   bool system = false;
-  std::string probe;  // empty, x,y,z or the name of a file of points
+  ProbeArguments probe;
   StepArguments steps;
 };
 
@@ -131,12 +133,53 @@ void printSpread(const char* of, const std::optional<ValueHistogram>& histogram)
           : "");
 }
 
+/// The range that a picture has without --range, and what stored values are wrong in parts of it.
+struct PictureError {
+  double lower = 0, upper = 0, largest = 0, typical = 0;
+};
+
+/// At a splat's standard deviation from its centre, where most of what is seen of it is. nullopt for a constant.
+std::optional<PictureError> pictureErrorOf(const CacheReader& reader, size_t variable,
+                                           const StreamErrors& errors) {
+  if (isNearlyConstant(reader.manifest().variables[variable])) return std::nullopt;
+  const auto [lower, upper] = FirstChoice(reader, variable, glm::dvec3(1)).function().range;
+  if (!(upper > lower)) return std::nullopt;
+  const double changes = kKernelSigma * std::sqrt(3.0);  // of three independent components
+  const auto part = [&](double value, double slope) {
+    return std::hypot(value, changes * slope) / (upper - lower);
+  };
+  return PictureError{lower, upper, part(errors.means.largest, errors.slopes.largest),
+                      part(errors.means.typical, errors.slopes.typical)};
+}
+
+void printPictureError(const CacheReader& reader, size_t variable, const StreamErrors& errors) {
+  if (const auto error = pictureErrorOf(reader, variable, errors))
+    fmt::print(
+        "           errors in a picture over {:.4g} .. {:.4g}, its range by default: typically {:.2g} % of "
+        "it "
+        "({:.0f} dB), at most {:.2g} %\n",
+        error->lower, error->upper, 100 * error->typical, -20 * std::log10(std::max(error->typical, 1e-15)),
+        100 * std::min(error->largest, 1.0));
+}
+
 /// Results of --verify and --probe.
 struct Findings {
   CacheVerification verification;
-  ProbedPoints asked;
-  std::vector<std::optional<ProbeResult>> probes;
+  Probe probe;
 };
+
+Probe probed(const CacheReader& reader, const InfoOptions& options) {
+  Probe probe{parseProbe(options.probe), options.probe.of_source, options.steps.severalSteps(), {}};
+  PointSource source{options.grid, options.gas};
+  if (probe.of_source) setSource(reader, options.probe.source, source.grid);
+  for (const StepPosition& position : chosenSteps(options.steps, reader)) {
+    const CacheReader at = reader.at(position);
+    probe.steps.push_back({position.step, reader.series().steps[position.step].time,
+                           valuesAt(at, probe.asked.points, probe.of_source ? &source : nullptr)});
+  }
+  if (!options.probe.plot.empty()) plotLine(reader, probe, options.probe.plot);
+  return probe;
+}
 
 Findings examine(const CacheReader& reader, const InfoOptions& options) {
   Findings found;
@@ -144,10 +187,7 @@ Findings examine(const CacheReader& reader, const InfoOptions& options) {
     Progress progress{progressBar()};
     found.verification = verifySteps(reader, progress);
   }
-  if (!options.probe.empty()) {
-    found.asked = parseProbe(options.probe);
-    found.probes = probeAll(reader, found.asked.points);
-  }
+  if (options.probe.any()) found.probe = probed(reader, options);
   return found;
 }
 
@@ -163,11 +203,17 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
   json["histograms"] = histogramsAsJson(reader, [&](size_t v) { return stepHistogram(reader, v); });
   json["stored_within"] = Json::array();
   json["stored_errors"] = Json::array();
+  json["picture_errors"] = Json::array();
   for (size_t v = 0; v < manifest.variables.size(); ++v) {
     const auto [means, slopes] = storedErrors(reader, v);
     json["stored_within"].push_back(means.largest);
     json["stored_errors"].push_back({{"values", {{"largest", means.largest}, {"typical", means.typical}}},
                                      {"slopes", {{"largest", slopes.largest}, {"typical", slopes.typical}}}});
+    const auto picture = pictureErrorOf(reader, v, {means, slopes});
+    json["picture_errors"].push_back(picture ? Json{{"range", {picture->lower, picture->upper}},
+                                                    {"largest", picture->largest},
+                                                    {"typical", picture->typical}}
+                                             : Json(nullptr));
   }
   json["bytes"] = totalBytes(manifest);
   json["bytes_per_node"] = bytesPerSample(manifest, totalBytes(manifest));
@@ -183,7 +229,7 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
     json["findings"] = found.verification.findings;
     json["notes"] = found.verification.notes;
   }
-  if (!options.probe.empty()) json["probe"] = probeAsJson(reader, found.asked, found.probes);
+  if (options.probe.any()) json["probe"] = probeAsJson(reader, found.probe);
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
@@ -242,6 +288,7 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
         "           errors of stored values: at most {:.1e}, typically {:.1e}; of changes within a sample: "
         "{:.1e}, {:.1e}\n",
         means.largest, means.typical, slopes.largest, slopes.typical);
+    printPictureError(reader, v, {means, slopes});
     printSpread("", stepHistogram(reader, v));
     if (reader.series().steps.size() > 1) printSpread(", all steps", seriesHistogram(reader, v));
   }
@@ -268,16 +315,16 @@ void printCacheInfo(const InfoOptions& options) {
   const Findings found = examine(reader, options);
   if (options.json)
     printAsJson(reader, options, found);
-  else if (!options.probe.empty())
-    printProbe(reader, found.asked, found.probes);
-  if (!options.json && (options.probe.empty() || options.verify)) printAsText(reader, options, found);
+  else if (options.probe.any())
+    printProbe(reader, found.probe);
+  if (!options.json && (!options.probe.any() || options.verify)) printAsText(reader, options, found);
   if (hasUnfinished(options.grid.grid))
     printMessage("note: a conversion that replaces this cache is in progress or was interrupted");
   if (!found.verification.findings.empty())
     throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
                 found.verification.findings.size());
-  if (!options.probe.empty() && !found.asked.of_file && !found.probes.front()) {
-    const glm::dvec3& point = found.asked.points.front();
+  if (options.probe.any() && found.probe.isOutside()) {
+    const glm::dvec3& point = found.probe.asked.points.front();
     throw Error(
         "{}: the point {}, {}, {} is outside of the data, which lies in x {:.6g} to {:.6g}, y {:.6g} to "
         "{:.6g}, z {:.6g} to {:.6g}",
@@ -294,10 +341,38 @@ void printInfo(const InfoOptions& options) {
   const fs::path& path = options.grid.grid;
   const bool is_cache = fs::is_directory(path) && !isGridFolder(path);
   if (is_cache || (!fs::exists(path) && hasUnfinished(path))) return printCacheInfo(options);
-  if (options.verify || !options.probe.empty())
+  if (options.verify || options.probe.any())
     throw UsageError("{}: is not a splat cache (a directory); --verify and --probe need one",
                      options.grid.grid.string());
   printGridInfo(options.grid, {options.gas, std::nullopt}, options.json);
+}
+
+void addProbeOptions(CLI::App& info, InfoOptions& options) {
+  constexpr const char* kProbe = "Probe";
+  CLI::Option* const probe =
+      info.add_option(
+              "--probe", options.probe.at,
+              "Print the values at x,y,z and the nearest node or cell (block, i, j, k) alone, with exit "
+              "status 1 if the point is outside the data; or a table of the values at all points of a "
+              "file, whose lines begin with x,y,z")
+          ->group(kProbe);
+  CLI::Option* const line = info.add_option("--probe-line", options.probe.line,
+                                            "Print a table of the values at N points from x,y,z to x,y,z")
+                                ->group(kProbe)
+                                ->type_name("FROM TO N")
+                                ->expected(3)
+                                ->excludes(probe);
+  info.add_option("--source", options.probe.source,
+                  "Take the values from the grid's own cells: from these files, or without any from those "
+                  "that the cache names. Exact, where the cache has rounded means")
+      ->group(kProbe)
+      ->expected(0, -1);
+  info.add_option("-o,--output", options.probe.plot, "Draw the values along the line into this PNG file")
+      ->group(kProbe)
+      ->needs(line);
+  info.add_option("--steps", options.steps.steps,
+                  "Print the values of each time step: all, FIRST:LAST or FIRST:LAST:STRIDE, counted from 0")
+      ->group(kProbe);
 }
 
 }  // namespace
@@ -311,15 +386,15 @@ void addInfo(CLI::App& app) {
   info->add_flag("--system", options->system, "Print the drawing back ends of this machine instead");
   info->add_flag("--verify", options->verify,
                  "Read the whole cache and check it; exit with status 1 if it is damaged");
-  info->add_option(
-      "--probe", options->probe,
-      "Print the values at x,y,z and the nearest node or cell (block, i, j, k) alone, with exit status "
-      "1 if the point is outside the data; or a table of the values at all points of a file, whose "
-      "lines begin with x,y,z");
+  addProbeOptions(*info, *options);
   addStepOptions(*info, options->steps, "Time steps");
   addGridOptions(*info, options->grid);
   addGasOptions(*info, options->gas);
-  info->callback([options] { printInfo(*options); });
+  info->callback([options, info] {
+    options->probe.of_source = info->count("--source") > 0;
+    std::erase(options->probe.source, "");  // what CLI11 makes of an option without values
+    printInfo(*options);
+  });
 }
 
 }  // namespace curvisplat

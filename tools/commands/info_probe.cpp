@@ -1,16 +1,17 @@
 #include "tools/commands/info_probe.h"
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <sstream>
 
+#include "render/annotate/plot.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "tools/options/option_parsers.h"
@@ -34,40 +35,57 @@ std::optional<glm::dvec3> pointOf(const std::string& line) {
   return point;
 }
 
-Json jsonOf(const CacheReader& reader, const ProbeResult& found) {
+Json jsonOf(const CacheReader& reader, const PointValues& found, bool of_source) {
+  const char* const at = of_source ? "place" : "centre";
   Json json = {{"block", found.block},
                {"i", found.i},
                {"j", found.j},
                {"k", found.k},
-               {"centre", {found.centre.x, found.centre.y, found.centre.z}},
-               {"distance", found.distance}};
+               {at, {found.place.x, found.place.y, found.place.z}},
+               {"distance", found.distance},
+               {"from", of_source ? "source" : "cache"}};
   json["values"] = Json::array();
-  for (size_t v = 0; v < found.variables.size(); ++v)
+  for (size_t v = 0; v < found.values.size(); ++v)
     json["values"].push_back({{"name", reader.manifest().variables[v].name},
-                              {"value", found.variables[v].value},
-                              {"mean", found.variables[v].mean}});
+                              {"value", found.values[v]},
+                              {"mean", found.sample[v]}});
   return json;
 }
 
-void printTable(const CacheReader& reader, const ProbedPoints& asked,
-                std::span<const std::optional<ProbeResult>> found) {
-  std::string names = "x,y,z";
-  for (const VariableInfo& variable : reader.manifest().variables) names += ',' + variable.name;
-  printLine("{},block,i,j,k", names);
-  for (size_t n = 0; n < found.size(); ++n) {
-    const glm::dvec3& point = asked.points[n];
-    std::string line = fmt::format("{},{},{}", point.x, point.y, point.z);
-    for (size_t v = 0; v < reader.manifest().variables.size(); ++v)
-      line += found[n] ? fmt::format(",{}", found[n]->variables[v].value) : ",";
-    fmt::print("{}{}\n", line,
-               found[n]
-                   ? fmt::format(",{},{},{},{}", found[n]->block + 1, found[n]->i, found[n]->j, found[n]->k)
-                   : ",,,,");
-  }
+/// A number of the cache has the digits of a float.
+std::string numberText(double value, bool of_source) {
+  return of_source ? fmt::format("{}", value) : fmt::format("{}", static_cast<float>(value));
+}
+
+void printTable(const CacheReader& reader, const Probe& probe) {
+  const auto& variables = reader.manifest().variables;
+  std::string names = probe.of_steps ? "step,time,x,y,z" : "x,y,z";
+  for (const VariableInfo& variable : variables) names += ',' + variable.name;
+  names += ",block,i,j,k,sample_x,sample_y,sample_z";
+  for (const VariableInfo& variable : variables) names += ",sample_" + variable.name;
+  printLine("{}{}", names, probe.asked.along.empty() ? "" : ",along");
+  for (const ProbedStep& step : probe.steps)
+    for (size_t n = 0; n < step.found.size(); ++n) {
+      const auto& found = step.found[n];
+      const glm::dvec3& point = probe.asked.points[n];
+      std::string line = probe.of_steps ? fmt::format("{},{},", step.step, step.time) : "";
+      line += fmt::format("{},{},{}", point.x, point.y, point.z);
+      for (size_t v = 0; v < variables.size(); ++v)
+        line += found ? ',' + numberText(found->values[v], probe.of_source) : ",";
+      line += found ? fmt::format(",{},{},{},{},{},{},{}", found->block + 1, found->i, found->j, found->k,
+                                  found->place.x, found->place.y, found->place.z)
+                    : ",,,,,,,";
+      for (size_t v = 0; v < variables.size(); ++v)
+        line += found ? ',' + numberText(found->sample[v], probe.of_source) : ",";
+      if (!probe.asked.along.empty()) line += fmt::format(",{}", probe.asked.along[n]);
+      fmt::print("{}\n", line);
+    }
 }
 
 /// In words that need no knowledge of splats.
-void printPoint(const CacheReader& reader, const glm::dvec3& at, const std::optional<ProbeResult>& found) {
+void printPoint(const CacheReader& reader, const Probe& probe) {
+  const glm::dvec3& at = probe.asked.points.front();
+  const std::optional<PointValues>& found = probe.steps.front().found.front();
   const std::string point = fmt::format("{}, {}, {}", at.x, at.y, at.z);
   if (!found) {
     fmt::print("{}: outside of the data\n", point);
@@ -77,25 +95,45 @@ void printPoint(const CacheReader& reader, const glm::dvec3& at, const std::opti
   const char* const sample = manifest.cells ? "cell" : "node";
   const std::string block = manifest.blocks.size() > 1 ? fmt::format("block {}, ", found->block + 1) : "";
   const char* const of_refined = manifest.refined > 1 ? " in the refined grid" : "";
-  fmt::print(
-      "{}: nearest {} {}i {}, j {}, k {} (counted from 0{}), the middle of whose cell is at {:.6g}, {:.6g}, "
-      "{:.6g}\n",
-      point, sample, block, found->i, found->j, found->k, of_refined, found->centre.x, found->centre.y,
-      found->centre.z);
-  for (size_t v = 0; v < found->variables.size(); ++v) {
+  const char* const where = !probe.of_source ? ", the middle of whose cell is"
+                            : manifest.cells ? ", whose middle is"
+                                             : ",";
+  fmt::print("{}: {} {} {}i {}, j {}, k {} (counted from 0){}{} at {:.6g}, {:.6g}, {:.6g}\n", point,
+             probe.of_source && manifest.cells ? "in" : "nearest", sample, block, found->i, found->j,
+             found->k, of_refined, where, found->place.x, found->place.y, found->place.z);
+  for (size_t v = 0; v < found->values.size(); ++v) {
     const VariableInfo& variable = manifest.variables[v];
-    printLine("  {:<20} {:.6g}{} at the point; {:.6g} in the middle of that cell", variable.name,
-              found->variables[v].value, variable.unit.empty() ? "" : " " + variable.unit,
-              found->variables[v].mean);
+    printLine("  {:<20} {:.{}g}{} at the point; {:.{}g} {}", variable.name, found->values[v],
+              probe.of_source ? 9 : 6, variable.unit.empty() ? "" : " " + variable.unit, found->sample[v],
+              probe.of_source ? 9 : 6, probe.of_source ? "there" : "in the middle of that cell");
   }
+}
+
+/// N points from a to b.
+ProbedPoints parseLine(const std::vector<std::string>& words) {
+  constexpr const char* kOption = "--probe-line";
+  constexpr uint64_t kMaxPoints = 10'000'000;
+  const glm::dvec3 from = parsePoint(kOption, words[0]), to = parsePoint(kOption, words[1]);
+  const uint64_t count = parseCount(kOption, words[2]);
+  if (count < 2 || count > kMaxPoints)
+    throw UsageError("{}: {} points; expected 2 to {}", kOption, count, kMaxPoints);
+  ProbedPoints asked{true, {}, {}};
+  for (uint64_t n = 0; n < count; ++n) {
+    const double part = static_cast<double>(n) / static_cast<double>(count - 1);
+    asked.points.push_back(from + part * (to - from));
+    asked.along.push_back(part * glm::length(to - from));
+  }
+  return asked;
 }
 
 }  // namespace
 
-ProbedPoints parseProbe(const std::string& text) {
+ProbedPoints parseProbe(const ProbeArguments& arguments) {
+  if (!arguments.line.empty()) return parseLine(arguments.line);
+  const std::string& text = arguments.at;
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(text, ignored)) return {false, {parsePoint("--probe", text)}};
-  ProbedPoints asked{true, {}};
+  if (!std::filesystem::is_regular_file(text, ignored)) return {false, {parsePoint("--probe", text)}, {}};
+  ProbedPoints asked{true, {}, {}};
   std::istringstream lines(readTextFile(text, uint64_t{1} << 30));
   std::string line;
   for (size_t number = 1; std::getline(lines, line); ++number) {
@@ -110,24 +148,42 @@ ProbedPoints parseProbe(const std::string& text) {
   return asked;
 }
 
-std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader,
-                                                 std::span<const glm::dvec3> points) {
-  std::vector<size_t> variables(reader.manifest().variables.size());
-  std::iota(variables.begin(), variables.end(), size_t{0});
-  return probeAll(reader, variables, points);
+Json probeAsJson(const CacheReader& reader, const Probe& probe) {
+  Json steps = Json::array();
+  for (const ProbedStep& step : probe.steps) {
+    Json all = Json::array();
+    for (const auto& of_point : step.found)
+      all.push_back(of_point ? jsonOf(reader, *of_point, probe.of_source) : Json(nullptr));
+    Json of_step = probe.asked.is_table ? all : all[0];
+    if (!probe.of_steps) return of_step;
+    steps.push_back({{"step", step.step}, {"time", step.time}, {"probe", std::move(of_step)}});
+  }
+  return steps;
 }
 
-Json probeAsJson(const CacheReader& reader, const ProbedPoints& asked,
-                 std::span<const std::optional<ProbeResult>> found) {
-  Json all = Json::array();
-  for (const auto& of_point : found) all.push_back(of_point ? jsonOf(reader, *of_point) : Json(nullptr));
-  return asked.of_file ? all : all[0];
+void printProbe(const CacheReader& reader, const Probe& probe) {
+  if (probe.isTable())
+    printTable(reader, probe);
+  else
+    printPoint(reader, probe);
 }
 
-void printProbe(const CacheReader& reader, const ProbedPoints& asked,
-                std::span<const std::optional<ProbeResult>> found) {
-  if (asked.of_file) return printTable(reader, asked, found);
-  printPoint(reader, asked.points.front(), found.front());
+void plotLine(const CacheReader& reader, const Probe& probe, const std::filesystem::path& file) {
+  requirePlots();
+  std::vector<LinePanel> panels;
+  for (size_t v = 0; v < reader.manifest().variables.size(); ++v) {
+    const VariableInfo& variable = reader.manifest().variables[v];
+    LinePanel panel{variable.name, "length along the line", variable.unit, {}, {}, false, true};
+    for (const ProbedStep& step : probe.steps) {
+      PlotLine line{probe.of_steps ? fmt::format("{:.6g}", step.time) : "", {}};
+      for (size_t n = 0; n < step.found.size(); ++n)
+        if (step.found[n]) line.points.push_back({probe.asked.along[n], step.found[n]->values[v]});
+      if (!line.points.empty()) panel.lines.push_back(std::move(line));
+    }
+    if (panel.lines.empty()) throw Error("{}: the line is outside of the data", reader.cachePath().string());
+    panels.push_back(std::move(panel));
+  }
+  writeFileAtomically(file, drawPlot(panels));
 }
 
 }  // namespace curvisplat

@@ -1,34 +1,62 @@
-// `info --probe`: what is known at a point, or at all points of a file.
+// `info --probe`, `--probe-line`: what is known at a point, at all points of a file or along a line.
 #pragma once
 
 #include <glm/vec3.hpp>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "stream/cache/cache_reader.h"
-#include "stream/cache/probe.h"
+#include "tools/options/point_values.h"
 
 namespace curvisplat {
 
-/// `text`: x,y,z, or the name of a file of points, whose lines begin with three numbers; a first line of words is left out.
-/// Throws UsageError, or Error if a line has no point.
-struct ProbedPoints {
-  bool of_file = false;
-  std::vector<glm::dvec3> points;
+/// As given.
+struct ProbeArguments {
+  std::string at;                 // x,y,z or the name of a file of points; empty: no probe
+  std::vector<std::string> line;  // from x,y,z, to x,y,z, points
+  bool of_source = false;
+  std::vector<std::filesystem::path> source;  // none: those that the cache names
+  std::filesystem::path plot;                 // of a line
+
+  bool any() const { return !at.empty() || !line.empty(); }
 };
-ProbedPoints parseProbe(const std::string& text);
 
-/// Of all scalars; null for points outside of the data.
-std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader,
-                                                 std::span<const glm::dvec3> points);
+/// Lines of a file begin with three numbers; a first line of words is left out.
+struct ProbedPoints {
+  bool is_table = false;  // of a file, or a line
+  std::vector<glm::dvec3> points;
+  std::vector<double> along;  // of a line: the length up to each point
+};
+/// Throws UsageError, or Error if a line of a file has no point.
+ProbedPoints parseProbe(const ProbeArguments& arguments);
 
-/// As JSON: an object for a point, null outside; for a file an array of them.
-nlohmann::ordered_json probeAsJson(const CacheReader& reader, const ProbedPoints& asked,
-                                   std::span<const std::optional<ProbeResult>> found);
-/// In words; of a file as a table with commas.
-void printProbe(const CacheReader& reader, const ProbedPoints& asked,
-                std::span<const std::optional<ProbeResult>> found);
+/// What was found at one step.
+struct ProbedStep {
+  uint64_t step = 0;
+  double time = 0;
+  std::vector<std::optional<PointValues>> found;  // [point]
+};
+
+/// What is printed.
+struct Probe {
+  ProbedPoints asked;
+  bool of_source = false;
+  bool of_steps = false;  // of several: a table
+  std::vector<ProbedStep> steps;
+
+  bool isTable() const { return asked.is_table || of_steps; }
+  bool isOutside() const { return !isTable() && !steps.front().found.front(); }
+};
+
+/// As JSON: an object for a point, null outside; of a table an array of them; of several steps an array for each.
+nlohmann::ordered_json probeAsJson(const CacheReader& reader, const Probe& probe);
+/// In words; a table with commas.
+void printProbe(const CacheReader& reader, const Probe& probe);
+/// A PNG file of the values of all scalars along a line. Throws UsageError if the program was built without plots.
+void plotLine(const CacheReader& reader, const Probe& probe, const std::filesystem::path& file);
 
 }  // namespace curvisplat

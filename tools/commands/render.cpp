@@ -36,6 +36,7 @@
 #include "tools/output/picture_page.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
+#include "tools/output/stored_steps.h"
 
 namespace curvisplat {
 namespace {
@@ -159,6 +160,8 @@ void render(const RenderArguments& given) {
   for (const auto& [of, function] : {std::pair(variable, &transfer_function), {shown, &colours}}) {
     const std::string range_warning = rangeMissesScalar(variableFor(cache, of, drawn), *function);
     if (!range_warning.empty()) printMessage("warning: {}", range_warning);
+    const std::string finer = rangeFinerThanStored(cache, of, function->range());
+    if (!finer.empty()) printMessage("warning: {}", finer);
     if (!scalars.colour) break;
   }
 
@@ -167,6 +170,10 @@ void render(const RenderArguments& given) {
                            !arguments.opacity.by.scalar.empty(), mapsOn(options.background)});
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
+  const bool of_colours = isoOfColours(arguments.opacity, arguments.scalar);
+  for (const std::string& finer :
+       isovaluesFinerThanStored(cache, of_colours ? shown : variable, arguments.surfaces.isovalues))
+    printMessage("warning: {}", finer);
 
   const ImageSize picture = options.size;
   const std::vector<ShownFunction> functions = shownFunctions(

@@ -23,6 +23,7 @@
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/point_values.h"
 #include "tools/options/scene_arguments.h"
 #include "tools/output/command_run.h"
 #include "tools/output/frame_output.h"

@@ -170,18 +170,6 @@ void requireSameCentring(const std::string& name, const std::vector<GridScalar>&
 
 }  // namespace
 
-std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache) {
-  std::vector<fs::path> files;
-  std::error_code ignored;
-  for (const std::string& source : manifest.sources) {
-    const fs::path given = source, beside = fs::absolute(cache).parent_path() / given.filename();
-    const fs::path found = fs::exists(given, ignored) ? given : beside;
-    if (!fs::exists(found, ignored)) return {};
-    files.push_back(fs::absolute(found));
-  }
-  return files;
-}
-
 std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::vector<fs::path>& files) {
   const CacheReader reader(cache);
   return furtherAmong(scalarsIn(files, reader), reader);

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "stream/base/progress.h"
-#include "stream/cache/manifest.h"
 
 namespace curvisplat {
 
@@ -14,10 +13,6 @@ struct FurtherScalar {
   std::string name, unit;
   bool derived = false;  // computed from others
 };
-
-/// The files that a cache names as its sources, as far as they are still there: as given, or beside the cache. Empty if
-/// one is missing.
-std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std::filesystem::path& cache);
 
 /// What `files` have and `cache` lacks, of the same centring, in the order of the files; of a series, what its first step has.
 /// Opens the files. Throws Error if they cannot be opened.

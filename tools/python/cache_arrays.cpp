@@ -13,6 +13,7 @@
 
 #include "render/export/field_sampler.h"
 #include "stream/base/error.h"
+#include "tools/options/point_values.h"
 #include "tools/output/start_checks.h"
 #include "tools/python/interruptible.h"
 
@@ -158,6 +159,43 @@ py::tuple pointArrays(const CacheReader& cache, const DataChoice& choice, const 
   return py::make_tuple(
       arrayOf(std::move(points.positions), {count, 3}), arrayOf(std::move(points.values), {count}),
       arrayOf(std::move(points.volumes), {count}), arrayOf(std::move(points.shapes), {count, 3, 3}));
+}
+
+py::tuple probedArrays(const CacheReader& reader, const std::vector<std::array<double, 3>>& points,
+                       const std::optional<std::vector<std::filesystem::path>>& source) {
+  std::vector<glm::dvec3> at;
+  at.reserve(points.size());
+  for (const std::array<double, 3>& point : points) at.emplace_back(point[0], point[1], point[2]);
+  PointSource from;
+  if (source) setSource(reader, *source, from.grid);
+  const auto found = valuesAt(reader, at, source ? &from : nullptr);
+  const auto count = static_cast<py::ssize_t>(at.size());
+  py::array_t<uint32_t> block(count);
+  py::array_t<uint64_t> index({count, py::ssize_t{3}});
+  py::array_t<double> place({count, py::ssize_t{3}});
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  py::dict values, sample_values;
+  for (size_t v = 0; v < reader.manifest().variables.size(); ++v) {
+    py::array_t<double> here(count), there(count);
+    for (size_t n = 0; n < at.size(); ++n) {
+      here.mutable_data()[n] = found[n] ? found[n]->values[v] : kNone;
+      there.mutable_data()[n] = found[n] ? found[n]->sample[v] : kNone;
+    }
+    const py::str name(reader.manifest().variables[v].name);
+    values[name] = here;
+    sample_values[name] = there;
+  }
+  for (size_t n = 0; n < at.size(); ++n) {
+    const PointValues one = found[n].value_or(PointValues());
+    block.mutable_data()[n] = found[n] ? one.block + 1 : 0;
+    const std::array<uint64_t, 3> of_sample{one.i, one.j, one.k};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<size_t>(axis);
+      index.mutable_data()[3 * n + a] = of_sample[a];
+      place.mutable_data()[3 * n + a] = found[n] ? one.place[axis] : kNone;
+    }
+  }
+  return py::make_tuple(values, block, index, place, sample_values);
 }
 
 }  // namespace curvisplat::python

@@ -6,8 +6,10 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stream/cache/cache_reader.h"
 
@@ -29,5 +31,10 @@ pybind11::tuple sampledArrays(const CacheReader& cache, const DataChoice& choice
 /// (positions (n, 3), float64; values (n), volumes (n), shapes (n, 3, 3), float32) of the splats with their centres in the box.
 pybind11::tuple pointArrays(const CacheReader& cache, const DataChoice& choice,
                             const pybind11::object& progress);
+
+/// What is at points: for each scalar its values at the points and at the samples next to them, and of these the block, the indices
+/// and the places; NaN, and block 0, outside of the data. `source`: null for the cache alone, or files; none: those that it names.
+pybind11::tuple probedArrays(const CacheReader& reader, const std::vector<std::array<double, 3>>& points,
+                             const std::optional<std::vector<std::filesystem::path>>& source);
 
 }  // namespace curvisplat::python

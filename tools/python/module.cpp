@@ -23,7 +23,6 @@
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
 #include "stream/base/memory.h"
-#include "stream/cache/probe.h"
 #include "stream/cache/series.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/option_parsers.h"
@@ -121,27 +120,10 @@ py::tuple orbitedCamera(const std::array<double, 3>& position, const std::array<
                         py::tuple(py::cast(arrayOf(turned.view_up))));
 }
 
-/// None where the point is outside of the data.
-py::object probeAt(OpenCache& cache, const std::array<double, 3>& point) {
+py::tuple probeAt(OpenCache& cache, const std::vector<std::array<double, 3>>& points,
+                  const std::optional<std::vector<std::filesystem::path>>& source) {
   const auto busy = cache.use();
-  const CacheReader& reader = cache.reader();
-  std::vector<size_t> variables;
-  for (size_t n = 0; n < reader.manifest().variables.size(); ++n) variables.push_back(n);
-  const auto found = probe(reader, variables, vectorOf(point));
-  if (!found) return py::none();
-  py::dict values, sample_values;
-  for (size_t n = 0; n < variables.size(); ++n) {
-    const py::str name(reader.manifest().variables[n].name);
-    values[name] = found->variables[n].value;
-    sample_values[name] = found->variables[n].mean;
-  }
-  py::dict out;
-  out["values"] = values;
-  out["sample_values"] = sample_values;
-  out["block"] = found->block + 1;
-  out["index"] = py::make_tuple(found->i, found->j, found->k);
-  out["position"] = arrayOf(found->centre);
-  return out;
+  return probedArrays(cache.reader(), points, source);
 }
 
 py::tuple sample(OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,

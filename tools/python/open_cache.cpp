@@ -15,6 +15,7 @@
 #include "tools/options/picture_choice.h"
 #include "tools/output/empty_picture.h"
 #include "tools/output/start_checks.h"
+#include "tools/output/stored_steps.h"
 #include "tools/python/interruptible.h"
 #include "tools/view/edited_function.h"
 
@@ -268,6 +269,13 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     picture.warnings = warningsOf(
         arguments, image,
         {manifest, manifest.variables[scalars.opacity.variable], function, at, frame, picture.statistics});
+    const TransferFunction& colours = scalars.colour ? scalars.colour->function : function;
+    if (std::string finer = rangeFinerThanStored(reader_, shown, colours.range()); !finer.empty())
+      picture.warnings.push_back(std::move(finer));
+    const bool iso_of_colours = isoOfColours(arguments.opacity, arguments.scalar);
+    for (std::string& finer : isovaluesFinerThanStored(
+             reader_, iso_of_colours ? shown : scalars.opacity.variable, arguments.surfaces.isovalues))
+      picture.warnings.push_back(std::move(finer));
     if (!(annotations == Annotations{})) {
       AnnotatedScene scene{size,
                            renderer.screenView(at, frame),

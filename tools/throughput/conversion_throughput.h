@@ -14,9 +14,9 @@
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
+#include "render/annotate/plot.h"
 #include "stream/base/progress.h"
 #include "tools/throughput/measurements.h"
-#include "tools/throughput/plot.h"
 
 namespace curvisplat {
 

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "render/annotate/plot.h"
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame_options.h"
 #include "stream/cache/cache_reader.h"
-#include "tools/throughput/plot.h"
 
 namespace curvisplat {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "render/annotate/plot.h"
 #include "tools/throughput/frame_throughput.h"
 #include "tools/throughput/measurements.h"
-#include "tools/throughput/plot.h"
 #include "tools/throughput/verdict.h"
 
 namespace curvisplat {

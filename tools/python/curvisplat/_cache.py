@@ -233,11 +233,30 @@ class Cache:
         return View(self.path, height, program)
 
     @_arguments.in_one_line
-    def probe(self, point: Vector) -> Optional[dict]:
+    def probe(self, point: Any, *, source: Any = None) -> Optional[dict]:
         """What is at a point (x, y, z): {"values": {scalar: value at the point}, "block": from 1, "index": (i, j, k) from 0 of the sample
         that it lies in, "position": the middle of that sample's cell, "sample_values": {scalar: value there}}. None if the point is outside of
-        the grid."""
-        return self._core.probe(_arguments.numbers("point", point, "(x, y, z)", 3))
+        the grid.
+
+        Of points (n, 3) the same with arrays: values of shape (n,), "block" 0 and NaN outside.
+
+        source: True takes the values from the files that the cache names, or a list of files from these: exactly what the grid's own cell has
+        there (trilinear; of cell-centred scalars the cell's value), where the cache has rounded means. "position" and "sample_values" are then those of the
+        nearest node itself, or of the cell, and points outside of the cells are outside.
+        """
+        points = np.asarray(point, float) if np.ndim(point) == 2 else None
+        if points is None:
+            points = np.array([_arguments.numbers("point", point, "(x, y, z)", 3)])
+        elif points.shape[1] != 3 or not np.isfinite(points).all():
+            raise _core.UsageError(f"points of shape {points.shape}: expected finite numbers of shape (n, 3)")
+        files = None if source is None or source is False else [] if source is True else [_arguments.path(f) for f in source]
+        values, block, index, position, sample_values = self._core.probe(points, files)
+        if np.ndim(point) != 2:
+            if block[0] == 0:
+                return None
+            values, sample_values = ({name: float(v[0]) for name, v in of.items()} for of in (values, sample_values))
+            block, index, position = int(block[0]), tuple(int(n) for n in index[0]), tuple(float(x) for x in position[0])
+        return {"values": values, "block": block, "index": index, "position": position, "sample_values": sample_values}
 
     def _box(self, box: Optional[Vector]) -> Tuple[list, list]:
         if box is None:

@@ -1,4 +1,4 @@
-#include "tools/throughput/plot.h"
+#include "render/annotate/plot.h"
 
 #include <cairo/cairo.h>
 
@@ -130,22 +130,32 @@ void drawLines(PlotCanvas& canvas, double panel_left, double panel_top, const Li
       ys.insert(y);
     }
   if (xs.empty()) return;
-  const double largest = *ys.rbegin() > 0 ? 1.05 * *ys.rbegin() : 1;
-  const double least = panel.log_values ? 0.8 * *ys.begin() : 0;
+  double largest = *ys.rbegin() > 0 ? 1.05 * *ys.rbegin() : 1;
+  double least = panel.log_values ? 0.8 * *ys.begin() : 0;
+  if (panel.is_profile) {
+    least = *ys.begin();
+    largest = *ys.rbegin();
+    const double around =
+        largest > least ? 0.05 * (largest - least) : std::max(0.05 * std::abs(largest), 1e-30);
+    least -= around;
+    largest += around;
+  }
   const std::vector<AxisTick> ticks = axisTicks({{least, largest}, panel.log_values}, 5);
   double label_width = 0;
   for (const AxisTick& tick : ticks) label_width = std::max(label_width, canvas.widthOf(tick.label));
 
   const double left = panel_left + 34 + label_width, right = panel_left + kPanelWidth - 24;
   const double top = panel_top + 8, bottom = panel_top + kLineHeight - 46;
-  const double low = std::log(*xs.begin()), high = std::log(*xs.rbegin());
+  const auto along = [&](double x) { return panel.is_profile ? x : std::log(x); };
+  const double low = along(*xs.begin()), high = along(*xs.rbegin());
   const auto xOf = [&](double x) {
     const double inset = 14;  // keeps the first and last point off the frame
     if (!(high > low)) return (left + right) / 2;
-    return left + inset + (std::log(x) - low) / (high - low) * (right - left - 2 * inset);
+    return left + inset + (along(x) - low) / (high - low) * (right - left - 2 * inset);
   };
   const auto yOf = [&](double y) {
-    const double part = panel.log_values ? std::log(y / least) / std::log(largest / least) : y / largest;
+    const double part =
+        panel.log_values ? std::log(y / least) / std::log(largest / least) : (y - least) / (largest - least);
     return bottom - part * (bottom - top);
   };
 
@@ -156,12 +166,16 @@ void drawLines(PlotCanvas& canvas, double panel_left, double panel_top, const Li
     canvas.ink(kInk);
     canvas.text(left - 7, yOf(tick.value) + 4, tick.label, 1);
   }
-  for (const double x : xs) {
+  const auto tickX = [&](double x, const std::string& label) {
     canvas.ink(kFaint);
     canvas.line(xOf(x), bottom, xOf(x), bottom + 4);
     canvas.ink(kInk);
-    canvas.text(xOf(x), bottom + 18, panel.x_label(x), 0.5);
-  }
+    canvas.text(xOf(x), bottom + 18, label, 0.5);
+  };
+  if (!panel.is_profile)
+    for (const double x : xs) tickX(x, panel.x_label(x));
+  else
+    for (const AxisTick& tick : axisTicks({{low, high}}, 5)) tickX(tick.value, tick.label);
   canvas.ink(kFaint);
   canvas.line(left, bottom, right, bottom);
   canvas.ink(kInk);
@@ -174,6 +188,7 @@ void drawLines(PlotCanvas& canvas, double panel_left, double panel_top, const Li
     cairo_new_path(canvas.get());
     for (const auto& [x, y] : panel.lines[n].points) cairo_line_to(canvas.get(), xOf(x), yOf(y));
     cairo_stroke(canvas.get());
+    if (panel.is_profile) continue;
     for (const auto& [x, y] : panel.lines[n].points) {
       cairo_arc(canvas.get(), xOf(x), yOf(y), 3.2, 0, 2 * M_PI);
       cairo_fill(canvas.get());

@@ -18,12 +18,13 @@ struct PlotLine {
   std::vector<Point> points;  // by increasing x
 };
 
-/// Lines over a logarithmic x axis, with a tick at the x of every point.
+/// Lines over a logarithmic x axis, with a tick at the x of every point; or profiles.
 struct LinePanel {
   std::string title, x_name, y_name;
   std::vector<PlotLine> lines;
   std::function<std::string(double)> x_label;  // text of a tick
   bool log_values = false;                     // logarithmic y axis; requires positive values
+  bool is_profile = false;                     // many points: linear axes around the values, and lines alone
 };
 
 struct Bar {

@@ -1,0 +1,144 @@
+#include "tools/options/point_values.h"
+
+#include <memory>
+#include <numeric>
+#include <string>
+#include <system_error>
+
+#include "preprocess/mesh/mesh_source.h"
+#include "preprocess/probe/source_probe.h"
+#include "stream/base/error.h"
+#include "stream/cache/probe.h"
+#include "tools/options/convert_arguments.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kOtherGrid = "is not the grid that the cache was made from";
+
+void requireSameBlocks(const CacheReader& reader, const GridDescription& description,
+                       const OpenGridOptions& grid) {
+  const auto& expected = reader.manifest().blocks;
+  const auto& blocks = description.blocks;
+  bool same = blocks.size() == expected.size();
+  for (size_t n = 0; same && n < blocks.size(); ++n)
+    same = blocks[n].ni == expected[n].ni && blocks[n].nj == expected[n].nj && blocks[n].nk == expected[n].nk;
+  if (!same) throw Error("{}: {}", grid.grid.string(), kOtherGrid);
+}
+
+void requireSameSamples(const CacheReader& reader, const GridDescription& description,
+                        const OpenGridOptions& grid) {
+  uint64_t samples = 0;
+  for (const MeshPiece& piece : description.pieces)
+    samples += reader.manifest().cells ? piece.cells : piece.points;
+  if (reader.manifest().blocks.size() != 1 || reader.manifest().blocks[0].ni != samples)
+    throw Error("{}: {}", grid.grid.string(), kOtherGrid);
+}
+
+/// By name, of the cache's centring.
+std::vector<uint32_t> scalarsLike(const CacheReader& reader, const GridDescription& description,
+                                  const OpenGridOptions& grid) {
+  const Centring centring = reader.manifest().cells ? Centring::kCell : Centring::kNode;
+  std::vector<uint32_t> scalars;
+  for (const VariableInfo& variable : reader.manifest().variables) {
+    uint32_t n = 0;
+    while (n < description.scalars.size() &&
+           (description.scalars[n].name != variable.name || description.scalars[n].centring != centring))
+      ++n;
+    if (n == description.scalars.size())
+      throw Error("{}: has no scalar {}; give all files of the grid", grid.grid.string(), variable.name);
+    scalars.push_back(n);
+  }
+  return scalars;
+}
+
+/// `found`: what the cache has there.
+std::vector<std::optional<SourceValues>> sourceValues(const CacheReader& reader, const PointSource& from,
+                                                      std::span<const glm::dvec3> points,
+                                                      std::span<const std::optional<ProbeResult>> found) {
+  const OpenGridOptions& grid = from.grid;
+  OpenGridOptions options = grid;
+  std::vector<ValueRange> ranges;
+  for (const VariableInfo& variable : reader.manifest().variables) {
+    options.scalars.push_back(variable.name);
+    ranges.push_back({variable.min, variable.max});
+  }
+  const auto source =
+      refinedBy(reader.manifest().refined, openWithDerived(options, {from.gas, std::nullopt}), std::nullopt);
+  const std::vector<uint32_t> scalars = scalarsLike(reader, source->description(), grid);
+  if (const auto* mesh = dynamic_cast<const MeshSource*>(source.get())) {
+    requireSameSamples(reader, source->description(), grid);
+    return probeMesh(*mesh, scalars, ranges, points);
+  }
+  requireSameBlocks(reader, source->description(), grid);
+  std::vector<std::vector<NearSample>> near(points.size());
+  for (size_t p = 0; p < points.size(); ++p)
+    if (found[p])
+      for (const ReachingSample& sample : found[p]->near)
+        near[p].push_back({sample.block, {sample.i, sample.j, sample.k}});
+  return probeGrid(dynamic_cast<const GridSource&>(*source), scalars, ranges, points, near);
+}
+
+}  // namespace
+
+std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache) {
+  std::vector<fs::path> files;
+  std::error_code ignored;
+  for (const std::string& source : manifest.sources) {
+    const fs::path given = source, beside = fs::absolute(cache).parent_path() / given.filename();
+    const fs::path found = fs::exists(given, ignored) ? given : beside;
+    if (!fs::exists(found, ignored)) return {};
+    files.push_back(fs::absolute(found));
+  }
+  return files;
+}
+
+void setSource(const CacheReader& reader, const std::vector<fs::path>& files, OpenGridOptions& grid) {
+  if (files.empty() && reader.series().steps.size() > 1)
+    throw UsageError("{}: is a series; name the files of the time step after --source",
+                     reader.cachePath().string());
+  const std::vector<fs::path> found =
+      files.empty() ? sourcesOf(reader.manifest(), reader.cachePath()) : files;
+  if (found.empty())
+    throw Error("{}: the files that it was made from are no longer there; name them after --source",
+                reader.cachePath().string());
+  grid.grid = found.front();
+  grid.solutions.assign(found.begin() + 1, found.end());
+}
+
+std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
+                                                 std::span<const glm::dvec3> points,
+                                                 const PointSource* source) {
+  std::vector<size_t> variables(reader.manifest().variables.size());
+  std::iota(variables.begin(), variables.end(), size_t{0});
+  const auto found = probeAll(reader, variables, points);
+  std::vector<std::optional<PointValues>> all(points.size());
+  if (source) {
+    const auto of_source = sourceValues(reader, *source, points, found);
+    for (size_t p = 0; p < points.size(); ++p)
+      if (const auto& at = of_source[p])
+        all[p] = {at->block,
+                  at->at[0],
+                  at->at[1],
+                  at->at[2],
+                  at->place,
+                  at->values,
+                  {at->sample.begin(), at->sample.end()},
+                  found[p] ? found[p]->distance : 0};
+    return all;
+  }
+  for (size_t p = 0; p < points.size(); ++p) {
+    if (!found[p]) continue;
+    const ProbeResult& at = *found[p];
+    all[p] = {at.block, at.i, at.j, at.k, at.centre, {}, {}, at.distance};
+    for (const ProbeVariable& variable : at.variables) {
+      all[p]->values.push_back(variable.value);
+      all[p]->sample.push_back(variable.mean);
+    }
+  }
+  return all;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,50 @@
+// The files that a cache was made from, and what they have at points: exact where the cache has rounded means.
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+
+/// The files that a cache names as its sources, as far as they are still there: as given, or beside the cache. Empty if
+/// one is missing.
+std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std::filesystem::path& cache);
+
+/// Sets the files of `grid`: `files`, or those that the cache names, if there are none. Throws Error if one of these is
+/// missing, or if they are those of a series, of which the step's have to be given.
+void setSource(const CacheReader& reader, const std::vector<std::filesystem::path>& files,
+               OpenGridOptions& grid);
+
+/// Where exact values come from, beside a cache.
+struct PointSource {
+  OpenGridOptions grid;  // with its files
+  GasModel gas;
+};
+
+/// What is at a point.
+struct PointValues {
+  uint32_t block = 0;  // of the nearest sample: a node or a cell; block, i, j and k count from 0
+  uint64_t i = 0, j = 0, k = 0;
+  glm::dvec3 place{
+      0.0};  // the middle of the sample's cell; from a source that of the cell or the node itself
+  std::vector<double> values;  // [scalar of the cache], at the point
+  std::vector<double> sample;  // and at `place`
+  double distance = 0;         // ProbeResult::distance
+};
+
+/// At each point: from the cache; or, with a source, what the grid's own cell has there. nullopt outside of the data.
+/// Throws Error as reading, and if the source is not the grid of the cache.
+std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
+                                                 std::span<const glm::dvec3> points,
+                                                 const PointSource* source);
+
+}  // namespace curvisplat

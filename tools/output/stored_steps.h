@@ -1,0 +1,27 @@
+// Warnings where a picture asks for finer differences of a scalar than its cache stores. From the index and the percentiles alone, without
+// reading bricks. Any thread.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+
+/// The widest step, twice the largest error, of stored values between `lower` and `upper`; 0 if there are none.
+double storedStep(const CacheReader& cache, size_t variable, double lower, double upper);
+
+/// A warning if the range has fewer than 100 steps; empty otherwise.
+std::string rangeFinerThanStored(const CacheReader& cache, size_t variable,
+                                 const std::pair<double, double>& range);
+
+/// A warning for each isovalue from which more than 2 % of the volume lies no further than a step, where its surface follows the values'
+/// rounding, or where steps are wider than 5 % of its own scale (ValueSpread). `isovalues`: as given, of numbers.
+std::vector<std::string> isovaluesFinerThanStored(const CacheReader& cache, size_t variable,
+                                                  std::span<const std::string> isovalues);
+
+}  // namespace curvisplat
