@@ -207,7 +207,7 @@ def main():
             for name in names:
                 column = answers[0].index(name)
                 got = np.array([float(a[column] or "nan") for a in answers[1:]])
-                error = np.abs(got - truths[name]) / (np.ptp(truths[name]) or 1)
+                error = np.abs(got - truths[name]) / (max(np.ptp(truths[name]), 1e-9 * np.abs(truths[name]).max()) or 1)
                 row_of[name].update({f"{how}_max": np.nanmax(error), f"{how}_99": np.nanpercentile(error, 99),
                                      f"{how}_missed": int(np.isnan(got).sum()), f"{how}_s": seconds})
 
