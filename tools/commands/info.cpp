@@ -142,13 +142,13 @@ struct PictureError {
 std::optional<PictureError> pictureErrorOf(const CacheReader& reader, size_t variable,
                                            const StreamErrors& errors) {
   if (isNearlyConstant(reader.manifest().variables[variable])) return std::nullopt;
-  const auto [lower, upper] = FirstChoice(reader, variable, glm::dvec3(1)).function().range;
-  if (!(upper > lower)) return std::nullopt;
+  const std::pair<double, double> range = FirstChoice(reader, variable, glm::dvec3(1)).function().range;
+  if (!(range.second > range.first)) return std::nullopt;
   const double changes = kKernelSigma * std::sqrt(3.0);  // of three independent components
   const auto part = [&](double value, double slope) {
-    return std::hypot(value, changes * slope) / (upper - lower);
+    return std::hypot(value, changes * slope) / (range.second - range.first);
   };
-  return PictureError{lower, upper, part(errors.means.largest, errors.slopes.largest),
+  return PictureError{range.first, range.second, part(errors.means.largest, errors.slopes.largest),
                       part(errors.means.typical, errors.slopes.typical)};
 }
 
