@@ -35,7 +35,7 @@ struct alignas(64) IsoCrossed {
 };
 
 /// A part of half the support of the shortest splat: how far places of a ray may lie apart.
-inline constexpr float kIsoStep = 0.6f;
+inline constexpr float kIsoStep = 0.4f;
 
 /// K in x = 1 - (r / support)²: x² times this polynomial, fitted by least squares.
 inline constexpr float kIsoKernel[] = {0.0451566f, 0.2057787f, -0.2786960f, 0.7582452f, -0.1769623f};

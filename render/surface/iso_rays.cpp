@@ -14,8 +14,7 @@ constexpr float kMinWeight = 0.02f;  // below it there is no field
 constexpr float kMinInside = 0.15f;
 constexpr float kHidden = 1.0f / 4096, kClear = 1.0f / 1024;
 constexpr int kRefinements = 4;
-constexpr float kNearTurn =
-    0.25f;  // of the nearest place's distance to the value: nearer turns are looked at
+constexpr float kNearTurn = 0.8f;  // of the nearest place's distance to the value: nearer turns are looked at
 
 }  // namespace
 

@@ -3,11 +3,23 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <map>
 #include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image_file.h"
+#include "render/mesh/triangle_mesh.h"
+#include "stream/base/file.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
@@ -84,6 +96,81 @@ TEST_F(Isosurfaces, EveryPainterDrawsTheSame) {
   for (const bool volume : {false, true}) {
     const Image cpu = drawn(table, 1, volume, 8);
     EXPECT_GT(compareImages(drawn(table, 1, volume, 8, Backend::kOsmesa), cpu).psnr_db, 50) << volume;
+  }
+}
+
+TEST_F(Isosurfaces, MeshesLieOnThemWithoutGaps) {
+  const std::string said =
+      run({"export", file("a.splats"), "-o", file("a.ply"), "--iso", "0.5", "--voxels", "200"}).out;
+  expectSays(said, "a.ply: isosurface of f at 0.5: ");
+  const InputFile ply(file("a.ply"));
+  std::vector<std::byte> bytes(ply.size());
+  ply.readAt(0, std::span(bytes));
+  const RawMesh mesh = parseMesh(bytes, file("a.ply"));
+  ASSERT_GT(mesh.triangles.size(), 10000u);
+  // Of the true surface: by the closed form and its slope. A cell of the grid is 0.02 to 0.05 long.
+  std::vector<double> off;
+  for (const glm::dvec3& at : mesh.positions) {
+    glm::dvec3 slope;
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 step(0.0);
+      step[axis] = 1e-4;
+      slope[axis] = (annulus_->scalar(at + step) - annulus_->scalar(at - step)) / 2e-4;
+    }
+    off.push_back(std::abs(annulus_->scalar(at) - kValue) / glm::length(slope));
+  }
+  std::sort(off.begin(), off.end());
+  fmt::print("mesh: 99 % within {:.5f}, all within {:.5f}\n", off[off.size() * 99 / 100], off.back());
+  EXPECT_LT(off[off.size() * 99 / 100], 0.01);
+  // An edge belongs to two triangles, once in each direction, or lies at the data's border.
+  std::map<std::pair<uint32_t, uint32_t>, int> edges;
+  for (const auto& corners : mesh.triangles)
+    for (size_t n = 0; n < 3; ++n) ++edges[{corners[n], corners[(n + 1) % 3]}];
+  size_t open = 0, inside = 0;
+  for (const auto& [edge, count] : edges) {
+    EXPECT_EQ(count, 1);
+    if (edges.contains({edge.second, edge.first})) continue;
+    ++open;
+    const glm::dvec3 middle = 0.5 * (mesh.positions[edge.first] + mesh.positions[edge.second]);
+    bool all = true;
+    for (int n = 0; n < 6; ++n) {
+      glm::dvec3 step(0.0);
+      step[n / 2] = n % 2 ? 0.03 : -0.03;
+      all = all && annulus_->contains(middle + step);
+    }
+    inside += all;
+  }
+  EXPECT_GT(open, 0u);
+  EXPECT_EQ(inside, 0u) << "of " << open;
+  // The same triangles in every format and with little memory.
+  for (const char* name : {"a.vtp", "a.stl"})
+    run({"export", file("a.splats"), "-o", file(name), "--iso", "0.5", "--voxels", "200", "--memory", "24M"});
+  EXPECT_EQ(readMeshFile(file("a.stl")).triangles.size(), readMeshFile(file("a.ply")).triangles.size());
+  run({"export", file("a.splats"), "-o", file("b.ply"), "--iso", "0.5", "--voxels", "200", "--memory",
+       "24M"});
+  const InputFile again(file("b.ply"));
+  std::vector<std::byte> more(again.size());
+  again.readAt(0, std::span(more));
+  EXPECT_EQ(more, bytes);
+}
+
+TEST_F(Isosurfaces, MeshesThatCannotBeAreRefused) {
+  const struct {
+    Words options;
+    int status;
+    std::string words;
+  } refused[] = {
+      {{"-o", file("c.vdb"), "--iso", "0.5"},
+       2,
+       "expected a name that ends with .ply, .stl or .vtp for --iso"},
+      {{"-o", file("c.stl")}, 2, ".stl files hold isosurfaces; give --iso VALUE"},
+      {{"-o", file("c.ply"), "--iso", "7"}, 2, "--iso 7: no isosurface: the values of f go from "},
+      {{"-o", file("c.ply"), "--iso", "0.5", "--tf", "glow"}, 2, "--tf cannot be combined with --iso"},
+      {{"-o", file("c.ply"), "--iso", "0.5", "--memory", "1M"}, 2, "is too little for an isosurface"}};
+  for (const auto& [options, status, words] : refused) {
+    const ProgramResult result = runProgram(Words{"export", file("a.splats")} + options);
+    EXPECT_EQ(result.status, status) << result.err;
+    expectSays(result.err, words);
   }
 }
 

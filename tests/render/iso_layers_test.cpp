@@ -184,6 +184,32 @@ TEST_F(IsoLayersTest, ItEndsWhereTheDataDoes) {
   EXPECT_GT(reach(), 3 * pixel);
 }
 
+/// Rays that graze it cross it twice within a step. A part of the outline, where cells are 60 pixels long: how much of each row is
+/// covered changes evenly.
+TEST_F(IsoLayersTest, OutlinesOfLargeCellsAreSmooth) {
+  setField([](const glm::dvec3& at) { return glm::length(at); });
+  camera_.position = {0.15, 0, 3};
+  camera_.focal_point = {0.15, 0, 0};
+  camera_.view_up = {0, 1, 0};
+  camera_.parallel_scale = 0.055;
+  const IsoLayers layers = drawn({0.15}, {all()});
+  std::vector<double> covered;
+  for (int y = 0; y < kSize.height; ++y) {
+    covered.push_back(0);
+    for (int x = 0; x < kSize.width; ++x) {
+      double through = 1;
+      for (const PixelLayer& layer : layers.at(x, y)) through *= 1 - double{layer.colour.w};
+      covered.back() += 1 - through;
+    }
+  }
+  EXPECT_NEAR(covered[kSize.height / 2], kSize.width / 2, 12);
+  double most = 0;
+  for (size_t y = 1; y + 1 < covered.size(); ++y)
+    most = std::max(most, std::abs(covered[y - 1] - 2 * covered[y] + covered[y + 1]));
+  std::printf("outline: bends by %.3f pixels from row to row\n", most);
+  EXPECT_LT(most, 0.7);
+}
+
 /// The edge of what a clip plane leaves, which lies on the edge of two tiles: 0.4 of the pixel beside it is covered.
 TEST_F(IsoLayersTest, OutlinesAtTheEdgeOfTilesAreSmooth) {
   setField([](const glm::dvec3& at) { return at.x; });

@@ -14,6 +14,7 @@
 
 #include "render/export/gaussian_files.h"
 #include "render/export/gaussian_splats.h"
+#include "render/export/iso_mesh.h"
 #include "render/export/vdb_file.h"
 #include "render/frame/frame.h"
 #include "stream/base/error.h"
@@ -35,6 +36,7 @@ struct ExportArguments {
   std::filesystem::path cache, output;
   ScalarArguments scalar;
   std::optional<std::string> max_splats, voxels;
+  std::optional<double> iso;
   std::string memory = "512M";
   StepArguments step;
   bool no_comparison = false;
@@ -93,12 +95,39 @@ double mebibytesOf(const std::filesystem::path& file) {
   return static_cast<double>(std::filesystem::file_size(file)) / (1 << 20);
 }
 
-void exportVdb(const ExportArguments& arguments) {
-  VdbOptions options;
+uint32_t voxelsOf(const ExportArguments& arguments) {
   const uint64_t voxels = parseCount("--voxels", arguments.voxels.value_or(kDefaultVoxels));
   if (voxels > kMaxVoxels)
     throw UsageError("--voxels {}: expected at most {} along the longest side", voxels, kMaxVoxels);
-  options.voxels = static_cast<uint32_t>(voxels);
+  return static_cast<uint32_t>(voxels);
+}
+
+void exportIsosurface(const ExportArguments& arguments) {
+  IsoMeshOptions options;
+  options.value = *arguments.iso;
+  options.voxels = voxelsOf(arguments);
+  options.memory_bytes = parseMemory("--memory", arguments.memory);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.step);
+  const size_t variable = chooseVariable(cache, arguments.scalar);
+  requireThreads();
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  const IsoMeshReport report = writeIsoMesh(cache, variable, options, arguments.output, progress);
+  printLine("{}: isosurface of {} at {:g}: {} triangles, {} vertices, voxels of {:g} units, {:.1f} MiB",
+            arguments.output.string(), cache.manifest().variables[variable].name, options.value,
+            report.triangles, report.vertices, report.voxel_size, mebibytesOf(arguments.output));
+  constexpr double kThin = 0.01;
+  if (report.thin_part > kThin)
+    printMessage(
+        "note: {:.0f} % of the cells that the isosurface may lie in are thinner than half a voxel, and it "
+        "may be missing there; give "
+        "more --voxels, or draw it (render --iso), which needs none",
+        100 * report.thin_part);
+}
+
+void exportVdb(const ExportArguments& arguments) {
+  VdbOptions options;
+  options.voxels = voxelsOf(arguments);
   options.memory_bytes = parseMemory("--memory", arguments.memory);
   const CacheReader cache = openAtStep(arguments.cache, arguments.step);
   const size_t variable = chooseVariable(cache, arguments.scalar);
@@ -110,26 +139,35 @@ void exportVdb(const ExportArguments& arguments) {
             mebibytesOf(arguments.output));
 }
 
-/// Grids hold the scalar itself, as it is stored; splats are drawn.
-void refuseOptionsOfOtherFiles(const ExportArguments& arguments, bool vdb) {
-  if (!vdb && arguments.voxels)
-    throw UsageError("--voxels cannot be combined with {}: it is of .vdb files; give --max-splats",
+/// Grids hold the scalar itself, as it is stored, and isosurfaces one value of it; splats are drawn.
+void refuseOptionsOfOtherFiles(const ExportArguments& arguments, bool splats) {
+  if (splats && arguments.voxels)
+    throw UsageError("--voxels cannot be combined with {}: it is of .vdb files and --iso; give --max-splats",
                      arguments.output.string());
   std::string given = givenFunctionOptions(arguments.scalar);
   if (given.empty() && arguments.max_splats) given = "--max-splats";
   if (given.empty() && arguments.no_comparison) given = "--no-comparison";
-  if (vdb && !given.empty())
-    throw UsageError(
-        "{} cannot be combined with {}: a .vdb file has the values of the scalar, without colours", given,
-        arguments.output.string());
+  if (splats || given.empty()) return;
+  if (arguments.iso)
+    throw UsageError("{} cannot be combined with --iso: an isosurface has one value, without colours", given);
+  throw UsageError("{} cannot be combined with {}: a .vdb file has the values of the scalar, without colours",
+                   given, arguments.output.string());
 }
 
 void exportCache(const ExportArguments& arguments) {
-  const bool vdb = arguments.output.extension() == ".vdb";
-  if (!vdb) checkGaussianName(arguments.output);
-  refuseOptionsOfOtherFiles(arguments, vdb);
+  const std::string extension = extensionOf(arguments.output);
+  const bool vdb = extension == ".vdb";
+  if (arguments.iso && !isIsoMeshName(arguments.output))
+    throw UsageError("-o {}: expected a name that ends with .ply, .stl or .vtp for --iso",
+                     arguments.output.string());
+  if (!arguments.iso && (extension == ".stl" || extension == ".vtp"))
+    throw UsageError("-o {}: {} files hold isosurfaces; give --iso VALUE", arguments.output.string(),
+                     extension);
+  if (!vdb && !arguments.iso) checkGaussianName(arguments.output);
+  refuseOptionsOfOtherFiles(arguments, !vdb && !arguments.iso);
   checkFunctionArguments(arguments.scalar);
   checkOutputFile("-o", arguments.output, {arguments.cache, arguments.scalar.transfer_function.value_or("")});
+  if (arguments.iso) return exportIsosurface(arguments);
   if (vdb) return exportVdb(arguments);
   const uint64_t max_splats = parseCount("--max-splats", arguments.max_splats.value_or(kDefaultSplats));
   const uint64_t memory = parseMemory("--memory", arguments.memory);
@@ -179,11 +217,13 @@ void exportCache(const ExportArguments& arguments) {
 
 void addExport(CLI::App& app) {
   auto arguments = std::make_shared<ExportArguments>();
-  CLI::App* command = app.add_subcommand(
-      "export",
-      "Export a cache as 3D Gaussian splats, which web viewers and game engines draw, or as OpenVDB grids");
+  CLI::App* command = app.add_subcommand("export",
+                                         "Export a cache as 3D Gaussian splats, which web viewers and game "
+                                         "engines draw, as OpenVDB grids, or an isosurface as a mesh");
   command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
-  command->add_option("-o,--output", arguments->output, "File to write: .ply, .spz or .glb; .vdb for grids")
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "File to write: .ply, .spz or .glb; .vdb for grids; with --iso .ply, .stl or .vtp")
       ->required();
   addScalarOption(*command, arguments->scalar);
   addFunctionOptions(*command, arguments->scalar, "Data and colours");
@@ -192,11 +232,12 @@ void addExport(CLI::App& app) {
       ->add_option("--max-splats", arguments->max_splats,
                    "Splat limit, such as 8M or 500K; the largest detail is kept first")
       ->default_str(kDefaultSplats);
-  command->add_option("--voxels", arguments->voxels, ".vdb: voxels along the longest side of the data")
+  command->add_option("--iso", arguments->iso, "Isosurface of this value, as triangles: .ply, .stl or .vtp");
+  command->add_option("--voxels", arguments->voxels, ".vdb, --iso: voxels along the longest side of the data")
       ->default_str(kDefaultVoxels);
   command
       ->add_option("--memory", arguments->memory,
-                   "Memory limit for the grids, or for the pictures of the comparison")
+                   "Memory limit for the grids, the isosurface, or the pictures of the comparison")
       ->capture_default_str();
   command->add_flag(
       "--no-comparison", arguments->no_comparison,

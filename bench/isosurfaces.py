@@ -1,0 +1,249 @@
+#!/usr/bin/env python3
+"""Isosurfaces against VTK's contour of the same grid.
+
+    bench/isosurfaces.py FOLDER [--curvisplat PROGRAM] [--grids GRIDS] [--only NAME] [--voxels 256]
+
+Grids: the blunt fin, the delta wing and the combustor of GRIDS (../shared/data beside the project; what is missing is
+left out, and said so), and a generated wake. VTK computes q_criterion, the magnitude of the vorticity and that of the
+pressure's gradient at their nodes; both programs then get the same .vts file. Of each scalar the values that 60, 80 and
+95 % of the nodes are below are contoured. Half a cell is half of what the contour's cell measures along its normal.
+
+Prints, for each: the share of VTK's surface within half a cell of ours and of ours within half a cell of VTK's, by area,
+the 99 % distance in cells, triangles, and the processor time of both. Needs VTK for Python.
+"""
+import argparse
+import pathlib
+import resource
+import subprocess
+import sys
+import time
+
+import numpy as np
+import vtk
+from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+SAMPLES = 20000  # of a surface
+
+
+def plot3d(grid, q):
+    reader = vtk.vtkMultiBlockPLOT3DReader()
+    reader.SetFileName(str(grid))
+    reader.SetQFileName(str(q))
+    reader.AutoDetectFormatOn()
+    reader.AddFunction(110)  # pressure
+    reader.AddFunction(200)  # velocity
+    reader.Update()
+    block = reader.GetOutput().GetBlock(0)
+    data = block.GetPointData()
+    return block, vtk_to_numpy(data.GetArray("Velocity")), vtk_to_numpy(data.GetArray("Pressure"))
+
+
+def cgns(path):
+    reader = vtk.vtkCGNSReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    reader.EnableAllPointArrays()
+    reader.Update()
+    block = reader.GetOutput().GetBlock(0).GetBlock(0)
+    data = block.GetPointData()
+    array = lambda name: vtk_to_numpy(data.GetArray(name)).astype(float)
+    density = array("Density")
+    momentum = np.stack([array("Momentum" + axis) for axis in "XYZ"], -1) if data.GetArray("MomentumX") \
+        else array("Momentum")
+    energy = array("EnergyStagnationDensity")
+    velocity = momentum / density[:, None]
+    return block, velocity, 0.4 * (energy - 0.5 * density * np.sum(velocity**2, -1))
+
+
+def gradient(block, values):
+    """Of a scalar or a vector at the nodes, by VTK."""
+    array = numpy_to_vtk(np.ascontiguousarray(values, dtype=float), deep=True)
+    array.SetName("v")
+    block.GetPointData().AddArray(array)
+    of = vtk.vtkGradientFilter()
+    of.SetInputData(block)
+    of.SetInputScalars(vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS, "v")
+    of.SetResultArrayName("g")
+    of.Update()
+    return vtk_to_numpy(of.GetOutput().GetPointData().GetArray("g"))
+
+
+def derived(block, velocity, pressure):
+    g = gradient(block, velocity).reshape(-1, 3, 3)
+    vorticity = np.stack([g[:, 2, 1] - g[:, 1, 2], g[:, 0, 2] - g[:, 2, 0], g[:, 1, 0] - g[:, 0, 1]], -1)
+    return {
+        "q_criterion": -0.5 * np.einsum("nij,nji->n", g, g),
+        "vorticity_magnitude": np.linalg.norm(vorticity, axis=-1),
+        "pressure_gradient_magnitude": np.linalg.norm(gradient(block, pressure), axis=-1),
+    }
+
+
+def wake(program, folder):
+    stem = folder / "wake"
+    subprocess.run([program, "generate", "wake", "--size", "96x64x48", "-o", stem], check=True,
+                   stdout=subprocess.DEVNULL)
+    with open(stem.with_suffix(".xyz"), "rb") as file:
+        raw = file.read()
+    dims = np.frombuffer(raw, "<i4", 3)
+    points = np.frombuffer(raw, "<f4", 3 * int(np.prod(dims)), 12).reshape(3, -1).T
+    values = np.frombuffer(stem.with_suffix(".fun").read_bytes(), "<f4", int(np.prod(dims)), 16)
+    return structured(dims, points), {"f": values.astype(float)}
+
+
+def structured(dims, points):
+    grid = vtk.vtkStructuredGrid()
+    grid.SetDimensions(*(int(n) for n in dims))
+    at = vtk.vtkPoints()
+    at.SetData(numpy_to_vtk(np.ascontiguousarray(points, dtype=float), deep=True))
+    grid.SetPoints(at)
+    return grid
+
+
+def clean(block, scalars):
+    """A grid of the same nodes that has these scalars alone."""
+    grid = structured(block.GetDimensions(), vtk_to_numpy(block.GetPoints().GetData()))
+    for name, values in scalars.items():
+        array = numpy_to_vtk(np.nan_to_num(values).astype(np.float32), deep=True)
+        array.SetName(name)
+        grid.GetPointData().AddArray(array)
+    return grid
+
+
+def contour(grid, name, value):
+    of = vtk.vtkContourFilter()
+    of.SetInputData(grid)
+    of.SetInputArrayToProcess(0, 0, 0, vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS, name)
+    of.SetValue(0, value)
+    of.ComputeNormalsOff()
+    begin = time.process_time()
+    of.Update()
+    return of.GetOutput(), time.process_time() - begin
+
+
+def samples(surface, rng):
+    """Points of a surface, evenly by area, and the normals there."""
+    triangles = vtk.vtkTriangleFilter()
+    triangles.SetInputData(surface)
+    triangles.PassVertsOff()
+    triangles.PassLinesOff()
+    triangles.Update()
+    surface = triangles.GetOutput()
+    at = vtk_to_numpy(surface.GetPoints().GetData()).astype(float)
+    cells = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    a, b, c = at[cells[:, 0]], at[cells[:, 1]], at[cells[:, 2]]
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=-1)
+    chosen = rng.choice(len(cells), SAMPLES, p=area / area.sum())
+    u, v = rng.random(SAMPLES), rng.random(SAMPLES)
+    flip = u + v > 1
+    u[flip], v[flip] = 1 - u[flip], 1 - v[flip]
+    points = a[chosen] + u[:, None] * (b - a)[chosen] + v[:, None] * (c - a)[chosen]
+    return points, normal[chosen] / area[chosen][:, None], area.sum() / 2
+
+
+def cell_lengths(grid, points, normals):
+    """Of the grid's cells at points, along the normals; not a number outside."""
+    locator = vtk.vtkStaticCellLocator()
+    locator.SetDataSet(grid)
+    locator.BuildLocator()
+    dims = np.array(grid.GetDimensions())
+    nodes = vtk_to_numpy(grid.GetPoints().GetData()).astype(float).reshape(*dims[::-1], 3)
+    lengths = np.full(len(points), np.nan)
+    size = dims - 1
+    for n, point in enumerate(points):
+        cell = locator.FindCell(point)
+        if cell < 0:
+            continue
+        i, j, k = cell % size[0], cell // size[0] % size[1], cell // (size[0] * size[1])
+        corners = nodes[k:k + 2, j:j + 2, i:i + 2]
+        edges = [np.mean(corners.take(1, axis) - corners.take(0, axis), (0, 1)) for axis in range(3)]
+        lengths[n] = sum(abs(np.dot(edge, normals[n])) for edge in edges)
+    return lengths
+
+
+def distances(points, surface):
+    locator = vtk.vtkStaticCellLocator()
+    locator.SetDataSet(surface)
+    locator.BuildLocator()
+    near, cell, sub, d2 = [0.0] * 3, vtk.reference(0), vtk.reference(0), vtk.reference(0.0)
+    out = np.empty(len(points))
+    for n, point in enumerate(points):
+        locator.FindClosestPoint(point, near, cell, sub, d2)
+        out[n] = d2.get() ** 0.5
+    return out
+
+
+def within(grid, of, to, rng):
+    """The share of a surface within half a cell of the other, and the distance of 99 % in cells."""
+    points, normals, _ = samples(of, rng)
+    lengths = cell_lengths(grid, points, normals)
+    known = lengths > 0
+    parts = distances(points, to)[known] / lengths[known]
+    return np.mean(parts <= 0.5), np.quantile(parts, 0.99)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--curvisplat", default=ROOT / "build/release/tools/curvisplat")
+    parser.add_argument("--grids", type=pathlib.Path, default=ROOT.parent / "shared/data")
+    parser.add_argument("--only")
+    parser.add_argument("--voxels", default="256")
+    arguments = parser.parse_args()
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    grids = {
+        "fin": lambda: plot3d(arguments.grids / "bluntfin/bluntfinxyz.bin", arguments.grids / "bluntfin/bluntfinq.bin"),
+        "wing": lambda: cgns(arguments.grids / "delta_wing/delta_vertex.cgns"),
+        "combustor": lambda: plot3d(arguments.grids / "combustor/combxyz.bin", arguments.grids / "combustor/combq.bin"),
+        "wake": lambda: wake(arguments.curvisplat, arguments.folder),
+    }
+    print(f"{'grid':<10}{'scalar':<28}{'value':>10}{'VTK near ours':>15}{'ours near VTK':>15}{'99 % cells':>16}"
+          f"{'triangles':>18}{'VTK s':>8}{'ours s':>8}")
+    for name, read in grids.items():
+        if arguments.only and arguments.only != name:
+            continue
+        if name != "wake" and not arguments.grids.is_dir():
+            print(f"{name}: left out: {arguments.grids} is missing", file=sys.stderr)
+            continue
+        result = read()
+        grid = clean(result[0], result[1] if len(result) == 2 else derived(*result))
+        scalars = [grid.GetPointData().GetArrayName(n) for n in range(grid.GetPointData().GetNumberOfArrays())]
+        file, cache = arguments.folder / f"{name}.vts", arguments.folder / f"{name}.splats"
+        writer = vtk.vtkXMLStructuredGridWriter()
+        writer.SetFileName(str(file))
+        writer.SetInputData(grid)
+        writer.Write()
+        subprocess.run([arguments.curvisplat, "convert", file, "-o", cache, "--overwrite", "--scalar", ",".join(scalars)],
+                       check=True, stdout=subprocess.DEVNULL)
+        for scalar in scalars:
+            values = vtk_to_numpy(grid.GetPointData().GetArray(scalar))
+            for percent in (60, 80, 95):
+                compare(arguments, grid, cache, name, scalar, float(np.percentile(values, percent)))
+
+
+def compare(arguments, grid, cache, name, scalar, value):
+    mesh = arguments.folder / "iso.vtp"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    result = subprocess.run([arguments.curvisplat, "export", cache, "--scalar", scalar, f"--iso={value:.9g}", "-o", mesh,
+                             "--voxels", arguments.voxels], capture_output=True, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    theirs, seconds = contour(grid, scalar, value)
+    head = f"{name:<10}{scalar:<28}{value:>10.4g}"
+    if result.returncode != 0:
+        print(head, result.stderr.strip(), flush=True)
+        return
+    reader = vtk.vtkXMLPolyDataReader()
+    reader.SetFileName(str(mesh))
+    reader.Update()
+    ours = reader.GetOutput()
+    rng = np.random.default_rng(1)
+    there, their_cells = within(grid, theirs, ours, rng)
+    back, our_cells = within(grid, ours, theirs, rng)
+    print(f"{head}{100 * there:>13.2f} %{100 * back:>13.2f} %{their_cells:>8.2f}{our_cells:>8.2f}"
+          f"{theirs.GetNumberOfPolys():>9}{ours.GetNumberOfPolys():>9}{seconds:>8.2f}"
+          f"{after.ru_utime - before.ru_utime:>8.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
