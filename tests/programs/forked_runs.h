@@ -29,6 +29,22 @@ struct RunRequest {
 };
 inline constexpr size_t kDescriptors = 4;
 
+/// A request as one message, with space for its descriptors. The request has to outlive it.
+struct RunMessage {
+  explicit RunMessage(RunRequest& request) : part{&request, sizeof request} {
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+  }
+  RunMessage(const RunMessage&) = delete;
+  RunMessage& operator=(const RunMessage&) = delete;
+
+  iovec part;
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(kDescriptors * sizeof(int))> control{};
+  msghdr message{};
+};
+
 /// An address without a file, which is gone with its last socket.
 struct SocketAddress {
   explicit SocketAddress(const std::string& name) {

@@ -3,7 +3,6 @@
 // becomes the program itself.
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -78,19 +77,13 @@ bool send(int socket, int argc, char** argv, char** environment) {
   for (int n = 0; n < static_cast<int>(request.limits.size()); ++n)
     getrlimit(static_cast<__rlimit_resource>(n), &request.limits[static_cast<size_t>(n)]);
   const std::array<int, kDescriptors> descriptors{0, 1, 2, open(".", O_PATH | O_DIRECTORY | O_CLOEXEC)};
-  iovec part{&request, sizeof request};
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof descriptors)> control{};
-  msghdr message{};
-  message.msg_iov = &part;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  cmsghdr* const header = CMSG_FIRSTHDR(&message);
+  RunMessage sent_with(request);
+  cmsghdr* const header = CMSG_FIRSTHDR(&sent_with.message);
   header->cmsg_level = SOL_SOCKET;
   header->cmsg_type = SCM_RIGHTS;
   header->cmsg_len = CMSG_LEN(sizeof descriptors);
   std::memcpy(CMSG_DATA(header), descriptors.data(), sizeof descriptors);
-  if (sendmsg(socket, &message, MSG_NOSIGNAL) != sizeof request) return false;
+  if (sendmsg(socket, &sent_with.message, MSG_NOSIGNAL) != sizeof request) return false;
   for (size_t sent = 0; sent < text.size();) {
     const ssize_t got = ::send(socket, text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
     if (got <= 0) return false;

@@ -41,15 +41,9 @@ bool readAll(int socket, void* to, size_t bytes) {
 
 bool receive(int socket, RunRequest& request, std::array<int, kDescriptors>& descriptors,
              std::vector<char>& text) {
-  iovec part{&request, sizeof request};
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof descriptors)> control{};
-  msghdr message{};
-  message.msg_iov = &part;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  if (recvmsg(socket, &message, MSG_CMSG_CLOEXEC | MSG_WAITALL) != sizeof request) return false;
-  const cmsghdr* const header = CMSG_FIRSTHDR(&message);
+  RunMessage received(request);
+  if (recvmsg(socket, &received.message, MSG_CMSG_CLOEXEC | MSG_WAITALL) != sizeof request) return false;
+  const cmsghdr* const header = CMSG_FIRSTHDR(&received.message);
   if (!header || header->cmsg_len != CMSG_LEN(sizeof descriptors)) return false;
   std::memcpy(descriptors.data(), CMSG_DATA(header), sizeof descriptors);
   text.resize(request.bytes);
