@@ -34,16 +34,18 @@ class GlBackend final : public PaintingBackend {
  private:
   void makePainter(const GlContext& context, Way way) {
     name_ = context.name();
-    if (way == Way::kTilesOrQuads) try {
+    std::string why_quads;
+    if (way == Way::kTilesOrQuads) {
+      try {
         painter_ = std::make_unique<GlTilePainter>(context, capacity_);
         tiles_ = true;
         name_ += ", compute shaders";
         return;
       } catch (const Error& error) {
-        name_ += fmt::format(", quads ({})", error.what());
+        why_quads = fmt::format(" ({})", error.what());
       }
-    else
-      name_ += ", quads";
+    }
+    name_ += ", quads" + why_quads;
     painter_ = std::make_unique<GlPainter>(context);
   }
 
