@@ -29,7 +29,7 @@ std::optional<std::array<double, 4>> weightsInTetrahedron(const Tetrahedron& cor
   return weights;
 }
 
-/// By the places of a cell's corners at those of a hexahedron, bits along the axes.
+/// Each corner of a hexahedron, numbered by its bits along the axes, is this corner of the cell.
 constexpr std::array<size_t, 8> kOfHexahedron{0, 1, 3, 2, 4, 5, 7, 6}, kOfWedge{0, 1, 2, 2, 3, 4, 5, 5},
     kOfPyramid{0, 1, 3, 2, 4, 4, 4, 4};
 

@@ -41,7 +41,7 @@ class NodesOfBox {
     }
   }
 
-  /// In the cells around a sample, the nearest first.
+  /// Looks for the point in the cells around a sample, the nearest first.
   std::optional<SourceValues> at(const glm::dvec3& point, const std::array<uint64_t, 3>& sample) const {
     std::optional<SourceValues> found;
     for (uint64_t away = 0; !found && away <= kAround; ++away) {

@@ -35,15 +35,15 @@ struct ValueRange {
   double lower, upper;
 };
 
-/// Of each point the values of the cell that has it, of the first of its samples whose surroundings have one; nullopt if no cell
-/// has. `scalars`: indices into the description. Reads boxes around the samples alone. Throws Error as reading does.
+/// Returns for each point the values of the cell that has it: the first that is found around the samples in `near`, in their order;
+/// nullopt if there is none. `scalars`: indices into the description. Reads boxes around the samples alone. Throws Error as reading does.
 std::vector<std::optional<SourceValues>> probeGrid(const GridSource& source,
                                                    std::span<const uint32_t> scalars,
                                                    std::span<const ValueRange> ranges,
                                                    std::span<const glm::dvec3> points,
                                                    std::span<const std::vector<NearSample>> near);
 
-/// The same of a mesh. Reads all points and cells, and keeps the points: 24 bytes each, and 4 for each scalar.
+/// Does the same for a mesh. It reads all points and cells, and keeps the points: 24 bytes each, and 4 for each scalar.
 std::vector<std::optional<SourceValues>> probeMesh(const MeshSource& source,
                                                    std::span<const uint32_t> scalars,
                                                    std::span<const ValueRange> ranges,

@@ -30,7 +30,7 @@ struct IsoCells {
       quads;  // numbers of cells, of this tile or the one before it on either axis
 };
 
-/// Of all points: pixels and planes.
+/// The points at which the field is sampled: `size` pixels, and planes of depth, `spacing` apart.
 struct IsoLattice {
   std::array<uint32_t, 3> size{};
   double spacing = 1;

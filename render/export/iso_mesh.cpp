@@ -184,7 +184,7 @@ class IsoMesher {
   }
   double spacing() const { return lattice_.lattice.spacing; }
 
-  /// As many tiles at a time as their splats fit into half of the memory.
+  /// Goes through the tiles, as many at a time as have splats that fit into half of the memory.
   void run() {
     const size_t tiles = TileSet::tilesOf(lattice_.view.size);
     progress_.begin("isosurface", tiles, "tiles");
@@ -258,7 +258,7 @@ class IsoMesher {
     return true;
   }
 
-  /// Of the splats of a tile, those thinner than half a voxel. One in several tiles counts in each.
+  /// Counts a tile's splats, and those that are thinner than half a voxel. A splat in several tiles counts in each.
   void countThin(std::span<const IsoSplats::Placed> splats) {
     splats_ += splats.size();
     thin_ += static_cast<uint64_t>(

@@ -61,7 +61,7 @@ void GlFunctions::check(std::string_view doing) const {
 
 namespace {
 
-/// Of what a driver says, which may be pages.
+/// The first line of what a driver says, which may be pages.
 template <typename GetLog>
 std::string firstLine(const GetLog& get_log, GLuint name) {
   std::string said(4096, '\0');

@@ -175,7 +175,7 @@ void GlTilePainter::drawOnly(const TileSet& tiles) {
 void GlTilePainter::draw(std::span<const ScreenSplat> splats) {
   State& state = *state_;
   while (!splats.empty()) {
-    // As many new ones as wait: what waits is looked at each time.
+    // A batch has at least as many new splats as waiting ones, since each batch looks at all that wait.
     const size_t most = std::max(state.capacity.splats, state.waiting);
     const size_t fresh = state.batch.size() - kMaxRecords - state.waiting;
     const size_t some = std::min(splats.size(), most - std::min(fresh, most));

@@ -27,7 +27,7 @@ struct SplatShaderKind {
 /// each order tile, and where they have one in all.
 inline constexpr int kSmallTile = kOrderSide, kLargeTile = 16;
 
-/// Of a quad a splat; OpenGL 3.3.
+/// The two shaders that draw a splat as a quad; OpenGL 3.3.
 std::string splatVertexShader();
 std::string splatFragmentShader(SplatShaderKind kind);
 /// Paints the pixels of tiles by their lists, front to back (gl_tile_painter.h); OpenGL 4.3.

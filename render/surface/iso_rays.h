@@ -65,7 +65,7 @@ class IsoRays {
   /// For one thread; `settings` as the splats'.
   explicit IsoRays(const IsoSplats::Settings& settings);
 
-  /// Makes room for packets that at most so many splats touch, by their pixels.
+  /// Reserves memory for packets of rays that meet at most `splats` splats.
   void makeRoom(size_t splats);
   /// Traces the rays through `splats`, in the order of IsoSplats::inTile(); those that touch none of the rays do no harm.
   /// Overwrites hits() of the packet's rays, from the nearest on.
