@@ -35,6 +35,13 @@ FLAGS = ["-Wthread-safety", "-Werror", "-Wno-unknown-warning-option", "-Wno-bitw
 AT_A_TIME = 16
 
 
+def sources_of(file):
+    """What a file of the build compiles: itself, or those that it includes (tools/cmake/unity.cmake)."""
+    if file.parent.name != "Unity":
+        return [file]
+    return [pathlib.Path(source) for source in re.findall(r'#include "(.*)"', file.read_text(encoding="utf-8"))]
+
+
 def commands(named):
     """(file, its compiler's arguments) of each source of ours, or of those named, which a build must have."""
     path = BUILD / "compile_commands.json"
@@ -42,9 +49,9 @@ def commands(named):
         sys.exit("check_clang: build/release is not configured; run tools/build.sh first")
     ours = {}
     for entry in json.loads(path.read_text()):
-        file = pathlib.Path(entry["file"])
-        if not file.is_relative_to(ROOT / "build") and (not named or file in named):
-            ours[file] = shlex.split(entry["command"])
+        for file in sources_of(pathlib.Path(entry["file"])):
+            if not file.is_relative_to(ROOT / "build") and (not named or file in named):
+                ours[file] = shlex.split(entry["command"])
     missing = named - ours.keys()
     if missing:
         sys.exit(f"check_clang: {min(missing)}: no target compiles this file; name a .cpp file of the build")
@@ -81,6 +88,8 @@ class Group:
         for argument in rest:
             if argument == "-isystem":
                 argument += next(rest)
+            if argument == "-Wno-shadow" and not self.are_tests:
+                continue  # of builds of sources that are compiled together
             if argument.startswith(("-D", "-I", "-isystem", "-std", "-W")) and argument not in (*self.flags, "-Winvalid-pch"):
                 self.flags.append(argument)
 

@@ -17,7 +17,7 @@ exec pkg-config "$@"
 END
 chmod +x "$folder/pkg-config"
 without=(-DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON -DPKG_CONFIG_EXECUTABLE="$folder/pkg-config")
-quickly=(-DCURVISPLAT_PRECOMPILE=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O0)
+quickly=(-DCURVISPLAT_PRECOMPILE=OFF -DCURVISPLAT_UNITY=OFF -DCMAKE_CXX_FLAGS_RELEASE=-O0)
 
 quietly cmake --preset headless -S "$root" -B "$folder/build" "${without[@]}" "${quickly[@]}"
 tools=tools/CMakeFiles/curvisplat.dir

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Tests tools/cmake/unity_groups.py: which names a source declares, and which sources it puts together."""
 import pathlib
+import re
 import sys
 import unittest
 
@@ -72,6 +73,12 @@ class UnityGroups(unittest.TestCase):
                 numbers = unity_groups.groups(texts, 10)
                 self.assertNotEqual(numbers[texts.index(includes)], numbers[1])
         self.assertEqual(unity_groups.groups(["int a() {", "struct Brick {", "int b() {"], 10), [0, 0, 0])
+
+    def test_a_source_with_a_constant_of_a_name_that_an_included_header_has_is_apart(self):
+        self.assertEqual(unity_groups.types("inline constexpr float kMost = 0x1p30f;\ninline constexpr Size kSize{3, 4};\n"), {"kMost", "kSize"})
+        includes = '#include "stream/codec/brick_codec.h"\n'
+        name = next(name for name in sorted(unity_groups.included(includes)) if re.match("k[A-Z]", name))
+        self.assertEqual(unity_groups.groups([includes, f"constexpr int {name} = 1;"], 10), [0, 1])
 
     def test_names_of_an_included_header_of_tests(self):
         self.assertIn("twoBlocks", unity_groups.included(HEADER))

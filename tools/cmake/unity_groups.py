@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Which sources can be compiled together, as one that includes them (tools/check_clang.py).
+"""Which sources can be compiled together, as one that includes them (tools/cmake/unity.cmake, tools/check_clang.py).
 
     unity_groups.py SIZE FILE ...    prints the number of each file's group, one a line
 
 A group has at most SIZE files. None of them declares a name for itself that another one declares, too, or that a header declares
-which another one includes (a type; in headers of the tests any name): a static function, or one in a namespace without name, say.
+which another one includes (a type or constant; in headers of the tests any name): a static function, or one in a namespace without name, say.
 What is declared is read from the layout: our formatter puts declarations of a namespace at the beginning of a line, and nothing
 else."""
 import functools
@@ -16,6 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 TYPE = re.compile(r"(?:struct|class|union|enum(?: class)?) (\w+)\b(?!::)")
 OTHER = re.compile(r"(?:struct|class|union) \w+;|using (?!\w+ =)|INSTANTIATE_\w+\($|(?:inline )?namespace|template|#include|extern")
+CONSTANT = re.compile(r"inline constexpr [^({=]*?(\w+)(?: =|\{)")
 ALIAS = re.compile(r"(?:using(?= \w+ =)|#define) (\w+)")
 TEST = re.compile(r"\w*TEST\w*\((\w+), (\w+)[,)]")
 FUNCTION = re.compile(r"[^(=]*?(?<![:~\w])(\w+)\(")
@@ -40,8 +41,9 @@ def names(text):
 
 
 def types(text):
-    """The types that a header declares in its namespaces."""
-    return {match[1] for line in text.splitlines() if not OTHER.match(line) and (match := TYPE.match(line))}
+    """The types and constants that a header declares in its namespaces."""
+    return {match[1] for line in text.splitlines()
+            if (match := CONSTANT.match(line) or (not OTHER.match(line) and TYPE.match(line)))}
 
 
 @functools.lru_cache(maxsize=None)
