@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Measures what building and testing cost, in processor seconds (user and system).
 
-    bench/build_times.py build [--target curvisplat] [--define CURVISPLAT_PRECOMPILE=OFF]    a build from nothing
+    bench/build_times.py build [--target curvisplat] [--define CURVISPLAT_UNITY=OFF]    a build from nothing
     bench/build_times.py headers [--top 30]      each header parsed alone, and the sources that include it
     bench/build_times.py tests [CTEST OPTIONS]   the built test suite
 
-`build` configures and builds in a temporary folder, and prints the sum, the rooms and the slowest sources. `headers` and `tests`
-use build/release, which tools/build.sh makes. The machine should be idle otherwise: other work slows the processor down.
+`build` configures and builds in a temporary folder, and prints the sum, the rooms and the slowest of what was compiled: several
+sources at once, unless CURVISPLAT_UNITY is off. `headers` and `tests` use build/release, which tools/build.sh makes. The machine
+should be idle otherwise: other work slows the processor down.
 """
 import argparse
 import collections
@@ -61,7 +62,7 @@ def build(options):
         log = f"{folder}/log"
         launcher = f"{sys.executable};{__file__};--launch;{log}"
         run(["cmake", "--preset", "release", "-B", folder, f"-DCMAKE_CXX_COMPILER_LAUNCHER={launcher}",
-             "-DCURVISPLAT_PRECOMPILE=ON", *(f"-D{define}" for define in options.define)],
+             "-DCURVISPLAT_PRECOMPILE=ON", "-DCURVISPLAT_UNITY=ON", *(f"-D{define}" for define in options.define)],
             cwd=ROOT, stdout=subprocess.DEVNULL)
         before = processor_seconds()
         run(["cmake", "--build", folder, "--parallel", str(options.jobs), "--target", *options.target],
@@ -72,9 +73,9 @@ def build(options):
             seconds, output = line.split("\t")
             rooms[room_of(output)] += float(seconds)
             sources.append((float(seconds), output))
-    print(f"{total:.0f} s of processor time, {len(sources)} sources, {sum(s for s, _ in sources):.0f} s of them compiling")
+    print(f"{total:.0f} s of processor time, {len(sources)} compiled, {sum(s for s, _ in sources):.0f} s of them compiling")
     print_table([(seconds, room) for room, seconds in rooms.items()], "By room", options.top)
-    print_table(sources, "By source", options.top)
+    print_table(sources, "By what was compiled", options.top)
 
 
 def flags_of_a_source():
