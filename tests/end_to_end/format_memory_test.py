@@ -35,7 +35,7 @@ class FormatMemory(StructuredFormats):
     """2,174,400 nodes; 2,079,360 in six tiles."""
 
     SHAPE, SMALL = (120, 120, 151), (60, 90, 101)
-    USUAL = ("test_plot3d", "test_tiles", "test_several_blocks", "test_xdmf")  # LongRows has the others, with fewer nodes
+    USUAL = ("test_plot3d", "test_tiles")  # LongRows has the others, with fewer nodes
     ALL_STORAGES = IS_WHOLE  # else the first of each format
 
     @classmethod
