@@ -36,6 +36,8 @@ std::string joined(const std::vector<std::string>& names) {
 void checkNames(const std::vector<std::string>& names, const CacheReader& cache) {
   std::vector<std::string> present;
   for (const VariableInfo& variable : cache.manifest().variables) present.push_back(variable.name);
+  for (const OwnBlanks& set : cache.seriesManifest().own_blanks)
+    present.insert(present.end(), set.variables.begin(), set.variables.end());
   for (const std::string& name : names)
     if (std::find(present.begin(), present.end(), name) != present.end())
       throw UsageError("{}: already has a scalar '{}'; it has {}", cache.path().string(), name,

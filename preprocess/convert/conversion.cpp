@@ -44,12 +44,8 @@ Unfinished unfinishedOf(const ConvertOptions& options) {
 class Conversion {
  public:
   Conversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
-             std::vector<ConversionFact> facts, EstimateNeeds estimate, Progress& progress)
-      : estimate_(std::move(estimate)),
-        options_(options),
-        plan_(plan),
-        progress_(progress),
-        ranks_(options.ranks) {
+             std::vector<ConversionFact> facts, FurtherParts parts, Progress& progress)
+      : parts_(std::move(parts)), options_(options), plan_(plan), progress_(progress), ranks_(options.ranks) {
     if (isFirst())
       workspace_.emplace(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
                          std::move(facts));
@@ -71,7 +67,8 @@ class Conversion {
     const Pass build_cache[] = {
         {"build", "nodes", nodes_, &Conversion::build},
     };
-    if (isFirst()) checkDiskOf({options_, *origin_, nodes_, *workspace_, estimate_}, progress_);
+    if (parts_.own_blanks) own_blanks_ = parts_.own_blanks(partial_);
+    if (isFirst()) checkDiskOf({options_, *origin_, nodes_, *workspace_, parts_.estimate}, progress_);
     if (hasSplats()) {
       try {
         runPasses(take_up_splats);
@@ -159,7 +156,7 @@ class Conversion {
     if (makesSplats()) splats_.survey = origin_->survey(progress_);
     if (ranks_ && !shares_splats_) splats_.survey = broadcastSurvey(splats_.survey, *ranks_);
     const auto& lost = splats_.survey.blanked.lost;
-    if (options_.may_leave_out_scalars && !lost.empty()) throw DifferingBlanks(lost);
+    if (options_.differing != DifferingScalars::kBlankAll && !lost.empty()) throw DifferingBlanks(lost, true);
     checkRanges(splats_.survey, origin_->description(), options_.scalars);
     openWriter();
     if (!isFirst()) return;
@@ -354,6 +351,8 @@ class Conversion {
     if (splats_removed_.valid()) splats_removed_.get();
     Manifest manifest = manifestOf(*origin_, options_, splats_);
     if (faces_file_) manifest.files.push_back(*faces_file_);
+    manifest.own_blanks = own_blanks_;
+    if (!own_blanks_.empty()) manifest.requirements.push_back(kOwnBlanks);
     reportCache(writer_->finish(manifest), report_);
     writer_.reset();
     file_.reset();  // of ranks, which all read it
@@ -388,7 +387,7 @@ class Conversion {
     return variablesOf(origin_->description(), options_.scalars, splats_.survey);
   }
 
-  const EstimateNeeds estimate_;
+  const FurtherParts parts_;
   const ConvertOptions& options_;
   const MemoryPlan plan_;
   Progress& progress_;
@@ -408,6 +407,7 @@ class Conversion {
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<CacheWriter> writer_;
   std::optional<FileInfo> faces_file_;
+  std::vector<OwnBlanks> own_blanks_;
   ConvertReport report_;
   std::future<void> splats_removed_;  // last: waits for the end of its thread
 };
@@ -417,11 +417,11 @@ constexpr const char* kKept = "; finished work is kept: continue with --resume";
 }  // namespace
 
 ConvertReport runConversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
-                            std::vector<ConversionFact> facts, const EstimateNeeds& estimate,
+                            std::vector<ConversionFact> facts, const FurtherParts& parts,
                             Progress& progress) {
   const RoomNeeded room = roomNeeded(options);
   std::optional<Conversion> conversion;
-  room.during([&] { conversion.emplace(source, options, plan, std::move(facts), estimate, progress); });
+  room.during([&] { conversion.emplace(source, options, plan, std::move(facts), parts, progress); });
   try {
     return conversion->run();
   } catch (const Interrupted& interrupted) {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -24,12 +25,18 @@ namespace curvisplat {
 /// Copies what the manifest of a cache says into the report.
 void reportCache(const Manifest& written, ConvertReport& report);
 
-/// Runs all passes that are not done yet. Where the disk may be too small, `estimate` is called first,
-/// unless it is empty. What is to be resumed stays when it is stopped, and on an Error if options.resume is
+/// What a conversion asks for beside its passes; both may be empty.
+struct FurtherParts {
+  EstimateNeeds estimate;  // where the disk may be too small
+  /// Makes the caches of scalars with blanks of their own, in the folder of the unfinished cache. Before the passes, which
+  /// then have the memory for themselves.
+  std::function<std::vector<OwnBlanks>(const std::filesystem::path& folder)> own_blanks;
+};
+
+/// Runs all passes that are not done yet. What is to be resumed stays when it is stopped, and on an Error if options.resume is
 /// set. Throws Error and Interrupted.
 ConvertReport runConversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
-                            std::vector<ConversionFact> facts, const EstimateNeeds& estimate,
-                            Progress& progress);
+                            std::vector<ConversionFact> facts, const FurtherParts& parts, Progress& progress);
 
 /// The scalars with these numbers in the description, as the cache has them.
 std::vector<VariableInfo> variablesOf(const GridDescription& description, std::span<const uint32_t> scalars,

@@ -20,19 +20,26 @@
 
 namespace curvisplat {
 
+/// What becomes of scalars that have values at different samples.
+enum class DifferingScalars {
+  kBlankAll,  // a sample is blanked where any of them has no value
+  kLeaveOut,  // the largest set of scalars that agree is kept, and the others are left out
+  kKeepApart  // as kLeaveOut, and each other set becomes a cache in the folder of the cache (Manifest::own_blanks)
+};
+
 struct ConvertOptions {
-  std::filesystem::path output;            // NAME.splats, without a trailing slash
-  bool check_disk_space = true;            // before the work
-  bool overwrite = false;                  // an existing cache is replaced once the new one is complete
-  bool resume = false;                     // continue an interrupted conversion, if there is one
-  bool keep_interrupted = true;            // leave finished work to be resumed; otherwise nothing
-  std::vector<uint32_t> scalars;           // positions in the source's description; the cache's variables
-  bool may_leave_out_scalars = false;      // those that have no value where others have one
-  std::optional<double> blank_value;       // samples with this value of any scalar are blanked
-  uint64_t memory_bytes = 0;               // 0: defaultMemory()
-  unsigned threads = 0;                    // 0: as many as the machine has
-  std::filesystem::path temporary_folder;  // empty: the folder of the output
-  std::string full_disk_hint;              // what to do about it; empty: as for `convert`
+  std::filesystem::path output;   // NAME.splats, without a trailing slash
+  bool check_disk_space = true;   // before the work
+  bool overwrite = false;         // an existing cache is replaced once the new one is complete
+  bool resume = false;            // continue an interrupted conversion, if there is one
+  bool keep_interrupted = true;   // leave finished work to be resumed; otherwise nothing
+  std::vector<uint32_t> scalars;  // positions in the source's description; the cache's variables
+  DifferingScalars differing = DifferingScalars::kBlankAll;
+  std::optional<double> blank_value;                 // samples with this value of any scalar are blanked
+  uint64_t memory_bytes = 0;                         // 0: defaultMemory()
+  unsigned threads = 0;                              // 0: as many as the machine has
+  std::filesystem::path temporary_folder;            // empty: the folder of the output
+  std::string full_disk_hint;                        // what to do about it; empty: as for `convert`
   std::vector<std::filesystem::path> given_folders;  // that the user gave, where these two are temporary
   std::string title;                                 // empty: the output's name
   std::optional<double> time;                        // of the step; otherwise the source's, or 0
@@ -57,17 +64,23 @@ struct ConvertOptions {
   std::chrono::milliseconds note_interval{10'000};
 };
 
-/// Thrown once the grid has been read where scalars may be left out: a cache has the same samples for all of its scalars, so
-/// that each of them would lose values where another has none.
+/// Thrown once the grid has been read, unless all scalars are blanked alike: a cache has the same samples for all of its own
+/// scalars, so that each of them would lose values where another has none.
 class DifferingBlanks final : public Error {
  public:
-  /// `lost`: BlankCounts'.
-  explicit DifferingBlanks(std::vector<BlankCounts::Lost> lost)
-      : Error("scalars have no values at different samples"), lost_(std::move(lost)) {}
+  /// `lost`: BlankCounts'. `is_any_drawn`: whether all scalars have values at some sample.
+  DifferingBlanks(std::vector<BlankCounts::Lost> lost, bool is_any_drawn)
+      : Error(
+            "at no sample do all scalars have a value; convert each to a cache of its own, with --scalar "
+            "NAME"),
+        lost_(std::move(lost)),
+        is_any_drawn_(is_any_drawn) {}
   const std::vector<BlankCounts::Lost>& lost() const { return lost_; }
+  bool isAnyDrawn() const { return is_any_drawn_; }
 
  private:
   std::vector<BlankCounts::Lost> lost_;
+  bool is_any_drawn_;
 };
 
 /// Where temporary files go.

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <optional>
 
+#include "preprocess/convert/convert_options.h"
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
@@ -87,7 +88,9 @@ class PartCounter {
 
 void checkExtent(const GridSurvey& survey, const GridDescription& description) {
   const std::string file = description.files.empty() ? description.format : description.files.front();
-  if (survey.nodes == survey.blanked.total())
+  const bool all_blanked = survey.nodes == survey.blanked.total();
+  if (all_blanked && !survey.blanked.lost.empty()) throw DifferingBlanks(survey.blanked.lost, false);
+  if (all_blanked)
     throw Error(
         "{}: all {} samples are blanked ({} by the grid, {} by value, {} not finite in single "
         "precision): there is nothing to draw{}",

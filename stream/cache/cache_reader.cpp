@@ -284,6 +284,26 @@ void CacheReader::State::readValues(const BrickOfVariable& of, SplatVariable& ou
 
 CacheReader::CacheReader(const fs::path& cache, uint64_t step)
     : state_(std::make_unique<State>(cache, step)) {}
+CacheReader CacheReader::ofScalar(const fs::path& cache, std::string_view name) {
+  CacheReader reader(cache);
+  const std::optional<size_t> set = reader.ownBlanksOf(name);
+  return set ? reader.ownBlanks(*set) : std::move(reader);
+}
+
+std::optional<size_t> CacheReader::ownBlanksOf(std::string_view name) const {
+  const auto is_named = [name](const std::string& variable) {
+    return name == variable || name.starts_with(variable + " [");  // as `info` prints it
+  };
+  const std::vector<OwnBlanks>& sets = seriesManifest().own_blanks;
+  for (size_t n = 0; n < sets.size(); ++n)
+    if (std::ranges::any_of(sets[n].variables, is_named)) return n;
+  return std::nullopt;
+}
+
+CacheReader CacheReader::ownBlanks(size_t set) const {
+  return CacheReader(ownBlanksFolder(cachePath(), seriesManifest(), set));
+}
+
 CacheReader::CacheReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
 CacheReader::~CacheReader() = default;
 CacheReader::CacheReader(CacheReader&&) noexcept = default;
@@ -342,6 +362,13 @@ size_t CacheReader::variableNamed(std::string_view name) const {
   for (size_t n = 0; n < variables.size(); ++n)  // as `info` prints it
     if (!variables[n].unit.empty() && name == fmt::format("{} [{}]", variables[n].name, variables[n].unit))
       return n;
+  for (const OwnBlanks& set : state_->of_series->own_blanks) {
+    if (std::ranges::find(set.variables, name) != set.variables.end())
+      throw UsageError("{}: {} has values at other samples than {}; it is drawn without them, by --scalar",
+                       path().string(), name, listed);
+    names.insert(names.end(), set.variables.begin(), set.variables.end());
+    for (const std::string& other : set.variables) listed += ", " + other;
+  }
   if (variables.empty()) throw UsageError("{}: the cache has no scalars", path().string());
   throw UsageError("{}: the cache has no scalar '{}'{}; it has {}", path().string(), name,
                    didYouMean(name, names), listed);

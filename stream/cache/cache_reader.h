@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,14 @@ class CacheReader {
   /// Opens the cache at a step, the first unless told otherwise. Throws an Error that names the file, what
   /// was found and what was expected.
   explicit CacheReader(const std::filesystem::path& cache, uint64_t step = 0);
+  /// Opens the cache with the scalar `name`, at the first step: the one in the folder `cache`, unless the scalar has values at
+  /// samples of its own (Manifest::own_blanks). A name that neither has, or none, opens the former. Throws Error as the
+  /// constructor.
+  static CacheReader ofScalar(const std::filesystem::path& cache, std::string_view name);
+  /// The set of seriesManifest().own_blanks that has the scalar `name`, which its unit may follow.
+  std::optional<size_t> ownBlanksOf(std::string_view name) const;
+  /// Opens the cache of the scalars in seriesManifest().own_blanks[set]. Throws Error as the constructor.
+  CacheReader ownBlanks(size_t set) const;
   ~CacheReader();
   CacheReader(CacheReader&&) noexcept;
   CacheReader& operator=(CacheReader&&) noexcept;
@@ -74,7 +83,7 @@ class CacheReader {
   std::span<const BrickVariable> brickVariables(size_t variable) const;
 
   /// The index in manifest().variables of the variable `name`, which its unit may follow ("T [K]"); 0 for
-  /// the empty name. Throws a UsageError that lists the names if there is none.
+  /// the empty name. Throws a UsageError that lists the names if there is none, and says where a name of own_blanks is.
   size_t variableNamed(std::string_view name) const;
 
   /// Reads, verifies and decodes a brick. Throws DamagedBrick if the checksum does not match, the file ends

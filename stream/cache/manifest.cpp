@@ -20,9 +20,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
-constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth,   kMergedBorders,
-                                          kFaceLayers,  kBorderPairs,  kSteps,
-                                          kFineValues,  kScaledValues, kCellOctants};
+constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers,
+                                          kBorderPairs, kSteps,      kFineValues,    kScaledValues,
+                                          kCellOctants, kOwnBlanks};
 constexpr const char* kFormat = "curvisplat splat cache";
 // 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;
@@ -135,6 +135,19 @@ void readSteps(const JsonField& list, Manifest& manifest) {
   if (manifest.steps.empty()) list.fail("at least one step");
 }
 
+void readOwnBlanks(const JsonField& list, Manifest& manifest) {
+  if (!manifest.hasFeature(kOwnBlanks)) list.fail("absent without the feature 'own-blanks'");
+  std::vector<std::string> names;
+  for (const VariableInfo& variable : manifest.variables) names.push_back(variable.name);
+  for (const JsonField& entry : list.elements()) {
+    manifest.own_blanks.push_back({linesOf(entry.at("variables")), checksumIn(entry.at("checksum"))});
+    const std::vector<std::string>& of_set = manifest.own_blanks.back().variables;
+    if (of_set.empty()) entry.at("variables").fail("at least one name");
+    names.insert(names.end(), of_set.begin(), of_set.end());
+  }
+  if (!allDifferent(names)) list.fail("names that are distinct, and not those of the cache's own variables");
+}
+
 void readFiles(const JsonField& list, Manifest& manifest) {
   std::vector<std::string> names;
   for (const JsonField& entry : list.elements()) {
@@ -219,6 +232,9 @@ std::string Manifest::toJson() const {
   for (const StepInfo& step : steps)
     json["steps"].push_back(
         {{"time", step.time}, {"geometry", step.geometry}, {"variables", step.variables}});
+  for (const OwnBlanks& set : own_blanks)
+    json["own_blanks"].push_back(
+        {{"variables", set.variables}, {"checksum", fmt::format("{:016x}", set.checksum)}});
   json["files"] = Json::array();
   for (const FileInfo& file : files)
     json["files"].push_back(
@@ -276,6 +292,7 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   if (const auto calendar = fields.find("calendar")) manifest.calendar = lineOf(*calendar);
   readVariables(fields.at("variables"), manifest);
   readSteps(fields.at("steps"), manifest);
+  if (const auto own = fields.find("own_blanks")) readOwnBlanks(*own, manifest);
   readFiles(fields.at("files"), manifest);
   return manifest;
 }

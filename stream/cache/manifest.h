@@ -34,6 +34,13 @@ struct StepInfo {
   std::vector<uint32_t> variables;  // numbers
 };
 
+/// Scalars that have values at other samples than the cache's own variables. They are in a cache by itself, with the
+/// geometry of these samples, in a folder of the cache (ownBlanksFolderName() in series.h).
+struct OwnBlanks {
+  std::vector<std::string> variables;  // names; those of all sets and the cache's own are distinct
+  uint64_t checksum = 0;               // of all bytes of the folder's manifest
+};
+
 /// Size and checksum (64-bit XXH3) of one of the cache's files. A payload file's checksum covers the table
 /// of its streams' checksums instead of the streams themselves, so that opening a cache reads no payloads.
 struct FileInfo {
@@ -69,6 +76,8 @@ inline constexpr const char* kSteps = "steps";  // a series of time steps (serie
 /// (preprocess/splats/node_splats.h). A reader need not do anything, but a program that adds scalars has to
 /// make the same splats.
 inline constexpr const char* kCellOctants = "cell-octants";
+/// Some scalars have values at other samples: Manifest::own_blanks. A program that does not know it would miss them.
+inline constexpr const char* kOwnBlanks = "own-blanks";
 
 // Manifest::overlap.
 inline constexpr const char* kOverlapAll = "all";      // every block is drawn
@@ -110,7 +119,8 @@ struct Manifest {
   std::string calendar;   // of the time unit, by the CF conventions; may be empty
   std::vector<VariableInfo> variables;
   std::vector<StepInfo> steps;
-  std::vector<FileInfo> files;  // all files of the cache except the manifest
+  std::vector<OwnBlanks> own_blanks;  // some only with kOwnBlanks
+  std::vector<FileInfo> files;        // all files of the cache except the manifest, and without folders'
 
   bool hasFeature(const char* feature) const;
   /// Whether records have slopes from before kEarlierSlopes (border_code.h).

@@ -71,7 +71,7 @@ namespace {
 
 /// Whether the program gives such a name to a folder in a cache.
 bool isOwnFolder(const std::string& name) {
-  static const std::regex own(R"(geometry\.\d+(\.partial)?)");
+  static const std::regex own(R"((geometry|blanks)\.\d+(\.partial)?)");
   return std::regex_match(name, own);
 }
 

@@ -289,19 +289,38 @@ GeometryFolder::GeometryFolder(fs::path folder, Manifest manifest)
   checkFile(geometry_, manifest_);
 }
 
+namespace {
+
+/// The text of the manifest of a folder in a cache, which states its checksum.
+std::string checkedText(const fs::path& manifest, uint64_t expected) {
+  std::string text = readTextFile(manifest);
+  const uint64_t found = checksumOf(std::as_bytes(std::span(text)));
+  if (found != expected)
+    throw Error(
+        "{}: has a wrong checksum (found {:016x}, expected {:016x}); the cache is damaged: convert again",
+        manifest.string(), found, expected);
+  return text;
+}
+
+}  // namespace
+
+std::string ownBlanksFolderName(size_t set) {
+  return fmt::format("blanks.{}", set + 1);
+}
+
+fs::path ownBlanksFolder(const fs::path& cache, const Manifest& manifest, size_t set) {
+  const fs::path folder = cacheFolder(cache, ownBlanksFolderName(set));
+  checkedText(cacheFile(folder, "manifest.json"), manifest.own_blanks.at(set).checksum);
+  return folder;
+}
+
 std::shared_ptr<const GeometryFolder> GeometryFolder::open(const fs::path& cache, const Manifest& manifest,
                                                            const Series& series, uint32_t geometry) {
   if (geometry == 0) return std::make_shared<GeometryFolder>(cache, manifest);
   const fs::path folder = cacheFolder(cache, geometryFolderName(geometry));
   const fs::path path = cacheFile(folder, "manifest.json");
-  const std::string text = readTextFile(path);
-  const uint64_t expected = series.steps[series.first_steps[geometry]].geometry_checksum;
-  const uint64_t found = checksumOf(std::as_bytes(std::span(text)));
-  if (found != expected)
-    throw Error(
-        "{}: has a wrong checksum (found {:016x}, expected {:016x}); the cache is damaged: convert again",
-        path.string(), found, expected);
-  Manifest of_folder = Manifest::fromJson(text, path);
+  Manifest of_folder = Manifest::fromJson(
+      checkedText(path, series.steps[series.first_steps[geometry]].geometry_checksum), path);
   bool fits = !of_folder.hasFeature(kSteps) && of_folder.variables.size() == manifest.variables.size();
   for (size_t v = 0; fits && v < manifest.variables.size(); ++v)
     fits = of_folder.variables[v].number == manifest.variables[v].number &&

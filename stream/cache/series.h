@@ -128,6 +128,12 @@ class GeometryFolder {
       GUARDED_BY(opening_);  // [step, variable]
 };
 
+/// "blanks.1": the folder of Manifest::own_blanks[0].
+std::string ownBlanksFolderName(size_t set);
+/// That folder of the cache with this manifest. Throws Error if its manifest is not the one that `manifest` states.
+std::filesystem::path ownBlanksFolder(const std::filesystem::path& cache, const Manifest& manifest,
+                                      size_t set);
+
 /// The manifest of the cache in the folder `cache`. Throws Error that says what the folder is instead.
 Manifest readManifest(const std::filesystem::path& cache);
 

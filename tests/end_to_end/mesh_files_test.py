@@ -161,18 +161,66 @@ class MeshFiles(MeshCase):
             writer.Write()
             with self.subTest(where=where):
                 top = side - 1
-                self.assertEqual(ranges(self.info(path)), {"a": (0, 4), "b": (2, top), "c": (0, top), "d": (0, 2 * top)})
+                ranges_of = {"a": (0, 4), "b": (2, top), "c": (0, top), "d": (0, 2 * top)}
+                self.assertEqual(ranges(self.info(path)), ranges_of)
                 result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite")
                 self.assertEqual(result.returncode, 0, result.stderr)
-                self.assertIn("left out: a, b, which have no values at some samples where c does", result.stderr)
-                manifest = self.manifest(self.folder / "n.splats")
-                self.assertEqual([v["name"] for v in manifest["variables"]], ["c", "d"])
-                self.assertAlmostEqual(manifest["volume"], 128, delta=0.3)
-                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite", "--resume")
-                self.assertEqual([v["name"] for v in self.manifest(self.folder / "n.splats")["variables"]], ["c", "d"], result.stderr)
-                result = self.run_program("convert", path, "-o", self.folder / "n.splats", "--overwrite", "--scalar", "c,a")
-                self.assertIn("of the values of c are left out, since other scalars of the cache have none there", result.stderr)
-                self.assertEqual(self.manifest(self.folder / "n.splats")["variables"][0]["max"], 4)
+                self.assertIn("a has values at other samples than c, d", result.stderr)
+                cache = self.folder / "n.splats"
+                whole = self.info(cache)
+                self.assertIn("own-blanks", whole["requires"])
+                volumes = {}
+                for part in (whole, *whole["own_blanks"]):
+                    for v in part["variables"]:
+                        self.assertAlmostEqual(v["min"], ranges_of[v["name"]][0], delta=1e-4)
+                        self.assertAlmostEqual(v["max"], ranges_of[v["name"]][1], delta=1e-4)
+                        volumes[v["name"]] = part["volume"]
+                # Of cells of side 1, and of nodes whose cells have no NaN corner: counted by hand.
+                cells = "cells" in where
+                for name, volume in {"c": 128, "d": 128, "a": 80 if cells else 64, "b": 96}.items():
+                    self.assertAlmostEqual(volumes[name], volume, delta=0.003 * volume, msg=name)
+                # Each is what a cache of its own has.
+                self.assertEqual(self.run_program("convert", path, "-o", self.folder / "own.splats", "--overwrite", "--scalar", "a").returncode, 0)
+                for name in ("geometry.bin", "bricks.bin", "var.0.bin"):
+                    self.assertEqual((cache / "blanks.1" / name).read_bytes(), (self.folder / "own.splats" / name).read_bytes(), name)
+                before = {str(p.relative_to(cache)): p.read_bytes() for p in cache.rglob("*") if p.is_file()}
+                result = self.run_program("convert", path, "-o", cache, "--overwrite", "--resume", "--threads", "1")
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertEqual({str(p.relative_to(cache)): p.read_bytes() for p in cache.rglob("*") if p.is_file()}, before)
+                result = self.run_program("convert", path, "-o", cache, "--overwrite", "--scalar", "c,a")
+                self.assertEqual([p["variables"][0]["name"] for p in self.info(cache)["own_blanks"]], ["a"], result.stderr)
+
+    def test_own_blanks_are_drawn_and_checked(self):
+        """Scalars that have a value nowhere together, and one that has none."""
+        image = vtk.vtkImageData()
+        image.SetDimensions(9, 5, 5)
+        x = (np.arange(225) % 9).astype(float)
+        for name, values in (("low", np.where(x > 4, np.nan, x)), ("high", np.where(x <= 4, np.nan, x)), ("none", x * np.nan)):
+            array = numpy_to_vtk(values, deep=True)
+            array.SetName(name)
+            image.GetPointData().AddArray(array)
+        writer = vtk.vtkXMLImageDataWriter()
+        writer.SetFileName(str(self.folder / "apart.vti"))
+        writer.SetInputData(image)
+        writer.Write()
+        cache = self.folder / "apart.splats"
+        result = self.run_program("convert", self.folder / "apart.vti", "-o", cache)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("left out: none, without a value at any sample", result.stderr)
+        whole = self.info(cache, "--verify")
+        self.assertEqual([[v["name"] for v in part["variables"]] for part in (whole, *whole["own_blanks"])], [["low"], ["high"]])
+        for name, splats in (("low", 125), ("high", 100)):
+            drawn = self.run_program("render", cache, "-o", self.folder / "p.png", "--size", "40x40", "--scalar", name)
+            self.assertIn(f"{splats} splats of {name}", drawn.stdout, drawn.stderr)
+        refused = self.run_program("render", cache, "-o", self.folder / "p.png", "--size", "40x40", "--opacity-by", "high")
+        self.assertIn("high has values at other samples than low", refused.stderr)
+        refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache, "--add-scalar", "high")
+        self.assertIn("already has a scalar 'high'", refused.stderr)
+        manifest = cache / "blanks.1" / "manifest.json"
+        manifest.write_text(manifest.read_text().replace('"apart"', '"other"'))
+        refused = self.run_program("render", cache, "-o", self.folder / "p.png", "--scalar", "high")
+        self.assertIn("has a wrong checksum", refused.stderr)
+        self.assertEqual(refused.returncode, 1)
 
     def test_ranges_are_of_what_is_drawn(self):
         """Faces that mesh generators write beside the cells have values, too."""

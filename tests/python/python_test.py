@@ -663,6 +663,40 @@ class Arrays(PythonTest):
         with curvisplat.open(steps) as cache:
             self.assertEqual(len(cache.times), 3)
 
+    def test_select_of_a_further_dimension(self):
+        try:
+            import netCDF4
+        except ModuleNotFoundError:
+            self.skipTest("netCDF4 is not installed")
+        path = self.folder / "months.nc"
+        with netCDF4.Dataset(path, "w") as file:
+            for name, unit, values in (("month", "1", [1, 2, 3]), ("z", "m", [0, 1, 2]), ("y", "m", [0, 1, 2]), ("x", "m", [0, 1, 2])):
+                file.createDimension(name, 3)
+                variable = file.createVariable(name, "f8", (name,))
+                variable[:] = values
+                variable.units = unit
+                if name != "month":
+                    variable.axis = name.upper()
+            file.createVariable("t", "f4", ("month", "z", "y", "x"))[:] = 100 * np.arange(1, 4)[:, None, None, None] + np.arange(27).reshape(3, 3, 3)
+        curvisplat.convert(self.folder / "month.splats", path, select={"month": 3})
+        scalar, = curvisplat.open(self.folder / "month.splats").scalars
+        self.assertEqual((scalar.min, scalar.max), (300, 326))
+        for wrong in ("month=3", {"month": 4}):
+            with self.assertRaises(curvisplat.Error):
+                curvisplat.convert(self.folder / "no.splats", path, select=wrong)
+
+    def test_scalars_with_blanks_of_their_own(self):
+        x, y, z, t = bent_duct()
+        half = np.where(np.arange(t.shape[2]) < 20, np.nan, t)
+        cache = self.folder / "half.splats"
+        curvisplat.convert_arrays(cache, curvisplat.Block(x, y, z, {"t": t, "half": half}))
+        opened = curvisplat.open(cache)
+        self.assertEqual([s.name for s in opened.scalars], ["t", "half"])
+        counts = [opened.points(name).positions.shape[0] for name in ("t", "half")]
+        self.assertEqual(counts, [t.size, t.size // 2])
+        drawn = [opened.render(name, size=(40, 40)).statistics["splats_drawn"] for name in ("t", "half")]
+        self.assertEqual(drawn, counts)
+
     def test_of_xarray_say_what_is_missing(self):
         try:
             import xarray

@@ -215,10 +215,15 @@ std::vector<double> printStored(const std::filesystem::path& cache, uint64_t ste
   std::vector<VariableInfo> variables;
   std::vector<ValueErrors> errors;
   try {
+    const auto add = [&](const CacheReader& reader) {
+      for (size_t n = 0; n < reader.manifest().variables.size(); ++n) {
+        errors.push_back(storedErrors(reader, n).means);
+        variables.push_back(reader.manifest().variables[n]);
+      }
+    };
     const CacheReader reader(cache, step);
-    for (size_t n = 0; n < reader.manifest().variables.size(); ++n)
-      errors.push_back(storedErrors(reader, n).means);
-    variables = reader.manifest().variables;
+    add(reader);
+    for (size_t n = 0; n < reader.seriesManifest().own_blanks.size(); ++n) add(reader.ownBlanks(n));
   } catch (const std::exception& error) {
     printMessage("warning: the cache is complete, but it cannot be read back: {}", error.what());
   }

@@ -170,7 +170,7 @@ void runConvert(ConvertArguments arguments) {
 
   std::unique_ptr<DataSource> source = openSource(arguments, arguments.output);
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
-  options.may_leave_out_scalars = arguments.scalars.empty();
+  options.differing = DifferingScalars::kKeepApart;
   options.title = arguments.grid.grid.stem().string();
   if (arguments.dry_run) return dryRun(std::move(source), options, arguments);
 

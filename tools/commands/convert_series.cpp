@@ -82,7 +82,7 @@ SeriesOptions seriesOptions(const ConvertArguments& arguments) {
   options.convert.title = titleOf(arguments.grid);
   applyCommonOptions(arguments, options.convert);
   applyGridUse(arguments, options.convert);
-  options.convert.may_leave_out_scalars = arguments.scalars.empty();
+  if (arguments.scalars.empty()) options.convert.differing = DifferingScalars::kLeaveOut;
   options.keep_going = arguments.keep_going;
   options.add = arguments.adds_steps;
   return options;

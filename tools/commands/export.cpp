@@ -107,7 +107,7 @@ void exportIsosurface(const ExportArguments& arguments) {
   options.value = *arguments.iso;
   options.voxels = voxelsOf(arguments);
   options.memory_bytes = parseMemory("--memory", arguments.memory);
-  const CacheReader cache = openAtStep(arguments.cache, arguments.step);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.step, arguments.scalar.scalar);
   const size_t variable = chooseVariable(cache, arguments.scalar);
   requireThreads();
   Progress progress{progressBar()};
@@ -129,7 +129,7 @@ void exportVdb(const ExportArguments& arguments) {
   VdbOptions options;
   options.voxels = voxelsOf(arguments);
   options.memory_bytes = parseMemory("--memory", arguments.memory);
-  const CacheReader cache = openAtStep(arguments.cache, arguments.step);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.step, arguments.scalar.scalar);
   const size_t variable = chooseVariable(cache, arguments.scalar);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
@@ -172,7 +172,7 @@ void exportCache(const ExportArguments& arguments) {
   const uint64_t max_splats = parseCount("--max-splats", arguments.max_splats.value_or(kDefaultSplats));
   const uint64_t memory = parseMemory("--memory", arguments.memory);
 
-  const CacheReader cache = openAtStep(arguments.cache, arguments.step);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.step, arguments.scalar.scalar);
   const size_t variable = chooseVariable(cache, arguments.scalar);
   PictureChoice choice(cache, variable, glm::dvec3(1));
   const TransferFunction function = choice.function(arguments.scalar);

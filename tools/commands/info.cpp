@@ -191,7 +191,7 @@ Findings examine(const CacheReader& reader, const InfoOptions& options) {
   return found;
 }
 
-void printAsJson(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
+Json asJson(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& manifest = reader.manifest();
   Json json = Json::parse(manifest.toJson());
   if (reader.series().steps.size() > 1) {
@@ -230,7 +230,7 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
     json["notes"] = found.verification.notes;
   }
   if (options.probe.any()) json["probe"] = probeAsJson(reader, found.probe);
-  fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+  return json;
 }
 
 /// The first ones and the last.
@@ -311,20 +311,37 @@ void printCacheInfo(const InfoOptions& options) {
   if (!options.grid.solutions.empty())
     throw UsageError("{}: is a splat cache, but solution files were given as well; give only the cache",
                      options.grid.grid.string());
-  const CacheReader reader = openAtStep(options.grid.grid, options.steps);
-  const Findings found = examine(reader, options);
-  if (options.json)
-    printAsJson(reader, options, found);
-  else if (options.probe.any())
-    printProbe(reader, found.probe);
-  if (!options.json && (!options.probe.any() || options.verify)) printAsText(reader, options, found);
+  std::vector<CacheReader> readers;  // the cache, and those of scalars with blanks of their own
+  readers.push_back(openAtStep(options.grid.grid, options.steps));
+  for (size_t n = 0; n < readers[0].seriesManifest().own_blanks.size(); ++n)
+    readers.push_back(readers[0].ownBlanks(n));
+  std::vector<Findings> found;
+  for (const CacheReader& reader : readers) found.push_back(examine(reader, options));
+  if (options.json) {
+    Json json = asJson(readers[0], options, found[0]);
+    for (size_t n = 1; n < readers.size(); ++n)
+      json["own_blanks"][n - 1] = asJson(readers[n], options, found[n]);
+    fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+  }
+  for (size_t n = 0; n < readers.size() && !options.json; ++n) {
+    if (options.probe.any()) printProbe(readers[n], found[n].probe);
+    if (options.probe.any() && !options.verify) continue;
+    if (n > 0)
+      printLine("\nvalues at other samples: {}",
+                fmt::join(readers[0].seriesManifest().own_blanks[n - 1].variables, ", "));
+    printAsText(readers[n], options, found[n]);
+  }
   if (hasUnfinished(options.grid.grid))
     printMessage("note: a conversion that replaces this cache is in progress or was interrupted");
-  if (!found.verification.findings.empty())
+  size_t findings = 0;
+  for (const Findings& of_reader : found) findings += of_reader.verification.findings.size();
+  if (findings > 0)
     throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
-                found.verification.findings.size());
-  if (options.probe.any() && found.probe.isOutside()) {
-    const glm::dvec3& point = found.probe.asked.points.front();
+                findings);
+  const auto is_outside = [](const Findings& of_reader) { return of_reader.probe.isOutside(); };
+  if (options.probe.any() && std::ranges::all_of(found, is_outside)) {
+    const CacheReader& reader = readers[0];
+    const glm::dvec3& point = found[0].probe.asked.points.front();
     throw Error(
         "{}: the point {}, {}, {} is outside of the data, which lies in x {:.6g} to {:.6g}, y {:.6g} to "
         "{:.6g}, z {:.6g} to {:.6g}",

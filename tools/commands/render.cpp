@@ -143,7 +143,7 @@ void render(const RenderArguments& given) {
       arguments.frame_rate ? parsePositive("--frame-rate", *arguments.frame_rate) : 25;
 
   arguments.cache = cacheToDraw(arguments);
-  CacheReader cache = openAtStep(arguments.cache, arguments.steps);
+  CacheReader cache = openAtStep(arguments.cache, arguments.steps, arguments.scalar.scalar);
   requireSameCache(cache, ranks);
   const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step

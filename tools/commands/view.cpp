@@ -140,7 +140,7 @@ void view(const ViewArguments& arguments) {
     return std::make_unique<MovieFile>(file, size, frames_per_s);
   };
   if (!arguments.files.empty() && !isGrid(arguments.files)) {
-    cache = openAtStep(arguments.files.front(), arguments.steps);
+    cache = openAtStep(arguments.files.front(), arguments.steps, arguments.scalar.value_or(""));
     takeScene(arguments, *cache, options);
   } else if (!arguments.files.empty()) {
     options.files = arguments.files;

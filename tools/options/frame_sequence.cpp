@@ -201,8 +201,9 @@ std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const Cach
   return {{step}};
 }
 
-CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments) {
-  CacheReader cache(path);
+CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments,
+                       std::string_view scalar) {
+  CacheReader cache = CacheReader::ofScalar(path, scalar);
   const StepPosition position = chosenSteps(arguments, cache).front();
   if (arguments.time) noteTimeOutside(*arguments.time, cache.series(), position);
   return position == cache.position() ? std::move(cache) : cache.at(position);

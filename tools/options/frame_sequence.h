@@ -88,8 +88,9 @@ void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std
 /// other or the cache has no such step.
 std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const CacheReader& cache);
 
-/// The cache at the first of its chosen steps. Throws Error as CacheReader.
-CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments);
+/// The cache with the scalar `scalar` (CacheReader::ofScalar()) at the first of its chosen steps. Throws Error as CacheReader.
+CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments,
+                       std::string_view scalar = {});
 
 /// Checks the options of a command that draws series, in place of checkCameraArguments(). Also throws
 /// UsageError if --interpolate has nothing to interpolate, or --frames nothing to spread.

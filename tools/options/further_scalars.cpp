@@ -143,6 +143,8 @@ std::vector<GridScalar> scalarsIn(const std::vector<fs::path>& files, const Cach
 std::vector<FurtherScalar> furtherAmong(const std::vector<GridScalar>& scalars, const CacheReader& cache) {
   std::set<std::string> names;
   for (const VariableInfo& variable : cache.manifest().variables) names.insert(variable.name);
+  for (const OwnBlanks& set : cache.seriesManifest().own_blanks)
+    names.insert(set.variables.begin(), set.variables.end());
   std::vector<FurtherScalar> further;
   for (const GridScalar& scalar : scalars)
     if (scalar.centring == centringOf(cache) && names.insert(scalar.name).second)
@@ -197,6 +199,7 @@ void addMissingScalars(const fs::path& cache, const std::vector<fs::path>& files
   missing.erase("");
   const CacheReader reader(cache);
   for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
+  std::erase_if(missing, [&](const std::string& name) { return reader.ownBlanksOf(name).has_value(); });
   if (missing.empty()) return;
   const std::vector<GridScalar> scalars = scalarsIn(files, reader);
   for (const GridScalar& scalar : scalars)  // as `info` prints it

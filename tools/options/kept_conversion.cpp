@@ -180,7 +180,7 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
   options.convert.precision = precision;
-  options.convert.may_leave_out_scalars = true;
+  options.convert.differing = DifferingScalars::kLeaveOut;
   const SeriesInput input = seriesInput(arguments, steps);
   makePreviewOfFirstStep(input, optionsFor(output, title), progress, events);
   convertSeries(input, options, progress, [&](const SeriesEvent& event) {
@@ -216,7 +216,7 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   ConvertOptions options = optionsFor(output, files.front().stem().string());
   options.precision = precision;
   options.scalars = chooseScalars(arguments, {}, source->description());
-  options.may_leave_out_scalars = true;
+  options.differing = DifferingScalars::kKeepApart;
   makePreview(*source, options, false, progress, events);
   sayAll(events, source->description(), convert(*source, options, progress));
 }

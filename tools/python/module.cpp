@@ -58,15 +58,21 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
 /// `function`, `camera`, `frame`: text by option; `others`: lists, flags and numbers.
 py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
                  const py::dict& others, const py::object& progress) {
-  const DrawnPicture picture = cache.render(pictureArguments(function, camera, frame, others), progress);
+  const PictureArguments arguments = pictureArguments(function, camera, frame, others);
+  const DrawnPicture picture = cache.withScalar(arguments.scalar.scalar).render(arguments, progress);
   return py::make_tuple(picture.rgba, picture.chosen, picture.notes, picture.warnings, picture.channels,
                         statisticsOf(picture.statistics));
 }
 
 py::list scalarsOf(const OpenCache& cache) {
   py::list out;
-  for (const VariableInfo& variable : cache.reader().manifest().variables)
-    out.append(py::make_tuple(variable.name, variable.unit, variable.min, variable.max));
+  const auto add = [&out](const Manifest& manifest) {
+    for (const VariableInfo& variable : manifest.variables)
+      out.append(py::make_tuple(variable.name, variable.unit, variable.min, variable.max));
+  };
+  add(cache.reader().manifest());
+  for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n)
+    add(cache.reader().ownBlanks(n).manifest());
   return out;
 }
 
@@ -80,8 +86,9 @@ std::vector<double> timesOf(const OpenCache& cache) {
   return times;
 }
 
-std::vector<double> histogramOfCache(OpenCache& cache, const std::string& scalar,
+std::vector<double> histogramOfCache(OpenCache& whole, const std::string& scalar,
                                      const std::pair<double, double>& range, bool log, size_t bins) {
+  OpenCache& cache = whole.withScalar(scalar);
   const auto busy = cache.use();
   const CountedWork counted(nullptr);
   const py::gil_scoped_release released;
@@ -129,12 +136,12 @@ py::tuple probeAt(OpenCache& cache, const std::vector<std::array<double, 3>>& po
 py::tuple sample(OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,
                  const py::object& progress) {
   const auto busy = cache.use();
-  return sampledArrays(cache.reader(), choice, size, progress);
+  return sampledArrays(cache.withScalar(choice.scalar).reader(), choice, size, progress);
 }
 
 py::tuple points(OpenCache& cache, const DataChoice& choice, const py::object& progress) {
   const auto busy = cache.use();
-  return pointArrays(cache.reader(), choice, progress);
+  return pointArrays(cache.withScalar(choice.scalar).reader(), choice, progress);
 }
 
 /// 1 where it is not given.
@@ -186,6 +193,8 @@ void beginThreads(unsigned count) {
 }
 
 py::dict convertSource(const DataSource& source, ConvertOptions options, const py::object& progress) {
+  // Of a step to which others are to be added, all scalars have the same samples.
+  if (!options.time) options.differing = DifferingScalars::kKeepApart;
   ConvertReport report;
   beginThreads(options.threads);
   runInterruptibly(progress, [&](Progress& of_work) { report = convert(source, options, of_work); });
@@ -308,6 +317,7 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   arguments.grid.grid = grid;
   arguments.grid.solutions = solutions;
   arguments.grid.time_step = py::cast<std::optional<uint32_t>>(given_options["time_step"]);
+  arguments.grid.select = py::cast<std::vector<std::string>>(given_options["select"]);
   arguments.grid.globe.vertical_scale = py::cast<double>(given_options["vertical_scale"]);
   arguments.scalars = scalars;
   arguments.steps = py::cast<std::optional<std::string>>(given_options["steps"]);
@@ -325,7 +335,7 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   runInterruptibly(progress, [&](Progress& of_work) {
     const auto source = openSource(arguments, options.output);
     options.scalars = chooseScalars(arguments, scalars, source->description());
-    options.may_leave_out_scalars = scalars.empty();
+    options.differing = DifferingScalars::kKeepApart;
     report = convert(*source, options, of_work);
     for (const std::string& warning : source->description().warnings) report.warnings.push_back(warning);
   });

@@ -176,6 +176,14 @@ std::vector<std::string> warningsOf(const PictureArguments& arguments, const Ima
 
 OpenCache::OpenCache(const std::filesystem::path& path) : path_(path), process_(::getpid()), reader_(path) {}
 
+OpenCache& OpenCache::withScalar(const std::string& name) {
+  const std::optional<size_t> set = reader_.ownBlanksOf(name);
+  if (!set) return *this;
+  std::unique_ptr<OpenCache>& cache = own_blanks_[*set];
+  if (!cache) cache = std::make_unique<OpenCache>(reader_.ownBlanks(*set).cachePath());
+  return *cache;
+}
+
 OpenCache::~OpenCache() {
   // The player would wait for threads that only its own process has.
   if (::getpid() != process_) player_.release();
@@ -302,6 +310,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
 
 void OpenCache::release() {
   const Use in_use = use();
+  own_blanks_.clear();
   player_.reset();
 }
 

@@ -76,6 +76,8 @@ class OpenCache {
   OpenCache& operator=(const OpenCache&) = delete;
 
   const CacheReader& reader() const { return reader_; }
+  /// The cache with the scalar: this one, or the one of scalars with blanks of their own. Throws Error as the constructor.
+  OpenCache& withScalar(const std::string& name);
   const std::filesystem::path& path() const { return path_; }
   /// Keeps the cache busy during its lifetime.
   class Use {
@@ -102,6 +104,7 @@ class OpenCache {
   void goTo(const StepPosition& position);
   FrameRenderer& rendererOf(const DrawnScalars& scalars, Backend backend);
 
+  std::map<size_t, std::unique_ptr<OpenCache>> own_blanks_;  // by their number in the manifest
   const std::filesystem::path path_;
   const pid_t process_;
   CacheReader reader_;

@@ -62,15 +62,21 @@ size_t variableOf(const CacheReader& reader, const std::string& name, const std:
 }  // namespace
 
 ServedCaches::ServedCaches(const std::vector<fs::path>& paths) {
-  for (const fs::path& path : paths) {
-    std::string name = nameOf(path);
-    const auto same = std::count_if(caches_.begin(), caches_.end(), [&](const Served& other) {
-      return nameOf(other.reader.cachePath()) == name;
-    });
-    if (same > 0) name += fmt::format(" ({})", same + 1);
-    CacheReader reader(path);
+  const auto add = [this](std::string name, CacheReader reader) {
     ViewState first = firstViewOf(reader, "", kFirstSize);
     caches_.push_back({std::move(name), std::move(reader), std::move(first)});
+  };
+  std::vector<std::string> names;
+  for (const fs::path& path : paths) {
+    std::string name = nameOf(path);
+    const auto same = std::ranges::count(names, name);
+    names.push_back(name);
+    if (same > 0) name += fmt::format(" ({})", same + 1);
+    const CacheReader reader(path);
+    add(name, reader.at(reader.position()));
+    const std::vector<OwnBlanks>& sets = reader.seriesManifest().own_blanks;
+    for (size_t n = 0; n < sets.size(); ++n)
+      add(fmt::format("{}: {}", name, fmt::join(sets[n].variables, ", ")), reader.ownBlanks(n));
   }
 }
 

@@ -41,7 +41,7 @@ def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory
 @_arguments.in_one_line
 def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, scalars: Union[str, Sequence[str]] = (),
             time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False, vertical_scale: float = 1,
-            blank_value: Optional[float] = None, refine: int = 1, overwrite: bool = False, resume: bool = False,
+            select: Optional[Mapping[str, float]] = None, blank_value: Optional[float] = None, refine: int = 1, overwrite: bool = False, resume: bool = False,
             memory: Union[str, int, None] = None, threads: int = 0, title: str = "", value_precision: str = "auto",
             progress: Optional[Progress] = None) -> Report:
     """Converts grid files of any kind that `curvisplat convert` reads to the cache `output`, with the same bytes.
@@ -51,6 +51,7 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
     keep_going: leave out those that cannot be converted; time_step: one of a file's.
 
     scalars: names (default: all that the files store). vertical_scale: the exaggeration of heights on the globe.
+    select: which value to read of dimensions of NetCDF that are neither space nor time, such as {"month": 3}.
     blank_value: samples with this value are not drawn. refine: cut each cell into so many parts along each axis, by its own
     trilinear map (1 to 16). resume: go on from an interrupted conversion. memory: the limit of this process, in bytes or as
     "2G". value_precision: "auto" (as fine as the spread of values needs), "normal" (16 bits for the range of a brick) or "fine" (24). progress: called with (phase, done,
@@ -63,27 +64,30 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
     options["value_precision"] = value_precision
     options["refine"] = _arguments.whole("refine", refine)
     return _convert_files(output, grid, solutions, scalars, options, time_step=time_step, steps=steps, keep_going=keep_going,
-                          vertical_scale=vertical_scale, progress=progress)
+                          vertical_scale=vertical_scale, select=select, progress=progress)
 
 
 @_arguments.in_one_line
 def append(cache: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, steps: Optional[str] = None,
-           keep_going: bool = False, vertical_scale: float = 1, blank_value: Optional[float] = None,
+           keep_going: bool = False, vertical_scale: float = 1, select: Optional[Mapping[str, float]] = None, blank_value: Optional[float] = None,
            memory: Union[str, int, None] = None, threads: int = 0, progress: Optional[Progress] = None) -> Report:
     """Adds the time steps of further files to a cache, as `curvisplat convert --add-steps` does. Arguments and errors as of convert()."""
     options = _options(False, False, blank_value, memory, threads, "")
     return _convert_files(cache, grid, solutions, (), options, add=True, steps=steps, keep_going=keep_going,
-                          vertical_scale=vertical_scale, progress=progress)
+                          vertical_scale=vertical_scale, select=select, progress=progress)
 
 
 def _convert_files(output: Path, grid: Path, solutions: Any, scalars: Any, options: dict, *, progress: Optional[Progress],
                    add: bool = False, time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False,
-                   vertical_scale: float = 1) -> Report:
+                   vertical_scale: float = 1, select: Optional[Mapping[str, float]] = None) -> Report:
     options["add"] = add
     options["time_step"] = None if time_step is None else _arguments.whole("time_step", time_step)
     options["steps"] = None if steps is None else str(steps)
     options["keep_going"] = _arguments.flag("keep_going", keep_going)
     options["vertical_scale"] = _arguments.numbers("vertical_scale", (vertical_scale,), "a number", 1)[0]
+    if select is not None and not isinstance(select, Mapping):
+        raise _core.UsageError('select: expected values by dimension, such as {"month": 3}')
+    options["select"] = [f"{dimension}={value}" for dimension, value in (select or {}).items()]
     files = [_arguments.path(path) for path in _arguments.several(solutions, (str, os.PathLike))]
     names = [_arguments.text("scalars", name) for name in _arguments.several(scalars)]
     return Report(**_core.convert_files(_arguments.path(output), _arguments.path(grid), files, names, options, progress))
