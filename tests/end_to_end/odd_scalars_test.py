@@ -75,6 +75,8 @@ class OddScalars(MeshCase):
                     info = self.info(path)
                     self.assertTrue(any(w.startswith(warning) for w in info["warnings"]), info["warnings"])
                     self.assertGreater(max(sign * info["scalars"][0][word] for word in ("min", "max")), 0)
+                    limit = "0 .. below 1.2e-38" if sign > 0 else "above -1.2e-38 .. 0"
+                    self.assertIn(limit, self.run_program("info", path).stdout)
                     result = self.run_program("convert", path, "-o", self.folder / "d.splats", "--overwrite")
                     self.assertEqual(result.returncode, 0, result.stderr)
                     self.assertIn("warning: " + warning, result.stderr)

@@ -213,8 +213,9 @@ void printScalars(const GridInfo& info) {
               isEmpty(range) ? "no value" : rangeText(range.min, range.max, 6));
     if (const uint64_t missing = info.statistics.missing[s]; missing > 0)
       printLine(
-          "          {} more of its values {} not finite or missing; `convert` leaves out the scalars that "
-          "differ so",
+          "          {} more of its values {} not finite or missing; `convert` keeps the scalars that differ "
+          "so "
+          "apart (of a series it leaves them out)",
           missing, missing == 1 ? "is" : "are");
   }
   std::string names;

@@ -6,7 +6,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json_fwd.hpp>
 
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -32,9 +34,15 @@ void printLine(fmt::format_string<Args...> format, Args&&... args) {
   fmt::print("{}\n", oneLine(fmt::format(format, std::forward<Args>(args)...)));
 }
 
-/// A range of values as people read it: "-2.5 .. 0"; -0 is printed as 0.
+/// A range of values as people read it: "-2.5 .. 0"; -0 is printed as 0. Numbers that are too small for single precision stand
+/// for smaller ones of the files.
 inline std::string rangeText(double min, double max, int digits) {
-  return fmt::format("{:.{}g} .. {:.{}g}", min + 0.0, digits, max + 0.0, digits);
+  constexpr double kSmallest = std::numeric_limits<float>::min();
+  const auto text = [digits](double value) {
+    if (value == 0 || std::abs(value) >= kSmallest) return fmt::format("{:.{}g}", value + 0.0, digits);
+    return std::string(value > 0 ? "below 1.2e-38" : "above -1.2e-38");
+  };
+  return text(min) + " .. " + text(max);
 }
 
 }  // namespace curvisplat
