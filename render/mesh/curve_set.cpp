@@ -38,6 +38,7 @@ CurveSet curveSetOf(const std::vector<glm::dvec3>& points, std::vector<uint32_t>
 namespace {
 
 constexpr size_t kMaxColumns = 1000;
+constexpr double kMaxCoordinate = 1e38;  // differences of two are finite in single precision
 
 class Rows {
  public:
@@ -162,8 +163,8 @@ CurveSet parseCurveText(std::string_view text, const std::filesystem::path& path
     for (int axis = 0; axis < 3; ++axis) {
       const std::string_view word = words[columns->position[static_cast<size_t>(axis)]];
       const auto number = rows.number(word);
-      if (!number || !std::isfinite(*number))
-        rows.fail("found '{}' for {}; expected a number", word, "xyz"[axis]);
+      if (!number || !(std::abs(*number) <= kMaxCoordinate))
+        rows.fail("found '{}' for {}; expected a number up to {:g}", word, "xyz"[axis], kMaxCoordinate);
       point[axis] = *number;
     }
     if (columns->id && words[*columns->id] != id) {

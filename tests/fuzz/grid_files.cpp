@@ -21,7 +21,7 @@ void fuzzTecplot(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.plt", bytes);
   options.temporary_folder = fuzzFolder();
-  if (isTecplot(InputFile(options.grid))) readData(*openTecplot(options));
+  if (isTecplot(InputFile(options.grid))) readData(openTecplot(options));
 }
 
 const RegisteredFuzzTarget tecplot_target("tecplot", fuzzTecplot);
@@ -42,7 +42,7 @@ void fuzzXdmf(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.xmf", bytes);
   options.temporary_folder = fuzzFolder();
-  if (isXdmf(InputFile(options.grid))) readData(*openXdmf(options));
+  if (isXdmf(InputFile(options.grid))) readData(openXdmf(options));
 }
 
 const RegisteredFuzzTarget xdmf_target("xdmf", fuzzXdmf);
@@ -54,7 +54,7 @@ void fuzzCgnsAdf(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.cgns", bytes);
   options.temporary_folder = fuzzFolder();
-  readData(*openCgns(options));
+  readData(openCgns(options));
 }
 
 const RegisteredFuzzTarget cgns_adf_target("cgns_adf", fuzzCgnsAdf);
@@ -77,7 +77,7 @@ void fuzzFileSeries(std::span<const std::byte> bytes) {
   const size_t times = first->description().times.size();
   for (uint32_t step = 0; step < std::min<size_t>(times, 4); ++step) {
     options.time_step = step;
-    readData(*openFileSeries(options, openData));
+    readData(openFileSeries(options, openData));
   }
 }
 
@@ -100,7 +100,7 @@ void fuzzUnpackedFile(std::span<const std::byte> bytes) {
   options.temporary_folder = fuzzFolder();
   if (!UnpackedFile::recognises(InputFile(options.grid))) return;
   try {
-    readData(*openUnpacked(options, openInside));
+    readData(openUnpacked(options, openInside));
   } catch (const Error& error) {
     CURVISPLAT_CHECK(std::string(error.what()).find(".unpacked/") == std::string::npos);
     throw;

@@ -2,11 +2,16 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
+#include <utility>
+#include <vector>
 
+#include "preprocess/formats/common/cut_source.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/error.h"
+#include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {
 
@@ -29,22 +34,33 @@ inline void readGrid(const GridSource& source) {
   }
 }
 
-/// The same of the first points and cells of every piece, as far as there are errors to throw.
+/// The same of the first points and cells of every piece.
 inline void readMesh(const MeshSource& source) {
   constexpr uint64_t kMax = 4096;
+  std::vector<uint32_t> of_points, of_cells;
+  for (uint32_t n = 0; n < source.description().scalars.size(); ++n)
+    (source.description().scalars[n].centring == Centring::kNode ? of_points : of_cells).push_back(n);
   const std::vector<MeshPiece>& pieces = source.description().pieces;
   MeshPoints points;
   MeshCells cells;
   for (uint32_t n = 0; n < pieces.size(); ++n) {
-    source.readPoints(n, 0, std::min(kMax, pieces[n].points), {}, points);
-    source.readCells(n, 0, std::min(kMax, pieces[n].cells), {}, cells);
+    const uint64_t point_count = std::min(kMax, pieces[n].points),
+                   cell_count = std::min(kMax, pieces[n].cells);
+    source.readPoints(n, 0, point_count, of_points, points);
+    source.readCells(n, 0, cell_count, of_cells, cells);
     checkCells(cells, pieces[n], 0);
+    CURVISPLAT_CHECK_OP(points.x.size(), ==, point_count);
+    CURVISPLAT_CHECK_OP(cells.size(), ==, cell_count);
+    for (const auto& values : points.scalars) CURVISPLAT_CHECK_OP(values.size(), ==, point_count);
+    for (const auto& values : cells.scalars) CURVISPLAT_CHECK_OP(values.size(), ==, cell_count);
   }
 }
 
-inline void readData(const DataSource& source) {
-  if (const auto* const mesh = dynamic_cast<const MeshSource*>(&source)) return readMesh(*mesh);
-  readGrid(dynamic_cast<const GridSource&>(source));
+/// Reads a grid, or a mesh whose curved cells are cut.
+inline void readData(std::unique_ptr<DataSource> source) {
+  source = cutCurved(std::move(source), true, fuzzFolder());
+  if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get())) return readMesh(*mesh);
+  readGrid(dynamic_cast<const GridSource&>(*source));
 }
 
 }  // namespace curvisplat

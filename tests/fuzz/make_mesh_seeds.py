@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of Tecplot's, XDMF's and NetCDF's structured ones, of surfaces
-of VTK, of grids that are compressed, of lists of time steps, of steps.bin and of records of parts: FOLDER/<target>/<seed>.
+"""make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of Tecplot's, XDMF's, VTKHDF's and NetCDF's structured ones, of surfaces
+and curves of VTK, of grids that are compressed, of lists of time steps, of steps.bin and of records of parts: FOLDER/<target>/<seed>.
 
 What others wrote: VTK (python3-vtk9), libnetcdf (python3-netcdf4) and libcgns. The other seeds are make_seeds's.
 """
@@ -90,6 +90,101 @@ def vtk_seeds(folder):
             writer.SetFileTypeToBinary() if binary else writer.SetFileTypeToASCII()
             of = with_values(polyhedra() if version == 42 else grid(), ghosts=True)
             put("vtk_legacy", f"mesh_{version}_{'binary' if binary else 'ascii'}", written(writer, of, "a.vtk"))
+
+
+def curved_seeds(folder):
+    """Cells of higher order, also rational ones of other orders along their axes."""
+    for name, kind, count, orders in (("quadratic", vtk.VTK_QUADRATIC_TETRA, 10, None), ("lagrange", vtk.VTK_LAGRANGE_HEXAHEDRON, 18, (2, 2, 1)),
+                                      ("bezier", vtk.VTK_BEZIER_WEDGE, 18, (2, 2, 2))):
+        of, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
+        points.SetData(numpy_to_vtk(np.random.default_rng(1).random((count, 3)), deep=True))
+        of.SetPoints(points)
+        of.InsertNextCell(kind, count, list(range(count)))
+        with_values(of)
+        if orders:
+            degrees, weights = numpy_to_vtk(np.array([orders], "f8"), deep=True), numpy_to_vtk(np.linspace(1, 2, count), deep=True)
+            of.GetCellData().SetHigherOrderDegrees(degrees)
+            degrees.SetName("HigherOrderDegrees")
+            of.GetPointData().SetRationalWeights(weights)
+            weights.SetName("RationalWeights")
+        writer = vtk.vtkXMLUnstructuredGridWriter()
+        writer.SetDataModeToAscii()
+        writer.SetFileName(str(folder / "a.vtu"))
+        writer.SetInputData(of)
+        writer.Write()
+        put("vtk_xml", f"curved_{name}", (folder / "a.vtu").read_bytes())
+
+
+def curve_seeds(folder):
+    lines, vertices = vtk.vtkCellArray(), vtk.vtkCellArray()
+    for corners in ((0, 1, 3, 2), (4, 5)):
+        lines.InsertNextCell(len(corners), corners)
+    vertices.InsertNextCell(1, [6])
+    points, curves, mesh = vtk.vtkPoints(), vtk.vtkPolyData(), vtk.vtkUnstructuredGrid()
+    points.SetData(numpy_to_vtk(POINTS.astype("f4"), deep=True))
+    curves.SetPoints(points)
+    curves.SetLines(lines)
+    curves.SetVerts(vertices)
+    mesh.SetPoints(points)
+    for kind, corners in ((vtk.VTK_POLY_LINE, (0, 1, 3)), (vtk.VTK_LINE, (4, 5)), (vtk.VTK_TETRA, (4, 5, 6, 8))):
+        mesh.InsertNextCell(kind, len(corners), list(corners))
+    for of in (curves, mesh):
+        values = numpy_to_vtk(np.arange(of.GetNumberOfCells() if of is mesh else len(POINTS), dtype="f4"), deep=True)
+        values.SetName("p")
+        (of.GetCellData() if of is mesh else of.GetPointData()).AddArray(values)
+    for name, choice, writer, of in (("lines_legacy", 0, vtk.vtkPolyDataWriter(), curves), ("lines_xml", 1, vtk.vtkXMLPolyDataWriter(), curves),
+                                     ("mesh_xml", 2, vtk.vtkXMLUnstructuredGridWriter(), mesh), ("points_xml", 17 + 32, vtk.vtkXMLPolyDataWriter(), curves),
+                                     ("mesh_legacy", 3, vtk.vtkUnstructuredGridWriter(), mesh)):
+        if hasattr(writer, "SetDataModeToAscii"):
+            writer.SetDataModeToAscii()
+        writer.SetFileName(str(folder / "a"))
+        writer.SetInputData(of)
+        writer.Write()
+        put("vtk_curves", name, bytes([choice]) + (folder / "a").read_bytes())
+    put("curve_text", "trajectories", b"\2x,y,z,p,id\n0,0,0,1,a\n1,0,0,2,a\n\n1,1,+1e2,,b # words\n2,2,2,nan,b\n")
+    put("curve_text", "points", b"\1" + b"0 0 0\n1 0.5 -2\r\n")
+
+
+def vtk_hdf_seeds():
+    """Of objects that the target writes by HDF5."""
+    def text(value):
+        return bytes([len(value)]) + value.encode()
+
+    def numbers(values):
+        kinds = {"<f4": 0, "f8": 1, "|u1": 3, "<i2": 4, "<i4": 5, "<i8": 6}
+        values = np.asarray(values)
+        values = values.astype("i8") if values.dtype.kind == "i" else values
+        stored = values.astype(">f8") if values.dtype == "f8" else values
+        return (bytes([kinds[values.dtype.str if values.dtype != "f8" else "f8"], values.ndim]) +
+                struct.pack(f"<{values.ndim}H", *values.shape) + stored.tobytes())
+
+    def group(path, kind, arrays, version=(2, 0), **attributes):
+        objects = [b"\2" + text(path) + text("Type") + text(kind), b"\1" + text(path) + text("Version") + numbers(version)]
+        objects += [b"\1" + text(path) + text(name) + numbers(values) for name, values in attributes.items()]
+        return b"".join(objects + [b"\0" + text(f"{path}/{name}") + numbers(values) for name, values in arrays.items()])
+
+    b = SmallBlock
+    image = {"PointData/p": b.p, "CellData/c": b.c, "PointData/v": np.moveaxis(b.places, 0, -1).astype("f8")}
+    box = {"WholeExtent": [0, 3, 0, 2, 0, 1], "Origin": [0.0, 0, 0], "Spacing": [1.0, 1, 1]}
+    put("vtk_hdf", "image", group("/VTKHDF", "ImageData", image, Direction=[0.0, -1, 0, 1, 0, 0, 0, 0, 1], **box))
+    mesh = {"NumberOfPoints": [12], "NumberOfCells": [2], "NumberOfConnectivityIds": [16], "Points": POINTS, "Types": np.array([12, 12], "u1"),
+            "Offsets": [0, 8, 16], "Connectivity": CELLS.ravel(), "PointData/p": np.arange(12.0), "CellData/c": np.arange(2.0)}
+    put("vtk_hdf", "mesh", group("/VTKHDF", "UnstructuredGrid", mesh))
+    twice = {name: np.concatenate([values, values]) for name, values in mesh.items()}
+    steps = {"Values": [0.0, 1], "PartOffsets": [0, 1], "NumberOfParts": [1, 1], "PointOffsets": [0, 12], "CellOffsets": [0, 2],
+             "ConnectivityIdOffsets": [0, 16], "PointDataOffsets/p": [0, 12], "CellDataOffsets/c": [0, 2]}
+    put("vtk_hdf", "steps", group("/VTKHDF", "UnstructuredGrid", twice | {f"Steps/{name}": values for name, values in steps.items()}))
+    corners = [[int(c) for c in np.array(cell)[list(face)]] for cell in CELLS for face in FACES]
+    polyhedra = {"NumberOfFaces": [12], "NumberOfFaceConnectivityIds": [48], "NumberOfPolyhedronToFaceIds": [12], "FaceOffsets": np.arange(13) * 4,
+                 "FaceConnectivity": np.ravel(corners), "PolyhedronOffsets": [0, 6, 12], "PolyhedronToFaces": np.arange(12)}
+    put("vtk_hdf", "polyhedra", group("/VTKHDF", "UnstructuredGrid", mesh | polyhedra | {"Types": np.array([42, 42], "u1")}, version=(2, 5)))
+    levels = b"".join(b"\1" + text(f"/VTKHDF/Level{n}") + text("Spacing") + numbers([0.5**n] * 3) + b"\0" + text(f"/VTKHDF/Level{n}/AMRBox") +
+                      numbers([low + high]) + b"\0" + text(f"/VTKHDF/Level{n}/CellData/c") + numbers(np.arange(8.0))
+                      for n, (low, high) in enumerate((([0, 1, 0], [1, 0, 1]), ([0, 1, 0], [1, 0, 1]))))
+    put("vtk_hdf", "refined", group("/VTKHDF", "OverlappingAMR", {}, Origin=[0.0, 0, 0]) + levels)
+    links = b"".join(b"\3" + text(f"/VTKHDF/Assembly/{name}") + text(f"/VTKHDF/{name}") for name in "ab")
+    put("vtk_hdf", "set", group("/VTKHDF", "PartitionedDataSetCollection", {}) + group("/VTKHDF/a", "ImageData", image, **box) +
+        group("/VTKHDF/b", "UnstructuredGrid", mesh) + links)
 
 
 def surface_seeds(folder):
@@ -259,6 +354,20 @@ def tecplot_seeds():
         put("tecplot", "text_blocks", path.read_bytes() + b"TEXT X=1 T=\"a\"\nZONE I=4 J=3 K=2 D=(1,2,3,4,5)\n")
         write_text(path, [("I=4, J=3, K=2", "POINT", [*b.places, b.p])], names[:4])
         put("tecplot", "text_points", path.read_bytes().replace(b"0.0 0.0", b"2*0"))
+    at, nodes, bricks = list(POINTS.T.astype("f4")), np.arange(12, dtype="f4"), np.array([1, 2], "f4")
+    rows = lambda values: "\n".join(" ".join(f"{v:g}" for v in np.ravel(row)) for row in values) + "\n"
+    words = "N=12, E=2, ZONETYPE=FEBRICK, DATAPACKING=BLOCK, VARLOCATION=([5]=CELLCENTERED)"
+    put("tecplot", "elements_text", ('VARIABLES = "X" "Y" "Z" "p" "c"\n' f"ZONE {words} SOLUTIONTIME=1\n" + rows([*at, nodes, bricks, *(CELLS + 1)]) +
+        f"ZONE {words} SOLUTIONTIME=2 VARSHARELIST=([1-3]=1) CONNECTIVITYSHAREZONE=1\n" + rows([nodes, bricks]) +
+        "ZONE N=12, E=1, F=FEPOINT, ET=TETRAHEDRON\n" + rows([*np.column_stack([*at, nodes, nodes]), [5, 6, 7, 9]])).encode())
+    for version in (107, 112):
+        file = Binary(names, version, "<" if version < 112 else ">")
+        of_zone = {"centrings": cells, "zone_type": 5, "elements": CELLS, "strand": 0}
+        file.zone(12, [*at, nodes, bricks], time=1.0, face_neighbours=version == 107, **of_zone)
+        file.zone(12, [None] * 3 + [nodes, bricks], time=2.0, shared=[0, 0, 0, -1, -1], elements_of=0, **of_zone)
+        with tempfile.TemporaryDirectory() as folder:
+            file.write(pathlib.Path(folder) / "a.plt")
+            put("tecplot", f"elements_{version}", (pathlib.Path(folder) / "a.plt").read_bytes())
 
 
 def xdmf_seeds():
@@ -281,6 +390,12 @@ def xdmf_seeds():
     uniform = f'<Geometry GeometryType="ORIGIN_DXDYDZ">{item.format(3, "0 0 0")}{item.format(3, "1 1 1")}</Geometry>'
     put("xdmf", "slab", (f'{head}<Topology TopologyType="3DCoRectMesh" Dimensions="2 3 4"/><Grid><Topology Reference="/Xdmf/Domain/Topology"/>'
                          f'{uniform}<Attribute Name="p">{slab}</Attribute></Grid></Domain></Xdmf>').encode())
+    mesh = lambda kind, count, numbers: (f'<Grid><Topology TopologyType="{kind}" NumberOfElements="{count}">{item.format(len(numbers), words(numbers))}</Topology>'
+        f'<Geometry GeometryType="XYZ">{item.format("12 3", words(POINTS))}</Geometry><Attribute Name="p">{item.format(12, words(np.arange(12)))}</Attribute>'
+        f'<Attribute Name="c" Center="Cell">{item.format(count, words(np.arange(count)))}</Attribute></Grid>')
+    faces = [v for face in FACES for v in (4, *CELLS[0][list(face)])]
+    put("xdmf", "mesh", f'{head}{mesh("Hexahedron", 2, np.ravel(CELLS))}{mesh("Tetrahedron_10", 1, np.arange(10))}</Domain></Xdmf>'.encode())
+    put("xdmf", "mixed_mesh", f'{head}{mesh("Mixed", 5, [9, *CELLS[0], 1, 2, 5, 6, 2, 3, 7, 8, 9, 6, 4, 5, 6, 8, 16, 6, *faces])}</Domain></Xdmf>'.encode())
 
 
 def ensight_seeds():
@@ -304,9 +419,10 @@ def ensight_seeds():
                 geometry = (head + text("part", "coordinates") + numbers([12], "i") + numbers(POINTS.T, "f") +
                             text("hexa8") + numbers([1, 1], "i") + numbers(CELLS[0] + 1, "i") + text("nfaced") + numbers([1, 2, 6], "i") +
                             numbers([4] * 6, "i") + numbers(faces, "i"))
-                values = text("v", "part") + numbers([1], "i") + text("coordinates") + numbers(np.arange(36.0), "f")
+                vectors = text("v", "part") + numbers([1], "i") + text("coordinates") + numbers(np.arange(36.0), "f")
+                values = vectors[:-24 * len(numbers([1.0], "f"))]
             of_cells = text("v", "part") + numbers([1], "i") + text("hexa8") + numbers([1], "f") + text("nfaced undef") + numbers([9, 2], "f")
-            for kind, file in ((0, values), (1, values if block else of_cells), (2, values)):
+            for kind, file in ((0, values), (1, values if block else of_cells), (2, values if block else vectors)):
                 if not (block and kind):
                     put("ensight", f"{name}_{'block' if block else 'mesh'}_{kind}",
                           bytes([kind]) + struct.pack("<H", len(geometry)) + geometry + file)
@@ -454,11 +570,14 @@ def part_records():
 
 with tempfile.TemporaryDirectory() as name:
     vtk_seeds(pathlib.Path(name))
+    curved_seeds(pathlib.Path(name))
+    curve_seeds(pathlib.Path(name))
     surface_seeds(pathlib.Path(name))
     cf_seeds(pathlib.Path(name))
     exodus_seeds(pathlib.Path(name))
     columns_seeds(pathlib.Path(name))
     adf_seeds(pathlib.Path(name))
+vtk_hdf_seeds()
 set_seeds()
 compressed_seeds()
 foam_seeds()

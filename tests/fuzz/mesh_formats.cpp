@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "preprocess/formats/ensight/ensight_case.h"
 #include "preprocess/formats/ensight/ensight_source.h"
@@ -40,11 +41,7 @@ void fuzzSu2(std::span<const std::byte> bytes) {
   if (!isSu2(InputFile(options.grid))) return;
   const auto restart = input.rest();
   if (!restart.empty()) options.solutions.push_back(fuzzFile("restart", restart));
-  const Su2Source source(options);
-  readMesh(source);
-  MeshPoints points;
-  for (uint32_t n = 0; n < source.description().scalars.size(); ++n)
-    source.readPoints(0, 0, source.description().pieces[0].points, std::span(&n, 1), points);
+  readMesh(Su2Source(options));
 }
 
 const RegisteredFuzzTarget su2_target("su2", fuzzSu2);
@@ -62,18 +59,7 @@ void fuzzEnsight(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.case", std::as_bytes(std::span(text)));
   options.temporary_folder = fuzzFolder();
-  const auto source = openEnsight(options);
-  readData(*source);
-  const auto* const mesh = dynamic_cast<const MeshSource*>(source.get());
-  if (!mesh) return;
-  const uint32_t scalar = 0;
-  const MeshPiece& piece = mesh->description().pieces[0];
-  MeshPoints points;
-  MeshCells cells;
-  if (mesh->description().scalars[0].centring == Centring::kNode)
-    mesh->readPoints(0, 0, std::min<uint64_t>(piece.points, 4096), std::span(&scalar, 1), points);
-  else
-    mesh->readCells(0, 0, std::min<uint64_t>(piece.cells, 4096), std::span(&scalar, 1), cells);
+  readData(openEnsight(options));
 }
 
 const RegisteredFuzzTarget ensight_target("ensight", fuzzEnsight);
@@ -101,12 +87,12 @@ void fuzzEnsightCase(std::span<const std::byte> bytes) {
   options.grid = fuzzFile("t.case", bytes);
   options.temporary_folder = fuzzFolder();
   if (!isEnsightCase(InputFile(options.grid))) return;
-  const auto first = openEnsight(options);
-  readData(*first);
+  auto first = openEnsight(options);
   const auto steps = static_cast<uint32_t>(std::min<size_t>(first->description().times.size(), 4));
+  readData(std::move(first));
   for (uint32_t step = 1; step < steps; ++step) {
     options.time_step = step;
-    readData(*openEnsight(options));
+    readData(openEnsight(options));
   }
 }
 

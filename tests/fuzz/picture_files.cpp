@@ -1,4 +1,4 @@
-// What a picture is made of: splats, colour maps, camera paths, pictures and surfaces.
+// What a picture is made of: splats, colour maps, camera paths, pictures, surfaces and curves.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +9,7 @@
 #include "render/cpu/cpu_painter.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
+#include "render/mesh/curve_set.h"
 #include "render/mesh/triangle_mesh.h"
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
@@ -167,6 +168,21 @@ void fuzzMesh(std::span<const std::byte> bytes) {
 }
 
 const RegisteredFuzzTarget mesh_target("mesh", fuzzMesh);
+
+// Lines and points of a picture as text with columns. The first byte: points (1), and the scalar p (2).
+void fuzzCurveText(std::span<const std::byte> bytes) {
+  FuzzInput input(bytes);
+  const auto choice = input.take<uint8_t>();
+  const CurveSet set =
+      parseCurveText(textOf(input.rest()), "a.csv", (choice & 2) != 0 ? "p" : "", (choice & 1) != 0);
+  CURVISPLAT_CHECK_OP(set.begins.back(), ==, set.positions.size());
+  CURVISPLAT_CHECK(std::ranges::is_sorted(set.begins));
+  CURVISPLAT_CHECK(set.values.empty() || set.values.size() == set.positions.size());
+  for (const glm::vec3& point : set.positions)
+    CURVISPLAT_CHECK(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z));
+}
+
+const RegisteredFuzzTarget curve_text_target("curve_text", fuzzCurveText);
 
 }  // namespace
 }  // namespace curvisplat

@@ -1,6 +1,8 @@
-// VTK's files: XML in all encodings, legacy ones, those that name others, and surfaces.
+// VTK's files: XML in all encodings, legacy ones, those that name others, surfaces and curves.
+#include <algorithm>
 #include <cmath>
 
+#include "preprocess/formats/vtk/vtk_curves.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
 #include "preprocess/formats/vtk/vtk_surface.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
@@ -16,9 +18,9 @@ void readVtk(std::string_view name, std::span<const std::byte> bytes) {
   options.grid = fuzzFile(name, bytes);
   options.temporary_folder = fuzzFolder();
   if (isVtkXml(InputFile(options.grid)))
-    readData(*openVtkXml(options));
+    readData(openVtkXml(options));
   else if (isVtkLegacy(InputFile(options.grid)))
-    readData(*openVtkLegacy(options));
+    readData(openVtkLegacy(options));
 }
 
 // .vts, .vtr and .vti files in all encodings.
@@ -66,6 +68,24 @@ void fuzzVtkSurface(std::span<const std::byte> bytes) {
 }
 
 const RegisteredFuzzTarget vtk_surface_target("vtk_surface", fuzzVtkSurface);
+
+// Lines and points of a picture. A byte chooses the file (1: .vtp, 2: .vtu, else .vtk) and, by its fifth bit, points; the scalar is
+// p, or none by its sixth. What is read belongs to one line each, and is finite in single precision, differences included.
+void fuzzVtkCurves(std::span<const std::byte> bytes) {
+  constexpr std::string_view kNames[] = {"a.vtk", "a.vtp", "a.vtu", "a.vtk"};
+  FuzzInput input(bytes);
+  const auto choice = input.take<uint8_t>();
+  const VtkCurves curves = readVtkCurves(fuzzFile(kNames[choice % 4], input.rest()),
+                                         (choice & 32) != 0 ? "" : "p", (choice & 16) != 0);
+  CURVISPLAT_CHECK_OP(curves.begins.back(), ==, curves.points.size());
+  CURVISPLAT_CHECK(std::ranges::is_sorted(curves.begins));
+  CURVISPLAT_CHECK(curves.values.empty() || curves.values.size() == curves.points.size());
+  for (const glm::dvec3& point : curves.points)
+    for (int axis = 0; axis < 3; ++axis)
+      CURVISPLAT_CHECK(std::isfinite(static_cast<float>(point[axis] - curves.points.front()[axis])));
+}
+
+const RegisteredFuzzTarget vtk_curves_target("vtk_curves", fuzzVtkCurves);
 
 }  // namespace
 }  // namespace curvisplat

@@ -20,6 +20,7 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kChunk = 65536;
+constexpr double kMaxCoordinate = 1e38;  // differences of two are finite in single precision
 constexpr uint64_t kMaxPoints = std::numeric_limits<uint32_t>::max() - 1;
 
 /// All tuples of an array's wanted components, one after the other.
@@ -63,8 +64,10 @@ class Collector {
     const auto addPoint = [&](uint64_t n, double of_cell) {
       if (n >= points[0].size()) fail("a cell refers to a point that does not exist");
       const glm::dvec3 at(points[0][n], points[1][n], points[2][n]);
-      if (!std::isfinite(at.x) || !std::isfinite(at.y) || !std::isfinite(at.z))
-        fail("a point's coordinates are not finite");
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(std::abs(at[axis]) <= kMaxCoordinate))
+          fail(fmt::format("a point has the coordinate {:g}; expected a number up to {:g}", at[axis],
+                           kMaxCoordinate));
       if (curves_.points.size() >= kMaxPoints) fail("has too many points");
       curves_.points.push_back(at);
       if (!scalar_.empty())

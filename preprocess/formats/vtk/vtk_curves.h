@@ -11,7 +11,7 @@
 namespace curvisplat {
 
 struct VtkCurves {
-  std::vector<glm::dvec3> points;   // of one line after the other; finite
+  std::vector<glm::dvec3> points;   // of one line after the other; 1e38 at most
   std::vector<uint32_t> begins{0};  // [lines + 1], into points
   std::vector<float> values;        // [points], or none
 };
