@@ -1,5 +1,7 @@
 #include "render/frame/frame_memory.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -44,19 +46,17 @@ constexpr uint64_t kKeptArrays = 15;  // five of each step
 
 }  // namespace
 
-TooLittleMemory::TooLittleMemory(uint64_t memory_bytes, uint64_t least, ImageSize picture)
-    : UsageError("--memory {}: too little for {}x{} pixels of this cache; give at least {} MiB",
-                 byteText(memory_bytes), picture.width, picture.height, (least >> 20) + 1),
-      least_bytes(least),
-      size(picture) {}
-
 FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads) {
   const uint64_t image_bytes = 4 * sizeof(float) * fixed.size.pixels();
   const uint64_t exact = fixed.index_bytes + fixed.painter_bytes + image_bytes + fixed.output_bytes;
   const uint64_t pools = kMinRingBytes + kMinSweepBytes + fixed.least_pager_bytes;
   const uint64_t worker_bytes = kWorkerBytes + (fixed.two_scalars ? kSecondScalarBytes : 0);
   const uint64_t least = exact + pools + worker_bytes;
-  if (memory_bytes < least) throw TooLittleMemory(memory_bytes, least, fixed.size);
+  if (memory_bytes < least)
+    throw TooLittleMemory(
+        fmt::format("--memory {}: too little for {}x{} pixels of this cache; give at least {} MiB",
+                    byteText(memory_bytes), fixed.size.width, fixed.size.height, (least >> 20) + 1),
+        fixed.size, least);
   const uint64_t part = memory_bytes / kParts;
   const uint64_t rounded = (exact + part - 1) / part * part;
   const unsigned wanted = threadsOrCores(threads);

@@ -13,20 +13,12 @@
 
 #include "render/camera/camera.h"
 #include "render/frame/frame_plan.h"
+#include "render/image/too_little_memory.h"
 #include "render/project/tile_set.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
-
-/// `least_bytes` are needed for a picture of `size`.
-class TooLittleMemory : public UsageError {
- public:
-  TooLittleMemory(uint64_t memory_bytes, uint64_t least, ImageSize picture);
-
-  uint64_t least_bytes;
-  ImageSize size;
-};
 
 /// The stages' shares of a frame's memory.
 struct FrameBudget {

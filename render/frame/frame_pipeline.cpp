@@ -1,5 +1,7 @@
 #include "render/frame/frame_pipeline.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 #include <span>
@@ -8,6 +10,7 @@
 
 #include "render/frame/frame_memory.h"
 #include "render/frame/frame_workers.h"
+#include "render/image/too_little_memory.h"
 #include "render/sweep/segment_ring.h"
 #include "render/sweep/sweep_buffer.h"
 #include "stream/base/compute_permits.h"
@@ -260,10 +263,12 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     statistics = std::move(drawn);
     return *std::move(image);
   }
-  throw UsageError(
-      "--memory {}: too little for what lies in one place of the picture; give more, or a coarser "
-      "--lod-pixels",
-      byteText(options.memory_bytes));
+  throw TooLittleMemory(
+      fmt::format(
+          "--memory {}: too little for what lies in one place of the picture; give more, or a coarser "
+          "--lod-pixels",
+          byteText(options.memory_bytes)),
+      options.size);
 }
 
 /// Nothing where more splats wait in the painter's tiles than it has memory for: fewer do in smaller regions.

@@ -1,5 +1,7 @@
 #include "render/frame/frame_pipeline.h"
 
+#include <fmt/format.h>
+
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
 
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "render/frame/frame_workers.h"
+#include "render/image/too_little_memory.h"
 #include "render/surface/curve_meshes.h"
 #include "render/surface/scene_layers.h"
 #include "render/surface/slice_sampler.h"
@@ -163,10 +166,12 @@ std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const F
     input.sample({cache_, plan.iso_parts, take, options.keep_going});
     if (splats.overflowed()) {
       if (tiles.count() == 1)
-        throw UsageError(
-            "isosurfaces: too many splats in {0}x{0} pixels (they need more than their {1} KiB of --memory); "
-            "increase --memory or --lod-pixels",
-            kTileSide, isoSplatBytes(options) >> 10);
+        throw TooLittleMemory(
+            fmt::format(
+                "isosurfaces: too many splats in {0}x{0} pixels (they need more than their {1} KiB of "
+                "--memory); increase --memory or --lod-pixels",
+                kTileSide, isoSplatBytes(options) >> 10),
+            options.size);
       const size_t middle = (tiles.begin + tiles.end) / 2;
       left.push_back({middle, tiles.end});
       left.push_back({tiles.begin, middle});

@@ -1,5 +1,7 @@
 #include "render/surface/iso_layers.h"
 
+#include <fmt/format.h>
+
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -11,6 +13,7 @@
 #include <memory>
 #include <numeric>
 
+#include "render/image/too_little_memory.h"
 #include "render/project/tile_set.h"
 #include "render/surface/surface_shader.h"
 #include "stream/base/error.h"
@@ -326,11 +329,12 @@ void IsoLayers::drawTile(Tracer& tracer, size_t number) {
 
 /// The tile has no smaller part.
 void IsoLayers::throwTooLarge(size_t number, uint64_t taken, uint64_t bytes) const {
-  throw UsageError(
-      "isosurfaces: the splats in the {0}x{0} pixels at {1},{2} are too many (they take {3} KiB, and have "
-      "{4} KiB of the "
-      "memory); give more --memory, or a larger --lod-pixels",
-      kTileSide, number % columns_ * kTileSide, number / columns_ * kTileSide, taken >> 10, bytes >> 10);
+  throw TooLittleMemory(
+      fmt::format(
+          "isosurfaces: the splats in the {0}x{0} pixels at {1},{2} are too many (they take {3} KiB, and "
+          "have {4} KiB of the memory); give more --memory, or a larger --lod-pixels",
+          kTileSide, number % columns_ * kTileSide, number / columns_ * kTileSide, taken >> 10, bytes >> 10),
+      size_);
 }
 
 /// Tiles that all threads may trace at a time, then those that half of them may, and so on. Tracers keep what they took, so each

@@ -73,6 +73,17 @@ class ServerMemory(unittest.TestCase):
             self.assertRegex("\n".join(told), rf"^--viewer-memory {memory} MiB: too little for 3840x2160 pixels of this cache, which "
                                               rf"need \d+ MiB; the picture has 1/{reduction} of them each way$")
 
+    def test_a_viewer_is_told_of_its_own_memory_alone(self):
+        """Isosurfaces whose splats lie in one tile, so that fewer pixels do not help."""
+        with serving(program, [self.cache], "--viewer-memory", "64M", "--memory", "64M", "--backend", "cpu") as server:
+            viewer = Viewer(server)
+            shown = viewer.open()["state"]
+            low, high = viewer.facts["scalars"][0]["low"], viewer.facts["scalars"][0]["high"]
+            shown |= {"isovalues": [low + (high - low) * (n + 0.5) / 32 for n in range(32)], "lod_pixels": 0}
+            shown["camera"]["parallel_scale"] *= 10
+            viewer.view(shown)
+            self.assertEqual(viewer.picture(), "--viewer-memory 64 MiB: too little for 64x48 pixels of this cache")
+
     def test_pictures_of_usual_sizes_are_drawn_while_others_are_sent(self):
         message, told = self.look(512, (1280, 800))
         self.assertEqual((size_of(message), told), ((1280, 800), []))

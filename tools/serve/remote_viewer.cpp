@@ -201,8 +201,9 @@ class RemoteViewer::Work {
   }
 
   std::string tooLittle(ImageSize size) const {
-    return fmt::format("--viewer-memory {}: too little for {}x{} pixels of this cache, which need {} MiB",
-                       byteText(limits_.memory_bytes), size.width, size.height, (least_bytes_ >> 20) + 1);
+    return fmt::format("--viewer-memory {}: too little for {}x{} pixels of this cache{}",
+                       byteText(limits_.memory_bytes), size.width, size.height,
+                       least_bytes_ == 0 ? "" : fmt::format(", which need {} MiB", (least_bytes_ >> 20) + 1));
   }
 
   /// Sends the newest picture, if there is one.
@@ -288,7 +289,7 @@ class RemoteViewer::Work {
   std::deque<Asked> asked_;
   std::string look_;          // all of the last request but its camera and step
   int reduction_ = 1;         // of the pictures of look_, as its memory allows
-  uint64_t least_bytes_ = 0;  // that it would need for all pixels
+  uint64_t least_bytes_ = 0;  // that it would need for all pixels, if that is known
   std::pair<ImageSize, int> reduction_said_;
   LineQuality line_;
   uint32_t pictures_ = 0;

@@ -176,7 +176,6 @@ std::string ServedCaches::errorText(std::string text) const {
     for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
       text.replace(at, from.size(), to);
   };
-  replaceAll("--memory", "the server's --viewer-memory");
   for (const Served& cache : caches_)
     for (const fs::path& path : {cache.reader.path(), cache.reader.cachePath()})
       replaceAll(path.string(), cache.name);
