@@ -37,6 +37,11 @@ constexpr size_t kNodesPerTask = 16384;
 
 CacheReader openAtLastStep(const std::filesystem::path& path) {
   CacheReader first(path);
+  if (const std::vector<OwnBlanks>& sets = first.seriesManifest().own_blanks; !sets.empty())
+    throw UsageError(
+        "{}: {} has values at other samples than {}, and a cache of steps has scalars of the same samples "
+        "alone: convert its steps anew, with --scalar",
+        path.string(), sets[0].variables[0], first.seriesManifest().variables[0].name);
   const uint64_t last = first.series().steps.size() - 1;
   return last == 0 ? std::move(first) : first.atStep(last);
 }

@@ -216,6 +216,8 @@ class MeshFiles(MeshCase):
         self.assertIn("high has values at other samples than low", refused.stderr)
         refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache, "--add-scalar", "high")
         self.assertIn("already has a scalar 'high'", refused.stderr)
+        refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache, "--add-steps")
+        self.assertIn("high has values at other samples than low", refused.stderr)
         manifest = cache / "blanks.1" / "manifest.json"
         manifest.write_text(manifest.read_text().replace('"apart"', '"other"'))
         refused = self.run_program("render", cache, "-o", self.folder / "p.png", "--scalar", "high")
