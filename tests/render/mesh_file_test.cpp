@@ -204,8 +204,11 @@ TEST(CurveText, LinesEndAtAnotherIdOrAnEmptyLine) {
 TEST(CurveText, RefusesWhatItCannotRead) {
   const std::string head = "x,y,z,speed\n";
   EXPECT_EQ(refusalOfCurves(head + "1,2,3,4\n1,2,3\n"), "a.csv: line 3: has 3 columns; expected 4");
-  EXPECT_EQ(refusalOfCurves(head + "1,2,three,4"), "a.csv: line 2: found 'three' for z; expected a number");
-  EXPECT_EQ(refusalOfCurves(head + "1,nan,3,4"), "a.csv: line 2: found 'nan' for y; expected a number");
+  for (const auto& [line, found] :
+       {std::pair("1,2,three,4", "'three' for z"), std::pair("1,nan,3,4", "'nan' for y"),
+        std::pair("1e39,2,3,4", "'1e39' for x")})
+    EXPECT_EQ(refusalOfCurves(head + line),
+              std::string("a.csv: line 2: found ") + found + "; expected a number up to 1e+38");
   EXPECT_EQ(refusalOfCurves(head + "1,2,3,fast", "speed"),
             "a.csv: line 2: found 'fast' for speed; expected a number");
   EXPECT_EQ(refusalOfCurves(head + "1,2,3,4", "sped"),
