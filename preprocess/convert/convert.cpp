@@ -138,7 +138,7 @@ using ScalarSet = std::vector<uint32_t>;
 
 /// Scalars by where they have values.
 struct ScalarSets {
-  /// Of one set all scalars have values at the same samples. The largest set is the first, of several the one with the most
+  /// All scalars of a set have values at the same samples. The largest set is the first, of several the one with the most
   /// values; then they are in the order of their first scalars.
   std::vector<ScalarSet> sets;
   ScalarSet without_values;  // at any sample

@@ -34,7 +34,7 @@ inline void readGrid(const GridSource& source) {
   }
 }
 
-/// The same of the first points and cells of every piece.
+/// Does the same with the first points and cells of every piece.
 inline void readMesh(const MeshSource& source) {
   constexpr uint64_t kMax = 4096;
   std::vector<uint32_t> of_points, of_cells;

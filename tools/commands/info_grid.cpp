@@ -214,8 +214,7 @@ void printScalars(const GridInfo& info) {
     if (const uint64_t missing = info.statistics.missing[s]; missing > 0)
       printLine(
           "          {} more of its values {} not finite or missing; `convert` keeps the scalars that differ "
-          "so "
-          "apart (of a series it leaves them out)",
+          "so apart (of a series it leaves them out)",
           missing, missing == 1 ? "is" : "are");
   }
   std::string names;

@@ -193,7 +193,7 @@ void beginThreads(unsigned count) {
 }
 
 py::dict convertSource(const DataSource& source, ConvertOptions options, const py::object& progress) {
-  // Of a step to which others are to be added, all scalars have the same samples.
+  // All scalars of a step to which others will be added have the same samples.
   if (!options.time) options.differing = DifferingScalars::kKeepApart;
   ConvertReport report;
   beginThreads(options.threads);
