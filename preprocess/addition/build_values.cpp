@@ -9,6 +9,7 @@
 #include "preprocess/grid/parallel.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/values_codec.h"
 
@@ -206,7 +207,8 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
 }
 
 void ValueBuilder::encode(uint32_t position, BrickSplats& brick, Built& built) const {
-  thread_local StepReferences::Scratch scratch;
+  static const PerThread<StepReferences::Scratch> scratches;
+  StepReferences::Scratch& scratch = scratches.own();
   for (size_t v = 0; v < brick.variables.size(); ++v) {
     TimeReferences references;
     if (references_) references = references_->of((*order_)[position], v, scratch);

@@ -65,9 +65,9 @@ void freeMemory(Vector& values) {
 }
 
 /// Throws std::bad_alloc unless 32 MiB can be mapped now. Maps and unmaps them, which takes some
-/// microseconds. To be called before threads begin to work: glibc allocates a few bytes when a thread first
-/// uses a thread_local object, and ends the process if it cannot. Under a limit of address space (ulimit
-/// -v), buffers that just fit leave nothing for that.
+/// microseconds. To be called before threads begin to work: glibc and other libraries allocate a few bytes
+/// when a thread first uses them, and some end the process if they cannot. Under a limit of address space
+/// (ulimit -v), buffers that just fit leave nothing for that.
 void requireSpareMemory();
 
 }  // namespace curvisplat

@@ -1,13 +1,17 @@
-// Threads: how many an option asks for, their names in debuggers and in top, and a team of them that runs
-// one job after another.
+// Threads: how many an option asks for, their names in debuggers and in top, objects that each thread has of
+// its own, and a team of threads that runs one job after another.
 //
 // A WorkerTeam owns its threads: it starts them when it is made and joins them when it is destroyed. One
 // thread owns the team and starts its jobs; any thread may call the functions.
 #pragma once
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <new>
 #include <thread>
 #include <vector>
 
@@ -22,6 +26,33 @@ inline unsigned threadsOrCores(unsigned threads) {
 
 /// Names the calling thread. `name`: at most 15 characters.
 void nameThisThread(const char* name);
+
+/// Objects of which each thread has its own, such as scratch memory. Make it a `static` variable of a function:
+/// it lives as long as the process. A `thread_local` object with a destructor would do the same, but glibc ends
+/// the process if it has no memory to note that destructor; this throws.
+template <typename Object>
+class PerThread {
+ public:
+  PerThread() {
+    if (pthread_key_create(&key_, [](void* object) { delete static_cast<Object*>(object); }) != 0)
+      throw std::bad_alloc();
+  }
+  PerThread(const PerThread&) = delete;
+  PerThread& operator=(const PerThread&) = delete;
+
+  /// The calling thread's object. It is made, by its default constructor, when the thread first asks for it, and
+  /// destroyed when the thread ends; the main thread's stays until the process ends. Throws std::bad_alloc
+  /// where there is no memory for it.
+  Object& own() const {
+    if (void* const known = pthread_getspecific(key_)) return *static_cast<Object*>(known);
+    auto made = std::make_unique<Object>();
+    if (pthread_setspecific(key_, made.get()) != 0) throw std::bad_alloc();
+    return *made.release();
+  }
+
+ private:
+  pthread_key_t key_;
+};
 
 /// A team of threads that run one job after another together. Each thread's own state (scratch memory, zstd
 /// contexts) stays warm from one job to the next.

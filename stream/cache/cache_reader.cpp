@@ -14,6 +14,7 @@
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
 #include "stream/base/text.h"
+#include "stream/base/threads.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/series.h"
 #include "stream/cache/series_values.h"
@@ -108,7 +109,8 @@ struct CacheReader::State {
   /// Reads a brick's stream into the thread's scratch.
   static std::span<const std::byte> read(const InputFile& file, uint32_t brick, const Extent& extent,
                                          ReadTimes& times) {
-    thread_local std::vector<std::byte> scratch;
+    static const PerThread<std::vector<std::byte>> streams;
+    std::vector<std::byte>& scratch = streams.own();
     scratch.resize(extent.length);
     readInto(file, brick, extent, scratch, times);
     return scratch;
@@ -268,7 +270,8 @@ void CacheReader::State::decodeValues(const BrickOfVariable& of, std::span<const
     if (keeps) keep_copy();
   }
   if (!next) return;
-  thread_local SplatVariable later;
+  static const PerThread<SplatVariable> nexts;
+  SplatVariable& later = nexts.own();
   next->readValues(of, later);
   blendValues(out, arraysOf(std::as_const(later)), position.part);
 }

@@ -6,6 +6,7 @@
 
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/prediction.h"
 #include "stream/codec/values_codec.h"
@@ -21,8 +22,8 @@ float roundedUp(double value) {
 }
 
 DecodedGeometry& scratchGeometry() {
-  thread_local DecodedGeometry scratch;
-  return scratch;
+  static const PerThread<DecodedGeometry> scratch;
+  return scratch.own();
 }
 
 void checkInput(const BrickSplats& brick) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/planes.h"
 #include "stream/model/border_code.h"
@@ -67,8 +68,8 @@ class GeometryDecoder {
 
  private:
   static ShapeCodes& codes() {
-    thread_local ShapeCodes codes;
-    return codes;
+    static const PerThread<ShapeCodes> codes;
+    return codes.own();
   }
 
   void decodeRuns() {

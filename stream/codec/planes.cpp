@@ -8,6 +8,7 @@
 #include <new>
 
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
@@ -17,23 +18,31 @@ constexpr int kZstdLevel = 1;
 // Shorter planes share a block: a block's header and tables would cost more than they save.
 constexpr size_t kSmallestBlock = 2048;
 
-struct FreeCCtx {
-  void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
-};
-struct FreeDCtx {
-  void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
+/// A context of zstd. `make` and `free`: zstd's functions for its kind.
+template <typename Kind, Kind* (*make)(), size_t (*free)(Kind*)>
+class Context {
+ public:
+  Context() : context_(make()) {
+    if (!context_) throw std::bad_alloc();
+  }
+  ~Context() { free(context_); }
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+
+  Kind* get() const { return context_; }
+
+ private:
+  Kind* context_;
 };
 
 ZSTD_CCtx* compressor() {
-  thread_local std::unique_ptr<ZSTD_CCtx, FreeCCtx> context(ZSTD_createCCtx());
-  if (!context) throw std::bad_alloc();
-  return context.get();
+  static const PerThread<Context<ZSTD_CCtx, ZSTD_createCCtx, ZSTD_freeCCtx>> context;
+  return context.own().get();
 }
 
 ZSTD_DCtx* decompressor() {
-  thread_local std::unique_ptr<ZSTD_DCtx, FreeDCtx> context(ZSTD_createDCtx());
-  if (!context) throw std::bad_alloc();
-  return context.get();
+  static const PerThread<Context<ZSTD_DCtx, ZSTD_createDCtx, ZSTD_freeDCtx>> context;
+  return context.own().get();
 }
 
 size_t checked(size_t result) {
@@ -74,7 +83,8 @@ std::vector<std::byte> PlaneWriter::compress(std::span<const std::byte> header) 
 
   // Each flushed block adds three bytes of header and whatever zstd had buffered. What is returned has no such room, since
   // many bricks wait for being written.
-  thread_local std::vector<std::byte> scratch;
+  static const PerThread<std::vector<std::byte>> packed;
+  std::vector<std::byte>& scratch = packed.own();
   const size_t most = ZSTD_compressBound(bytes_.size()) + 64 * (ends_.size() + 1);
   if (scratch.size() < most) scratch.resize(most);
   ZSTD_outBuffer to{scratch.data(), most, 0};
@@ -102,7 +112,8 @@ PlaneReader::PlaneReader(std::span<const std::byte> frame, size_t unpacked_bytes
   const unsigned long long stated = ZSTD_getFrameContentSize(frame.data(), frame.size());
   if (stated != unpacked_bytes)
     throw Error("it does not begin with a zstd frame of {} unpacked bytes", unpacked_bytes);
-  thread_local std::vector<std::byte> scratch;
+  static const PerThread<std::vector<std::byte>> unpacked;
+  std::vector<std::byte>& scratch = unpacked.own();
   if (scratch.size() < unpacked_bytes) scratch.resize(unpacked_bytes);
   const size_t got =
       ZSTD_decompressDCtx(decompressor(), scratch.data(), unpacked_bytes, frame.data(), frame.size());

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 #include "stream/codec/planes.h"
 
 namespace curvisplat {
@@ -415,7 +416,8 @@ void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const 
   PlaneReader planes(bytes.subspan(sizeof header), unpacked);
   const std::vector<Row> rows = rowsFrom(planes.bytes(header.rows_bytes), count);
 
-  thread_local std::vector<uint32_t> scratch, expected;
+  static const PerThread<std::vector<uint32_t>> stored_codes, expected_codes;
+  std::vector<uint32_t>&scratch = stored_codes.own(), &expected = expected_codes.own();
   scratch.resize(count);
   uint32_t* codes = scratch.data();
   const auto decode = [&](size_t array, float* values, auto value) {

@@ -7,10 +7,12 @@
 #include <new>
 #include <semaphore>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "stream/base/compute_permits.h"
 #include "stream/base/memory.h"
+#include "stream/base/threads.h"
 #include "tests/support/memory_limit.h"
 
 namespace curvisplat {
@@ -143,6 +145,42 @@ TEST(ComputePermits, OfAThreadThatHoldsOneAreEnough) {
   }
   const Computing without(nullptr);
   EXPECT_TRUE(without.granted());
+}
+
+struct Counted {
+  Counted() { ++alive; }
+  ~Counted() { --alive; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+
+  static inline std::atomic<int> alive = 0;
+};
+
+TEST(PerThread, EachThreadHasAnObjectUntilItEnds) {
+  static const PerThread<Counted> objects;
+  const Counted* const here = &objects.own();
+  EXPECT_EQ(here, &objects.own());
+  std::thread([&] {
+    const Counted* const there = &objects.own();
+    EXPECT_NE(there, here);
+    EXPECT_EQ(there, &objects.own());
+    EXPECT_EQ(Counted::alive, 2);
+  }).join();
+  EXPECT_EQ(Counted::alive, 1);
+}
+
+struct FailsOnce {
+  FailsOnce() {
+    if (std::exchange(fails, false)) throw std::bad_alloc();
+  }
+
+  static inline bool fails = true;
+};
+
+TEST(PerThread, LackOfMemoryIsThrownAndCanBeTriedAgain) {
+  static const PerThread<FailsOnce> objects;
+  EXPECT_THROW(objects.own(), std::bad_alloc);
+  EXPECT_EQ(&objects.own(), &objects.own());
 }
 
 using test::mappedBytes;

@@ -6,6 +6,7 @@
 
 #include "preprocess/formats/common/byte_source.h"
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
@@ -22,7 +23,9 @@ constexpr size_t kBufferBytes = size_t{256} << 10;
 constexpr size_t kBeforeInteger = 7, kBehindInteger = 6;
 
 std::span<std::byte> threadBuffer() {
-  thread_local std::vector<std::byte> buffer(kBufferBytes);
+  static const PerThread<std::vector<std::byte>> buffers;
+  std::vector<std::byte>& buffer = buffers.own();
+  buffer.resize(kBufferBytes);
   return buffer;
 }
 

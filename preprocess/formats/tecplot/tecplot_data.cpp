@@ -8,6 +8,7 @@
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
@@ -47,7 +48,8 @@ void checkTecplotCounts(const std::string& file, size_t zones, uint64_t variable
 
 template <typename Value>
 void readTecplotValues(const TecplotValues& values, uint64_t first, std::span<Value> to) {
-  thread_local std::vector<std::byte> buffer;
+  static const PerThread<std::vector<std::byte>> buffers;
+  std::vector<std::byte>& buffer = buffers.own();
   const size_t width = bytesOf(values.type);
   const auto most = static_cast<size_t>(std::max<uint64_t>(1, kBufferBytes / values.stride));
   for (size_t done = 0; done < to.size(); done += most) {

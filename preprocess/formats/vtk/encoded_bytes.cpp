@@ -11,6 +11,7 @@
 
 #include "preprocess/formats/common/byte_source.h"
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
@@ -365,7 +366,8 @@ CompressedBytes::Place CompressedBytes::placeOf(uint64_t block) const {
 }
 
 std::span<const std::byte> CompressedBytes::unpacked(uint64_t block) const {
-  thread_local UnpackedBlock kept;
+  static const PerThread<UnpackedBlock> blocks;
+  UnpackedBlock& kept = blocks.own();
   if (kept.id == id_ && kept.block == block) return kept.bytes;
   kept.id = 0;
   const Place place = placeOf(block);

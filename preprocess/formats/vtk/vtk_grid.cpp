@@ -10,6 +10,7 @@
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
@@ -223,7 +224,9 @@ template <typename Value>
 void readTuples(const VtkArray& array, uint64_t first, uint64_t count,
                 std::span<const WantedComponent<Value>> wanted) {
   CURVISPLAT_CHECK(first <= array.tuples && count <= array.tuples - first);
-  thread_local std::vector<std::byte> buffer(kBufferBytes);
+  static const PerThread<std::vector<std::byte>> buffers;
+  std::vector<std::byte>& buffer = buffers.own();
+  buffer.resize(kBufferBytes);
   const uint64_t tuple_bytes = array.tupleBytes();
   const bool swap = array.order != kMachineByteOrder;
   for (uint64_t done = 0; done < count;) {

@@ -9,6 +9,7 @@
 #include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
@@ -21,7 +22,8 @@ constexpr uint64_t kMaxNumbers = uint64_t{1} << 24;  // of cells that are read t
 template <typename Use>
 void forEachTuple(const XdmfValues& values, uint64_t components, uint64_t first, uint64_t count,
                   const Use& use) {
-  thread_local std::vector<double> buffer;
+  static const PerThread<std::vector<double>> buffers;
+  std::vector<double>& buffer = buffers.own();
   const uint64_t most = std::max<uint64_t>(1, kBufferNumbers / components);
   for (uint64_t done = 0; done < count; done += most) {
     const uint64_t tuples = std::min(most, count - done);
