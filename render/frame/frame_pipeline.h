@@ -48,8 +48,8 @@ namespace curvisplat {
 struct SamplingWork;
 
 /// Draws what lies in the volume before the volume is drawn: surfaces, faces of the grid, slices and
-/// isosurfaces. They become layers of the plan's pixels. DESIGN.md, "Splats", "Surfaces and slices" and
-/// "Isosurfaces". Keeps the surfaces' memory from picture to picture.
+/// isosurfaces. They become layers of the plan's pixels. DESIGN.md, "Surfaces and slices" and "Isosurfaces".
+/// Keeps the surfaces' memory from picture to picture.
 class LayerDrawer {
  public:
   /// Gives the splats of some bricks to whoever samples them, and returns once all are sampled.
