@@ -3,7 +3,7 @@
 
     bench/real_grids.py FOLDER [--data DATA] [--only REGEX] [--views REGEX] [--pixels N] [--json OUT.json] [--table OUT.md]
 
-Without --data: the generated grids alone. With it: also those of the folder of real grids (bench/README.md says which).
+Without --data: the generated grids alone. With it: also those of the folder of real grids (real_grids_cases.cpp names them).
 Caches, marched pictures and VTK's pictures stay in FOLDER and are used again. FOLDER/sheet.png has all grids at half size,
 FOLDER/sheet_GRID.png one at full size; a row has for the uniform medium and then for the scalar curvisplat's picture, the truth,
 VTK's, and the differences of curvisplat and of VTK to the truth, around grey, 5 and 10 times as large as they are.

@@ -20,8 +20,8 @@ struct RealGrid {
   std::string scalar;
 };
 
-/// Generated grids that have the troubles of real ones; and every grid of `data` (the folder of real grids
-/// that bench/README.md names) that is there. Empty: the generated ones alone.
+/// Generated grids that have the troubles of real ones; and every grid of `data`, the folder of real grids,
+/// that is there. Empty: the generated ones alone.
 std::vector<RealGrid> realGrids(const std::filesystem::path& data);
 
 struct NamedView {
