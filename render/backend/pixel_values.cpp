@@ -146,7 +146,7 @@ class ValuePainter final : public Painter {
     loop_.emplace(threadsOrCores(resources.threads), resources.permits);
     bins_.emplace(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, loop_->threads());
     bins_->open();
-    queues_.emplace(size, resources.waiting_splats);
+    queues_.emplace(size, resources.waiting_splats, loop_->threads());
     constexpr float kNone = std::numeric_limits<float>::infinity(),
                     kUnknown = std::numeric_limits<float>::quiet_NaN();
     halves_.assign(TileSet::tilesOf(size), {});

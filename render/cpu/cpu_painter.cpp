@@ -68,6 +68,7 @@ struct CpuPainter::State {
   ImageSize size{0, 0};
   glm::vec4 background{0};
   size_t batch_splats = 0, waiting_splats = 0;
+  uint64_t prepared_bytes = kMinPreparedBytes;  // of a thread
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
   std::vector<uint32_t> touched;                   // tiles of a batch
@@ -186,10 +187,11 @@ void CpuPainter::State::allocate(ImageSize wanted, unsigned threads, const Paint
   if (!tiles) throw std::bad_alloc();
   open = std::make_unique<std::atomic<BlockMask>[]>(tileCount(wanted));
   bins.emplace(wanted, resources.batch_splats, kEntriesASplat * resources.batch_splats, threads);
-  queues.emplace(wanted, resources.waiting_splats);
+  queues.emplace(wanted, resources.waiting_splats, threads);
   size = wanted;
   batch_splats = resources.batch_splats;
   waiting_splats = resources.waiting_splats;
+  prepared_bytes = std::clamp(resources.preparedBytes() / threads, kMinPreparedBytes, kMaxPreparedBytes);
 }
 
 void CpuPainter::State::paintBatch() {
@@ -252,7 +254,7 @@ BlockMask CpuPainter::State::paintOrdered(size_t number, const OrderedTile& orde
       paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
                  static_cast<int>(number / columns) * kTileSide, open[number].load(std::memory_order_relaxed),
                  ordered.splats, ordered.order, ordered.lists, *table, colours ? &*colours : nullptr, shading,
-                 windows.tile(number)});
+                 windows.tile(number), prepared_bytes});
   open[number].store(left, std::memory_order_relaxed);
   return left;
 }

@@ -1,4 +1,3 @@
-#include <hwy/aligned_allocator.h>
 #include <hwy/cache_control.h>
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "render/cpu/tile.h"
+#include "stream/base/threads.h"
 
 // Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
 #undef HWY_TARGET_INCLUDE
@@ -203,17 +203,18 @@ BlockMask paintInOrder(const TileWork& work) {
 }
 
 /// Splats that are painted one block at a time, by the lists of the blocks. Each is prepared when it is first needed, with
-/// its fifteen neighbours.
+/// its fifteen neighbours, and kept until forget(). Each thread has one for all its tiles: memory that is freed and taken
+/// again costs a fault a page.
 class Listed {
  public:
-  explicit Listed(const TileWork& work)
-      : work_(work), ways_(work.order.size(), kUnknown), others_(work.order.size()) {
-    plains_ = hwy::AllocateAligned<Plain>(work.order.size());
-    if (!plains_) throw std::bad_alloc();
-    if (work.colours) coloured_.resize((work.order.size() + kLanes - 1) / kLanes);
+  /// For the splats of a tile; `work` must stay until they are painted.
+  void begin(const TileWork& work) {
+    work_ = &work;
+    places_.resize(work.order.size());
+    forget();
   }
 
-  /// Paints the splats of an order tile's list in its block. Whether that is saturated then. Some are looked up before the
+  /// Paints a part of an order tile's list in its block. Whether that is saturated then. Some are looked up before the
   /// first of them is blended: what was written as many narrow vectors is not ready at once to be read as a wide one.
   HWY_INLINE bool paint(const OrderList& list, int block) {
     constexpr size_t kAtOnce = 8;
@@ -223,30 +224,51 @@ class Listed {
       const OrderList some = list.subspan(begin, std::min(kAtOnce, list.size() - begin));
       for (size_t n = 0; n < some.size(); ++n) {
         const uint32_t number = numberOf(some[n]);
-        if (ways_[number] == kUnknown) prepare(number / kLanes);
-        if (ways_[number] == kPixels)
-          found[n] = lookUpBlock(pixelwise_[others_[number]].e, pixelwise_[others_[number]].scalar,
-                                 {work_.table, footprint_}, cornerOf(block), looked_up[n]);
-        else if (ways_[number] == kCutPixels)
-          found[n] = lookUpCut(work_, cuts_[others_[number]], footprint_, block, looked_up[n]);
+        if (places_[number].way == kUnknown) prepare(number / kLanes);
+        const auto [way, at] = places_[number];
+        if (way == kPixels)
+          found[n] = lookUpBlock(pixelwise_[at].e, pixelwise_[at].scalar, {work_->table, footprint_},
+                                 cornerOf(block), looked_up[n]);
+        else if (way == kCutPixels)
+          found[n] = lookUpCut(*work_, cuts_[at], footprint_, block, looked_up[n]);
       }
-      for (size_t n = 0; n < some.size();)
-        if (ways_[numberOf(some[n])] == kPlain) {
+      for (size_t n = 0; n < some.size();) {
+        const Place place = places_[numberOf(some[n])];
+        if (place.way == kPlain) {
           if (paintPlains(some, n, block)) return true;
         } else {
-          const bool is_looked_up =
-              ways_[numberOf(some[n])] == kPixels || ways_[numberOf(some[n])] == kCutPixels;
-          if (is_looked_up ? found[n] && paintFound(looked_up[n], numberOf(some[n]), block)
-                           : paintOther(numberOf(some[n]), block))
+          const bool is_looked_up = place.way == kPixels || place.way == kCutPixels;
+          if (is_looked_up ? found[n] && paintFound(looked_up[n], place, block) : paintOther(place, block))
             return true;
           ++n;
         }
+      }
     }
     return false;
   }
 
+  uint64_t preparedBytes() const {
+    return plains_.size() * sizeof(Plain) + lines_.size() * sizeof(LineSplat) +
+           pixelwise_.size() * sizeof(PixelwiseSplat) + cuts_.size() * sizeof(CutSplat) +
+           coloured_.size() * sizeof(Prepared);
+  }
+
+  void forget() {
+    std::fill(places_.begin(), places_.end(), Place{});
+    plains_.clear();
+    lines_.clear();
+    pixelwise_.clear();
+    cuts_.clear();
+    coloured_.clear();
+  }
+
  private:
-  enum Way : uint8_t { kUnknown, kPlain, kLine, kPixels, kCutPixels, kCut, kColoured, kNoWay };
+  enum Way : uint32_t { kUnknown, kPlain, kLine, kPixels, kCutPixels, kCut, kColoured, kNoWay };
+  /// Where a splat's preparation is: `at` counts in the vector of its way; of kColoured, in lanes of coloured_.
+  struct Place {
+    Way way = kUnknown;
+    uint32_t at = 0;
+  };
   struct LineSplat {
     Ellipse e;
     Along s;
@@ -258,27 +280,26 @@ class Listed {
     Lit lit;
   };
 
-  HWY_INLINE float* placeOf(int block) const { return work_.tile + block * kBlockFloats; }
+  HWY_INLINE float* placeOf(int block) const { return work_->tile + block * kBlockFloats; }
 
-  HWY_INLINE bool paintFound(const LookedUp& found, uint32_t number, int block) const {
-    const Lit lit = ways_[number] == kPixels ? pixelwise_[others_[number]].lit : cuts_[others_[number]].lit;
+  HWY_INLINE bool paintFound(const LookedUp& found, Place place, int block) const {
+    const Lit lit = place.way == kPixels ? pixelwise_[place.at].lit : cuts_[place.at].lit;
     return paintLookedUp(found, lit, placeOf(block));
   }
 
-  HWY_NOINLINE bool paintOther(uint32_t number, int block) {
-    const uint32_t other = others_[number];
-    switch (ways_[number]) {
+  HWY_NOINLINE bool paintOther(Place place, int block) {
+    switch (place.way) {
       case kLine: {
-        const LineSplat& line = lines_[other];
+        const LineSplat& line = lines_[place.at];
         return paintBlock(line.e, line.line, line.s, footprint_, placeOf(block), cornerOf(block));
       }
       case kCut:
-        return paintCutBlock(work_, cuts_[other], footprint_, block);
+        return paintCutBlock(*work_, cuts_[place.at], footprint_, block);
       case kColoured: {
         const BlockMask bit = BlockMask{1} << block;
-        const Prepared& group = coloured_[number / kLanes];
-        const size_t n = number % kLanes;
-        return (group.touched(n) & bit) != 0 && group.paint(work_, bit, bit, n, footprint_) != 0;
+        const Prepared& group = coloured_[place.at / kLanes];
+        const size_t n = place.at % kLanes;
+        return (group.touched(n) & bit) != 0 && group.paint(*work_, bit, bit, n, footprint_) != 0;
       }
       default:
         return false;
@@ -299,17 +320,20 @@ class Listed {
       through[v] = hn::Load(d, at + 3 * kBlockPixels + lane);
     }
     bool saturated = false;
+    Place next = places_[numberOf(list[n])];
     do {
-      if (n + 1 < list.size()) hwy::Prefetch(&plains_[numberOf(list[n + 1])]);
-      const Plain& plain = plains_[numberOf(list[n])];
+      const Plain& plain = plains_[next.at];
+      if (++n < list.size()) {
+        next = places_[numberOf(list[n])];
+        if (next.way == kPlain) hwy::Prefetch(&plains_[next.at]);
+      }
       V most = hn::Zero(d);
       for (size_t v = 0; v < kVectors; ++v) {
         blendPlain(plain, footprint_, corner, v * hn::Lanes(d), colour[v], through[v]);
         most = hn::Max(most, through[v]);
       }
-      ++n;
       saturated = isSaturated(most);
-    } while (!saturated && n < list.size() && ways_[numberOf(list[n])] == kPlain);
+    } while (!saturated && n < list.size() && next.way == kPlain);
     for (size_t v = 0; v < kVectors; ++v) {
       const size_t lane = v * hn::Lanes(d);
       for (int c = 0; c < 3; ++c) hn::Store(colour[v][c], d, at + c * kBlockPixels + lane);
@@ -320,59 +344,76 @@ class Listed {
 
   HWY_NOINLINE void prepare(size_t number) {
     const size_t begin = number * kLanes;
-    Prepared& group = work_.colours ? coloured_[number] : group_;
-    group.prepare(work_, begin);
+    Prepared& group = work_->colours ? coloured_.emplace_back() : group_;
+    group.prepare(*work_, begin);
     for (size_t n = 0; n < group.count; ++n) {
       const Visit visit{group.visits, group.fits, n};
       const BlockMask touched = group.touched(n);
-      ways_[begin + n] =
-          touched == 0 ? kNoWay : make(visit, touched, static_cast<size_t>(group.numbers.at[n]), begin + n);
+      places_[begin + n] =
+          touched == 0 ? Place{kNoWay} : make(visit, touched, static_cast<size_t>(group.numbers.at[n]));
     }
   }
 
-  HWY_INLINE Way make(const Visit& visit, BlockMask touched, size_t splat, size_t number) {
-    if (work_.colours) return kColoured;
+  /// `splat`: in the splats of the tile.
+  HWY_INLINE Place make(const Visit& visit, BlockMask touched, size_t splat) {
+    const auto last = [](const auto& prepared) { return static_cast<uint32_t>(prepared.size() - 1); };
+    if (work_->colours)
+      return {kColoured, last(coloured_) * uint32_t{kLanes} + static_cast<uint32_t>(visit.n)};
     if (visit.all.cut.at[visit.n] != 0) {
-      others_[number] = static_cast<uint32_t>(cuts_.size());
-      makeCut(work_, visit, splat, cuts_.emplace_back());
-      return cuts_.back().isLookedUp() ? kCutPixels : kCut;
+      makeCut(*work_, visit, splat, cuts_.emplace_back());
+      return {cuts_.back().isLookedUp() ? kCutPixels : kCut, last(cuts_)};
     }
     if (isPlain(visit)) {
-      makePlain(visit, &plains_[number]);
-      return kPlain;
+      makePlain(visit, &plains_.emplace_back());
+      return {kPlain, last(plains_)};
     }
     Polyline line;
-    if (fitsPolyline(work_, visit, std::popcount(touched) > 1, line)) {
-      others_[number] = static_cast<uint32_t>(lines_.size());
+    if (fitsPolyline(*work_, visit, std::popcount(touched) > 1, line)) {
       lines_.push_back({visit.ellipse(), alongPolyline(visit), line});
-      return kLine;
+      return {kLine, last(lines_)};
     }
-    others_[number] = static_cast<uint32_t>(pixelwise_.size());
-    pixelwise_.push_back({visit.ellipse(), visit.scalar(), visit.all.lit(work_, visit.n)});
-    return kPixels;
+    pixelwise_.push_back({visit.ellipse(), visit.scalar(), visit.all.lit(*work_, visit.n)});
+    return {kPixels, last(pixelwise_)};
   }
 
-  const TileWork& work_;
+  const TileWork* work_ = nullptr;
   const float* const footprint_ = footprintPolynomial();
   Prepared group_;
-  std::vector<Way> ways_;                      // [splat]
-  hwy::AlignedFreeUniquePtr<Plain[]> plains_;  // [splat], of those that are
-  std::vector<uint32_t> others_;               // [splat] in one of the following
+  std::vector<Place> places_;  // [splat]
+  std::vector<Plain> plains_;
   std::vector<LineSplat> lines_;
   std::vector<PixelwiseSplat> pixelwise_;
   std::vector<CutSplat> cuts_;
-  std::vector<Prepared> coloured_;  // [splat / 16], in pictures of two scalars
+  std::vector<Prepared> coloured_;  // in pictures of two scalars
 };
 
 static_assert(kOrderSide == kBlockSide);  // blocks are the order tiles, and have their numbers
 
-/// Each block in its own order.
+/// Each block in its own order. They advance together, by steps of depth: neighbours then need the same splats at about
+/// the same time, and what is prepared of a splat can be forgotten when there is much of it.
 BlockMask paintByLists(const TileWork& work) {
-  Listed listed(work);
+  constexpr size_t kStep = 64;  // splats of the longest list
+  const auto& lists = *work.lists;
+  const OrderList longest = *std::max_element(
+      lists.begin(), lists.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  static const PerThread<Listed> of_threads;
+  Listed& listed = of_threads.own();
+  listed.begin(work);
+  size_t painted[kOrderTiles] = {};  // of each list
   BlockMask open = work.open;
-  for (BlockMask left = open; left != 0;) {
-    const int block = takeFirst(left);
-    if (listed.paint((*work.lists)[static_cast<size_t>(block)], block)) open &= ~(BlockMask{1} << block);
+  for (size_t step = kStep; open != 0; step += kStep) {
+    const bool last = step >= longest.size();
+    const uint32_t end = last ? 0 : keyOf(longest[step]);
+    for (BlockMask left = open; left != 0;) {
+      const int block = takeFirst(left);
+      const OrderList rest = lists[static_cast<size_t>(block)].subspan(painted[block]);
+      size_t count = last ? rest.size() : 0;
+      while (!last && count < rest.size() && keyOf(rest[count]) < end) ++count;
+      if (listed.paint(rest.first(count), block)) open &= ~(BlockMask{1} << block);
+      painted[block] += count;
+      if (listed.preparedBytes() > work.prepared_bytes) listed.forget();
+    }
+    if (last) break;
   }
   return open;
 }

@@ -37,8 +37,10 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // Larger buffers do not make a frame faster: they only even out bricks that take different times.
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
-constexpr uint64_t kMaxWaitingBytes = 64 << 20;
-constexpr uint64_t kWaitingSplatBytes = sizeof(ScreenSplat) + sizeof(uint64_t);  // render/tiles/tile_queues.h
+constexpr uint64_t kMaxWaitingBytes = 96 << 20;
+// In the queues of tiles (render/tiles/tile_queues.h), and prepared.
+constexpr uint64_t kWaitingSplatBytes =
+    sizeof(ScreenSplat) + sizeof(uint64_t) + PaintResources::kPreparedBytesASplat;
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
 // picture of a slightly different size then needs no new pools, and the cache keeps its bricks.
 constexpr uint64_t kParts = 16;
@@ -66,7 +68,7 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   budget.workers =
       static_cast<unsigned>(std::min<uint64_t>(wanted, std::max(std::min(fit, kFirstWorkers), fit / 2)));
   uint64_t free = memory_bytes - taken - pools - budget.workers * worker_bytes;
-  const uint64_t waiting_bytes = std::min(free / 8, kMaxWaitingBytes);
+  const uint64_t waiting_bytes = std::min(free / 6, kMaxWaitingBytes);
   budget.waiting_splats += waiting_bytes / kWaitingSplatBytes;
   free -= waiting_bytes;
   const uint64_t share = free / 4;

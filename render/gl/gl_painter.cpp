@@ -197,7 +197,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   state_->allocate(size, state_->tables.windows());
   if (!same_size || !state_->bins || resources.waiting_splats != state_->waiting_splats) {
     state_->bins.emplace(size, kBatchSplats, kEntriesASplat * kBatchSplats, 1);
-    state_->queues.emplace(size, resources.waiting_splats);
+    state_->queues.emplace(size, resources.waiting_splats, 1u);
     state_->waiting_splats = resources.waiting_splats;
   }
   state_->bins->clear();

@@ -30,6 +30,10 @@ struct PaintResources {
       {};  // once it is requested, the rest may be left out: nobody wants the picture any more
   ComputePermits* permits =
       nullptr;  // that those who compute hold; outlive the frame. Null: there is no further bound
+
+  /// What all threads together may keep of splats that they have prepared, and need again.
+  uint64_t preparedBytes() const { return kPreparedBytesASplat * waiting_splats; }
+  static constexpr uint64_t kPreparedBytesASplat = 32;  // that may wait
 };
 
 /// How the pixels of a splat get their colours.

@@ -38,6 +38,10 @@ inline uint32_t numberOf(uint64_t item) {
   return item & ((1u << kItemNumberBits) - 1);
 }
 
+inline uint32_t keyOf(uint64_t item) {
+  return static_cast<uint32_t>(item >> kItemNumberBits);
+}
+
 /// The lists of one tile at a time. Keeps its memory between calls. One thread at a time.
 class TileLists {
  public:

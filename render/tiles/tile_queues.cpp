@@ -12,8 +12,9 @@ namespace {
 constexpr size_t kWorthPainting = 512, kShareOfWaiting = 1;
 // Splats that are prepared and sorted together; more would not stay in a core's cache.
 constexpr size_t kRound = 1024;
+constexpr size_t kPlacesOfARound = 2 * kRound;  // with records
 constexpr uint32_t kLastKey = INT32_MAX;
-// Of a thread: a round, the splats that wait in a tile, and what the painter prepares of them.
+// Of a thread: a round, the lists of a tile, and the least that the painter keeps of their splats.
 constexpr uint64_t kScratchBytes = 2 << 20;
 
 /// How many records lie before a splat.
@@ -34,13 +35,18 @@ constexpr size_t kAhead = 16;
 
 }  // namespace
 
-TileQueues::TileQueues(ImageSize size, size_t splats)
+/// Each thread has room for a round, beside what waits.
+size_t TileQueues::chunksFor(size_t splats, unsigned threads) {
+  return (splats + threads * kPlacesOfARound + kChunk - 1) / kChunk;
+}
+
+TileQueues::TileQueues(ImageSize size, size_t splats, unsigned threads)
     : columns_(TileSet::tilesAlong(size.width)),
       queues_(TileSet::tilesOf(size)),
-      memory_(std::make_unique_for_overwrite<ScreenSplat[]>((splats + kChunk - 1) / kChunk * kChunk)),
-      left_(std::make_unique_for_overwrite<OrderTileMask[]>((splats + kChunk - 1) / kChunk * kChunk)),
+      memory_(std::make_unique_for_overwrite<ScreenSplat[]>(chunksFor(splats, threads) * kChunk)),
+      left_(std::make_unique_for_overwrite<OrderTileMask[]>(chunksFor(splats, threads) * kChunk)),
       free_count_(0),
-      chunks_((splats + kChunk - 1) / kChunk) {
+      chunks_(chunksFor(splats, threads)) {
   clear();
 }
 
@@ -58,31 +64,46 @@ void TileQueues::clear() {
   full_ = false;
 }
 
-void TileQueues::append(Queue& queue, std::span<const ScreenSplat> splats, OrderTileMask left) {
-  for (const ScreenSplat& splat : splats) {
-    if (queue.count == queue.chunks.size() * kChunk) {
-      const MutexLock lock(mutex_);
-      if (free_.empty()) {
-        full_.store(true, std::memory_order_relaxed);
-        return;
-      }
-      queue.chunks.push_back(free_.back());
-      free_.pop_back();
-      free_count_.store(free_.size(), std::memory_order_relaxed);
-    }
-    const size_t place = queue.chunks[queue.count / kChunk] * kChunk + queue.count % kChunk;
-    memory_[place] = splat;
-    left_[place] = left;
-    ++queue.count;
-  }
+/// Where the next `places` of a queue lie in one chunk: at `count`, or where the next chunk begins.
+uint32_t TileQueues::nextFor(const Queue& queue, uint32_t count, uint32_t places) {
+  while (count % kChunk != 0 && count % kChunk + places > kChunk)
+    memory_[placeOf(queue, count++)] = ScreenCut{}.record();
+  return count;
 }
 
-void TileQueues::free(Queue& queue) {
+/// Makes room for `places` at queue.count. Whether there is memory for them.
+bool TileQueues::reserve(Queue& queue, uint32_t places) {
+  queue.count = nextFor(queue, queue.count, places);
+  if (queue.count < queue.chunks.size() * kChunk) return true;
   const MutexLock lock(mutex_);
-  free_.insert(free_.end(), queue.chunks.begin(), queue.chunks.end());
+  if (free_.empty()) return false;
+  queue.chunks.push_back(free_.back());
+  free_.pop_back();
   free_count_.store(free_.size(), std::memory_order_relaxed);
-  queue.chunks.clear();
-  queue.count = queue.looked_at = 0;
+  return true;
+}
+
+/// Adds a splat of the batch, with its records. Its place; none where there is no memory.
+std::optional<uint32_t> TileQueues::append(Queue& queue, const New& added, uint32_t entry) {
+  const uint32_t records = recordsBefore(added.splats, entry);
+  if (!reserve(queue, records + 1)) return {};
+  const size_t place = placeOf(queue, queue.count);
+  std::copy_n(&added.splats[entry - records], records + 1, &memory_[place]);
+  left_[place + records] = kUnknown;
+  queue.count += records + 1;
+  return static_cast<uint32_t>(place + records);
+}
+
+/// Leaves the first `count` places.
+void TileQueues::shorten(Queue& queue, uint32_t count) {
+  queue.count = queue.looked_at = count;
+  const size_t chunks = (count + kChunk - 1) / kChunk;
+  if (chunks == queue.chunks.size()) return;
+  const auto first = queue.chunks.begin() + static_cast<ptrdiff_t>(chunks);
+  const MutexLock lock(mutex_);
+  free_.insert(free_.end(), first, queue.chunks.end());
+  free_count_.store(free_.size(), std::memory_order_relaxed);
+  queue.chunks.erase(first, queue.chunks.end());
 }
 
 TileCorner TileQueues::cornerOf(size_t number) const {
@@ -90,35 +111,45 @@ TileCorner TileQueues::cornerOf(size_t number) const {
           static_cast<float>(static_cast<int>(number) / columns_ * kTileSide)};
 }
 
-/// Moves what waits into the scratch memory.
-void TileQueues::load(Queue& queue, const TileCorner& corner, Scratch& scratch) {
-  for (uint32_t n = 0, records = 0; n < queue.count; ++n) {
-    const size_t place = queue.chunks[n / kChunk] * kChunk + n % kChunk;
-    const ScreenSplat& splat = memory_[place];
-    scratch.splats.push_back(splat);
-    if (isRecord(splat)) {
+/// Lists what waits.
+void TileQueues::list(const Queue& queue, const TileCorner& corner, std::vector<Active>& active) const {
+  active.clear();
+  uint32_t records = 0;
+  for (uint32_t n = 0; n < queue.count; ++n) {
+    if (n % kChunk == 0) records = 0;
+    const size_t place = placeOf(queue, n);
+    if (isRecord(memory_[place])) {
       ++records;
       continue;
     }
     const OrderTileMask left = left_[place];
-    scratch.active.push_back({n, records, left == kUnknown ? orderTilesOf(corner, splat) : left});
+    active.push_back({static_cast<uint32_t>(place), records,
+                      left == kUnknown ? orderTilesOf(corner, memory_[place]) : left});
     records = 0;
   }
-  free(queue);
 }
 
-void TileQueues::store(Queue& queue, const Scratch& scratch) {
-  for (const Active& active : scratch.active)
-    append(queue, {&scratch.splats[active.splat - active.records], active.records + size_t{1}}, active.left);
-  queue.looked_at = queue.count;
+/// Leaves of the queue what is active, in the same order. Nothing moves backwards, so that it can be done in place.
+void TileQueues::compact(Queue& queue, std::vector<Active>& active) {
+  uint32_t count = 0;
+  for (Active& splat : active) {
+    const uint32_t places = splat.records + 1;
+    count = nextFor(queue, count, places);
+    const size_t to = placeOf(queue, count), from = splat.place - splat.records;
+    if (to != from) std::copy_n(&memory_[from], places, &memory_[to]);
+    splat.place = static_cast<uint32_t>(to + splat.records);
+    left_[splat.place] = splat.left;
+    count += places;
+  }
+  shorten(queue, count);
 }
 
 /// Lists what lies up to the front, and keeps in `active` what has more behind it.
-void TileQueues::listActive(uint32_t front, OrderTileMask open, Scratch& scratch) {
+void TileQueues::listActive(uint32_t front, OrderTileMask open, Scratch& scratch) const {
   for (Active& active : scratch.active) {
-    const ScreenSplat& splat = scratch.splats[active.splat];
+    const ScreenSplat& splat = memory_[active.place];
     active.left &= open;
-    if (splat.first <= front) active.left = scratch.lists.add(splat, active.splat, active.left, front);
+    if (splat.first <= front) active.left = scratch.lists.add(splat, active.place, active.left, front);
   }
   scratch.lists.end();
   std::erase_if(scratch.active, [](const Active& active) { return active.left == 0; });
@@ -135,31 +166,30 @@ void TileQueues::paint(size_t number, const New& added, uint64_t open, const Pai
     return;
   }
   const size_t fresh = queue.count - queue.looked_at + entries.size();
-  const bool has_space = free_count_.load(std::memory_order_relaxed) > chunks_ / 4;
-  if (!added.last && has_space && fresh < std::max(kWorthPainting, queue.looked_at / kShareOfWaiting)) {
-    for (size_t entry = 0; entry < entries.size(); ++entry) {
+  if (!added.last && hasSpace() && fresh < std::max(kWorthPainting, queue.looked_at / kShareOfWaiting)) {
+    for (size_t entry = 0; entry < entries.size() && !isFull(); ++entry) {
       prefetch(added, entry + kAhead);
-      const uint32_t n = entries[entry];
-      const uint32_t records = recordsBefore(added.splats, n);
-      append(queue, added.splats.subspan(n - records, records + size_t{1}), kUnknown);
+      if (!append(queue, added, entries[entry])) full_.store(true, std::memory_order_relaxed);
     }
     return;
   }
   Scratch& scratch = scratch_.local();
-  scratch.splats.clear();
-  scratch.active.clear();
   const TileCorner corner = cornerOf(number);
-  load(queue, corner, scratch);
+  list(queue, corner, scratch.active);
   size_t next = 0;
   do {
     const size_t worth = std::max(kRound, scratch.active.size() / kShareOfWaiting);
-    for (size_t round = 0; round < worth && next < entries.size(); ++round, ++next) {
+    for (size_t round = 0; next < entries.size() && (round < kRound || (round < worth && hasSpace()));
+         ++round, ++next) {
       prefetch(added, next + kAhead);
-      const uint32_t splat = entries[next], records = recordsBefore(added.splats, splat);
-      scratch.splats.insert(scratch.splats.end(), added.splats.begin() + (splat - records),
-                            added.splats.begin() + splat + 1);
-      scratch.active.push_back({static_cast<uint32_t>(scratch.splats.size() - 1), records,
-                                orderTilesOf(corner, added.splats[splat])});
+      const auto place = append(queue, added, entries[next]);
+      if (!place && round == 0) {
+        full_.store(true, std::memory_order_relaxed);
+        return;
+      }
+      if (!place) break;
+      scratch.active.push_back({*place, recordsBefore(added.splats, entries[next]),
+                                orderTilesOf(corner, added.splats[entries[next]])});
     }
     const uint32_t front = next < entries.size() ? added.splats[entries[next]].first
                            : added.last          ? kLastKey
@@ -167,9 +197,10 @@ void TileQueues::paint(size_t number, const New& added, uint64_t open, const Pai
     scratch.lists.begin(corner);
     listActive(front, open, scratch);
     if (!scratch.lists.order().empty())
-      open = paint({scratch.splats, scratch.lists.order(), &scratch.lists.lists()});
+      open = paint({{memory_.get(), chunks_ * kChunk}, scratch.lists.order(), &scratch.lists.lists()});
+    if (open == 0) scratch.active.clear();
+    compact(queue, scratch.active);
   } while (next < entries.size() && open != 0);
-  if (open != 0) store(queue, scratch);
 }
 
 }  // namespace curvisplat

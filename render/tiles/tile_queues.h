@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -45,8 +46,8 @@ class TileQueues {
   static constexpr uint64_t kAllOpen = ~uint64_t{0};
   static_assert(kOrderTiles <= 64);
 
-  /// At most `splats` wait in all tiles together, records counted.
-  TileQueues(ImageSize size, size_t splats);
+  /// At most `splats` wait in all tiles together, records counted; `threads` paint.
+  TileQueues(ImageSize size, size_t splats, unsigned threads);
   static uint64_t bytes(ImageSize size, size_t splats, unsigned threads);
 
   /// Nothing waits.
@@ -69,28 +70,35 @@ class TileQueues {
   static constexpr size_t kChunk = 32;  // splats and records
   static constexpr OrderTileMask kUnknown = 0;
 
+  /// A splat and its records lie in one chunk. What they leave of it at the end holds records of no splat.
   struct Queue {
     std::vector<uint32_t> chunks;
-    uint32_t count = 0;      // splats and records
-    uint32_t looked_at = 0;  // those that were there when the tile was last painted
+    uint32_t count = 0;      // places in the chunks that hold something
+    uint32_t looked_at = 0;  // those that did when the tile was last painted
   };
   struct Active {
-    uint32_t splat;      // in Scratch::splats; its records lie before it
+    uint32_t place;      // in memory_; its records lie before it
     uint32_t records;    // how many
     OrderTileMask left;  // where it has not been painted
   };
   struct Scratch {
-    std::vector<ScreenSplat> splats;
     std::vector<Active> active;
     TileLists lists;
   };
 
+  static size_t chunksFor(size_t splats, unsigned threads);
   TileCorner cornerOf(size_t number) const;
-  void load(Queue& queue, const TileCorner& corner, Scratch& scratch);
-  void store(Queue& queue, const Scratch& scratch);
-  void append(Queue& queue, std::span<const ScreenSplat> splats, OrderTileMask left);
-  void free(Queue& queue);
-  static void listActive(uint32_t front, OrderTileMask open, Scratch& scratch);
+  bool hasSpace() const { return free_count_.load(std::memory_order_relaxed) > chunks_ / 4; }
+  size_t placeOf(const Queue& queue, uint32_t n) const {
+    return queue.chunks[n / kChunk] * kChunk + n % kChunk;
+  }
+  uint32_t nextFor(const Queue& queue, uint32_t count, uint32_t places);
+  bool reserve(Queue& queue, uint32_t places);
+  std::optional<uint32_t> append(Queue& queue, const New& added, uint32_t entry);
+  void list(const Queue& queue, const TileCorner& corner, std::vector<Active>& active) const;
+  void compact(Queue& queue, std::vector<Active>& active);
+  void shorten(Queue& queue, uint32_t count);
+  void listActive(uint32_t front, OrderTileMask open, Scratch& scratch) const;
 
   const int columns_;
   std::vector<Queue> queues_;  // [tile]

@@ -147,7 +147,7 @@ void expectOrders(const Orders& found, const Orders& specified) {
 TEST(TileQueues, GiveEachTileItsOwnOrderHoweverSplatsAreBatched) {
   const auto splats = leaningSplats(1500, 3);
   const Orders specified = specifiedFor(splats);
-  TileQueues queues(kSize, 1 << 16);
+  TileQueues queues(kSize, 1 << 16, 2);
   expectOrders(ordersOf(queues, splats, {}), specified);
   expectOrders(ordersOf(queues, splats, std::vector<size_t>(50, 40)), specified);
   expectOrders(ordersOf(queues, splats, {1, 2, 3, 500, 7, 300, 300}), specified);
@@ -157,7 +157,7 @@ TEST(TileQueues, GiveEachTileItsOwnOrderHoweverSplatsAreBatched) {
 
 TEST(TileQueues, SayWhenMoreWaitThanTheyHold) {
   const auto splats = leaningSplats(1500, 4);
-  TileQueues queues(kSize, 200);
+  TileQueues queues(kSize, 200, 0);
   ordersOf(queues, splats, std::vector<size_t>(50, 40));
   EXPECT_TRUE(queues.isFull());
   queues.clear();
@@ -168,7 +168,7 @@ TEST(TileQueues, SplatsThatDoNotLeanNeverWait) {
   auto splats = leaningSplats(800, 5);
   for (ScreenSplat& splat : splats)
     if (!isRecord(splat)) splat.key_slope0 = splat.key_slope1 = 0, splat.key = splat.first;
-  TileQueues queues(kSize, 32);
+  TileQueues queues(kSize, 32, 0);
   expectOrders(ordersOf(queues, splats, std::vector<size_t>(50, 40)), specifiedFor(splats));
   EXPECT_FALSE(queues.isFull());
 }

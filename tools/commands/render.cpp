@@ -186,6 +186,7 @@ void render(const RenderArguments& given) {
   const ShownBox box = shownBox(manifest, options.scale, options.clip_box, arguments.annotations.shown);
   const CameraArguments camera = choice.picture.camera(
       arguments.camera, transfer_function, {box, options.size, has_box || options.clip_box.has_value()});
+  choice.picture.release();
   const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), box, options.size), series,
                                      arguments.steps, steps, arguments.camera.frames);
   const std::vector<uint64_t> numbers =
