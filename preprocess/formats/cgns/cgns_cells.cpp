@@ -40,10 +40,10 @@ void forEachPart(const std::vector<uint64_t>& begins, uint64_t first, uint64_t c
 
 }  // namespace
 
-CgnsCells::CgnsCells(const CgnsFile& file, const CgnsZone& zone, const std::filesystem::path& folder)
+CgnsCells::CgnsCells(const CgnsFile& file, const CgnsZone& zone, const ListSpools& spools)
     : file_(file.path().string()),
       zone_(zone.base + "/" + zone.name),
-      sections_(readCgnsSections(file, zone.sections, folder)) {
+      sections_(readCgnsSections(file, zone.sections, spools)) {
   first_face_.push_back(0);
   first_point_.push_back(0);
   for (const CgnsSection& section : sections_) {
@@ -65,7 +65,7 @@ CgnsCells::CgnsCells(const CgnsFile& file, const CgnsZone& zone, const std::file
   if (has_nface && faces_.empty())
     throw Error("{}: {} has cells of faces (NFACE_n) without faces (NGON_n); the file is damaged", file_,
                 zone_);
-  if (!faces_.empty() && !has_nface) findCellsOfFaces(folder);
+  if (!faces_.empty() && !has_nface) findCellsOfFaces(spools);
 }
 
 std::string CgnsCells::label() const {
@@ -104,7 +104,7 @@ void CgnsCells::countCells(const CgnsSection& section) {
 }
 
 /// The cells that are on the sides of faces.
-void CgnsCells::findCellsOfFaces(const std::filesystem::path& folder) {
+void CgnsCells::findCellsOfFaces(const ListSpools& spools) {
   for (const CgnsSection* const section : faces_)
     if (!section->parents.read)
       throw Error("{}: {} has neither cells (NFACE_n) nor ParentElements; expected one of them", file_,
@@ -137,7 +137,7 @@ void CgnsCells::findCellsOfFaces(const std::filesystem::path& folder) {
       [&](const auto& use) {
         forEachCell([&](uint64_t face, int64_t cell) { use(face, static_cast<uint64_t>(cell) - base); });
       },
-      std::make_shared<SpoolFile>(folder), folder);
+      spools);
   runs_.push_back({nullptr, cells_, cells});
   cells_ += cells;
   counts_.solid += cells;

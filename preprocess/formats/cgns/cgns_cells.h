@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,7 +16,7 @@ namespace curvisplat {
 class CgnsCells {
  public:
   /// Looks at the types of all elements of MIXED sections. `file` must outlive it. Throws Error if the zone is damaged.
-  CgnsCells(const CgnsFile& file, const CgnsZone& zone, const std::filesystem::path& folder);
+  CgnsCells(const CgnsFile& file, const CgnsZone& zone, const ListSpools& spools);
 
   uint64_t cells() const { return cells_; }
   /// Cells of which kind there are; `others`: elements of MIXED sections that are not solid.
@@ -38,7 +37,7 @@ class CgnsCells {
 
   std::string label() const;
   void countCells(const CgnsSection& section);
-  void findCellsOfFaces(const std::filesystem::path& folder);
+  void findCellsOfFaces(const ListSpools& spools);
   uint64_t faceOf(int64_t element) const;
   void readFaceBegins(uint64_t first, std::span<uint64_t> to) const;
   void readFacePoints(uint64_t first, std::span<uint64_t> to) const;

@@ -93,9 +93,8 @@ CgnsIntegers spooledIntegers(SpooledNumbers numbers) {
 
 class SectionReader {
  public:
-  SectionReader(const CgnsFile& file, double version, const CgnsNode& node,
-                const std::filesystem::path& folder)
-      : file_(file), version_(version), node_(node), folder_(folder) {}
+  SectionReader(const CgnsFile& file, double version, const CgnsNode& node, const ListSpools& spools)
+      : file_(file), version_(version), node_(node), spools_(spools) {}
 
   CgnsSection read();
 
@@ -112,7 +111,7 @@ class SectionReader {
   const CgnsFile& file_;
   const double version_;
   const CgnsNode& node_;
-  const std::filesystem::path& folder_;
+  const ListSpools& spools_;
 };
 
 void SectionReader::readRange(const std::vector<double>& range, CgnsSection& section) const {
@@ -183,7 +182,7 @@ void SectionReader::checkBegins(const CgnsSection& section) const {
 
 /// Of files before CGNS 3.4. Elements of NGON_n and NFACE_n are written without their lengths.
 void SectionReader::findBegins(CgnsSection& section) const {
-  NumberSpool<int64_t> begins(folder_), members(folder_);
+  NumberSpool<int64_t> begins(spools_.begins), members(spools_.items);
   const bool counted = section.type != kCgnsMixed;
   std::vector<int64_t> values;
   uint64_t left = 0, elements = 0;  // numbers of this element that are to come
@@ -227,10 +226,10 @@ CgnsElementKind cgnsElementKind(int64_t type, double version) {
 }
 
 std::vector<CgnsSection> readCgnsSections(const CgnsFile& file, const std::vector<CgnsNode>& nodes,
-                                          const std::filesystem::path& folder) {
+                                          const ListSpools& spools) {
   std::vector<CgnsSection> sections;
   const double version = versionOf(file);
-  for (const CgnsNode& node : nodes) sections.push_back(SectionReader(file, version, node, folder).read());
+  for (const CgnsNode& node : nodes) sections.push_back(SectionReader(file, version, node, spools).read());
   std::sort(sections.begin(), sections.end(),
             [](const CgnsSection& a, const CgnsSection& b) { return a.first < b.first; });
   for (size_t n = 1; n < sections.size(); ++n)

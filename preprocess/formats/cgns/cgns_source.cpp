@@ -150,7 +150,8 @@ CgnsMeshSource::CgnsMeshSource(std::shared_ptr<const CgnsFile> file, CgnsTree tr
                                const std::filesystem::path& folder)
     : file_(std::move(file)), tree_(std::move(tree)) {
   cells_.reserve(tree_.zones.size());  // cells hold pointers to their own sections
-  for (const CgnsZone& zone : tree_.zones) cells_.emplace_back(*file_, zone, folder);
+  const ListSpools spools(folder);
+  for (const CgnsZone& zone : tree_.zones) cells_.emplace_back(*file_, zone, spools);
   for (size_t n = 0; n < tree_.zones.size(); ++n) dropFieldsOfCells(n);
   describeZones(*file_, tree_, time_step, description_);
   for (size_t n = 0; n < tree_.zones.size(); ++n)

@@ -170,7 +170,7 @@ void ColumnsSource::spoolHeights(const std::filesystem::path& folder) {
   for (const size_t dim : heights_.of_faces->dims)
     if (dim != map_.face_dim && file_.dimensions()[dim].length == levels()) level_dim = dim;
   const ColumnsReader reader(file_, *heights_.of_faces, map_.face_dim, level_dim, description_.time_step);
-  NumberSpool<double> spool(folder);
+  NumberSpool<double> spool(std::make_shared<SpoolFile>(folder));
   for (uint64_t level = 0; level < levels(); ++level) {
     std::vector<double> sums(map_.nodes, 0.0);
     std::vector<uint32_t> counts(map_.nodes, 0);
@@ -192,7 +192,7 @@ void ColumnsSource::spoolHeights(const std::filesystem::path& folder) {
 void ColumnsSource::spoolHeightsOfNodes(const std::filesystem::path& folder) {
   const ColumnsReader reader(file_, *heights_.of_nodes, map_.node_dim, scalars_.layer_dim,
                              description_.time_step);
-  NumberSpool<double> spool(folder);
+  NumberSpool<double> spool(std::make_shared<SpoolFile>(folder));
   for (uint64_t level = 0; level < levels(); ++level) {
     const auto heights = reader.read<double>(0, map_.nodes, level, 1);
     for (uint64_t node = 0; node < map_.nodes; ++node) spool.add(heights.value(node, 0) * heights_.scale);

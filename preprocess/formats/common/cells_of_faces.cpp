@@ -64,8 +64,7 @@ LoadedFaces load(const FaceLists& lists, const CellChunk& chunk) {
 
 }  // namespace
 
-CellFaces sortFacesByCell(uint64_t cells, const ForEachSide& for_each_side,
-                          const std::shared_ptr<SpoolFile>& spool, const std::filesystem::path& folder) {
+CellFaces sortFacesByCell(uint64_t cells, const ForEachSide& for_each_side, const ListSpools& spools) {
   CellFaces result;
   result.cells = cells;
   uint64_t total = 0;
@@ -90,10 +89,11 @@ CellFaces sortFacesByCell(uint64_t cells, const ForEachSide& for_each_side,
     to_begins(std::as_bytes(std::span(&total, 1)));
   };
   // One file has one writer at a time.
-  result.begins.spool = std::make_shared<SpoolFile>(folder);
-  result.faces.spool = spool;
-  result.begins.offset = result.begins.spool->append([&](const SpoolFile::Sink& to_begins) {
-    result.faces.offset = spool->append([&](const SpoolFile::Sink& to_faces) { write(to_begins, to_faces); });
+  result.begins.spool = spools.begins;
+  result.faces.spool = spools.items;
+  result.begins.offset = spools.begins->append([&](const SpoolFile::Sink& to_begins) {
+    result.faces.offset =
+        spools.items->append([&](const SpoolFile::Sink& to_faces) { write(to_begins, to_faces); });
   });
   result.faces.count = total;
   result.begins.count = cells + 1;

@@ -32,8 +32,7 @@ struct CellFaces {
 using ForEachSide = std::function<void(const std::function<void(uint64_t face, uint64_t cell)>&)>;
 
 /// Sorts faces by cell, with a pass over all sides for each 500,000 cells. `cells`: more than any cell's number.
-CellFaces sortFacesByCell(uint64_t cells, const ForEachSide& for_each_side,
-                          const std::shared_ptr<SpoolFile>& spool, const std::filesystem::path& folder);
+CellFaces sortFacesByCell(uint64_t cells, const ForEachSide& for_each_side, const ListSpools& spools);
 
 /// The chunk of cells that follow one another whose faces are faces[begins[n] - begins[0], ...).
 struct CellChunk {

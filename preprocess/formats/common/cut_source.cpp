@@ -66,9 +66,11 @@ class CutSource final : public MeshSource {
   CutSource(std::unique_ptr<MeshSource> whole, bool cut, const std::filesystem::path& temporary_folder)
       : whole_(std::move(whole)), description_(whole_->description()), cut_(cut) {
     Counts counts;
+    const auto of_begins = std::make_shared<SpoolFile>(temporary_folder),
+               of_volumes = std::make_shared<SpoolFile>(temporary_folder);
     for (uint32_t piece = 0; piece < description_.pieces.size(); ++piece) {
-      NumberSpool<uint64_t> begins(temporary_folder);
-      NumberSpool<double> volumes(temporary_folder);
+      NumberSpool<uint64_t> begins(of_begins);
+      NumberSpool<double> volumes(of_volumes);
       description_.pieces[piece].cells = measureParts(piece, begins, volumes, counts);
       begins_.push_back(begins.finish());
       volumes_.push_back(volumes.finish());

@@ -43,6 +43,15 @@ class SpoolFile {
   std::unique_ptr<NamelessFile> file_;  // created under the mutex, before the first append() returns
 };
 
+/// Two files for lists of several lengths: where each list begins, and the items of all. Lists of all pieces share
+/// them, since each open file takes two of the process's descriptors.
+struct ListSpools {
+  explicit ListSpools(const std::filesystem::path& folder)
+      : begins(std::make_shared<SpoolFile>(folder)), items(std::make_shared<SpoolFile>(folder)) {}
+
+  std::shared_ptr<SpoolFile> begins, items;
+};
+
 /// Bytes that are produced at the first read and then kept in a spool file.
 class SpooledBytes final : public ByteSource {
  public:
@@ -84,14 +93,13 @@ struct SpooledNumbers {
   }
 };
 
-/// Writes numbers to a spool file of its own, some at a time. For one thread.
+/// Writes numbers to a spool file, some at a time. For one thread. Several lists may share the file if they
+/// are written one after the other.
 template <typename Value>
 class NumberSpool {
  public:
   static_assert(sizeof(Value) == 8);
-  explicit NumberSpool(const std::filesystem::path& folder) {
-    numbers_.spool = std::make_shared<SpoolFile>(folder);
-  }
+  explicit NumberSpool(std::shared_ptr<SpoolFile> spool) { numbers_.spool = std::move(spool); }
   void add(Value value) {
     pending_.push_back(value);
     ++added_;

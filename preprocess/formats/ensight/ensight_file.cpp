@@ -57,8 +57,8 @@ std::vector<double> EnsightList::all() const {
 }
 
 EnsightFile::EnsightFile(std::shared_ptr<const PooledFile> file, std::optional<bool> binary,
-                         const std::filesystem::path& folder)
-    : file_(std::move(file)), spool_(folder) {
+                         const EnsightScratch& scratch)
+    : file_(std::move(file)), spool_(scratch.spools.items) {
   std::array<char, kTextBytes> begin{};
   const size_t shown = std::min<uint64_t>(begin.size(), file_->size());
   file_->readAt(0, std::as_writable_bytes(std::span(begin).first(shown)));

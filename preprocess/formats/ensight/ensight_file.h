@@ -29,12 +29,20 @@ struct EnsightList {
   std::vector<double> all() const;
 };
 
+/// What the readers of a case share, so that any number of variables takes few open files.
+struct EnsightScratch {
+  explicit EnsightScratch(const std::filesystem::path& folder) : spools(folder) {}
+
+  std::shared_ptr<OpenFiles> pool = std::make_shared<OpenFiles>();
+  ListSpools spools;  // items: numbers of all files; begins: of polyhedra
+};
+
 /// For one thread: texts and lists, in their order.
 class EnsightFile {
  public:
   /// `binary`: whether it has to be; nullopt: as a geometry file itself tells, whose first text says so.
   EnsightFile(std::shared_ptr<const PooledFile> file, std::optional<bool> binary,
-              const std::filesystem::path& folder);
+              const EnsightScratch& scratch);
 
   bool binary() const { return binary_; }
   bool swap() const { return swap_; }

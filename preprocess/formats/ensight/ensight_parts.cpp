@@ -50,9 +50,9 @@ EnsightElements elementsOf(const std::string& type) {
 
 class GeometryReader {
  public:
-  GeometryReader(const std::filesystem::path& path, const std::filesystem::path& folder)
-      : file_(std::make_shared<const PooledFile>(std::make_shared<OpenFiles>(), path), std::nullopt, folder),
-        folder_(folder) {}
+  GeometryReader(const std::filesystem::path& path, const EnsightScratch& scratch)
+      : file_(std::make_shared<const PooledFile>(scratch.pool, path), std::nullopt, scratch),
+        scratch_(scratch) {}
 
   EnsightGeometry run();
 
@@ -66,7 +66,7 @@ class GeometryReader {
   SpooledNumbers beginsOf(const EnsightList& lengths);
 
   EnsightFile file_;
-  const std::filesystem::path& folder_;
+  const EnsightScratch& scratch_;
   bool node_ids_ = false, element_ids_ = false;
   std::string next_;  // keyword
   EnsightGeometry geometry_;
@@ -101,7 +101,7 @@ void GeometryReader::readCoordinates(EnsightPart& part) {
 
 /// Where each of some lists begins, from their lengths.
 SpooledNumbers GeometryReader::beginsOf(const EnsightList& lengths) {
-  NumberSpool<uint64_t> begins(folder_);
+  NumberSpool<uint64_t> begins(scratch_.spools.begins);
   file_.finish();
   uint64_t total = 0;
   std::vector<double> values;
@@ -240,8 +240,8 @@ EnsightGeometry GeometryReader::run() {
 
 }  // namespace
 
-EnsightGeometry readEnsightGeometry(const std::filesystem::path& path, const std::filesystem::path& folder) {
-  return GeometryReader(path, folder).run();
+EnsightGeometry readEnsightGeometry(const std::filesystem::path& path, const EnsightScratch& scratch) {
+  return GeometryReader(path, scratch).run();
 }
 
 namespace {
@@ -249,11 +249,10 @@ namespace {
 class ValuesReader {
  public:
   ValuesReader(const EnsightVariable& variable, const EnsightGeometry& geometry,
-               const std::filesystem::path& folder)
+               const EnsightScratch& scratch)
       : variable_(variable),
         geometry_(geometry),
-        file_(std::make_shared<const PooledFile>(std::make_shared<OpenFiles>(), variable.file),
-              geometry.binary, folder) {
+        file_(std::make_shared<const PooledFile>(scratch.pool, variable.file), geometry.binary, scratch) {
     file_.setSwap(geometry.swap);
   }
 
@@ -328,8 +327,8 @@ std::vector<EnsightValues> ValuesReader::run() {
 }  // namespace
 
 std::vector<EnsightValues> readEnsightValues(const EnsightVariable& variable, const EnsightGeometry& geometry,
-                                             const std::filesystem::path& folder) {
-  return ValuesReader(variable, geometry, folder).run();
+                                             const EnsightScratch& scratch) {
+  return ValuesReader(variable, geometry, scratch).run();
 }
 
 }  // namespace curvisplat

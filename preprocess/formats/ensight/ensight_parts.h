@@ -52,7 +52,7 @@ struct EnsightGeometry {
 };
 
 /// Reads the parts of a geometry file. Throws Error if it is damaged.
-EnsightGeometry readEnsightGeometry(const std::filesystem::path& path, const std::filesystem::path& folder);
+EnsightGeometry readEnsightGeometry(const std::filesystem::path& path, const EnsightScratch& scratch);
 
 /// The values of a variable on a part. Values at nodes have one list; values in elements have one for each
 /// of EnsightPart::elements, or one for a structured part. A list has all values of a component, then those
@@ -65,6 +65,6 @@ struct EnsightValues {
 /// The values of a variable on each part of the geometry. Throws Error if the file is damaged or does not
 /// fit the geometry.
 std::vector<EnsightValues> readEnsightValues(const EnsightVariable& variable, const EnsightGeometry& geometry,
-                                             const std::filesystem::path& folder);
+                                             const EnsightScratch& scratch);
 
 }  // namespace curvisplat

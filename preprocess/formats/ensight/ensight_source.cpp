@@ -58,7 +58,8 @@ void appendPolyhedra(const EnsightElements& elements, uint64_t first, uint64_t c
 
 EnsightData::EnsightData(const OpenGridOptions& options) {
   EnsightCase found = readEnsightCase(options.grid, options.namesFolder(), options.time_step);
-  geometry_ = readEnsightGeometry(found.geometry, options.temporary_folder);
+  const EnsightScratch scratch(options.temporary_folder);
+  geometry_ = readEnsightGeometry(found.geometry, scratch);
   description_.files = {options.grid.string(), found.geometry.string()};
   description_.times = std::move(found.times);
   description_.time_step = found.time_step;
@@ -66,7 +67,7 @@ EnsightData::EnsightData(const OpenGridOptions& options) {
   description_.coordinate_bytes = 4;
   for (const EnsightVariable& variable : found.variables) {
     description_.files.push_back(variable.file.string());
-    values_.push_back(readEnsightValues(variable, geometry_, options.temporary_folder));
+    values_.push_back(readEnsightValues(variable, geometry_, scratch));
   }
   chooseParts();
   describeParts();

@@ -126,9 +126,9 @@ bool FoamFile::exists(const std::filesystem::path& path) {
   return std::filesystem::is_regular_file(path, error) || std::filesystem::is_regular_file(packed, error);
 }
 
-FoamFile::FoamFile(const std::filesystem::path& path, std::shared_ptr<SpoolFile> spool,
+FoamFile::FoamFile(const std::filesystem::path& path, ListSpools spools,
                    const std::filesystem::path& temporary_folder, uint32_t processor)
-    : original_(path), spool_(std::move(spool)), temporary_folder_(temporary_folder) {
+    : original_(path), spools_(std::move(spools)) {
   if (!isRegularFile(path) && isRegularFile(path.string() + ".gz")) original_ += ".gz";
   std::filesystem::path plain = original_;
   if (UnpackedFile::recognises(InputFile(original_))) {
@@ -160,7 +160,7 @@ void FoamFile::enterProcessor(uint32_t processor) {
 }
 
 uint32_t FoamFile::processorsIn(const std::filesystem::path& path) {
-  FoamFile file(path, nullptr, {});
+  FoamFile file(path, ListSpools({}), {});
   Parser& in = *file.parser_;
   if (in.end() == in.file().size()) return 1;
   uint32_t count = 0;
@@ -196,9 +196,9 @@ FoamFile::~FoamFile() = default;
 
 FoamList FoamFile::numbers(size_t components) {
   Parser& in = *parser_;
-  FoamList list{spool_, 0, in.label()};
+  FoamList list{spools_.items, 0, in.label()};
   list.count *= components;
-  list.offset = spool_->append([&](const SpoolFile::Sink& sink) {
+  list.offset = spools_.items->append([&](const SpoolFile::Sink& sink) {
     Chunks<double> chunks(sink);
     if (binary_)
       in.binary(list.count, in.scalar_bytes, [&](std::span<const std::byte> bytes, size_t width) {
@@ -215,8 +215,8 @@ FoamList FoamFile::numbers(size_t components) {
 
 FoamList FoamFile::labels() {
   Parser& in = *parser_;
-  FoamList list{spool_, 0, in.label()};
-  list.offset = spool_->append([&](const SpoolFile::Sink& sink) {
+  FoamList list{spools_.items, 0, in.label()};
+  list.offset = spools_.items->append([&](const SpoolFile::Sink& sink) {
     Chunks<uint64_t> chunks(sink);
     in.addLabels(list.count, binary_, chunks);
     chunks.flush();
@@ -248,11 +248,11 @@ FoamFile::Faces FoamFile::faces() {
     labels.flush();
   };
   // One file has one writer at a time.
-  faces.begins.spool = std::make_shared<SpoolFile>(temporary_folder_);
-  faces.labels.spool = spool_;
-  faces.begins.offset = faces.begins.spool->append([&](const SpoolFile::Sink& to_begins) {
+  faces.begins.spool = spools_.begins;
+  faces.labels.spool = spools_.items;
+  faces.begins.offset = spools_.begins->append([&](const SpoolFile::Sink& to_begins) {
     faces.labels.offset =
-        spool_->append([&](const SpoolFile::Sink& to_labels) { write(to_begins, to_labels); });
+        spools_.items->append([&](const SpoolFile::Sink& to_labels) { write(to_begins, to_labels); });
   });
   in.expect(")");
   faces.begins.count = count + 1;

@@ -29,7 +29,7 @@ class FoamFile {
  public:
   /// Opens `path`, or `path`.gz where that is what there is; of a collated file, the processor's part. Throws Error
   /// if it is not a file of OpenFOAM.
-  FoamFile(const std::filesystem::path& path, std::shared_ptr<SpoolFile> spool,
+  FoamFile(const std::filesystem::path& path, ListSpools spools,
            const std::filesystem::path& temporary_folder, uint32_t processor = 0);
   FoamFile(FoamFile&&) noexcept;
   ~FoamFile();
@@ -64,8 +64,7 @@ class FoamFile {
   std::filesystem::path original_;
   std::unique_ptr<UnpackedFile> unpacked_;
   std::unique_ptr<Parser> parser_;
-  std::shared_ptr<SpoolFile> spool_;
-  std::filesystem::path temporary_folder_;
+  ListSpools spools_;
   std::string type_;
   bool binary_ = false;
 };

@@ -97,8 +97,7 @@ bool isFoamCase(const fs::path& path) {
 }
 
 FoamSource::FoamSource(const OpenGridOptions& options)
-    : spool_(std::make_shared<SpoolFile>(options.temporary_folder)),
-      temporary_folder_(options.temporary_folder) {
+    : spools_(options.temporary_folder), temporary_folder_(options.temporary_folder) {
   choosePieces(caseOf(options.grid));
   findTimes(options.time_step, options.grid);
   for (Piece& piece : pieces_) openPiece(piece);
@@ -204,7 +203,7 @@ void FoamSource::listFacesOfCells(Piece& piece, const FoamList& owner, const Foa
               if (values[n] < cells) use(first + n, values[n]);
           });
       },
-      spool_, temporary_folder_);
+      spools_);
 }
 
 void FoamSource::findFields() {

@@ -53,7 +53,7 @@ class FoamSource final : public MeshSource {
   void findTimes(std::optional<uint32_t> asked, const std::filesystem::path& shown);
   std::filesystem::path meshFile(const std::filesystem::path& folder, const char* name) const;
   FoamFile open(const Piece& piece, const std::filesystem::path& path) const {
-    return FoamFile(path, spool_, temporary_folder_, piece.processor);
+    return FoamFile(path, spools_, temporary_folder_, piece.processor);
   }
   void openPiece(Piece& piece);
   void listFacesOfCells(Piece& piece, const FoamList& owner, const FoamList& neighbour);
@@ -61,7 +61,7 @@ class FoamSource final : public MeshSource {
   void addField(const std::string& name, size_t components);
   const FoamList& valuesOf(uint32_t piece, size_t field, std::vector<double>& uniform) const;
 
-  std::shared_ptr<SpoolFile> spool_;
+  ListSpools spools_;
   std::filesystem::path temporary_folder_;
   std::vector<std::string> time_names_;
   std::vector<Piece> pieces_;

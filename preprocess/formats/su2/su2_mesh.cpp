@@ -81,7 +81,7 @@ CellKind kindOf(double type) {
 class MeshParser {
  public:
   MeshParser(const std::shared_ptr<const PooledFile>& file, const std::filesystem::path& folder)
-      : text_(file, 0, file->size()), folder_(folder) {}
+      : text_(file, 0, file->size()), spools_(folder) {}
 
   std::vector<Su2Zone> run();
 
@@ -102,7 +102,7 @@ class MeshParser {
   void endZone();
 
   TextReader text_;
-  const std::filesystem::path& folder_;
+  const MeshSpools spools_;
   uint64_t line_number_ = 0;
   std::string_view line_;
   std::array<double, kMaxWords> numbers_{};
@@ -207,7 +207,7 @@ std::vector<Su2Zone> MeshParser::run() {
       if (writer_) endZone();
       if (count(*value) != 3)
         throw Error("{}: is a mesh of {} dimensions (NDIME); expected 3", text_.file().name(), count(*value));
-      writer_.emplace(folder_);
+      writer_.emplace(spools_);
     } else if (const auto cells = valueOf("NELEM")) {
       if (!writer_) fail("elements precede NDIME; the file is damaged");
       readCells(count(*cells));

@@ -40,11 +40,21 @@ struct SpooledMesh {
   void readCells(uint64_t first, uint64_t count, MeshCells& out) const;
 };
 
-/// Writes a SpooledMesh point by point and cell by cell. For one thread.
+/// The spool files that the meshes of all zones share.
+struct MeshSpools {
+  explicit MeshSpools(const std::filesystem::path& folder)
+      : positions(std::make_shared<SpoolFile>(folder)),
+        begins(std::make_shared<SpoolFile>(folder)),
+        words(std::make_shared<SpoolFile>(folder)) {}
+
+  std::shared_ptr<SpoolFile> positions, begins, words;
+};
+
+/// Writes a SpooledMesh point by point and cell by cell. For one thread; one mesh is written at a time.
 class SpooledMeshWriter {
  public:
-  explicit SpooledMeshWriter(const std::filesystem::path& folder)
-      : positions_(folder), begins_(folder), words_(folder) {}
+  explicit SpooledMeshWriter(const MeshSpools& spools)
+      : positions_(spools.positions), begins_(spools.begins), words_(spools.words) {}
 
   void addPoint(double x, double y, double z);
   void addCell(CellKind kind, std::span<const uint64_t> corners);

@@ -41,13 +41,13 @@ std::vector<std::string_view> fieldsOf(std::string_view line) {
 }  // namespace
 
 Su2Restart::Su2Restart(std::shared_ptr<const PooledFile> file, uint64_t points,
-                       const std::filesystem::path& folder)
+                       const std::shared_ptr<SpoolFile>& spool)
     : file_(std::move(file)) {
   std::array<std::byte, sizeof(int32_t)> begin{};
   if (file_->size() >= begin.size()) file_->readAt(0, begin);
   swap_ = loadStored<int32_t>(begin.data(), true) == kMagic;
   binary_ = swap_ || loadStored<int32_t>(begin.data(), false) == kMagic;
-  binary_ ? openBinary(points) : readText(points, folder);
+  binary_ ? openBinary(points) : readText(points, spool);
   if (names_.empty()) throw Error("{}: has no variables besides positions", file_->name());
 }
 
@@ -86,7 +86,7 @@ void Su2Restart::openBinary(uint64_t points) {
   keepNames(names);
 }
 
-void Su2Restart::readText(uint64_t points, const std::filesystem::path& folder) {
+void Su2Restart::readText(uint64_t points, const std::shared_ptr<SpoolFile>& spool) {
   TextReader text(file_, 0, file_->size());
   const auto header = text.line();
   std::vector<std::string> names;
@@ -99,7 +99,7 @@ void Su2Restart::readText(uint64_t points, const std::filesystem::path& folder) 
     throw Error("{}: is not a restart file of SU2; expected the variables' names, or the number 535532",
                 file_->name());
   keepNames(names);
-  NumberSpool<double> values(folder);
+  NumberSpool<double> values(spool);
   for (uint64_t point = 0; point < points; ++point) {
     const auto line = text.line();
     if (!line) throw Error("{}: has {} points; expected {}, the mesh's", file_->name(), point, points);
@@ -205,10 +205,11 @@ void Su2Source::openRestarts(const OpenGridOptions& options) {
     throw Error("{}: has {} zones, but {} restart files are given; give one for each, in their order",
                 options.grid.string(), zones_.size(), files.size());
   const auto pool = std::make_shared<OpenFiles>();
+  const auto spool = std::make_shared<SpoolFile>(options.temporary_folder);
   for (size_t n = 0; n < files.size(); ++n) {
     const size_t piece = zones_.size() > 1 ? n : 0;
     restarts_.emplace_back(std::make_shared<const PooledFile>(pool, files[n]), zones_[piece].mesh.points(),
-                           options.temporary_folder);
+                           spool);
     description_.files.push_back(files[n].string());
     if (zones_.size() > 1)
       description_.notes.push_back(fmt::format("zone {} has the values of {}", n + 1, files[n].string()));

@@ -27,7 +27,8 @@ namespace curvisplat {
 class Su2Restart {
  public:
   /// An ASCII file goes to a spool file. Throws Error if it is damaged, or does not have `points` points.
-  Su2Restart(std::shared_ptr<const PooledFile> file, uint64_t points, const std::filesystem::path& folder);
+  Su2Restart(std::shared_ptr<const PooledFile> file, uint64_t points,
+             const std::shared_ptr<SpoolFile>& spool);
 
   /// Its variables, without the point's number and position.
   const std::vector<std::string>& names() const { return names_; }
@@ -37,7 +38,7 @@ class Su2Restart {
 
  private:
   void openBinary(uint64_t points);
-  void readText(uint64_t points, const std::filesystem::path& folder);
+  void readText(uint64_t points, const std::shared_ptr<SpoolFile>& spool);
   void keepNames(const std::vector<std::string>& all);
 
   std::shared_ptr<const PooledFile> file_;

@@ -57,7 +57,9 @@ const XdmfCellType* typeNamed(std::string name) {
 class Reader {
  public:
   explicit Reader(const OpenGridOptions& options)
-      : document_(options.grid), items_(document_, options.namesFolder()), folder_(options.temporary_folder) {
+      : document_(options.grid),
+        items_(document_, options.namesFolder()),
+        begins_(std::make_shared<SpoolFile>(options.temporary_folder)) {
     for (const pugi::xml_node grid : document_.domain().children("Grid")) findLeaves(grid, std::nullopt, 0);
     if (leaves_.empty()) throw Error("{}: has no Grid", name());
     chooseStep(options);
@@ -259,7 +261,7 @@ class Reader {
   /// Finds where each cell begins. `only`: the type of all, which then does not stand before them.
   void indexMixed(const XdmfCellType* only, const std::string& where, XdmfCells& cells) {
     constexpr uint64_t kAtOnce = 32 << 10;
-    NumberSpool<uint64_t> begins(folder_);
+    NumberSpool<uint64_t> begins(begins_);
     const uint64_t all = cells.connectivity->size();
     std::vector<double> window;
     uint64_t window_begin = 0, at = 0;
@@ -396,8 +398,8 @@ class Reader {
 
   XdmfDocument document_;
   XdmfItems items_;
-  const std::filesystem::path folder_;     // of temporary files
-  std::map<pugi::xml_node, Times> times_;  // of temporal collections
+  const std::shared_ptr<SpoolFile> begins_;  // of the cells of all grids
+  std::map<pugi::xml_node, Times> times_;    // of temporal collections
   std::vector<Leaf> leaves_;
   size_t visited_ = 0;
   XdmfFile file_;
