@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <string_view>
+#include <unordered_map>
 
 #include "stream/base/error.h"
 
@@ -311,14 +312,15 @@ std::vector<EnsightValues> ValuesReader::run() {
   values_.resize(geometry_.parts.size());
   file_.text();  // description
   next_ = file_.keyword();
+  std::unordered_map<uint64_t, size_t> parts;  // by their numbers; of equal ones the first
+  for (size_t n = 0; n < geometry_.parts.size(); ++n) parts.emplace(geometry_.parts[n].number, n);
   while (!next_.empty()) {
     const uint64_t number = next_ == "part" ? file_.integer() : 0;
-    const auto found = std::find_if(geometry_.parts.begin(), geometry_.parts.end(),
-                                    [&](const EnsightPart& part) { return part.number == number; });
-    if (next_ != "part" || found == geometry_.parts.end())
+    const auto found = parts.find(number);
+    if (next_ != "part" || found == parts.end())
       throw Error("{}: has '{}' {} where a part of the geometry is expected; the file is damaged",
                   file_.name(), printable(next_.substr(0, 40)), number);
-    readPart(static_cast<size_t>(found - geometry_.parts.begin()));
+    readPart(found->second);
   }
   file_.finish();
   return std::move(values_);

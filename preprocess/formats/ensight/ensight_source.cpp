@@ -54,6 +54,15 @@ void appendPolyhedra(const EnsightElements& elements, uint64_t first, uint64_t c
   }
 }
 
+/// `kept`: which elements stay, in their order.
+template <typename Element>
+void keepOnly(const std::vector<size_t>& kept, std::vector<Element>& all) {
+  std::vector<Element> left;
+  left.reserve(kept.size());
+  for (const size_t n : kept) left.push_back(std::move(all[n]));
+  all = std::move(left);
+}
+
 }  // namespace
 
 EnsightData::EnsightData(const OpenGridOptions& options) {
@@ -85,13 +94,15 @@ void EnsightData::chooseParts() {
     structured_ = structured_ || (part.structured && solid.back());
   }
   size_t others = 0, flat = 0;
-  for (size_t n = geometry_.parts.size(); n-- > 0;) {
-    const bool kept = solid[n] && geometry_.parts[n].structured == structured_;
-    if (kept) continue;
-    ++(solid[n] ? others : flat);
-    geometry_.parts.erase(geometry_.parts.begin() + static_cast<ptrdiff_t>(n));
-    for (auto& of_parts : values_) of_parts.erase(of_parts.begin() + static_cast<ptrdiff_t>(n));
+  std::vector<size_t> kept;
+  for (size_t n = 0; n < geometry_.parts.size(); ++n) {
+    if (solid[n] && geometry_.parts[n].structured == structured_)
+      kept.push_back(n);
+    else
+      ++(solid[n] ? others : flat);
   }
+  keepOnly(kept, geometry_.parts);
+  for (auto& of_parts : values_) keepOnly(kept, of_parts);
   if (geometry_.parts.empty())
     throw Error("{}: has no part with volumes ({} of points, lines or faces)", name, flat);
   if (flat > 0)
@@ -137,11 +148,11 @@ void EnsightData::describeUndefined(const std::string& name, const std::vector<E
 }
 
 void EnsightData::addScalars(const std::vector<EnsightVariable>& variables) {
+  std::set<std::string> taken;
   for (size_t n = 0; n < variables.size(); ++n) {
     const auto add = [&](std::string name, int component) {
-      const auto taken = [&](const GridScalar& other) { return other.name == name; };
-      if (std::any_of(description_.scalars.begin(), description_.scalars.end(), taken))
-        name += variables[n].centring == Centring::kCell ? ":cell" : ":node";
+      if (taken.count(name) > 0) name += variables[n].centring == Centring::kCell ? ":cell" : ":node";
+      taken.insert(name);
       GridScalar scalar;
       scalar.name = std::move(name);
       scalar.centring = variables[n].centring;

@@ -200,9 +200,10 @@ pugi::xml_node XdmfDocument::resolved(pugi::xml_node node) const {
     // Nothing that takes long to look up.
     const bool simple = path.size() < 1000 && path.starts_with('/') && path.find("//") == std::string::npos &&
                         path.find_first_of("(*|:") == std::string::npos;
-    pugi::xml_node found;
+    // Many grids refer to the same node.
+    pugi::xml_node& found = referred_[path];
     try {
-      if (simple) found = document_.select_node(path.c_str()).node();
+      if (simple && !found) found = document_.select_node(path.c_str()).node();
     } catch (const pugi::xpath_exception&) {
     }
     if (!found) throw Error("{} refers to {}, which the file does not have", describe(node), printable(path));

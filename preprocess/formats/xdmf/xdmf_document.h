@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <initializer_list>
+#include <map>
 #include <pugixml.hpp>
 #include <string>
 #include <string_view>
@@ -43,6 +44,7 @@ class XdmfDocument {
  private:
   std::filesystem::path path_;
   pugi::xml_document document_;
+  mutable std::map<std::string, pugi::xml_node> referred_;  // by their paths
   pugi::xml_node domain_;
 };
 

@@ -182,6 +182,7 @@ class Reader {
 
   XdmfGrid readGrid(const pugi::xml_node& node) {
     XdmfGrid grid;
+    attributes_of_grid_.clear();
     grid.name = xdmfAttribute(node, {"Name"});
     if (grid.name.empty()) grid.name = fmt::format("grid {}", file_.grids.size() + 1);
     const pugi::xml_node topology = document_.resolved(node.child("Topology"));
@@ -380,18 +381,14 @@ class Reader {
         attribute.components > kMaxComponents)
       throw Error("{} has {} numbers; expected {}, or some times as many", document_.describe(node),
                   attribute.values->size(), samples);
-    const auto known = [&](const XdmfAttribute& other) {
-      return other.name == attribute.name && other.centring == attribute.centring;
-    };
-    if (std::any_of(grid.attributes.begin(), grid.attributes.end(), known))
+    if (!attributes_of_grid_.emplace(attribute.name, attribute.centring).second)
       warn(fmt::format("a second attribute {} is ignored", attribute.name));
     else
       grid.attributes.push_back(std::move(attribute));
   }
 
   void warn(std::string warning) {
-    if (std::find(file_.warnings.begin(), file_.warnings.end(), warning) == file_.warnings.end())
-      file_.warnings.push_back(std::move(warning));
+    if (warned_.insert(warning).second) file_.warnings.push_back(std::move(warning));
   }
 
   static constexpr size_t kMaxGrids = 100'000;
@@ -401,6 +398,8 @@ class Reader {
   const std::shared_ptr<SpoolFile> begins_;  // of the cells of all grids
   std::map<pugi::xml_node, Times> times_;    // of temporal collections
   std::vector<Leaf> leaves_;
+  std::set<std::pair<std::string, Centring>> attributes_of_grid_;
+  std::set<std::string> warned_;
   size_t visited_ = 0;
   XdmfFile file_;
 };

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
+#include <tuple>
 
 #include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
@@ -42,12 +45,19 @@ Value pick(std::span<const double> tuple, int component) {
   return static_cast<Value>(std::sqrt(squares));
 }
 
-const XdmfAttribute* attributeNamed(const XdmfGrid& grid, const std::string& name, Centring centring,
-                                    uint64_t components) {
-  for (const XdmfAttribute& attribute : grid.attributes)
-    if (attribute.name == name && attribute.centring == centring && attribute.components == components)
-      return &attribute;
-  return nullptr;
+bool attributeComesBefore(const XdmfAttribute& a, const XdmfAttribute& b) {
+  return std::tie(a.name, a.centring) < std::tie(b.name, b.centring);
+}
+
+/// Null if the grid has no such attribute. Its attributes are sorted.
+const XdmfAttribute* attributeNamed(const XdmfGrid& grid, const XdmfScalar& scalar) {
+  const auto before = [](const XdmfAttribute& attribute, const XdmfScalar& wanted) {
+    return std::tie(attribute.name, attribute.centring) < std::tie(wanted.name, wanted.centring);
+  };
+  const auto found = std::lower_bound(grid.attributes.begin(), grid.attributes.end(), scalar, before);
+  const bool same = found != grid.attributes.end() && found->name == scalar.name &&
+                    found->centring == scalar.centring && found->components == scalar.components;
+  return same ? &*found : nullptr;
 }
 
 /// What is no number of a point becomes the largest, which is refused.
@@ -56,8 +66,8 @@ uint64_t pointOf(double number) {
                                          : std::numeric_limits<uint64_t>::max();
 }
 
-/// Files, times, warnings and scalars.
-std::vector<XdmfScalar> describe(const XdmfFile& file, GridDescription& description) {
+/// Files, times, warnings and scalars. Sorts the attributes of each grid.
+std::vector<XdmfScalar> describe(XdmfFile& file, GridDescription& description) {
   description.files = file.files;
   description.times = file.times;
   description.time_step = file.time_step;
@@ -68,20 +78,24 @@ std::vector<XdmfScalar> describe(const XdmfFile& file, GridDescription& descript
       if (grid.kind == XdmfGrid::Kind::kUniform || (places && places->valueBytes() == 8))
         description.coordinate_bytes = 8;
   std::vector<XdmfScalar> attributes, scalars;
-  for (const XdmfGrid& grid : file.grids)
+  std::vector<size_t> grids_with;  // [attribute]
+  std::map<std::tuple<std::string, Centring, uint64_t>, size_t> known;
+  for (XdmfGrid& grid : file.grids) {
     for (const XdmfAttribute& attribute : grid.attributes) {
-      const auto same = [&](const XdmfScalar& other) {
-        return other.name == attribute.name && other.centring == attribute.centring &&
-               other.components == attribute.components;
-      };
-      if (std::none_of(attributes.begin(), attributes.end(), same))
+      const auto [found, is_new] =
+          known.try_emplace({attribute.name, attribute.centring, attribute.components}, attributes.size());
+      if (is_new) {
         attributes.push_back({attribute.name, attribute.centring, attribute.components, 0});
+        grids_with.push_back(0);
+      }
+      ++grids_with[found->second];
     }
-  for (const XdmfScalar& attribute : attributes) {
-    const auto lacks = [&](const XdmfGrid& grid) {
-      return !attributeNamed(grid, attribute.name, attribute.centring, attribute.components);
-    };
-    const auto without = std::count_if(file.grids.begin(), file.grids.end(), lacks);
+    std::sort(grid.attributes.begin(), grid.attributes.end(), attributeComesBefore);
+  }
+  std::set<std::string> taken;
+  for (size_t n = 0; n < attributes.size(); ++n) {
+    const XdmfScalar& attribute = attributes[n];
+    const size_t without = file.grids.size() - grids_with[n];
     if (without > 0)
       description.warnings.push_back(
           fmt::format("{} of {} grids have no attribute {}; they are not drawn with it", without,
@@ -90,12 +104,10 @@ std::vector<XdmfScalar> describe(const XdmfFile& file, GridDescription& descript
       GridScalar scalar;
       scalar.centring = attribute.centring;
       scalar.name = attribute.name + suffix;
-      const auto taken = [&](const GridScalar& other) { return other.name == scalar.name; };
-      const std::vector<GridScalar>& known = description.scalars;
-      if (std::any_of(known.begin(), known.end(), taken) && scalar.centring == Centring::kCell)
+      if (taken.count(scalar.name) > 0 && scalar.centring == Centring::kCell)
         scalar.name = attribute.name + ":cell" + suffix;
-      if (std::any_of(known.begin(), known.end(), taken))
-        scalar.name += fmt::format(":{}", scalars.size() + 1);
+      if (taken.count(scalar.name) > 0) scalar.name += fmt::format(":{}", scalars.size() + 1);
+      taken.insert(scalar.name);
       description.scalars.push_back(std::move(scalar));
       scalars.push_back({attribute.name, attribute.centring, attribute.components, component});
     };
@@ -144,8 +156,7 @@ void XdmfMeshSource::readScalars(const XdmfGrid& grid, uint64_t first, uint64_t 
   for (size_t n = 0; n < scalars.size(); ++n) {
     const XdmfScalar& scalar = scalars_.at(scalars[n]);
     out[n].assign(count, std::numeric_limits<float>::quiet_NaN());
-    if (const XdmfAttribute* const attribute =
-            attributeNamed(grid, scalar.name, scalar.centring, scalar.components))
+    if (const XdmfAttribute* const attribute = attributeNamed(grid, scalar))
       forEachTuple(*attribute->values, scalar.components, first, count,
                    [&](uint64_t tuple, std::span<const double> values) {
                      out[n][tuple] = pick<float>(values, scalar.component);
@@ -262,8 +273,7 @@ void XdmfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
     std::vector<float>& to = out.scalars[n];
     to.assign(nodes, std::numeric_limits<float>::quiet_NaN());
     const XdmfScalar& scalar = scalars_.at(scalars[n]);
-    const XdmfAttribute* const attribute =
-        attributeNamed(grid, scalar.name, scalar.centring, scalar.components);
+    const XdmfAttribute* const attribute = attributeNamed(grid, scalar);
     if (!attribute) continue;
     const uint64_t less = scalar.centring == Centring::kCell ? 1 : 0;
     const uint64_t along = ni - less, nj = grid.nodes[1] - less;
