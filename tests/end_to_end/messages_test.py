@@ -107,6 +107,13 @@ class Messages(FormatCase):
         self.assertNotIn(chosen, again.stdout)
         self.assertEqual(picture.read_bytes(), once)
 
+    def test_a_temporary_folder_that_is_not_there(self):
+        grid = self.vti("a.vti", "T")
+        for folder in ("/there/is/none", str(grid), "x" * 5000):
+            done = subprocess.run([PROGRAM, "info", grid], env={**os.environ, "TMPDIR": folder}, capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 1)
+            self.assertRegex(done.stderr, f"^curvisplat: TMPDIR={folder}: .*; set TMPDIR to a directory for temporary files, or unset it\n$")
+
     def test_compressed_files_name_files_beside_them(self):
         steps = [self.vti(f"parts/{n}.vti", "p") for n in range(2)]
         pvd = "".join(f'<DataSet timestep="{n}" file="parts/{path.name}"/>' for n, path in enumerate(steps))

@@ -13,6 +13,7 @@
 #include <string>
 #include <system_error>
 
+#include "preprocess/formats/common/temporary_folder.h"
 #include "render/annotate/plot.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
@@ -281,7 +282,7 @@ void benchConversion(const BenchArguments& arguments) {
   if (arguments.memory) effort.memory_bytes = parseMemory("--memory", *arguments.memory);
   effort.threads = arguments.threads;
   effort.temporary_folder =
-      arguments.temporary_folder.empty() ? fs::temp_directory_path() : arguments.temporary_folder;
+      arguments.temporary_folder.empty() ? systemTemporaryFolder() : arguments.temporary_folder;
   std::error_code ignored;
   if (!fs::is_directory(effort.temporary_folder, ignored))
     throw Error("--tmp {}: no such directory", effort.temporary_folder.string());

@@ -13,6 +13,7 @@
 #include <string>
 #include <system_error>
 
+#include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/derived/derived_source.h"
 #include "preprocess/gradients/gradient_mesh.h"
 #include "preprocess/grid/grid_views.h"
@@ -119,7 +120,7 @@ std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const D
     source.release();
     return std::make_unique<GradientMesh>(
         std::make_unique<DerivedMeshSource>(std::unique_ptr<MeshSource>(mesh), derived), derived,
-        grid.temporary_folder.empty() ? std::filesystem::temp_directory_path() : grid.temporary_folder);
+        grid.temporary_folder.empty() ? systemTemporaryFolder() : grid.temporary_folder);
   }
   return std::make_unique<DerivedSource>(requireGrid(std::move(source), ""), derived);
 }

@@ -18,6 +18,7 @@
 #include <thread>
 #include <utility>
 
+#include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/common/unpacked_file.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_files.h"
@@ -159,7 +160,7 @@ std::string smallText(const fs::path& file) {
   if (error || bytes > kMaxText) return "";
   if (!UnpackedFile::recognises(InputFile(file))) return readTextFile(file);
   if (bytes > kMaxPacked) return "";
-  const UnpackedFile unpacked(file, fs::temp_directory_path());
+  const UnpackedFile unpacked(file, systemTemporaryFolder());
   return fs::file_size(unpacked.path(), error) > kMaxText || error ? "" : readTextFile(unpacked.path());
 }
 

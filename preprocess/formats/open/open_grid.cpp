@@ -16,6 +16,7 @@
 #include "preprocess/formats/cgns/cgns_source.h"
 #include "preprocess/formats/columns/columns_source.h"
 #include "preprocess/formats/common/cut_source.h"
+#include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/ensight/ensight_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
@@ -240,7 +241,7 @@ std::unique_ptr<DataSource> openInAnyOrder(const OpenGridOptions& options) {
 
 std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   OpenGridOptions complete = options;
-  if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
+  if (complete.temporary_folder.empty()) complete.temporary_folder = systemTemporaryFolder();
   std::unique_ptr<DataSource> source =
       cutCurved(openInAnyOrder(complete), options.cut_curved.value_or(true), complete.temporary_folder);
   chosenTimeStep(options.grid.string(), source->description().times, options.time_step);

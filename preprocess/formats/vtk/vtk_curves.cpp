@@ -10,6 +10,7 @@
 #include <set>
 #include <span>
 
+#include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "stream/base/error.h"
@@ -147,7 +148,7 @@ bool isVtkCurveFile(const std::filesystem::path& path) {
 }
 
 VtkCurves readVtkCurves(const std::filesystem::path& path, const std::string& scalar, bool as_points) {
-  const VtkFiles files(std::filesystem::temp_directory_path());
+  const VtkFiles files(systemTemporaryFolder());
   Collector collector(path.string(), scalar, as_points);
   if (extensionOf(path) == ".vtk")
     collector.add(readVtkLegacyLines(files, path));

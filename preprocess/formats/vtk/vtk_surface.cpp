@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/vtk/vtk_xml_file.h"
 
 namespace curvisplat {
@@ -107,7 +108,7 @@ class PieceReader {
 }  // namespace
 
 VtkSurface readVtkSurface(const std::filesystem::path& path) {
-  const VtkXmlFile file(VtkFiles(std::filesystem::temp_directory_path()), path);
+  const VtkXmlFile file(VtkFiles(systemTemporaryFolder()), path);
   if (file.type() != "PolyData")
     file.fail("is a VTK file of type " + file.type() + "; a surface is a .vtp file, of type PolyData");
   VtkSurface surface;
