@@ -4,13 +4,11 @@
 #include <glm/geometric.hpp>
 
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <span>
-#include <sstream>
 
+#include "preprocess/probe/point_list.h"
 #include "render/annotate/plot.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
@@ -21,19 +19,6 @@ namespace curvisplat {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::optional<glm::dvec3> pointOf(const std::string& line) {
-  glm::dvec3 point(0.0);
-  const char* at = line.c_str();
-  for (int axis = 0; axis < 3; ++axis) {
-    at += std::strspn(at, " \t,;");
-    char* end = nullptr;
-    point[axis] = std::strtod(at, &end);
-    if (end == at || !std::isfinite(point[axis])) return std::nullopt;
-    at = end;
-  }
-  return point;
-}
 
 Json jsonOf(const CacheReader& reader, const PointValues& found, bool of_source) {
   const char* const at = of_source ? "place" : "centre";
@@ -133,19 +118,7 @@ ProbedPoints parseProbe(const ProbeArguments& arguments) {
   const std::string& text = arguments.at;
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(text, ignored)) return {false, {parsePoint("--probe", text)}, {}};
-  ProbedPoints asked{true, {}, {}};
-  std::istringstream lines(readTextFile(text, uint64_t{1} << 30));
-  std::string line;
-  for (size_t number = 1; std::getline(lines, line); ++number) {
-    if (line.find_first_not_of(" \t\r,;") == std::string::npos) continue;
-    const auto point = pointOf(line);
-    if (point)
-      asked.points.push_back(*point);
-    else if (number > 1)
-      throw Error("{}: line {} does not begin with three numbers x,y,z", text, number);
-  }
-  if (asked.points.empty()) throw Error("{}: has no points; expected lines of x,y,z", text);
-  return asked;
+  return {true, parsePointList(readTextFile(text, uint64_t{1} << 30), text), {}};
 }
 
 Json probeAsJson(const CacheReader& reader, const Probe& probe) {
