@@ -100,6 +100,10 @@ TEST_F(OddFiles, InputsAreNotOverwritten) {
   expectRefused({"render", cache(), "-o", file("a.png"), "--stats", cache() + "/manifest.json"}, 1,
                 {"would overwrite"});
   expectRefused({"bench", cache(), "--quick", "--json", cache() + "/bricks.bin"}, 1, {"would overwrite"});
+  for (const std::string& output : {cache() + "/manifest.json", file("cube.fun"), file("./cube.xyz")})
+    expectRefused({"info", cache(), "--probe-line", "0,0,0", "1,1,1", "3", "--source", file("cube.xyz"),
+                   file("cube.fun"), "-o", output},
+                  1, {"would overwrite"});
   expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("./a.png")}, 1, {"would overwrite"});
   expectRefused(
       {"render", cache(), "-o", file("a.png"), "--stats", file("b.png"), "--first-image", file("b.png")}, 1,
@@ -107,6 +111,19 @@ TEST_F(OddFiles, InputsAreNotOverwritten) {
   std::ofstream(file("tf.json")) << "{}";
   expectRefused({"render", cache(), "-o", file("a.png"), "--tf", file("tf.json"), "--stats", file("tf.json")},
                 1, {"would overwrite"});
+  std::ofstream(file("tf.csv")) << "0,0,0\n";
+  std::ofstream(file("tf.vtp")) << "";
+  for (const char* const output : {"--stats", "--trace"}) {
+    expectRefused(
+        {"render", file("cube.xyz"), file("cube.fun"), "-o", file("a.png"), output, file("./cube.fun")}, 1,
+        {"would overwrite"});
+    for (const char* const input : {"--lines", "--points"})
+      expectRefused({"render", cache(), "-o", file("a.png"), input, file("tf.csv"), output, file("tf.csv")},
+                    1, {"would overwrite"});
+    expectRefused(
+        {"render", cache(), "-o", file("a.png"), "--surface", file("tf.vtp"), output, file("tf.vtp")}, 1,
+        {"would overwrite"});
+  }
   expectRefused(cubeArguments(folder_ / "cube", {"--overwrite", "--stats", cache() + "/manifest.json"}), 1,
                 {"would overwrite"});
   fs::create_symlink(cache() + "/a.png", file("into.png"));

@@ -32,6 +32,7 @@
 #include "tools/options/frame_sequence.h"
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
+#include "tools/output/start_checks.h"
 #include "tools/window/window.h"
 
 namespace curvisplat {
@@ -172,6 +173,12 @@ Probe probed(const CacheReader& reader, const InfoOptions& options) {
   Probe probe{parseProbe(options.probe), options.probe.of_source, options.steps.severalSteps(), {}};
   PointSource source{options.grid, options.gas};
   if (probe.of_source) setSource(reader, options.probe.source, source.grid);
+  if (!options.probe.plot.empty()) {
+    std::vector<fs::path> inputs = options.grid.solutions;
+    inputs.insert(inputs.end(), source.grid.solutions.begin(), source.grid.solutions.end());
+    inputs.insert(inputs.end(), {options.grid.grid, source.grid.grid});
+    checkOutputFile("-o", options.probe.plot, inputs);
+  }
   for (const StepPosition& position : chosenSteps(options.steps, reader)) {
     const CacheReader at = reader.at(position);
     probe.steps.push_back({position.step, reader.series().steps[position.step].time,

@@ -425,7 +425,9 @@ void addRender(CLI::App& app) {
   command->add_option("--trace", arguments->trace, kTraceHelp)->group(how);
   command->callback([arguments, command] {
     requireSameOptions(*command);
-    TraceOfRun trace(arguments->trace, {arguments->cache, arguments->output, arguments->statistics});
+    std::vector<std::filesystem::path> others = inputsOf(*arguments);
+    others.insert(others.end(), {arguments->output, arguments->statistics});
+    TraceOfRun trace(arguments->trace, others);
     render(*arguments);
     trace.end();
   });

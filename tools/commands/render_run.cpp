@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <set>
 #include <string>
 #include <vector>
@@ -59,6 +60,18 @@ void checkPartArguments(const RenderArguments& arguments) {
 
 }  // namespace
 
+std::vector<std::filesystem::path> inputsOf(const RenderArguments& arguments) {
+  std::vector<std::filesystem::path> inputs = arguments.solutions;
+  inputs.insert(inputs.end(),
+                {arguments.cache, arguments.camera.path, arguments.scalar.transfer_function.value_or("")});
+  const CurveArguments& curves = arguments.surfaces.curves;
+  inputs.insert(inputs.end(), curves.lines.begin(), curves.lines.end());
+  inputs.insert(inputs.end(), curves.points.begin(), curves.points.end());
+  std::copy_if(arguments.surfaces.surfaces.begin(), arguments.surfaces.surfaces.end(),
+               std::back_inserter(inputs), isSurfaceFile);
+  return inputs;
+}
+
 void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
   checkMotionArguments(arguments.camera, arguments.steps);
   checkFunctionArguments(arguments.scalar);
@@ -80,8 +93,7 @@ void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
   if (channelsOf(arguments).any() && !arguments.first_image.empty())
     throw UsageError("--first-image {}: a first picture has no channels of values; leave out --channels",
                      arguments.first_image.string());
-  std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
-                                            arguments.scalar.transfer_function.value_or("")};
+  std::vector<std::filesystem::path> others = inputsOf(arguments);
   checkOutputFile("-o", arguments.output, others);
   if (severalFrames(arguments) && !isMovieName(arguments.output)) {
     const FrameNames names(arguments.output);

@@ -46,6 +46,9 @@ bool severalFrames(const RenderArguments& arguments);
 /// The values that the pictures have beside their colours (--channels). Throws UsageError.
 ValueChannels channelsOf(const RenderArguments& arguments);
 
+/// The cache, or the files of the grid, and the files that other options name: what outputs must not overwrite.
+std::vector<std::filesystem::path> inputsOf(const RenderArguments& arguments);
+
 /// Needs no cache. `size`: of the picture. Throws UsageError if options contradict each other, and Error if
 /// an output cannot be written.
 void checkRenderArguments(const RenderArguments& arguments, ImageSize size);
