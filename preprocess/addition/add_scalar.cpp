@@ -1,5 +1,7 @@
 #include "preprocess/addition/add_scalar.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <glm/vector_relational.hpp>
 #include <memory>
@@ -27,21 +29,12 @@
 namespace curvisplat {
 namespace {
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 void checkNames(const std::vector<std::string>& names, const CacheReader& cache) {
-  std::vector<std::string> present;
-  for (const VariableInfo& variable : cache.manifest().variables) present.push_back(variable.name);
-  for (const OwnBlanks& set : cache.seriesManifest().own_blanks)
-    present.insert(present.end(), set.variables.begin(), set.variables.end());
+  const std::vector<std::string> present = cache.allScalars();
   for (const std::string& name : names)
     if (std::find(present.begin(), present.end(), name) != present.end())
       throw UsageError("{}: already has a scalar '{}'; it has {}", cache.path().string(), name,
-                       joined(present));
+                       fmt::join(present, ", "));
 }
 
 std::filesystem::path temporaryFolder(const AddScalarOptions& options) {
@@ -165,7 +158,7 @@ class Addition {
       throw Error(
           "{}: {} of its samples have no value of {} ({} not finite in single precision, {} with the blank "
           "value), and every splat needs one; convert again with all scalars",
-          cache_.path().string(), missing, joined(report_.scalars), survey_.blanked.not_finite,
+          cache_.path().string(), missing, fmt::join(report_.scalars, ", "), survey_.blanked.not_finite,
           survey_.blanked.by_value);
     checkRanges(survey_, description_, options_.scalars);
     const auto inside = [](const glm::dvec3& a, const glm::dvec3& b) {
@@ -188,7 +181,8 @@ class Addition {
     const bool cells = (mesh_ ? origin_->centring() : reader_->centring()) == Centring::kCell;
     if (cells != manifest().cells)
       throw Error("{}: its scalars are {}-centred, but {} is {}-centred; convert it to a cache of its own",
-                  cache_.path().string(), words(manifest().cells), joined(report_.scalars), words(cells));
+                  cache_.path().string(), words(manifest().cells), fmt::join(report_.scalars, ", "),
+                  words(cells));
   }
 
   void scatter() {

@@ -416,6 +416,13 @@ constexpr const char* kKept = "; finished work is kept: continue with --resume";
 
 }  // namespace
 
+uint64_t samplesOf(const GridDescription& description) {
+  uint64_t samples = 0;
+  for (const GridBlock& block : description.blocks) samples += block.nodes();
+  for (const MeshPiece& piece : description.pieces) samples += std::max(piece.points, piece.cells);
+  return samples;
+}
+
 ConvertReport runConversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
                             std::vector<ConversionFact> facts, const FurtherParts& parts,
                             Progress& progress) {

@@ -25,6 +25,9 @@ namespace curvisplat {
 /// Copies what the manifest of a cache says into the report.
 void reportCache(const Manifest& written, ConvertReport& report);
 
+/// The nodes, or of an unstructured grid the points or cells, whichever are more.
+uint64_t samplesOf(const GridDescription& description);
+
 /// What a conversion asks for beside its passes; both may be empty.
 struct FurtherParts {
   EstimateNeeds estimate;  // where the disk may be too small

@@ -13,23 +13,20 @@
 
 #include "preprocess/convert/conversion.h"
 #include "preprocess/convert/conversion_workspace.h"
+#include "preprocess/convert/convert_sets.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
-#include "preprocess/convert/scan.h"
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/faces/grid_faces_pass.h"
-#include "preprocess/gather/mesh_reader.h"
 #include "preprocess/grid/grid_views.h"
 #include "preprocess/grid/parallel.h"
-#include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/manifest.h"
-#include "stream/cache/series.h"
 
 namespace curvisplat {
 namespace {
@@ -37,14 +34,6 @@ namespace {
 // Of the cache: samples of eight million nodes promised 0.73 to 1.20 of what grids of 12 to 64 million then
 // took.
 constexpr double kSampleMargin = 1.15;
-
-/// At most.
-uint64_t samplesOf(const GridDescription& description) {
-  uint64_t samples = 0;
-  for (const GridBlock& block : description.blocks) samples += block.nodes();
-  for (const MeshPiece& piece : description.pieces) samples += std::max(piece.points, piece.cells);
-  return samples;
-}
 
 /// The shape of the grid and its scalars, in words. Without files' names and times, which may differ between
 /// machines.
@@ -134,166 +123,8 @@ DiskNeeds sampledNeeds(const GridSource& grid, const ConvertOptions& options,
 
 namespace {
 
-using ScalarSet = std::vector<uint32_t>;
-
-/// Scalars by where they have values.
-struct ScalarSets {
-  /// All scalars of a set have values at the same samples. The largest set is the first, of several the one with the most
-  /// values; then they are in the order of their first scalars.
-  std::vector<ScalarSet> sets;
-  ScalarSet without_values;  // at any sample
-};
-
-ScalarSets setsOf(const ScalarSet& scalars, const DifferingBlanks& differing) {
-  const std::vector<BlankCounts::Lost>& lost = differing.lost();
-  ScalarSets found;
-  std::vector<ScalarSet>& sets = found.sets;
-  std::vector<BlankCounts::Lost> of_sets;
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    if (lost[n].samples == 0 && !differing.isAnyDrawn()) {
-      found.without_values.push_back(scalars[n]);
-      continue;
-    }
-    size_t set = 0;
-    while (set < sets.size() && of_sets[set].set != lost[n].set) ++set;
-    if (set == sets.size()) {
-      sets.emplace_back();
-      of_sets.push_back(lost[n]);
-    }
-    sets[set].push_back(scalars[n]);
-  }
-  size_t best = 0;
-  for (size_t n = 1; n < sets.size(); ++n)
-    if (std::pair(sets[n].size(), of_sets[n].samples) > std::pair(sets[best].size(), of_sets[best].samples))
-      best = n;
-  std::rotate(sets.begin(), sets.begin() + static_cast<ptrdiff_t>(best),
-              sets.begin() + static_cast<ptrdiff_t>(best) + 1);
-  return found;
-}
-
-/// Found without converting.
-ScalarSets surveyedSets(const DataSource& source, const ConvertOptions& options, Progress& progress) {
-  const auto* const grid = dynamic_cast<const GridSource*>(&source);
-  const MemoryPlan plan =
-      MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
-  progress.begin("scan", samplesOf(source.description()), "samples");
-  try {
-    const GridSurvey survey = grid ? surveyGrid(NodeReader(*grid, options.scalars, options.blank_value),
-                                                plan.slab_bytes, {}, progress)
-                                   : surveyMesh(MeshReader(dynamic_cast<const MeshSource&>(source),
-                                                           options.scalars, options.blank_value),
-                                                progress)
-                                         .grid;
-    if (survey.blanked.lost.empty()) return {{options.scalars}, {}};
-    return setsOf(options.scalars, DifferingBlanks(survey.blanked.lost, true));
-  } catch (const DifferingBlanks& differing) {
-    return setsOf(options.scalars, differing);
-  }
-}
-
-using MakeOwnBlanks = decltype(FurtherParts::own_blanks);
-
 ConvertReport convertScalars(const DataSource& source, const ConvertOptions& given_options,
-                             Progress& progress, const MakeOwnBlanks& own_blanks = {});
-
-std::string namesOf(const GridDescription& description, const ScalarSet& set) {
-  std::string names;
-  for (const uint32_t scalar : set) names += (names.empty() ? "" : ", ") + description.scalars[scalar].name;
-  return names;
-}
-
-/// Converts scalars that have blanks of their own to a cache in `folder`, unless an interrupted conversion has. Returns what
-/// the manifest of the whole cache says of it.
-OwnBlanks convertSet(const DataSource& source, const ConvertOptions& whole, const ScalarSet& set,
-                     const std::filesystem::path& folder, ConvertReport& sum, Progress& progress) {
-  const GridDescription& description = source.description();
-  ConvertOptions options = whole;
-  options.output = folder;
-  options.scalars = set;
-  options.differing = DifferingScalars::kBlankAll;
-  options.temporary_folder = temporaryFolder(whole);
-  options.overwrite = false;
-  const std::filesystem::path manifest = folder / "manifest.json";
-  std::vector<uint8_t> exists{whole.resume && std::filesystem::exists(manifest)};
-  if (whole.ranks) exists = fromBytes<uint8_t>(whole.ranks->broadcast(toBytes(exists)));
-  if (exists[0] == 0) {
-    const ConvertReport report = convertScalars(source, options, progress);
-    sum.temporary_bytes = std::max(sum.temporary_bytes, report.temporary_bytes);
-    sum.warnings.insert(sum.warnings.end(), report.warnings.begin(), report.warnings.end());
-  }
-  const std::string text = readTextFile(manifest);
-  const Manifest written = Manifest::fromJson(text, manifest);
-  for (const FileInfo& file : written.files)
-    sum.files.push_back({folder.filename().string() + "/" + file.name, file.size});
-  sum.notes.push_back(fmt::format(
-      "{} {} values at other samples than {}: {} of them; {} kept apart in the cache, and --scalar draws {}",
-      namesOf(description, set), set.size() == 1 ? "has" : "have", namesOf(description, whole.scalars),
-      written.nodes - written.blanked_nodes, set.size() == 1 ? "it is" : "they are",
-      set.size() == 1 ? "it" : "each"));
-  OwnBlanks of_set;
-  for (const uint32_t scalar : set) of_set.variables.push_back(description.scalars[scalar].name);
-  of_set.checksum = checksumOf(std::as_bytes(std::span(text)));
-  return of_set;
-}
-
-/// Converts the first of the sets to a cache, and leaves out the others or gives each a cache of its own in that.
-ConvertReport convertSets(const DataSource& source, ConvertOptions options, const ScalarSets& found,
-                          Progress& progress) {
-  const GridDescription& description = source.description();
-  const std::vector<ScalarSet>& sets = found.sets;
-  options.scalars = sets.front();
-  const bool are_kept = options.differing == DifferingScalars::kKeepApart;
-  options.differing = DifferingScalars::kBlankAll;
-  ConvertReport of_sets;
-  const auto own_blanks = [&](const std::filesystem::path& folder) {
-    std::vector<OwnBlanks> made;
-    for (size_t n = 1; n < sets.size(); ++n)
-      made.push_back(
-          convertSet(source, options, sets[n], folder / ownBlanksFolderName(n - 1), of_sets, progress));
-    return made;
-  };
-  ConvertReport report = convertScalars(source, options, progress, are_kept ? own_blanks : MakeOwnBlanks());
-  report.files.insert(report.files.end(), of_sets.files.begin(), of_sets.files.end());
-  report.notes.insert(report.notes.end(), of_sets.notes.begin(), of_sets.notes.end());
-  report.temporary_bytes = std::max(report.temporary_bytes, of_sets.temporary_bytes);
-  for (std::string& warning : of_sets.warnings)
-    if (std::ranges::find(report.warnings, warning) == report.warnings.end())
-      report.warnings.push_back(std::move(warning));
-  if (!found.without_values.empty())
-    report.warnings.push_back(fmt::format("left out: {}, without a value at any sample",
-                                          namesOf(description, found.without_values)));
-  ScalarSet left_out;
-  for (size_t n = 1; n < sets.size() && !are_kept; ++n)
-    left_out.insert(left_out.end(), sets[n].begin(), sets[n].end());
-  if (left_out.empty()) return report;
-  std::sort(left_out.begin(), left_out.end());
-  const bool one = left_out.size() == 1;
-  report.warnings.push_back(fmt::format(
-      "left out: {}, which {} no values at some samples where {} does; convert {} to a cache of {} own, with "
-      "--scalar NAME",
-      namesOf(description, left_out), one ? "has" : "have", description.scalars[sets[0].front()].name,
-      one ? "it" : "them", one ? "its" : "their"));
-  return report;
-}
-
-}  // namespace
-
-ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress) {
-  if (options.differing == DifferingScalars::kBlankAll || options.scalars.size() < 2)
-    return convertScalars(source, options, progress);
-  // What an interrupted conversion has left is of the scalars that it kept.
-  if (options.resume) return convertSets(source, options, surveyedSets(source, options, progress), progress);
-  try {
-    return convertScalars(source, options, progress);
-  } catch (const DifferingBlanks& differing) {
-    return convertSets(source, options, setsOf(options.scalars, differing), progress);
-  }
-}
-
-namespace {
-
-ConvertReport convertScalars(const DataSource& source, const ConvertOptions& given_options,
-                             Progress& progress, const MakeOwnBlanks& own_blanks) {
+                             Progress& progress, const decltype(FurtherParts::own_blanks)& own_blanks) {
   ConvertOptions options = given_options;
   if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
@@ -349,6 +180,15 @@ uint64_t nodesOf(const GridDescription& description) {
 }
 
 }  // namespace
+
+ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress) {
+  return convertSets(
+      source, options,
+      [&](const ConvertOptions& of_set, const decltype(FurtherParts::own_blanks)& own_blanks) {
+        return convertScalars(source, of_set, progress, own_blanks);
+      },
+      progress);
+}
 
 uint64_t times(uint64_t count, double factor) {
   return static_cast<uint64_t>(std::llround(static_cast<double>(count) * factor));

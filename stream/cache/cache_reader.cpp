@@ -62,13 +62,15 @@ struct BrickOfVariable {
 
 struct CacheReader::State {
   State(const fs::path& cache_path, uint64_t number)
-      : cache(cache_path), of_series(std::make_shared<const Manifest>(readManifest(cache_path))) {
+      : cache(cache_path),
+        whole(cache_path),
+        of_series(std::make_shared<const Manifest>(readManifest(cache_path))) {
     series = std::make_shared<const Series>(readSeries(cache, *of_series));
     open(number, nullptr);
   }
 
   State(const State& other, const StepPosition& wanted)
-      : cache(other.cache), of_series(other.of_series), series(other.series) {
+      : cache(other.cache), whole(other.whole), of_series(other.of_series), series(other.series) {
     open(wanted.step, &other);
     if (wanted.part > 0) blendWithNext(wanted.part);
   }
@@ -168,7 +170,7 @@ struct CacheReader::State {
 
   class ValuesDecoder;
 
-  fs::path cache;
+  fs::path cache, whole;
   std::shared_ptr<const Manifest> of_series;
   std::shared_ptr<const Series> series;
   StepPosition position;
@@ -304,7 +306,17 @@ std::optional<size_t> CacheReader::ownBlanksOf(std::string_view name) const {
 }
 
 CacheReader CacheReader::ownBlanks(size_t set) const {
-  return CacheReader(ownBlanksFolder(cachePath(), seriesManifest(), set));
+  CacheReader reader(ownBlanksFolder(cachePath(), seriesManifest(), set));
+  reader.state_->whole = cachePath();
+  return reader;
+}
+
+std::vector<std::string> CacheReader::allScalars() const {
+  std::vector<std::string> names;
+  for (const VariableInfo& variable : seriesManifest().variables) names.push_back(variable.name);
+  for (const OwnBlanks& set : seriesManifest().own_blanks)
+    names.insert(names.end(), set.variables.begin(), set.variables.end());
+  return names;
 }
 
 CacheReader::CacheReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -322,6 +334,10 @@ const Manifest& CacheReader::manifest() const {
 
 const fs::path& CacheReader::cachePath() const {
   return state_->cache;
+}
+
+const fs::path& CacheReader::wholePath() const {
+  return state_->whole;
 }
 
 const Manifest& CacheReader::seriesManifest() const {
@@ -355,26 +371,19 @@ std::span<const BrickVariable> CacheReader::brickVariables(size_t variable) cons
 
 size_t CacheReader::variableNamed(std::string_view name) const {
   const auto& variables = state_->manifest.variables;
-  std::string listed;
-  std::vector<std::string> names;
-  for (size_t n = 0; n < variables.size(); ++n) {
+  for (size_t n = 0; n < variables.size(); ++n)
     if (name.empty() || variables[n].name == name) return n;
-    listed += (n ? ", " : "") + variables[n].name;
-    names.push_back(variables[n].name);
-  }
   for (size_t n = 0; n < variables.size(); ++n)  // as `info` prints it
     if (!variables[n].unit.empty() && name == fmt::format("{} [{}]", variables[n].name, variables[n].unit))
       return n;
-  for (const OwnBlanks& set : state_->of_series->own_blanks) {
-    if (std::ranges::find(set.variables, name) != set.variables.end())
-      throw UsageError("{}: {} has values at other samples than {}; it is drawn without them, by --scalar",
-                       path().string(), name, listed);
-    names.insert(names.end(), set.variables.begin(), set.variables.end());
-    for (const std::string& other : set.variables) listed += ", " + other;
-  }
+  const std::vector<std::string> names = allScalars();
+  const std::span<const std::string> own(names.data(), variables.size());
+  if (std::ranges::find(names, name) != names.end())
+    throw UsageError("{}: {} has values at other samples than {}; it is drawn without them, by --scalar",
+                     path().string(), name, fmt::join(own, ", "));
   if (variables.empty()) throw UsageError("{}: the cache has no scalars", path().string());
   throw UsageError("{}: the cache has no scalar '{}'{}; it has {}", path().string(), name,
-                   didYouMean(name, names), listed);
+                   didYouMean(name, names), fmt::join(names, ", "));
 }
 
 const fs::path& CacheReader::geometryPath() const {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -46,10 +47,12 @@ class CacheReader {
   /// samples of its own (Manifest::own_blanks). A name that neither has, or none, opens the former. Throws Error as the
   /// constructor.
   static CacheReader ofScalar(const std::filesystem::path& cache, std::string_view name);
-  /// The set of seriesManifest().own_blanks that has the scalar `name`, which its unit may follow.
+  /// The set of seriesManifest().own_blanks that has the scalar `name`, which its unit may follow; nullopt for all other names.
   std::optional<size_t> ownBlanksOf(std::string_view name) const;
   /// Opens the cache of the scalars in seriesManifest().own_blanks[set]. Throws Error as the constructor.
   CacheReader ownBlanks(size_t set) const;
+  /// The names of all scalars: of the cache's own, then of each set of seriesManifest().own_blanks.
+  std::vector<std::string> allScalars() const;
   ~CacheReader();
   CacheReader(CacheReader&&) noexcept;
   CacheReader& operator=(CacheReader&&) noexcept;
@@ -63,6 +66,8 @@ class CacheReader {
   const std::filesystem::path& cachePath() const;
   const Manifest& seriesManifest() const;
   const Series& series() const;
+  /// The folder of the cache that this one was opened from by ofScalar() or ownBlanks(); cachePath() otherwise.
+  const std::filesystem::path& wholePath() const;
   /// The step; of a reader between two steps the earlier.
   uint64_t step() const { return position().step; }
   const StepPosition& position() const;

@@ -141,10 +141,8 @@ std::vector<GridScalar> scalarsIn(const std::vector<fs::path>& files, const Cach
 }
 
 std::vector<FurtherScalar> furtherAmong(const std::vector<GridScalar>& scalars, const CacheReader& cache) {
-  std::set<std::string> names;
-  for (const VariableInfo& variable : cache.manifest().variables) names.insert(variable.name);
-  for (const OwnBlanks& set : cache.seriesManifest().own_blanks)
-    names.insert(set.variables.begin(), set.variables.end());
+  const std::vector<std::string> present = cache.allScalars();
+  std::set<std::string> names(present.begin(), present.end());
   std::vector<FurtherScalar> further;
   for (const GridScalar& scalar : scalars)
     if (scalar.centring == centringOf(cache) && names.insert(scalar.name).second)
@@ -198,14 +196,14 @@ void addMissingScalars(const fs::path& cache, const std::vector<fs::path>& files
   std::set<std::string> missing(names.begin(), names.end());
   missing.erase("");
   const CacheReader reader(cache);
-  for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
-  std::erase_if(missing, [&](const std::string& name) { return reader.ownBlanksOf(name).has_value(); });
+  const std::vector<std::string> present = reader.allScalars();
+  for (const std::string& name : present) missing.erase(name);
   if (missing.empty()) return;
   const std::vector<GridScalar> scalars = scalarsIn(files, reader);
   for (const GridScalar& scalar : scalars)  // as `info` prints it
     if (!scalar.unit.empty() && missing.erase(fmt::format("{} [{}]", scalar.name, scalar.unit)) > 0)
       missing.insert(scalar.name);
-  for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
+  for (const std::string& name : present) missing.erase(name);
   for (const FurtherScalar& one : furtherAmong(scalars, reader))
     if (missing.erase(one.name) > 0) addFurtherScalar(cache, files, one.name, progress);
   for (const std::string& name : missing) requireSameCentring(name, scalars, reader, files);

@@ -64,7 +64,7 @@ py::tuple render(OpenCache& cache, const Options& function, const Options& camer
                         statisticsOf(picture.statistics));
 }
 
-py::list scalarsOf(const OpenCache& cache) {
+py::list scalarsOf(OpenCache& cache) {
   py::list out;
   const auto add = [&out](const Manifest& manifest) {
     for (const VariableInfo& variable : manifest.variables)
@@ -72,7 +72,7 @@ py::list scalarsOf(const OpenCache& cache) {
   };
   add(cache.reader().manifest());
   for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n)
-    add(cache.reader().ownBlanks(n).manifest());
+    add(cache.ownBlanks(n).reader().manifest());
   return out;
 }
 
@@ -387,7 +387,8 @@ PYBIND11_MODULE(_core, module) {
         return DataChoice{scalar, lower, upper, level, step};
       }));
   py::class_<OpenCache>(module, "OpenCache")
-      .def(py::init<std::filesystem::path>())
+      .def(py::init(
+          [](const std::filesystem::path& path) { return std::make_unique<OpenCache>(CacheReader(path)); }))
       .def("render", &render)
       .def("release", &OpenCache::release)
       .def("probe", &probeAt)
@@ -398,7 +399,8 @@ PYBIND11_MODULE(_core, module) {
       .def_property_readonly("times", &timesOf)
       .def_property_readonly("time_unit",
                              [](const OpenCache& cache) { return cache.reader().seriesManifest().time_unit; })
-      .def_property_readonly("path", [](const OpenCache& cache) { return cache.path().string(); })
+      .def_property_readonly("path",
+                             [](const OpenCache& cache) { return cache.reader().cachePath().string(); })
       .def_property_readonly("scalars", &scalarsOf)
       .def_property_readonly("lower",
                              [](const OpenCache& cache) { return arrayOf(cache.reader().manifest().lower); })

@@ -174,14 +174,17 @@ std::vector<std::string> warningsOf(const PictureArguments& arguments, const Ima
 
 }  // namespace
 
-OpenCache::OpenCache(const std::filesystem::path& path) : path_(path), process_(::getpid()), reader_(path) {}
+OpenCache::OpenCache(CacheReader reader) : process_(::getpid()), reader_(std::move(reader)) {}
+
+OpenCache& OpenCache::ownBlanks(size_t set) {
+  std::unique_ptr<OpenCache>& cache = own_blanks_[set];
+  if (!cache) cache = std::make_unique<OpenCache>(reader_.ownBlanks(set));
+  return *cache;
+}
 
 OpenCache& OpenCache::withScalar(const std::string& name) {
   const std::optional<size_t> set = reader_.ownBlanksOf(name);
-  if (!set) return *this;
-  std::unique_ptr<OpenCache>& cache = own_blanks_[*set];
-  if (!cache) cache = std::make_unique<OpenCache>(reader_.ownBlanks(*set).cachePath());
-  return *cache;
+  return set ? ownBlanks(*set) : *this;
 }
 
 OpenCache::~OpenCache() {
@@ -310,7 +313,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
 
 void OpenCache::release() {
   const Use in_use = use();
-  own_blanks_.clear();
+  for (const auto& [set, cache] : own_blanks_) cache->release();
   player_.reset();
 }
 

@@ -69,16 +69,16 @@ struct HistogramArguments {
 /// lacks the threads.
 class OpenCache {
  public:
-  /// Throws Error.
-  explicit OpenCache(const std::filesystem::path& path);
+  explicit OpenCache(CacheReader reader);
   ~OpenCache();
   OpenCache(const OpenCache&) = delete;
   OpenCache& operator=(const OpenCache&) = delete;
 
   const CacheReader& reader() const { return reader_; }
-  /// The cache with the scalar: this one, or the one of scalars with blanks of their own. Throws Error as the constructor.
+  /// The cache of CacheReader::ownBlanks(set), open as long as this one. Throws Error as opening it does.
+  OpenCache& ownBlanks(size_t set);
+  /// The cache with the scalar: this one, or the one of scalars with blanks of their own. Throws as ownBlanks().
   OpenCache& withScalar(const std::string& name);
-  const std::filesystem::path& path() const { return path_; }
   /// Keeps the cache busy during its lifetime.
   class Use {
    public:
@@ -105,7 +105,6 @@ class OpenCache {
   FrameRenderer& rendererOf(const DrawnScalars& scalars, Backend backend);
 
   std::map<size_t, std::unique_ptr<OpenCache>> own_blanks_;  // by their number in the manifest
-  const std::filesystem::path path_;
   const pid_t process_;
   CacheReader reader_;
   std::unique_ptr<StepPlayer> player_;  // of reader_
