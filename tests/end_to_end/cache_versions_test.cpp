@@ -26,35 +26,64 @@ class CacheVersion : public ::testing::TestWithParam<const char*> {
 INSTANTIATE_TEST_SUITE_P(Versions, CacheVersion, ::testing::Values("version_1", "version_2"),
                          [](const auto& tested) { return tested.param; });
 
+/// `base`: what the names of the files beside the cache begin with, which say what is in it.
+void expectContents(const CacheReader& cache, const std::string& base) {
+  SCOPED_TRACE(base);
+  EXPECT_TRUE(verifyCache(cache).findings.empty());
+
+  const auto expected = jsonOf(base + ".json");
+  const auto found = summaryOf(cache);
+  EXPECT_EQ(found.size(), expected.size());
+  for (const auto& [what, sum] : found) {
+    ASSERT_TRUE(expected.contains(what)) << what;
+    const double wanted = expected[what].get<double>();
+    EXPECT_NEAR(sum, wanted, 1e-6 * std::abs(wanted) + 1e-9) << what;
+  }
+
+  const TemporaryFolder drawn;
+  for (size_t variable = 0; variable < cache.manifest().variables.size(); ++variable) {
+    const fs::path picture = drawn / "a.png";
+    writeImage(smallPictureOf(cache, variable), picture);
+    const Image kept = readImage(fmt::format("{}.{}.png", base, variable));
+    // The kept pictures are from before tiles had their own order, and border cells their own scalar.
+    EXPECT_GE(compareImages(readImage(picture), kept).psnr_db, 50) << variable;
+  }
+}
+
 TEST_P(CacheVersion, IsStillRead) {
   std::vector<std::string> names{"blocks", "cells"};
-  if (GetParam() != std::string("version_1")) names.insert(names.end(), {"faces", "octants", "steep"});
+  if (GetParam() != std::string("version_1"))
+    names.insert(names.end(), {"faces", "octants", "own_blanks", "steep"});
   for (const std::string& name : names) {
-    SCOPED_TRACE(name);
-    const fs::path base = folder() / name;
-    const CacheReader cache(base.string() + ".splats");
-    EXPECT_TRUE(verifyCache(cache).findings.empty());
-
-    const auto expected = jsonOf(base.string() + ".json");
-    const auto found = summaryOf(cache);
-    EXPECT_EQ(found.size(), expected.size());
-    for (const auto& [what, sum] : found) {
-      ASSERT_TRUE(expected.contains(what)) << what;
-      const double wanted = expected[what].get<double>();
-      EXPECT_NEAR(sum, wanted, 1e-6 * std::abs(wanted) + 1e-9) << what;
-    }
-
-    const TemporaryFolder drawn;
-    for (size_t variable = 0; variable < cache.manifest().variables.size(); ++variable) {
-      const fs::path picture = drawn / "a.png";
-      writeImage(smallPictureOf(cache, variable), picture);
-      const Image kept = readImage(fmt::format("{}.{}.png", base.string(), variable));
-      // The kept pictures are from before tiles had their own order, and border cells their own scalar.
-      EXPECT_GE(compareImages(readImage(picture), kept).psnr_db, 50) << variable;
-    }
+    const std::string base = (folder() / name).string();
+    const CacheReader cache(base + ".splats");
+    expectContents(cache, base);
+    for (size_t n = 0; n < cache.seriesManifest().own_blanks.size(); ++n)
+      expectContents(cache.ownBlanks(n), fmt::format("{}.blanks.{}", base, n + 1));
   }
   EXPECT_GT(CacheReader(folder() / "blocks.splats").manifest().levels, 1u);
   EXPECT_TRUE(CacheReader(folder() / "cells.splats").manifest().cells);
+}
+
+TEST(CacheVersions, ScalarsWithOwnBlanksAreFoundByName) {
+  const fs::path folder = fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/own_blanks.splats";
+  const CacheReader cache(folder);
+  EXPECT_EQ(cache.allScalars(), (std::vector<std::string>{"s1", "s3", "s0", "s2"}));
+  EXPECT_EQ(CacheReader::ofScalar(folder, "s3").cachePath(), folder);
+  const CacheReader other = CacheReader::ofScalar(folder, "s2 [K]");
+  EXPECT_EQ(other.cachePath(), folder / "blanks.2");
+  EXPECT_EQ(other.allScalars(), std::vector<std::string>{"s2"});
+  for (const CacheReader* const reader : {&cache, &other}) {
+    EXPECT_EQ(reader->wholePath(), folder);
+    EXPECT_EQ(reader->atStep(0).wholePath(), folder);
+  }
+  try {
+    cache.variableNamed("s2");
+    ADD_FAILURE();
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("s2 has values at other samples than s1, s3"), std::string::npos)
+        << error.what();
+  }
 }
 
 TEST(CacheVersions, FacesAreStillRead) {

@@ -3,26 +3,29 @@
 //    make_version_caches tests/data/caches/version_<n>
 //
 // To be run once for each version, by the program that is the first to write it; never again for an older
-// one. Caches of features that came later (octants, steep) are added beside the others, which stay.
+// one. Caches of features that came later (octants, own_blanks, steep) are added beside the others, which stay.
 //
-//    blocks.splats   three blocks, two of which share a face, and a hole; levels, two scalars
-//    cells.splats    a block with a scalar in its cells
-//    faces.splats    a block whose faces have levels of detail and a hole
-//    octants.splats  a block with a box of blanked nodes, at whose edges cells lose octants
-//    steep.splats    two blocks of cells that grow steeply, up to shorter last ones
-//    *.json, *.png   what a reader must get out of them (tests/support/cache_summary.h)
+//    blocks.splats      three blocks, two of which share a face, and a hole; levels, two scalars
+//    cells.splats       a block with a scalar in its cells
+//    faces.splats       a block whose faces have levels of detail and a hole
+//    octants.splats     a block with a box of blanked nodes, at whose edges cells lose octants
+//    own_blanks.splats  two scalars of a block, and two that have no values in a part of it, each in another
+//    steep.splats       two blocks of cells that grow steeply, up to shorter last ones
+//    *.json, *.png      what a reader must get out of them (tests/support/cache_summary.h)
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "preprocess/convert/convert.h"
 #include "render/image/image_file.h"
 #include "stream/base/durable_file.h"
+#include "stream/cache/series.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/cache_summary.h"
 
@@ -51,20 +54,28 @@ FunctionGridSource blocks() {
   });
 }
 
+/// What must be read from the cache, in files whose names begin with `beside`.
+void summarise(const CacheReader& reader, const std::string& beside) {
+  nlohmann::json json = summaryOf(reader);
+  writeFileDurably(beside + ".json", json.dump(1) + "\n");
+  for (size_t variable = 0; variable < reader.manifest().variables.size(); ++variable)
+    writeImage(smallPictureOf(reader, variable), fmt::format("{}.{}.png", beside, variable));
+}
+
 void make(const GridSource& source, std::vector<uint32_t> scalars, const fs::path& cache) {
   ConvertOptions options;
   options.output = cache;
   options.scalars = std::move(scalars);
+  options.differing = DifferingScalars::kKeepApart;
   options.title = cache.stem().string();
   Progress progress;
   convert(source, options, progress);
 
   const CacheReader reader(cache);
-  nlohmann::json json = summaryOf(reader);
-  const fs::path beside = fs::path(cache).replace_extension();
-  writeFileDurably(beside.string() + ".json", json.dump(1) + "\n");
-  for (size_t variable = 0; variable < reader.manifest().variables.size(); ++variable)
-    writeImage(smallPictureOf(reader, variable), fmt::format("{}.{}.png", beside.string(), variable));
+  const std::string beside = fs::path(cache).replace_extension().string();
+  summarise(reader, beside);
+  for (size_t n = 0; n < reader.seriesManifest().own_blanks.size(); ++n)
+    summarise(reader.ownBlanks(n), fmt::format("{}.{}", beside, ownBlanksFolderName(n)));
 }
 
 void makeAll(const fs::path& folder) {
@@ -106,6 +117,14 @@ void makeAll(const fs::path& folder) {
     return NodeValues{at, {static_cast<float>(at.x + 0.1 * at.y)}, false};
   });
   make(growing, {0}, folder / "steep.splats");
+  const FunctionGridSource parts({gridBlock(8, 7, 6)}, 4, [](const GridNode& node) {
+    const glm::dvec3 at(static_cast<double>(node.i) + 0.25 * static_cast<double>(node.j),
+                        static_cast<double>(node.j), 0.5 * static_cast<double>(node.k));
+    const auto value = static_cast<float>(at.x * at.y);
+    const float none = std::numeric_limits<float>::quiet_NaN();
+    return NodeValues{at, {node.i < 3 ? none : value, value, node.k > 3 ? none : value, -value}, false};
+  });
+  make(parts, {0, 1, 2, 3}, folder / "own_blanks.splats");
 }
 
 }  // namespace

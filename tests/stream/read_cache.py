@@ -9,7 +9,7 @@ import numpy as np
 import zstandard
 from xxhash import xxh3_64_intdigest as checksum
 
-FEATURES = set("steps fine-values cell-growth merged-borders face-layers border-pairs border-faces cell-octants scaled-values".split())
+FEATURES = set("steps fine-values cell-growth merged-borders face-layers border-pairs border-faces cell-octants scaled-values own-blanks".split())
 SHAPE, VALUES = ["a0", "a1", "a2", "l10", "l20", "l21"], ["mean", "slope0", "slope1", "slope2", "variance"]
 
 
@@ -177,8 +177,7 @@ class Cache:
         self.open_manifest()
         if "steps" in self.manifest.get("requires", []):
             self.open_step(len(self.manifest["variables"]))
-        count, self.geometry_name = self.manifest["bricks"], self.manifest["steps"][0]["geometry"]
-        data = self.verify("bricks.bin")
+        count, self.geometry_name, data = self.manifest["bricks"], self.manifest["steps"][0]["geometry"], self.verify("bricks.bin")
         need(data[:24] == struct.pack("<8sIIQ", b"CVSbrick", 1, 144, count), "header of bricks.bin")
         self.bricks = records(data[24:], "level:u4 at:3u4 splats:u4 octants:8u4 radius:f4 error:f4 parent:u4 box:6f8 "
                                          "children:2u4 offset:u8 checksum:u8 length:u4 reserved:u4")
@@ -186,13 +185,14 @@ class Cache:
         self.tables = {number: self.table(number, step) for number in self.manifest["steps"][0]["variables"]}
 
     def open_manifest(self):
-        text = (self.folder / "manifest.json").read_text(encoding="utf-8")
-        self.manifest = json.loads(text)
+        self.manifest = json.loads(text := (self.folder / "manifest.json").read_text(encoding="utf-8"))
         version, requires = (self.manifest["format"], self.manifest["version"]), set(self.manifest.get("requires", []))
         need(version == ("curvisplat splat cache", 2 if requires else 1) and requires <= FEATURES, "format, version or feature")
         packed = re.sub(r'("(?:\\.|[^"\\])*")|\s+', lambda match: match[1] or "", text)
-        packed = re.sub(r',"checksum":"[0-9a-f]{16}"}$', "}", packed)
-        need(self.manifest.get("checksum") in (None, f"{checksum(packed):016x}"), "checksum of the manifest")
+        found = format(checksum(re.sub(r',"checksum":"[0-9a-f]{16}"}$', "}", packed)), "016x")
+        need(self.manifest.get("checksum", found) == found, "checksum of the manifest")
+        for n, own in enumerate(self.manifest.get("own_blanks", []), 1):
+            need(checksum((self.folder / f"blanks.{n}/manifest.json").read_bytes()) == int(own["checksum"], 16), "checksum of a set")
         self.files = {file["name"]: (file["size"], int(file["checksum"], 16)) for file in self.manifest["files"]}
         return text
 

@@ -186,7 +186,8 @@ def main(program, *caches):
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([program, "--make", folder], check=True)
         made = sorted(pathlib.Path(folder).glob("*.splats"))
-        for path in [*caches, *made]:
+        of_sets = [path for cache in caches for path in sorted(pathlib.Path(cache).glob("blanks.*"))]
+        for path in [*caches, *of_sets, *made]:
             cache = read_cache.Cache(path)
             for step in range(len(cache.steps) or 1):
                 dump = subprocess.run([program, path, str(step)], check=True, stdout=subprocess.PIPE).stdout
