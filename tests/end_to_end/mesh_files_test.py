@@ -212,6 +212,24 @@ class MeshFiles(MeshCase):
         for name, splats in (("low", 125), ("high", 100)):
             drawn = self.run_program("render", cache, "-o", self.folder / "p.png", "--size", "40x40", "--scalar", name)
             self.assertIn(f"{splats} splats of {name}", drawn.stdout, drawn.stderr)
+        # At x = 2 there is low, at x = 7 high, at x = 20 neither.
+        point = self.run_program("info", cache, "--probe", "7,2,2")
+        self.assertEqual(point.returncode, 0, point.stderr)
+        self.assertRegex(point.stdout, "(?s)nearest node i 7, j 2, k 2 .*low +no value at the point.*high +7.* at the point")
+        points = self.folder / "points.csv"
+        points.write_text("x,y,z\n2,2,2\n7,2,2\n20,2,2\n")
+        table = self.run_program("info", cache, "--probe", points)
+        rows = [line.split(",") for line in table.stdout.splitlines()]
+        self.assertEqual(rows[0], "x,y,z,low,high,block,i,j,k,sample_x,sample_y,sample_z,sample_low,sample_high".split(","))
+        self.assertEqual([[bool(cell) for cell in row[3:6]] for row in rows[1:]], [[True, False, True], [False, True, True], [False, False, False]])
+        np.testing.assert_allclose([float(rows[1][3]), float(rows[2][4])], [2, 7], atol=0.01)
+        outside = self.run_program("info", cache, "--probe", "20,2,2")
+        self.assertIn("is outside of the data, which lies in x 0 to 8", outside.stderr)
+        self.assertEqual(outside.returncode, 1)
+        exact = self.run_program("info", cache, "--probe", "6.5,2,2", "--source")
+        self.assertRegex(exact.stdout, "high +6.5 at the point", exact.stderr)
+        line = self.run_program("info", cache, "--probe-line", "0,2,2", "8,2,2", "9", "-o", self.folder / "line.png")
+        self.assertEqual(line.returncode, 0, line.stderr)
         refused = self.run_program("render", cache, "-o", self.folder / "p.png", "--size", "40x40", "--opacity-by", "high")
         self.assertIn("high has values at other samples than low", refused.stderr)
         refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache, "--add-scalar", "high")

@@ -696,6 +696,21 @@ class Arrays(PythonTest):
         self.assertEqual(counts, [t.size, t.size // 2])
         drawn = [opened.render(name, size=(40, 40)).statistics["splats_drawn"] for name in ("t", "half")]
         self.assertEqual(drawn, counts)
+        # Both are known at the first point, one at the second, none at the third.
+        places = np.array([[c[3, 3, i] for c in (x, y, z)] for i in (30, 10)] + [[1e3, 0, 0]])
+        found = opened.probe(places)
+        self.assertEqual(list(found["values"]), ["t", "half"])
+        self.assertEqual((found["block"] == 0).tolist(), [False, False, True])
+        for of in (found["values"], found["sample_values"]):
+            self.assertEqual(np.isnan(of["t"]).tolist(), [False, False, True])
+            self.assertEqual(np.isnan(of["half"]).tolist(), [False, True, True])
+            self.assertAlmostEqual(of["half"][0], t[3, 3, 30], delta=2e-3 * np.ptp(t))
+        np.testing.assert_array_equal(found["index"][:2, 0], [30, 10])
+        single = opened.probe(places[1])
+        self.assertTrue(np.isnan(single["values"]["half"]))
+        self.assertEqual(single["values"]["t"], found["values"]["t"][1])
+        opened.close()
+        self.assertEqual(opened.render("half", size=(40, 40)).statistics["splats_drawn"], counts[1])
 
     def test_of_xarray_say_what_is_missing(self):
         try:

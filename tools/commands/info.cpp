@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <glm/common.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
@@ -170,21 +172,24 @@ struct Findings {
 };
 
 Probe probed(const CacheReader& reader, const InfoOptions& options) {
-  Probe probe{parseProbe(options.probe), options.probe.of_source, options.steps.severalSteps(), {}};
-  PointSource source{options.grid, options.gas};
-  if (probe.of_source) setSource(reader, options.probe.source, source.grid);
+  Probe probe{parseProbe(options.probe),
+              options.probe.of_source,
+              {options.grid, options.gas},
+              options.steps.severalSteps(),
+              {}};
+  if (probe.of_source) setSource(reader, options.probe.source, probe.source.grid);
   if (!options.probe.plot.empty()) {
+    const OpenGridOptions& source = probe.source.grid;
     std::vector<fs::path> inputs = options.grid.solutions;
-    inputs.insert(inputs.end(), source.grid.solutions.begin(), source.grid.solutions.end());
-    inputs.insert(inputs.end(), {options.grid.grid, source.grid.grid});
+    inputs.insert(inputs.end(), source.solutions.begin(), source.solutions.end());
+    inputs.insert(inputs.end(), {options.grid.grid, source.grid});
     checkOutputFile("-o", options.probe.plot, inputs);
   }
   for (const StepPosition& position : chosenSteps(options.steps, reader)) {
     const CacheReader at = reader.at(position);
     probe.steps.push_back({position.step, reader.series().steps[position.step].time,
-                           valuesAt(at, probe.asked.points, probe.of_source ? &source : nullptr)});
+                           valuesAt(at, probe.asked.points, probe.of_source ? &probe.source : nullptr)});
   }
-  if (!options.probe.plot.empty()) plotLine(reader, probe, options.probe.plot);
   return probe;
 }
 
@@ -324,18 +329,23 @@ void printCacheInfo(const InfoOptions& options) {
     readers.push_back(readers[0].ownBlanks(n));
   std::vector<Findings> found;
   for (const CacheReader& reader : readers) found.push_back(examine(reader, options));
-  if (options.json) {
-    Json json = asJson(readers[0], options, found[0]);
-    for (size_t n = 1; n < readers.size(); ++n)
-      json["own_blanks"][n - 1] = asJson(readers[n], options, found[n]);
-    fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
-  }
+  Json json;
+  if (options.json) json = asJson(readers[0], options, found[0]);
+  for (size_t n = 1; n < readers.size() && options.json; ++n)
+    json["own_blanks"][n - 1] = asJson(readers[n], options, found[n]);
+  std::vector<Probe> probes;
+  for (Findings& of_reader : found) probes.push_back(std::move(of_reader.probe));
+  const Probe joined = joinedProbe(readers, std::move(probes));
+  if (!options.probe.plot.empty()) plotLine(readers, joined, options.probe.plot);
+  if (options.json) fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+  if (options.probe.any() && !options.json) printProbe(readers, joined);
   for (size_t n = 0; n < readers.size() && !options.json; ++n) {
-    if (options.probe.any()) printProbe(readers[n], found[n].probe);
     if (options.probe.any() && !options.verify) continue;
-    if (n > 0)
-      printLine("\nvalues at other samples: {}",
+    if (n > 0) {
+      fmt::print("\n");
+      printLine("values at other samples: {}",
                 fmt::join(readers[0].seriesManifest().own_blanks[n - 1].variables, ", "));
+    }
     printAsText(readers[n], options, found[n]);
   }
   if (hasUnfinished(options.grid.grid))
@@ -345,16 +355,18 @@ void printCacheInfo(const InfoOptions& options) {
   if (findings > 0)
     throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
                 findings);
-  const auto is_outside = [](const Findings& of_reader) { return of_reader.probe.isOutside(); };
-  if (options.probe.any() && std::ranges::all_of(found, is_outside)) {
-    const CacheReader& reader = readers[0];
-    const glm::dvec3& point = found[0].probe.asked.points.front();
+  if (options.probe.any() && joined.isOutside()) {
+    glm::dvec3 lower = readers[0].manifest().lower, upper = readers[0].manifest().upper;
+    for (const CacheReader& reader : readers) {
+      lower = glm::min(lower, reader.manifest().lower);
+      upper = glm::max(upper, reader.manifest().upper);
+    }
+    const glm::dvec3& point = joined.asked.points.front();
     throw Error(
         "{}: the point {}, {}, {} is outside of the data, which lies in x {:.6g} to {:.6g}, y {:.6g} to "
         "{:.6g}, z {:.6g} to {:.6g}",
-        options.grid.grid.string(), point.x, point.y, point.z, reader.manifest().lower.x,
-        reader.manifest().upper.x, reader.manifest().lower.y, reader.manifest().upper.y,
-        reader.manifest().lower.z, reader.manifest().upper.z);
+        options.grid.grid.string(), point.x, point.y, point.z, lower.x, upper.x, lower.y, upper.y, lower.z,
+        upper.z);
   }
 }
 

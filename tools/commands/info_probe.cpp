@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "preprocess/probe/point_list.h"
 #include "render/annotate/plot.h"
@@ -37,13 +38,21 @@ Json jsonOf(const CacheReader& reader, const PointValues& found, bool of_source)
   return json;
 }
 
-/// A number of the cache has the digits of a float.
+/// A number of the cache has the digits of a float. Empty for what has no value.
 std::string numberText(double value, bool of_source) {
+  if (std::isnan(value)) return "";
   return of_source ? fmt::format("{}", value) : fmt::format("{}", static_cast<float>(value));
 }
 
-void printTable(const CacheReader& reader, const Probe& probe) {
-  const auto& variables = reader.manifest().variables;
+std::vector<VariableInfo> variablesOf(std::span<const CacheReader> readers) {
+  std::vector<VariableInfo> variables;
+  for (const CacheReader& reader : readers)
+    variables.insert(variables.end(), reader.manifest().variables.begin(), reader.manifest().variables.end());
+  return variables;
+}
+
+void printTable(std::span<const CacheReader> readers, const Probe& probe) {
+  const std::vector<VariableInfo> variables = variablesOf(readers);
   std::string names = probe.of_steps ? "step,time,x,y,z" : "x,y,z";
   for (const VariableInfo& variable : variables) names += ',' + variable.name;
   names += ",block,i,j,k,sample_x,sample_y,sample_z";
@@ -68,7 +77,7 @@ void printTable(const CacheReader& reader, const Probe& probe) {
 }
 
 /// In words that need no knowledge of splats.
-void printPoint(const CacheReader& reader, const Probe& probe) {
+void printPoint(std::span<const CacheReader> readers, const Probe& probe) {
   const glm::dvec3& at = probe.asked.points.front();
   const std::optional<PointValues>& found = probe.steps.front().found.front();
   const std::string point = fmt::format("{}, {}, {}", at.x, at.y, at.z);
@@ -76,7 +85,7 @@ void printPoint(const CacheReader& reader, const Probe& probe) {
     fmt::print("{}: outside of the data\n", point);
     return;
   }
-  const Manifest& manifest = reader.manifest();
+  const Manifest& manifest = readers.front().manifest();
   const char* const sample = manifest.cells ? "cell" : "node";
   const std::string block = manifest.blocks.size() > 1 ? fmt::format("block {}, ", found->block + 1) : "";
   const char* const of_refined = manifest.refined > 1 ? " in the refined grid" : "";
@@ -86,11 +95,18 @@ void printPoint(const CacheReader& reader, const Probe& probe) {
   fmt::print("{}: {} {} {}i {}, j {}, k {} (counted from 0){}{} at {:.6g}, {:.6g}, {:.6g}\n", point,
              probe.of_source && manifest.cells ? "in" : "nearest", sample, block, found->i, found->j,
              found->k, of_refined, where, found->place.x, found->place.y, found->place.z);
-  for (size_t v = 0; v < found->values.size(); ++v) {
-    const VariableInfo& variable = manifest.variables[v];
-    printLine("  {:<20} {:.{}g}{} at the point; {:.{}g} {}", variable.name, found->values[v],
-              probe.of_source ? 9 : 6, variable.unit.empty() ? "" : " " + variable.unit, found->sample[v],
-              probe.of_source ? 9 : 6, probe.of_source ? "there" : "in the middle of that cell");
+  const std::vector<VariableInfo> variables = variablesOf(readers);
+  const int digits = probe.of_source ? 9 : 6;
+  for (size_t v = 0; v < variables.size(); ++v) {
+    const std::string unit = variables[v].unit.empty() ? "" : " " + variables[v].unit;
+    const double value = found->values[v], of_sample = found->sample[v];
+    std::string text = "no value";
+    if (!std::isnan(value)) text = fmt::format("{:.{}g}{}", value, digits, unit);
+    text += " at the point";
+    if (!std::isnan(of_sample))
+      text += fmt::format("; {:.{}g} {}", of_sample, digits,
+                          probe.of_source ? "there" : "in the middle of that cell");
+    printLine("  {:<20} {}", variables[v].name, text);
   }
 }
 
@@ -134,28 +150,46 @@ Json probeAsJson(const CacheReader& reader, const Probe& probe) {
   return steps;
 }
 
-void printProbe(const CacheReader& reader, const Probe& probe) {
-  if (probe.isTable())
-    printTable(reader, probe);
-  else
-    printPoint(reader, probe);
+Probe joinedProbe(std::span<const CacheReader> readers, std::vector<Probe> probes) {
+  Probe joined = std::move(probes.front());
+  if (probes.size() == 1) return joined;
+  for (size_t step = 0; step < joined.steps.size(); ++step) {
+    std::vector<SetValues> sets;
+    for (size_t n = 0; n < probes.size(); ++n) {
+      Probe& of_set = n == 0 ? joined : probes[n];
+      sets.push_back(
+          {&readers[n], of_set.of_source ? &of_set.source : nullptr, std::move(of_set.steps[step].found)});
+    }
+    joined.steps[step].found = joinedValues(sets);
+  }
+  return joined;
 }
 
-void plotLine(const CacheReader& reader, const Probe& probe, const std::filesystem::path& file) {
+void printProbe(std::span<const CacheReader> readers, const Probe& probe) {
+  if (probe.isTable())
+    printTable(readers, probe);
+  else
+    printPoint(readers, probe);
+}
+
+void plotLine(std::span<const CacheReader> readers, const Probe& probe, const std::filesystem::path& file) {
   requirePlots();
   std::vector<LinePanel> panels;
-  for (size_t v = 0; v < reader.manifest().variables.size(); ++v) {
-    const VariableInfo& variable = reader.manifest().variables[v];
+  const std::vector<VariableInfo> variables = variablesOf(readers);
+  for (size_t v = 0; v < variables.size(); ++v) {
+    const VariableInfo& variable = variables[v];
     LinePanel panel{variable.name, "length along the line", variable.unit, {}, {}, false, true};
     for (const ProbedStep& step : probe.steps) {
       PlotLine line{probe.of_steps ? fmt::format("{:.6g}", step.time) : "", {}};
       for (size_t n = 0; n < step.found.size(); ++n)
-        if (step.found[n]) line.points.push_back({probe.asked.along[n], step.found[n]->values[v]});
+        if (step.found[n] && !std::isnan(step.found[n]->values[v]))
+          line.points.push_back({probe.asked.along[n], step.found[n]->values[v]});
       if (!line.points.empty()) panel.lines.push_back(std::move(line));
     }
-    if (panel.lines.empty()) throw Error("{}: the line is outside of the data", reader.cachePath().string());
-    panels.push_back(std::move(panel));
+    if (!panel.lines.empty()) panels.push_back(std::move(panel));
   }
+  if (panels.empty())
+    throw Error("{}: the line is outside of the data", readers.front().cachePath().string());
   writeFileAtomically(file, drawPlot(panels));
 }
 

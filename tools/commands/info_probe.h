@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,7 @@ struct ProbedStep {
 struct Probe {
   ProbedPoints asked;
   bool of_source = false;
+  PointSource source;     // then
   bool of_steps = false;  // of several: a table
   std::vector<ProbedStep> steps;
 
@@ -54,9 +56,11 @@ struct Probe {
 
 /// As JSON: an object for a point, null outside; of a table an array of them; of several steps an array for each.
 nlohmann::ordered_json probeAsJson(const CacheReader& reader, const Probe& probe);
-/// In words; a table with commas.
-void printProbe(const CacheReader& reader, const Probe& probe);
+/// What several sets of scalars have at the same points, as joinedValues() has it. `readers`: of the probes.
+Probe joinedProbe(std::span<const CacheReader> readers, std::vector<Probe> probes);
+/// `probe`: joinedProbe() of the readers, the cache's own first. In words; a table with commas.
+void printProbe(std::span<const CacheReader> readers, const Probe& probe);
 /// A PNG file of the values of all scalars along a line. Throws UsageError if the program was built without plots.
-void plotLine(const CacheReader& reader, const Probe& probe, const std::filesystem::path& file);
+void plotLine(std::span<const CacheReader> readers, const Probe& probe, const std::filesystem::path& file);
 
 }  // namespace curvisplat

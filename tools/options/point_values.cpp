@@ -1,5 +1,7 @@
 #include "tools/options/point_values.h"
 
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -100,7 +102,7 @@ void setSource(const CacheReader& reader, const std::vector<fs::path>& files, Op
     throw UsageError("{}: is a series; name the files of the time step after --source",
                      reader.cachePath().string());
   const std::vector<fs::path> found =
-      files.empty() ? sourcesOf(reader.manifest(), reader.cachePath()) : files;
+      files.empty() ? sourcesOf(reader.manifest(), reader.wholePath()) : files;
   if (found.empty())
     throw Error("{}: the files that it was made from are no longer there; name them after --source",
                 reader.cachePath().string());
@@ -136,6 +138,38 @@ std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
     for (const ProbeVariable& variable : at.variables) {
       all[p]->values.push_back(variable.value);
       all[p]->sample.push_back(variable.mean);
+    }
+  }
+  return all;
+}
+
+std::vector<std::optional<PointValues>> joinedValues(std::span<const SetValues> sets) {
+  std::vector<std::optional<PointValues>> all(sets.front().found.size());
+  std::vector<glm::dvec3> places(all.size(), glm::dvec3(0.0));
+  for (size_t p = 0; p < all.size(); ++p) {
+    const auto first =
+        std::ranges::find_if(sets, [p](const SetValues& set) { return set.found[p].has_value(); });
+    if (first == sets.end()) continue;
+    all[p] = *first->found[p];
+    all[p]->values.clear();
+    all[p]->sample.clear();
+    places[p] = all[p]->place;
+  }
+  for (const SetValues& set : sets) {
+    const std::vector<double> none(set.reader->manifest().variables.size(),
+                                   std::numeric_limits<double>::quiet_NaN());
+    const auto there = valuesAt(*set.reader, places, set.source);
+    const auto append = [](std::vector<double>& to, const std::vector<double>& values) {
+      to.insert(to.end(), values.begin(), values.end());
+    };
+    for (size_t p = 0; p < all.size(); ++p) {
+      if (!all[p]) continue;
+      const std::optional<PointValues>& found = set.found[p];
+      append(all[p]->values, found ? found->values : none);
+      if (found && found->place == places[p])
+        append(all[p]->sample, found->sample);
+      else
+        append(all[p]->sample, there[p] ? there[p]->values : none);
     }
   }
   return all;

@@ -161,27 +161,35 @@ py::tuple pointArrays(const CacheReader& cache, const DataChoice& choice, const 
       arrayOf(std::move(points.volumes), {count}), arrayOf(std::move(points.shapes), {count, 3, 3}));
 }
 
-py::tuple probedArrays(const CacheReader& reader, const std::vector<std::array<double, 3>>& points,
+py::tuple probedArrays(const std::vector<const CacheReader*>& sets,
+                       const std::vector<std::array<double, 3>>& points,
                        const std::optional<std::vector<std::filesystem::path>>& source) {
   std::vector<glm::dvec3> at;
   at.reserve(points.size());
   for (const std::array<double, 3>& point : points) at.emplace_back(point[0], point[1], point[2]);
+  std::vector<SetValues> of_sets;
+  std::vector<std::string> names;
   PointSource from;
-  if (source) setSource(reader, *source, from.grid);
-  const auto found = valuesAt(reader, at, source ? &from : nullptr);
+  const PointSource* const exact = source ? &from : nullptr;
+  if (source) setSource(*sets.front(), *source, from.grid);
+  for (const CacheReader* const set : sets) {
+    of_sets.push_back({set, exact, valuesAt(*set, at, exact)});
+    for (const VariableInfo& variable : set->manifest().variables) names.push_back(variable.name);
+  }
+  const auto found = sets.size() == 1 ? std::move(of_sets.front().found) : joinedValues(of_sets);
   const auto count = static_cast<py::ssize_t>(at.size());
   py::array_t<uint32_t> block(count);
   py::array_t<uint64_t> index({count, py::ssize_t{3}});
   py::array_t<double> place({count, py::ssize_t{3}});
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   py::dict values, sample_values;
-  for (size_t v = 0; v < reader.manifest().variables.size(); ++v) {
+  for (size_t v = 0; v < names.size(); ++v) {
     py::array_t<double> here(count), there(count);
     for (size_t n = 0; n < at.size(); ++n) {
       here.mutable_data()[n] = found[n] ? found[n]->values[v] : kNone;
       there.mutable_data()[n] = found[n] ? found[n]->sample[v] : kNone;
     }
-    const py::str name(reader.manifest().variables[v].name);
+    const py::str name(names[v]);
     values[name] = here;
     sample_values[name] = there;
   }

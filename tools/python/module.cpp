@@ -130,7 +130,10 @@ py::tuple orbitedCamera(const std::array<double, 3>& position, const std::array<
 py::tuple probeAt(OpenCache& cache, const std::vector<std::array<double, 3>>& points,
                   const std::optional<std::vector<std::filesystem::path>>& source) {
   const auto busy = cache.use();
-  return probedArrays(cache.reader(), points, source);
+  std::vector<const CacheReader*> sets{&cache.reader()};
+  for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n)
+    sets.push_back(&cache.ownBlanks(n).reader());
+  return probedArrays(sets, points, source);
 }
 
 py::tuple sample(OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,

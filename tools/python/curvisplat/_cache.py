@@ -235,8 +235,8 @@ class Cache:
     @_arguments.in_one_line
     def probe(self, point: Any, *, source: Any = None) -> Optional[dict]:
         """What is at a point (x, y, z): {"values": {scalar: value at the point}, "block": from 1, "index": (i, j, k) from 0 of the sample
-        that it lies in, "position": the middle of that sample's cell, "sample_values": {scalar: value there}}. None if the point is outside of
-        the grid.
+        that it lies in, "position": the middle of that sample's cell, "sample_values": {scalar: value there}}. NaN for a scalar that has no value
+        there where others have one. None if the point is outside of the grid.
 
         Of points (n, 3) the same with arrays: values of shape (n,), "block" 0 and NaN outside.
 
