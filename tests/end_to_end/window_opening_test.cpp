@@ -397,6 +397,30 @@ TEST_F(FurtherScalarTest, WithoutTheSourcesNoneIsOffered) {
   close();
 }
 
+/// It is in a cache of its own within the one that is shown.
+TEST_F(WindowOpening, AScalarWithOwnBlanksIsShownWhenItIsChosen) {
+  fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/own_blanks.splats", "sets.splats",
+           fs::copy_options::recursive);
+  cache_ = "sets";
+  open();
+  press("x");
+  std::vector<Image> pictures{saveAndCopy()};
+  for (const std::string name : {"s2", "s3"}) {
+    chooseScalar(name);
+    placeOf("scalar shown: " + name);
+    press("ctrl+z");  // the states before are of scalars that this cache lacks
+    pictures.push_back(saveAndCopy());
+  }
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 3u);
+  for (size_t n = 0; n < commands.size(); ++n) {
+    EXPECT_EQ(valueOf(commands[n], "--scalar"), n == 0 ? "s1" : n == 1 ? "s2" : "s3");
+    EXPECT_TRUE(commands[n].at(1).ends_with("sets.splats")) << commands[n][1];
+    EXPECT_EQ(valueOf(commands[n], "--position"), valueOf(commands[0], "--position"));
+    expectDraws(commands[n], pictures[n]);
+  }
+}
+
 /// All steps get it: the series is converted again beside the window.
 TEST_F(WindowOpening, AScalarIsAddedToASeries) {
   run({"generate", "wake", "--size", "24x16x12", "--steps", "3", "-o", "s"});

@@ -145,6 +145,25 @@ TEST(ViewState, VariablesKeepTheFunctionOverTheirOwnRange) {
   EXPECT_THROW(chooseVariable(state, manifest(), "w"), UsageError);
 }
 
+TEST(ViewState, OfAnotherCacheHasNothingOfScalarsThatThatLacks) {
+  const ViewState before = changedState();
+  ViewState same = before;
+  leaveOtherScalars(same, manifest(), "density");
+  EXPECT_EQ(toJson(same), toJson(before));
+
+  Manifest other = manifest();
+  other.variables = {{0, "half", "", 5, 6}};
+  ViewState state = before;
+  leaveOtherScalars(state, other, "half");
+  EXPECT_EQ(state.variable, "half");
+  EXPECT_EQ(state.function.range(), std::pair(5.0, 6.0));
+  EXPECT_FALSE(state.opacity_by);
+  EXPECT_FALSE(state.faces_by);
+  EXPECT_TRUE(state.isovalues.empty());
+  EXPECT_EQ(state.camera.position, before.camera.position);
+  EXPECT_EQ(state.slices.size(), 1u);
+}
+
 TEST(ViewState, AnAutomaticFunctionComesBackWithItsScale) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   const FunctionParts parts{"inferno", {0.5, 3}, AsinhScale{1, 0.25}, {{0, 0.5}, {0.25, 0}, {1, 0.75}}, 0.5};

@@ -28,7 +28,7 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   ImGui::Begin("panels", nullptr, kFixed);
   if (facts.playback && facts.playback->steps() > 1)
     if (const Section open{"Time", true}) drawTime(actions, *facts.playback);
-  if (const Section open{"Scalar", true}) drawScalars(state, facts.further, actions);
+  if (const Section open{"Scalar", true}) drawScalars(state, facts, actions);
   if (const Section open{"Colours and opacities", true})
     drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
   actions.changed |= actions.function_changed;
@@ -83,6 +83,14 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
 
 namespace {
 
+/// Scalars of other caches within the whole one.
+void drawElsewhere(const std::vector<std::string>& names, PanelActions& actions) {
+  for (const std::string& name : names) {
+    if (ImGui::Selectable(fmt::format("{}  (at other samples)", name).c_str())) actions.scalar = name;
+    nameWidget("scalar " + name);
+  }
+}
+
 /// What the sources have besides, at the end of the list of scalars.
 void drawFurther(const FurtherScalars& further, PanelActions& actions) {
   if (further.from.empty()) {
@@ -108,7 +116,7 @@ void drawFurther(const FurtherScalars& further, PanelActions& actions) {
 
 }  // namespace
 
-void Panels::drawScalars(const ViewState& state, const FurtherScalars* further, PanelActions& actions) {
+void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions) {
   const auto& variables = cache_.manifest().variables;
   label("scalar");
   if (ImGui::BeginCombo("##scalar", state.variable.c_str(), ImGuiComboFlags_HeightLargest)) {
@@ -118,10 +126,12 @@ void Panels::drawScalars(const ViewState& state, const FurtherScalars* further, 
       nameWidget("scalar " + one.name);
       if (chooses) actions.scalar = one.name;
     }
-    if (further) drawFurther(*further, actions);
+    if (facts.elsewhere) drawElsewhere(*facts.elsewhere, actions);
+    if (facts.further) drawFurther(*facts.further, actions);
     ImGui::EndCombo();
   } else {
     nameWidget("scalar");
+    nameWidget("scalar shown: " + state.variable);
   }
   label("opacity by");
   ImGui::BeginDisabled(variables.size() < 2);

@@ -40,7 +40,8 @@ struct PanelFacts {
   std::vector<std::string> views;  // saved ones, by name
   Rectangle place;                 // of the panels in the window
   const FurtherScalars* further = nullptr;
-  const std::vector<std::string>* faces = nullptr;  // that can be added as surfaces
+  const std::vector<std::string>* faces = nullptr;      // that can be added as surfaces
+  const std::vector<std::string>* elsewhere = nullptr;  // scalars that have values at other samples
 };
 
 class Panels {
@@ -56,7 +57,7 @@ class Panels {
 
  private:
   void drawTime(PanelActions& actions, Playback& playback);
-  void drawScalars(const ViewState& state, const FurtherScalars* further, PanelActions& actions);
+  void drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawFunctions(ViewState& state, PanelActions& actions, uint64_t step);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);

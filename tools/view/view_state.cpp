@@ -337,6 +337,13 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
   state.function.fitRange(variable->min, variable->max);
 }
 
+void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown) {
+  if (!find(manifest, state.isoScalar())) state.isovalues.clear();  // they were at its values
+  if (state.opacity_by && !find(manifest, state.opacity_by->variable)) state.opacity_by.reset();
+  if (state.faces_by && !find(manifest, state.faces_by->variable)) state.faces_by.reset();
+  if (!find(manifest, state.variable)) chooseVariable(state, manifest, shown);
+}
+
 std::string toJson(const ViewState& state) {
   Json json = {{"curvisplat_view", 1}, {"variable", state.variable}, {"camera", jsonOf(state.camera)}};
   put(json, state.function);

@@ -114,6 +114,9 @@ void loadSurfaces(ViewState& state);
 /// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the
 /// scalars if there is none of this name.
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name);
+/// For a view of another cache of the same grid: removes what is of scalars that it lacks (opacities, isosurfaces, colours of
+/// faces). `shown`: the scalar that takes the place of the one that is shown, if that is lacking.
+void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown);
 
 std::string toJson(const ViewState& state);
 /// `path` names the file in messages. Throws Error with the path and the field that is missing or out of

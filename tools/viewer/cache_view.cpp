@@ -42,7 +42,13 @@ ImageSize pixelsOf(const Rectangle& place, const Window& window) {
 std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& options) {
   if (options.preview || !options.conversion.sources_of) return {};
   if (!options.grid_files.empty()) return options.grid_files;
-  return options.conversion.sources_of(cache.seriesManifest(), cache.cachePath());
+  return options.conversion.sources_of(cache.seriesManifest(), cache.wholePath());
+}
+
+bool hasScalarsOf(const Manifest& manifest, const Manifest& other) {
+  return std::ranges::all_of(other.variables, [&](const VariableInfo& one) {
+    return std::ranges::find(manifest.variables, one.name, &VariableInfo::name) != manifest.variables.end();
+  });
 }
 
 /// [step]: whether the next one has its geometry.
@@ -61,6 +67,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       target_s_(options.target_s),
       faces_at_(options.faces.at),
       face_names_(prepared.face_names),
+      elsewhere_(prepared.elsewhere),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
@@ -76,7 +83,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       picture_(window.gl()),
       overlay_(window.gl()),
       views_(savedViewsOf(whole())),
-      further_(options.conversion, cache_.cachePath(), sourcesFor(cache_, options), Window::wake),
+      further_(options.conversion, cache_.wholePath(), sourcesFor(cache_, options), Window::wake),
       probe_(cache_),
       chooser_(cache_, Window::wake) {
   frames_.emplace(cache_, backend_, Window::wake, std::move(after));
@@ -94,7 +101,8 @@ void CacheView::releasePictures() {
   if (save_to_) say("The picture was not saved, because something else has been opened.");
   if (copy_requested_) say("The command was not copied, because something else has been opened.");
   if (wanted_scalar_)
-    say(fmt::format("{} was not added, because something else has been opened.", *wanted_scalar_));
+    say(fmt::format("{} was not {}, because something else has been opened.", *wanted_scalar_,
+                    hasElsewhere(*wanted_scalar_) ? "shown" : "added"));
   picture_.release();
   overlay_.release();
 }
@@ -110,7 +118,7 @@ void CacheView::takeRequestsOf(CacheView& before) {
   copy_requested_ = std::exchange(before.copy_requested_, false);
   copies_movie_ = before.copies_movie_;
   wanted_scalar_ = std::exchange(before.wanted_scalar_, std::nullopt);
-  chooser_.takeQuestionsOf(before.chooser_);
+  if (hasScalarsOf(manifest(), before.manifest())) chooser_.takeQuestionsOf(before.chooser_);
   if (before.playback_.steps() == playback_.steps()) playback_ = before.playback_;
 }
 
@@ -246,6 +254,7 @@ void CacheView::drawPanels(const WindowLayout& layout) {
   facts.playback = &playback_;
   facts.views = views_;
   facts.faces = &face_names_;
+  facts.elsewhere = &elsewhere_;
   facts.place = layout.panels;
   const FurtherScalars further = furtherScalars();
   facts.further = &further;
@@ -310,11 +319,11 @@ void CacheView::run(Command command) {
       saveTo({});
       return;
     case Command::kSavePictureAs:
-      return dialog_.openToSavePicture(cache_.cachePath().stem().string() + ".png", picture_size_);
+      return dialog_.openToSavePicture(cache_.wholePath().stem().string() + ".png", picture_size_);
     case Command::kSaveTurnMovie:
     case Command::kSaveStepsMovie:
       movie_kind_ = command == Command::kSaveTurnMovie ? MovieKind::kOneTurn : MovieKind::kAllSteps;
-      return dialog_.openToSaveMovie(cache_.cachePath().stem().string() + ".mp4", textOf(newMovie({})));
+      return dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", textOf(newMovie({})));
     case Command::kCopyCommand:
     case Command::kCopyMovieCommand:
       copy_requested_ = true;
@@ -447,9 +456,13 @@ void CacheView::restore(const ViewState* state) {
   changed_ = true;
 }
 
-std::shared_ptr<const CarriedView> CacheView::carried() const {
+std::shared_ptr<const CarriedView> CacheView::carriedTo(const PreparedView& next) const {
   if (isUntouchedPreview()) return nullptr;
-  return std::make_shared<const CarriedView>(CarriedView{state_, history_});
+  if (hasScalarsOf(next.cache.manifest(), manifest()))
+    return std::make_shared<const CarriedView>(CarriedView{state_, history_});
+  ViewState state = state_;
+  leaveOtherScalars(state, next.cache.manifest(), next.scalar);
+  return std::make_shared<const CarriedView>(CarriedView{state, History(state)});
 }
 
 bool CacheView::isOf(const CacheReader& cache) const {

@@ -1,6 +1,7 @@
 // One cache in the window: its picture, the panels beside it, and what they change.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <future>
 #include <memory>
@@ -78,17 +79,22 @@ class CacheView {
   /// Saves the state for the next time; that of a preview only if the user has changed it.
   void remember() const;
 
-  /// For another view of the same grid. nullptr if this is a preview that the user has left as it was.
-  std::shared_ptr<const CarriedView> carried() const;
+  /// For another view of the same grid, without what is of scalars that its cache lacks. nullptr if this is a preview that the
+  /// user has left as it was.
+  std::shared_ptr<const CarriedView> carriedTo(const PreparedView& next) const;
   const std::optional<Preview>& preview() const { return preview_; }
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }
-  /// A scalar of the sources that is to be added to the cache, once. `is_busy`: something is being opened or added; then it
+  /// A scalar that the cache lacks, once: one that hasElsewhere(), or one of the sources, to be added. `is_busy`: something is being opened or added; then it
   /// waits.
   std::optional<std::string> takeWantedScalar(bool is_busy);
   /// A movie that is to be drawn, once.
   std::optional<MovieRequest> takeWantedMovie() { return std::exchange(wanted_movie_, std::nullopt); }
   const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
-  const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
+  const std::filesystem::path& wholePath() const { return cache_.wholePath(); }
+  /// Whether the whole cache has the scalar, with values at other samples than those of the shown cache.
+  bool hasElsewhere(const std::string& scalar) const {
+    return std::ranges::find(elsewhere_, scalar) != elsewhere_.end();
+  }
   /// Whether its state can be that of a view of this cache: it shows the same one.
   bool isOf(const CacheReader& cache) const;
 
@@ -151,6 +157,7 @@ class CacheView {
   const double target_s_;
   const FacesAtStep faces_at_;
   const std::vector<std::string> face_names_;  // that the list of surfaces offers
+  const std::vector<std::string> elsewhere_;   // scalars that the whole cache has besides
   const std::optional<Preview> preview_;
   const std::vector<std::filesystem::path> grid_files_;  // that were opened, if the cache is kept for them
   Window& window_;

@@ -203,7 +203,7 @@ void CacheView::savePictureIfFinal() {
   fs::path file = *std::exchange(save_to_, std::nullopt);
   const bool numbered = file.empty();
   for (int number = 1; file.empty() || (numbered && fs::exists(file)); ++number)
-    file = fmt::format("{}_{:04}.png", cache_.cachePath().stem().string(), number);
+    file = fmt::format("{}_{:04}.png", cache_.wholePath().stem().string(), number);
   try {
     const ShownFunctions functions(state_, manifest());
     const AnnotatedScene scene = sceneOf(state_, functions, *shown_, picture_size_);
@@ -248,7 +248,8 @@ MovieRequest CacheView::newMovie(const fs::path& file) const {
 
 void CacheView::copyCommand(bool turns) {
   try {
-    CommandOptions options{shortPath(whole()), picture_size_, {}, {}, turns};
+    CommandOptions options{
+        shortPath(preview_ ? preview_->whole : cache_.wholePath()), picture_size_, {}, {}, turns};
     if (!grid_files_.empty() && grid_files_.size() <= kMaxNamedFiles) {
       options.cache = shortPath(grid_files_.front());
       for (size_t n = 1; n < grid_files_.size(); ++n) options.solutions.push_back(shortPath(grid_files_[n]));
@@ -257,7 +258,7 @@ void CacheView::copyCommand(bool turns) {
     const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
       if (!needsFile(function)) return;
       // Beside the picture that the command will write.
-      file = fmt::format("{}_{}.json", cache_.cachePath().stem().string(), what);
+      file = fmt::format("{}_{}.json", cache_.wholePath().stem().string(), what);
       writeFileDurably(file, toParaViewPreset(function.definition()));
     };
     keep(state_.function, "colours", options.function_file);
@@ -335,6 +336,7 @@ std::vector<std::string> CacheView::otherScalars() const {
 
 void CacheView::addTo(MenuFacts& facts) {
   for (const VariableInfo& one : manifest().variables) facts.scalars.push_back(one.name);
+  facts.scalars.insert(facts.scalars.end(), elsewhere_.begin(), elsewhere_.end());
   facts.scalar = state_.variable;
   facts.opacity_scalars = otherScalars();
   facts.opacity_scalar = state_.opacity_by ? state_.opacity_by->variable : facts.opacity_scalars.front();
@@ -362,6 +364,10 @@ void CacheView::choose(const MenuChoice& choice) {
 
 void CacheView::chooseScalar(const std::string& name) {
   using For = FunctionChooser::For;
+  if (hasElsewhere(name)) {
+    wanted_scalar_ = name;
+    return;
+  }
   const bool is_shown = name == state_.variable;
   if (!is_shown && state_.function.isAutomatic()) return chooser_.ask({For::kScalar, name});
   chooser_.drop(For::kScalar);  // one that was chosen before

@@ -52,7 +52,8 @@ struct OpenedView::Preparation {
   std::shared_ptr<const PreparedView> prepared;  // once the thread has ended
 
   void prepare(const fs::path& cache) {
-    prepared = std::make_shared<const PreparedView>(prepareView(CacheReader(cache), options, picture));
+    CacheReader with_scalar = CacheReader::ofScalar(cache, options.scalar.value_or(""));
+    prepared = std::make_shared<const PreparedView>(prepareView(std::move(with_scalar), options, picture));
   }
 };
 
@@ -67,7 +68,7 @@ OpenedView::~OpenedView() {
 }
 
 void OpenedView::show(CacheReader cache) {
-  const fs::path path = fs::absolute(cache.cachePath());
+  const fs::path path = fs::absolute(cache.wholePath());
   show(prepareView(std::move(cache), options_, surroundings_.picture_size()), options_, {path});
 }
 
@@ -79,7 +80,7 @@ void OpenedView::show(const PreparedView& prepared, const ViewerOptions& options
                                           surroundings_.dialog, before_has_ended.get_future().share());
   if (options.carried && view_) view->takePictureOf(*view_);
   const auto preview = view_ ? view_->preview() : std::nullopt;
-  const fs::path& whole = options.preview ? options.preview->whole : prepared.cache.cachePath();
+  const fs::path& whole = options.preview ? options.preview->whole : prepared.cache.wholePath();
   if (view_ && (options.carried || (preview && preview->whole == whole))) view->takeRequestsOf(*view_);
   retire(std::exchange(view_, std::move(view)), std::move(before_has_ended));
   surroundings_.window.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
@@ -139,17 +140,19 @@ void OpenedView::open(const std::vector<fs::path>& files) {
       Window::wake);
 }
 
-/// Adds a scalar of the sources to the cache that is shown.
+/// Shows a scalar that the shown cache lacks: the whole cache has it, or it is added to that from the sources.
 void OpenedView::add(const std::string& scalar) {
   adds_to_ = scalar;
   preparation_ =
       std::make_shared<Preparation>(Preparation{viewOptions(), surroundings_.picture_size(), nullptr});
   preparation_->options.scalar = scalar;
+  preparation_->options.preview = view_->preview();
+  const bool is_there = view_->hasElsewhere(scalar);
   opening_ = std::make_unique<Opening>(
-      "adding " + scalar,
-      [add = options_.conversion.add_scalar, scalar, cache = view_->cachePath(), files = view_->sources(),
-       of = preparation_](Progress& progress, const OpeningEvents&) {
-        add(cache, files, scalar, progress);
+      (is_there ? "opening " : "adding ") + scalar,
+      [add = options_.conversion.add_scalar, is_there, scalar, cache = view_->wholePath(),
+       files = view_->sources(), of = preparation_](Progress& progress, const OpeningEvents&) {
+        if (!is_there) add(cache, files, scalar, progress);
         of->prepare(cache);
         return cache;
       },
@@ -191,8 +194,9 @@ void OpenedView::takeWhole() {
     ViewerOptions options = viewOptions();
     if (adds_to_) {
       options.grid_files = view_->gridFiles();
-      options.carried = view_->carried();
+      options.carried = view_->carriedTo(*preparation->prepared);
       options.scalar = adds_to_;
+      options.preview = view_->preview();
       return show(*preparation->prepared, options,
                   options.grid_files.empty() ? std::vector{cache} : options.grid_files);
     }
@@ -202,7 +206,7 @@ void OpenedView::takeWhole() {
     const bool follows_preview = preview && preview->whole == cache;
     // Of one that is opened again, too, what the user has changed while it opened.
     if (follows_preview || (view_ && view_->isOf(preparation->prepared->cache)))
-      options.carried = view_->carried();
+      options.carried = view_->carriedTo(*preparation->prepared);
     if (options.carried) options.scalar.reset();  // the user has chosen since
     show(*preparation->prepared, options, opening_files_);
   } catch (const Interrupted&) {
@@ -219,7 +223,7 @@ void OpenedView::showPreview(const Preview& preview) {
     options.preview = preview;
     options.preview->view.reset();
     if (view_ && view_->preview() && view_->preview()->whole == preview.whole)
-      options.carried = view_->carried();
+      options.carried = view_->carriedTo(*preview.view);
     if (options.carried) options.scalar.reset();
     show(*preview.view, options, opening_files_);
     surroundings_.reports.say(fmt::format("A preview of {}; the whole follows.", preview.what));

@@ -1,5 +1,6 @@
 #include "tools/viewer/prepared_view.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "stream/base/error.h"
@@ -44,6 +45,18 @@ void removeMissingFaces(const FaceServices& services, const CacheReader& cache, 
   }
 }
 
+/// The scalars that the whole cache has and this one lacks.
+std::vector<std::string> scalarsElsewhere(const CacheReader& cache) {
+  std::vector<std::string> names = cache.wholePath() == cache.cachePath()
+                                       ? cache.allScalars()
+                                       : CacheReader(cache.wholePath()).allScalars();
+  std::erase_if(names, [&](const std::string& name) {
+    return std::ranges::find(cache.manifest().variables, name, &VariableInfo::name) !=
+           cache.manifest().variables.end();
+  });
+  return names;
+}
+
 }  // namespace
 
 PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageSize picture) {
@@ -69,7 +82,8 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   removeMissingFaces(options.faces, cache, state);
   std::vector<std::string> faces;
   if (options.faces.names) faces = options.faces.names(cache);
-  return {std::move(cache), std::move(state), scalar, automatic, std::move(faces)};
+  std::vector<std::string> elsewhere = scalarsElsewhere(cache);
+  return {std::move(cache), std::move(state), scalar, automatic, std::move(faces), std::move(elsewhere)};
 }
 
 }  // namespace curvisplat

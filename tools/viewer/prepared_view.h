@@ -64,6 +64,7 @@ struct PreparedView {
   std::string scalar;                   // for which
   EditedFunction automatic;             // was chosen from the data
   std::vector<std::string> face_names;  // that the list of surfaces offers
+  std::vector<std::string> elsewhere;   // scalars of the whole cache that have values at other samples
 };
 
 /// The first view, or the one that was left last time, with what `options` except `carried` ask for.
