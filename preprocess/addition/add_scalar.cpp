@@ -22,6 +22,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/memory.h"
+#include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/values_writer.h"
@@ -106,6 +107,7 @@ class Addition {
             "{}: its blocks overlap, and older scalars have no values at some of its samples; convert again "
             "with all scalars",
             cache_.path().string());
+      warnOfLeftOut();
       // Older scalars have blanked nodes that the grid does not: only the cache knows them.
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
       if (grid_ && manifest().splats < manifest().nodes - manifest().blanked_nodes)
@@ -113,6 +115,20 @@ class Addition {
       pass("scan again", nodesOfRank(), "nodes", &Addition::survey);
     }
     if (isFirst()) checkSurvey();
+  }
+
+  /// Where older scalars have no values. The survey is of all that the grid has.
+  void warnOfLeftOut() {
+    const uint64_t kept_out = manifest().blanked_nodes, blanked = survey_.blanked.total();
+    uint64_t values = blanked < kept_out ? kept_out - blanked : 0;
+    uint64_t of_some = 0;  // where another added scalar has none
+    for (const BlankCounts::Lost& lost : survey_.blanked.lost) of_some = std::max(of_some, lost.samples);
+    values += of_some;
+    if (values > 0)
+      report_.warnings.push_back(
+          fmt::format("left out: the values of {} at {}, where the scalars of the cache have none; to keep "
+                      "them, convert again with all scalars",
+                      fmt::join(report_.scalars, ", "), countText(values, "sample")));
   }
 
   bool isFirst() const { return !ranks_ || ranks_->isFirst(); }

@@ -43,10 +43,11 @@ struct AddScalarReport {
   unsigned threads = 0;           // that worked
   uint64_t memory_bytes = 0;      // the limit that was kept
   std::vector<FileReport> files;  // the new ones
+  std::vector<std::string> warnings;
 };
 
 /// Adds. `source` is read twice (a third time if older scalars blanked nodes that the grid does not). Nodes
-/// that the cache draws must have the new values; what it does not draw does not matter. Throws Error if the
+/// that the cache draws must have the new values; those of other nodes are left out, with a warning. Throws Error if the
 /// grid is not the one the cache was made from, if a value is missing, or if something outside fails;
 /// UsageError if the cache has a scalar of the name. Then the cache is as it was. Peak memory, everything
 /// counted: options.memory_bytes.

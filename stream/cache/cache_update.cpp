@@ -10,10 +10,12 @@
 #include <cstring>
 #include <span>
 #include <string>
+#include <system_error>
 
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/cache/series.h"
 
 namespace curvisplat {
 namespace {
@@ -25,9 +27,23 @@ std::filesystem::path partOf(const std::filesystem::path& manifest) {
   return part;
 }
 
+void requireWhole(const std::filesystem::path& cache) {
+  const std::filesystem::path absolute = std::filesystem::absolute(cache).lexically_normal();
+  const std::filesystem::path whole = absolute.parent_path();
+  std::error_code ignored;
+  if (!absolute.filename().string().starts_with("blanks.") ||
+      !std::filesystem::exists(whole / "manifest.json", ignored))
+    return;
+  for (size_t n = 0; n < readManifest(whole).own_blanks.size(); ++n)
+    if (absolute.filename() == ownBlanksFolderName(n))
+      throw Error("{}: is a part of {}, which would no longer open if this was changed; name that cache",
+                  cache.string(), whole.string());
+}
+
 }  // namespace
 
 CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manifest_(cache / "manifest.json") {
+  requireWhole(cache_);
   // Opened for writing because network file systems require that for an exclusive lock.
   fd_ = openRetrying(manifest_, O_RDWR);
   if (fd_ < 0)

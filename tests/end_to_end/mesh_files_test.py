@@ -234,6 +234,8 @@ class MeshFiles(MeshCase):
         self.assertIn("high has values at other samples than low", refused.stderr)
         refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache, "--add-scalar", "high")
         self.assertIn("already has a scalar 'high'", refused.stderr)
+        refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache / "blanks.1", "--add-scalar", "volume")
+        self.assertIn("is a part of", refused.stderr)
         refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache, "--add-steps")
         self.assertIn("high has values at other samples than low", refused.stderr)
         manifest = cache / "blanks.1" / "manifest.json"

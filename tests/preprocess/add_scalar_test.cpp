@@ -272,6 +272,33 @@ TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
   }));
 }
 
+TEST(AddScalar, SaysWhichValuesAreLeftOut) {
+  const GridBlock box = gridBlock(20, 10, 10);
+  const FunctionGridSource source({box}, 4, [=](const GridNode& node) {
+    NodeValues values = bentBox(node, box);
+    values.scalars.push_back(values.scalars[0]);
+    if (node.i < 5) values.scalars[0] = values.scalars[1] = kNotANumber;
+    if (node.i < 2) values.scalars[2] = kNotANumber;
+    return values;
+  });
+  const TemporaryFolder folder;
+  const auto warningsOfAdding = [&](const std::string& name, const std::vector<uint32_t>& scalars) {
+    convertTo(folder / name, source, {0});
+    return added(source, adding(folder / name, scalars)).warnings;
+  };
+  EXPECT_EQ(warningsOfAdding("same", {1}), std::vector<std::string>{});
+  const std::vector<std::pair<std::vector<uint32_t>, std::string>> others{
+      {{2}, "the values of s2 at 300 samples"},
+      {{3}, "the values of s3 at 500 samples"},
+      {{1, 2, 3}, "the values of s1, s2, s3 at 500 samples"}};
+  for (const auto& [scalars, text] : others) {
+    const std::vector<std::string> warnings = warningsOfAdding(text, scalars);
+    ASSERT_EQ(warnings.size(), 1u) << text;
+    expectSays(warnings[0], text);
+    expectSays(warnings[0], "convert again with all scalars");
+  }
+}
+
 TEST(AddScalar, RefusesBlanksThatTheCacheLeavesAmbiguous) {
   // Of nodes that coincide, the older scalar blanked some: were the others merged, or blanked too?
   const TemporaryFolder folder;

@@ -92,6 +92,7 @@ void runAddScalar(ConvertArguments arguments) {
   nlohmann::json numbers = statisticsOfAddition(report, progress);
   numbers["ranks"] = ranks.count();
   for (const std::string& warning : source->description().warnings) printMessage("warning: {}", warning);
+  for (const std::string& warning : report.warnings) printMessage("warning: {}", warning);
   if (const auto note = timeStepNote(source->description(), arguments.grid.time_step))
     printMessage("note: {}", *note);
   printAddition(arguments, report, secondsOf(progress));

@@ -185,7 +185,8 @@ void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files,
   options.cache = cache;
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
   try {
-    addScalars(*source, options, progress);
+    for (const std::string& warning : addScalars(*source, options, progress).warnings)
+      printMessage("warning: {}", warning);
   } catch (const UsageError& error) {
     throw Error("{}", error.what());
   }
