@@ -12,6 +12,7 @@
 #include "stream/cache/cache_format.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/partial_folder.h"
+#include "stream/cache/series.h"
 #include "stream/codec/face_codec.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/values_codec.h"
@@ -115,6 +116,10 @@ void writeTables(const Seeds& seeds) {
   SmallCache cache;
   cache.write(path);
   seeds.write("manifest", "small", bytesOfFile(path / "manifest.json"));
+  Manifest with_own_blanks = readManifest(path);
+  with_own_blanks.requirements.push_back(kOwnBlanks);
+  with_own_blanks.own_blanks = {{{"half", "quarter"}, 1}, {{"none"}, 2}};
+  seeds.write("manifest", "own_blanks", with_own_blanks.toJson());
   const std::string bricks = bytesOfFile(path / "bricks.bin"), values = bytesOfFile(path / "var.0.bin");
   const size_t count = (bricks.size() - sizeof(BricksHeader)) / sizeof(BrickRecord);
   const size_t table = values.size() - count * sizeof(VariableRecord);
