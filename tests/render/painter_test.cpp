@@ -330,11 +330,11 @@ TEST(GlPainter, RefusesAnImageBeyondTheLimitAndGoesOn) {
 }
 
 /// Splats that lean, some cut, in the order of their first keys.
-std::vector<ScreenSplat> leaning(int count, ImageSize size) {
+std::vector<ScreenSplat> leaning(int count, ImageSize size, float opacity = 0.5f) {
   std::vector<std::vector<ScreenSplat>> placed;  // each behind its records, which cutSome() has behind it
   std::mt19937 random(5);
   std::uniform_real_distribution<float> around(-1, 1);
-  for (const ScreenSplat& element : cutSome(randomSplats(count, 7, size), 4)) {
+  for (const ScreenSplat& element : cutSome(randomSplats(count, 7, size, 0.3f, opacity), 4)) {
     if (isRecord(element)) {
       placed.back().insert(placed.back().begin(), element);
       continue;
@@ -358,6 +358,24 @@ Image drawn(Painter& painter, std::span<const ScreenSplat> nearest_first, const 
   painter.begin(size, kWhite, table, {});
   painter.draw(nearest_first);
   return painter.end();
+}
+
+// One tile, whose splats take more than the least that is kept when they are prepared, and less than the most.
+TEST(CpuPainter, HasTheSameBitsWhateverIsKeptOfPreparedSplats) {
+  const ImageSize size{kTileSide, kTileSide};
+  const auto table = lively();
+  const auto splats = leaning(6000, size, 0.002f);
+  const auto painted = [&](size_t waiting_splats) {
+    Image image;
+    makeBackend(Backend::kCpu)->run([&](Painter& painter) {
+      painter.begin(size, kWhite, table, {}, {.threads = 1, .waiting_splats = waiting_splats});
+      painter.draw(splats);
+      image = painter.end();
+      EXPECT_FALSE(painter.isOverfull());
+    });
+    return image;
+  };
+  EXPECT_EQ(painted(12288).rgba, painted(1 << 17).rgba);
 }
 
 TEST(GlTilePainter, HasTheSameBitsInAnyBatchesAndBoxes) {
