@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <new>
 #include <regex>
+#include <span>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -206,6 +207,15 @@ void refuseOptionsAsValues(CLI::App& app) {
     refuseOptionsAsValues(*command);
 }
 
+/// CLI11 takes the next word where nothing follows "=".
+void refuseEmptyValues(std::span<const char* const> words) {
+  for (const std::string_view word : words) {
+    if (word == "--") return;
+    if (word.starts_with("--") && word.find('=') + 1 == word.size())
+      throw UsageError("{}: needs a value (found nothing behind '=')", word.substr(0, word.size() - 1));
+  }
+}
+
 /// Reports a failure, as one rank for all where there are several.
 int fail(const std::string& line, int status) {
   endRanksAfter(line, status);
@@ -234,6 +244,7 @@ int run(int argc, char** argv) {
   refuseOptionsAsValues(app);
 
   try {
+    refuseEmptyValues({argv, static_cast<size_t>(argc)});
     app.parse(argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {

@@ -283,6 +283,7 @@ TEST_F(Suggestions, Options) {
 TEST_F(Suggestions, OptionsWithoutTheirValues) {
   expectMeantByRender({"--orbit", "--size", "9x9"}, "--orbit: needs a value (found the option --size)");
   expectMeantByRender({"--scalar", "--size", "9x9"}, "--scalar: needs a value (found the option --size)");
+  expectMeantByRender({"--asinh=", "--size=9x9"}, "--asinh: needs a value (found nothing behind '=')");
 }
 
 TEST_F(Suggestions, Values) {

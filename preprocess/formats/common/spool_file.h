@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "stream/base/error.h"
 #include "stream/base/mutex.h"
 #include "stream/base/temporary_files.h"
 
@@ -124,6 +125,7 @@ class NumberSpool {
     const uint64_t at = numbers_.spool->append(
         [&](const SpoolFile::Sink& sink) { sink(std::as_bytes(std::span(pending_))); });
     if (numbers_.count == 0) numbers_.offset = at;
+    CURVISPLAT_CHECK_OP(at, ==, numbers_.offset + 8 * numbers_.count);  // no other list between
     numbers_.count += pending_.size();
     pending_.clear();
   }
