@@ -7,6 +7,7 @@
 #include <limits>
 #include <queue>
 
+#include "render/project/painter.h"
 #include "render/project/projection.h"
 #include "render/ranks/tile_dealer.h"
 #include "render/sweep/sweep_buffer.h"
@@ -38,7 +39,7 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
 constexpr uint64_t kMaxWaitingBytes = 96 << 20;
-// In the queues of tiles (render/tiles/tile_queues.h), and prepared.
+// What a waiting splat takes in the queues of tiles (render/tiles/tile_queues.h) and prepared.
 constexpr uint64_t kWaitingSplatBytes =
     sizeof(ScreenSplat) + sizeof(uint64_t) + PaintResources::kPreparedBytesASplat;
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a

@@ -14,7 +14,7 @@ constexpr size_t kWorthPainting = 512, kShareOfWaiting = 1;
 constexpr size_t kRound = 1024;
 constexpr size_t kPlacesOfARound = 2 * kRound;  // with records
 constexpr uint32_t kLastKey = INT32_MAX;
-// Of a thread: a round, the lists of a tile, and the least that the painter keeps of their splats.
+// Each thread needs this for a round, the lists of a tile, and the least that the painter keeps of prepared splats.
 constexpr uint64_t kScratchBytes = 2 << 20;
 
 /// How many records lie before a splat.
@@ -83,15 +83,15 @@ bool TileQueues::reserve(Queue& queue, uint32_t places) {
   return true;
 }
 
-/// Adds a splat of the batch, with its records. Its place; none where there is no memory.
-std::optional<uint32_t> TileQueues::append(Queue& queue, const New& added, uint32_t entry) {
+/// Adds a splat of the batch, with its records. Returns its place, or nothing where there is no memory.
+std::optional<TileQueues::Active> TileQueues::append(Queue& queue, const New& added, uint32_t entry) {
   const uint32_t records = recordsBefore(added.splats, entry);
   if (!reserve(queue, records + 1)) return {};
   const size_t place = placeOf(queue, queue.count);
   std::copy_n(&added.splats[entry - records], records + 1, &memory_[place]);
   left_[place + records] = kUnknown;
   queue.count += records + 1;
-  return static_cast<uint32_t>(place + records);
+  return Active{static_cast<uint32_t>(place + records), records, kUnknown};
 }
 
 /// Leaves the first `count` places.
@@ -182,14 +182,14 @@ void TileQueues::paint(size_t number, const New& added, uint64_t open, const Pai
     for (size_t round = 0; next < entries.size() && (round < kRound || (round < worth && hasSpace()));
          ++round, ++next) {
       prefetch(added, next + kAhead);
-      const auto place = append(queue, added, entries[next]);
-      if (!place && round == 0) {
+      auto active = append(queue, added, entries[next]);
+      if (!active && round == 0) {
         full_.store(true, std::memory_order_relaxed);
         return;
       }
-      if (!place) break;
-      scratch.active.push_back({*place, recordsBefore(added.splats, entries[next]),
-                                orderTilesOf(corner, added.splats[entries[next]])});
+      if (!active) break;
+      active->left = orderTilesOf(corner, added.splats[entries[next]]);
+      scratch.active.push_back(*active);
     }
     const uint32_t front = next < entries.size() ? added.splats[entries[next]].first
                            : added.last          ? kLastKey

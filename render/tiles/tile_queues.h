@@ -94,7 +94,7 @@ class TileQueues {
   }
   uint32_t nextFor(const Queue& queue, uint32_t count, uint32_t places);
   bool reserve(Queue& queue, uint32_t places);
-  std::optional<uint32_t> append(Queue& queue, const New& added, uint32_t entry);
+  std::optional<Active> append(Queue& queue, const New& added, uint32_t entry);
   void list(const Queue& queue, const TileCorner& corner, std::vector<Active>& active) const;
   void compact(Queue& queue, std::vector<Active>& active);
   void shorten(Queue& queue, uint32_t count);
