@@ -37,35 +37,44 @@ void MergedFaces::clear() {
 
 void MergedFaces::add(size_t voxel, const glm::dvec3& position, const Splat& splat, uint32_t border_code) {
   const InwardAxes inward = inwardAxes(border_code);
+  const glm::dvec3 first(inward.axis[0]);
+  if (inward.plate) {
+    for (const double side : {1.0, -1.0}) addFace(voxel, position, splat, {side * first, 0.5, true, true});
+    return;
+  }
   const uint32_t layers = layersOf(border_code);
   for (int a = 0; a < 3; ++a) {
-    const bool is_layer = (layers >> a & 1) != 0;
-    if (a >= inward.count && !is_layer) continue;
     const glm::dvec3 q(inward.axis[static_cast<size_t>(a)]);
-    const glm::dvec3 per_length = gradientOf(splat, q);
-    const double thickness = 1 / glm::length(per_length);
-    if (!(thickness > 0 && std::isfinite(thickness))) continue;
-    const glm::dvec3 normal = thickness * per_length;
-    const double section = splat.weight / thickness;
-    Sums* sums = nullptr;
-    size_t count = 0;
-    for (uint32_t n = first_[voxel]; n != kNone && !sums; n = sums_[n].next, ++count)
-      if (glm::dot(sums_[n].inward, normal) > kSimilar * glm::length(sums_[n].inward)) sums = &sums_[n];
-    if (!sums) {
-      if (count == VoxelPlanes::kMax) continue;
-      sums = &sums_.emplace_back();
-      sums->next = first_[voxel];
-      first_[voxel] = static_cast<uint32_t>(sums_.size() - 1);
-    }
-    sums->inward += section * normal;
-    const double distance = is_layer ? layerDistance(0) : inward.distance;
-    sums->point += section * (position - distance * (splat.factor() * q));
-    sums->section += section;
-    sums->face &= is_layer || inward.hasFace(a);
-    if (is_layer || inward.behind) continue;
-    sums->area += section;
-    sums->thickest = std::max(sums->thickest, thickness);
+    if ((layers >> a & 1) != 0)
+      addFace(voxel, position, splat, {q, layerDistance(0), true, false});
+    else if (a < inward.count)
+      addFace(voxel, position, splat, {q, inward.distance, inward.hasFace(a), !inward.behind});
   }
+}
+
+void MergedFaces::addFace(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatFace& face) {
+  const glm::dvec3 per_length = gradientOf(splat, face.inward);
+  const double thickness = 1 / glm::length(per_length);
+  if (!(thickness > 0 && std::isfinite(thickness))) return;
+  const glm::dvec3 normal = thickness * per_length;
+  const double section = splat.weight / thickness;
+  Sums* sums = nullptr;
+  size_t count = 0;
+  for (uint32_t n = first_[voxel]; n != kNone && !sums; n = sums_[n].next, ++count)
+    if (glm::dot(sums_[n].inward, normal) > kSimilar * glm::length(sums_[n].inward)) sums = &sums_[n];
+  if (!sums) {
+    if (count == VoxelPlanes::kMax) return;
+    sums = &sums_.emplace_back();
+    sums->next = first_[voxel];
+    first_[voxel] = static_cast<uint32_t>(sums_.size() - 1);
+  }
+  sums->inward += section * normal;
+  sums->point += section * (position - face.distance * (splat.factor() * face.inward));
+  sums->section += section;
+  sums->face &= face.cut;
+  if (!face.touched) return;
+  sums->area += section;
+  sums->thickest = std::max(sums->thickest, thickness);
 }
 
 VoxelPlanes MergedFaces::of(size_t voxel) const {
@@ -79,6 +88,30 @@ VoxelPlanes MergedFaces::of(size_t voxel) const {
   }
   return found;
 }
+
+namespace {
+
+/// Of a splat between two opposite faces that both touch most of it; else kNoBorder.
+uint32_t plateCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged) {
+  constexpr double kParallel = -0.9, kCovered = 0.6, kThinner = 0.75, kThicker = 1.33;
+  for (size_t n = 0; n < planes.count; ++n) {
+    const auto& a = planes.planes[n];
+    for (size_t m = 0; m < n; ++m) {
+      const auto& b = planes.planes[m];
+      const double apart = glm::dot(a.inward, position - a.point) + glm::dot(b.inward, position - b.point);
+      const double cosine = glm::dot(a.inward, b.inward);
+      if (!(a.face && b.face && cosine < kParallel)) continue;
+      const glm::dvec3 across = glm::normalize(a.inward - b.inward) * merged.factor();
+      const double length = glm::length(across);
+      if (!(apart > kThinner * length && apart < kThicker * length)) continue;
+      if (!(std::min(a.area, b.area) * length > kCovered * merged.weight)) continue;
+      return packPlateCode(across / length);
+    }
+  }
+  return kNoBorder;
+}
+
+}  // namespace
 
 uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged,
                           double voxel_size) {
@@ -104,7 +137,7 @@ uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position,
       faces[at] = faces[at - 1];
     faces[at] = face;
   }
-  if (count == 0) return kNoBorder;
+  if (count == 0) return plateCode(planes, position, merged);
   std::array<glm::dvec3, 3> axes;
   size_t touched = 0;
   for (size_t n = 0; n < count && touched < 3; ++n) {

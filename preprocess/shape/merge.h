@@ -59,6 +59,14 @@ class MergedFaces {
     bool face = true;
     uint32_t next = kNone;  // of the same voxel
   };
+  struct SplatFace {
+    glm::dvec3 inward;  // in the splat's frame, unit length
+    double distance;    // from its middle, in its lengths
+    bool cut;           // a face to be cut at
+    bool touched;       // the splat ends there, and is not only behind it
+  };
+
+  void addFace(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatFace& face);
 
   std::vector<uint32_t> first_;  // [voxel]: of its sums
   std::vector<Sums> sums_;

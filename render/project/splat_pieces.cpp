@@ -177,6 +177,15 @@ size_t partsAtBorder(const SplatPiece& whole, const InwardAxes& inward, uint32_t
     pieces[0].faces.add({inward.axis[0], inward.distance, true});
     return 1;
   }
+  if (inward.plate) {
+    pieces[0] = whole;
+    pieces[0].growth.count = 0;
+    constexpr auto kLess = static_cast<float>(1 - kPlateThickness * kPlateThickness);
+    const glm::vec3& q = inward.axis[0];
+    reshape(pieces[0], {1 - kLess * q.x * q.x, -kLess * q.y * q.x, 1 - kLess * q.y * q.y, -kLess * q.z * q.x,
+                        -kLess * q.z * q.y, 1 - kLess * q.z * q.z});
+    return 1;
+  }
   const bool pairs = isOfPairs(style) && inward.ratio == 0;
   size_t count = 1;
   for (int a = 0; a < inward.count; ++a)

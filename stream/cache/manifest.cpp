@@ -20,7 +20,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
-constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers,
+constexpr const char* kKnownFeatures[] = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers, kPlates,
                                           kBorderPairs, kSteps,      kFineValues,    kScaledValues,
                                           kCellOctants, kOwnBlanks};
 constexpr const char* kFormat = "curvisplat splat cache";

@@ -36,6 +36,7 @@ constexpr uint32_t kMaxRatio = 21;                         // of 3
 constexpr double kLongestNext = 3;                         // splats behind, to a merged one's length
 // In the place of a ratio: of layers behind several faces.
 constexpr uint32_t kLayers = 24, kThreeLayers = 4;
+constexpr uint32_t kPlate = 22;  // in the place of a ratio
 
 /// In 16 bits: the octahedron |x| + |y| + |z| = 1, its lower half folded outwards.
 uint32_t packDirection(const glm::dvec3& q) {
@@ -130,6 +131,10 @@ uint32_t packMergedCode(const glm::dvec3& inward, double distance, double ratio)
   return code | static_cast<uint32_t>(std::min(std::round(step), 1.0 * kMaxRatio)) << kRatioShift;
 }
 
+uint32_t packPlateCode(const glm::dvec3& across) {
+  return kLayer | kPlate << kRatioShift | packDirection(across) << kInwardShift;
+}
+
 uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
   if (inward.empty()) return kNoBorder;
   const PackedRotation rotation = packRotation(rotationOf(inward));
@@ -161,6 +166,8 @@ InwardAxes inwardAxes(uint32_t border_code) {
     if (border_code == kNoBorder) return inward;
     inward.count = 1;
     inward.axis[0] = unpackDirection(border_code >> kInwardShift & 0xffff);
+    inward.plate = ratio == kPlate;
+    if (inward.plate) return inward;
     inward.faces = 1;
     inward.distance = static_cast<float>((border_code >> kDistanceShift) / kDistanceSteps);
     inward.behind = ratio == 0;
@@ -186,6 +193,7 @@ bool isPossibleBorderCode(uint32_t border_code) {
   if ((border_code & 7) != kLayer) return false;
   const uint32_t ratio = border_code >> kRatioShift & kRatioBits, distance = border_code >> kDistanceShift;
   if (ratio >= kLayers) return true;
+  if (ratio == kPlate) return distance == 0;
   return ratio <= kMaxRatio && distance != 0 && (ratio == 0 || distance <= kDistanceSteps);
 }
 
@@ -202,7 +210,7 @@ double borderReach(uint32_t border_code) {
   const uint32_t own = (1u << (border_code & 3)) - 1;
   if (own != 0) return (border_code >> kFacesShift & own) != 0 ? kCutReach : kPartsReach;
   const uint32_t ratio = border_code >> kRatioShift & kRatioBits;
-  if (ratio == 0 || ratio >= kLayers) return 0;
+  if (ratio == 0 || ratio >= kPlate) return 0;
   const BorderPart part = mergedPart(inwardAxes(border_code));
   return std::max(0.0, part.offset + kKernelSupport * (part.size - 1));
 }

@@ -12,9 +12,11 @@
 #include <cstdint>
 #include <span>
 
+#include "stream/model/kernel.h"
+
 namespace curvisplat {
 
-// A code has one of four forms. In the first, the cell ends at borders. The directions are unit vectors in
+// A code has one of five forms. In the first, the cell ends at borders. The directions are unit vectors in
 // the frame of the splat's A (A q is from the border inwards, as long as the cell is in that direction) and
 // at right angles to one another, since J = A Q with Q orthogonal. They are kept as a rotation, good to
 // 0.006 (0.02 at the most) in the cell's own measure whatever its aspect ratio, and each has a bit that says
@@ -62,6 +64,7 @@ struct InwardAxes {
   float distance = 0.5f;          // of the faces from the cell's middle, in cells
   bool behind = false;            // the cell is in the layer behind the one face
   float ratio = 0;                // > 0: a merged splat's; its one face is to be cut at
+  bool plate = false;             // a merged splat between axis[0]'s two faces, which need not be cut at
 
   bool hasFace(int n) const { return (faces >> n & 1) != 0; }
 };
@@ -74,6 +77,8 @@ uint32_t packLayerCode(const glm::dvec3& inward, double distance);
 /// A code of the third form, of a merged splat. `distance`: as for packLayerCode(); the splats behind it are
 /// `ratio` times as long as twice the distance. kNoBorder if the distance is out of the code's range.
 uint32_t packMergedCode(const glm::dvec3& inward, double distance, double ratio);
+/// A code of the fifth form. `across`: from one face of the plate to the other.
+uint32_t packPlateCode(const glm::dvec3& across);
 /// A code for a cell that is behind faces, at least one: of the first form if it also ends at borders,
 /// otherwise of the fourth. `inward`: two or three directions at right angles. The first `count` lead from
 /// borders that are faces, the others from faces that the cell is behind; three of the latter are in a
@@ -91,7 +96,7 @@ inline float layerDistance(float growth) {
   return 1 - 0.106f * growth;
 }
 
-/// Whether a code is kNoBorder or has one of the four forms. Only such codes may be passed to the other
+/// Whether a code is kNoBorder or has one of the five forms. Only such codes may be passed to the other
 /// functions.
 bool isPossibleBorderCode(uint32_t border_code);
 
@@ -138,6 +143,10 @@ inline bool isOfPairs(const BorderStyle& style) {
 /// ratio, as polynomials of its inverse. Squared errors are 0.004 at the smallest ratio, and 0.001 and less
 /// from 1 on.
 BorderPart mergedPart(const InwardAxes& inward);
+
+/// How thick a plate is drawn, of its thickness: splats are drawn wider than their cells, by kKernelSigma √12, since
+/// neighbours overlap; a plate has none across it.
+inline constexpr double kPlateThickness = 0.288675 / kKernelSigma;
 
 /// How much farther than the splat itself its drawn parts reach, at most, in units of its largest axis; for
 /// a merged splat's code, in units of its length in the code's direction. kPartsReach is the inner parts'

@@ -321,7 +321,7 @@ InwardAxes borderInVoxel(double voxel_size, const std::vector<Cell>& cells) {
 }
 
 TEST(VoxelMerger, SplatsOfALatticeEndAtTheirFaces) {
-  const glm::dvec3 up(0, 0, 1), down(0, 0, -1), half(1, 1, 0.5), whole(1, 1, 1), right(1, 0, 0);
+  const glm::dvec3 up(0, 0, 1), half(1, 1, 0.5), whole(1, 1, 1), right(1, 0, 0);
   const uint32_t face = packBorderCode({&up, 1}, 1), behind = packLayerCode(up, 1);
   // A half cell and the whole one behind it: 1.5 long, in a voxel of 2.
   const InwardAxes found = borderInVoxel(2, {{{0, 0, 0.25}, half, face}, {{0, 0, 1}, whole, behind}});
@@ -340,13 +340,43 @@ TEST(VoxelMerger, SplatsOfALatticeEndAtTheirFaces) {
   EXPECT_EQ(borderInVoxel(1, {{{0.25, 0, 0.25}, {0.5, 1, 0.5}, edge}, {{0.25, 1, 0.25}, {0.5, 1, 0.5}, edge}})
                 .count,
             2);
-  // A layer that ends at both sides, borders that are no faces, and cells on both sides of the plane.
-  const uint32_t other = packBorderCode({&down, 1}, 1), parts = packBorderCode({&up, 1}, 0);
-  EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, face}, {{0, 0, 0.75}, half, other}}).count, 0);
+  // Borders that are no faces, and cells on both sides of the plane.
+  const uint32_t parts = packBorderCode({&up, 1}, 0);
   EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, parts}, {{0, 0, 1}, whole, kNoBorder}}).count, 0);
   EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, face}, {{1, 0, -0.5}, whole, kNoBorder}}).count, 0);
   // One comes back with its own.
   EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, edge}}).count, 2);
+}
+
+TEST(VoxelMerger, SplatsOfALatticeBetweenTwoFacesArePlates) {
+  const glm::dvec3 up(0, 0, 1), down(0, 0, -1), half(1, 1, 0.5);
+  const uint32_t bottom = packBorderCode({&up, 1}, 1), top = packBorderCode({&down, 1}, 1);
+  const InwardAxes found = borderInVoxel(4, {{{0, 0, 0.25}, half, bottom}, {{0, 0, 0.75}, half, top}});
+  EXPECT_TRUE(found.plate);
+  EXPECT_EQ(found.count, 1);
+  EXPECT_EQ(found.faces, 0u);
+  EXPECT_GT(std::abs(found.axis[0].z), 0.9999f);
+  // Not where most of the voxel ends at one of them only, nor where they are not parallel.
+  const glm::dvec3 long_half(6, 1, 0.5), slanted = glm::normalize(glm::dvec3(1, 0, -1));
+  EXPECT_FALSE(borderInVoxel(4, {{{0, 0, 0.25}, half, bottom}, {{2.5, 0, 0.75}, long_half, top}}).plate);
+  const uint32_t roof = packBorderCode({&slanted, 1}, 1);
+  EXPECT_FALSE(borderInVoxel(4, {{{0, 0, 0.25}, half, bottom}, {{0, 0, 0.75}, half, roof}}).plate);
+
+  // Those of a plate are as thick as it is, on each level.
+  VoxelMerger voxels(1, 1);
+  voxels.clear(8);
+  const uint32_t plate = packPlateCode(up);
+  for (const double x : {-1.0, 1.0}) {
+    const Splat splat{{}, {2, 2, 0.5}, {}, 2};
+    const SplatScalar value{3, {0, 0, 0.25}, 0};
+    voxels.add(0, {x, 0, 0}, splat, {&value, 1}, {plate, kNoGrowth});
+  }
+  Splat merged;
+  SplatScalar value;
+  EXPECT_TRUE(inwardAxes(voxels.finish(0, merged, {&value, 1}).border).plate);
+  EXPECT_NEAR(merged.axis[2], 0.5, 1e-9);
+  EXPECT_NEAR(merged.axis[1], std::sqrt(0.418 * 4 + 0.582 * 64), 1e-9);
+  EXPECT_NEAR(value.slope.z, 0.25, 1e-9);
 }
 
 TEST(VoxelMerger, DetailIsTheSpreadOfTheCentres) {

@@ -219,6 +219,30 @@ TEST(BorderParts, InTheLayerBehindAFaceAreItselfCutThere) {
   EXPECT_LT(glm::distance(glm::dvec3(pieces[0].faces.face[0].inward), kInward[0]), 0.02);
 }
 
+TEST(BorderParts, OfAPlateAreOneAsThinAsIt) {
+  const glm::vec3 q(inwardAxes(packPlateCode(kInward[0])).axis[0]);
+  EXPECT_LT(glm::distance(glm::dvec3(q), kInward[0]), 0.02);
+  BorderPieces pieces;
+  ASSERT_EQ(partsAtBorder(kWhole, packPlateCode(kInward[0]), kHalfCellStyle, pieces), 1u);
+  const SplatPiece& piece = pieces[0];
+  EXPECT_EQ(piece.position, kWhole.position);
+  EXPECT_EQ(piece.weight, kWhole.weight);
+  EXPECT_EQ(piece.mean, kWhole.mean);
+  EXPECT_EQ(piece.faces.count, 0);
+  // The deviation of the kernel across it is that of the plate; the gradient stays, and what it is along the plate.
+  const glm::dmat3 drawn = factorOf(piece.shape), whole = factorOf(kWhole.shape);
+  const glm::dvec3 normal = glm::normalize(glm::inverse(glm::transpose(whole)) * glm::dvec3(q));
+  const double length = glm::length(normal * whole);
+  EXPECT_NEAR(glm::length(normal * drawn) * kKernelSigma, length / std::sqrt(12.0), 1e-4 * length);
+  const glm::dvec3 along = glm::cross(normal, glm::dvec3(0, 0, 1));
+  EXPECT_NEAR(glm::length(along * drawn), glm::length(along * whole), 1e-4 * glm::length(along * whole));
+  const auto gradient = [](const glm::dmat3& factor, const Slope& w) {
+    return glm::inverse(glm::transpose(factor)) * vectorOf(w);
+  };
+  const glm::dvec3 expected = gradient(whole, kWhole.slope);
+  EXPECT_LT(glm::distance(gradient(drawn, piece.slope), expected), 1e-3 * glm::length(expected));
+}
+
 TEST(BorderParts, AreCutAtTheFacesThatTheyLieBehind) {
   const glm::dmat3 a = factorOf(kWhole.shape);
   for (size_t ends = 0; ends <= 2; ++ends) {
