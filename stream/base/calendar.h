@@ -6,7 +6,7 @@
 
 namespace curvisplat {
 
-/// By the CF conventions; either may be empty.
+/// A unit of time and a calendar as the CF conventions name them. Either may be empty.
 struct TimeUnit {
   std::string name;      // "days since 2001-01-01", "s"
   std::string calendar;  // "noleap"; empty: standard

@@ -27,14 +27,14 @@ class JsonDocument;
 /// the file, the value's place, what was found and what was expected. Any thread.
 class JsonField {
  public:
-  // Of an object.
+  // The member `name` of an object.
   JsonField at(std::string_view name) const;
   /// nullopt if there is no such field, or its value is null.
   std::optional<JsonField> find(std::string_view name) const;
   bool has(std::string_view name) const { return find(name).has_value(); }
   std::vector<std::string> names() const;
 
-  // Of an array.
+  // The elements of an array.
   std::vector<JsonField> elements(size_t most = std::numeric_limits<size_t>::max()) const;
   size_t size() const;
   JsonField operator[](size_t n) const;
@@ -47,7 +47,7 @@ class JsonField {
   std::string text() const;
   /// Finite.
   double number() const;
-  /// From `least` to `most`.
+  /// A number from `least` to `most`.
   double number(double least, double most) const;
   uint64_t count(uint64_t least = 0, uint64_t most = std::numeric_limits<uint64_t>::max()) const;
   /// Three numbers of magnitudes up to `largest`.

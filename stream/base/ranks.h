@@ -93,7 +93,7 @@ class Ranks {
   std::vector<Bytes> exchange(std::vector<Bytes> to);
   /// The same, for messages that are large and many. What a rank has for itself stays where it is, in `to`.
   void exchange(const Messages& to, Messages& from);
-  /// At rank 0: what each rank has given; elsewhere nothing.
+  /// Returns at rank 0 what each rank has given, [rank]; elsewhere nothing.
   std::vector<Bytes> gather(Bytes bytes);
   /// What rank 0 has given.
   Bytes broadcast(Bytes bytes);

@@ -158,7 +158,7 @@ class ThreadEvents {
     events_.clear();
   }
 
-  /// For the next trace.
+  /// Forgets the events, for the next trace.
   void forget() {
     const MutexLock lock(mutex_);
     events_.clear();

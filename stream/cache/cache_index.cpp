@@ -52,7 +52,7 @@ class PostOrder {
   }
 
  private:
-  /// As deep as the octree has levels.
+  /// Visits the bricks below, recursively: at most as deep as the octree has levels.
   bool visit(uint32_t first, uint32_t count) {
     for (uint32_t n = first; n < first + count; ++n) {
       if (!bricks_[n].isLeaf() && !visit(bricks_[n].first_child, bricks_[n].child_count)) return false;
@@ -241,9 +241,9 @@ void readRecords(const InputFile& file, const Header& header, uint64_t offset, u
   checkChecksum(file.path(), info, checksum.value());
 }
 
-/// So that growing needs no copies: those are twice the memory, and a third of the time that opening takes.
-/// Pages that are not written take no memory, so that a sparse file gets none; the limit is for the address
-/// space.
+/// Reserves the bricks at once, so that growing needs no copies: those are twice the memory, and a third of
+/// the time that opening takes. Pages that are not written take no memory, so that a sparse file gets none;
+/// the limit is for the address space.
 void reserveBricks(std::vector<Brick>& bricks, uint64_t count) {
   constexpr uint64_t kMaxBytes = uint64_t{256} << 20;
   bricks.reserve(std::min<uint64_t>(count, kMaxBytes / sizeof(Brick)));

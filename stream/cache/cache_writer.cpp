@@ -88,7 +88,7 @@ struct CacheWriter::State {
   bool isWhole(const AppendedBrick& appended) const;
   void keep(uint64_t count);
 
-  // Of finish(), once the bricks are in the order of the index.
+  // Writes the index, for finish(), once the bricks are in its order.
   FileInfo writeIndex();
   FileInfo writeTable(size_t variable);
   FileInfo writeGrids();
@@ -103,7 +103,8 @@ struct CacheWriter::State {
   std::vector<Brick> bricks;                       // as appended
   std::vector<double> weights;                     // [brick]
   std::vector<std::vector<BrickVariable>> tables;  // [variable][brick]
-  // For readBack(). Opened by the constructor, because any number of threads may call readBack().
+  // The geometry, as readBack() reads it. Opened by the constructor, because any number of threads may call
+  // readBack().
   InputFile geometry_input;
   std::vector<InputFile> values_input;
   BrickLog log;

@@ -51,8 +51,8 @@ class CacheWriter {
   /// threads may read at the same time, while nothing is appended.
   BrickSplats readBack(uint64_t id) const;
 
-  /// For the histograms of the variables: finish() writes those to which every leaf was added. Any thread
-  /// may add.
+  /// The sums for the histograms of the variables, of which finish() writes those to which every leaf was
+  /// added. Any thread may add.
   HistogramSums& histograms();
 
   /// What append() has noted of a brick.

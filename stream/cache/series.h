@@ -64,7 +64,7 @@ struct Series {
   uint32_t geometries() const { return static_cast<uint32_t>(first_steps.size()); }
   /// The step whose time is nearest; of two that are equally near the earlier.
   uint64_t nearest(double time) const;
-  /// Where `time` lies between the steps; the first or the last step if it is before or after all.
+  /// The place of `time` between the steps; the first or the last step if it is before or after all.
   StepPosition between(double time) const;
   double timeAt(const StepPosition& position) const;
   /// The geometry of the steps whose grid has this checksum.
@@ -130,7 +130,8 @@ class GeometryFolder {
 
 /// "blanks.1": the folder of Manifest::own_blanks[0].
 std::string ownBlanksFolderName(size_t set);
-/// That folder of the cache with this manifest. Throws Error if its manifest is not the one that `manifest` states.
+/// The path of that folder in the folder `cache`, whose manifest is `manifest`. Throws Error if its manifest
+/// is not the one that `manifest` states.
 std::filesystem::path ownBlanksFolder(const std::filesystem::path& cache, const Manifest& manifest,
                                       size_t set);
 

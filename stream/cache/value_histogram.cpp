@@ -106,7 +106,7 @@ PercentilesRecord percentilesOf(const ValueHistogram& histogram) {
 
 namespace {
 
-/// Those that end at `offset`; empty if there are none.
+/// Reads the percentiles that end at `offset`; empty if there are none.
 std::vector<float> readPercentiles(const InputFile& file, uint64_t offset, const HistogramRecord& histogram) {
   PercentilesRecord record;
   if (offset < sizeof record) return {};
@@ -229,7 +229,7 @@ void HistogramSums::clear() {
   std::fill(sums_.begin(), sums_.end(), Sum());
 }
 
-/// In wholes.
+/// The volume of a sum, in wholes (Sum).
 double HistogramSums::volumeOf(const Sum& sum) {
   return static_cast<double>(sum.whole) + std::ldexp(static_cast<double>(sum.part), -kPartBits);
 }

@@ -88,7 +88,7 @@ struct HistogramBins {
 size_t histogramBin(double mean, double lower, double upper);
 
 HistogramRecord recordOf(const ValueHistogram& histogram);
-/// Of a histogram that has percentiles.
+/// The record of a histogram that has percentiles.
 PercentilesRecord percentilesOf(const ValueHistogram& histogram);
 
 /// The histogram that ends at `table_offset` of a file of values; nullopt if there is none. Throws Error if
@@ -111,7 +111,8 @@ class HistogramSums {
   /// `variables`: with their ranges.
   HistogramSums(const RootCube& root, const std::vector<VariableInfo>& variables);
 
-  /// Before any leaf is added: has a variable's percentiles found by these bins. Without, it gets none.
+  /// Has a variable's percentiles found by these bins; a variable without bins gets none. Call it before any
+  /// leaf is added.
   void divide(size_t variable, HistogramBins bins);
   /// Adds a leaf's splats, as decoded. Each leaf is to be added once.
   void add(const BrickSplats& leaf);

@@ -23,7 +23,7 @@
 
 namespace curvisplat {
 
-/// Where conversion puts the values streams that it makes: a VariableWriter or a StepWriter.
+/// The destination of the values streams that conversion makes: a VariableWriter or a StepWriter.
 class ValuesWriter {
  public:
   /// `variables`: the new ones, or those of the step, with their ranges.

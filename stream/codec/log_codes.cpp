@@ -34,7 +34,7 @@ void findRange(std::span<const double> values, double& least, double& most) {
   }
 }
 
-/// As logCodes(); -1 where the code is in doubt.
+/// Does what logCodes() does, but writes -1 where a code is in doubt.
 void approximateCodes(std::span<const double> values, double lowest, double step, int32_t* codes) {
   constexpr double kInDoubt = 1e-6;  // of a step, which is far above what the logarithms differ by
   const hn::ScalableTag<double> d;

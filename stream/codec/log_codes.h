@@ -29,7 +29,7 @@ std::optional<LogCodes> logCodes(std::span<const double> values, double step, ui
 class LogTable {
  public:
   LogTable() = default;
-  /// For n from 0 to `largest`. Costs about 64 + largest / 64 exponentials.
+  /// Holds the powers for n from 0 to `largest`. Costs about 64 + largest / 64 exponentials.
   LogTable(double base, double step, uint32_t largest) : coarse_((largest >> kFineBits) + 1), fine_(kFine) {
     for (uint32_t n = 0; n < kFine; ++n) fine_[n] = std::exp(n * step);
     for (uint32_t n = 0; n < coarse_.size(); ++n) coarse_[n] = std::exp(base + n * (kFine * step));

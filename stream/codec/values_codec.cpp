@@ -24,7 +24,7 @@ constexpr uint8_t kInTime = 8;
 // scale.
 constexpr uint8_t kFine = 16, kScaled = 32;
 
-// With kAuto values are coded by their own scale where steps are wider than these shares of the spread.
+// Limits of kAuto: values are coded by their own scale where steps are wider than these shares of the spread.
 constexpr double kWidestMeanStep = 1.0 / 1000, kWidestSlopeStep = 1.0 / 450;
 
 Predictor coded(Predictor predictor, bool in_time) {

@@ -104,7 +104,8 @@ const char* featureOf(std::span<const std::byte> stream);
 struct ValueErrors {
   double largest = 0, typical = 0;
 };
-/// Of the means and of the slopes' components of a stream of values in this range, by its header. Throws Error as stepsBackOf().
+/// The errors of the means, and of the slopes' components, that the header of a stream of values in this
+/// range allows. Throws Error as stepsBackOf().
 struct StreamErrors {
   ValueErrors means, slopes;
 };

@@ -135,8 +135,8 @@ struct SplatRange {
   uint32_t size() const { return end - begin; }
 };
 
-/// Where the splats of a part of a brick lie: octants that follow one another make one range, so that there
-/// are at most four.
+/// The ranges in which the splats of a part of a brick lie: octants that follow one another make one range,
+/// so that there are at most four.
 class SplatRanges {
  public:
   SplatRanges(const Brick& brick, uint8_t octants) {

@@ -125,7 +125,7 @@ class BrickCache {
 
   bool contains(uint32_t brick) const;
 
-  /// From now on the values of bricks that are here are of an earlier step; their geometry stays. Nothing
+  /// Declares that the values of the bricks here are of an earlier step; their geometry stays. Nothing
   /// may be pinned.
   void stepChanged();
   /// Whether the brick is here with values of an earlier step.

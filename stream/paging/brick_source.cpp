@@ -134,7 +134,7 @@ void BrickSource::stepChanged() {
   cached_.stepChanged();
 }
 
-/// Without the pager.
+/// Reads a part in this thread, without the pager.
 BrickSource::Splats BrickSource::readAlone(const BrickPart& part, Scratch& scratch) const {
   cache_.readGeometry(part.brick, scratch.geometry, nullptr, &scratch.times);
   cache_.readVariable(part.brick, variable_, scratch.values, &scratch.times);
@@ -214,7 +214,7 @@ void BrickSource::readAncestor(uint32_t brick, Scratch& scratch) const {
   if (second_) cache_.readVariable(brick, *second_, scratch.second, &scratch.times);
 }
 
-/// Of `ancestor` in the scratch, what stands for the space of `part`.
+/// Keeps of `ancestor`, which is in the scratch, the splats that stand for the space of `part`.
 void BrickSource::keepPart(const BrickPart& part, uint32_t ancestor, Scratch& scratch) const {
   const auto bricks = cache_.bricks();
   uint32_t below = part.brick;  // the ancestor's child that holds the brick

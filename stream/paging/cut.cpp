@@ -42,9 +42,9 @@ class BrickView {
     });
   }
 
-  /// With all below it.
+  /// Whether the brick and all bricks below it are transparent.
   bool transparentThroughout(uint32_t id) const { return transparent_(tree_.subtrees[id]); }
-  /// Its own splats.
+  /// Whether the brick's own splats are transparent.
   bool transparent(uint32_t id) const { return transparent_(boundsOf(tree_.variables[id])); }
 
   bool visible(uint32_t id) const { return !outOfImage(id) && !transparentThroughout(id); }
@@ -64,7 +64,7 @@ class BrickView {
     return lod_pixels_ > 0 && (error_px <= lod_pixels_ || (weight_ && weight_(id) * error_px <= lod_pixels_));
   }
 
-  /// As far as it counts.
+  /// The brick's error on the screen, capped at lod_pixels where its weight makes it fine enough.
   double shownError(uint32_t id) const {
     const double error_px = errorPixels(id);
     return error_px > lod_pixels_ && fineEnough(id) ? lod_pixels_ : error_px;
@@ -113,13 +113,13 @@ std::array<uint32_t, 9> childrenByOctant(const BrickView& view, const Brick& bri
   return begin;
 }
 
-/// Which octants of which bricks are replaced by their children.
+/// The octants of bricks that are replaced by their children.
 class Refinement {
  public:
-  /// Of all that is not fine enough.
+  /// Refines all that is not fine enough.
   explicit Refinement(const BrickView& view) : view_(view) {}
 
-  /// Of what fits the limits: the largest error first, of equal ones the lowest brick number.
+  /// Refines within the limits: the largest error first, of equal ones the lowest brick number.
   Refinement(const BrickView& view, size_t bricks, uint64_t max_splats, uint64_t max_bytes)
       : view_(view), limited_(true), max_splats_(max_splats), max_bytes_(max_bytes), refined_(bricks) {
     for (uint32_t id = 0; id < view_.roots(); ++id) {

@@ -1,4 +1,4 @@
-// Which bricks one view needs: a pure function, apart from reading and drawing them.
+// Chooses the bricks that one view needs: a pure function, apart from reading and drawing them.
 // DESIGN.md, "The pipeline".
 //
 // The cut starts at the root and goes down until a brick's error counts little enough on the screen, or it

@@ -13,7 +13,7 @@
 namespace curvisplat {
 namespace {
 
-// So many batches share the buffer, or twice that: some are read while some are decoded.
+// The buffer is shared by this many batches, or twice as many: some are read while some are decoded.
 constexpr uint64_t kBatchesInBuffer = 8;
 
 // A read that the kernel puts off (EAGAIN, EINTR) so many times in a row has failed.

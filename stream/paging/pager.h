@@ -49,11 +49,11 @@ struct PagerOptions {
   unsigned queue_depth = 8;
   Way way = Way::kAutomatic;  // io_uring: Error where the kernel refuses it
   bool direct = true;         // false: through the page cache
-  /// For tests: what reads, in the place of all of the ways, at most `depth` at once.
+  /// Test seam: makes what replaces every reading method, at most `depth` reads at once.
   std::function<std::unique_ptr<AsyncReads>(unsigned depth)> reads;
 };
 
-/// Of all that was read since the pager was made.
+/// What was read since the pager was made.
 struct PagerStatistics {
   double reading_s = 0;            // with a read under way
   uint64_t bytes = 0;              // from the files, with what lies between streams

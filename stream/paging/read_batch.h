@@ -1,4 +1,4 @@
-// Which reads fetch the next bricks: a pure function of where their streams lie.
+// Chooses the reads that fetch the next bricks: a pure function of where their streams lie.
 //
 // Bricks are drawn in an order that turns with the camera and lie in the file in one that does not, but both
 // walk the same octree: what is drawn within a short time lies close together. So the bricks of one batch are

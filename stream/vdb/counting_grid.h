@@ -20,7 +20,7 @@ struct VoxelRun {
   uint32_t count;
 };
 
-/// Not for several threads at once.
+/// Counts of splats by cell. One thread at a time.
 class CountingGrid {
  public:
   virtual ~CountingGrid() = default;
@@ -64,7 +64,7 @@ class VoxelRuns {
   std::span<const VoxelRun> runs() const { return runs_; }
 
  private:
-  /// Where == would call memcmp().
+  /// Compares without memcmp(), which == would call.
   static bool isSame(const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>& b) {
     return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
   }
