@@ -117,7 +117,8 @@ class Addition {
     if (isFirst()) checkSurvey();
   }
 
-  /// Where older scalars have no values. The survey is of all that the grid has.
+  /// Warns if the grid has values at samples where older scalars have none, which are left out. The survey is
+  /// of all that the grid has.
   void warnOfLeftOut() {
     const uint64_t kept_out = manifest().blanked_nodes, blanked = survey_.blanked.total();
     uint64_t values = blanked < kept_out ? kept_out - blanked : 0;
@@ -132,7 +133,7 @@ class Addition {
   }
 
   bool isFirst() const { return !ranks_ || ranks_->isFirst(); }
-  /// Of a pass that ranks share.
+  /// The nodes of this rank's share of a pass.
   uint64_t nodesOfRank() const { return manifest().nodes / (ranks_ ? ranks_->count() : 1); }
 
   void survey() {
@@ -256,7 +257,7 @@ class Addition {
   const AdditionWorkspace workspace_;  // before the cache is read, and before what has files in its folder
   const CacheReader cache_;
   const GridDescription& description_;
-  // Of a structured grid, or of an unstructured one.
+  // The grid, structured or unstructured.
   std::unique_ptr<CacheGrid> grid_;
   std::unique_ptr<NodeReader> reader_;
   std::unique_ptr<DrawnMesh> mesh_;

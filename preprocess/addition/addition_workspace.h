@@ -29,7 +29,7 @@ class AdditionWorkspace {
   AdditionWorkspace(const AdditionWorkspace&) = delete;
   AdditionWorkspace& operator=(const AdditionWorkspace&) = delete;
 
-  /// At rank 0.
+  /// The lock, at rank 0 only.
   const CacheLock& lock() const { return *lock_; }
   /// The folder that all ranks see.
   const std::filesystem::path& shared() const { return shared_; }

@@ -75,7 +75,7 @@ class ValueBuilder {
   ValuesWriter* writer_;
   const StepReferences* references_ = nullptr;
   Progress* progress_;
-  // Of inner bricks some of whose children are built: what these gave, [octant].
+  // The values of inner bricks some of whose children are built: what these gave, [octant].
   std::map<uint32_t, std::array<Values, 8>> octants_;
   std::unique_ptr<OctantMerger> open_;  // of the leaf cell whose bricks go on in the next bucket
   tbb::enumerable_thread_specific<Scratch> scratch_;

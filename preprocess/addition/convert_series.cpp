@@ -109,7 +109,7 @@ class SeriesConversion {
     return std::nullopt;
   }
 
-  /// Not all ranks may see why a conversion fails, so that they cannot leave the step out.
+  /// Uses a step that cannot be left out: not all ranks may see why its conversion fails.
   void useTogether(uint64_t number, const OpenStep& step) {
     try {
       use(number, step);
@@ -153,8 +153,8 @@ class SeriesConversion {
     return next;
   }
 
-  /// At rank 0. Where it can convert a step that another rank could not, something is wrong there. Where it cannot
-  /// either, its own line says why.
+  /// Converts, at rank 0, a step that another rank could not. If rank 0 can, something is wrong at that rank;
+  /// if it cannot either, its own message says why.
   void takeAfterOthers(uint64_t number) {
     const size_t steps = times_.size();
     takeOrLeaveOut(number);
@@ -304,7 +304,8 @@ class SeriesConversion {
     sayNewNames(number, source.description());
   }
 
-  /// Once: names that are others than in the first step, unless they differ only in the numbers of files' steps.
+  /// Prints once which names differ from those in the first step, unless they differ only in the numbers of
+  /// files' steps.
   void sayNewNames(uint64_t number, const GridDescription& description) {
     if (names_said_ || names_.size() != description.blocks.size()) return;
     const bool own_files = std::any_of(description.files.begin(), description.files.end(),
@@ -344,7 +345,7 @@ class SeriesConversion {
     if (!ranks_ || ranks_->isFirst()) report_event_({step, nullptr, nullptr, nullptr, reason});
   }
 
-  /// In messages.
+  /// The number of a step in messages.
   uint64_t numberOf(uint64_t number) const {
     return input_.places.empty() ? first_number_ + number : input_.places[number];
   }
@@ -357,7 +358,7 @@ class SeriesConversion {
     return text;
   }
 
-  /// Of a step that could be left out.
+  /// The message about a step that could be left out.
   std::string refusal(uint64_t number, const std::string& reason) const {
     const bool may_leave_out = !times_.empty() && input_.places.empty() && !options_.keep_going;
     return whyNot(number, reason) + (may_leave_out ? "; --keep-going leaves out such steps" : "");

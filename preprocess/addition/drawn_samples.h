@@ -21,7 +21,7 @@
 
 namespace curvisplat {
 
-/// Which nodes a cache has splats of, from the node runs of its leaves: a bit a node, in a temporary file.
+/// The nodes that a cache has splats of, from the node runs of its leaves: a bit a node, in a temporary file.
 /// Nodes that were merged into another one at a seam have no splat of their own, and no bit.
 class DrawnNodes {
  public:
@@ -36,7 +36,7 @@ class DrawnNodes {
   void blankOthers(uint64_t first, std::span<uint8_t> blank) const;
 
   bool holds(uint64_t node) const;
-  /// Not while others read.
+  /// Adds a node. No other thread may read meanwhile.
   void add(uint64_t node);
 
  private:

@@ -55,7 +55,7 @@ void linkOrCopy(const std::filesystem::path& from, const std::filesystem::path& 
 /// decodes from three streams at most, and it depends only on earlier steps, whatever is added later.
 inline constexpr uint64_t kStepGroup = 3;
 
-/// Which steps of a series the next one on `geometry` is predicted from, the nearest first; `series` may
+/// The steps of a series from which the next one on `geometry` is predicted, the nearest first; `series` may
 /// have later steps than those before `next`. `leaves_out_first`: step 0 belongs to no group, as in a part
 /// of a series.
 std::vector<uint64_t> referenceSteps(const Series& series, uint32_t geometry, uint64_t next,

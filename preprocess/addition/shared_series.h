@@ -61,17 +61,17 @@ class SharedSteps {
   SharedSteps(const SharedSteps&) = delete;
   SharedSteps& operator=(const SharedSteps&) = delete;
 
-  /// Where the cache is when a round begins.
+  /// The state of the cache when a round begins.
   struct Start {
     uint64_t step = 0;  // its last
     uint64_t expects_geometry = 0;
     uint64_t next = 0;  // of the input
     uint64_t in_group = 0;
   };
-  /// At ranks other than 0: converts this rank's steps to its part. Throws Interrupted.
+  /// Converts this rank's steps to its part, at ranks other than 0. Throws Interrupted.
   ConvertedSteps convertPart(const Start& start) const;
-  /// At rank 0: takes over what rank `of` has converted; `took` is called after each step with its number of the input.
-  /// Returns whether that was all of its range.
+  /// Takes over, at rank 0, what rank `of` has converted; `took` is called after each step with its number of
+  /// the input. Returns whether that was all of its range.
   bool take(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
             const std::function<void(uint64_t number, const AddStepReport&)>& took) const;
 

@@ -42,7 +42,7 @@ class NodeNumbers {
  public:
   explicit NodeNumbers(const std::vector<BlockInfo>& blocks);
 
-  /// Of the first node of a run. Throws Error if the run is not in the grid.
+  /// The number of the first node of a run. Throws Error if the run is not in the grid.
   uint64_t firstOf(const NodeRun& run) const;
   /// The node's place, in words.
   std::string nameOf(uint64_t node) const;

@@ -44,7 +44,7 @@ void ValuePasses::openFile() {
       std::make_unique<BucketFile>(fileOf(ranks_ ? ranks_->rank() : 0), numbers, plan_.chunkBytes(numbers));
 }
 
-/// At rank 0 the file has all ranks' records then.
+/// Joins the ranks' files: rank 0's file then has the records of all.
 void ValuePasses::joinFiles() {
   const std::vector<BucketChains> others = gatherChains(file_->chains(), *ranks_);
   for (size_t n = 0; n < others.size(); ++n) file_->join(fileOf(static_cast<unsigned>(n + 1)), others[n]);

@@ -45,22 +45,23 @@ class ValuePasses {
   ValuePasses(const CacheReader& cache, size_t variables, const MemoryPlan& plan,
               std::filesystem::path scratch, Progress& progress);
 
-  /// Before scatter(): all ranks call scatter() and mergeSeams() together, and rank 0 alone build().
-  /// `shared`: a folder for temporary files that all of them see. The plan has to be the same at all ranks
-  /// (commonPlan()).
+  /// Shares the work among ranks: all of them call scatter() and mergeSeams() together, and rank 0 alone
+  /// build(). Call it before scatter(). `shared`: a folder for temporary files that all of them see. The plan
+  /// has to be the same at all ranks (commonPlan()).
   void shareWith(Ranks& ranks, std::filesystem::path shared);
-  /// Before scatter(): the overlaps of the grid's blocks, for a cache in which each point is drawn once.
+  /// Sets the overlaps of the grid's blocks, for a cache in which each point is drawn once. Call it before
+  /// scatter().
   void setOverlaps(std::vector<BlockOverlap> overlaps) { overlaps_ = std::move(overlaps); }
   /// `see`: as SlabPass has it. Throws Error if the cache has no cell for a splat.
   void scatter(const NodeReader& reader, std::function<void(const LoadedSlab&)> see = {});
-  /// Of an unstructured grid, after its survey(); rank 0 makes all its splats.
+  /// Scatters the values of an unstructured grid, after its survey(); rank 0 makes all its splats.
   void scatter(SplatOrigin& origin);
   void mergeSeams();
   /// `references`: what the values are predicted from; may be null. Throws Error if the splats are not those
   /// of the cache.
   void build(ValuesWriter& writer, const StepReferences* references = nullptr);
 
-  /// Of the scattered values of all ranks, after mergeSeams(); at rank 0.
+  /// The bytes of the scattered values of all ranks, at rank 0 after mergeSeams().
   uint64_t temporaryBytes() const { return temporary_bytes_; }
 
  private:

@@ -52,18 +52,18 @@ class AbuttingFaces {
     double spacing = 0;  // to other faces' centres, at least
     bool collapsed = false;
   };
-  /// Of a face at its block's end; `corners` of its cell, as Hexahedron takes them. Any thread.
+  /// The centre of a face at its block's end; `corners` of its cell, as Hexahedron takes them. Any thread.
   Centre centreOf(const CellFace& face, const std::array<glm::dvec3, 8>& corners) const;
 
-  /// Before match(): notes which faces fold(). Takes its Needs' memory once more.
+  /// Has match() note which faces fold(). Call it before match(). Takes its Needs' memory once more.
   void keepFolds() { folded_.resize(abutting_.size()); }
 
   /// Faces of cells that are not blanked. One thread at a time. Throws Error if the disk fails.
   void add(std::span<const Centre> centres);
-  /// After the last add(): finds those that abut. Throws Error if the disk fails, Interrupted if a stop is
-  /// asked for.
+  /// Finds the faces that abut, after the last add(). Throws Error if the disk fails, Interrupted if a stop
+  /// is asked for.
   void match(const Progress& progress);
-  /// Of a face at its block's end, after match(). Any thread.
+  /// Whether a face at its block's end abuts on another, after match(). Any thread.
   bool abuts(const CellFace& face) const { return abutting_[numberOf(face)]; }
   /// Whether the side of a block that has the face abuts on itself there: a cut behind a body, or a body
   /// without thickness. After keepFolds() and match(). Any thread.

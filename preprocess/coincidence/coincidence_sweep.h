@@ -53,8 +53,8 @@ class CoincidenceSweep {
   /// they are one point.
   CoincidenceSweep(int coordinate_bytes, Sink sink);
 
-  /// In rising order of `along`. Returns the number of the node's set, counted from 0. Numbers of sets that
-  /// the sink has had are used again.
+  /// Adds the next node, in rising order of `along`. Returns the number of the node's set, counted from 0.
+  /// Numbers of sets that the sink has had are used again.
   size_t add(const SweptNode& node);
   /// Gives out all sets that are left.
   void finish();

@@ -85,7 +85,7 @@ void RecordSorter::takeMemory() {
   preferHugePages(records_.get(), 2 * half_ * record_size_ * sizeof(double));
 }
 
-/// As many as there is room for. Returns how many doubles these are.
+/// Takes as many records as there is space for. Returns how many doubles these are.
 size_t RecordSorter::fill(Half& half, std::span<const double> records) {
   const size_t room = (half_ - half.entries.size()) * record_size_;
   records = records.first(std::min(room, records.size()));
@@ -174,7 +174,7 @@ void RecordSorter::visitInMemory(const std::vector<Entry>& entries, double from,
   }
 }
 
-/// As a run that is sorted.
+/// Sorts a half and writes it as a run.
 RecordSorter::Run RecordSorter::write(Half& half) {
   const TraceScope trace("write a run");
   if (!file_) file_ = std::make_unique<NamelessFile>(folder_);

@@ -44,7 +44,7 @@ class RecordSorter {
   /// Visits all that was added, by (along, number), and forgets it.
   void drain(const Visit& visit);
 
-  /// In place of drain(): ends adding. Then up to `visitors` threads may visit() at the same time, and
+  /// Ends adding, in place of drain(). Then up to `visitors` threads may visit() at the same time, and
   /// cutsInto() is known.
   void sort(unsigned visitors = 1);
   /// Visits the records with from <= along < to, by (along, number), until `visit` returns false.

@@ -267,7 +267,7 @@ void BucketBuilds::noteBegun() {
   startNextIfDue();
 }
 
-/// If no more than one other is on its way: a third would take more memory.
+/// Starts the next bucket if no more than one other is on its way: a third would take more memory.
 void BucketBuilds::startNextIfDue() {
   if (!latest_has_begun_ || buckets_.size() > 1) return;
   latest_has_begun_ = false;

@@ -73,7 +73,7 @@ class BucketLoader {
   /// The next bucket, until it is given back; null at the end. Throws Error if the disk fails. Two may be
   /// taken. One thread at a time.
   LoadedBucket* take() { return ahead_.take(); }
-  /// Of those taken, the one that was taken first. Any thread.
+  /// Gives back the bucket that was taken first of those not given back. Any thread.
   void giveBack() { ahead_.giveBack(); }
 
  private:
@@ -109,7 +109,7 @@ struct CellJob {
 /// What is built of a bucket, in Morton order.
 struct BucketJobs {
   std::vector<CellJob> cells;
-  // Of cells that began in earlier buckets: their records, and the places of these.
+  // The records of cells that began in earlier buckets, and the places of these records.
   std::vector<std::vector<std::byte>> carried;
   std::vector<std::vector<uint32_t>> carried_places;
 };
@@ -124,7 +124,7 @@ class BucketBuilds {
     /// The next bucket, valid until it is given back; null at the end. May wait until those are given back
     /// that were taken before the last.
     std::function<LoadedBucket*()> take;
-    /// Of those taken, the one that was taken first.
+    /// Gives back the bucket that was taken first of those not given back.
     std::function<void()> give_back;
     /// Called for one bucket after the other, that are not too large.
     std::function<BucketJobs(LoadedBucket&)> jobs_of;

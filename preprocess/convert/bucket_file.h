@@ -72,11 +72,11 @@ class BucketFile {
   /// nothing can be appended. `sync`: another machine will read it.
   void close(bool sync = false);
 
-  /// After close(): the records of another rank's file, which has the same buckets, are read as well. That file
-  /// stays. Throws as the second constructor does.
+  /// Has the records of another rank's file, which has the same buckets, read as well. Call it after close().
+  /// That file stays. Throws as the second constructor does.
   void join(const std::filesystem::path& path, BucketChains chains);
 
-  /// Of its own file.
+  /// The chains of this rank's own file.
   BucketChains chains() const;
   uint64_t bytes(uint32_t bucket) const;
   /// All records of a bucket; the order is not to be relied on. Overwrites `out` and keeps its capacity.

@@ -85,8 +85,8 @@ class BucketTree {
   std::vector<Node> nodes_;
 };
 
-/// As BucketTree::assignBuckets, with at most `most_buckets`: where `capacity` would make more, buckets are
-/// larger, and are divided again when they are built.
+/// Assigns buckets as BucketTree::assignBuckets does, but at most `most_buckets`: where `capacity` would make
+/// more, buckets are larger, and are divided again when they are built.
 uint32_t assignBucketsWithin(BucketTree& tree, const std::vector<uint32_t>& leaves,
                              const std::function<uint64_t(uint32_t leaf)>& count, uint64_t capacity,
                              uint32_t most_buckets);

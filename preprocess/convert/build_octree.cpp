@@ -69,7 +69,7 @@ NodeRange nodesIn(const BucketFile& file, uint32_t bucket, size_t variables) {
   return range;
 }
 
-/// Where each record in `records` begins.
+/// The places in `records` at which each record begins.
 std::vector<uint32_t> placesOfRecords(std::span<const std::byte> records, size_t variables) {
   std::vector<uint32_t> places;
   forEachRecord(records, variables, [&](std::span<const std::byte> record) {

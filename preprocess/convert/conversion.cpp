@@ -85,7 +85,7 @@ class Conversion {
     return end();
   }
 
-  /// After run() has thrown: whether there is something to resume, which then stays.
+  /// Returns, after run() has thrown, whether there is something to resume, which then stays.
   bool leaveForResuming() {
     if (file_) file_->leave();
     return workspace_ && workspace_->leaveForResuming();
@@ -262,8 +262,8 @@ class Conversion {
     readSample(scratch_, splats_);
   }
 
-  /// In the place of all before: the splats of a conversion that was interrupted, which may have had another number
-  /// of ranks.
+  /// Takes up, in place of all passes before, the splats of a conversion that was interrupted, which may have
+  /// had another number of ranks.
   void takeUpSplats() {
     if (ranks_)
       shareSplats();

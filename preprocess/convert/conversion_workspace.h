@@ -99,7 +99,7 @@ class ConversionWorkspace {
   const std::filesystem::path& scratch() const { return scratch_->path(); }
 
   void noteSplats(ScatteredSplats splats);
-  /// After LostBuckets: the splats on disk are damaged.
+  /// Forgets the splats on disk: LostBuckets says that they are damaged.
   void forgetSplats();
 
   /// Bytes that the partial folder takes already, which need no further disk space.
@@ -107,8 +107,8 @@ class ConversionWorkspace {
 
   /// Leaves the folders for a later conversion if they are worth it. Returns whether they are.
   bool leaveForResuming();
-  /// If a conversion was killed after its cache was in place and before clearFinished(): removes its files
-  /// and returns the facts of that conversion.
+  /// Removes the files of a conversion that was killed after its cache was in place and before
+  /// clearFinished(), and returns the facts of that conversion; nullopt if there is none.
   static std::optional<std::vector<ConversionFact>> clearKilled(const std::filesystem::path& output);
 
  private:
@@ -136,8 +136,8 @@ struct UncheckedConversion {
   const EstimateNeeds& estimate;  // called only where the most that it may need does not fit; may be empty
 };
 
-/// Before the first pass. Throws Error if the disks have too little room, unless options.check_disk_space is
-/// false; Interrupted.
+/// Checks the space on disk before the first pass. Throws Error if the disks have too little room, unless
+/// options.check_disk_space is false; Interrupted.
 void checkDiskOf(const UncheckedConversion& conversion, Progress& progress);
 
 }  // namespace curvisplat

@@ -31,8 +31,8 @@
 namespace curvisplat {
 namespace {
 
-// Of the cache: samples of eight million nodes promised 0.73 to 1.20 of what grids of 12 to 64 million then
-// took.
+// A margin for forecasts of the cache's size: samples of eight million nodes promised 0.73 to 1.20 of what
+// grids of 12 to 64 million then took.
 constexpr double kSampleMargin = 1.15;
 
 /// The shape of the grid and its scalars, in words. Without files' names and times, which may differ between

@@ -52,15 +52,16 @@ struct ConvertOptions {
   /// Processes that convert together: each has the same source and options, and calls convert(). Null: this process alone.
   Ranks* ranks = nullptr;
 
-  /// For tests: buckets smaller than memory would allow, so that a small grid has many.
+  /// Test seam: buckets smaller than memory would allow, so that a small grid has many.
   std::optional<uint64_t> bucket_splats;
-  /// For tests: a memory limit for unstructured grids, so that small ones are processed like large ones.
+  /// Test seam: a memory limit for unstructured grids, so that small ones are processed like large ones.
   std::optional<uint64_t> mesh_bytes;
-  /// For tests: a memory limit for the cells of overlapping blocks, so that small ones are read in several parts.
+  /// Test seam: a memory limit for the cells of overlapping blocks, so that small ones are read in several
+  /// parts.
   std::optional<uint64_t> owner_bytes;
-  /// For tests: slabs smaller than memory would allow, so that even the rows of a small grid are cut.
+  /// Test seam: slabs smaller than memory would allow, so that even the rows of a small grid are cut.
   std::optional<uint64_t> slab_bytes;
-  /// For tests: how often scatter notes what is on disk.
+  /// Test seam: how often scatter notes what is on disk.
   std::chrono::milliseconds note_interval{10'000};
 };
 
@@ -83,7 +84,7 @@ class DifferingBlanks final : public Error {
   bool is_any_drawn_;
 };
 
-/// Where temporary files go.
+/// The folder for temporary files: the one that was chosen, otherwise the one of the output.
 inline std::filesystem::path temporaryFolder(const ConvertOptions& options) {
   return options.temporary_folder.empty() ? folderOf(options.output) : options.temporary_folder;
 }

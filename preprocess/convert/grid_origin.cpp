@@ -46,8 +46,8 @@ AbuttingFaces::Needs GridOrigin::needsOfFaces() const {
   return needs;
 }
 
-/// Of passes that do little with a node. The nodes of such a slab are still in the processor's cache when they are worked
-/// on; as many threads read as there is memory for slabs.
+/// The buffers for passes that do little with a node. The nodes of such a slab are still in the processor's
+/// cache when they are worked on; as many threads read as there is memory for slabs.
 SlabBuffers GridOrigin::smallSlabs(Halo halo) const {
   constexpr uint64_t kBytes = uint64_t{16} << 20, kMaxReaders = 4;
   const uint64_t bytes =

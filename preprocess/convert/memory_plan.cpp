@@ -23,8 +23,8 @@ constexpr uint64_t kMiB = uint64_t{1} << 20;
 // libraries (RssFile of a conversion of NetCDF tiles); the rest has room for what HDF5 keeps of its files.
 constexpr uint64_t kProgramBytes = 80 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
-// For each thread that shares a heap: gaps between blocks of several threads. With 5 threads up to 22 MiB more than planned were in
-// use, with 9 up to 16.
+// Gaps between blocks of several threads, for each thread that shares a heap. With 5 threads up to 22 MiB
+// more than planned were in use, with 9 up to 16.
 constexpr uint64_t kGapBytes = 3 * kMiB;
 constexpr uint64_t kSeamShare = 8, kSlabShare = 8, kMeshShare = 2, kOverlapShare = 4;  // of the rest
 // The fewest splats of a bucket: some bricks for each thread to work on.

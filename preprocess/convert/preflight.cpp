@@ -24,9 +24,8 @@ constexpr uint64_t kCacheBytesPerNode = 16, kCacheBytesPerScalar = 5;
 // Chunk headers, chunks that are not full, and the records of borders and seams, which are a fifth longer.
 constexpr uint64_t kTemporaryMarginPercent = 8;
 
-// Between what grids took that were measured (3.9 to 5.0 bytes; 1.2 to 1.6 million splats a second on two
-// threads).
-// Of meshes: points 7.5 to 13, cells 8 to 18 and, where they have a random order, 14 to 23.
+// Values between those measured: 3.9 to 5.0 bytes a splat, and 1.2 to 1.6 million splats a second on two
+// threads. Meshes: points 7.5 to 13 bytes, cells 8 to 18 and, where they have a random order, 14 to 23.
 constexpr double kUsualBytesPerMeshPoint = 11, kUsualBytesPerMeshCell = 13;
 constexpr double kUsualBytesPerSplat = 5, kUsualBytesPerScalar = 1.5;
 constexpr double kUsualStartSeconds = 0.1, kUsualSplatsPerSecond = 0.7e6;

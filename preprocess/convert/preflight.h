@@ -24,7 +24,7 @@ struct DiskNeeds {
   uint64_t mostTemporary() const { return std::max(temporary_bytes, before_cache_bytes); }
 };
 DiskNeeds diskNeeds(uint64_t nodes, size_t variables);
-/// With what the grid's passes need beside its splats.
+/// Adds to `needs` what the grid's passes need beside its splats.
 DiskNeeds with(const TemporaryNeeds& temporary, DiskNeeds needs);
 /// The same for adding variables to a cache; `record_bytes`: what a splat takes in the temporary file.
 DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables, size_t record_bytes);

@@ -24,7 +24,7 @@ struct SampledScalars {
     }
   }
 
-  /// Before any leaf is added.
+  /// Divides the histograms by the sample's bins. Call it before any leaf is added.
   void divide(HistogramSums& histograms) const {
     for (size_t v = 0; v < bins.size(); ++v) histograms.divide(v, bins[v]);
   }

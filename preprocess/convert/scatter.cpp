@@ -80,7 +80,7 @@ class SplatStream {
     for (Worker& worker : workers_) seams_->add(worker.for_seams);
   }
 
-  /// Of all that was sent. Not while slabs are added.
+  /// The state of all that was sent. Call it only while no slab is being added.
   ScatterState state() const {
     ScatterState state = before_;
     for (const Worker& worker : workers_) {

@@ -189,7 +189,7 @@ fs::path folderOfBricks(const fs::path& scratch, unsigned rank) {
   return folder;
 }
 
-/// In post-order: what lies below a cell comes before it.
+/// Whether `a` comes before `b` in post-order: what lies below a cell comes before it.
 bool comesBefore(const Cell& a, const Cell& b) {
   const auto last_deepest = [](const Cell& cell) {
     Cell deepest{static_cast<uint32_t>(kMaxLevel), {}};

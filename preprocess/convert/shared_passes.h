@@ -55,7 +55,7 @@ BucketTree broadcastTree(const BucketTree& tree, Ranks& ranks);
 /// [node of the tree]: the sums of all ranks' contents, at every rank.
 void sumContents(std::vector<CellContents>& contents, Ranks& ranks);
 
-/// At rank 0: the chains of the other ranks' files, from rank 1 on.
+/// Returns at rank 0 the chains of the other ranks' files, from rank 1 on.
 std::vector<BucketChains> gatherChains(const BucketChains& chains, Ranks& ranks);
 
 /// [rank]: its buckets, about as many splats for each. No cell that is built as a whole lies in two ranges.

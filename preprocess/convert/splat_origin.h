@@ -29,7 +29,7 @@
 
 namespace curvisplat {
 
-/// Where a pass sends its splats.
+/// The destination of a pass's splats.
 class SplatSink {
  public:
   virtual ~SplatSink() = default;
@@ -60,7 +60,7 @@ struct ScatterState {
   std::vector<Handedness> handedness;  // [block]
 };
 
-/// For a scatter() that may be interrupted: where it goes on, and how it notes what is done.
+/// Notes about a scatter() that may be interrupted: where it goes on, and how it notes what is done.
 struct ScatterNotes {
   const ScatterState* from = nullptr;  // null: at the beginning
   /// Whether it is time for a note; empty: never.
@@ -81,12 +81,12 @@ class SplatOrigin {
   virtual ~SplatOrigin() = default;
 
   virtual const GridDescription& description() const = 0;
-  /// Where the samples are.
+  /// Whether the samples are nodes or cells.
   virtual Centring centring() const = 0;
   /// The samples' numbers count through these, i fastest; NodeSplat::node is one.
   virtual const std::vector<GridBlock>& blocks() const = 0;
-  /// Of temporary files that survey() and scatter() need beside the splats': at the most, and as a forecast, for which the grid
-  /// may be read once.
+  /// The needs of temporary files beside the splats' in survey() and scatter(): at the most, and as a
+  /// forecast, for which the grid may be read once.
   virtual TemporaryNeeds mostTemporaryNeeds() const { return {}; }
   virtual TemporaryNeeds temporaryNeeds(const Progress&) const { return mostTemporaryNeeds(); }
   /// Bytes of all temporary files together, and of those that are counted beside them, at the moment when they were the most.
@@ -108,7 +108,7 @@ class SplatOrigin {
   virtual std::string overlap() const { return ""; }
   /// Whether splats lose what reaches into blanked cells (kCellOctants).
   virtual bool cutsOctants() const { return false; }
-  /// As one in how many splats count() looks at, the same at all ranks. After survey().
+  /// One in how many splats count() looks at, the same at all ranks. After survey().
   virtual uint32_t splatsPerCounted() const { return 1; }
   /// Counts the splats by cells of `root`, about: a wrong count makes buckets of uneven sizes, no other cache.
   virtual void count(const RootCube& root, CountingGrid& counts, Progress& progress) = 0;

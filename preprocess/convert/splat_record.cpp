@@ -25,7 +25,7 @@ double axisOf(uint32_t bits) {
   return std::bit_cast<float>(bits << kDroppedBits);
 }
 
-// Of weight / (a0 a1 a2), as regular splats keep it. Those below a quarter would lose digits.
+// Steps of weight / (a0 a1 a2), as regular splats keep it. Those below a quarter would lose digits.
 constexpr double kRatioSteps = 0x1p15;
 constexpr double kSmallestRatio = 0.25, kLargestRatio = 0xffff / kRatioSteps;
 

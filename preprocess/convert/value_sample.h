@@ -27,7 +27,7 @@ class ValueSample {
  public:
   static constexpr size_t kSplats = 32768;
 
-  /// Of very many variables the sample has fewer splats, so that it stays below 16 MiB.
+  /// Takes fewer splats if there are very many variables, so that the sample stays below 16 MiB.
   explicit ValueSample(size_t variables)
       : columns_(kValues + variables), splats_(std::min(kSplats, kMaxNumbers / columns_)) {}
 

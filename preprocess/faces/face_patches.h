@@ -15,7 +15,7 @@
 
 namespace curvisplat {
 
-/// Which quads of a face are drawn: a bit each, rows along u.
+/// The quads of a face that are drawn: a bit each, rows along u.
 class QuadMask {
  public:
   explicit QuadMask(const GridFace& face)
@@ -50,14 +50,14 @@ class FaceRegions {
   std::vector<FaceRegion> regions_;  // by face
 };
 
-/// Which quads of a face lie in any of its regions, row after row.
+/// The quads of a face that lie in any of its regions, row after row.
 class RegionRows {
  public:
   /// `regions`: of one face, each with a quad at least. `quads`: the range of each row.
   RegionRows(std::span<const FaceRegion> regions, const RowRange& quads);
 
-  /// Of row v, which is no less than that of the call before: [quad of the range], 1 in a region. Valid
-  /// until the next call.
+  /// The quads of row v, which is no less than that of the call before: [quad of the range], 1 in a region.
+  /// Valid until the next call.
   std::span<const uint8_t> row(uint64_t v);
 
  private:

@@ -49,7 +49,7 @@ Node nodeAt(const GridFace& face, uint64_t layer, uint64_t u, uint64_t v) {
   return node;
 }
 
-/// Of the cells behind a face, or at either side of an index plane.
+/// The index of the layer of cells behind a face, or at either side of an index plane.
 uint64_t layerOfCells(const GridFace& face, const Node& size) {
   return std::min(face.index, size[static_cast<size_t>(face.axis)] - 2);
 }
@@ -58,7 +58,7 @@ bool isThere(const NodeArrays& nodes, size_t at, bool of_cells) {
   return of_cells ? !(nodes.blank[at] & kNoNode) : !nodes.blank[at];
 }
 
-/// Without a value: a cell that is not drawn.
+/// Whether a cell is drawn: all corners are there, and it has a value.
 bool cellIsThere(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride) {
   return !(cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) &&
          !(nodes.blank[at] & (kNoValue | kBlankValue | kValueNotFinite));
@@ -158,7 +158,8 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
   }
 }
 
-/// Of the cells whose lowest nodes are in the slab's box, and which have their corners at the end.
+/// Adds the ends of the cells whose lowest nodes are in the slab's box, and which have their corners at the
+/// end.
 void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const {
   const Slab& slab = loaded.slab;
   const Node size = sizeOf(reader_.source().description().blocks[slab.block]);
@@ -175,7 +176,7 @@ void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const
               });
 }
 
-/// Of the cells whose lowest nodes are in `box`. Several threads, each with a box.
+/// Adds the ends of the cells whose lowest nodes are in `box`. Several threads, each with a box.
 void FaceSpool::addEndsIn(const LoadedSlab& loaded, const NodeBox& box, AbuttingFaces& abutting,
                           Mutex& adding) const {
   const Slab& slab = loaded.slab;

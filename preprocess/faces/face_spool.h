@@ -43,7 +43,7 @@ void forRowParts(uint64_t count, const Use& use) {
     use(RowRange{begin, begin + kNodesAtATime < count ? begin + kNodesAtATime : count});
 }
 
-/// Those of a block, of faces in the order of their blocks. A grid may have 100,000 blocks.
+/// The faces of a block, out of faces in the order of their blocks. A grid may have 100,000 blocks.
 std::span<const GridFace> facesOfBlock(std::span<const GridFace> faces, uint32_t block);
 
 class FaceSpool {
@@ -60,7 +60,7 @@ class FaceSpool {
   std::span<const GridFace> faces() const { return faces_; }
   const FaceBox& box() const { return box_; }
   size_t scalars() const { return reader_.scalars(); }
-  /// After fill(). Rows of nodes along u. Any thread.
+  /// The nodes of a row along u, after fill(). Any thread.
   LatticeRow row(size_t face, uint64_t v, const RowRange& range = {}) const;
   /// Every `stride`-th node of the range, from its first on, and its last.
   LatticeRow thinnedRow(size_t face, uint64_t v, const RowRange& range, uint32_t stride) const;

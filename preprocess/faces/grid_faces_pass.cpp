@@ -135,7 +135,8 @@ class FacesPass {
     bool folds = false;
   };
 
-  /// Of a face: those that another block does not close, and those of boundaries, whose nodes and cells are there.
+  /// The quads of a face that are drawn (those that another block does not close) and those of boundaries.
+  /// The nodes and cells of all of them are there.
   Quads quadsOf(uint32_t number, std::span<const FaceRegion> regions) const {
     const TraceScope trace("find drawn quads");
     const GridFace& face = spool_.faces()[number];
@@ -144,7 +145,7 @@ class FacesPass {
     return quads;
   }
 
-  /// Of a range of the columns.
+  /// Finds the quads in a range of the columns.
   void drawPart(uint32_t number, std::span<const FaceRegion> regions, const RowRange& part,
                 Quads& quads) const {
     const GridFace& face = spool_.faces()[number];

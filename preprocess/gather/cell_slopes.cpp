@@ -34,7 +34,7 @@ struct PairRecord {
   uint32_t first, second;
 };
 
-/// Of another range.
+/// A neighbour that belongs to another range.
 struct NeighbourRecord {
   uint64_t cell, neighbour;
   glm::dvec3 centre;  // of the neighbour; values follow
@@ -116,7 +116,7 @@ class RangeOfCells {
   size_t size() const { return bodies_.size(); }
   BodyRecord body(size_t n) const { return bodies_[n]; }
   void values(size_t n, std::span<float> out) const { bodies_.values(n, out); }
-  /// Of cell n, in the order of their numbers. Any thread.
+  /// The neighbours of cell n, in the order of their numbers. Any thread.
   void neighbours(size_t n, std::vector<glm::dvec3>& steps, std::vector<float>& values) {
     steps.clear();
     values.clear();
@@ -145,7 +145,7 @@ class RangeOfCells {
       }
     });
   }
-  /// Of a body, or of a record of another range's behind them.
+  /// The number of a cell that is among the bodies, or among another range's records behind them.
   uint64_t numberOf(uint32_t neighbour) const {
     return neighbour < bodies_.size() ? bodies_[neighbour].cell
                                       : beside_[neighbour - bodies_.size()].neighbour;
@@ -159,7 +159,7 @@ class RangeOfCells {
   std::vector<uint32_t> neighbours_;
 };
 
-/// Of cells [begin, end).
+/// Sets the bodies of cells [begin, end).
 void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<CellBody> out) {
   for (size_t n = begin; n < end;) {
     if (cells.areFourAlike(n, end, 0)) {

@@ -21,7 +21,7 @@ namespace curvisplat {
 
 class CellSlopes {
  public:
-  /// For cells with numbers below `cells`; `fields`: at least one value each.
+  /// Takes cells with numbers below `cells`; `fields`: at least one value each.
   CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch);
   ~CellSlopes();
 

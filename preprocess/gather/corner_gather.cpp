@@ -26,7 +26,7 @@ uint64_t cornersDrawn(const MeshCells& cells) {
   return corners;
 }
 
-/// Where a corner wants its point.
+/// The slot of a corner, and the point that it waits for.
 struct Reference {
   uint64_t point, slot;
 };

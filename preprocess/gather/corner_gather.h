@@ -39,7 +39,7 @@ struct GatheredCells {
   static constexpr size_t kMaxCorners = size_t{1} << 17;
 
   size_t size() const { return shapes.size(); }
-  /// Of a part of a curved cell; 0: that of the linear cell.
+  /// The volume of a part of a curved cell; 0: that of the linear cell.
   float volumeOf(size_t n) const { return volumes.empty() ? 0.0f : volumes[n]; }
   CellView view(size_t n, size_t corner_fields) const;
   /// Whether the four cells from n on come before `end`, and have one shape that isTakenAtOnce().

@@ -135,7 +135,7 @@ void FaceMatcher::add(std::span<const FaceCorners> faces, const FaceCalls& calls
   makeRecords(calls);
 }
 
-/// Of the faces that were added and still wait.
+/// Makes records of the faces that were added and still wait.
 void FaceMatcher::makeRecords(const FaceCalls& calls) {
   std::erase_if(taken_, [&](const auto& taken) { return waiting_[taken.first].face != taken.second; });
   parallelFor(tbb::blocked_range<size_t>(0, taken_.size(), kRecordsPerTask),

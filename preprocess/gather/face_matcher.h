@@ -47,7 +47,8 @@ class FaceMatcher {
   using TakePair = std::function<void(std::span<const std::byte>, std::span<const std::byte>)>;
   using TakeSingle = std::function<void(std::span<const std::byte>)>;
 
-  /// For about `faces` of them. Streams keep to `memory_bytes`, beside the faces that wait (waitingBytes()).
+  /// Expects about `faces` faces. Streams keep to `memory_bytes`, beside the faces that wait
+  /// (waitingBytes()).
   FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes, ScratchFiles scratch);
   ~FaceMatcher();
 
@@ -57,12 +58,12 @@ class FaceMatcher {
   /// The others, and those without another. Once, after all faces.
   void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
 
-  /// Of the stream that a face takes which does not wait in memory.
+  /// Bytes of the stream that a face takes if it does not wait in memory.
   static uint64_t spilledBytes(size_t record_bytes) { return sizeof(FaceCorners) + record_bytes; }
   /// The memory of all streams.
   static uint64_t streamBytes(uint64_t memory_bytes) { return memory_bytes / 4; }
   static constexpr uint32_t kMaxWaiting = uint32_t{1} << 17;
-  /// Of as many faces as wait at the most.
+  /// Bytes of as many faces as wait at most.
   static uint64_t waitingBytes(size_t record_bytes, uint64_t faces);
 
  private:
@@ -106,7 +107,7 @@ struct HalfFace {
 /// The faces of all cells in their order. Collapsed ones, with fewer than three corners, are left out.
 class FaceList {
  public:
-  /// Which face.
+  /// The place of a face.
   struct Place {
     uint32_t cell, at;  // among the gathered ones; where it begins in facesOf() the cell
     bool of_plain_cell;

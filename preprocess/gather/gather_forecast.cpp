@@ -192,7 +192,7 @@ class Followed {
     some_.face_begin.push_back(some_.faces.size());
   }
 
-  /// As CornerGather and PointSums would treat the cells.
+  /// Counts a batch as CornerGather and PointSums would treat its cells.
   void endBatch() {
     counts_->cells += batch_.size();
     counts_->corners += batch_corners_.size();

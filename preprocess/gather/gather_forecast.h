@@ -37,7 +37,7 @@ class WaitingFaces {
     };
     Pairs found, found_late;  // while cells come; when all have come
   };
-  /// Of the whole mesh, after all cells.
+  /// The counts of the whole mesh, after all cells.
   Counts counts() const;
 
  private:
@@ -106,7 +106,7 @@ class GatherCounts {
   uint64_t sum_file_bytes = 0;
   WaitingFaces::Counts faces;
 
-  /// Of faces that were counted piece by piece.
+  /// Joins faces that were counted piece by piece.
   void joinPieces();
   GatherNeeds needs() const;
   const GatherJob& job() const { return job_; }

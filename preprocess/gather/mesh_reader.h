@@ -55,7 +55,7 @@ class MeshReader {
   const MeshSource& source() const { return *source_; }
   const std::vector<MeshPiece>& pieces() const { return source_->description().pieces; }
   size_t scalars() const { return scalars_.size(); }
-  /// Their indices in the description.
+  /// The scalars' indices in the description.
   const std::vector<uint32_t>& scalarIndices() const { return scalars_; }
   Centring centring() const { return centring_; }
   uint64_t points() const { return points_; }
@@ -72,7 +72,7 @@ class MeshReader {
   void forEachCells(const std::function<void(const LoadedCells&)>& use) const;
   void forEachCells(const std::vector<MeshRange>& ranges,
                     const std::function<void(const LoadedCells&)>& use) const;
-  /// Until use() returns false.
+  /// Reads cells until use() returns false.
   void forEachCellsWhile(const std::vector<MeshRange>& ranges,
                          const std::function<bool(const LoadedCells&)>& use) const;
   /// Reads all cells: bytes of the largest chunk. Most of them where cells are polyhedra.

@@ -43,7 +43,7 @@ bool isBeside(const Side& side, const Side& other) {
          kApart * area * std::sqrt(kCorners * area);
 }
 
-/// Those that lie against another one; all where very many meet.
+/// Marks the sides that lie against another one; all where very many meet.
 void markClosed(std::span<Side> sides) {
   if (sides.size() > kMaxCompared) {
     for (Side& side : sides) side.closed = true;

@@ -22,21 +22,21 @@ class OuterPlanes {
   OuterPlanes(size_t ranges, uint64_t range_size, uint64_t memory_bytes, ScratchFiles scratch)
       : range_size_(range_size), file_(std::move(scratch), ranges, memory_bytes) {}
 
-  /// Of a plane in the file.
+  /// Bytes of a plane in the file.
   static constexpr uint64_t bytesOfPlane() { return sizeof(OfRange::Record); }
 
   /// One thread. A plane without area is left out. `face`: its number, the same for all that it is added to.
   void add(uint64_t number, const OuterPlane& plane, uint64_t face = 0);
   void close() { file_.close(); }
-  /// After close(): leaves out faces that another one lies against at one of their numbers. There are cells
-  /// on both sides, whose faces do not fit together: nodes hang. Where more than 256 meet, all are left out.
-  /// Memory: 8 bytes for each such face.
+  /// Leaves out faces that another one lies against at one of their numbers. Call it after close(). There are
+  /// cells on both sides, whose faces do not fit together: nodes hang. Where more than 256 meet, all are left
+  /// out. Memory: 8 bytes for each such face.
   void leaveOutClosed(const Progress& progress);
 
   /// The planes of a range; what comes out does not depend on the order in which they came in.
   class OfRange {
    public:
-    /// Of a splat. Any thread; `scratch` keeps its capacity.
+    /// The planes of the splat `number`. Any thread; `scratch` keeps its capacity.
     std::span<const OuterPlane> of(uint64_t number, std::vector<OuterPlane>& scratch) const;
 
    private:
@@ -61,7 +61,7 @@ class OuterPlanes {
 /// those of a cell that has the point.
 class PointBorders {
  public:
-  /// For ranges of `range_points` numbers. `cells`: about how many there will be.
+  /// Sorts by ranges of `range_points` numbers. `cells`: about how many there will be.
   PointBorders(uint64_t points, uint64_t range_points, uint64_t cells, uint64_t memory_bytes,
                const ScratchFiles& scratch);
 
@@ -71,9 +71,9 @@ class PointBorders {
   void finish(const Progress& progress);
   OuterPlanes::OfRange load(size_t range) { return planes_.load(range); }
 
-  /// Of the faces that wait for their second cell, whatever memory there is.
+  /// Bytes of the faces that wait for their second cell, whatever memory there is.
   static uint64_t waitingBytes(uint64_t cells);
-  /// Of the record of a face.
+  /// Bytes of the record of a face.
   static size_t faceBytes();
   static constexpr uint64_t kMaxPlanesOfFace = 8;
 

@@ -22,8 +22,8 @@
 
 namespace curvisplat {
 
-/// Which pages of a long array are in memory: those that were wanted last. The caller has the pages
-/// themselves, in slots.
+/// Chooses the pages of a long array that are in memory: those that were wanted last. The caller has the
+/// pages themselves, in slots.
 class PageSlots {
  public:
   static constexpr uint32_t kNone = UINT32_MAX;
@@ -43,7 +43,7 @@ class PageSlots {
   bool hold(std::span<const uint64_t> items, double most_again);
   /// want() of pages [first, end).
   bool wantPages(uint64_t first, uint64_t end);
-  /// Those of them that are not in memory, rising.
+  /// The wanted pages that are not in memory, rising.
   std::span<const uint64_t> missing() const { return missing_; }
   /// Pages that have to leave memory for them. Their slots are free now.
   struct Left {
@@ -81,7 +81,7 @@ class PointPages {
   /// over the mesh then.
   bool hold(std::span<const uint64_t> points);
 
-  /// Of a point that hold() was last called with. Any thread.
+  /// The position of a point that hold() was last called with. Any thread.
   const glm::dvec3& at(uint64_t point) const { return pageOf(point).at[point & (kPoints - 1)]; }
   const float* values(uint64_t point) const {
     return pageOf(point).values.data() + (point & (kPoints - 1)) * fields_;
@@ -118,7 +118,8 @@ class SumPages {
   // A page is read and written, a cell in a stream as well, but once for all of its corners.
   static constexpr double kMaxAgain = 0.25;
 
-  /// Of points below `points`, each with as many `values` and `moments`. At most `pages` are in memory.
+  /// Holds points below `points`, each with `values` values and `moments` moments. At most `pages` are in
+  /// memory.
   SumPages(uint64_t points, size_t values, size_t moments, uint64_t pages, ScratchFiles scratch);
 
   static uint64_t bytesOfPoint(size_t values, size_t moments) {
@@ -131,7 +132,7 @@ class SumPages {
   bool hold(std::span<const uint64_t> points);
   /// All of pages [first, end), as many as there may be in memory.
   void holdPages(uint64_t first, uint64_t end);
-  /// From now on as many may be in memory.
+  /// Sets how many pages may be in memory from now on.
   void setMost(uint64_t pages) { slots_.setMost(pages); }
   /// The page is not used again.
   void forget(uint64_t page) { slots_.leave(page); }

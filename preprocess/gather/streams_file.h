@@ -43,7 +43,7 @@ class StreamsFile {
   void forget(size_t stream) { streams_[stream] = {}; }
 
   static constexpr size_t kMinBuffer = size_t{16} << 10, kMaxBuffer = size_t{256} << 10;
-  /// Of `bytes` in streams alike, those that do not stay in memory.
+  /// Bytes that do not stay in memory, of `bytes` in streams alike.
   static uint64_t bytesInFile(uint64_t bytes, size_t streams, uint64_t memory_bytes);
   /// The number of streams whose buffers fit in that memory.
   static size_t mostStreams(uint64_t memory_bytes) { return memory_bytes / (2 * kMinBuffer) + 1; }

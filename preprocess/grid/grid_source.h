@@ -43,7 +43,7 @@ struct MeshPiece {
   uint64_t points = 0, cells = 0;
 };
 
-/// Where a scalar's samples lie.
+/// The places of a scalar's samples: nodes or cells.
 enum class Centring { kNode, kCell };
 
 struct GridScalar {
@@ -128,9 +128,9 @@ class GridSource : public DataSource {
   /// The number of whole rows that readPartOfRows() holds in memory beside `out`: 0 if it reads the parts
   /// alone.
   virtual uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const { return 1; }
-  /// Which nodes of the box, which has whole rows, are fringe: interpolated from another block (a negative
-  /// iblank). Fills `out` with 1 or 0 for each and returns true; returns false if the grid does not tell. As
-  /// read().
+  /// Reads which nodes of the box, which has whole rows, are fringe: interpolated from another block (a
+  /// negative iblank). Fills `out` with 1 or 0 for each and returns true; returns false if the grid does not
+  /// tell. As read().
   virtual bool readFringe(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<uint8_t>& /*out*/) const {
     return false;
   }

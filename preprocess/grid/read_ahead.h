@@ -77,7 +77,7 @@ class ReadAhead {
     if (error_) std::rethrow_exception(error_);
     return nullptr;
   }
-  /// Of the values taken, the one that was taken first. Any thread.
+  /// Gives back the value that was taken first of those not given back. Any thread.
   void giveBack() {
     const MutexLock lock(mutex_);
     ++given_back_;

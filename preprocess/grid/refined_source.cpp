@@ -63,7 +63,7 @@ struct PlaceBetween {
   std::array<size_t, 3> steps{};    // [axis] from the lower to the higher one
   std::array<uint32_t, 3> parts{};  // [axis] from the lower one
 
-  /// Of the 1, 2, 4 or 8 nodes around it.
+  /// The number of nodes around it: 1, 2, 4 or 8.
   size_t corners() const { return size_t{1} << axes; }
   size_t corner(size_t number) const {
     size_t node = at;

@@ -18,8 +18,8 @@ struct Extent {
   uint64_t i, j, k;
 };
 
-/// Of slabs of whole rows whose windows have at most `window_rows` rows. `margin`: rows of the halo, the sum of both
-/// sides.
+/// The extent of slabs of whole rows whose windows have at most `window_rows` rows. `margin`: rows of the
+/// halo, the sum of both sides.
 Extent extentOfRows(const GridBlock& block, uint64_t window_rows, uint64_t margin) {
   const uint64_t planes = window_rows / block.nj;
   if (planes >= block.nk) return {block.ni, block.nj, block.nk};
@@ -30,7 +30,7 @@ Extent extentOfRows(const GridBlock& block, uint64_t window_rows, uint64_t margi
   return {block.ni, j - std::min(j - 1, margin), k - std::min(k - 1, margin)};
 }
 
-/// Of slabs of parts of rows.
+/// The extent of slabs of parts of rows.
 Extent extentOfParts(const GridBlock& block, uint64_t window_nodes, uint64_t margin) {
   if (margin == 0) return {std::max<uint64_t>(1, window_nodes), 1, 1};
   const auto nodes = static_cast<double>(window_nodes);
@@ -66,7 +66,7 @@ void makeRoom(size_t count, size_t scalars, NodeArrays& nodes) {
   for (auto& values : nodes.scalars) make(values);
 }
 
-/// Of its window.
+/// Nodes of the slab's window.
 uint64_t nodesOf(const Slab& slab, uint64_t ni) {
   return rowsOf(slab.window) * slab.window.rowNodes(ni);
 }

@@ -35,7 +35,7 @@ inline uint64_t rowsOf(const NodeBox& box) {
   return (box.j1 - box.j0) * (box.k1 - box.k0);
 }
 
-/// Where the nodes of a window of a block lie in NodeArrays: node i, j, k of the block is element at(i, j, k).
+/// The strides of a window of a block in NodeArrays: node i, j, k of the block is element at(i, j, k).
 struct WindowStrides {
   uint64_t i0, j0, k0;
   size_t row, plane;  // from one row to the next, and from one plane to the next

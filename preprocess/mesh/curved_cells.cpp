@@ -80,7 +80,7 @@ void addTetrahedron(const std::array<Place, 4>& at, int order, std::vector<Place
   if (order >= 4) addTetrahedron(inside(at, order), order - 4, out);
 }
 
-/// Of hexahedra and wedges: nodes with each axis from first to last, i fastest.
+/// Calls add() for nodes of hexahedra and wedges: nodes with each axis from first to last, i fastest.
 template <typename Add>
 void forBox(const Place& first, const Place& last, const Add& add) {
   for (int k = first[2]; k <= last[2]; ++k)

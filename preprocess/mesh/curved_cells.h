@@ -18,7 +18,7 @@ namespace curvisplat {
 
 inline constexpr size_t kMaxCurveOrder = 10;
 
-/// Of a cell with that many nodes; of order 0 if there is no such one.
+/// The curve of a cell with that many nodes; of order 0 if there is no such one.
 CellCurve curveOf(CellKind shape, size_t nodes);
 
 /// (i, j, k) of each node: from 0 to the order. Of wedges and tetrahedra i + j (+ k) is the order at most; of a pyramid i and j are

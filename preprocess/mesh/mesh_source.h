@@ -59,8 +59,9 @@ struct MeshCells {
                                         // places among the cell's corners
   std::vector<uint8_t> hidden;          // 1: blanked by the file, or another piece's
   std::vector<std::vector<float>> scalars;  // [requested scalar][cell]
-  // Of cells of higher order, which have all their nodes as corners: the cell, and its polynomial. Only from readers of files:
-  // what follows them sees linear cells (cutCurved(), preprocess/formats/common/cut_source.h).
+  // The cells of higher order, which have all their nodes as corners: the cell, and its polynomial. Only from
+  // readers of files: what follows them sees linear cells (cutCurved(),
+  // preprocess/formats/common/cut_source.h).
   std::vector<std::pair<size_t, CellCurve>> curved;
   std::vector<float>
       volumes;  // [cell] of parts of curved cells; 0: that of the linear cell. Empty: of all cells

@@ -120,7 +120,7 @@ glm::dvec3 meanOf(std::span<const glm::dvec3> corners) {
   return sum / static_cast<double>(corners.size());
 }
 
-/// Of a tetrahedron: C = (1/20) Σ (y - ȳ)(y - ȳ)ᵀ.
+/// The body of a tetrahedron: C = (1/20) Σ (y - ȳ)(y - ȳ)ᵀ.
 CellBody bodyOfTetrahedron(std::span<const glm::dvec3> at) {
   CellBody body;
   body.volume = sixVolumes(at[1] - at[0], at[2] - at[0], at[3] - at[0]) / 6;

@@ -54,7 +54,8 @@ struct CellBody {
   double xx = 0, xy = 0, yy = 0, xz = 0, yz = 0, zz = 0;
 };
 
-/// Of a cell without volume the centre is the mean of its corners, and the covariance 0.
+/// The volume, centre and covariance of a cell. If it has no volume, its centre is the mean of its corners,
+/// and the covariance 0.
 CellBody bodyOf(const CellView& cell);
 /// From the moments 0 to 9 of the whole cell about `middle`, the mean of its corners.
 CellBody bodyFrom(const glm::dvec3& middle, std::span<const double, 10> moments);

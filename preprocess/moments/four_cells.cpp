@@ -20,7 +20,7 @@ using Four = double __attribute__((vector_size(kCellsAtOnce * sizeof(double))));
 struct Four3 {
   Four x, y, z;
 };
-/// xx xy yy xz yz zz
+/// Symmetric matrices: xx xy yy xz yz zz.
 struct Squares {
   Four of[6];
 };

@@ -178,7 +178,7 @@ class BlockOwners::SlabCover {
     const uint64_t width = box.j1 - box.j0;
     parallelFor(uint64_t{0}, rowsOf(box), [&](uint64_t n) { each(box.j0 + n % width, box.k0 + n / width); });
   }
-  /// Of a row of `box`.
+  /// Calls each() for the samples of a row of `box`.
   template <typename Each>
   void forSamples(const NodeBox& box, uint64_t j, uint64_t k, const Each& each) const {
     const size_t first = samples_.elementOf(box.i0, j, k);

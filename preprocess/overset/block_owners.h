@@ -1,4 +1,4 @@
-// Which block draws the data where several overlap: every point of space has one owner.
+// Decides which block draws the data where several overlap: every point of space has one owner.
 //
 // The owner of a point is, of the blocks with a cell that holds it, the one whose node next to the point is
 // no fringe (GridSource::readFringe), and of several such the one with the smallest cell (cell_tree.h), and

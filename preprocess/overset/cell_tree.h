@@ -43,7 +43,7 @@ class CellTree {
   /// `fringe`: [node of the window], or empty.
   CellTree(const GridBlock& block, LoadedSlab loaded, std::vector<uint8_t> fringe, Centring centring);
 
-  /// Of all cells; empty if there are none.
+  /// The box of all cells; empty if there are none.
   const BoundingBox& box() const { return box_; }
   uint64_t bytes() const;
 
@@ -52,7 +52,7 @@ class CellTree {
     size_t cell = 0;
     glm::dvec3 u{0.0};
   };
-  /// Where a search begins: next to where the last one ended. One a thread.
+  /// The place where a search begins: next to where the last one ended. One a thread.
   struct Hint {
     std::optional<size_t> cell;
   };
@@ -101,7 +101,7 @@ class CellTree {
     const NodeArrays& nodes = loaded_.nodes;
     return cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), cell, row_stride_, plane_stride_);
   }
-  /// By way of neighbours from the hint's cell; none if it is not near, or on a face.
+  /// Searches by way of neighbours from the hint's cell; none if it is not near, or on a face.
   std::optional<Holder> near(const glm::dvec3& point, const Hint& hint) const;
   std::optional<Holder> in(size_t cell, const glm::dvec3& point) const;
   static bool holds(const Node& node, const glm::dvec3& from_origin) {

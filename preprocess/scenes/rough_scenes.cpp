@@ -139,8 +139,8 @@ class GlobeFace : public Scene {
 
 class DuctPart : public Scene {
  public:
-  /// From x = begin to begin + 1. `clustering`: cells along i gather at the beginning where it is positive,
-  /// at the end where it is negative.
+  /// A part of the duct from x = begin to begin + 1. `clustering`: cells along i gather at the beginning
+  /// where it is positive, at the end where it is negative.
   DuctPart(double begin, double clustering)
       : Scene("duct"), begin_(begin), clustering_(clustering), growth_(std::expm1(clustering)) {}
 

@@ -47,7 +47,7 @@ struct SceneTime {
 std::vector<std::shared_ptr<const Scene>> makeScenesAt(std::string_view name,
                                                        std::optional<double> clustering,
                                                        const SceneTime& time);
-/// As makeScenes(), for a scene of one block.
+/// Makes a scene of one block, as makeScenes() does.
 std::shared_ptr<const Scene> makeScene(std::string_view name,
                                        std::optional<double> clustering = std::nullopt);
 

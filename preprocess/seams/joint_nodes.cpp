@@ -224,7 +224,7 @@ void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values
   sides_.assign(sides.begin(), sides.end());
 }
 
-/// Its probes tell of them; those of the other parts tell the same of the same faces.
+/// The layers of the lowest part, from its probes; those of the other parts tell the same of the same faces.
 std::vector<OpenBorders::Layer> MergedParts::layersOfLowest() const {
   const NodeSplat& lowest = lowest_.splat;
   const InwardAxes inward = inwardAxes(lowest.border_code);

@@ -34,7 +34,7 @@ namespace curvisplat {
 /// at.
 bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind);
 
-/// Which borders of a node's cell are still open once the parts that coincide there are merged: two halves
+/// The borders of a node's cell that are still open once the parts that coincide there are merged: two halves
 /// of two blocks close the border between them, while a face that both of them end at stays one.
 class OpenBorders {
  public:
@@ -153,8 +153,8 @@ class MergedParts {
   /// Forgets what it had. `sides`: those of the part.
   void begin(const NodeSplat& first, std::span<const SplatScalar> values, std::span<const JointSide> sides);
   void add(const NodeSplat& part, std::span<const SplatScalar> values, std::span<const JointSide> sides);
-  /// Its node (and node_position) is the lowest of the parts; regular is false unless there is only one,
-  /// which comes out as it went in.
+  /// The merged splat. Its node (and node_position) is the lowest of the parts; regular is false unless there
+  /// is only one, which comes out as it went in.
   SplatWithValues finish() const;
   /// The nodes in it, in the order of adding.
   const std::vector<uint64_t>& nodes() const { return nodes_; }
@@ -187,7 +187,7 @@ class JointNodes {
   /// Gets a splat and the nodes that it is merged of; none of the layer behind.
   using Sink =
       std::function<void(const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes)>;
-  /// Then forgets the nodes.
+  /// Gives the merged splats to `sink`, then forgets the nodes.
   void finish(const Sink& sink);
 
  private:

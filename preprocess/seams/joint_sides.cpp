@@ -56,7 +56,7 @@ uint32_t growthAlong(const CellGrowth& growth, const InFrame& in_frame) {
   return axes.code();
 }
 
-/// Along one axis of the lattice.
+/// How a splat changes along one axis of the lattice.
 struct AxisChange {
   double factor = 1;  // the length's
   double shift = 0;   // along the axis, in the splat's length before

@@ -52,13 +52,13 @@ class SeamSorter {
 
   /// Visits all that was added, by (along, node), and forgets it.
   void drain(const Visit& visit);
-  /// In place of drain(): ends adding, for `visitors` threads to visit ranges at the same time. Coordinates
-  /// are of `coordinate_bytes` bytes.
+  /// Ends adding, in place of drain(), so that `visitors` threads can visit ranges at the same time.
+  /// Coordinates are of `coordinate_bytes` bytes.
   std::vector<SweepRange> sort(unsigned visitors, int coordinate_bytes);
   void visit(const SweepRange& range, const Visit& visit) const;
   void forget() { records_.forget(); }
 
-  /// As drain(): the packed records.
+  /// Visits the records as drain() does, but packed.
   void drainPacked(const std::function<void(std::span<const double>)>& visit);
 
  private:

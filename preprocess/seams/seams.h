@@ -59,7 +59,7 @@ class SeamMerger {
   uint64_t finishInParallel(int coordinate_bytes,
                             const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink);
 
-  /// In place of finish(): calls `visit` for each set of nodes that it would merge, in rising order.
+  /// Calls `visit`, in place of finish(), for each set of nodes that would be merged, in rising order.
   void forEachSet(int coordinate_bytes, const std::function<void(std::span<const uint64_t>)>& visit);
 
  private:

@@ -13,8 +13,8 @@ namespace curvisplat {
 namespace {
 
 constexpr double kSimilar = 0.7;  // cosine: of one plane
-// Of two that close one another, or of a layer thinner than a voxel. Beyond the -0.5 of the sides of a
-// regular hexagon or a triangle, which rounding would decide.
+// The cosine of two faces that close one another, or of a layer thinner than a voxel. Beyond the -0.5 of the
+// sides of a regular hexagon or a triangle, which rounding would decide.
 constexpr double kOpposite = -0.55;
 constexpr double kEven = 0.9;  // the length of a mean of unit vectors that are about the same
 // How far a splat's middle is from a face that it ends at, in its lengths: a box's is 1/2, a wedge's 0.41 or

@@ -44,7 +44,7 @@ class MergedFaces {
   explicit MergedFaces(size_t voxels) : first_(voxels, kNone) {}
   void clear();
 
-  /// As VoxelMerger::add(). Sums depend on the order of the calls.
+  /// Adds a splat as VoxelMerger::add() does. Sums depend on the order of the calls.
   void add(size_t voxel, const glm::dvec3& position, const Splat& splat, uint32_t border_code);
   /// The planes of a voxel; similar ones are one plane. Those beyond the first VoxelPlanes::kMax are left
   /// out.

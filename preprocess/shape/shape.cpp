@@ -50,8 +50,9 @@ double largestEntry(const glm::dmat3& m) {
   return largest;
 }
 
-/// Of a matrix that is not zero and whose entries are about 1 at most. Hestenes' method: it keeps the digits
-/// of small columns (thin cells), which a diagonalisation of mᵀm would lose.
+/// The singular value decomposition of a matrix that is not zero and whose entries are about 1 at most.
+/// Hestenes' method: it keeps the digits of small columns (thin cells), which a diagonalisation of mᵀm would
+/// lose.
 Svd decompose(const glm::dmat3& m) {
   glm::dmat3 b = m, v(1.0);
   constexpr int kMaxSweeps = 30;  // it converges quadratically; 3x3 takes four to six

@@ -70,7 +70,7 @@ class Cells {
     return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * (known_i1_ - known_i0_) +
            (i - known_i0_);
   }
-  /// For a side on which the block has no neighbour.
+  /// Whether a side of a cell is a border, if the block has no neighbour there.
   bool isBorder(const std::array<uint64_t, 3>& cell, int axis, bool upper) const {
     if (!ends_.faces) return false;
     const CellFace face{ends_.block, cell, axis, upper};
@@ -151,7 +151,8 @@ void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
   }
 }
 
-/// Of a cell, number `index` of `count` along the axis; `stride` is from one to the next in the scratch.
+/// The stretch of a cell, number `index` of `count` along the axis; `stride` is from one to the next in the
+/// scratch.
 Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const {
   const auto is_there = [&](uint64_t before, uint64_t after) {
     return index >= before && index + after < count &&
@@ -185,9 +186,9 @@ double smallestAxis(const glm::dvec3& centre) {
   return std::max(kAxisFloor * (length > 0 ? length : 1.0), std::numeric_limits<double>::min());
 }
 
-/// Of a block that is one cell thick along some axes, each half of a cell along these is a splat of its own, since a
-/// border code has one face across each axis. The upper half has the number of a node on the block's last plane, which
-/// no cell has.
+/// Adds a cell. In a block that is one cell thick along some axes, each half of a cell along these is a splat
+/// of its own, since a border code has one face across each axis. The upper half has the number of a node on
+/// the block's last plane, which no cell has.
 void Cells::addCell(const std::array<uint64_t, 3>& index, uint32_t half) {
   const auto [i, j, k] = index;
   const size_t node = nodeAt(i, j, k), cell = cellAt(i, j, k);

@@ -45,8 +45,8 @@ struct LayeredBorder {
   uint8_t layers = 0;
 };
 
-/// Of a cell that ends at the borders `ends`, all of them faces, and lies behind those of `layers`: at right
-/// angles, three directions in all at the most.
+/// The code of a cell that ends at the borders `ends`, all of them faces, and lies behind those of `layers`:
+/// at right angles, three directions in all at the most.
 LayeredBorder layeredBorder(std::span<const glm::dvec3> ends, std::span<const LayerAxis> layers);
 
 /// The axis of the lattice of the code's axis n; -1 if that is no layer's.
@@ -61,7 +61,7 @@ LayeredBorder withoutSeams(const LayeredBorder& border, uint32_t axes);
 /// upper one, or 0.
 using Layers = std::array<int, 3>;
 
-/// Of a node with this index along an axis of `count` nodes; 0 in blocks of three nodes or fewer.
+/// The layer of a node with this index along an axis of `count` nodes; 0 in blocks of three nodes or fewer.
 inline int layerOf(uint64_t index, uint64_t count) {
   if (count < 4) return 0;
   return index == 1 ? 1 : index + 2 == count ? -1 : 0;
@@ -73,7 +73,7 @@ struct NodeBehind {
   Layers layers{};
 };
 
-/// Where the cell of a node ends that is behind one face.
+/// The end of a node's cell that is behind one face.
 struct CutBehindFace {
   uint32_t border_code = kNoBorder;
   glm::dvec3 face_node{0.0};  // the face's, next to the node
@@ -95,11 +95,11 @@ class FacesBehind {
   /// outlives it.
   FacesBehind(const NodeLattice& lattice, bool middles) : lattice_(lattice), middles_(middles) {}
 
-  /// Of a node's splat that is behind a face of one axis, whose neighbours along it are both there; none if
-  /// the face has collapsed.
+  /// Cuts the splat of a node that is behind a face of one axis, and whose neighbours along it are both
+  /// there; nullopt if the face has collapsed.
   std::optional<CutBehindFace> cutAtOne(const NodeBehind& behind, int axis, const Splat& splat) const;
 
-  /// Of a node's splat that ends at faces (`inwards`, as borderCode() takes it) or is behind several.
+  /// Cuts the splat of a node that ends at faces (`inwards`, as borderCode() takes it) or is behind several.
   /// `along`: columns, the frame's images of the directions inwards from these faces along i, j, k.
   CutBehindFaces cutAtSeveral(const NodeBehind& behind, const std::array<double, 3>& inwards,
                               const glm::dmat3& along, const Splat& splat) const;
@@ -150,9 +150,9 @@ struct LayerFit {
   double growth = 0, drift = 0;  // inwards
 };
 
-/// Of a cell one away from the face, by its line across it.
+/// The fit of a cell one away from the face, by its line across it.
 LayerFit fitBehindFace(const JointLine& line);
-/// Of a half cell at the face.
+/// The fit of a half cell at the face.
 LayerFit fitAtFace(const JointLine& line);
 
 /// What a node's cell ends at and is behind along i, j and k, as computeNodeSplats() has it.

@@ -19,7 +19,7 @@ using V = hn::Vec<Doubles>;
 HWY_INLINE V number(double value) {
   return hn::Set(Doubles(), value);
 }
-/// As std::nearbyint(), of numbers far below 2^51.
+/// Rounds as std::nearbyint() does; the numbers are far below 2^51.
 HWY_INLINE V nearestInteger(V v) {
   const V shift = number(0x1.8p52);
   return hn::Sub(hn::Add(v, shift), shift);
@@ -33,7 +33,7 @@ HWY_INLINE V codeOf(V v, int bits, int shift) {
   return hn::Mul(low, number(1 << shift));
 }
 
-/// As packGrowthCode(), of the axis from[0..2] alone, which grows by `growth` steps.
+/// The code that packGrowthCode() gives to the axis from[0..2] alone, which grows by `growth` steps.
 HWY_INLINE V codeAlong(const V (&from)[3], V growth) {
   const V zero = number(0), one = number(1);
   // The frame's axis that is nearest.

@@ -51,7 +51,7 @@ HWY_INLINE V dot(const V3& a, const V3& b) {
 HWY_INLINE V length(const V3& v) {
   return hn::Sqrt(dot(v, v));
 }
-/// Of zeros, `a`: as std::min() and std::max().
+/// The smaller of two numbers, as std::min() finds it: `a` if both are zeros.
 HWY_INLINE V smaller(V a, V b) {
   return hn::IfThenElse(hn::Lt(b, a), b, a);
 }
@@ -63,7 +63,8 @@ HWY_INLINE V signOf(V v) {
   return hn::IfThenElse(hn::Lt(v, number(0)), number(-1), number(1));
 }
 
-/// As LqFactors, of rows without a zero; lanes with one get numbers that are not above the floor.
+/// The factors of LqFactors, for rows without a zero; lanes with one get numbers that are not above the
+/// floor.
 struct Factors {
   V a00, a10, a11, a20, a21, a22;
   V inverse_a00, inverse_a11, determinant;
@@ -102,7 +103,7 @@ struct Factors {
     return {r.x, hn::Add(hn::Mul(cosine, r.y), hn::Mul(sine, r.z)),
             hn::Mul(last_sign, hn::Sub(hn::Mul(cosine, r.z), hn::Mul(sine, r.y)))};
   }
-  /// As PlainFrame's.
+  /// Transforms as PlainFrame::inFrame() does.
   HWY_INLINE V3 inFrame(const V3& v) const {
     const V v0 = hn::Mul(v.x, inverse_a00);
     const V v1 = hn::Mul(hn::Sub(v.y, hn::Mul(a10, v0)), inverse_a11);
@@ -128,7 +129,7 @@ struct Cells {
   std::array<V, 3> stretch2;
 };
 
-/// As asideOf().
+/// Does what asideOf() (block_window.h) does.
 HWY_INLINE V3 asideOf(const V3& to_before, const V3& to_after, V before, V after) {
   const V both = hn::Add(before, after), share = hn::Div(before, both);
   const V3 aside = times(number(0.25), times(share, to_after) - times(hn::Sub(number(1), share), to_before));
@@ -142,7 +143,7 @@ HWY_INLINE V3 cross(const V3& a, const V3& b) {
           hn::Sub(hn::Mul(a.x, b.y), hn::Mul(b.x, a.y))};
 }
 
-/// As gentleVolume() (dual_cell.cpp), from the same differences along the axes.
+/// The volume that gentleVolume() (dual_cell.cpp) finds, from the same differences along the axes.
 /// `growth`: as widthGrowth() (dual_cell.h).
 HWY_INLINE V gentleVolume(const InnerRow& row, ptrdiff_t at, const V3 (&x)[3], const V3 (&xx)[3],
                           V (&growth)[3]) {

@@ -50,11 +50,11 @@ struct alignas(64) InnerSplats {
   bool is_plain[kInnerNodesAtOnce];  // the node's numbers are of no use
 };
 
-/// Of nodes `first` to first + kInnerNodesAtOnce - 1 of the row, with all corrections
+/// Computes the splats of nodes `first` to first + kInnerNodesAtOnce - 1 of the row, with all corrections
 /// (NodeSplatCorrections). `values`: [node of these * scalars + scalar].
 void computeInnerNodes(const InnerRow& row, size_t first, InnerSplats& out, SplatScalar* values);
 
-/// In place of a code (stream/model/growth_code.h): the cell grows along several axes.
+/// Stands for a code (stream/model/growth_code.h) where the cell grows along several axes.
 inline constexpr int32_t kGrowsAlongSeveral = -1;
 
 struct alignas(64) InnerGrowthCodes {

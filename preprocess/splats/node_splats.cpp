@@ -191,7 +191,7 @@ double Window::weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) const {
 
 constexpr double kCollapsed = 1e-9;  // of the distance to the nearest neighbour that is elsewhere
 
-/// Of the last node, whose cell has collapsed. False if its piece has no volume either.
+/// Finds the piece of the last node, whose cell has collapsed. False if its piece has no volume either.
 bool Window::takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
                        const std::array<double, 3>& inwards) {
   if (!corrections_.dual_cells || (in_.covered && in_.covered[at] != 0)) return false;
@@ -469,7 +469,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   count_ += is_left;
 }
 
-/// Of one face that it is behind: along j before k before i.
+/// Cuts a node at one face that it is behind: along j before k before i.
 void Window::cutBehindOne(const NodeBehind& behind, NodeSplat& node) const {
   const int axis = behind.layers[1] != 0 ? 1 : behind.layers[2] != 0 ? 2 : 0;
   const std::optional<CutBehindFace> cut = faces_.cutAtOne(behind, axis, node.splat);
@@ -480,7 +480,7 @@ void Window::cutBehindOne(const NodeBehind& behind, NodeSplat& node) const {
   node.spacing = cut->spacing;
 }
 
-/// Of the last node.
+/// Cuts the last node.
 void Window::cutBehindSeveral(const CutBehindFaces& cut) {
   if (cut.count == 0) return;
   for (size_t n = 0; n < cut.count; ++n) out_.probes.push_back({count_, cut.probes[n]});

@@ -90,11 +90,11 @@ struct NodeSplat {
   bool on_block_face = false;        // may coincide with a node of another face: to be merged by SeamMerger
   bool behind_face = false;          // its border_code is for a face that SeamMerger may find to be closed
   glm::dvec3 node_position{0.0};     // where the node itself is; behind a face, where the face's node is
-  // Of that node, where SeamMerger is asked: the smallest distance > 0 to a neighbour along an axis, 0 if there
-  // is none; the seams' tolerance. Elsewhere 0.
+  // The smallest distance > 0 from that node to a neighbour along an axis, 0 if there is none: the seams'
+  // tolerance. Set only where SeamMerger is asked; 0 elsewhere.
   double spacing = 0;
 
-  // Of the lattice's axes: across faces of the block that the node is on, or one away from.
+  // The lines of the lattice's axes: across faces of the block that the node is on, or one away from.
   std::array<JointLine, 3> lines{};
   // LayeredBorder's: layers behind faces that SeamMerger may find to be closed, where the code has several directions.
   uint8_t layers = 0;
@@ -135,7 +135,7 @@ struct NodeSplats {
 struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
   bool faces = true;         // to be cut at; else cells at borders are drawn in parts
-  // Behind several faces; else nodes on a face are cut there alone, others at one face behind them.
+  // Cuts behind several faces; otherwise nodes on a face are cut there alone, others at one face behind them.
   bool layers = true;
   bool middles = true;  // else splats sit at nodes, but for half cells
   bool bends = true;    // of the scalar
@@ -144,9 +144,11 @@ struct NodeSplatCorrections {
   bool lines = true;    // else cells at joints know their own block alone; takes growth and stretch
   bool steep = true;    // else stretches are StretchFit::kGentle (kSteepStretch)
   bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
-  // Else weights are |det J|, and the scalars of bent layers follow their slopes however far (kMaxBend).
+  // Weights and scalars of dual cells (dual_cell.h); otherwise weights are |det J|, and the scalars of bent
+  // layers follow their slopes however far (kMaxBend).
   bool dual_cells = true;
-  // Else splats that are not for seams have none: values do not depend on them, and they take a sixth of the time.
+  // Growth codes of all splats; otherwise only splats for seams have them: values do not depend on them, and
+  // they take a sixth of the time.
   bool growth_codes = true;
 
   bool all() const {

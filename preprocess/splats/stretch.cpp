@@ -62,9 +62,10 @@ class LineEnd {
     own_ *= half * half;
   }
 
-  /// Of the end node itself.
+  /// The squared extent of the end node itself.
   double own() const { return own_; }
-  /// Of the sample that would be `steps` beyond the end node, from that of its mirror image.
+  /// The squared extent of the sample that would be `steps` beyond the end node, from that of its mirror
+  /// image.
   double beyond(int steps, double mirrored) const {
     double shrunk = mirrored;
     for (int n = 0; n < 2 * steps; ++n) shrunk /= growth_;

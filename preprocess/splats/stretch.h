@@ -93,8 +93,8 @@ struct Stretch {
 /// The largest growth of any splat.
 inline constexpr float kLargestGrowth = 0.65f;
 
-/// ln √x of a positive number, to 1e-6. Single precision: it is quicker, and bits do not depend on vector
-/// instructions.
+/// The logarithm of the root of a positive number, ln √x, to 1e-6. Single precision: it is quicker, and bits
+/// do not depend on vector instructions.
 [[gnu::always_inline]] inline float halfLogarithm(float x) {
   constexpr uint32_t kRootOfHalf = 0x3f3504f3;
   const auto bits = std::bit_cast<uint32_t>(x);
@@ -169,8 +169,9 @@ struct StretchRow {
   float *factor, *growth, *drift;
 };
 
-/// Of `count` nodes that follow `at` in memory, along the axis of `stride`. Each has three neighbours on
-/// either side. The same bits as stretchOf(extentsOnLine()) would give. Any thread; never allocates.
+/// Finds the stretches of `count` nodes that follow `at` in memory, along the axis of `stride`. Each has
+/// three neighbours on either side. The same bits as stretchOf(extentsOnLine()) would give. Any thread; never
+/// allocates.
 void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count,
                   const StretchRow& out, StretchFit fit = StretchFit::kSteep);
 
@@ -240,7 +241,7 @@ class JointLine {
   CellRow row() const;
   Stretch stretch(StretchFit fit) const { return stretchOfRow(row(), fit); }
 
-  /// Which way the row leads, away from the face, in the frame of the node's splat: to a hundredth.
+  /// The direction of the row, away from the face, in the frame of the node's splat: to a hundredth.
   glm::dvec3 inward() const;
   /// The same to 1e-7: thin layers that are bent are many times as wide as they are thick.
   glm::dvec3 exactInward() const;

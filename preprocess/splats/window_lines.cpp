@@ -137,7 +137,7 @@ WindowLines::NodeOnLine WindowLines::onLine(ptrdiff_t at, ptrdiff_t stride, uint
   return {at, stride, index, count, neighbours(index, -stride), neighbours(count - 1 - index, stride)};
 }
 
-/// None where the node has a neighbour on neither side, or on both sides of a face.
+/// The line of a node; empty if the node has a neighbour on neither side, or on both sides of a face.
 JointLine WindowLines::lineOf(const NodeOnLine& node, const SquaredExtents& extents) const {
   const bool has_before = node.before > 0, has_after = node.after > 0;
   const bool is_half = isFace(node.index, node.count) && has_before != has_after;

@@ -17,7 +17,7 @@ inline bool isFace(uint64_t index, uint64_t count) {
   return index == 0 || index + 1 == count;
 }
 
-/// Not for several threads at once. `in` and the scratch outlive it.
+/// The lines and stretches of a window's rows. One thread at a time. `in` and the scratch outlive it.
 class WindowLines {
  public:
   /// Sets the scratch to cells that are not stretched.

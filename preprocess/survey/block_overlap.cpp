@@ -28,7 +28,7 @@ constexpr size_t kPairsNamed = 4;
 constexpr uint64_t kBytesOfPair = 96;  // in a map, and in the result
 constexpr uint64_t kMinPoints = 4 * BlockSampling::kMaxPointsOfCell;
 
-/// Of a block that was read as a whole: how it is slanted; nullopt if one of its corners is blanked.
+/// The slanted box of a block that was read as a whole; nullopt if one of its corners is blanked.
 std::optional<SlantedBox> slantedBoxOf(const GridBlock& block, const NodeArrays& nodes) {
   const auto position = [&](size_t n) { return glm::dvec3(nodes.x[n], nodes.y[n], nodes.z[n]); };
   std::array<glm::dvec3, 8> corner;
@@ -150,7 +150,7 @@ class OverlapSearch {
                   shared_.tooMany(), (memory_.cap_for(2 * shared_.tooMany() * kBytesOfPair) >> 20) + 1);
     return shared_.overlaps();
   }
-  /// As findOverlaps() has it, after find().
+  /// The meetings in vain that findOverlaps() reports, after find().
   uint64_t metInVain() const { return met_in_vain_; }
 
  private:

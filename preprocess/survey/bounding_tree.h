@@ -133,8 +133,8 @@ class SlantedBox {
       : SlantedBox(corner, [&](const auto& visit) {
           for (const glm::dvec3& node : corner) visit(node);
         }) {}
-  /// Along the faces of `corner`; holds the same of any hexahedron between the nodes, for each of which
-  /// for_each_node(visit) calls visit(position). All numbers are finite.
+  /// Bounds along the faces of `corner`; holds the same of any hexahedron between the nodes, for each of
+  /// which for_each_node(visit) calls visit(position). All numbers are finite.
   template <typename ForEachNode>
   SlantedBox(const std::array<glm::dvec3, 8>& corner, const ForEachNode& for_each_node);
 
@@ -186,7 +186,7 @@ SlantedBox::SlantedBox(const std::array<glm::dvec3, 8>& corner, const ForEachNod
   }
 }
 
-/// Where something lies: in both boxes, if there are two.
+/// The bounds of something: in both boxes, if there are two.
 struct Bounds {
   BoundingBox box;
   std::optional<SlantedBox> slanted;

@@ -85,7 +85,7 @@ namespace {
 
 constexpr uint64_t kNodesOfTask = 16384;
 
-/// Of x, y, z and blank of a row.
+/// The checksum of x, y, z and blank of a row.
 uint64_t checksumOfRow(uint32_t block, uint64_t j, uint64_t k, const std::array<uint64_t, 4>& arrays) {
   const std::array<uint64_t, 7> parts{block, j, k, arrays[0], arrays[1], arrays[2], arrays[3]};
   return checksumOf(std::as_bytes(std::span(parts)));

@@ -274,8 +274,7 @@ bool PointHolders::isWanted(uint32_t point, uint32_t block) const {
          latest_[point].load(std::memory_order_relaxed) != block + 1;
 }
 
-/// So many meetings in vain cost what sorting the points again does: for each of them, and in any case. Any
-/// thread.
+/// Whether meetings in vain have cost as much as sorting the points again would. Any thread.
 bool PointHolders::shouldPrune() const {
   constexpr size_t kInVainEach = 32, kInVainAnyway = 1 << 17;
   return in_vain_.load(std::memory_order_relaxed) > kInVainEach * tree_.size() + kInVainAnyway;

@@ -60,10 +60,10 @@ class AxisSampling {
 /// The sample points of a block, as a product of those along i, j and k. Any thread.
 class BlockSampling {
  public:
-  /// Of a block that has cells, in a grid of `cells_in_all` cells and `blocks` blocks.
+  /// Samples a block that has cells, in a grid of `cells_in_all` cells and `blocks` blocks.
   BlockSampling(const GridBlock& block, double cells_in_all, size_t blocks);
 
-  /// Those of cells with blanked corners included.
+  /// The number of points, with those of cells with blanked corners.
   uint64_t points() const { return i.points() * j.points() * k.points(); }
   uint64_t cellNumber(uint64_t at_i, uint64_t at_j, uint64_t at_k) const {
     return (at_k * nj_ + at_j) * ni_ + at_i;
@@ -100,8 +100,8 @@ class PointPicker {
 
   /// A slab of the block with kCornerHalo. In any order.
   void add(const LoadedSlab& loaded);
-  /// After the last slab: adds the points' volumes to `volume`, and removes those in no cell and, with
-  /// `others`, those in no other block's bounds.
+  /// Ends the block after its last slab: adds the points' volumes to `volume`, and removes those in no cell
+  /// and, with `others`, those in no other block's bounds.
   void finish(double& volume, const BoxTree* others);
 
  private:

@@ -14,7 +14,8 @@ constexpr uint64_t kChunk = 65536;
 // Elements of the highest order that CGNS knows have 125 nodes and a type.
 constexpr int64_t kMaxNumbers = 126;
 
-/// From 1; what is none of them is refused as any number that is too large.
+/// The point of a node, which the file counts from 1. Numbers below 1 become one that is too large, which is
+/// refused.
 uint64_t pointOf(int64_t node) {
   return node >= 1 ? static_cast<uint64_t>(node) - 1 : std::numeric_limits<uint64_t>::max();
 }
@@ -143,7 +144,7 @@ void CgnsCells::findCellsOfFaces(const ListSpools& spools) {
   counts_.solid += cells;
 }
 
-/// Of the number of an element, which may be negative.
+/// The index of the face that has an element's number, which may be negative.
 uint64_t CgnsCells::faceOf(int64_t element) const {
   const uint64_t number =
       element < 0 ? uint64_t{0} - static_cast<uint64_t>(element) : static_cast<uint64_t>(element);

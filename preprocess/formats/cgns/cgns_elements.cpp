@@ -180,7 +180,8 @@ void SectionReader::checkBegins(const CgnsSection& section) const {
   }
 }
 
-/// Of files before CGNS 3.4. Elements of NGON_n and NFACE_n are written without their lengths.
+/// Finds where elements begin in files before CGNS 3.4. Elements of NGON_n and NFACE_n are written without
+/// their lengths.
 void SectionReader::findBegins(CgnsSection& section) const {
   NumberSpool<int64_t> begins(spools_.begins), members(spools_.items);
   const bool counted = section.type != kCgnsMixed;

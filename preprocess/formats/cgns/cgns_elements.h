@@ -56,8 +56,8 @@ struct CgnsSection {
       parents;  // of NGON_n: first one side of all faces, then the other; none if there is no such node
 };
 
-/// In the order of their elements. `file` must outlive them; spooled lists go to `spools`. Throws Error if a section is damaged, or of a type that
-/// CGNS does not have.
+/// Reads the sections, in the order of their elements. `file` must outlive them; spooled lists go to
+/// `spools`. Throws Error if a section is damaged, or of a type that CGNS does not have.
 std::vector<CgnsSection> readCgnsSections(const CgnsFile& file, const std::vector<CgnsNode>& nodes,
                                           const ListSpools& spools);
 

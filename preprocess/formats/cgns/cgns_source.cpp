@@ -161,7 +161,7 @@ CgnsMeshSource::CgnsMeshSource(std::shared_ptr<const CgnsFile> file, CgnsTree tr
   arrays_ = describeScalars(tree_, description_);
 }
 
-/// Where the zone's fields do not have a value for each of its cells.
+/// Drops the zone's fields in cells if they do not have a value for each of its cells.
 void CgnsMeshSource::dropFieldsOfCells(size_t zone_number) {
   CgnsZone& zone = tree_.zones[zone_number];
   const uint64_t cells = cells_[zone_number].cells();

@@ -54,8 +54,8 @@ struct ColumnsHeights {
   std::string words;                         // "by the variable zgrid"
 };
 
-/// Of scalars in cells the levels between which their layers lie; at nodes, those of the values. Throws Error if the
-/// layers have no heights.
+/// Finds the levels of the heights: for scalars in cells those between which their layers lie; for scalars at
+/// nodes those of the values. Throws Error if the layers have no heights.
 ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map,
                                   const ColumnsScalars& scalars);
 

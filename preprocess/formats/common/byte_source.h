@@ -76,8 +76,8 @@ Value convertedTo(Stored stored) {
   return value;
 }
 
-/// For floats that a library has made of doubles: if all are 0, reads the doubles, by read(std::span<double>), and
-/// converts them.
+/// Converts floats that a library has made of doubles: if all are 0, reads the doubles, by
+/// read(std::span<double>), and converts them.
 template <typename Read>
 void convertIfZero(std::span<float> values, const Read& read) {
   if (std::any_of(values.begin(), values.end(), [](float value) { return value != 0; })) return;
@@ -119,9 +119,9 @@ class PooledFile {
   PooledFile(std::shared_ptr<OpenFiles> pool, std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
-  /// For error messages.
+  /// The path, for error messages.
   std::string name() const { return path_.string(); }
-  /// Its size in bytes when it was first opened.
+  /// The file's size in bytes when it was first opened.
   uint64_t size() const { return size_; }
   /// Fills `to` with the bytes at `offset`. Throws Error if the file ends before that, or if reading fails.
   void readAt(uint64_t offset, std::span<std::byte> to) const { pool_->at(path_)->readAt(offset, to); }

@@ -68,7 +68,7 @@ class Hdf5Array {
   uint64_t size() const { return size_; }
   bool isFloat() const { return kind_ == H5T_FLOAT; }
   bool isSigned() const { return signed_; }
-  /// Of a number: 4 or 8, of integers 1 or 2, too.
+  /// Bytes of a number: 4 or 8, of integers 1 or 2, too.
   size_t bytes() const { return bytes_; }
   /// What it takes in the file, packed; numbers that were never written take nothing.
   uint64_t storedBytes() const { return stored_bytes_; }

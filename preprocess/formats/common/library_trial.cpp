@@ -116,7 +116,7 @@ bool isVirtual(const Hdf5Properties& properties) {
   return properties && H5Pget_layout(properties.id()) == H5D_VIRTUAL;
 }
 
-/// Its index, and its first and last value.
+/// Reads a data set's index, and its first and last value.
 void readDataSet(hid_t object, size_t& read) {
   const Hdf5DataSet set(H5Dopen2(object, ".", H5P_DEFAULT));
   if (!set) return;
@@ -155,7 +155,7 @@ herr_t visitLink(hid_t, const char*, const H5L_info_t* link, void*) {
   return 0;
 }
 
-/// Of H5Ovisit2(), which comes to each object once.
+/// Visits an object, for H5Ovisit2(), which comes to each once.
 herr_t visit(hid_t root, const char* name, const H5O_info_t* info, void* read) {
   const Hdf5Object object(H5Oopen(root, name, H5P_DEFAULT));
   if (!object) return 0;
@@ -185,7 +185,7 @@ class Hdf5Exits {
     std::string set;
   };
 
-  /// None if HDF5 cannot open the file. Throws Error if it leads where it may not.
+  /// Finds nothing if HDF5 cannot open the file. Throws Error if it leads where it may not.
   explicit Hdf5Exits(const std::filesystem::path& path) : path_(path) {
     const QuietHdf5 quiet;
     const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
@@ -207,7 +207,7 @@ class Hdf5Exits {
     }
   }
 
-  /// Those that exist.
+  /// The files that exist.
   const std::set<std::filesystem::path>& files() const { return files_; }
   const std::vector<VirtualSource>& sources() const { return sources_; }
 

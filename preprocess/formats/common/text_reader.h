@@ -28,7 +28,7 @@ std::string printable(std::string_view text);
 /// Parses a number in the notation of C, C++ or Fortran. False unless `text` is exactly one number.
 bool parseNumber(std::string_view text, double& value);
 
-/// For one thread. Each result is valid until the next call.
+/// Reads a text file by words and lines. One thread at a time; each result is valid until the next call.
 class TextReader {
  public:
   /// Reads the bytes [begin, end) of `file`, cut off at its end.
@@ -45,7 +45,7 @@ class TextReader {
   /// The rest of the line without the line break; nullopt at the end of the text. Throws Error if it exceeds
   /// any sane length.
   std::optional<std::string_view> line();
-  /// As word(), but without advancing.
+  /// Returns what word() would, without advancing.
   std::string_view peekWord();
   /// The next number. Throws Error at the end, or if the next word is not a number.
   double number();

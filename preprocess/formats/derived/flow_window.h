@@ -92,7 +92,7 @@ class FlowWindow {
  private:
   template <typename Each>
   void forEachRow(const NodeBox& whole, const Each& each) const;
-  /// Of the box's first node in a row.
+  /// The element of the first node that the box has in a row.
   size_t nodeAt(uint64_t j, uint64_t k) const {
     return (k - window_.k0) * plane_ + (j - window_.j0) * row_ + (box_.i0 - window_.i0);
   }

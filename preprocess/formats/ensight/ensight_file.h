@@ -23,7 +23,7 @@ struct EnsightList {
   uint64_t begin = 0, count = 0;  // begin: in bytes, or in numbers
   bool integers = false, swap = false;
 
-  /// Of integers and of floats.
+  /// Reads integers or floats, from the number `first` on.
   void read(uint64_t first, std::span<double> to) const;
   void read(uint64_t first, std::span<float> to) const;
   std::vector<double> all() const;
@@ -37,7 +37,7 @@ struct EnsightScratch {
   ListSpools spools;  // items: numbers of all files; begins: of polyhedra
 };
 
-/// For one thread: texts and lists, in their order.
+/// Reads texts and lists in their order. One thread at a time.
 class EnsightFile {
  public:
   /// `binary`: whether it has to be; nullopt: as a geometry file itself tells, whose first text says so.
@@ -51,7 +51,7 @@ class EnsightFile {
 
   /// The next text of 80 characters, or the next line, without surrounding space.
   std::string text();
-  /// As text(), but past empty ones and in small letters; empty at the end of the file.
+  /// The next text() that is not empty, in small letters; empty at the end of the file.
   std::string keyword();
   /// The next list. Throws Error if the file is too short for it.
   EnsightList integers(uint64_t count) { return list(count, true); }
@@ -61,7 +61,7 @@ class EnsightFile {
   uint64_t integer(bool decides_order = false);
   /// The numbers that integers() has passed, of an ASCII file before finish() too.
   std::vector<double> valuesOf(const EnsightList& list);
-  /// After the last text or list: spooled lists can be read.
+  /// Ends the file after its last text or list: spooled lists can be read.
   void finish();
 
  private:

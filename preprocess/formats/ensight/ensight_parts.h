@@ -25,8 +25,8 @@ struct EnsightElements {
   bool ghosts = false;
   uint64_t count = 0, nodes_each = 0;  // nodes_each: 0 of polyhedra
   EnsightList nodes;
-  // For polyhedra: where the faces of each begin among all faces, and the nodes of each face among the
-  // nodes.
+  // The faces of polyhedra: the first face of each polyhedron among all faces, and the first node of each
+  // face among the nodes.
   SpooledNumbers first_face, first_node;  // [count + 1], [faces + 1]
 };
 
@@ -38,7 +38,7 @@ struct EnsightPart {
   EnsightList coordinates;         // x of all points, then y, then z
   std::vector<EnsightElements> elements;
 
-  // Of a structured part.
+  // The kind of a structured part.
   enum class Kind { kCurvilinear, kRectilinear, kUniform } kind = Kind::kCurvilinear;
   std::array<uint64_t, 3> nodes{};
   std::array<std::vector<double>, 3> axes;  // of kRectilinear and kUniform

@@ -16,7 +16,8 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-/// From 1; what is none of them is refused as any number that is too large.
+/// The point of a node, which the file counts from 1. Other numbers become one that is too large, which is
+/// refused.
 uint64_t pointOf(double node) {
   return node >= 1 && node <= 0x1p53 ? static_cast<uint64_t>(node) - 1 : std::numeric_limits<uint64_t>::max();
 }

@@ -1,5 +1,5 @@
-// Which of a variable's dimensions are space, and which time, the faces of a grid, or steps of another kind
-// (months, members).
+// Finds which of a variable's dimensions are space, and which time, the faces of a grid, or steps of another
+// kind (months, members).
 #pragma once
 
 #include <cstddef>

@@ -30,7 +30,8 @@ struct CfGrid {
   std::optional<CfMask> mask;
   std::string steps_of;  // the dimension whose values are the steps, if it is not one of time: "month"
 
-  /// Of a grid of several faces (dims.face): whose nodes its terms read, from 0. At first those of the first.
+  /// Sets the face (of dims.face, from 0) whose nodes the terms read, in a grid of several faces. At first it
+  /// is face 0.
   void setFace(uint64_t number);
   uint64_t face = 0;
 };

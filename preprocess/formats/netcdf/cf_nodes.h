@@ -24,7 +24,7 @@ class CfNodes {
 
   const CfGrid& grid() const { return grid_; }
 
-  /// As GridSource::read(), of a box that begins and ends anywhere along i. Throws Error.
+  /// Reads as GridSource::read() does, but the box begins and ends anywhere along i. Throws Error.
   void read(const CfRange& range, std::span<const uint32_t> scalars, NodeArrays& out) const;
 
   /// Values of one variable, NaN where it is missing, to the beginning of `to`.

@@ -130,7 +130,7 @@ class CfMask {
   /// "mask_rho is 0", for messages.
   const std::string& description() const { return description_; }
 
-  /// For a grid of several faces: the face whose nodes apply() masks.
+  /// Sets the face whose nodes apply() masks, in a grid of several faces.
   void setFace(uint64_t face) { term_.setFace(face); }
 
   /// Sets the marks of nodes that the mask hides to 1. `blank`: the nodes of `range`, i fastest.

@@ -40,8 +40,8 @@ class CfVertical {
   /// A single value along the axes on which the height does not depend.
   CfValues heights(const NetcdfFiles& file, const CfRange& range) const;
 
-  /// If the file stores a height for every node in the order of the nodes: reads them to the beginning of
-  /// `to` and returns true, without a buffer. Else returns false.
+  /// Reads the heights to the beginning of `to`, without a buffer, and returns true if the file stores one
+  /// for every node in the order of the nodes. Else returns false.
   bool readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const;
 
   /// The globe's, which is subtracted from levels that are distances from the Earth's centre.
@@ -49,7 +49,7 @@ class CfVertical {
     if (offset_ != 0) offset_ = -kilometres;
   }
 
-  /// Of a grid of several faces: whose heights are read.
+  /// Sets the face whose heights are read, in a grid of several faces.
   void setFace(uint64_t face);
 
   const std::string& description() const {

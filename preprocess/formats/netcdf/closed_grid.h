@@ -35,8 +35,8 @@ struct GridClosure {
 /// The points [begin, end) of row j on the unit sphere, not finite where there is none.
 using PointsOfRow = std::function<std::vector<glm::dvec3>(uint64_t j, uint64_t begin, uint64_t end)>;
 
-/// From a few rows of a block of ni x nj columns; nullopt if the grid needs nothing. Long rows are read in parts. Throws what
-/// `points` throws.
+/// Finds how a grid closes, from a few rows of a block of ni x nj columns; nullopt if the grid needs nothing.
+/// Long rows are read in parts. Throws what `points` throws.
 std::optional<GridClosure> closureOf(uint64_t ni, uint64_t nj, const PointsOfRow& points);
 
 class ClosedGrid final : public GridSource {

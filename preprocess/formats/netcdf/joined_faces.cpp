@@ -244,7 +244,8 @@ class JoinedFaces final : public GridSource {
   }
 
  private:
-  /// Where nodes read from the source go: node (row, level) to `first + 2 * (row + rows * level)`.
+  /// The destination of nodes that are read from the source: node (row, level) to `first + 2 * (row + rows *
+  /// level)`.
   struct Target {
     uint64_t first = 0, rows = 0;
     bool backwards = false;  // the first node read is that of the last row
@@ -268,7 +269,8 @@ class JoinedFaces final : public GridSource {
     return source_->pointsOf(c.face, {{c.i, c.j, 0}, {c.i + 1, c.j + 1, 1}}).at(0);
   }
 
-  /// In such an order that the block has the handedness of the first corner's face.
+  /// The columns around a hole, in such an order that the block has the handedness of the first corner's
+  /// face.
   Hole holeOf(const std::vector<FaceCorner>& corners) const {
     std::vector<Column> around;
     for (const FaceCorner& corner : corners)

@@ -23,7 +23,7 @@ namespace curvisplat {
 /// A grid whose blocks are faces of equal dimensions.
 class FaceSource : public GridSource {
  public:
-  /// As read(), for a range that may begin and end anywhere along i.
+  /// Reads as read() does, but the range may begin and end anywhere along i.
   virtual void readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
                         NodeArrays& out) const = 0;
   void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,

@@ -1,4 +1,4 @@
-// From the horizontal coordinates of a file to positions in the world. MapProjection converts the
+// Converts the horizontal coordinates of a file to positions in the world. MapProjection converts the
 // coordinates of a map projection, or of a rotated pole, to longitude and latitude. Globe converts
 // longitude, latitude and height to positions on a sphere, or on a flat map (equirectangular projection).
 // World units are kilometres, horizontally and vertically.

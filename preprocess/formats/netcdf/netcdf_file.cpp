@@ -40,7 +40,7 @@ void addNumbersOfText(NetcdfAttribute& attribute) {
   attribute.numbers.insert(attribute.numbers.end(), numbers.begin(), numbers.end());
 }
 
-// For each open variable: the rows of a slab usually lie in a few chunks.
+// The cache of chunks of each open variable: the rows of a slab usually lie in a few chunks.
 constexpr size_t kChunkCacheBytes = size_t{2} << 20;
 constexpr size_t kChunkCacheSlots = 1009;
 constexpr float kChunkCachePreemption = 0.75f;

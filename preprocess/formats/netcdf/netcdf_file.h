@@ -53,7 +53,7 @@ class NetcdfFile {
   std::vector<double> numbers(const char* attribute) const;
   /// The same with one value.
   std::optional<double> number(const char* attribute) const;
-  /// Which stored values of a variable read() replaces by NaN, in words; empty if none.
+  /// Describes the stored values of a variable that read() replaces by NaN; empty if none.
   std::string missingValues(const NetcdfVariable& variable) const {
     return packings_.at(variable.position).missingValues();
   }

@@ -75,7 +75,7 @@ void NetcdfFiles::select(const std::string& choice) {
   selected_ += fmt::format("{}{} {}", selected_.empty() ? "" : ", ", name, choice.substr(sign + 1));
 }
 
-/// Of a value of a dimension: of its coordinate, which may be of text, or, without one, its number.
+/// The index of a value of a dimension: of its coordinate, which may be of text, or, without one, its number.
 size_t NetcdfFiles::indexOf(size_t dimension, const std::string& value) const {
   const auto& [name, length, unlimited] = dimensions_[dimension];
   const NetcdfVariable* coordinate = nullptr;

@@ -28,7 +28,7 @@ class NetcdfFiles {
   /// is not NetCDF; UsageError for a selection of what is not there.
   explicit NetcdfFiles(const OpenGridOptions& options);
 
-  /// Of the first file.
+  /// The path of the first file.
   const std::filesystem::path& path() const { return files_.front().front().path(); }
   const std::string& kind() const { return files_.front().front().kind(); }
   std::vector<std::string> paths() const;
@@ -44,15 +44,15 @@ class NetcdfFiles {
   /// The chosen values of dimensions, for messages: "month 3"; empty if there are none.
   const std::string& selected() const { return selected_; }
 
-  /// Of the first file that has the attribute; as NetcdfFile's.
+  /// The text of an attribute in the first file that has it, as NetcdfFile::text() returns it.
   std::string text(const char* attribute) const;
   bool hasAttribute(const char* attribute) const;
   std::optional<double> number(const char* attribute) const;
-  /// Of the first file; as NetcdfFile's.
+  /// The groups of the first file, as NetcdfFile::groups() returns them.
   const std::vector<std::string>& groups() const { return files_.front().front().groups(); }
   bool plainHdf5() const { return files_.front().front().plainHdf5(); }
 
-  /// As NetcdfFile's.
+  /// Describes the missing values as NetcdfFile does.
   std::string missingValues(const NetcdfVariable& variable) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;

@@ -273,9 +273,9 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
                     grid_.variables[mask_]->name, 100 * share));
 }
 
-/// Where a file marks land by zeros alone: the share of columns that are 0 at the first, middle and last level,
-/// in a row in the middle and those a quarter from the ends. 0 if less than a hundredth, if all, in the air, and
-/// where values are missing or a mask tells.
+/// Detects a file that marks land by zeros alone: the share of columns that are 0 at the first, middle and
+/// last level, in a row in the middle and those a quarter from the ends. 0 if less than a hundredth, if all,
+/// in the air, and where values are missing or a mask tells.
 double NetcdfSource::shareOfZeros() const {
   const GridBlock& block = description_.blocks[0];
   if (grid_.levels != 2 || grid_.mask || !isOcean(file_, grid_)) return 0;

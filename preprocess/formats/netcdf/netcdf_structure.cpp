@@ -109,7 +109,7 @@ class Header {
     return static_cast<double>((static_cast<uint64_t>(std::min(bytes, 1e18)) + 3) / 4 * 4);
   }
 
-  /// Of all variables together.
+  /// The bytes of a record of all variables together.
   double recordBytes() const {
     const auto in_records = [](const Variable& variable) { return variable.in_records; };
     const bool one = std::count_if(variables_.begin(), variables_.end(), in_records) == 1;
@@ -119,7 +119,7 @@ class Header {
     return bytes;
   }
 
-  /// Of a file that is still being written, whose header does not count them: those that are complete.
+  /// The number of complete records in a file that is still being written, whose header does not count them.
   uint64_t recordsIn(double file_bytes) const {
     double begin = file_bytes;  // of the first record
     for (const Variable& variable : variables_)

@@ -48,10 +48,10 @@ class NetcdfTiles {
   /// How many parts belong to the map; 1 of other files.
   uint64_t total() const { return parts_.front().domain ? parts_.front().domain->total : 1; }
   std::vector<std::string> paths() const;
-  /// Of the whole map.
+  /// The length of the dimension in the whole map.
   uint64_t length(size_t dimension) const;
 
-  /// As NetcdfFile's, of the front's variable. NaN where no part has a value.
+  /// Reads a variable of the front as NetcdfFile does. NaN where no part has a value.
   template <typename Value>
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<Value> to) const;
   void release() const;
@@ -64,7 +64,8 @@ class NetcdfTiles {
   template <typename Value>
   void readPart(const Part& part, const NetcdfVariable& variable, const NetcdfBox& box,
                 std::span<Value> to) const;
-  /// Which of the map's two directions a dimension of the front is, if this is one of several parts.
+  /// The direction of the map (0 or 1) along which a dimension of the front runs, if this is one of several
+  /// parts.
   std::optional<size_t> directionOf(size_t dimension) const;
 
   std::vector<Part> parts_;

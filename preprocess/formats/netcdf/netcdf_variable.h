@@ -57,7 +57,7 @@ class NetcdfPacking {
   /// it is _FillValue (or NetCDF's default fill value), missing_value, or outside the valid range.
   void unpack(std::span<float> values) const;
   void unpack(std::span<double> values) const;
-  /// Which stored numbers become NaN, in words; empty if none.
+  /// Describes the stored numbers that become NaN; empty if none.
   std::string missingValues() const;
 
  private:

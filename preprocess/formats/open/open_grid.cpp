@@ -167,7 +167,7 @@ std::unique_ptr<GridSource> openPart(const OpenGridOptions& options) {
                      "cannot be combined with further files; give the file with all arrays alone");
 }
 
-/// For the formats without dimensions to choose from.
+/// Refuses --select for formats without dimensions to choose from.
 void requireNoSelection(const OpenGridOptions& options) {
   if (!options.select.empty())
     throw UsageError("--select {}: {} is not a NetCDF file, whose dimensions have names",

@@ -20,7 +20,7 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options);
 /// Whether openData() opens this folder, an OpenFOAM case, or refuses it by the name of its format.
 bool isGridFolder(const std::filesystem::path& path);
 
-/// As openData(), for a structured grid: throws Error for an unstructured one.
+/// Opens a structured grid as openData() does: throws Error for an unstructured one.
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
 
 /// `source` as a structured grid. Throws Error, which says what cannot be done to an unstructured one

@@ -1,4 +1,4 @@
-// Which files and time steps make a series. These are several steps:
+// Finds the files and time steps that make a series. These are several steps:
 //
 //   q.0000 q.0100 ...     files whose names differ in numbers only, in natural order (q.9 before q.10): PLOT3D
 //                         solutions of one grid, or grids with their own scalars; several kinds go side by side

@@ -24,7 +24,7 @@ namespace curvisplat {
 
 using FoamList = SpooledNumbers;
 
-/// For one thread.
+/// A file of OpenFOAM. One thread at a time.
 class FoamFile {
  public:
   /// Opens `path`, or `path`.gz where that is what there is; of a collated file, the processor's part. Throws Error

@@ -22,7 +22,7 @@ class FoamParser {
 
   const InputFile& file() const { return file_; }
   const std::string& name() const { return name_; }
-  /// Where the text ends: that of the file, or of a processor's part of it.
+  /// The end of the text: that of the file, or of a processor's part of it.
   uint64_t end() const { return end_; }
   void setEnd(uint64_t end) { end_ = end; }
   uint64_t offset() const { return buffer_offset_ + at_; }
@@ -38,7 +38,7 @@ class FoamParser {
   std::string token();
   bool atEnd();
   void expect(const char* wanted);
-  /// For a value that is not `wanted`.
+  /// Throws an Error about a value that is not `wanted`.
   [[noreturn]] void failValue(const std::string& word, const char* wanted) const;
   double number();
   /// A number of 0 or more.

@@ -79,7 +79,8 @@ class RecordMismatch : public Error {
 /// Needs a few bytes per (sub)record. One thread appends the records; then any number of threads may read.
 class PayloadFile {
  public:
-  /// Without markers all `size` bytes are payload; with markers the payload is empty until nextRecord().
+  /// Reads all `size` bytes as payload if there are no markers; with markers the payload is empty until
+  /// nextRecord().
   PayloadFile(std::shared_ptr<const InputFile> file, uint64_t size, RecordMarkers records, ByteOrder order);
 
   /// Skips the next record, checks the markers of each of its subrecords, and appends it to the payload.

@@ -30,7 +30,7 @@ class Su2Restart {
   Su2Restart(std::shared_ptr<const PooledFile> file, uint64_t points,
              const std::shared_ptr<SpoolFile>& spool);
 
-  /// Its variables, without the point's number and position.
+  /// The names of the file's variables, without the point's number and position.
   const std::vector<std::string>& names() const { return names_; }
   bool binary() const { return binary_; }
   /// Values of points [first, first + to.size()).

@@ -344,7 +344,7 @@ class Reader {
     return words_.take<float>() == kZone;
   }
 
-  /// They have no fixed size: up to the mark of the next zone.
+  /// Skips the neighbours of faces, which have no fixed size: up to the mark of the next zone.
   void skipNeighbours(uint64_t neighbours, size_t number) {
     if (neighbours == 0 || number + 1 == data_.zones.size()) return;
     while (words_.take<float>() != kZone) continue;

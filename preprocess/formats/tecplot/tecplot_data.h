@@ -19,7 +19,7 @@
 
 namespace curvisplat {
 
-/// As binary files number them.
+/// The types of values, as binary files number them.
 enum class TecplotType : uint8_t { kFloat = 1, kDouble, kInt32, kInt16, kByte };
 
 size_t bytesOf(TecplotType type);
@@ -50,7 +50,7 @@ struct TecplotZone {
   std::array<uint64_t, 3> nodes{1, 1, 1};
   std::optional<double> time;         // of a zone that belongs to a series; nullopt: it belongs to every step
   std::vector<TecplotValues> values;  // [variable]
-  // Of finite elements, which have nodes[0] nodes: tetrahedra or bricks.
+  // The cells of a zone of finite elements, which has nodes[0] nodes: tetrahedra or bricks.
   uint64_t elements = 0, element_nodes = 0;  // 0: the zone is ordered
   TecplotValues connectivity;                // element_nodes numbers of nodes for each
   uint64_t first_node = 0;                   // the lowest of these

@@ -72,7 +72,7 @@ void TecplotGrid::chooseStep(const OpenGridOptions& options) {
   std::erase_if(data.zones, [&](const TecplotZone& zone) { return zone.time && *zone.time != time; });
 }
 
-/// Those without volume; and those of finite elements where there are others.
+/// Leaves out zones without volume; and those of finite elements where there are others.
 void TecplotGrid::leaveOutZones() {
   std::string flat;
   for (size_t n = 0; n < data.zones.size() && flat.empty(); ++n)

@@ -66,7 +66,8 @@ Base64Bytes::Base64Bytes(std::shared_ptr<const PooledFile> file, uint64_t begin,
   }
 }
 
-/// From the first two line breaks. Lines that groups of four do not fill are no lines of base64.
+/// Finds the length of a line, from the first two line breaks. Lines that groups of four do not fill are no
+/// lines of base64.
 void Base64Bytes::findLines() {
   std::array<std::byte, 4096> text;
   const auto some = std::span(text).first(std::min<uint64_t>(text.size(), std::max(end_, begin_) - begin_));

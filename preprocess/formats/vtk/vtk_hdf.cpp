@@ -49,7 +49,7 @@ class HdfGatherer {
   }
 
  private:
-  /// Where an open data set's step lies in its arrays.
+  /// The place of an open data set's step in its arrays.
   struct Step {
     std::string group;  // Steps; empty without
     uint64_t number = 0, count = 0;

@@ -217,7 +217,8 @@ class LegacyReader : VtkLegacyFile {
     cells_ = std::move(kept);
   }
 
-  /// Since version 5 of the format: where each cell begins, and the end of the last; then the points of all.
+  /// Reads the cells as the format has them since version 5: where each cell begins, and the end of the last;
+  /// then the points of all.
   void readOffsets(uint64_t offsets, uint64_t points) {
     if (offsets == 0) fail("has CELLS without OFFSETS; expected one more than cells");
     nextWord();
@@ -231,7 +232,8 @@ class LegacyReader : VtkLegacyFile {
     cells_.faces_inline = true;
   }
 
-  /// Before that: of each cell the number of its points, and these.
+  /// Reads the cells as the format has them before version 5: of each cell the number of its points, and
+  /// these.
   void readCountedCells(uint64_t cells, uint64_t numbers) {
     cells_.connectivity = readNumbers("CELLS", "int", 1, numbers);
     cells_.cells = cells;

@@ -34,7 +34,7 @@ class VtkLegacyFile {
   }
 
   std::string nextWord() { return lowerCase(text_.word()); }
-  /// As it was before it was written: special characters are coded.
+  /// The next name as it was before it was written: special characters are coded.
   std::string nextName();
   /// The remaining words of the line.
   std::vector<std::string> restOfLine();

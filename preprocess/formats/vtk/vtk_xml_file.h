@@ -20,7 +20,7 @@ class VtkXmlFile {
 
   std::string name() const { return file_->name(); }
   const std::filesystem::path& path() const { return file_->path(); }
-  /// Of the format: 2.2.
+  /// The version of the format: 2.2.
   double version() const { return root_.attribute("version").as_double(); }
   /// "StructuredGrid".
   const std::string& type() const { return type_; }
@@ -32,7 +32,7 @@ class VtkXmlFile {
   /// The array of a <DataArray> that must have `tuples` tuples. Throws Error if it has not, or if it is
   /// truncated; text and the contents of compressed blocks are checked when they are read.
   VtkArray array(const pugi::xml_node& node, uint64_t tuples) const;
-  /// As array(), but nullopt for arrays that are not numeric.
+  /// Returns what array() does, but nullopt for arrays that are not numeric.
   std::optional<VtkArray> numericArray(const pugi::xml_node& node, uint64_t tuples) const;
 
   /// The numbers in an attribute. Throws Error unless there are `count`.

@@ -21,10 +21,10 @@ struct XdmfSlab {
 class XdmfValues {
  public:
   virtual ~XdmfValues() = default;
-  /// Of all dimensions: the slowest comes first.
+  /// The lengths of all dimensions: the slowest comes first.
   const std::vector<uint64_t>& dims() const { return dims_; }
   uint64_t size() const { return size_; }
-  /// As stored: 4 or 8 for single and double precision.
+  /// Bytes of a value as it is stored: 4 or 8 for single and double precision.
   virtual int valueBytes() const = 0;
   /// The numbers [first, first + to.size()), in the order of the file. Throws Error with the file.
   virtual void read(uint64_t first, std::span<double> to) const = 0;
