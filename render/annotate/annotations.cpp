@@ -136,7 +136,7 @@ ScalarBar layOut(cairo_t* cairo, ImageSize picture, const ShownFunction& shown) 
   return bar;
 }
 
-/// Of the colours, or of the opacities: how much ink.
+/// The colour of the strip: of the colours, or of the opacities as an amount of ink.
 glm::dvec3 colourOf(const ShownFunction& shown, double scalar, const glm::dvec3& ink) {
   const TransferFunction::Value value = shown.function->at(scalar);
   if (shown.part != ShownFunction::Part::kOpacities) return value.colour;

@@ -42,7 +42,7 @@ VariableInfo variableFor(const CacheReader& cache, size_t variable, ChosenFor wh
 CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
                             ChosenFor what = ChosenFor::kStep);
 
-/// Those in the box [lower, upper].
+/// The samples in the box [lower, upper].
 CoarseSamples samplesIn(const CoarseSamples& samples, const glm::dvec3& lower, const glm::dvec3& upper);
 
 }  // namespace curvisplat

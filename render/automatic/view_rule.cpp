@@ -76,7 +76,7 @@ struct Bounds {
 /// Coarse samples as seen from one side, sorted into square pixels: what areas are measured with. Borrows the samples.
 class PixelSums {
  public:
-  /// Of the longer side: some 50 samples for each pixel.
+  /// Pixels along the longer side: some 50 samples for each pixel.
   static constexpr int kPixels = 80;
 
   /// `view`: as Camera::named() knows it. `bounds`: of the samples, of which there are some.
@@ -114,7 +114,7 @@ class PixelSums {
              return sum > least;
            }));
   }
-  /// Of the pixels with samples.
+  /// The area of the pixels with samples.
   double coveredArea() const {
     return areaOver(0, of([](size_t) { return 1.0; }));
   }

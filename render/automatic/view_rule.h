@@ -34,7 +34,7 @@ struct ViewChoice {
   std::string view = "iso";                              // as Camera::named() knows it
   std::optional<glm::dvec3> focal_point = std::nullopt;  // nullopt: the whole data is shown
   double parallel_scale = 0;                             // with a focal point, unless there is a position
-  /// With a focal point: in perspective from here, z up; `view` does not count.
+  /// The eye of a view in perspective, z up; `view` does not count then. Takes a focal point.
   std::optional<glm::dvec3> position = std::nullopt;
 };
 constexpr double kChosenViewAngle = 30;  // degrees, of a view in perspective

@@ -33,7 +33,7 @@ glm::dvec3 placeOf(const ScreenView& view, int x, int y, double depth) {
 
 namespace {
 
-/// Of a layer's pixel, from the neighbours that are nearest in depth; 0 without neighbours.
+/// The normal of a layer's pixel, from the neighbours that are nearest in depth; 0 without neighbours.
 glm::dvec3 layerNormal(const ScreenView& view, const std::vector<float>& depths, int x, int y) {
   const auto depthAt = [&](int column, int row) {
     if (column < 0 || row < 0 || column >= view.size.width || row >= view.size.height)
@@ -127,7 +127,7 @@ struct UnpackedSplat {
   UnpackedSplat& operator=(const UnpackedSplat&) = delete;
 };
 
-/// Where a splat takes a pixel to its half: the pixel, u, and the depth.
+/// The place where a splat takes a pixel to its half: the pixel, u, and the depth.
 struct Found {
   int x, y;
   double u0, u1, depth;
@@ -271,7 +271,7 @@ class ValuePainter final : public Painter {
     addToHalf(splat.half, box, *extinction_, halves_[number], events);
   }
 
-  /// Of one splat in one tile.
+  /// The events of one splat in one tile.
   class Events final : public HalfEvents {
    public:
     Events(ValuePainter& painter, size_t tile, const UnpackedSplat& splat)

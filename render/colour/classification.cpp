@@ -126,7 +126,7 @@ std::vector<Extremes> extremesOf(const ClassificationTable& table) {
   return elements;
 }
 
-/// Of two blocks each.
+/// The extremes of two blocks each.
 std::vector<Extremes> halved(const std::vector<Extremes>& blocks) {
   std::vector<Extremes> wider((blocks.size() + 1) / 2);
   for (size_t n = 0; n < wider.size(); ++n) {

@@ -13,9 +13,9 @@
 
 namespace curvisplat {
 
-/// As ParaView names them: RGB; HSV, the shorter way round the circle of hues; HSVNoWrap; Lab, CIE L*a*b*
-/// with D65; Diverging, Moreland's Msh (Lab in polar form, with white between distinct hues); Step, where a
-/// segment has the colour of its upper end.
+/// Colour spaces as ParaView names them: RGB; HSV, the shorter way round the circle of hues; HSVNoWrap; Lab,
+/// CIE L*a*b* with D65; Diverging, Moreland's Msh (Lab in polar form, with white between distinct hues);
+/// Step, where a segment has the colour of its upper end.
 enum class ColourSpace { kRgb, kHsv, kHsvNoWrap, kLab, kDiverging, kStep };
 
 struct ColourPoint {

@@ -67,7 +67,7 @@ class TransferFunction {
   Value at(double scalar) const;
   double extinctionAt(double scalar) const;
 
-  /// From the lowest to the highest point of colours and opacities.
+  /// The range from the lowest to the highest point of colours and opacities.
   std::pair<double, double> range() const { return range_; }
   /// Whether points are interpolated in the logarithm of the scalar.
   bool logScale() const { return log_scale_; }
@@ -76,7 +76,7 @@ class TransferFunction {
   const std::string& name() const { return name_; }
   /// World units.
   double opacityUnit() const { return opacity_unit_; }
-  /// For the user: "no Points in the file: the default opacity ramp is used".
+  /// Notes for the user: "no Points in the file: the default opacity ramp is used".
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:

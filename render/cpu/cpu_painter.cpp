@@ -24,7 +24,7 @@ namespace {
 static_assert(kSharedTileSide % kBlockSide == 0);
 static_assert(kOrderSide == kBlockSide);  // blocks are the order tiles, and have their numbers
 
-// Of most scenes' splats, one in four touches a second tile. Where they touch more, batches are smaller.
+// One splat in four of most scenes touches a second tile. Where they touch more, batches are smaller.
 constexpr size_t kEntriesASplat = 4;
 
 size_t tileCount(ImageSize size) {
@@ -200,7 +200,7 @@ void CpuPainter::State::paintBatch() {
   paintTiles(false);
 }
 
-/// As many as fit into a batch of their own, which are taken off the span's beginning.
+/// Paints as many splats as fit into a batch of their own, and takes them off the span's beginning.
 void CpuPainter::State::paintBorrowed(std::span<const ScreenSplat>& splats) {
   const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
   splats = splats.subspan(bins->sortBorrowed(splats, *loop));

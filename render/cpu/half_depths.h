@@ -21,7 +21,7 @@ class MeanExtinction {
  public:
   explicit MeanExtinction(const ClassificationTable& table);
 
-  /// In cells of the table. Monotonic.
+  /// The scalar in cells of the table. Monotonic.
   double inCells(double scalar) const;
   bool isLinear() const { return !log_scale_; }
   double scale() const { return scale_; }

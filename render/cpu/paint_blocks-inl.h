@@ -51,7 +51,7 @@ struct Ellipse {
   SkewPolynomial skew;
 };
 
-/// Where a block's first pixel is in the tile.
+/// The place of a block's first pixel in the tile.
 struct Corner {
   float x, y;
 };

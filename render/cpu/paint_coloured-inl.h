@@ -36,7 +36,7 @@ struct ColourVisits {
   }
 };
 
-/// From the ScreenColours beside the splats with these numbers.
+/// Sets up the colours from the ScreenColours beside the splats with these numbers.
 HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const Visits& visits,
                              const Fits& opacity, size_t count, ColourVisits& out) {
   constexpr int32_t kFloats = sizeof(ScreenSplat) / sizeof(float);

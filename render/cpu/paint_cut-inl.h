@@ -57,7 +57,7 @@ struct Interval {
     const Floats d;
     return hn::Div(hn::Set(d, 1.0f), hn::Max(share, hn::Set(d, 1e-6f)));
   }
-  /// Of slivers there are no digits left: the mean is then held within them.
+  /// The mean depth. Slivers leave no digits of it: it is then held within them.
   HWY_INLINE V mean(V share) const {
     const V first = hn::Sub(firstTo(hn::Mul(hi, hi)), firstTo(hn::Mul(lo, lo)));
     return hn::Clamp(hn::Mul(hn::Mul(hn::Set(Floats(), -5.0f / 32), first), inverse(share)), lo, hi);
@@ -153,7 +153,7 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const CutShade& c
   return isSaturated(most);
 }
 
-/// Of a splat that is cut. Whether anything is left of it in the block.
+/// Looks up the colours of a splat that is cut. Returns whether anything is left of it in the block.
 HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& cuts, const Tables& tables,
                             Corner corner, LookedUp& out) {
   const Floats d;

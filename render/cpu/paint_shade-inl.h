@@ -101,7 +101,7 @@ HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t
   }
 }
 
-/// From integrals to means.
+/// Makes means of integrals.
 HWY_INLINE void meansOf(const float* HWY_RESTRICT integrals, V scale, size_t lane, V (&out)[4]) {
   const Floats d;
   hn::LoadInterleaved4(d, integrals + 4 * lane, out[0], out[1], out[2], out[3]);
@@ -160,9 +160,9 @@ HWY_INLINE V errorOver(const ShadingTable& table, const Range& low, const Range&
   return hn::MulAdd(hn::Mul(hn::Set(d, 0.25f), width_loss), second, off);
 }
 
-/// And of the change between the ends, on a logarithmic scale. The third derivative of g(log m) has g'' and
-/// g' in it, too; r is the move in the logarithm: 0.0189 (3 g'' r + 2 g' r²) at the most, with g'' and g' at
-/// most 4 changes.
+/// The largest error from the change between the ends, on a logarithmic scale. The third derivative of g(log
+/// m) has g'' and g' in it, too; r is the move in the logarithm: 0.0189 (3 g'' r + 2 g' r²) at the most, with
+/// g'' and g' at most 4 changes.
 HWY_INLINE V logErrorOver(const ShadingTable& table, const Range& low, const Range& high) {
   const Floats d;
   const V move = hn::Max(hn::Sub(high.to, low.to), hn::Sub(high.from, low.from));
@@ -222,14 +222,14 @@ HWY_INLINE void fitPieces(const ShadingTable& table, const Pieces& pieces, size_
   }
 }
 
-/// Where a parabola does not do for a piece: a line of fifteen parts, at[n] + (s - n) step[n], n the whole
-/// part of s, with s = 0 to 15 from end to end.
+/// A line that stands in where a parabola does not do for a piece: a line of fifteen parts, at[n] + (s - n)
+/// step[n], n the whole part of s, with s = 0 to 15 from end to end.
 struct Polyline {
   static constexpr float kParts = kLanes - 1;
 
   Values at, step;
 
-  /// As Fits::light().
+  /// Does what Fits::light() does.
   HWY_INLINE void light(const Lit& lit) {
     const Floats d;
     for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
@@ -250,9 +250,10 @@ struct alignas(64) LongRow {
   HWY_INLINE void repeatLast() { at[kLanes] = at[kLanes - 1]; }
 };
 
-/// Of one piece. Whether it is good enough. Over a move by h cells a straight line is off by at most 0.25 h
-/// m sum of |second differences| (ShadingTable); and on a logarithmic scale, where the move itself is bent,
-/// by an eighth of r (of twice that, since r <= 0.3 changes within the move) times the largest slope.
+/// Fits a line to one piece, and returns whether it is good enough. Over a move by h cells a straight line is
+/// off by at most 0.25 h m sum of |second differences| (ShadingTable); and on a logarithmic scale, where the
+/// move itself is bent, by an eighth of r (of twice that, since r <= 0.3 changes within the move) times the
+/// largest slope.
 HWY_INLINE bool fitPolyline(const ShadingTable& table, const Pieces& pieces, size_t n, Polyline& line) {
   const Floats d;
   const float from = pieces.from.at[n], per_part = (pieces.to.at[n] - from) / Polyline::kParts;

@@ -79,7 +79,7 @@ HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks,
   });
 }
 
-/// From `begin` to `end` over piece n.
+/// The change from `begin` to `end` over piece n.
 HWY_INLINE Along along(const Pieces& pieces, size_t n, const Scalar& scalar, float begin, float end) {
   const float from = pieces.from.at[n];
   const float per_t = (end - begin) / (pieces.to.at[n] - from);
@@ -147,7 +147,7 @@ struct Prepared {
   IntRow numbers;  // of the tile's splats
   size_t count;
 
-  /// Those of work.order from `begin` on.
+  /// Prepares the splats of work.order from `begin` on.
   HWY_INLINE void prepare(const TileWork& work, size_t begin) {
     count = std::min(kLanes, work.order.size() - begin);
     // The next sixteen come from anywhere in the batch.
@@ -207,7 +207,7 @@ BlockMask paintInOrder(const TileWork& work) {
 /// again costs a fault a page.
 class Listed {
  public:
-  /// For the splats of a tile; `work` must stay until they are painted.
+  /// Begins with the splats of a tile; `work` must stay until they are painted.
   void begin(const TileWork& work) {
     work_ = &work;
     places_.resize(work.order.size());
@@ -264,7 +264,8 @@ class Listed {
 
  private:
   enum Way : uint32_t { kUnknown, kPlain, kLine, kPixels, kCutPixels, kCut, kColoured, kNoWay };
-  /// Where a splat's preparation is: `at` counts in the vector of its way; of kColoured, in lanes of coloured_.
+  /// The place of a splat's preparation: `at` counts in the vector of its way; of kColoured, in lanes of
+  /// coloured_.
   struct Place {
     Way way = kUnknown;
     uint32_t at = 0;
@@ -306,8 +307,8 @@ class Listed {
     }
   }
 
-  /// Those from the n-th on that are plain, and leaves n behind them. Whether the block is saturated then. The colours stay
-  /// in registers.
+  /// Paints the splats from the n-th on that are plain, leaves n behind them and returns whether the block is
+  /// saturated then. The colours stay in registers.
   HWY_INLINE bool paintPlains(const OrderList& list, size_t& n, int block) {
     const Floats d;
     const Corner corner = cornerOf(block);

@@ -102,10 +102,10 @@ HWY_INLINE V hidesItself(const TileWork& work, V cell_depth, V along) {
                  hn::Min(hn::Mul(tau, hn::Set(d, 1.0f / 6)), hn::Set(d, 1.0f)));
 }
 
-// In cells of the table: what is seen of splats with less is not worth the work: a 250th of the function.
+// The least hidesItself() that is worth the work, in cells of the table: a 250th of the function.
 constexpr float kHidingCells = 16;
 
-/// From the splats with these numbers.
+/// Sets up the visits from the splats with these numbers.
 HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
   constexpr int32_t kFloats = sizeof(ScreenSplat) / sizeof(float);
   static_assert(kFloats == 16);
@@ -240,7 +240,7 @@ HWY_INLINE void trim(const Visits& visits, size_t n, IntRow& from_block, IntRow&
   }
 }
 
-/// Of a row: `from` to `to`, none where from > to.
+/// The blocks of a row from `from` to `to`; none where from > to.
 HWY_INLINE BlockMask blocksOfRow(int from, int to) {
   return from > to ? 0 : (BlockMask{2} << to) - (BlockMask{1} << from);
 }
@@ -272,9 +272,9 @@ HWY_INLINE Corner cornerOf(int block) {
           static_cast<float>(block / kTileBlocks * kBlockSide)};
 }
 
-/// With a look-up for every pixel: look_up(block, where to), false for nothing. A few blocks are looked up
-/// before they are blended: what was written as many narrow vectors is not ready at once to be read as a wide
-/// one.
+/// Paints blocks with a look-up for every pixel: look_up(block, where to), false for nothing. A few blocks
+/// are looked up before they are blended: what was written as many narrow vectors is not ready at once to be
+/// read as a wide one.
 template <typename LookUp>
 HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks, const Lit& lit,
                                          const LookUp& look_up) {

@@ -125,7 +125,8 @@ struct TileWork {
   const ShadingTable* colours;  // of pictures of two scalars; else null
   PixelShading shading;
   TileWindows* windows = nullptr;  // null: no layers, and no splats with a ScreenDepth
-  // Kept of prepared splats: when they take more they are forgotten, and prepared again for other blocks.
+  // The bytes that may be kept of prepared splats: when they take more they are forgotten, and prepared again
+  // for other blocks.
   uint64_t prepared_bytes = kMaxPreparedBytes;
 };
 

@@ -10,7 +10,7 @@ int tilesAlong(int pixels) {
   return (pixels + kTileSide - 1) / kTileSide;
 }
 
-/// Of a pixel of a tile, in the order of its floats.
+/// The place of a pixel of a tile, in the order of its floats.
 size_t placeOf(int x, int y) {
   const int block = y / kBlockSide * kTileBlocks + x / kBlockSide;
   return static_cast<size_t>(block * kBlockPixels + y % kBlockSide * kBlockSide + x % kBlockSide);

@@ -43,7 +43,7 @@ inline constexpr uint64_t kSampleBytes = 32;  // of a point, while it is sampled
 std::vector<uint32_t> bricksOfDetail(const CacheReader& cache, double detail);
 /// The bricks of a level of the octree, and the leaves above it. UsageError if the cache has no such level.
 std::vector<uint32_t> bricksOfLevel(const CacheReader& cache, uint32_t level);
-/// Those of `bricks` whose splats reach the box.
+/// The bricks of `bricks` whose splats reach the box.
 std::vector<uint32_t> bricksInBox(const CacheReader& cache, std::span<const uint32_t> bricks,
                                   const glm::dvec3& lower, const glm::dvec3& upper);
 

@@ -38,7 +38,8 @@ struct GaussianSplat {
   float opacity = 0;       // at its centre, 0..1
 };
 
-/// From the peak optical depth: the opacity of the centre, and the factor of the footprint's area.
+/// The look of a Gaussian, from the peak optical depth: the opacity of the centre, and the factor of the
+/// footprint's area.
 struct GaussianOpacity {
   double opacity, area;
 };

@@ -134,7 +134,7 @@ class TileOfCells {
   struct Pixels {
     uint32_t x0, y0, x1, y1;
   };
-  /// Those splats that touch pixels, and depths.
+  /// Crosses the splats that touch the pixels and depths.
   void cross(const IsoFan& fan, const Pixels& pixels, double near, double far) {
     crossed_.clear();
     for (const IsoSplats::Placed& placed : in_tile_) {
@@ -255,7 +255,8 @@ class TileOfCells {
     return std::min(sum / weight, weight / kMinInside - 1);
   }
 
-  /// Between the cubes around the edges that go on from a point. Counter-clockwise as seen from smaller values, in view axes.
+  /// Finds the quads between the cubes around the edges that go on from a point: counter-clockwise as seen
+  /// from smaller values, in view axes.
   void findQuads(const Point& p) {
     const float here = at(p);
     if (std::isnan(here) || !isCell(p.x, p.y) || p.k + 1 >= planes_.end) return;

@@ -13,7 +13,7 @@
 
 namespace curvisplat {
 
-/// Where a cube meets the surface.
+/// The vertex of a cube that meets the surface.
 struct IsoVertex {
   glm::dvec3 at;     // in view axes, from the eye
   glm::vec3 normal;  // to smaller values

@@ -133,7 +133,7 @@ class Stitcher {
     return vertex.index;
   }
 
-  /// Where a triangle's edge leaves the data: once for both triangles of an edge.
+  /// The vertex at which a triangle's edge leaves the data: once for both triangles of an edge.
   uint32_t between(const Vertex& a, const Vertex& b) {
     const Vertex &first = a.number < b.number ? a : b, &second = a.number < b.number ? b : a;
     const auto [at, is_new] = cuts_.try_emplace({first.number, second.number}, kNoIndex);

@@ -20,7 +20,7 @@ class IsoMeshFile {
   /// Throws UsageError for another extension, Error if nothing can be written there.
   explicit IsoMeshFile(const std::filesystem::path& path);
 
-  /// Its index. Throws Error if there are too many.
+  /// Adds a vertex and returns its index. Throws Error if there are too many.
   uint32_t addVertex(const glm::dvec3& at, const glm::vec3& normal);
   void addTriangle(const std::array<uint32_t, 3>& corners);
   uint64_t vertices() const { return vertices_.count; }

@@ -72,7 +72,7 @@ void add(FogVolume& volume, const SampleLattice& lattice, uint32_t k_begin, uint
         if (samples.density[n] > kMinDensity) volume.set({i, j, k}, samples.value[n], samples.density[n]);
 }
 
-/// By a stream of ours that throws: OpenVDB's own file does not look whether its stream has failed.
+/// Writes by a stream of ours that throws: OpenVDB's own file does not look whether its stream has failed.
 void writeVolume(const FogVolume& volume, const std::filesystem::path& path) {
   TemporaryFile temporary(writableTarget(path));
   errno = 0;

@@ -73,7 +73,8 @@ struct FrameRenderer::State {
     return image;
   }
 
-  /// That of layers, without which all is as far away as the data.
+  /// The depth at which depths of pixels begin: that of the layers or, if there are none, that of the data's
+  /// middle.
   double depthOrigin(const FramePlan& plan) const {
     if (plan.layers) return plan.layers->depthOrigin();
     const ScreenView& view = plan.settings.view;

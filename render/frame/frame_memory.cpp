@@ -27,7 +27,7 @@ constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16
                                   BrickProjector::kMaxSplats * (sizeof(ScreenSplat) + sizeof(float)) +
                                   BrickProjector::kMaxSplats * (4 + 2 * sizeof(DepthItem)) +
                                   SweepBuffer::kMaxBatch * 2 * sizeof(DepthItem) + (1 << 20);
-// In pictures of two scalars: the second one's values, and a record for each splat.
+// What pictures of two scalars take in addition: the second one's values, and a record for each splat.
 constexpr uint64_t kSecondScalarBytes =
     uint64_t{kMaxBrickSplats} * (5 * sizeof(float) + sizeof(ScreenSplat) + 8 + 2 * sizeof(DepthItem));
 // These have what they need first. More workers take half of the memory at most: where little is left for splats, the picture is
@@ -97,10 +97,10 @@ constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, kMaxRegio
 constexpr double kLayerShare = 0.7;
 // What a slab has of it, on average, where the layer does not fit.
 constexpr double kSlabShare = 0.6;
-// Between regions threads wait for one another: as long as preparing this number of splats takes.
+// The wait of threads for one another between regions: as long as preparing this number of splats takes.
 constexpr double kSplatsARegion = 100e3;
-// Of more parts a sample of at least this number stands for all. The choice only changes how the work is divided, and of a
-// million parts it would take seconds.
+// The size of a sample of parts that stands for all of them, if there are more. The choice only changes how
+// the work is divided, and of a million parts it would take seconds.
 constexpr size_t kSampledParts = size_t{1} << 15;
 // Shared tiles: regions are made of whole painters' tiles, as far as those are this rank's.
 constexpr int kUnit = kTileSide / kSharedTileSide;

@@ -220,7 +220,7 @@ void FramePipeline::beginExchange(const FramePlan& plan, const FrameOptions& opt
   }
 }
 
-/// Of each of the exchange's three buffers.
+/// The bytes of each of the exchange's three buffers.
 uint64_t FramePipeline::exchangeBytes(const FrameOptions& options) const {
   const uint64_t least =
       SplatExchange::leastBytes(BrickProjector::kMaxSplats + (coloured_by_ ? kMaxBrickSplats : 0));

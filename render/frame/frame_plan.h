@@ -102,10 +102,10 @@ class FramePlanner {
                  const FrameOptions& options) const;
 
   const ClassificationTable& table() const { return table_; }
-  /// Of pictures of two scalars: what PixelShading::colours is.
+  /// PixelShading::colours of pictures of two scalars; null for one scalar.
   const ClassificationTable* colourClasses() const { return colour_classes_ ? &*colour_classes_ : nullptr; }
   const ColourTable& colours() const { return colours_; }
-  /// Of the opacities.
+  /// The function of the opacities.
   const TransferFunction& transferFunction() const { return transfer_function_; }
   /// Memory in bytes of the octree, and of what plans and the later stages note about its bricks.
   uint64_t bytes() const;

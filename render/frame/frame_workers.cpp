@@ -223,7 +223,7 @@ bool FrameWorkers::isUnneeded(uint64_t sequence) {
   return true;
 }
 
-/// In a handler: keeps the exception, if it is the first, and stops all workers.
+/// Keeps the exception that is being handled, if it is the first, and stops all workers.
 void FrameWorkers::fail() {
   {
     const MutexLock lock(failing_);

@@ -30,7 +30,7 @@ std::string describe(const std::string& library, const GlFunctions& gl) {
   return fmt::format("{} {}, {}, OpenGL {}", library, driver, text(gl, GL_RENDERER), version);
 }
 
-/// By the names that software renderers give themselves.
+/// Knows software renderers by the names that they give themselves.
 bool isSoftwareRenderer(const std::string& renderer) {
   for (const char* name : {"llvmpipe", "softpipe", "SWR", "SwiftShader", "Software"})
     if (renderer.find(name) != std::string::npos) return true;

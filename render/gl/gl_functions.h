@@ -16,7 +16,7 @@
 
 namespace curvisplat {
 
-// name without its gl, and its type in glcorearb.h
+// Each function: its name without gl, and its type in glcorearb.h.
 #define CURVISPLAT_GL_FUNCTIONS(X)                             \
   X(ActiveTexture, PFNGLACTIVETEXTUREPROC)                     \
   X(AttachShader, PFNGLATTACHSHADERPROC)                       \

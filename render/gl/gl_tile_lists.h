@@ -71,7 +71,7 @@ class GlTileLists {
   const CardBuffer& numbers() const { return numbers_[sorted_]; }
   const CardBuffer& ranges() const { return ranges_; }
   uint64_t cardBytes() const;
-  /// Since resetCounts(): entries, and times the digits that they were sorted by.
+  /// The entries listed since resetCounts(), and that number times the digits that they were sorted by.
   uint64_t listedEntries() const { return listed_entries_; }
   uint64_t movedEntries() const { return moved_entries_; }
   void resetCounts() { listed_entries_ = moved_entries_ = 0; }

@@ -18,7 +18,7 @@ namespace curvisplat {
 namespace {
 
 constexpr uint32_t kLastKey = INT32_MAX;
-// Before a batch's first element: records of a splat are looked for before it.
+// Records before a batch's first element, since records of a splat are looked for before it.
 constexpr size_t kMaxRecords = 3;
 enum : size_t { kPaint = GlTileLists::kOtherStages, kStages };
 constexpr int kGroupSide = 8;  // of splatTileShader()
@@ -319,7 +319,8 @@ void GlTilePainter::State::keepWaiting(uint32_t front) {
   batch.resize(kMaxRecords);
 }
 
-/// Which large tiles take no more, for hides(). By what was painted before: nothing has to be waited for.
+/// Finds which large tiles take no more, for hides(), by what was painted before: nothing has to be waited
+/// for.
 void GlTilePainter::State::lookAtClosed() {
   std::vector<uint32_t> pixels(largeTiles());
   closed.bind();

@@ -207,8 +207,9 @@ vec4 seenOf(vec4 of, float along, vec2 side) {
   return vec4(of.x - 1.7320508 * along * side.x, of.yz, sqrt(max(0.0, of.w * of.w - 3.0 * along * along * side.y)));
 }
 
-// Of a scalar (mean, slopes, half_width) at u. By its correlation with the depth, what is left of the depths moves the
-// mean and narrows the width: `left` has their mean, and the part of their variance that is lost.
+// The interval of a scalar (mean, slopes, half_width) at u. By its correlation with the depth, what is left
+// of the depths moves the mean and narrows the width: `left` has their mean, and the part of their variance
+// that is lost.
 vec2 intervalOf(vec4 of, float correlation, vec2 u, vec2 left, bool log_scale, vec2 cells_from) {
   float mean = PER_PIXEL ? of.x + dot(of.yz, u) : of.x;
   float width = PER_PIXEL ? of.w : 0.0;
@@ -248,7 +249,7 @@ vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
 }
 
 #if WINDOWS > 1 || LAYERED
-// Of the window between layers n - 1 and n.
+// What is seen in the window between layers n - 1 and n.
 vec4 seenIn(int n, vec2 u, float depth, vec4 ends) {
   float lo = n > 0 ? clamp(ends[max(n - 1, 0)], -1.0, 1.0) : -1.0, hi = n < 4 ? clamp(ends[min(n, 3)], -1.0, 1.0) : 1.0;
   if (lo >= hi) return vec4(0.0);

@@ -29,12 +29,12 @@ class SplatTables {
  public:
   explicit SplatTables(const GlFunctions& gl);
 
-  /// Of a frame. `table` and what `shading` borrows are borrowed until the frame ends.
+  /// Loads the tables of a frame. `table` and what `shading` borrows are borrowed until the frame ends.
   void load(ImageSize size, const ClassificationTable& table, const PixelShading& shading);
   /// What the frame's splats are drawn by.
   SplatShaderKind kind() const;
   int windows() const { return layers_ ? layers_->windows() : 1; }
-  /// Of the frame, for a program of that kind, which is then in use.
+  /// Sets the frame's uniforms of a program of that kind, which is then in use.
   void use(const GlProgram& program) const;
 
   /// The frame's picture. `drawn` [windows() pictures, one after the other]: colours, and transmittances or, by

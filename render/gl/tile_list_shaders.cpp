@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kCommon = R"(
 shared uint lane_sums[THREADS];
 
-// Or the most there is: of more entries than can be counted, none is written.
+// The sum, or the largest number if that is less: of more entries than can be counted, none is written.
 uint sumOf(uint a, uint b) {
   return a + b < a ? 0xffffffffu : a + b;
 }
@@ -87,7 +87,7 @@ bool isClosed(ivec2 tile) {
   return closed[closed_begin + tile.y * closed_columns + tile.x] == uint(pixels.x * pixels.y);
 }
 
-// Of the splat's tiles, how many there are; writes them from `to` on.
+// Counts the splat's tiles, and writes them from `to` on.
 uint list(uint n, uint to) {
   uint at = first_splat + n;
   vec4 part0 = uintBitsToFloat(splats[4u * at]);
@@ -177,8 +177,8 @@ void main() {
 }
 )";
 
-// Which threads have a digit is a set of bits. So an entry's place follows from its number alone, and threads write into the
-// sets in any order.
+// Finds places by sets of bits: which threads have a digit. So an entry's place follows from its number
+// alone, and threads write into the sets in any order.
 constexpr const char* kScatter = R"(
 layout(std430, binding = 2) readonly buffer Sums { uint sums[]; };
 layout(std430, binding = 3) readonly buffer Totals { uint totals[]; };  // [digit]

@@ -15,7 +15,7 @@
 
 namespace curvisplat {
 
-/// In pixels.
+/// The size of a picture in pixels.
 struct ImageSize {
   int width = 600;
   int height = 600;

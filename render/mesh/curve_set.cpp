@@ -96,7 +96,7 @@ class Rows {
   size_t at_ = 0, number_ = 0;
 };
 
-/// Which columns are which.
+/// The meaning of the columns.
 struct Columns {
   std::array<size_t, 3> position{0, 1, 2};
   std::optional<size_t> id, scalar;

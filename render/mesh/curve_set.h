@@ -23,7 +23,7 @@ struct CurveSet {
   std::vector<float> values;         // [positions], or none; NaN: no value
 
   size_t lines() const { return begins.size() - 1; }
-  /// Of the values; {0, 0} without any.
+  /// The range of the values; {0, 0} without any.
   std::pair<float, float> range() const;
 };
 

@@ -23,7 +23,7 @@ uint64_t hashOf(const glm::dvec3& p) {
   return hash;
 }
 
-/// For each position the first that equals it.
+/// The first position that equals each position.
 std::vector<uint32_t> firstEqual(const std::vector<glm::dvec3>& positions) {
   const size_t slots = std::bit_ceil(2 * positions.size() + 1);
   constexpr uint32_t kFree = ~uint32_t{0};

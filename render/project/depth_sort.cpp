@@ -14,10 +14,12 @@
 namespace curvisplat {
 namespace {
 
-// Of 2^32: steps are below a micron of a metre, and parts of bricks have no more than a few million.
+// The largest keys, out of 2^32: steps are below a micron of a metre, and parts of bricks have no more than a
+// few million.
 constexpr double kMaxKey = (1 << 28) - 1, kMaxPerspectiveKey = (1 << 30) - 1;
-// Of a brick's largest radius. Cutting a splat moves the centres of its pieces by less than half the sum of
-// A's columns, 1.5 of its singular values, and a border by less than 0.6; a radius has 1.55 of them.
+// The reach of pieces, in a brick's largest radius. Cutting a splat moves the centres of its pieces by less
+// than half the sum of A's columns, 1.5 of its singular values, and a border by less than 0.6; a radius has
+// 1.55 of them.
 constexpr double kPieceReach = 1.35;
 // Pixels from a splat's own support to the middle of a tile that it touches: half the tile's diagonal, and
 // what the low-pass adds.

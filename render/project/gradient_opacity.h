@@ -29,10 +29,10 @@ class GradientPercentiles {
  public:
   static constexpr size_t kIntervals = 256;
 
-  /// Of the finest splats, at up to five steps of a series. Damaged bricks are left out; throws Error if the
-  /// disk fails. `scale`: stretches the data.
+  /// Measures the finest splats, at up to five steps of a series. Damaged bricks are left out; throws Error
+  /// if the disk fails. `scale`: stretches the data.
   GradientPercentiles(const CacheReader& cache, size_t variable, const glm::dvec3& scale);
-  /// Of magnitudes, each with its volume; of these some are above zero.
+  /// Measures `magnitudes`, each with its volume; of these some are above zero.
   GradientPercentiles(std::vector<float> magnitudes, const std::vector<float>& volumes);
 
   /// [kIntervals + 1]: n / kIntervals of the volume is less steep. All 0 without data.

@@ -11,7 +11,7 @@
 namespace curvisplat {
 namespace {
 
-// Of a packed float, from the lowest bit on.
+// Bits of a packed float, from the lowest bit on.
 constexpr int kSpecularBits = 7, kDiffuseBits = 9;
 constexpr uint32_t kSpecularMask = (1u << kSpecularBits) - 1, kDiffuseMask = (1u << kDiffuseBits) - 1;
 constexpr uint32_t kLitMask = (1u << (kSpecularBits + kDiffuseBits)) - 1;

@@ -41,8 +41,9 @@ struct PixelShading {
   bool per_pixel = true;  // from the splat's slope and width; false: one colour and extinction per splat
   bool lit = false;       // splats carry light (light.h)
   const PixelLayers* layers = nullptr;  // of the picture's size, in it; outlive the frame
-  /// In pictures of two scalars: the colours, with extinction 1, of the scalar of the splats' ScreenColours, which all
-  /// of them have then. Of the other table's values the extinctions alone count. Outlives the frame; null: none.
+  /// The colours of pictures of two scalars, with extinction 1, of the scalar of the splats' ScreenColours,
+  /// which all of them have then. Of the other table's values the extinctions alone count. Outlives the
+  /// frame; null: none.
   const ClassificationTable* colours = nullptr;
   float low_pass_px2 = static_cast<float>(kLowPass);  // ScreenView's
 };
@@ -64,8 +65,9 @@ class Painter {
   /// larger than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      PixelShading shading, const PaintResources& resources = {}) = 0;
-  /// After begin(): from now on only `tiles` are drawn, which fill their box. No two calls name pixels of the same square of
-  /// kTileSide, and all splats of one are drawn before the next; what no call has named shows nothing that matters.
+  /// Draws only `tiles` from now on, which fill their box. Call it after begin(). No two calls name pixels of
+  /// the same square of kTileSide, and all splats of one are drawn before the next; what no call has named
+  /// shows nothing that matters.
   virtual void drawOnly(const TileSet& tiles) = 0;
   /// Blends `splats` into the frame, behind all splats drawn so far, each behind those before it; but for those
   /// that lean, which each tile takes in its own order (tile_key.h). The memory may be used again when the call
@@ -83,8 +85,8 @@ class Painter {
   virtual double drawSeconds() const = 0;
   /// Nothing if OpenGL does not draw. Complete after end().
   virtual CardWork cardWork() const { return {}; }
-  /// After end(): more splats waited for others than PaintResources allow, and the picture is wrong. Smaller
-  /// regions of it need fewer.
+  /// Whether more splats waited for others than PaintResources allow, so that the picture is wrong. Known
+  /// after end(). Smaller regions of it need fewer.
   virtual bool isOverfull() const { return false; }
   /// How many of the splats given to draw() since begin() were left out because they are hidden completely.
   virtual uint64_t hiddenSplats() const { return 0; }

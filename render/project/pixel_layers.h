@@ -63,7 +63,7 @@ class PixelLayers {
     const size_t pixel = static_cast<size_t>(y) * static_cast<size_t>(size_.width) + static_cast<size_t>(x);
     return {layers_.data() + begins_[pixel], begins_[pixel + 1] - begins_[pixel]};
   }
-  /// Of a pixel with these layers.
+  /// The windows of a pixel with these layers.
   static int windowsOf(std::span<const PixelLayer> layers) {
     return static_cast<int>(layers.size()) + (layers.empty() || layers.back().colour.w < 1 ? 1 : 0);
   }

@@ -45,7 +45,7 @@ std::vector<ClipPlane> clipPlanesOf(std::span<const ClipPlane> planes, const std
 /// What a clip box leaves of a box; all of it where that is nothing, or there is none.
 WorldBox leftBy(const std::optional<WorldBox>& clip_box, const WorldBox& box);
 
-/// On which side of the clip planes a splat lies.
+/// The side of the clip planes on which a splat lies.
 enum class ClipSide : uint8_t { kInside, kAcross, kOutside };
 
 /// Clip planes in float, relative to a brick's origin.

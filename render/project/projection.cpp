@@ -110,7 +110,7 @@ CURVISPLAT_VECTOR_CLONES void computePlanes(const PerspectiveMap& map,
   fillPlanes(map, geometry, begin, count, planes);
 }
 
-/// As skewOf() has them.
+/// Computes the skews, as skewOf() has them.
 template <typename Map>
 void computeSkews(const Map& map, const GeometryArrays<const float>& geometry, size_t begin, size_t count,
                   GrowthBlock& growth, Block& block) {
@@ -138,7 +138,7 @@ struct BrickArrays {
   const VariableArrays<const float>* colours;  // null: of pictures of one scalar
 };
 
-/// Of the distribution of depths, the part between the faces on the ray through the centre.
+/// The part of the distribution of depths between the faces, on the ray through the centre.
 float shareAtCentre(const ScreenCut& cut) {
   float lo = -1, hi = 1;
   for (size_t n = 0; n < ScreenCut::kFaces; ++n) {

@@ -102,8 +102,8 @@ class BrickProjector {
   /// depend on the tiles.
   void keepTouching(const TileSet& tiles);
 
-  /// In the order of the ranges. A splat's records precede it and have the same depth. Their keys are not
-  /// known yet: until DepthKeys::setKeys() their slopes are pixels of depth a pixel.
+  /// The projected splats, in the order of the ranges. A splat's records precede it and have the same depth.
+  /// Their keys are not known yet: until DepthKeys::setKeys() their slopes are pixels of depth a pixel.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
   std::span<ScreenSplat> mutableSplats() { return splats_; }
   /// [splats()], larger is farther: orthographic, the distance along the view from the brick's origin;

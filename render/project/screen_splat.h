@@ -22,12 +22,12 @@ struct ScreenSplat {
   float half_width;      // √3 deviations along the ray at rho = 0; in lit pictures with the light (light.h)
   uint32_t skew;         // of the footprint, packed (footprint.h); 0: none
   float along;           // by how much the scalar changes with each deviation of depth along the ray
-  // Where the splat comes in each tile's order (tile_key.h).
+  // The splat's place in each tile's order (tile_key.h).
   uint32_t key, first;           // in drawing order: at (x, y); the first of any tile's
   float key_slope0, key_slope1;  // keys a pixel to the right, and down
 };
 static_assert(sizeof(ScreenSplat) == 64);
-// So that the large buffers of a frame take no memory before they are filled.
+// Trivial, so that the large buffers of a frame take no memory before they are filled.
 static_assert(std::is_trivially_default_constructible_v<ScreenSplat>);
 
 /// The faces that a splat is cut at: a record of its own, directly before the splat where splats come from
@@ -51,7 +51,7 @@ struct ScreenCut {
   static constexpr float kNoFace = 4;          // > √7
   static constexpr float kReach = 2.6457513f;  // √7
 
-  /// As a record among splats, which isRecord() tells from splats, and back.
+  /// Makes a record among splats, which isRecord() tells from splats, and back.
   ScreenSplat record() const;
   static ScreenCut of(const ScreenSplat& record);
 };

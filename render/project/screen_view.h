@@ -55,7 +55,7 @@ struct ScreenView {
     return std::max(std::abs(viewFromData(corner).z), near);
   }
 
-  /// Where a point in view axes lies in the image; perspective: in front of the eye.
+  /// The place in the image of a point in view axes, which in perspective must be in front of the eye.
   glm::dvec2 pixelFromView(const glm::dvec3& view) const;
 };
 

@@ -164,7 +164,7 @@ class SplatChooser {
   std::vector<float>& depths_;
 };
 
-/// Where a splat lies among the layers of a picture: in front of all that its pixels have, behind opaque
+/// The place of a splat among the layers of a picture: in front of all that its pixels have, behind opaque
 /// ones, or somewhere where it has to be cut.
 enum class LayerSide : uint8_t { kBefore, kAcross, kBehind };
 
@@ -200,8 +200,8 @@ class LocalLayers {
   float offset_ = 0;
 };
 
-/// In pictures of two scalars: the scalar of the colours on the screen, for a piece that has it as its
-/// scalar. `faces`, `across`: what cuts the piece.
+/// The colours' scalar on the screen, in pictures of two scalars, for a piece that has it as its scalar.
+/// `faces`, `across`: what cuts the piece.
 template <typename Map>
 ScreenColour colourOf(const Map& map, const PlacedPiece& at, const SplatPiece& piece, float variance,
                       bool faces, bool across) {

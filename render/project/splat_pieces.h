@@ -184,7 +184,7 @@ bool cutUp(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks_lef
   return true;
 }
 
-/// At most two parts along each of three axes.
+/// The pieces of a splat at borders: at most two parts along each of three axes.
 using BorderPieces = std::array<SplatPiece, 8>;
 
 /// How the splat of a cell at a border is drawn. Along each axis that ends at a face it is one wider splat

@@ -102,7 +102,7 @@ class PaintedParts {
   std::vector<uint32_t> ranks_of_part_;
 };
 
-/// Of a rank that paints some of a part's splats: sorting and painting them.
+/// The cost for a rank that paints some of a part's splats: sorting and painting them.
 double paintCost(const PartCost& part, const Painted& painted) {
   if (!(part.splats > 0)) return 0;
   return (part.sort * painted.splats + part.paint * painted.inside) / part.splats;

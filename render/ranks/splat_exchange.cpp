@@ -121,7 +121,7 @@ bool SplatExchange::beginSlab(std::optional<Request> request) {
   return any;
 }
 
-/// Of the parts that any rank needs. `requests`: of all ranks.
+/// Begins the rounds of the parts that any rank needs. `requests`: of all ranks.
 void SplatExchange::beginRounds(const std::vector<Ranks::Bytes>& requests) {
   std::vector<uint32_t> needed;
   for (uint32_t part = 0; part < shared_.parts.size(); ++part)
@@ -184,7 +184,8 @@ TileBox SplatExchange::tilesOf(const ScreenBox& box) const {
           TileSet::tileAt(box.y1 + TileSet::kMargin, rows_) + 1};
 }
 
-/// Which splats touch whose tiles. A receiver may get more than those: what touches none of its tiles is not seen.
+/// Finds which splats touch whose tiles. A receiver may get more than those: what touches none of its tiles
+/// is not seen.
 void SplatExchange::findReceivers(Prepared& part, std::span<const ScreenSplat> splats) const {
   constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
   std::vector<uint32_t> place(ranks_.count(), kNone);  // [rank] in the receivers
@@ -343,7 +344,7 @@ SplatExchange::Arrived& SplatExchange::arrived(uint32_t number) {
   return arrived_[static_cast<size_t>(found - needed_.begin())];
 }
 
-/// Where this rank itself needs all splats of a part that it has prepared: they arrive where they are.
+/// Keeps a part where this rank itself needs all splats that it has prepared: they arrive where they are.
 bool SplatExchange::keep(Prepared& part, Receiver& receiver, uint32_t number) {
   if (receiver.rank != ranks_.rank() || receiver.count == 0 || receiver.count != part.splats.size())
     return false;
@@ -361,7 +362,8 @@ void SplatExchange::endKept() {
   kept_.clear();
 }
 
-/// Of the needed parts in their order, as many as there is space for. Each rank may send all up to a number.
+/// Grants the needed parts in their order, as many as there is space for. Each rank may send all up to a
+/// number.
 std::vector<Ranks::Bytes> SplatExchange::grants() {
   uint64_t bytes = 0;
   for (; available_ < needed_.size(); ++available_) {
@@ -405,7 +407,7 @@ void SplatExchange::send(const std::vector<uint32_t>& granted) {
     takeSplats(rank == ranks_.rank() ? sending_.of(rank) : received_.of(rank));
 }
 
-/// Of one rank: they stay where they are until the next step.
+/// Takes the splats of one rank: they stay where they are until the next step.
 void SplatExchange::takeSplats(std::span<const std::byte> bytes) {
   for (size_t at = 0; at < bytes.size();) {
     MessageHeader header;

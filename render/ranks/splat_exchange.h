@@ -71,7 +71,7 @@ class SplatExchange {
   /// Begins a slab; nullopt: this rank has none any more, but may have to prepare parts for others. All
   /// ranks call it; false if none has one. No other thread may use the exchange meanwhile.
   bool beginSlab(std::optional<Request> request);
-  /// Those of SharedParts.
+  /// The parts of SharedParts.
   std::span<const SweptPart> parts() const { return shared_.parts; }
   /// The parts that this rank prepares in the slab, in order.
   const std::vector<uint32_t>& toPrepare() const { return own_; }
@@ -93,7 +93,7 @@ class SplatExchange {
   /// The next part that has arrived, as its place in the request; nullopt: none until the next step. Any
   /// thread.
   std::optional<uint64_t> nextReceived();
-  /// Its splats, until the next step; nullopt where the part was cancelled.
+  /// The part's splats, until the next step; nullopt where the part was cancelled.
   std::optional<Received> received(uint64_t sequence) const;
 
   /// Sends and receives. All ranks call it, while their workers do nothing; false if nothing is left to be
@@ -117,7 +117,8 @@ class SplatExchange {
     uint32_t rank = 0;
     uint32_t first = 0, count = 0;  // entries, or all
     bool offered = false, done = false;
-    // It is this rank, which takes all of the part's splats from where they are, until the next step.
+    // True if this rank is the receiver: it takes all of the part's splats from where they are, until the
+    // next step.
     bool kept = false;
     uint64_t bytes() const { return kHeaderBytes + count * kElementBytes; }
   };
@@ -156,7 +157,7 @@ class SplatExchange {
   const uint64_t buffer_bytes_;
   const int columns_, rows_;
 
-  // Of the slab; changed by beginSlab() and step() only, except as said.
+  // State of the slab; changed by beginSlab() and step() only, except as said.
   std::vector<TileBox> boxes_;      // [rank] its tiles
   std::vector<uint32_t> painters_;  // [shared tile] a rank, or kNobody
   std::vector<uint32_t> needed_, own_;

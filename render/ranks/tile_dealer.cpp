@@ -26,7 +26,7 @@ class Dealer {
       if (const TilePart part = TilePart::of(cost, size); part.isSeen()) parts_.push_back(part);
   }
 
-  /// By the costs of tiles instead of parts.
+  /// Deals by the costs of tiles instead of parts.
   Dealer(std::span<const double> tile_costs, ImageSize size)
       : how_{{0, 0, TileSet::tilesAlong(size.width, kSharedTileSide),
               TileSet::tilesAlong(size.height, kSharedTileSide)}},

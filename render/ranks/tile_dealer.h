@@ -65,8 +65,8 @@ std::vector<double> tileCosts(std::span<const PartCost> parts, ImageSize size);
 // kPaintPerPixel by the square of its reach in pixels; clearing and resolving a tile costs as much as
 // painting 300 splats for each painter's tile of pixels.
 inline constexpr double kSortPerPrepare = 1.4, kPaintPerPixel = 0.06;
-// Of a splat: finding out who gets it and copying it for others; taking it from another's message, or from
-// this rank's own parts.
+// Costs of a splat: finding out who gets it and copying it for others; taking it from another's message, or
+// from this rank's own parts.
 inline constexpr double kSendCost = 0.25, kReceiveCost = 0.25, kKeepCost = 0.1;
 inline constexpr double kTileCost = 300.0 * kSharedTileSide * kSharedTileSide / (kTileSide * kTileSide);
 

@@ -69,7 +69,7 @@ class Builder {
     return place;
   }
 
-  /// Those that the picture tells apart, and both ends.
+  /// The places that the picture tells apart, and both ends.
   void placesOf(size_t line, std::vector<Place>& places) const {
     places.clear();
     const uint32_t begin = set_.begins[line], end = set_.begins[line + 1];

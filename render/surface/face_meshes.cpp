@@ -18,7 +18,8 @@ constexpr double kFinestPixels = 0.5;
 // is to be seen only by their number. Beyond, smooth normals would suffer.
 constexpr double kFreeEdges = 2;
 constexpr size_t kMinNodes = 1 << 16;
-// While a mesh is made: nodes, triangles, the mesh itself, and the last picture's vertices on the screen.
+// Bytes while a mesh is made: nodes, triangles, the mesh itself, and the last picture's vertices on the
+// screen.
 constexpr uint64_t kBytesANode = 164;
 
 size_t mostNodes(uint64_t pixels) {
@@ -63,7 +64,7 @@ bool overlaps(const GridFace& face, const FacePatch& patch, const GridSurface::P
   return true;
 }
 
-/// Where a border of a finer patch meets one of a coarser patch along an axis of their face.
+/// The places where a border of a finer patch meets one of a coarser patch along an axis of their face.
 class Stitches {
  public:
   Stitches(const FacesReader& faces, const ChosenPatches& chosen, std::vector<PatchNodes>& nodes)

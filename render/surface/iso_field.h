@@ -43,7 +43,7 @@ inline constexpr float kIsoKernel[] = {0.0451566f, 0.2057787f, -0.2786960f, 0.75
 /// False if no ray meets its support.
 bool crossSplat(const IsoSplats::Placed& placed, const IsoFan& fan, IsoCrossed& out);
 
-/// At the depths z of the rays: Σ w, and F.
+/// The field at the depths z of the rays: Σ w, and F.
 struct IsoField {
   IsoRow weight{}, value{};
 };

@@ -30,7 +30,7 @@ class IsoLayers {
   /// and ranges of tiles.
   void draw(const IsoSplats& splats, const Look& look, uint64_t bytes);
 
-  /// Of a pixel: from the nearest on.
+  /// The layers of a pixel, from the nearest on.
   std::span<const PixelLayer> at(int x, int y) const;
 
  private:

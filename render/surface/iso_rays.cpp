@@ -22,7 +22,7 @@ IsoRays::IsoRays(const IsoSplats::Settings& settings) : settings_(settings) {
   fan_.perspective = settings.view.projection == Projection::kPerspective;
 }
 
-/// Of a ray: where it is in view axes; in perspective at the depth 1.
+/// The place of a ray in view axes; in perspective at the depth 1.
 glm::dvec2 IsoRays::acrossAt(const IsoPacket& packet, size_t ray) const {
   const ScreenView& view = settings_.view;
   return {(double{packet.x[ray]} - 0.5 * view.size.width) / view.focal_px,
@@ -64,7 +64,7 @@ void IsoRays::begin(const IsoPacket& packet, Ahead& ahead) {
   least_step_ = 0;
 }
 
-/// Those that may begin before a depth.
+/// Crosses the splats that may begin before a depth.
 void IsoRays::crossBefore(Ahead& ahead, float depth) {
   const double before = fan_.base_depth + double{depth};
   while (!ahead.splats.empty() && double{ahead.splats[0].splat->near} < before) crossNext(ahead);
@@ -88,7 +88,8 @@ float IsoRays::firstBegin() const {
   return first;
 }
 
-/// Those that begin within a step from `at`; where it ends, so that none is stepped over.
+/// Activates the splats that begin within a step from `at`, and returns where the step ends, so that none is
+/// stepped over.
 float IsoRays::activate(float at, float step) {
   float to = at + std::max(step, least_step_);
   size_t kept = 0;
@@ -105,7 +106,7 @@ float IsoRays::activate(float at, float step) {
   return to;
 }
 
-/// Without the common field: of each ray the splat that weighs most there.
+/// Finds for each ray the splat that weighs most there, which stands in for the common field.
 void IsoRays::heaviestAt(Place& place) const {
   place.field = {};
   for (const IsoCrossed* splat : active_)

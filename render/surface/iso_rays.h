@@ -1,4 +1,4 @@
-// Where rays meet isosurfaces. Along a ray, with w = V K(|u|) / √det S at the depth z,
+// Finds where rays meet isosurfaces. Along a ray, with w = V K(|u|) / √det S at the depth z,
 //
 //     F(z) = Σ w (f + slope · u) / Σ w
 //
@@ -31,7 +31,7 @@ struct IsoHit {
   float other_scalar;  // that of the picture's other scalar; of one scalar, the same
 };
 
-/// Of crossings. Those that are nearly clear are not there.
+/// The opacity of crossings. Those that are nearly clear are not there.
 struct IsoOpacity {
   double factor = 1;
   const ColourTable* function = nullptr;  // none: 1
@@ -62,7 +62,7 @@ class IsoRays {
     std::span<const IsoHit> all() const { return {hit.data(), count}; }
   };
 
-  /// For one thread; `settings` as the splats'.
+  /// Traces rays in one thread; `settings` as the splats'.
   explicit IsoRays(const IsoSplats::Settings& settings);
 
   /// Reserves memory for packets of rays that meet at most `splats` splats.

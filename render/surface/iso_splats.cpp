@@ -102,7 +102,7 @@ void IsoSplats::addPiece(Part& part, const glm::dvec3& cell_min, const SplatPiec
   if (!overflowed()) part.splats.push_back(splat);
 }
 
-/// Where it lies; false if no pixel can see it.
+/// Finds the place of a splat; false if no pixel can see it.
 bool IsoSplats::place(const glm::dvec3& centre, const Shape& shape, IsoSplat& splat) const {
   const ScreenView& view = settings_.view;
   splat.centre = view.viewFromData(centre);

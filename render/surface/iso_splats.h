@@ -61,7 +61,7 @@ class IsoSplats {
     IsoCorrections corrections = {};
     bool two_scalars = false;  // the picture's
   };
-  /// Of `parts` parts of bricks. What `settings` refers to outlives it.
+  /// Holds the splats of `parts` parts of bricks. What `settings` refers to outlives it.
   IsoSplats(const Settings& settings, size_t parts);
 
   /// Adds the splats of one part. Any thread; each part once. `other`: the picture's other scalar, or null.
@@ -81,7 +81,7 @@ class IsoSplats {
   };
   /// How many splats were added.
   uint64_t count() const;
-  /// After the last add(): sorts them into the tiles. Parallel on the caller's TBB arena.
+  /// Sorts the splats into the tiles, after the last add(). Parallel on the caller's TBB arena.
   void sort();
   /// The splats of a tile of the range, and of the pixels around it, by `near`, then in the order of parts.
   std::span<const Placed> inTile(size_t tile) const;

@@ -1,4 +1,4 @@
-// Which triangle is seen at each of a pixel's samples, tile by tile.
+// Finds which triangle is seen at each of a pixel's samples, tile by tile.
 //
 // Vertices are moved to a grid of 1/16 pixel, in which edge functions are exact, in float for small
 // triangles and in double for others: triangles that share an edge leave no gap and share no sample. Eight

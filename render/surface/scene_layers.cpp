@@ -43,7 +43,7 @@ class SampledLayers {
   void append(const PixelSamples& samples, int x, int y, unsigned& hidden);
   /// What is appended next is the next pixel's.
   void endPixel() { ends_.push_back(unshaded_.size()); }
-  /// After the last pixel.
+  /// Shades all samples, after the last pixel.
   void shade();
   /// The layers of a pixel, in the order of append().
   std::span<const PixelLayer> at(size_t pixel) const {
@@ -133,7 +133,7 @@ void SampledLayers::append(const PixelSamples& samples, int x, int y, unsigned& 
   }
 }
 
-/// Of sorted samples, the first that is not of the layer that begins at `begin`.
+/// The first of the sorted samples that is not of the layer that begins at `begin`.
 size_t SampledLayers::endOfLayer(const std::array<Seen, kSamples>& seen, size_t begin, size_t count) const {
   double tolerance = 0;
   size_t known = begin;  // the samples before it are in the tolerance
@@ -149,7 +149,7 @@ size_t SampledLayers::endOfLayer(const std::array<Seen, kSamples>& seen, size_t 
   return end;
 }
 
-/// Of the samples of one layer. `left`: samples that nothing opaque has hidden so far.
+/// Appends the samples of one layer. `left`: samples that nothing opaque has hidden so far.
 void SampledLayers::appendLayer(std::span<const Seen> seen, int x, int y, size_t& left, unsigned& hidden) {
   size_t opaque = seen.size();
   if (has_translucent_) {
@@ -173,8 +173,8 @@ void SampledLayers::appendLayer(std::span<const Seen> seen, int x, int y, size_t
        triangles_.depthOf(static_cast<float>(value / static_cast<double>(seen.size())), middle_x, middle_y)});
 }
 
-/// Where the triangles of a layer are shaded: those that meet an earlier one with it, in the middle of all
-/// their samples.
+/// The spots where the triangles of a layer are shaded: those that meet an earlier one with it, in the middle
+/// of all their samples.
 size_t SampledLayers::appendSpots(std::span<const Seen> seen, float middle_x, float middle_y) {
   struct Part {
     uint32_t number, last;  // the first triangle, and the last that was taken
@@ -315,7 +315,7 @@ class PixelSlices {
     return left;
   }
 
-  /// By the function.
+  /// The opacity by the function.
   float opacityOf(size_t slice, const SliceSampler::Sample& sample, int x, int y) const {
     if (!scene_.slices_by_function || !look_.opacities) return 1;
     if (look_.opacity_slices.empty()) return look_.opacities->opacityAt(sample.scalar);

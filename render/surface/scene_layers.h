@@ -25,8 +25,8 @@ struct SceneLook {
   std::optional<Light> light;              // of surfaces; none: a light at the viewer
   std::span<const ClipPlane> clip_planes;  // of slices
   double depth_origin = 0;
-  // Of slices and surfaces whose opacities are the picture's function's: it, and where it is of another
-  // scalar, that one's samples of slices.
+  // The picture's function, if slices or surfaces take their opacities from it; and, where it is of another
+  // scalar, that scalar's samples of slices.
   const ColourTable* opacities = nullptr;
   std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
   const IsoLayers* isosurfaces = nullptr;

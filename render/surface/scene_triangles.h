@@ -114,7 +114,7 @@ struct TriangleRun {
   uint32_t first, count;
 };
 
-/// Which triangles may be seen in which tiles of a picture.
+/// The triangles that may be seen in each tile of a picture.
 ///
 /// A triangle is listed in every tile that its box of pixels touches; triangles outside of the picture,
 /// before the near plane or without a size on the grid of samples are listed nowhere. Batches of triangles

@@ -61,7 +61,7 @@ class SliceSampler {
     float depth;     // PixelLayers', from the depth origin
     glm::dvec3 at;   // data coordinates
   };
-  /// After the last add(). `depth_origin` as in PixelLayers.
+  /// The sample at a pixel, after the last add(). `depth_origin` as in PixelLayers.
   std::optional<Sample> at(int x, int y, double depth_origin) const;
   /// Whether any pixel has a sample.
   bool isEmpty() const { return !touched_.load(std::memory_order_relaxed); }

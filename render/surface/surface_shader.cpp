@@ -71,7 +71,7 @@ SurfaceShader::SurfaceShader(const SceneTriangles& triangles, const Tables& tabl
   }
 }
 
-/// Of the triangles of spots.
+/// The corners of the triangles of spots.
 struct SurfaceShader::Corners {
   using Row = std::array<float, kAtOnce>;
   alignas(64) Row at_x, at_y;  // the spots

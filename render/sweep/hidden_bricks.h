@@ -1,5 +1,5 @@
-// Which bricks a frame need not read or prepare, because the splats painted so far hide them. The test is
-// exact: a brick is hidden if splats anywhere in its rectangle of the screen would change no bit of the
+// Finds bricks that a frame need not read or prepare, because the splats painted so far hide them. The test
+// is exact: a brick is hidden if splats anywhere in its rectangle of the screen would change no bit of the
 // picture (Painter::hides). The picture does not depend, therefore, on when the test is made; only how much
 // is read does.
 //

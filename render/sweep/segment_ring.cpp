@@ -23,7 +23,7 @@ std::optional<std::span<ScreenSplat>> SegmentRing::acquire(uint64_t sequence, si
   return splats_.subspan(*begin % capacity, count);
 }
 
-/// Where the segment would begin; nullopt if it is not its turn or there is no space.
+/// The place where the segment would begin; nullopt if it is not its turn or there is no space.
 std::optional<uint64_t> SegmentRing::placeFor(uint64_t sequence, size_t count) const {
   const size_t capacity = splats_.size();
   if (sequence != first_sequence_ + segments_.size()) return {};

@@ -9,7 +9,7 @@
 namespace curvisplat {
 namespace {
 
-// Where the slab's end is put when space is short: behind this many eighths of the buffer's pages, when the
+// The place of the slab's end when space is short: behind this many eighths of the buffer's pages, when the
 // slab first gets an end and when the end moves nearer.
 constexpr size_t kFirstEighths = 6, kNextEighths = 7;
 // Space is made for the part that needs it, and for one page in kSpareShare of the buffer in addition.
@@ -34,8 +34,8 @@ size_t countBefore(const SweepPosition& mark, uint32_t rank, std::span<const Dep
   return low;
 }
 
-/// Behind all splats with the same key. A slab ends there where it can: which of a part's splats another rank sends may
-/// differ from slab to slab, and so their numbers among those with equal keys.
+/// The position behind all splats with the same key. A slab ends there where it can: which of a part's splats
+/// another rank sends may differ from slab to slab, and so their numbers among those with equal keys.
 SweepPosition behindKey(const SweepPosition& position) {
   return {position.key + 1, 0, 0};
 }

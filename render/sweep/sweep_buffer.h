@@ -127,7 +127,7 @@ class SweepBuffer {
 
   /// A batch of final splats, if there are enough for a full one. The caller sorts it and calls giveBack().
   std::optional<Batch> next();
-  /// As next(), but waits for a batch as long as one can still come in this slab.
+  /// Returns a batch as next() does, but waits for one as long as one can still come in this slab.
   std::optional<Batch> awaitNext();
   /// Any final splats, for a turn that finds no space; nullopt while other batches are being sorted.
   std::optional<Batch> nextFinal();

@@ -20,7 +20,7 @@ size_t tileCount(ImageSize size) {
 
 }  // namespace
 
-// Of records, too, which are in no list.
+// The tiles of splats that touch none, and of records, which are in no list.
 constexpr SplatBins::Tiles SplatBins::kNoTiles{1, 1, 0, 0};
 
 SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pieces)
@@ -182,7 +182,7 @@ void SplatBins::writeEntries(PaintLoop& loop) {
   });
 }
 
-/// From how many entries a piece has for each tile to where it writes them.
+/// Turns the number of entries that a piece has for each tile into the place where it writes them.
 void SplatBins::sumCounts() {
   const TraceScope trace("sum bins");
   const size_t tiles = begins_.size() - 1;

@@ -81,7 +81,7 @@ class PaintLoop {
   tbb::task_arena arena_;
 };
 
-/// Which splats of a batch touch which tiles: for every tile a list of indices, in the batch's order.
+/// Lists which splats of a batch touch which tiles: for every tile a list of indices, in the batch's order.
 ///
 /// A batch is either collected, add() by add(), and then sorted, or borrowed: splats that are many enough
 /// stay where they are, and nothing of the work is left to a single thread.

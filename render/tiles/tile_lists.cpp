@@ -35,7 +35,8 @@ CURVISPLAT_VECTOR_CLONES void findExtents(float x, float y, const ScreenSplat& s
 struct OrderTileRange {
   int first, last;
 
-  /// Those along a tile with pixels' centres in from .. to, which count from the tile's first; none where first > last.
+  /// The order tiles along a tile with pixels' centres in from .. to, which count from the tile's first; none
+  /// where first > last.
   static OrderTileRange of(float from, float to) {
     constexpr float kPerPixel = 1.0f / kOrderSide, kMargin = 0.01f;  // for rounding
     if (!(to >= -kMargin && from <= kTileSide - 1 + kMargin)) return {0, -1};

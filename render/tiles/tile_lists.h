@@ -26,7 +26,8 @@ struct TileCorner {
   float x, y;
 };
 
-/// Those that have the centre of a pixel in the splat's ellipse, or within a hundredth of a pixel of it.
+/// The order tiles that have the centre of a pixel in the splat's ellipse, or within a hundredth of a pixel
+/// of it.
 OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat);
 
 /// The splats of an order tile, in the order in which they are to be painted. From the top bit: the order tile, 6 bits; the

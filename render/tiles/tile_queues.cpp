@@ -64,7 +64,7 @@ void TileQueues::clear() {
   full_ = false;
 }
 
-/// Where the next `places` of a queue lie in one chunk: at `count`, or where the next chunk begins.
+/// The place where the next `places` of a queue lie in one chunk: at `count`, or where the next chunk begins.
 uint32_t TileQueues::nextFor(const Queue& queue, uint32_t count, uint32_t places) {
   while (count % kChunk != 0 && count % kChunk + places > kChunk)
     memory_[placeOf(queue, count++)] = ScreenCut{}.record();
