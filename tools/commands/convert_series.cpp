@@ -64,7 +64,7 @@ void checkArguments(const ConvertArguments& arguments) {
   refuse(arguments.overwrite, "--overwrite");
 }
 
-/// For a new cache. A link stays: the folders for unfinished files are beside its target.
+/// Checks the folder for a new cache. A link stays: the folders for unfinished files are beside its target.
 void checkCacheFolder(const std::filesystem::path& output) {
   checkOutputFolder("-o", output);
   checkOutputFolder("-o", linkTarget(output), launchedRanks().alone() ? kPartialSuffix : kRanksSuffix);

@@ -52,7 +52,7 @@ std::string stepPrefix(const std::string& prefix, uint64_t step) {
   return fmt::format("{}_{:04}", prefix, step);
 }
 
-/// Of the names of the files, after the prefix.
+/// The longest ending of the names of the files, after the prefix.
 std::string longestEnding(const GenerateOptions& options) {
   const std::string ending = ".xyz";
   return options.steps ? stepPrefix("", options.first_step + *options.steps - 1) + ending : ending;

@@ -255,7 +255,7 @@ std::string sourcesText(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Those of the step that the reader is at.
+/// Prints the files of the step that the reader is at.
 void printFiles(const CacheReader& reader) {
   const Manifest& m = reader.manifest();
   const uint64_t steps = reader.series().steps.size();

@@ -76,7 +76,7 @@ void printTable(std::span<const CacheReader> readers, const Probe& probe) {
     }
 }
 
-/// In words that need no knowledge of splats.
+/// Prints a point in words that need no knowledge of splats.
 void printPoint(std::span<const CacheReader> readers, const Probe& probe) {
   const glm::dvec3& at = probe.asked.points.front();
   const std::optional<PointValues>& found = probe.steps.front().found.front();

@@ -15,7 +15,7 @@
 
 namespace curvisplat {
 
-/// As given.
+/// The arguments as given.
 struct ProbeArguments {
   std::string at;                 // x,y,z or the name of a file of points; empty: no probe
   std::vector<std::string> line;  // from x,y,z, to x,y,z, points
@@ -54,7 +54,8 @@ struct Probe {
   bool isOutside() const { return !isTable() && !steps.front().found.front(); }
 };
 
-/// As JSON: an object for a point, null outside; of a table an array of them; of several steps an array for each.
+/// The probe as JSON: an object for a point, null outside; of a table an array of them; of several steps an
+/// array for each.
 nlohmann::ordered_json probeAsJson(const CacheReader& reader, const Probe& probe);
 /// What several sets of scalars have at the same points, as joinedValues() has it. `readers`: of the probes.
 Probe joinedProbe(std::span<const CacheReader> readers, std::vector<Probe> probes);

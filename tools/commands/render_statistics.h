@@ -48,9 +48,9 @@ nlohmann::json statisticsOf(const RenderReport& report);
 
 /// Statistics of a frame, or of several, as a message between ranks; and back.
 Ranks::Bytes packStatistics(const std::vector<FrameReport>& frames);
-/// Without cameras.
+/// Unpacks statistics; the reports have no cameras.
 std::vector<FrameReport> unpackStatistics(const Ranks::Bytes& bytes);
-/// Of a picture that several ranks drew (combine).
+/// The statistics of a picture that several ranks drew (combine).
 FrameStatistics combined(const std::vector<FrameStatistics>& ranks);
 
 }  // namespace curvisplat

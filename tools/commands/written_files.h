@@ -34,7 +34,7 @@ class WrittenFiles {
 
   /// The next step, in order, whose files are all written; nullopt if there is none yet.
   std::optional<StepFiles> next();
-  /// After nullopt: how long to wait at most before looking again, unless a file changes.
+  /// How long to wait at most after nullopt before looking again, unless a file changes.
   std::chrono::milliseconds untilNext() const { return until_next_; }
 
  private:

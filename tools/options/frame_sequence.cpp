@@ -22,7 +22,7 @@ double numberOr(const std::string& option, const std::optional<std::string>& tex
   return text ? parseNumber(option, *text) : otherwise;
 }
 
-/// Before --roll and --zoom. Rolling counts for what fits.
+/// The camera before --roll and --zoom. Rolling counts for what fits.
 Camera placedCamera(const CameraArguments& arguments, const ShownBox& box, ImageSize size) {
   const auto projection = arguments.view_angle ? Projection::kPerspective : Projection::kOrthographic;
   const double angle = arguments.view_angle ? parsePositive("--view-angle", *arguments.view_angle) : 30;
@@ -142,7 +142,7 @@ CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox
 
 namespace {
 
-/// That a time lies outside of the series: perhaps it is in another unit.
+/// Notes that a time lies outside of the series: perhaps it is in another unit.
 void noteTimeOutside(const std::string& time, const Series& series, const StepPosition& position) {
   const double number = parseNumber("--time", time), first = series.steps.front().time,
                last = series.steps.back().time;

@@ -64,7 +64,7 @@ uint64_t checksumOfFile(const fs::path& path, Progress& progress) {
   return checksum.value();
 }
 
-/// Where a file's checksum and its stamp are noted.
+/// The file in which a file's checksum and its stamp are noted.
 fs::path memoOf(const fs::path& path, const fs::path& known) {
   std::error_code ignored;
   return known / fmt::format("{:016x}", checksumOfText(fs::weakly_canonical(path, ignored).string()));
@@ -85,8 +85,8 @@ std::optional<uint64_t> notedChecksum(const fs::path& memo, const std::string& s
   return std::nullopt;
 }
 
-/// Under a name of its own first: several processes may open one file for the first time. A note that cannot be written
-/// is missed by the next one only.
+/// Notes a file's checksum. Several processes may open one file for the first time, so it is written under
+/// another name first. A note that cannot be written is missed by the next process only.
 void noteChecksum(const fs::path& memo, const std::string& stamp, uint64_t checksum) {
   try {
     writeFileDurably(memo, fmt::format("{}\n{}\n", stamp, checksum));
@@ -263,7 +263,8 @@ uint64_t contentsOf(const std::vector<fs::path>& files, const StampedFiles& stam
   return checksumOfText(contents);
 }
 
-/// Beside a cache whose files changed while it was made: shown now, and made again when they are opened next.
+/// A mark beside a cache whose files changed while it was made: shown now, and made again when they are
+/// opened next.
 constexpr const char* kChanged = "changed";
 
 void removeChanged(const fs::path& place, const fs::path& cache) {

@@ -12,7 +12,8 @@ namespace curvisplat {
 
 /// Command-line arguments as given; checked and parsed later.
 struct OpacityArguments {
-  /// Of the opacities. Their points and unit are --opacity and --opacity-unit, which ScalarArguments of the --scalar has.
+  /// The scalar of the opacities. Their points and unit are --opacity and --opacity-unit, which
+  /// ScalarArguments of the --scalar has.
   ScalarArguments by;
   std::string iso_scalar;  // of the isosurfaces
 };

@@ -23,17 +23,17 @@ inline constexpr unsigned kMaxThreads = 1024;  // limit of --threads
 double parseNumber(std::string_view option, std::string_view text);
 /// A finite number above zero.
 double parsePositive(std::string_view option, std::string_view text);
-/// As many finite numbers as `form` ("x,y,z") names, separated by commas.
+/// Finite numbers separated by commas, as many as `form` ("x,y,z") names.
 std::vector<double> parseNumbers(std::string_view option, std::string_view text, std::string_view form);
 /// "x,y,z".
 glm::dvec3 parsePoint(std::string_view option, std::string_view text);
-/// As many whole numbers above zero as `form` ("NIxNJxNK") names, separated by x.
+/// Whole numbers above zero separated by x, as many as `form` ("NIxNJxNK") names.
 std::vector<uint64_t> parseExtents(std::string_view option, std::string_view text, std::string_view form);
 /// "600x400", at most 16384 each way.
 ImageSize parseImageSize(std::string_view option, std::string_view text);
 /// A number of bytes, optionally with a unit K, M, G or T (powers of 1024): "2G", "1.5GiB", "512MB".
 uint64_t parseByteSize(std::string_view option, std::string_view text);
-/// As parseByteSize(), but at most the machine's memory.
+/// A number of bytes as parseByteSize() reads it, but at most the machine's memory.
 uint64_t parseMemory(std::string_view option, std::string_view text);
 /// A whole number above zero, optionally with a suffix K, M or G (powers of 1000): "8M".
 uint64_t parseCount(std::string_view option, std::string_view text);

@@ -41,8 +41,8 @@ struct PointValues {
   double distance = 0;         // ProbeResult::distance
 };
 
-/// At each point: from the cache; or, with a source, what the grid's own cell has there. nullopt outside of the data.
-/// Throws Error as reading, and if the source is not the grid of the cache.
+/// The values at each point, from the cache or, with a source, from the grid's own cell there; nullopt
+/// outside of the data. Throws Error as reading does, and if the source is not the grid of the cache.
 std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
                                                  std::span<const glm::dvec3> points,
                                                  const PointSource* source);

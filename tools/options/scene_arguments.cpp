@@ -51,7 +51,7 @@ SheetOpacity parseSheetOpacity(const std::string& option, const std::string& tex
   return opacity;
 }
 
-/// Of surface number n.
+/// The opacity of surface number n.
 SheetOpacity surfaceOpacity(const SurfaceArguments& arguments, size_t n) {
   const auto& texts = arguments.surface_opacities;
   return texts.empty() ? SheetOpacity()

@@ -12,7 +12,7 @@
 namespace curvisplat {
 namespace {
 
-// Without scripts the first picture is seen.
+// The page's head. Without scripts, the first picture is seen.
 constexpr const char* kHead = R"(<!doctype html>
 <html lang="en">
 <head>

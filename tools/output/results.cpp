@@ -16,7 +16,8 @@
 namespace curvisplat {
 namespace {
 
-// Not with stream/base/file.h, which reads as many bytes as the file's size: files of /proc have size 0.
+// The command line, read without stream/base/file.h, which reads as many bytes as the file's size: files of
+// /proc have size 0.
 std::vector<std::string> commandLine() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::vector<std::string> arguments;

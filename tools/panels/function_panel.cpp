@@ -149,7 +149,7 @@ void paintNumbers(const EditedFunction& function) {
 
 constexpr double kHeights[] = {0.05, 0.25, 0.5, 1};  // opacities at the left of the curve
 
-/// Of the numbers beside the curve and of half a point at its end.
+/// The width of the numbers beside the curve and of half a point at its end.
 float widthOfHeights() {
   float width = 0;
   for (const double opacity : kHeights)

@@ -47,9 +47,9 @@ bool option(const char* text, bool& value);
 class Section {
  public:
   Section(const char* text, bool open_at_first);
-  /// Of a list, which is folded at first. It unfolds if the list has grown, by the menu or by a saved view, and is then
-  /// scrolled to if it would lie below the window's end. `seen`: how many entries there were in the frame before; nullopt
-  /// before the first frame.
+  /// A section with a list, which is folded at first. It unfolds if the list has grown, by the menu or by a
+  /// saved view, and is then scrolled to if it would lie below the window's end. `seen`: how many entries
+  /// there were in the frame before; nullopt before the first frame.
   Section(const char* text, std::optional<size_t>& seen, size_t number);
   ~Section();
   Section(const Section&) = delete;

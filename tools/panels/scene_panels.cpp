@@ -284,7 +284,7 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
   removeAt(state.surfaces, removed, actions);
 }
 
-/// Of the faces of the grid; a file's have no scalar.
+/// Draws the choice of a colour for the faces of the grid; a file's have no scalar.
 void SurfacePanel::drawColouring(const ViewState& state, PanelActions& actions) {
   constexpr const char* kOwn = "a colour of its own";
   label("faces coloured by");

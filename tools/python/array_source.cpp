@@ -187,7 +187,7 @@ class ArraySource : public GridSource {
     }
   }
 
-  /// In whichever thread: a series frees its steps where it converts them.
+  /// Frees the arrays in whichever thread this is: a series frees its steps where it converts them.
   ~ArraySource() override {
     const py::gil_scoped_acquire locked;
     views_.clear();

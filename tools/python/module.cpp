@@ -276,7 +276,7 @@ std::vector<StepFiles> stepsIn(ConvertArguments& arguments) {
   return chosenSteps(arguments, "steps");
 }
 
-/// Of the first step, with the number of steps and the bytes of all.
+/// The report of the first step, with the number of steps and the bytes of all.
 py::dict convertSteps(const ConvertArguments& arguments, const std::vector<StepFiles>& steps,
                       ConvertOptions of_each, const py::object& progress) {
   SeriesOptions options;

@@ -94,8 +94,8 @@ class OpenCache {
   Use use();
   /// Throws UsageError and Error as `curvisplat render` does, and what stops runInterruptibly().
   DrawnPicture render(const PictureArguments& arguments, const pybind11::object& progress);
-  /// Of the step that was drawn last. Throws UsageError for a range that is empty, or not above zero where
-  /// `log`.
+  /// The histogram of the step that was drawn last. Throws UsageError for a range that is empty, or not above
+  /// zero where `log`.
   std::vector<double> histogram(const HistogramArguments& arguments) const;
   /// Ends threads and gives back their memory; the next picture starts them again.
   void release();

@@ -139,7 +139,7 @@ class ByteRows {
       }
   }
 
-  /// Not toByte(): a loop that the compiler turns into vector instructions.
+  /// Converts a row without toByte(): a loop that the compiler turns into vector instructions.
   void convert(int y) {
     const float* const from = image_.pixel(0, y);
     for (size_t x = 0; x < row_.size() / 3; ++x)

@@ -49,7 +49,7 @@ struct PictureMemory {
 constexpr int kCoarsest = 8;        // reduction
 constexpr uint64_t kLineShare = 4;  // of the longest message: as long as less is on its way, more is sent
 
-/// Of a viewer that has `memory_bytes`.
+/// The memory of a viewer that has `memory_bytes`.
 PictureMemory memoryFor(ImageSize picture, const Annotations& annotations, uint64_t memory_bytes) {
   const uint64_t image = 4 * sizeof(float) * picture.pixels(), message = messageBytes(picture);
   // One after the other: an image of fewer pixels that is enlarged; the whole picture beside its data, at most twice as
@@ -100,7 +100,7 @@ class RemoteViewer::Work {
     return line_.isOpen(asked_.empty() ? UINT64_MAX : messageBytes(asked_.back().picture) / kLineShare);
   }
 
-  /// Once the values of the picture are there: the sample that is seen at the picked place. Empty until then.
+  /// The sample that is seen at the picked place, once the values of the picture are there. Empty until then.
   std::string pickedText() {
     const std::optional<ShownValues> values = frames_->takeValues();
     if (!values) return {};
@@ -239,7 +239,7 @@ class RemoteViewer::Work {
     send(asked_.front(), std::move(frame));
   }
 
-  /// When there is more of it than was said of this step.
+  /// Reports damage if there is more of it than was said of this step.
   void reportDamage(uint64_t step, const std::vector<BrickFailure>& damaged) {
     if (damaged.empty()) return;
     size_t& said = damaged_said_[step];

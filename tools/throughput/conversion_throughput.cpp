@@ -24,8 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// Per node: 16 for the grid, 67 for scattered splats, up to 13 for the cache (bench/README.md), with a
-// margin; a minimum for small grids.
+// Bytes on disk per node: 16 for the grid, 67 for scattered splats, up to 13 for the cache (bench/README.md),
+// with a margin; a minimum for small grids.
 constexpr uint64_t kDiskBytesPerNode = 100, kMinDiskBytes = 16 << 20;
 
 /// A temporary folder, removed with its contents.

@@ -39,7 +39,7 @@ struct DiskRun {
 
 inline constexpr std::array<uint64_t, 4> kDiskBlocks{4 << 10, 64 << 10, 256 << 10, 1 << 20};
 inline constexpr std::array<unsigned, 6> kDiskDepths{1, 2, 4, 8, 16, 32};
-/// While one parameter is varied the other has the pager's value.
+/// The pager's values: one parameter has its own while the other is varied.
 inline constexpr uint64_t kPagerBlock = 256 << 10;
 inline constexpr unsigned kPagerDepth = 8;
 

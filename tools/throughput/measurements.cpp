@@ -81,7 +81,7 @@ std::string threeDigits(double value) {
   return fmt::format("{:.{}f}", value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0);
 }
 
-/// With a unit prefix for powers of 1000.
+/// The number with a unit prefix for powers of 1000.
 std::string scaled(double value) {
   for (const auto& [size, letter] : {std::pair{1e12, "T"}, {1e9, "G"}, {1e6, "M"}, {1e3, "k"}})
     if (value >= size) return threeDigits(value / size) + " " + letter;

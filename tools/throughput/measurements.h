@@ -61,7 +61,7 @@ class TextTable {
  public:
   explicit TextTable(std::vector<std::string> heads) : rows_{std::move(heads)} {}
 
-  /// At most as many cells as there are heads.
+  /// Adds a row of at most as many cells as there are heads.
   void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
   bool empty() const { return rows_.size() == 1; }
 

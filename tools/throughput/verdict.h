@@ -25,7 +25,8 @@ struct JudgedFrame {
 struct StageSpeeds {
   std::optional<double> read_bytes_s;  // nullopt if not measured
   double verify_splats_s = 0, decode_splats_s = 0, project_splats_s = 0, sort_splats_s = 0, draw_splats_s = 0;
-  /// Of the samples of the least steady stage: half the distance from the smallest to the largest, as a fraction of their median.
+  /// The spread of the samples of the least steady stage: half the distance from the smallest to the largest,
+  /// as a fraction of their median.
   double spread = 0;
 };
 

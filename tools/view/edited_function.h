@@ -89,7 +89,7 @@ class EditedFunction {
   /// Replaces many colour points by nine, which people can edit. Does nothing if there are at most twelve.
   void thinColours();
   void setColour(size_t point, const glm::dvec3& rgb);
-  /// Between the neighbours; does nothing for the first and the last point.
+  /// Moves a point, but not beyond its neighbours; does nothing for the first and the last point.
   void moveColour(size_t point, double x);
   /// Adds a point with the colour that is there. Returns its index.
   size_t addColour(double x);

@@ -31,7 +31,8 @@ std::vector<uint8_t> bytesOf(const Image& image) {
 
 }  // namespace
 
-// Too slow: reduce splats as long as that helps, then the resolution. Too fast: raise them in reverse order.
+// Adapts the effort. A picture that was too slow reduces splats as long as that helps, then the resolution;
+// one that was fast raises them in reverse order.
 void Effort::learn(double seconds, double target, bool complete) {
   has_learned_ = true;
   const double factor = std::clamp(target / std::max(seconds, 1e-6), 0.25, 2.0);
@@ -281,7 +282,7 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
   }
 }
 
-/// Of the request's scalars and functions, at its time.
+/// Prepares the player of the request's scalars and functions, at its time.
 void FrameLoop::preparePlayer(Drawing& drawing, const FrameRequest& request) {
   const DrawnScalars& scalars = request.scalars;
   std::vector<size_t> variables{scalars.opacity.variable};

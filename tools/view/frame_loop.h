@@ -145,7 +145,7 @@ class FrameLoop {
   void giveBack();
   /// Asks for the values of the newest request's picture, once that is shown. A request ends it.
   void requestValues();
-  /// Those that were asked for, once.
+  /// The values that requestValues() asked for, once.
   std::optional<ShownValues> takeValues();
   /// Whether more pictures of the newest request will follow.
   bool busy() const;

@@ -184,7 +184,7 @@ void addOpacities(const EditedFunction& function, Words& words) {
   words.add("--opacity-unit", number(function.opacityUnit()));
 }
 
-/// Of pictures of two scalars: colours of one, opacities of the other.
+/// Adds the functions, in pictures of two scalars the colours of one and the opacities of the other.
 void addFunctions(const ViewState& state, const CommandOptions& options, Words& words) {
   addFunction(state.function, options.function_file, words);
   if (!state.opacity_by) return addOpacities(state.function, words);

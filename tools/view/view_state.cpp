@@ -35,7 +35,7 @@ Json jsonOf(const std::vector<ClipPlane>& planes) {
   return json;
 }
 
-/// At most `most`; states of earlier versions have none.
+/// Reads clip planes, at most `most`; states of earlier versions have none.
 std::vector<ClipPlane> planesFrom(const JsonField& fields, const char* name, size_t most) {
   std::vector<ClipPlane> planes;
   const auto list = fields.find(name);

@@ -87,7 +87,7 @@ struct ViewState {
   std::vector<Marker> markers = {};
 
   glm::vec4 background() const { return dark ? kDefaultBackground : glm::vec4(1); }
-  /// As EditedFunction::suitBackground(), all functions.
+  /// Suits all functions to the background (EditedFunction::suitBackground()).
   void suitBackground();
   /// The scalar of isosurfaces and of opacities.
   const std::string& isoScalar() const { return opacity_by ? opacity_by->variable : variable; }
@@ -97,10 +97,10 @@ struct ViewState {
   }
   /// Without anything else the volume is drawn, whatever `volume` says.
   bool drawsVolume() const { return volume || !hasSheets(); }
-  /// As it is drawn: without a scalar there is no function.
+  /// The opacity of faces as they are drawn: without a scalar there is no function.
   SheetOpacity opacityOf(const NamedFaces& named) const;
   FaceNames faceNames() const;
-  /// Its grid surfaces have their look; their faces are found by faceNames().
+  /// The options of a frame whose grid surfaces have their look; their faces are found by faceNames().
   FrameOptions frameOptions(ImageSize size) const;
 };
 
@@ -114,8 +114,9 @@ void loadSurfaces(ViewState& state);
 /// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the
 /// scalars if there is none of this name.
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name);
-/// For a view of another cache of the same grid: removes what is of scalars that it lacks (opacities, isosurfaces, colours of
-/// faces). `shown`: the scalar that takes the place of the one that is shown, if that is lacking.
+/// Removes, for a view of another cache of the same grid, what is of scalars that it lacks (opacities,
+/// isosurfaces, colours of faces). `shown`: the scalar that takes the place of the one that is shown, if that
+/// is lacking.
 void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown);
 
 std::string toJson(const ViewState& state);

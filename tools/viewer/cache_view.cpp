@@ -122,7 +122,8 @@ void CacheView::takeRequestsOf(CacheView& before) {
   if (before.playback_.steps() == playback_.steps()) playback_ = before.playback_;
 }
 
-/// As the view before has it now. Reads only where the user has chosen another scalar since the view was prepared.
+/// The state that the view before has now, if there is one. Reads only where the user has chosen another
+/// scalar since the view was prepared.
 ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOptions& options) const {
   if (!options.carried) return prepared.state;
   ViewState state = options.carried->state;
@@ -202,7 +203,7 @@ void CacheView::giveUpSaving() {
   if (std::exchange(save_to_, std::nullopt)) say("The picture was not saved, because it could not be drawn.");
 }
 
-/// Of each damaged brick of a step once.
+/// Reports each damaged brick of a step once.
 void CacheView::reportDamage() {
   const BrickFailure* first = nullptr;
   for (const BrickFailure& failure : shown_->statistics.bricks_unreadable)

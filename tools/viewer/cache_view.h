@@ -31,7 +31,7 @@
 
 namespace curvisplat {
 
-/// Where things are in the window.
+/// The places of things in the window.
 struct WindowLayout {
   Rectangle panels, picture, status;
   bool shows_panels = true;
@@ -145,7 +145,8 @@ class CacheView {
   bool isUntouchedPreview() const { return preview_ && toJson(state_) == first_state_; }
   std::optional<glm::dvec2> placeOf(const glm::dvec3& point, const WindowLayout& layout) const;
   bool isShown() const { return shown_ && shown_->request == request_; }
-  /// Of a moving camera there is one picture, and the loop may have yet to notice that it has drawn it.
+  /// Whether better pictures will follow. There is one picture of a moving camera, and the loop may have yet
+  /// to notice that it has drawn it.
   bool isRefining() const { return frames_->busy() && !(was_moving_ && isShown()); }
   bool isFinal() const { return isShown() && shown_->is_final && !chooser_.busy(); }
   void say(const std::string& text) { reports_.say(text); }

@@ -53,7 +53,7 @@ void CacheView::showPicture(const WindowLayout& layout) {
   if (!overlay_.isEmpty()) list->AddImage(overlay_.id(), toImGui(place.x, place.y), toImGui(right, bottom));
 }
 
-/// By the picture that is shown.
+/// Finds a point in the picture that is shown.
 std::optional<glm::dvec2> CacheView::placeOf(const glm::dvec3& point, const WindowLayout& layout) const {
   if (!shown_) return std::nullopt;
   const ScreenView& view = shown_->view;
@@ -215,7 +215,7 @@ void CacheView::savePictureIfFinal() {
   }
 }
 
-/// That draws what is shown; empty of one step.
+/// The option that draws the time that is shown; empty of one step.
 std::string CacheView::timeOption() const {
   const StepPosition at = playback_.position();
   if (playback_.steps() == 1) return {};
@@ -223,7 +223,8 @@ std::string CacheView::timeOption() const {
                       : fmt::format(" --time={} --interpolate", cache_.series().timeAt(at));
 }
 
-/// Of another size than the window's: it is drawn in the background. What is seen in the window is in it.
+/// Saves a picture of another size than the window's: it is drawn in the background. What is seen in the
+/// window is in it.
 void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
   movie_kind_ = MovieKind::kOnePicture;
   saveMovieTo(file);
@@ -420,7 +421,7 @@ void CacheView::colourFaces(const std::string& scalar) {
   changed_ = true;
 }
 
-/// On another thread: a file may be large.
+/// Reads a surface on another thread: a file may be large.
 void CacheView::readSurface(const fs::path& file) {
   if (reading_surface_.valid()) return say("A surface is being read already.");
   if (state_.surfaces.size() + state_.faces.size() >= kMaxSurfaces)

@@ -50,7 +50,8 @@ uint64_t framesOf(const MovieRequest& movie);
 /// "90 pictures of 1280 x 800, 3.6 s".
 std::string textOf(const MovieRequest& movie);
 
-/// Where a movie named so is written: as it is, or with the frame's number if it is of pictures: "a.png" -> "a_%04d.png".
+/// The name under which a movie named so is written: as it is, or with the frame's number if it is of
+/// pictures: "a.png" -> "a_%04d.png".
 std::filesystem::path movieNameOf(const std::filesystem::path& file);
 
 /// Draws and writes all of it; returns the name of what was written. Its reader goes to other steps. Any thread. Throws Error as

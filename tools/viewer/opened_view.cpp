@@ -45,7 +45,7 @@ constexpr size_t kMaxTitle = 60;
 
 }  // namespace
 
-/// Of this size; where the view prepares on the thread that opens.
+/// A view of a picture of this size as the thread that opens prepares it.
 struct OpenedView::Preparation {
   ViewerOptions options;
   ImageSize picture;

@@ -51,8 +51,8 @@ struct ViewerOptions {
   std::vector<std::filesystem::path> files;  // to open first, in place of a cache
   double target_s = 0.033;                   // per picture while moving
 
-  /// For the cache that is shown: the grid's files that were opened, if it is a kept cache of them; the
-  /// preview, if it is one; and the view of the same grid that it continues.
+  /// Facts about the cache that is shown: the grid's files that were opened, if it is a kept cache of them;
+  /// the preview, if it is one; and the view of the same grid that it continues.
   std::vector<std::filesystem::path> grid_files;
   std::optional<Preview> preview;
   std::shared_ptr<const CarriedView> carried;

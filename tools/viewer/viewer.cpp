@@ -100,7 +100,7 @@ class Viewer {
     reports_.attempt([&] { reports_.say("saved " + fs::absolute(done->take()).string()); });
   }
 
-  /// Of what goes on in the background.
+  /// Draws what goes on in the background.
   void drawJobs(const Rectangle& picture) {
     JobDisplay display(picture, window_);
     opened_.drawOpening(display);

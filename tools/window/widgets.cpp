@@ -52,7 +52,7 @@ uint64_t appearanceOf(const ImDrawData& frame) {
 
 namespace {
 
-// Where distributions put DejaVu Sans; the first is where the build found it.
+// The places where distributions put DejaVu Sans; the first is where the build found it.
 constexpr std::array kSystemFiles{CURVISPLAT_FONT, "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
                                   "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
                                   "/usr/share/fonts/dejavu/DejaVuSans.ttf",

@@ -153,7 +153,8 @@ class Window {
   GLFWwindow* window_ = nullptr;
   std::unique_ptr<GlFunctions> gl_;
   std::string context_name_;
-  // As of GLFW's last callback: querying would wait for the display, which may still be showing a frame.
+  // The size as of GLFW's last callback: querying would wait for the display, which may still be showing a
+  // frame.
   ImageSize pixels_{0, 0};
   int width_ = 0;  // in units of the mouse
 

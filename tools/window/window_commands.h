@@ -72,7 +72,7 @@ struct CommandInfo {
   bool begins_group = false;  // a line is drawn above it
 };
 
-/// In the order of the menus.
+/// The commands in the order of the menus.
 std::span<const CommandInfo> commands();
 const CommandInfo& infoOf(Command command);
 /// The command of a key; nullopt if it has none.
