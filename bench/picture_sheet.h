@@ -17,7 +17,7 @@ class PictureSheet {
   /// size 0 x 0) leaves its place blank.
   void addRow(const std::string& label, const std::vector<Image>& pictures);
 
-  /// Over white.
+  /// The sheet over white.
   Image image() const;
 
  private:

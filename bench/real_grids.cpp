@@ -63,7 +63,7 @@ double opticalDepth(double transmittance) {
   return -std::log(std::clamp(transmittance, 1e-12, 1.0));
 }
 
-/// Where in a picture of a uniform medium the ray is how deep in the grid.
+/// The depth in the grid of the ray through each pixel, from a picture of a uniform medium.
 class Outline {
  public:
   explicit Outline(const Image& truth) : size_(truth.size), depth_(size_.pixels()) {
@@ -101,7 +101,7 @@ double decibels(double square_sum, size_t pixels) {
   return std::min(kMax, -10 * std::log10(square_sum / static_cast<double>(pixels)));
 }
 
-/// Of two pictures of a uniform medium, black over white.
+/// The ripple of two pictures of a uniform medium, black over white.
 Ripple rippleOf(const Image& picture, const Image& truth) {
   constexpr double kThin = 0.05;  // of the largest depth: thinner places have no ripple worth a ratio
   constexpr int kMargin = 2;
@@ -264,7 +264,7 @@ class Measurement {
     return readImage(path);
   }
 
-  /// Of the same size, or empty.
+  /// VTK's picture of the same size, or empty.
   Image byVtk(const OpenGrid& grid, const NamedView& view, const char* what) const {
     const auto path = pathOf(grid, view, what, "png");
     return std::filesystem::exists(path) ? readImage(path) : Image();

@@ -59,7 +59,8 @@ TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
   EXPECT_EQ(readTextFile(file("a.png")), readTextFile(file("b.png"))) << result.out;
 }
 
-/// Of grids from thin to long, in pictures from wide to high: nothing is cut off at the sides, with an outline nor without.
+/// Grids are thin to long, and pictures wide to high: nothing is cut off at the sides, with an outline or
+/// without.
 TEST_P(DefaultPictures, HoldTheWholeData) {
   constexpr int kTouchedZoomed = 6;  // of 640 pixels along the edges
   convert(GetParam(), "48x32x24");

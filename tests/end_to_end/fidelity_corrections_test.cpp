@@ -138,7 +138,7 @@ TEST_F(Corrections, LayersBehindSeveralFaces) {
   EXPECT_GT(outside(false), 1e-3) << "is not needed";
 }
 
-/// Through the middle of the half-annulus: across the view, along it, and both.
+/// Clip planes through the middle of the half-annulus: across the view, along it, and both.
 const ClipPlane kAcross{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
 const ClipPlane kAlong{{-0.5, 0.1, 0.4}, {0.1, -0.9, -0.6}};
 

@@ -129,7 +129,7 @@ TEST_F(Surfaces, ASphereIsLitAndCutsTheSplats) {
   expectWorth("sphere", "smooth", layers, scene, {48.5, 46, 44}, 2);
 }
 
-/// As surfaces in the view of `camera`.
+/// The curve as surfaces, in the view of `camera`.
 std::shared_ptr<SurfaceScene> curveScene(const std::vector<glm::dvec3>& points, double width,
                                          const Camera& camera) {
   SurfaceScene curves;

@@ -87,8 +87,8 @@ class Fidelity : public ProgramSuite<Fidelity> {
     EXPECT_LT(difference.largest, 1.0 / 255);
   }
 
-  /// Of the processor's painter: least fidelity from the finest level, from the root alone, and that detail
-  /// never costs any.
+  /// Expects a least fidelity of the processor's painter from the finest level and from the root alone, and
+  /// that detail never costs any.
   static void expectPsnr(const std::string& name, double least_db, double least_of_root_db) {
     const Image& reference = knownReference(name, kSize);
     double coarser_db = least_of_root_db;

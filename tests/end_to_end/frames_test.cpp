@@ -43,7 +43,7 @@ class Frames : public ProgramSuite<Frames> {
 
   static std::string cache(const std::string& name = "small") { return file(name + ".splats"); }
 
-  /// Of a million nodes; made by the first who asks.
+  /// A cache of a million nodes; made by the first who asks.
   static std::string large() {
     if (!fs::exists(cache("large"))) madeCache(file("large"), "half-annulus", "160x80x80");
     return cache("large");

@@ -36,7 +36,7 @@ std::map<std::string, uint64_t> checksumsOf(const fs::path& folder) {
 
 class InterruptedConversion : public ProgramSuite<InterruptedConversion> {
  protected:
-  // So many that the least memory takes several buckets.
+  // Makes a grid so large that the least memory takes several buckets.
   static void prepare() {
     Progress progress;
     writePlot3d(SceneGridSource(makeScene("wake"), {160, 100, 90}), *folder_ / "in", progress);

@@ -1,4 +1,4 @@
-// Kept caches where several programs make one, files change meanwhile, and what lies in their folder is damaged.
+// Caches that are kept: several programs make one, files change meanwhile, and what lies in their folder is damaged.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -120,7 +120,7 @@ void writeSet(const std::string& set, const std::string& file, int times) {
   out << "</vtkMultiBlockDataSet></VTKFile>";
 }
 
-// It ends: each block was compared with every other one, which took more than a minute.
+// Each block was once compared with every other one, which took more than a minute.
 TEST_F(KeptCaches, InfoOfASetThatNamesOneFileThousandsOfTimesEnds) {
   writeFileAtomically("one.vts", vtsFile(annulusVtsGrid(2, 2, 2), {}));
   writeSet("many.vtm", "one.vts", 5000);

@@ -1,6 +1,6 @@
-// As little memory, as many threads, as large and as small a picture as there may be; and an index of a
-// million bricks, as 10^10 nodes have: opened, planned and drawn in bounded memory. How long that takes is
-// for bench/index_bench.cpp to say.
+// The limits: as little memory, as many threads, as large and as small a picture as there may be; and an
+// index of a million bricks, as 10^10 nodes have: opened, planned and drawn in bounded memory. How long that
+// takes is for bench/index_bench.cpp to say.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -105,7 +105,7 @@ TEST_F(LimitsTest, LongRowsAreConvertedWithinTheMemory) {
        mebibytes(kMebibytes)});
 }
 
-// Whose boxes overlap, so that the check for overlaps picks the points of all of them.
+// The blocks' boxes overlap, so that the check for overlaps picks the points of all of them.
 TEST_F(LimitsTest, ManySmallBlocksAreConvertedWithinTheMemory) {
   constexpr uint64_t kMebibytes = 160;
   constexpr int32_t kBlocks = 10'000, kSide = 4;
@@ -232,7 +232,7 @@ TEST_F(LimitsTest, ALineOfPixelsHasRoomForAnnotations) {
 }
 
 constexpr uint64_t kBricks = 1'000'001;  // the root, and eights
-// Of 144 + 40 bytes a brick on disk, and what the program takes without them.
+// The memory of 144 + 40 bytes a brick on disk, and what the program takes without them.
 constexpr uint64_t kMaxMemoryBytes = uint64_t{320} << 20;
 
 class SparseCache : public ProgramSuite<SparseCache> {
@@ -259,7 +259,7 @@ TEST_F(SparseCache, IsDescribed) {
   EXPECT_GT(info["splats"], 9'000'000'000);
 }
 
-/// Its coarse levels are those of the lattice, of which the third is the finest.
+/// The sparse cache's coarse levels are those of the lattice, of which the third is the finest.
 TEST_F(SparseCache, IsDrawnAsTheLatticeWithinItsMemory) {
   writeLatticeCache(file("lattice.splats"), 0, {1, 0, 0});
   // On the screen a cell of level n is 150 / 2^n pixels long; the sparse cache's errors are a sixteenth of that.

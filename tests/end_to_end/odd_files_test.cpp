@@ -36,7 +36,7 @@ class OddFiles : public ProgramTest {
 
   std::string cache() const { return file("cube.splats"); }
 
-  /// Through a shell: `command` ends in redirections.
+  /// Runs the program through a shell: `command` ends in redirections.
   ProgramResult shell(const std::string& command) const {
     return RunningProgram(
                {"sh", "-c", "cd '" + folder_.path().string() + "' && " CURVISPLAT_PROGRAM " " + command},

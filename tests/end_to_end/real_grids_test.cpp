@@ -158,7 +158,7 @@ TEST_P(RealVolumes, AreTheSumsOfTheWeights) {
   EXPECT_NEAR(ratio, 1, 0.01);
 }
 
-// Of one block. The dome's bent cells are larger than their hexahedra, by 1.3 % at this size.
+// Volumes of one block. The dome's bent cells are larger than their hexahedra, by 1.3 % at this size.
 INSTANTIATE_TEST_SUITE_P(Generated, RealVolumes, testing::Values(kSpectral),
                          [](const auto& grid) { return std::string(grid.param.name); });
 INSTANTIATE_TEST_SUITE_P(Shared, RealVolumes, testing::Values(kBluntfin, kCombustor, kLoxPost),

@@ -127,7 +127,7 @@ class UntrustedCache : public ProgramTest {
                                more);
   }
 
-  /// None opens it.
+  /// Expects that no command opens the cache.
   void expectNoneOpens(const fs::path& cache, const std::string& says) {
     expectRefused(runWithLittleMemory({"info", cache.string()}), 1, {says});
     expectRefused(runWithLittleMemory({"bench", cache.string(), "--quick"}), 1, {says});
@@ -137,7 +137,7 @@ class UntrustedCache : public ProgramTest {
     SCOPED_TRACE("to be refused: " + says);
     expectNoneOpens(harmed(harm), says);
   }
-  /// It opens, since opening reads no payload; who reads the brick refuses it.
+  /// Expects that the cache opens, since opening reads no payload; who reads the brick refuses it.
   void expectBrickRefused(const std::string& says, const Harm& harm) {
     SCOPED_TRACE("to be refused: " + says);
     const fs::path cache = harmed(harm);
@@ -147,7 +147,7 @@ class UntrustedCache : public ProgramTest {
     EXPECT_EQ(render(cache, {"--keep-going"}).status, 0);
   }
 
-  /// Of random splats, some are about weights.
+  /// What `info --verify` finds. Splats are random, so that some findings are about weights.
   static std::string findingsIn(const fs::path& cache) {
     return runWithLittleMemory({"info", cache.string(), "--verify"}).out;
   }

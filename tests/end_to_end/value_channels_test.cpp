@@ -66,7 +66,7 @@ class ValueChannelsTest : public ProgramSuite<ValueChannelsTest> {
     return {camera.position, glm::normalize(forward + half * (across * right + upwards * up))};
   }
 
-  /// Where the ray has half of its opacity; `kappa` at a point.
+  /// The point at which the ray has half of its opacity; `kappa` at a point.
   std::optional<At> halfAlong(const std::function<double(const glm::dvec3&)>& kappa, const glm::dvec3& origin,
                               const glm::dvec3& direction) const {
     constexpr double kStep = 0.002;

@@ -131,7 +131,7 @@ class WindowOpening : public KeptCaches {
   static std::string titleOfWindow() {
     return outputOf({"/usr/bin/env", "xdotool", "getwindowname", windowNumber()});
   }
-  /// As from a file manager.
+  /// Drops files as a file manager does.
   static void drop(const Words& files) {
     const Words words{"python3", CURVISPLAT_TEST_DATA "/../support/drop_files.py", windowNumber(), "560",
                       "300"};
@@ -342,7 +342,7 @@ TEST_F(WindowOpening, ASeriesIsOpened) {
   EXPECT_EQ(kept().size(), 1u);  // the same one
 }
 
-/// Of a series that was stopped nothing stays once the window has left it.
+/// Nothing stays of a series that was stopped once the window has left it.
 TEST_F(WindowOpening, ASeriesThatIsStoppedLeavesNothing) {
   run({"generate", "wake", "--size", "96x64x48", "--steps", "8", "-o", "long"});
   Words files{"long.xyz"};
@@ -397,7 +397,7 @@ TEST_F(FurtherScalarTest, WithoutTheSourcesNoneIsOffered) {
   close();
 }
 
-/// It is in a cache of its own within the one that is shown.
+/// The scalar is in a cache of its own within the one that is shown.
 TEST_F(WindowOpening, AScalarWithOwnBlanksIsShownWhenItIsChosen) {
   fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/own_blanks.splats", "sets.splats",
            fs::copy_options::recursive);

@@ -62,7 +62,7 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   expectDraws(command, twice);
 }
 
-/// As if a frame took so long that all of it came before the next one: Control and A, letters, Return.
+/// One frame takes so long that all input comes before the next one: Control and A, letters, Return.
 TEST_F(WindowPictures, HaveTheNameThatWasTypedDuringOneFrame) {
   open();
   save();

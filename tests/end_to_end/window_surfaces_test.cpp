@@ -71,7 +71,7 @@ TEST_F(WindowSurfaces, FacesOfTheGridAreAddedColouredUndoneAndRemoved) {
   expectDraws(commands[3], by_function);
 }
 
-/// They are there again in the next window, without the volume that was switched off.
+/// Surfaces are there again in the next window, without the volume that was switched off.
 TEST_F(WindowSurfaces, AreRemembered) {
   openWithRoom();
   choose("Picture", "Add an isosurface");
@@ -141,7 +141,7 @@ TEST_F(WindowSurfaces, NoTwoWidgetsAreOne) {
   close();
 }
 
-/// It can be typed, and stays where it is when the other side is kept.
+/// A clip plane's coordinate can be typed, and stays where it is when the other side is kept.
 TEST_F(WindowSurfaces, AClipPlaneIsAtACoordinate) {
   openWithRoom();
   const Image whole = save();
@@ -172,7 +172,7 @@ TEST_F(WindowSurfaces, AClipPlaneIsAtACoordinate) {
   expectDraws(commands[1], other);
 }
 
-/// In a window that ends above the list.
+/// The window ends above the list.
 TEST_F(WindowSurfaces, WhatTheMenuAddsIsScrolledTo) {
   open();
   save();

@@ -224,7 +224,7 @@ class MeshSweep : public ConversionSweep {
     writeFileAtomically(grid_, MixedCells(4).file());
     inputs_ = filesOf(input_.path());
   }
-  /// Of this scalar and the next one.
+  /// Sets up an addition of this scalar and the next one.
   void setUpFrom(const std::string& name) {
     startAnew();
     const std::vector<GridScalar> scalars = open()->description().scalars;

@@ -38,7 +38,7 @@ class RenderSweep : public ::testing::Test {
     picture_ = filesOf(pictures_).at("a.png");
   }
 
-  /// As `curvisplat render` does.
+  /// Draws as `curvisplat render` does.
   void draw() {
     const CacheReader cache(cache_);
     const Manifest& manifest = cache.manifest();
@@ -145,7 +145,7 @@ class ExportSweep : public ::testing::Test {
     return files;
   }
 
-  /// As `curvisplat export` does.
+  /// Exports as `curvisplat export` does.
   void exportTo(const fs::path& file) const {
     const CacheReader cache(cache_);
     Progress progress;
@@ -160,7 +160,7 @@ class ExportSweep : public ::testing::Test {
     }
   }
 
-  /// As `curvisplat render --orbit` does.
+  /// Draws frames as `curvisplat render --orbit` does.
   void drawFrames(const fs::path& name) const {
     const CacheReader cache(cache_);
     const Manifest& manifest = cache.manifest();
@@ -181,7 +181,7 @@ class ExportSweep : public ::testing::Test {
     output->finish();
   }
 
-  /// Of a job that writes `expected`, in this order, where there was nothing, or `old`.
+  /// The sweep of a job that writes `expected`, in this order, where there was nothing, or `old`.
   faults::FaultSweep writing(const std::function<void()>& job, const Files& expected,
                              const Files& old) const {
     faults::FaultSweep sweep;

@@ -74,7 +74,7 @@ class SmallConversion : public ::testing::Test {
     writeFiles(input_.path(), inputs_);
     writeFiles(work_, {});
   }
-  /// Beside the cache of the first scalar.
+  /// Begins with the cache of the first scalar.
   void startWithOne() const {
     startAnew();
     writeFiles(output_, one_);

@@ -71,7 +71,7 @@ void writeStreams(const Seeds& seeds) {
   }
 }
 
-/// Of a scalar that grows from step to step, as the second and third of a group are coded.
+/// Writes values of a scalar that grows from step to step, as the second and third of a group are coded.
 void writeValuesInTime(const Seeds& seeds) {
   constexpr uint16_t kSplats = 20;
   const auto valuesAt = [](double time) {

@@ -47,7 +47,7 @@ class FuzzInput {
     if (!bytes.empty()) std::memcpy(&value, bytes.data(), bytes.size());
     return value;
   }
-  /// At most `count`.
+  /// Takes at most `count` bytes.
   std::span<const std::byte> takeBytes(size_t count) {
     const auto taken = rest_.first(count < rest_.size() ? count : rest_.size());
     rest_ = rest_.subspan(taken.size());

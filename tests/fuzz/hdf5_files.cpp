@@ -67,7 +67,7 @@ class Writer {
     write(path, attribute, type, space.id(), filled.data());
   }
 
-  /// Without a name of an attribute a data set.
+  /// Writes an attribute or, if its name is empty, a data set.
   void write(const std::string& path, const std::string& attribute, hid_t type, hid_t space,
              const void* values) {
     if (attribute.empty()) {

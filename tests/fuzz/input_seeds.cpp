@@ -233,7 +233,7 @@ void writeNetcdf(const Seeds& seeds) {
   }
 }
 
-/// As models of the ocean and the atmosphere write them.
+/// Writes files as models of the ocean and the atmosphere do.
 void writeModels(const Seeds& seeds) {
   const TemporaryFolder folder;
   const fs::path path = folder / "a.nc";

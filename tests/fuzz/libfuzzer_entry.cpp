@@ -19,7 +19,7 @@
 
 namespace {
 
-/// Of _Unwind_Backtrace(): notes whether a frame is of a library that reads data.
+/// Notes whether a frame of _Unwind_Backtrace() is of a library that reads data.
 _Unwind_Reason_Code noteLibrary(_Unwind_Context* frame, void* found) {
   Dl_info place{};
   if (dladdr(reinterpret_cast<void*>(_Unwind_GetIP(frame)), &place) == 0 || !place.dli_fname)

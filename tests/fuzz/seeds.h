@@ -46,9 +46,9 @@ class Seeds {
   std::filesystem::path folder_;
 };
 
-/// Of the cache's files.
+/// Writes seeds of the cache's files.
 void writeCacheSeeds(const Seeds& seeds);
-/// Of grids, surfaces and pictures.
+/// Writes seeds of grids, surfaces and pictures.
 void writeInputSeeds(const Seeds& seeds);
 
 }  // namespace curvisplat

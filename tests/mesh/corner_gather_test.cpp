@@ -182,7 +182,7 @@ struct Disk {
   uint64_t forecast = 0, bound = 0, used = 0;
 };
 
-/// Of a conversion with one scalar, whose passes over the mesh have `mesh_bytes` of memory.
+/// The disk that a conversion with one scalar takes, whose passes over the mesh have `mesh_bytes` of memory.
 Disk diskOf(const MeshSource& mesh, uint32_t scalar, uint64_t mesh_bytes) {
   const TemporaryFolder folder;
   ConvertOptions options;

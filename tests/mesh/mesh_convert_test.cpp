@@ -123,7 +123,7 @@ TEST_F(MeshConvert, BytesAreTheSameForAnyThreadsAndMemory) {
     }
 }
 
-/// Its cells from `first` on come in a random order.
+/// The piece with its cells from `first` on in a random order.
 ArrayPiece shuffledFrom(size_t first, const ArrayPiece& piece) {
   std::vector<size_t> order(piece.cells.size());
   std::iota(order.begin(), order.end(), size_t{0});

@@ -102,7 +102,7 @@ TEST_P(MeshLattice, LinesAreDenseWhereThePointsAre) {
   EXPECT_NEAR(static_cast<double>(below) / static_cast<double>(nodes.block.ni), 0.375, 0.05);
 }
 
-/// Its cells number the points of their own piece.
+/// Cells of a piece number the points of their own piece.
 TEST_P(MeshLattice, HasTheValuesOfAMeshInPieces) {
   const ArrayPiece whole = boxes(12, [](const glm::dvec3&) { return true; });
   const ArrayMesh in_pieces(split(whole, 3, [](size_t cell) { return cell % 3; }));

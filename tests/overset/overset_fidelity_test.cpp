@@ -89,7 +89,7 @@ FunctionGridSource boxesInARow(double overlap) {
   });
 }
 
-/// Of the optical depth over its mean, for a picture of the joint, seen along it.
+/// The ripple of the optical depth over its mean, for a picture of the joint, seen along it.
 double rippleAtJoint(const Image& image) {
   double sum = 0, squares = 0;
   for (size_t n = 0; n < image.rgba.size(); n += 4) {

@@ -69,7 +69,7 @@ std::string refusal(const GridSource& source, const AddScalarOptions& options) {
   return curvisplat::errorOf([&] { added(source, options); });
 }
 
-/// That `files` has all payload and index files of `others`, byte for byte.
+/// Expects that `files` has all payload and index files of `others`, byte for byte.
 void expectHolds(const Files& files, const Files& others, const char* when) {
   for (const auto& [name, bytes] : others) {
     if (name == "manifest.json") continue;
@@ -333,7 +333,7 @@ class ToAnExistingCache : public ::testing::Test {
  protected:
   ToAnExistingCache() { convertTo(cache, source, {0}), before = allFilesOf(cache); }
 
-  /// That adding is refused with these words, and changes nothing.
+  /// Expects that adding is refused with these words, and changes nothing.
   void expectRefused(const GridSource& from, const AddScalarOptions& options, const std::string& words) {
     const std::string text = refusal(from, options);
     expectSays(text, words);

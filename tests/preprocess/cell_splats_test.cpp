@@ -39,7 +39,7 @@ struct CellBlock : MappedBlock {
           values[at(i, j, k)] = static_cast<float>(f(centre(i, j, k)));
   }
 
-  /// As a NodeReader marks them.
+  /// Marks nodes without values as a NodeReader does.
   void mark() {
     for (size_t n = 0; n < block.nodes(); ++n)
       for (const auto& values : nodes.scalars) nodes.blank[n] |= std::isnan(values[n]) ? kNoValue : 0;

@@ -19,7 +19,7 @@ namespace {
 
 const std::filesystem::path kShared = CURVISPLAT_SHARED_DATA;
 
-/// As zlib's: polynomial 0x04c11db7, reflected.
+/// The checksum of zlib: polynomial 0x04c11db7, reflected.
 class Crc32 {
  public:
   template <typename Value>

@@ -131,7 +131,7 @@ class CgnsHolesOfZones : public Cgns {
     file.hole("Hole", cells, indices, ranges);
   }
 
-  /// Of every box of rows: the nodes that are blanked, and the cells without a value.
+  /// Expects these blanked nodes and cells without a value, for every box of rows.
   void expectBlanked(const Hidden& node, const Hidden& cell) const {
     const auto source = open();
     EXPECT_TRUE(source->description().warnings.empty());

@@ -43,7 +43,7 @@ class CutRows : public testing::Test {
     return window_nodes * slabBytesPerNode(scalars);
   }
 
-  /// Into how many parts rows are cut at the most.
+  /// The number of parts into which rows are cut, at most.
   static size_t partsOfRows(const GridSource& source, uint64_t window_nodes) {
     const bool cells = source.description().scalars.front().centring == Centring::kCell;
     size_t most = 0, parts = 0;

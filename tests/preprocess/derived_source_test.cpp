@@ -131,7 +131,7 @@ TEST(DerivedSource, HasTheTextbookValuesAtEveryNode) {
   }
 }
 
-// Of a field that is linear in x, y, z differences give the exact gradient on any grid, at its ends too.
+// Differences give the exact gradient of a field that is linear in x, y, z on any grid, at its ends too.
 TEST(DerivedSource, DifferentiatesLinearFlowExactly) {
   const auto flow = [](const glm::dvec3& x) {
     return Flow{1,

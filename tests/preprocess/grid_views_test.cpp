@@ -189,7 +189,7 @@ double numberOf(uint64_t i, uint64_t j, uint64_t k) {
   return static_cast<double>(i + 100 * j + 10000 * k);
 }
 
-/// Its coordinates and its scalar are the indices.
+/// A grid whose coordinates and scalar are the indices.
 class Numbered final : public GridSource {
  public:
   Numbered() {

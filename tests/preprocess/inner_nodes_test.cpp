@@ -162,7 +162,7 @@ glm::dmat3 randomAxes(std::mt19937& random) {
   return turn;
 }
 
-/// Of several axes, one or none; beyond what codes hold; between two steps.
+/// Growth along several axes, one or none; beyond what codes hold; between two steps.
 std::array<float, 3> randomGrowth(std::mt19937& random) {
   std::uniform_real_distribution<float> length(-0.8f, 0.8f);
   std::array<float, 3> growth{};

@@ -136,7 +136,7 @@ inline Bytes plot3dBytes(const Plot3dLayout& layout, const std::vector<TestBlock
   return file;
 }
 
-/// As a text, equal neighbours written with repeat counts.
+/// The file as text, equal neighbours written with repeat counts.
 inline Bytes plot3dText(const Plot3dLayout& layout, const std::vector<TestBlock>& blocks) {
   std::string text;
   const auto append = [&](const auto& numbers) {

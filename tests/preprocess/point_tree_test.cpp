@@ -1,5 +1,5 @@
-// Which boxes hold a point, and which points lie in a hexahedron: by the trees, and by looking at all of
-// them.
+// Trees that find the boxes that hold a point, and the points that lie in a hexahedron: compared with looking
+// at all of them.
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 

@@ -126,7 +126,7 @@ bool isWhole(const GridBlock& block, const Index& cell, const IsThere& is_there)
   return true;
 }
 
-/// Those of its nodes for which `isGone` says so: blanked, by value, not finite or not in a place.
+/// Why some nodes are gone: blanked, by value, not finite or not in a place.
 enum class Gone { kBlanked, kByValue, kNotFinite, kNowhere };
 
 std::unique_ptr<FunctionGridSource> gridWithGone(const Index& counts, uint64_t seed, Gone how) {

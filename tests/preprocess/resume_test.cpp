@@ -50,7 +50,8 @@ class StoppingSystemCalls : public SystemCalls {
   std::atomic<int64_t> writes_ = 0;
 };
 
-/// Of the last calls of a conversion, these come when all bricks are written; and these remove an old cache.
+/// Calls at the end of a conversion: kCallsToFinish come when all bricks are written, kCallsToRemove remove
+/// an old cache.
 constexpr int64_t kCallsToFinish = 17, kCallsToRemove = 8;
 
 class Resume : public ::testing::Test {
@@ -138,7 +139,7 @@ class Resume : public ::testing::Test {
       EXPECT_TRUE(files.contains(name) && files.at(name) == bytes) << name;
   }
 
-  /// It does not open as a cache, unless it has all that the cache has.
+  /// Expects that the folder does not open as a cache, unless it has all that the cache has.
   void expectUnfinishedOrWhole(const fs::path& path) const {
     try {
       const CacheReader reader(path);

@@ -77,7 +77,7 @@ class SharedAddition : public testing::Test {
     EXPECT_EQ(entriesOf(folder_.path()), 2u) << "something is left";
   }
 
-  /// That a job fails with these words, and leaves the cache as it was.
+  /// Expects that a job fails with these words, and leaves the cache as it was.
   void expectFails(unsigned count, const std::function<void(Ranks& ranks)>& job, const std::string& words) {
     SCOPED_TRACE(words);
     const Files before = allFilesOf(options().cache);

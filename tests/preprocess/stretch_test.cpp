@@ -79,15 +79,15 @@ TEST(Stretch, IsAsItIsDefined) {
   }
 }
 
-/// Of Crawfis and Max (1993), in units of the cell.
+/// The kernel of Crawfis and Max (1993), in units of the cell.
 double kernel(double r) {
   if (r < 0.889392) return 0.557526 + r * r * (-1.157743 + 0.671033 * r);
   const double left = std::max(0.0, 1.556228 - r);
   return left * left * (0.067599 + 0.282474 * left);
 }
 
-/// Of a uniform medium on a line of these steps: rms of the density over its mean, away from the ends. `plain`: kernels as long as
-/// their cells, symmetric, in the middles.
+/// The ripple of a uniform medium on a line of these steps: rms of the density over its mean, away from the
+/// ends. `plain`: kernels as long as their cells, symmetric, in the middles.
 struct RippleOptions {
   bool plain = false;
   StretchFit fit = StretchFit::kSteep;
@@ -205,7 +205,8 @@ TEST(Stretch, OfSpectralElementsIsTheSameWhereALineEndsBetweenTwo) {
   EXPECT_GT(whole.stretch(6), 1.05);
 }
 
-/// Of nodes whose distances grow by `factor` from one to the next, twelve times, and shrink again.
+/// Expects the stretches of a row to have the bits of those of its nodes one by one. The distances between
+/// nodes grow by `factor` from one to the next, twelve times, and shrink again.
 void expectOneRow(double factor) {
   std::mt19937_64 random(2);
   std::uniform_real_distribution<double> jitter(-0.3, 0.3);

@@ -127,7 +127,7 @@ TEST(PositionSample, HasAllNodesOfASmallGridButBlankedOnes) {
   EXPECT_EQ(sample.positions().size(), 39u * 30 * 25 + 7 * 60 * 31);
 }
 
-/// Of a part of the grid, be it a plane, a column or a box, about as many as of the others.
+/// A part of the grid, be it a plane, a column or a box, has about as many samples as the others.
 TEST(PositionSample, IsEven) {
   const PositionSample sample = sampleOf(twoBoxes(), 6000, 64 << 20);
   ASSERT_GT(sample.nodesEach(), 5u);

@@ -94,7 +94,7 @@ Ending endingOf(const std::filesystem::path& path, const Content& whole, const s
   return ending;
 }
 
-/// Of this many truncations and wrong bytes of a file, all with tools/test.sh --whole, usually one in four.
+/// Truncations and wrong bytes of a file: all with tools/test.sh --whole, usually one in four.
 constexpr size_t kTruncations = 100, kWrongBytes = 1000;
 size_t tried(size_t of_all) {
   return faults::isWholeSweep() ? of_all : of_all / 4;

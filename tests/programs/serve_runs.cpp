@@ -98,7 +98,7 @@ void closeRun(const Run& run) {
   if (run.process_ended >= 0) close(run.process_ended);
 }
 
-/// As stream/vdb/vdb_library.cpp does when it is first needed.
+/// Loads OpenVDB as stream/vdb/vdb_library.cpp does when it is first needed.
 void loadOpenVdb(const char* program) {
   std::string plugin(program);
   plugin.resize(plugin.rfind('/') + 1);

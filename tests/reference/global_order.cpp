@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-/// Of one splat or a record.
+/// The place of a splat or a record in the order.
 struct Placed {
   uint32_t key, first, brick, number;
   ScreenSplat splat;
@@ -22,7 +22,7 @@ void sort(std::vector<Placed>& placed) {
   });
 }
 
-/// As they are, in the order of their keys: none leans any more.
+/// The splats in the order of their keys: none leans any more.
 std::vector<ScreenSplat> sorted(std::vector<Placed> placed) {
   sort(placed);
   std::vector<ScreenSplat> splats;
@@ -33,7 +33,7 @@ std::vector<ScreenSplat> sorted(std::vector<Placed> placed) {
   return splats;
 }
 
-/// Those that may touch a tile, with their keys there.
+/// The splats that may touch a tile, with their keys there.
 std::vector<Placed> inTile(const std::vector<Placed>& placed, int x, int y) {
   std::vector<Placed> found;
   size_t first_record = 0;  // the records of a splat come before it

@@ -56,7 +56,7 @@ class GridProbe : public FieldProbe {
   }
 
  private:
-  /// From cell to neighbouring cell.
+  /// Goes from cell to neighbouring cell.
   bool follow(const glm::dvec3& world) {
     constexpr int kMaxCells = 4;
     GridField::InCell to = at_;

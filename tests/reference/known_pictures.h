@@ -25,7 +25,7 @@ struct KnownFunction {
   static KnownFunction of(const std::string& name, double low = 0, double high = 1, double length = 1);
 };
 
-/// Along the layers of half-annulus: they are seen edge-on.
+/// A camera that looks along the layers of half-annulus: they are seen edge-on.
 Camera edgeOnCamera();
 /// halfAnnulusCamera() in perspective: the focal plane is seen as large, under `view_angle_deg`.
 Camera perspectiveCamera(double view_angle_deg = 30);

@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kFacesOfLeaf = 4;
 constexpr double kOutside = 1e-9;  // of a face: how far beyond its edges a line still meets it
 
-/// Seen along a line: two coordinates across it, one along it.
+/// A line, and points as seen along it: two coordinates across it, one along it.
 class Line {
  public:
   Line(const glm::dvec3& origin, const glm::dvec3& direction) : origin_(origin), along_(direction) {

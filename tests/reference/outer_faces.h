@@ -1,4 +1,4 @@
-// Where rays meet the outer faces of a grid. A face is the bilinear patch of its four corners, as the
+// Finds where rays meet the outer faces of a grid. A face is the bilinear patch of its four corners, as the
 // trilinear map of its cell has it, so the outline of a marched picture is exact, and no part of a ray is too
 // short to be found.
 #pragma once

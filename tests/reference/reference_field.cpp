@@ -38,7 +38,7 @@ bool isIn(const Pipe& pipe, const glm::dvec3& p) {
          above >= 0 && above <= radius2;
 }
 
-/// Of the powers of t.
+/// Coefficients of the powers of t.
 using Cubic = std::array<double, 4>;
 
 double valueOf(const Cubic& f, double t) {

@@ -21,7 +21,7 @@ class FieldProbe {
 
   /// The scalar at a point of the world; nothing outside of the field.
   virtual std::optional<double> at(const glm::dvec3& world) = 0;
-  /// As at(), of a point in the field or just outside of it, which need not be found out.
+  /// The scalar as at() has it, for a point that is known to be in the field or just outside of it.
   virtual std::optional<double> atInside(const glm::dvec3& world) { return at(world); }
   /// How far one may go along `direction` (of length 1) from the point last asked about, which had a scalar,
   /// until about one cell of the grid is passed. Infinite where the field has no cells.

@@ -144,7 +144,7 @@ class Marcher {
     first_.reset();
   }
 
-  /// Without knowing where the field begins and ends.
+  /// Marches without knowing where the field begins and ends.
   void marchSearching(double begin, double end, double largest_step) {
     double t = begin;
     Sample here = sample(t);

@@ -132,7 +132,7 @@ ConvergedImage convergedMarch(const ReferenceField& field, const OpticalFunction
                               const Camera& camera, ImageSize size, MarchSteps steps = {},
                               double agreement_db = 75);
 
-/// As a picture over white.
+/// The picture over white.
 Image toImage(const ReferenceImage& reference);
 
 /// The camera of DESIGN.md, "Fidelity": orthographic, on the half-annulus.

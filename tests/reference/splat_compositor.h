@@ -53,7 +53,7 @@ Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationT
 /// Colours and extinction that change with the scalar, and a jump.
 ClassificationTable lively(bool log_scale = false);
 
-/// Without a jump: straight lines fit.
+/// A table without a jump: straight lines fit.
 ClassificationTable smooth(bool log_scale = false);
 
 /// Round, lean and thin ones, every other one skewed. Some lie outside of the image, some are larger than it, some much thinner than

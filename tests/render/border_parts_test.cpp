@@ -120,7 +120,7 @@ TEST(BorderParts, AtFacesAreOneThatIsCutThere) {
   }
 }
 
-/// Of Crawfis and Max (1993), along two axes, at x spacings from the middle.
+/// The kernel of Crawfis and Max (1993), along two axes, at x spacings from the middle.
 double marginal(double x) {
   constexpr int kSamples = 200;
   double sum = 0;

@@ -20,7 +20,7 @@ glm::dvec3 corner(int n) {
   return {n & 1 ? kUpper.x : kLower.x, n & 2 ? kUpper.y : kLower.y, n & 4 ? kUpper.z : kLower.z};
 }
 
-/// Where a point is in the image: -1..1 from the left and from the bottom.
+/// The place of a point in the image: -1..1 from the left and from the bottom.
 glm::dvec2 inImage(const Camera& camera, const glm::dvec3& world, ImageSize size) {
   const glm::dvec3 view(camera.viewFromWorld() * glm::dvec4(world, 1));
   const double half_height = camera.projection == Projection::kOrthographic

@@ -144,7 +144,7 @@ struct Classes {
   double unlimitedCells(double scalar) const {
     return (log_scale ? std::log(std::max(scalar, 1e-37)) : scalar) * scale + bias;
   }
-  /// At most half a cell outside of the table: nothing changes further out.
+  /// Cells of the table, at most half a cell outside of it: nothing changes further out.
   double cells(double scalar) const {
     return std::clamp(unlimitedCells(scalar), -0.5, ClassificationTable::kCells + 0.5);
   }

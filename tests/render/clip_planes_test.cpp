@@ -230,7 +230,8 @@ TEST(SplatCutter, APencilIsCutAcrossOnly) {
   EXPECT_LT(pieces, 100u);
 }
 
-// Such splats are in no cache that conversion makes, and in any that somebody wants to hang a program with.
+// Splats of such sizes are in no cache that conversion makes, and in any that somebody wants to hang a
+// program with.
 TEST(SplatCutter, EndsWhateverTheSize) {
   const ClassificationTable table([](double) { return TransferFunction::Value{glm::dvec3(1), 1.0}; }, 0, 1);
   for (const float size : {1e9f, 1e18f, 1e30f, 3e38f})

@@ -284,7 +284,7 @@ TEST(CpuPainter, FootprintIsClose) {
   }
 }
 
-// Else a window would wait for the rest of a large batch whenever its camera begins to move.
+// A window would otherwise wait for the rest of a large batch whenever its camera begins to move.
 TEST(CpuPainter, PaintsNothingMoreOnceStopped) {
   const ImageSize size{70, 50};
   const auto table = lively();

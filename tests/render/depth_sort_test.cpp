@@ -46,8 +46,8 @@ ScreenSplat leaning(float x, float y) {
   return splat;
 }
 
-// Against depths in double precision: no two splats that differ by more than rounding change places, and
-// holding keys within their brick's range moves none.
+// Keys are compared with depths in double precision: no two splats that differ by more than rounding change
+// places, and holding keys within their brick's range moves none.
 TEST_F(DepthKeysTest, AreInTheOrderOfTheDepths) {
   std::mt19937 random(3);
   const RootCube& root = cache_->manifest().root;

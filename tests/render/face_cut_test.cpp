@@ -98,7 +98,7 @@ TEST(FaceCut, LeavesAllOrNothingFarFromTheFace) {
   EXPECT_EQ(cutAtFaces(example.rows, example.piece, example.ellipse(), kLowPass2, cut), Remains::kAll);
 }
 
-// Seen edge-on, the low-pass makes a step as wide as a pixel's, however large the splat.
+// The step at a face that is seen edge-on is as wide as the low-pass makes it, however large the splat.
 TEST(FaceCut, IsAntialiasedEdgeOn) {
   for (const float size : {10.0f, 1000.0f, 1e5f}) {
     SplatPiece piece{{0, 0, 0}, {size, size, size, 0, 0, 0}, {0, 0, 0}, 0, 1};

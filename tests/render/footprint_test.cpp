@@ -267,7 +267,7 @@ TEST(Light, LeavesWhatHasNoGradient) {
   }
 }
 
-/// Of 1000 magnitudes the squares of their ranks, each with a volume of its own.
+/// The 1000 magnitudes are the squares of their ranks, each with a volume of its own.
 TEST(GradientOpacity, IsLinearOverTheShareOfTheVolumeThatIsLessSteep) {
   std::vector<float> magnitudes, volumes;
   std::vector<double> below;  // share of the volume, of each

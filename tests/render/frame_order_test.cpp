@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-/// With each backend.
+/// Tests of each backend.
 class FrameOrderTest : public testing::TestWithParam<Backend> {
  protected:
   static void SetUpTestSuite() {
@@ -71,7 +71,7 @@ class FrameOrderTest : public testing::TestWithParam<Backend> {
     camera.position = manifest.lower + glm::dvec3(0.2, 0.5, 0.5) * (manifest.upper - manifest.lower);
     return camera;
   }
-  /// As little memory as renders at all.
+  /// The least memory that renders at all.
   static uint64_t leastMemory(FrameRenderer& renderer, const Camera& camera, FrameOptions wanted) {
     wanted.memory_bytes = 1 << 20;
     wanted.threads = 8;  // as many as any test has: each takes some

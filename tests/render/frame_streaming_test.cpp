@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 using faults::FaultySystemCalls;
 using Way = PagerOptions::Way;
 
-/// With each backend.
+/// Tests of each backend.
 class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
  protected:
   FrameStreamingTest() {
@@ -47,7 +47,7 @@ class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
     const Manifest& manifest = cache_->manifest();
     return Camera::named(view, manifest.lower, manifest.upper, options().size, Projection::kOrthographic, 30);
   }
-  /// As little memory as renders at all.
+  /// The least memory that renders at all.
   static uint64_t leastMemory(FrameRenderer& renderer, const Camera& camera) {
     FrameOptions wanted = options();
     wanted.memory_bytes = 1 << 20;

@@ -70,7 +70,7 @@ class IsoLayersTest : public testing::Test {
     }
     return layers;
   }
-  /// In order by one thread; by more of them each some parts, from the last on.
+  /// Adds the parts in order by one thread; by more of them each some parts, from the last on.
   void addParts(IsoSplats& splats, int threads) const {
     const auto count = static_cast<uint32_t>(geometry_.size());
     const auto add = [&](uint32_t part) {

@@ -50,7 +50,7 @@ class Random {
     }
   }
 
-  /// Of axes `size` and up to `aspect` times smaller, near `around`.
+  /// A splat with axes of `size` and up to `aspect` times smaller, near `around`.
   TestSplat splat(double size, double aspect, const glm::dvec3& around) {
     TestSplat made;
     made.splat.position = around + point(-0.1, 0.1);

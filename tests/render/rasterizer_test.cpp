@@ -49,7 +49,7 @@ SurfaceScene randomScene(double deepest) {
   return scene;
 }
 
-/// In the exact arithmetic of whole numbers.
+/// Whether a triangle covers a sample, in the exact arithmetic of whole numbers.
 bool covers(const std::array<ScreenVertex, 3>& v, int64_t x, int64_t y) {
   int64_t gx[3], gy[3];
   for (size_t n = 0; n < 3; ++n)

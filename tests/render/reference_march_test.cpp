@@ -150,7 +150,7 @@ class SilentField : public ReferenceField {
   const ReferenceField& field_;
 };
 
-// Whose rays are oblique, along the z axis, along the y axis, and from inside.
+// Cameras whose rays are oblique, along the z axis, along the y axis, and from inside.
 std::vector<Camera> camerasAroundAPipe() {
   std::vector<Camera> cameras(4, halfAnnulusCamera());
   cameras[1].position = cameras[1].focal_point + glm::dvec3(0, 0, 4);

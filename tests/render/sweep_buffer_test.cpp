@@ -176,7 +176,7 @@ struct Scene {
   std::vector<SweptPart> parts;
   std::vector<std::vector<uint32_t>> keys;  // [part]
 
-  /// Of `values` different keys; few make long ties.
+  /// A scene of `values` different keys; few make long ties.
   Scene(uint64_t seed, uint32_t count, uint32_t most_splats, uint32_t values) {
     std::mt19937_64 random(seed);
     for (uint32_t n = 0; n < count; ++n) {

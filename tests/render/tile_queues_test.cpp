@@ -14,7 +14,8 @@ namespace {
 
 constexpr ImageSize kSize{100, 70};
 
-/// In the order of their first keys; `mean` is the number. Some have a record before them, whose x is minus that.
+/// Splats in the order of their first keys; `mean` is the number. Some have a record before them, whose x is
+/// minus that.
 std::vector<ScreenSplat> leaningSplats(int count, uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
@@ -112,7 +113,7 @@ bool touches(const ScreenSplat& splat, float x, float y) {
   return false;
 }
 
-/// Those that a tile's list must have.
+/// The orders that a tile's list must have.
 Orders specifiedFor(std::span<const ScreenSplat> splats) {
   Orders orders;
   const int columns = TileSet::tilesAlong(kSize.width);

@@ -24,7 +24,7 @@
 namespace curvisplat {
 namespace {
 
-/// That two readers decode to the same bits, and state the same ranges.
+/// Expects that two readers decode to the same bits, and state the same ranges.
 void expectSame(const CacheReader& found, const CacheReader& wanted) {
   ASSERT_EQ(found.bricks().size(), wanted.bricks().size());
   ASSERT_EQ(found.manifest().variables.size(), wanted.manifest().variables.size());
@@ -217,7 +217,8 @@ TEST(ConvertSeries, ResumesAfterTheStepsThatAreDone) {
   }
 }
 
-/// It was killed before it had removed its own files, which are in the cache and in the temporary folder.
+/// A conversion was killed before it had removed its own files, which are in the cache and in the temporary
+/// folder.
 TEST(ConvertSeries, ClearsAConversionKilledAtTheEndOfAStep) {
   for (const double shift : {0.0, 0.5}) {  // the second step's geometry is a conversion of its own
     const std::vector<StepKind> kinds{{0}, {1, shift}, {2, shift}};

@@ -107,7 +107,7 @@ TEST_F(Interpolation, BlendsWhatTheTwoStepsHave) {
   }
 }
 
-/// Of a field that is linear in time, leaves at a time between are those of the field at that time.
+/// Leaves at a time between two steps are those of the field at that time, if it is linear in time.
 TEST_F(Interpolation, IsExactForAFieldLinearInTime) {
   const CacheReader between = CacheReader(cache()).at({1, 0.25}), wanted(cache("between.splats"));
   ASSERT_EQ(between.bricks().size(), wanted.bricks().size());
@@ -262,7 +262,7 @@ class StepPlayerTest : public ProgramSuite<StepPlayerTest> {
     return Camera::named("iso", reader.manifest().lower, reader.manifest().upper, {80, 60},
                          Projection::kOrthographic);
   }
-  /// By a reader and a renderer of that step alone.
+  /// The picture by a reader and a renderer of that step alone.
   static Image alone(uint64_t step) {
     const CacheReader reader(cache(), step);
     FrameRenderer renderer(reader, 0, function(), Backend::kCpu);

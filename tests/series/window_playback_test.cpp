@@ -59,7 +59,7 @@ TEST(Playback, GoesOnWhenTheStepHasBeenShown) {
   EXPECT_FALSE(steady.isPlaying());
 }
 
-/// Between steps 0 and 1 and between 2 and 3; steps 1 and 2 have different grids.
+/// Steps 0 and 1 have one grid, and steps 2 and 3 have another.
 TEST(Playback, StopsBetweenStepsOfOneGeometry) {
   Playback playback(4, {true, false, true});
   playback.setStepsPerSecond(10);

@@ -40,7 +40,7 @@ glm::dmat3 solve(const glm::dmat3& a, const glm::dmat3& b) {
   return x;
 }
 
-/// By power iteration on A Aᵀ: slow, and another way than the codec's.
+/// The largest singular value by power iteration on A Aᵀ: slow, and another way than the codec's.
 double largestSingular(const glm::dmat3& a) {
   glm::dmat3 power = a * glm::transpose(a);
   double log_scale = 0;

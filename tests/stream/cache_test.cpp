@@ -209,7 +209,7 @@ TEST(Cache, FoldersThatNoConversionMadeAreRefused) {
   EXPECT_EQ(bytesOfFile(partial), "a file");
 }
 
-// Where the mark could not be removed from the finished cache.
+// The mark of the finished cache could not be removed.
 TEST(Cache, AForeignFolderBesideAMarkedCacheIsRefused) {
   const TemporaryFolder folder;
   const fs::path target = folder.path() / "a.splats", partial = folder.path() / "a.splats.partial";

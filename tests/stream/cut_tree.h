@@ -93,7 +93,7 @@ inline CutView randomView(std::mt19937& random, bool perspective) {
   return view;
 }
 
-/// Where a ray enters a stretched cell; none if it misses it.
+/// The distance at which a ray enters a stretched cell; none if it misses it.
 inline std::optional<double> entry(const CutTestTree& tree, const CutView& view, const Cell& cell,
                                    const glm::dvec3& origin, const glm::dvec3& direction) {
   const glm::dvec3 lower = view.scale * tree.root.cellMin(cell);

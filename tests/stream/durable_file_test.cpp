@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using faults::FaultySystemCalls;
 
-/// As on file systems that cannot swap two names.
+/// System calls of file systems that cannot swap two names.
 class WithoutExchange : public FaultySystemCalls {
  public:
   int exchange(const char*, const char*) override {

@@ -67,14 +67,14 @@ TEST(Cell, MortonOrderVisitsChildrenTogether) {
   }
 }
 
-/// By iteration. Converges in value for equal ones, too.
+/// The largest singular value by iteration. Converges in value for equal ones, too.
 double largestSingular(const glm::dmat3& a) {
   glm::dvec3 v(0.6, 0.5, 0.4);
   for (int n = 0; n < 3000; ++n) v = glm::normalize(glm::transpose(a) * (a * v));
   return glm::length(a * v);
 }
 
-/// Of one brick: cells of one kind, thin ones, long ones or cubes, with some noise; many are equal.
+/// Splats of one brick: cells of one kind, thin ones, long ones or cubes, with some noise; many are equal.
 std::vector<Splat> someSplats(std::mt19937& random, double unit) {
   std::normal_distribution<double> normal;
   std::vector<Splat> splats(40);

@@ -30,7 +30,7 @@ namespace {
 /// Does reads by others, and passes their ends through `change`.
 class FaultyAsyncReads : public AsyncReads {
  public:
-  /// Given the number of the end (from 0) and its result; returns what is to be said instead.
+  /// Gets the number of the end (from 0) and its result; returns what is to be said instead.
   using Change = std::function<int64_t(uint64_t number, int64_t result)>;
 
   FaultyAsyncReads(std::unique_ptr<AsyncReads> reads, Change change)

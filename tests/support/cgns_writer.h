@@ -14,7 +14,7 @@ namespace curvisplat {
 enum class CgnsFileType { kAdf, kHdf5 };
 enum class CgnsNumbers { kSinglePrecision, kDoublePrecision, kInteger };
 
-/// Of indices from 0 in the zone itself; negative, or beyond the zone, on rind planes.
+/// A function of indices from 0 in the zone itself; negative, or beyond the zone, on rind planes.
 using CgnsFunction = std::function<double(int64_t i, int64_t j, int64_t k)>;
 using CgnsRind = std::array<int, 6>;  // planes before and behind along i, j, k
 

@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-/// Of the node (i, j, k), which stands there unless this says otherwise: one scalar.
+/// Changes the node (i, j, k), which otherwise lies at (i, j, k), and sets its one scalar.
 using CubeNode = std::function<void(const GridNode&, NodeValues&)>;
 
 /// Writes `side`³ nodes to PREFIX.xyz and PREFIX.fun. The scalar is `name`.

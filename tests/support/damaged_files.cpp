@@ -39,8 +39,8 @@ enum Ending : int {
   kCrash
 };
 
-/// For a signal handler: the heap may be damaged, and its lock held, so that even dprintf() would wait for
-/// ever.
+/// Prints from a signal handler: the heap may be damaged, and its lock held, so that even dprintf() would
+/// wait for ever.
 void printMessage(const char* text) {
   if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) ::_exit(kCrash);
 }
@@ -55,8 +55,8 @@ const char* libraryOf(const char* file, const char* const (&libraries)[kCount]) 
   return nullptr;
 }
 
-/// Whose crash it is: of the first frame that is neither the C library's nor the sanitizers'. Before the C
-/// library's, which calls this function, are this function's own.
+/// Names the source of a crash: the first frame that is neither the C library's nor the sanitizers'.
+/// Before the C library's, which calls this function, are this function's own.
 void onCrash(int) {
   void* frames[64];
   const int count = ::backtrace(frames, 64);

@@ -38,7 +38,7 @@ void FaultySystemCalls::dawdle() {
   for (int64_t n = transfers_++ * 2654435761 % 97; n >= 0; --n) std::this_thread::yield();
 }
 
-/// If it is this one's turn.
+/// Cuts the file off if it is this one's turn.
 void FaultySystemCalls::cut(int fd) {
   const std::string link = "/proc/self/fd/" + std::to_string(fd);
   const std::string path = std::filesystem::read_symlink(link);

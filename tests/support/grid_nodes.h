@@ -26,7 +26,7 @@ inline NodeArrays allNodes(const GridSource& source, uint32_t block) {
   return nodes;
 }
 
-/// Those values of a scalar that belong to cells: without the last i, j and k.
+/// The values of a scalar that belong to cells: without the last i, j and k.
 inline std::vector<float> cellValues(const GridBlock& block, const std::vector<float>& values) {
   std::vector<float> cells;
   for (uint64_t k = 0; k + 1 < block.nk; ++k)

@@ -50,7 +50,7 @@ class Hdf5Editor {
   Hdf5Editor& operator=(const Hdf5Editor&) = delete;
 
   void replaceAttribute(const std::string& object, const std::string& attribute, HostileAttribute hostile);
-  /// As a fixed string of `bytes` bytes, without a terminating zero where `text` fills them.
+  /// Writes a fixed string of `bytes` bytes, without a terminating zero where `text` fills them.
   void writeText(const std::string& object, const std::string& attribute, const std::string& text,
                  size_t bytes);
   void group(const std::string& path);

@@ -22,7 +22,7 @@ struct NetcdfDoubleList {                      // written as doubles
 };
 using NetcdfAttributes =
     std::vector<std::pair<std::string, std::variant<NetcdfText, NetcdfNumberList, NetcdfDoubleList>>>;
-/// Of the indices along the variable's dimensions, the slowest first.
+/// A function of the indices along the variable's dimensions, the slowest first.
 using NetcdfFunction = std::function<double(const std::vector<size_t>&)>;
 
 class NetcdfWriter {
@@ -34,7 +34,7 @@ class NetcdfWriter {
 
   /// `unlimited`: it is written as an unlimited dimension with `length` records.
   void dimension(const std::string& name, size_t length, bool unlimited = false);
-  /// Of the file.
+  /// Writes an attribute of the file.
   void attribute(const std::string& name, const std::string& text);
   void variable(const std::string& name, NetcdfNumbers numbers, const std::vector<std::string>& dimensions,
                 const NetcdfAttributes& attributes, const NetcdfFunction& value);

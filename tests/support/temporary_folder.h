@@ -33,7 +33,7 @@ using Files = std::map<std::string, std::string>;
 /// The files in the folder itself, not those in folders below it.
 Files filesOf(const std::filesystem::path& folder);
 
-/// Those in folders below it, too, by their paths; and these folders, whose paths end in '/'.
+/// The files of the folder and of those below it, by their paths; and these folders, whose paths end in '/'.
 Files allFilesOf(const std::filesystem::path& folder);
 
 /// Whether each file of `expected` is among `files`, with the same bytes. There may be others.

@@ -139,7 +139,7 @@ namespace {
 constexpr uint32_t kLeafSplats = 11'000, kInnerSplats = 24 * 24 * 24;
 constexpr uint32_t kGeometryBytes = 6, kValuesBytes = 2;  // a splat
 
-/// Which cells of a full octree have children, so that it has a given number of bricks.
+/// The cells of a full octree that have children, so that it has a given number of bricks.
 class OctreeShape {
  public:
   /// There are whole eights of children: `bricks` is rounded down to 1 + 8 n.

@@ -31,7 +31,7 @@ struct Threads {
   std::set<std::thread::id> ids;
 };
 
-/// Of those that two tasks run in, which wait for each other: TBB has to find a second thread.
+/// The threads that two tasks run in, which wait for each other: TBB has to find a second thread.
 Threads threadsOfALoop() {
   std::mutex mutex;
   std::latch both(2);

@@ -155,7 +155,7 @@ TEST_F(FunctionChooserTest, AnErrorEndsItsQuestionOnly) {
   EXPECT_EQ(answersOf(chooser_), (std::vector<FunctionChooser::Question>{{For::kOpacities, scalar_}}));
 }
 
-/// Of a view that is replaced while it chooses.
+/// A view is replaced while it chooses.
 TEST_F(FunctionChooserTest, AnotherTakesItsQuestions) {
   FunctionChooser next(cache_, [] {});
   chooser_.ask({For::kScalar, scalar_});

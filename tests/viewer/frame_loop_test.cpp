@@ -126,7 +126,7 @@ TEST_F(FrameLoopTest, AMovingPicturesTimeDecidesItsSplatsAndPixels) {
   EXPECT_TRUE(unhurried.is_final);  // there was time for all there is
 }
 
-// Else the first movement in each view would take as long as the processor is slow.
+// The first movement in each view would otherwise take as long as the processor is slow.
 TEST_F(FrameLoopTest, TheFirstPictureAtRestTeachesWhatAMovingOneMayHave) {
   FrameRequest request = requestOf();
   request.target_s = 1e-9;  // no picture is as quick as that
