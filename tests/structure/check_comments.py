@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+"""Checks that documenting comments do not begin with a fragment, in the sources alone: nothing is built.
+
+    check_comments.py [ROOT]    prints one line for each fault; exit status 1 if there is one
+
+A documenting comment is a file's head, or the lines above something that a namespace or a class declares. Its reader has
+only the declaration beside it, so that its first sentence names its subject: "The faces of a block", not "Of a block".
+Noun phrases are sentences here ("Number of splats"), as are verbs without a subject ("Reads a brick"). A first
+sentence ends at a full stop, a colon or a semicolon, and is a fragment if it begins with
+
+  a word of CONTINUES, which goes on with something that was not said
+  a word of OPENS, and no comma follows: "For tests.", but not "For a scene of one block, the second list is empty."
+  a small letter, unless the word is a name: of code (`quoted`, snake_case, camelCase, call(), a::b, one letter, any of the
+  declaration's), a label (out:), a file's (manifest.json) or one of PROGRAMS
+
+Comments within functions, tables and comments that end a line of code are not looked at. C++ is read as clang-format leaves it.
+"""
+import pathlib
+import re
+import sys
+
+from check_parameters import FOLDERS, without_text
+
+CONTINUES = set("Also And As But Else Given It Its Kept Likewise None Nor Not Noted Of Or Same Seen So Such Taken Than That Their "
+                "Them Then They Those Too Which Whose".split())
+OPENS = set("Across After Against Along Around At Because Before Behind Below Beside Besides Between Beyond By During For From If In "
+            "Inside Into Like On Once Outside Over Past Per Since Through Towards Under Unless Until When Where While With Within "
+            "Without".split())
+PROGRAMS = set("clang false ffmpeg gcc glibc libcgns libjpeg llvmpipe nullopt nullptr true xdotool zlib zstd".split())
+
+COMMENT = re.compile(r"\s*///?(?:\s(.*))?$")
+NAME = re.compile(r"`|\w[\w.]*[_A-Z0-9(\[]|\w+(?::|\.\w)|.(?!\w)")
+TABLE = re.compile(r"\S+(?:  | \|)")
+# What opens a brace after which there are declarations again.
+SCOPE = re.compile(r"(?:^|[\s>])(?:class|struct|enum|union|namespace|extern)\b[^;{}()=]*(?:\([^()]*\)[^;{}()=]*)?$")
+
+
+def is_fragment(sentence, declaration=""):
+    """Whether the first sentence of the comment above the line `declaration` is a fragment."""
+    word = re.match(r"[A-Za-z]*", sentence)[0]
+    if word in OPENS:
+        return "," not in sentence
+    if word[:1].islower():
+        return not (NAME.match(sentence) or TABLE.match(sentence) or word in PROGRAMS or re.search(rf"\b{word}\b", declaration))
+    return word in CONTINUES
+
+
+def begin_declarations(code):
+    """[line] whether what begins there is declared by a namespace or a class. `code`: without comments and strings."""
+    opened, head, found = [], "", []
+    for line in code.split("\n"):
+        found.append(all(opened) and not head.strip().endswith((",", "(", "=")))
+        if line.lstrip().startswith("#"):
+            continue
+        for character in line:
+            if character == "{":
+                opened.append(bool(SCOPE.search(head)))
+            elif character == "}" and opened:
+                opened.pop()
+            head = "" if character in "{};" else head + character
+        head += " "
+    return found
+
+
+def first_sentences(source):
+    """(line, first sentence, line of code that follows) of each documenting comment."""
+    lines = source.split("\n")
+    declares = begin_declarations(without_text(source))
+    begin = 0
+    while begin < len(lines):
+        end = begin
+        while end < len(lines) and COMMENT.match(lines[end]):
+            end += 1
+        # A comment that ends a line of code goes on below itself.
+        goes_on = begin > 0 and lines[begin - 1].find("//") == lines[begin].find("//") > 0
+        if end > begin and declares[begin] and not goes_on:
+            text = " ".join(COMMENT.match(line)[1] or "" for line in lines[begin:end]).strip()
+            yield begin + 1, re.split(r"(?<=[.:;])\s", text)[0], lines[end] if end < len(lines) else ""
+        begin = max(end, begin + 1)
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).resolve().parents[2]
+    checked = faults = 0
+    for top in FOLDERS:
+        for path in sorted((root / top).rglob("*")):
+            if path.suffix not in (".h", ".cpp"):
+                continue
+            for line, sentence, declaration in first_sentences(path.read_text()):
+                checked += 1
+                if is_fragment(sentence, declaration):
+                    faults += 1
+                    print(f'{path.relative_to(root).as_posix()}:{line}: "{sentence}" is a fragment; name its subject')
+    if checked == 0:
+        print(f"{root}: there are no sources")
+        return 1
+    print(f"{checked} comments, {faults} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
