@@ -17,7 +17,7 @@
 namespace curvisplat {
 
 struct AddScalarOptions {
-  std::filesystem::path cache;             // to which they are added
+  std::filesystem::path cache;             // that gets the scalars
   std::vector<uint32_t> scalars;           // positions in the source's description
   std::optional<double> blank_value;       // no drawn node may have it
   uint64_t memory_bytes = 0;               // 0: defaultMemory()
@@ -29,10 +29,10 @@ struct AddScalarOptions {
   /// cache, and its report counts. Null: this process alone.
   Ranks* ranks = nullptr;
 
-  /// Smaller buckets than memory would allow, and fewer of them in a file: for tests.
+  /// Test seam: smaller buckets than memory would allow, and fewer of them in a file.
   std::optional<uint64_t> bucket_splats;
   std::optional<uint32_t> most_buckets;
-  /// Smaller slabs, in which even the rows of a small grid are cut: for tests.
+  /// Test seam: smaller slabs, in which even the rows of a small grid are cut.
   std::optional<uint64_t> slab_bytes;
 };
 
@@ -46,11 +46,11 @@ struct AddScalarReport {
   std::vector<std::string> warnings;
 };
 
-/// Adds. `source` is read twice (a third time if older scalars blanked nodes that the grid does not). Nodes
-/// that the cache draws must have the new values; those of other nodes are left out, with a warning. Throws Error if the
-/// grid is not the one the cache was made from, if a value is missing, or if something outside fails;
-/// UsageError if the cache has a scalar of the name. Then the cache is as it was. Peak memory, everything
-/// counted: options.memory_bytes.
+/// Adds the scalars. `source` is read twice (a third time if older scalars blanked nodes that the grid does
+/// not). Nodes that the cache draws must have the new values; those of other nodes are left out, with a
+/// warning. Throws Error if the grid is not the one the cache was made from, if a value is missing, or if
+/// something outside fails; UsageError if the cache has a scalar of the name. After an exception the cache is
+/// as it was. The peak memory of the process, everything included, is options.memory_bytes.
 AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& options, Progress& progress);
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
-// Adds a time step to a cache, and says what a series of such steps is (SeriesInput), as convert_series.h
-// and join_series.h take it. If the step's coordinates and blanking are those of an earlier step, only its
+// Adds a time step to a cache, and defines the input of a series of steps (SeriesInput) for convert_series.h
+// and join_series.h. If the step's coordinates and blanking are those of an earlier step, only its
 // values are added, which takes half a conversion's time; otherwise it is converted to a geometry of its
 // own. One thread calls; memory is bounded by the options.
 #pragma once
@@ -30,10 +30,10 @@ struct AddStepOptions {
   bool expect_new_geometry = false;        // for speed only: the previous step had a new geometry
   bool to_part = false;                    // the cache is a part of a series (series_steps.h)
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
-  std::vector<std::filesystem::path> given_folders;  // that the user gave, where these two are temporary
+  std::vector<std::filesystem::path> given_folders;  // the user's, if those above are temporary
 
-  /// Smaller buckets than memory would allow, and smaller slabs, in which even the rows of a small grid are
-  /// cut: for tests.
+  /// Test seam: smaller buckets than memory would allow, and smaller slabs, in which even the rows of a small
+  /// grid are cut.
   std::optional<uint64_t> bucket_splats, slab_bytes;
 };
 
@@ -46,13 +46,13 @@ struct AddStepReport {
 };
 
 /// statedTime() in the unit of the series, where both have one: each file of a model may count from a date
-/// of its own. Throws Error if it cannot be converted to that.
+/// of its own. Throws Error if it cannot be converted to that unit.
 std::optional<double> timeOf(const GridDescription& description, const TimeUnit& of_series);
 
-/// Adds. The cache's scalars are found in the source by name. Throws Error if the step does not fit: other
-/// blocks, a missing scalar, a time that is not after the last; or if something outside fails. Then the
-/// cache is as it was. Killed at any moment it leaves the cache with the steps before. Peak memory,
-/// everything counted: options.memory_bytes.
+/// Adds the step. The cache's scalars are found in the source by name. Throws Error if the step does not fit:
+/// other blocks, a missing scalar, a time that is not after the last; or if something outside fails. After an
+/// exception the cache is as it was; after a kill at any moment it has the steps before. The peak memory of
+/// the process, everything included, is options.memory_bytes.
 AddStepReport addStep(const DataSource& source, const AddStepOptions& options, Progress& progress);
 
 /// The steps of a series, in the order in which they are converted.
@@ -64,8 +64,8 @@ struct SeriesInput {
   std::function<std::unique_ptr<DataSource>(uint64_t)> open;
   /// Positions of the scalars to convert, for the first step. Throws Error.
   std::function<std::vector<uint32_t>(const GridDescription&)> scalars;
-  /// [step] where it stands in the whole series, of which this is a part (series_steps.h). Empty: these are
-  /// all.
+  /// [step] its number in the whole series, of which this is a part (series_steps.h). Empty: this is the
+  /// whole series.
   std::vector<uint64_t> places;
 };
 

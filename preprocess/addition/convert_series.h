@@ -48,9 +48,10 @@ struct SeriesReport {
   std::vector<StepOrigin> origins;  // [step], those that the cache had before too; of a part of a series only
 };
 
-/// Converts a series. With options.convert.ranks by all ranks together (shared_series.h). With options.convert.resume it continues an interrupted conversion of the same series:
-/// steps that the cache has already, by their times, are skipped. `report` is called after each step. Throws
-/// Error that names the step that does not fit, unless options.keep_going, and Interrupted; the cache keeps the
+/// Converts a series, with options.convert.ranks by all ranks together (shared_series.h). With
+/// options.convert.resume it continues an interrupted conversion of the same series: steps that the cache has
+/// already, by their times, are skipped. `report` is called after each step. Throws Error that names the step
+/// that does not fit, unless options.keep_going, and Interrupted; the cache keeps the
 /// steps so far.
 SeriesReport convertSeries(const SeriesInput& input, const SeriesOptions& options, Progress& progress,
                            const std::function<void(const SeriesEvent&)>& report);

@@ -1,5 +1,5 @@
-// Conversion: a grid of any size becomes a splat cache, in bounded memory. DESIGN.md, "Conversion". And an
-// estimate of what a conversion will take, from that of a sample of the grid. One thread calls.
+// Converts a grid of any size to a splat cache, in bounded memory (DESIGN.md, "Conversion"), and estimates
+// what a conversion will take on disk, by converting a sample of the grid. One thread calls.
 #pragma once
 
 #include <cstdint>
@@ -15,14 +15,14 @@ namespace curvisplat {
 
 /// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three
 /// times, and once more for surfaces. The bytes of the cache depend on source, scalars and blank value
-/// alone. Peak memory of the process, everything included: options.memory_bytes.
+/// alone. The peak memory of the process, everything included, is options.memory_bytes.
 ///
 /// Throws Error (and UsageError) if input, disk or options are at fault. Then no temporary file and no
 /// partial cache is left, and an existing output is unchanged.
 ///
 /// After SIGKILL, or a crash of the machine, a partial folder is left, which is not a cache; `resume`
-/// continues from it. progress.stop() leaves one, too (convert() then throws Interrupted), and with `resume`
-/// set an Error does. If there is such a folder, a conversion to the same output throws Error unless
+/// continues from it. progress.stop() leaves one too (convert() then throws Interrupted), as does an Error if
+/// `resume` is set. If there is such a folder, a conversion to the same output throws Error unless
 /// `resume` is set, or `overwrite`, which starts anew. An interruption before there is anything worth
 /// resuming removes all files.
 ///
@@ -33,13 +33,13 @@ namespace curvisplat {
 ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress);
 
 /// Nodes of a sample for sampledNeeds() and `--dry-run`. Smaller samples have too few bricks of coarser
-/// levels, of which the caches of large grids have a third of their bytes: of one million out of 27,
-/// estimates were 0.57 to 0.84 of what was taken.
+/// levels, which take a third of the bytes of a large grid's cache: estimates from one million nodes of 27
+/// were 0.57 to 0.84 of what was taken.
 inline constexpr uint64_t kSampledNodes = 8'000'000;
 
-/// What convert() will take on disk, from a sample of about `nodes` nodes, which is converted within
-/// `folder`; that is made and removed. The whole takes within a factor of 1.5 of it. Throws Error if the
-/// sample cannot be converted, Interrupted once `progress` is stopped.
+/// Estimates what convert() will take on disk from a sample of about `nodes` nodes, which is converted within
+/// `folder`; the folder is made and removed. The estimate is right within a factor of 1.5. Throws Error if
+/// the sample cannot be converted, Interrupted once `progress` is stopped.
 DiskNeeds sampledNeeds(const GridSource& grid, const ConvertOptions& options,
                        const std::filesystem::path& folder, const Progress& progress,
                        uint64_t nodes = kSampledNodes);

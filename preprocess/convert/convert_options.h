@@ -1,4 +1,4 @@
-// What a conversion is asked for, and what it reports.
+// The options of a conversion, and its report.
 #pragma once
 
 #include <chrono>
@@ -20,7 +20,7 @@
 
 namespace curvisplat {
 
-/// What becomes of scalars that have values at different samples.
+/// How scalars are treated that have values at different samples.
 enum class DifferingScalars {
   kBlankAll,  // a sample is blanked where any of them has no value
   kLeaveOut,  // the largest set of scalars that agree is kept, and the others are left out
@@ -39,8 +39,8 @@ struct ConvertOptions {
   uint64_t memory_bytes = 0;                         // 0: defaultMemory()
   unsigned threads = 0;                              // 0: as many as the machine has
   std::filesystem::path temporary_folder;            // empty: the folder of the output
-  std::string full_disk_hint;                        // what to do about it; empty: as for `convert`
-  std::vector<std::filesystem::path> given_folders;  // that the user gave, where these two are temporary
+  std::string full_disk_hint;                        // advice about one; empty: as for `convert`
+  std::vector<std::filesystem::path> given_folders;  // the user's, if those above are temporary
   std::string title;                                 // empty: the output's name
   std::optional<double> time;                        // of the step; otherwise the source's, or 0
   std::optional<TimeUnit> time_unit;                 // of `time`; otherwise the source's
@@ -69,7 +69,7 @@ struct ConvertOptions {
 /// scalars, so that each of them would lose values where another has none.
 class DifferingBlanks final : public Error {
  public:
-  /// `lost`: BlankCounts'. `is_any_drawn`: whether all scalars have values at some sample.
+  /// `lost`: as in BlankCounts. `is_any_drawn`: whether all scalars have values at some sample.
   DifferingBlanks(std::vector<BlankCounts::Lost> lost, bool is_any_drawn)
       : Error(
             "at no sample do all scalars have a value; convert each to a cache of its own, with --scalar "
@@ -106,10 +106,10 @@ struct ConvertReport {
   uint64_t splats = 0, bricks = 0;
   uint32_t levels = 0;
   double volume = 0;
-  uint64_t temporary_bytes = 0;  // in temporary files, when they were the most
+  uint64_t temporary_bytes = 0;  // the most in temporary files at a time
   bool resumed = false;          // an interrupted conversion was continued
   uint64_t resumed_bricks = 0;   // bricks that the interrupted one had made
-  unsigned threads = 0;          // that worked: memory may allow fewer than asked for
+  unsigned threads = 0;          // in use: memory may allow fewer than asked for
   uint64_t memory_bytes = 0;     // the memory limit that was kept
   std::vector<FileReport> files;
   std::vector<std::string> warnings, notes;

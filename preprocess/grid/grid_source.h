@@ -114,6 +114,7 @@ class DataSource {
   virtual const GridDescription& description() const = 0;
 };
 
+/// A structured grid, read by boxes of nodes.
 class GridSource : public DataSource {
  public:
   /// Reads the nodes of `box`, which has whole rows, in block number `block`: coordinates, the block's own
@@ -129,8 +130,8 @@ class GridSource : public DataSource {
   /// alone.
   virtual uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const { return 1; }
   /// Reads which nodes of the box, which has whole rows, are fringe: interpolated from another block (a
-  /// negative iblank). Fills `out` with 1 or 0 for each and returns true; returns false if the grid does not
-  /// tell. As read().
+  /// negative iblank). Fills `out` with 1 or 0 for each and returns true; returns false if the grid has no
+  /// such marks. Threads and errors are as for read().
   virtual bool readFringe(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<uint8_t>& /*out*/) const {
     return false;
   }

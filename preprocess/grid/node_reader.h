@@ -12,10 +12,11 @@
 
 namespace curvisplat {
 
-/// What samples are that BlankCounts::not_finite counts, for messages: coordinates are read in double precision, values in single.
+/// Describes the samples that BlankCounts::not_finite counts, for messages: coordinates are read in double
+/// precision, values in single.
 std::string notFiniteText(const GridDescription& description);
 
-/// Tells samples apart by their positions.
+/// A number for telling samples apart by their positions.
 uint64_t idOfPosition(double x, double y, double z);
 
 struct BlankCounts {
@@ -44,7 +45,7 @@ enum CellMark : uint8_t {
   kValueNotFinite = 8,  // the cell's value is infinite
 };
 
-/// Any number of threads may read concurrently.
+/// Reads nodes and marks blanked ones. Any number of threads may read concurrently.
 class NodeReader {
  public:
   /// `scalars`: indices into source.description().scalars. `source` must outlive the reader. Throws Error if

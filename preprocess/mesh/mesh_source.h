@@ -104,6 +104,7 @@ struct MeshPoints {
   std::vector<std::vector<float>> scalars;  // [requested scalar][point]
 };
 
+/// An unstructured grid, read by ranges of points and cells of a piece.
 class MeshSource : public DataSource {
  public:
   /// Points [first, first + count) of a piece, and the node-centred scalars with the given indices in
@@ -119,14 +120,14 @@ class MeshSource : public DataSource {
   /// Whether some of its cells are curved (MeshCells::curved).
   virtual bool hasCurvedCells() const { return false; }
 
-  /// To be called before these scalars are read, in one thread: computes those that are made of the whole
-  /// mesh, within `memory_bytes`. May be called again. Throws Interrupted once `progress` is stopped.
+  /// Computes those of these scalars that depend on the whole mesh, within `memory_bytes`. Call it in one
+  /// thread before they are read; further calls are allowed. Throws Interrupted once `progress` is stopped.
   virtual void prepare(std::span<const uint32_t> /*scalars*/, uint64_t /*memory_bytes*/,
                        const Progress& /*progress*/) const {}
 
-  /// What prepare() has to do for these scalars that is not done yet.
+  /// The work that prepare() still has to do for these scalars.
   struct Preparation {
-    size_t fields = 0;  // that are gathered at once, at the most
+    size_t fields = 0;  // gathered at once, at most
     size_t values = 0;  // of each sample that stay on disk, 4 bytes each
     Centring centring = Centring::kNode;
   };

@@ -12,7 +12,7 @@ namespace curvisplat {
 
 enum class Projection { kOrthographic, kPerspective };
 
-/// In world units, after --scale has been applied to the data.
+/// A camera in world units, after --scale has been applied to the data.
 struct Camera {
   glm::dvec3 position{0, 0, 1};
   glm::dvec3 focal_point{0, 0, 0};

@@ -127,7 +127,7 @@ class ColourTable {
  public:
   explicit ColourTable(const TransferFunction& function);
 
-  /// Outside of the function's range, the colour at its nearer end. Not for NaN.
+  /// The colour at a scalar; outside of the function's range, that at its nearer end. NaN is not allowed.
   glm::vec3 at(double scalar) const { return glm::vec3(valueAt(scalar)); }
   /// The opacity there, as the opacity points state it.
   float opacityAt(double scalar) const { return valueAt(scalar).w; }

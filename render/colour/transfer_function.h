@@ -63,7 +63,8 @@ class TransferFunction {
   static TransferFunction fromFile(const std::filesystem::path& path, const std::pair<double, double>* range,
                                    double opacity_unit, double default_opacity_unit);
 
-  /// Outside of range(), the value at its nearer end, as in ParaView. NaN has no extinction.
+  /// The value at a scalar. Outside of range() it is the value at the nearer end, as in ParaView. NaN has no
+  /// extinction.
   Value at(double scalar) const;
   double extinctionAt(double scalar) const;
 
@@ -74,7 +75,7 @@ class TransferFunction {
   /// The range as it is to be shown to people.
   ScalarAxis axis() const { return {range_, log_scale_, asinh_}; }
   const std::string& name() const { return name_; }
-  /// World units.
+  /// The opacity unit, in world units.
   double opacityUnit() const { return opacity_unit_; }
   /// Notes for the user: "no Points in the file: the default opacity ramp is used".
   const std::vector<std::string>& notes() const { return notes_; }

@@ -1,4 +1,4 @@
-// One frame: the pipeline of DESIGN.md, "The pipeline", as a call.
+// Draws frames by the pipeline of DESIGN.md, "The pipeline".
 //
 //   plan -> read -> prepare -> sweep -> draw -> image
 //    |               |          |        painter
@@ -46,7 +46,7 @@ class FrameRenderer {
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
                 Backend backend = Backend::kAutomatic)
       : FrameRenderer(cache, DrawnScalars(variable, transfer_function), backend) {}
-  /// For pictures of one scalar, or two.
+  /// Draws pictures of one scalar or two. Throws Error as the other constructor.
   FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend = Backend::kAutomatic);
   ~FrameRenderer();
 
@@ -54,8 +54,8 @@ class FrameRenderer {
   /// max_splats (the message says how much is needed); Error if reading or drawing fails; Interrupted once
   /// options.stop or `progress` are stopped, at the latest when each worker has finished its brick and the
   /// painter its segment. The renderer can be used again after each of them. `statistics` is overwritten.
-  /// With options.ranks all ranks have to call it: rank 0 returns the picture, which has the bits of one
-  /// process's, the others only their tiles. Statistics are each rank's own.
+  /// With options.ranks, all ranks have to call it: rank 0 returns the picture, bit for bit that of one
+  /// process; the others return only their tiles. Statistics are each rank's own.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
 
@@ -82,7 +82,7 @@ class FrameRenderer {
   /// need, as far as they fit in the cache of bricks. The next frame or prefetch() ends it. Its errors are
   /// not reported; render() reports those that matter to it.
   void prefetch(const Camera& camera, const FrameOptions& options);
-  /// Does so for renderQuickly() with these arguments.
+  /// Prefetches for renderQuickly() with these arguments.
   void prefetch(const Camera& camera, const FrameOptions& options, const QuickLimits& limits);
 
   /// Goes to another time step of the same geometry: calls `change`, which has to replace the cache's reader
@@ -97,9 +97,9 @@ class FrameRenderer {
   /// The projection that render() uses for these arguments. Throws UsageError as render() does.
   ScreenView screenView(const Camera& camera, const FrameOptions& options) const;
 
-  /// A thread that computes between frames, while bricks are fetched ahead, holds one of these: no more
-  /// threads than the last frame's options.threads compute then. Null before the first frame. Valid until
-  /// the next.
+  /// Permits for threads that compute between frames, while bricks are fetched ahead: with them, no more
+  /// threads compute than the last frame's options.threads. Null before the first frame. Valid until the next
+  /// frame.
   ComputePermits* permits() const;
 
   /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
@@ -116,7 +116,7 @@ class FrameRenderer {
 /// kept while values change.
 class StepPlayer {
  public:
-  /// `cache` must outlive it, and is at the step that is drawn. Throws Error as FrameRenderer.
+  /// `cache` must outlive the player; it is at the step that is drawn. Throws Error as FrameRenderer.
   StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend);
 
   FrameRenderer& renderer() { return *renderer_; }

@@ -1,5 +1,5 @@
-// What a picture is drawn of, how it looks, and which resources drawing it may use: the inputs of a frame,
-// but for the cache and the camera.
+// The inputs of a frame, except the cache and the camera: what a picture shows, how it looks, and which
+// resources drawing it may use.
 //
 // DrawnScalars are fixed for a renderer, apart from the opacities' function; FrameOptions are given with
 // each frame. Plain values; the ranks are borrowed.
@@ -32,9 +32,9 @@ struct DrawnScalar {
   TransferFunction function;
 };
 
-/// The scalars of a picture. Of one scalar: its function has colours and opacities. Of two: the opacities
-/// are one scalar's, and so are isosurfaces and light; the colours are the other's, those of slices and
-/// surfaces too.
+/// The scalars of a picture. A picture of one scalar takes colours and opacities from its function. In a
+/// picture of two, `opacity` gives the opacities, isosurfaces and light, and `colour` the colours, also those
+/// of slices and surfaces.
 struct DrawnScalars {
   DrawnScalar opacity;
   std::optional<DrawnScalar> colour = std::nullopt;  // none: also the opacity's
@@ -59,7 +59,7 @@ struct FrameOptions {
   std::optional<WorldBox> clip_box;    // nothing outside it is drawn
   std::vector<ClipPlane> clip_planes;  // nothing on their outer sides is drawn
   std::optional<Light> light;          // none: unlit, the colours of the transfer function
-  // Over the share of the volume whose gradient is less steep, factors of the extinction; empty: none.
+  // Factors of the extinction over the share of the volume whose gradient is less steep; empty: none.
   std::vector<OpacityPoint> gradient_opacity;
   std::shared_ptr<const SurfaceScene> scene;  // surfaces and slices; null: none
   glm::vec4 background{1, 1, 1, 1};           // premultiplied

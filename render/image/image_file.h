@@ -29,7 +29,7 @@ inline constexpr uint64_t kChannelBytes = 8;
 std::vector<ImageChannel> readChannels(const std::filesystem::path& path);
 /// Whether writeImage() takes the name: .png, .exr or .pfm.
 bool isImageName(const std::filesystem::path& path);
-/// Throws UsageError for a name that writeImage() would refuse. For checking before long work.
+/// Throws UsageError for a name that writeImage() would refuse. Call it before long work.
 void checkImageName(const std::filesystem::path& path);
 /// Throws UsageError unless width and height are in [1, kLargestImageSide]: Python's arrays may have any.
 void checkImageSize(uint64_t width, uint64_t height, const std::filesystem::path& path);
@@ -52,7 +52,7 @@ Bytes encodeExr(const Image& image);
 Bytes encodeExr(const Image& image, std::span<const ImageChannel> more);
 Bytes encodePfm(const Image& image);
 
-/// `name` is the file's, for messages.
+/// Decode an image file. `name` is the file's, for messages.
 Image decodePng(std::span<const std::byte> bytes, const std::string& name);
 Image decodeExr(std::span<const std::byte> bytes, const std::string& name);
 /// Decodes the channels that are not colours.

@@ -29,7 +29,7 @@ struct PaintResources {
   std::stop_token stop =
       {};  // once it is requested, the rest may be left out: nobody wants the picture any more
   ComputePermits* permits =
-      nullptr;  // that those who compute hold; outlive the frame. Null: there is no further bound
+      nullptr;  // held by threads that compute; outlive the frame. Null: there is no further bound
 
   /// What all threads together may keep of splats that they have prepared, and need again.
   uint64_t preparedBytes() const { return kPreparedBytesASplat * waiting_splats; }
@@ -69,9 +69,9 @@ class Painter {
   /// the same square of kTileSide, and all splats of one are drawn before the next; what no call has named
   /// shows nothing that matters.
   virtual void drawOnly(const TileSet& tiles) = 0;
-  /// Blends `splats` into the frame, behind all splats drawn so far, each behind those before it; but for those
-  /// that lean, which each tile takes in its own order (tile_key.h). The memory may be used again when the call
-  /// returns.
+  /// Blends `splats` into the frame, behind all splats drawn so far and each behind those before it. Only
+  /// splats that lean are blended in an order of each tile's own (tile_key.h). The memory may be used again
+  /// when the call returns.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
   /// Whether all splats drawn from now on whose footprints lie in `box` would be hidden. The picture's bits
   /// do not depend on whether they are drawn. Any thread, between begin() and end().
@@ -83,7 +83,7 @@ class Painter {
   /// OpenGL may draw later than the call; end() waits for it, and this wait counts as drawing.
   virtual double uploadSeconds() const = 0;
   virtual double drawSeconds() const = 0;
-  /// Nothing if OpenGL does not draw. Complete after end().
+  /// The work of OpenGL; all zeros if it does not draw. Complete after end().
   virtual CardWork cardWork() const { return {}; }
   /// Whether more splats waited for others than PaintResources allow, so that the picture is wrong. Known
   /// after end(). Smaller regions of it need fewer.

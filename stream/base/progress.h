@@ -1,5 +1,5 @@
-// How far a job is: its phases for the display and for --stats, with what each took of the machine, and
-// requests to stop it.
+// The progress of a job: its phases, for the display and for --stats, with the time and resources that each
+// took, and requests to stop the job.
 //
 // One thread runs a job and begins its phases. Any thread counts steps, which costs an atomic addition, and
 // any thread, even a signal handler, asks the job to stop. The job then ends with the exception Interrupted,

@@ -20,7 +20,8 @@
 
 namespace curvisplat {
 
-/// What a library for message passing does for Ranks. Nothing throws; a failure of the library ends the process.
+/// The message passing that Ranks needs of a library such as MPI. No function throws; a failure of the
+/// library ends the process.
 class RankTransport {
  public:
   virtual ~RankTransport() = default;
@@ -28,8 +29,8 @@ class RankTransport {
   virtual unsigned rank() const = 0;
   virtual unsigned count() const = 0;
 
-  /// Each of the three begins a call, which ends when isDone() returns true; until then the memory must stay. If the caller does not
-  /// wait for that, until this object has ended.
+  /// Each of the three begins a call, which ends when isDone() returns true. The memory must stay until then
+  /// or, if the caller does not wait for that, until this object has ended.
   ///   out, in  [rank]  a number for each rank, and from each
   virtual void beginSizes(const uint64_t* out, uint64_t* in) = 0;
   ///   out, in  [rank]  bytes for each rank, and from each
@@ -49,14 +50,15 @@ class RankTransport {
   [[noreturn]] virtual void abort(int status) = 0;
 };
 
-/// Messages for each rank, or from each, in one block of memory that stays for the next ones: of large blocks that are
-/// allocated anew, the system first has to clear every page. One thread at a time.
+/// Messages for each rank, or from each, in one block of memory that stays for the next ones: the system
+/// would have to clear every page of a large block that is allocated anew. One thread at a time.
 class Messages {
  public:
   /// `expected`: bytes of all messages together, as far as known; more are allocated where needed.
   explicit Messages(uint64_t expected = 0) : expected_(expected) {}
 
-  /// Makes room for bytes[n] to or from each rank n. What was there is lost; the new bytes have any values.
+  /// Makes space for bytes[n] to or from each rank n. The former contents are lost; the new bytes are not
+  /// initialised.
   void begin(std::span<const uint64_t> bytes);
   std::span<std::byte> of(unsigned rank) const {
     return {block_.get() + begins_[rank], begins_[rank + 1] - begins_[rank]};
@@ -82,20 +84,20 @@ class Ranks {
   unsigned rank() const { return transport_ ? transport_->rank() : 0; }
   unsigned count() const { return transport_ ? transport_->count() : 1; }
   bool alone() const { return count() == 1; }
-  /// Whether this rank is the one that writes and prints what there is once.
+  /// Whether this rank is the one that writes and prints what is written and printed once.
   bool isFirst() const { return rank() == 0; }
 
-  /// Called again and again while a call waits; what it throws leaves the call, as does an Error where another rank
-  /// has failed. Afterwards there are no more calls.
+  /// Sets a function that is called again and again while a call waits. What it throws leaves the waiting
+  /// call, as does the Error that another rank has failed; no further calls are allowed then.
   void whileWaiting(std::function<void()> check) { check_ = std::move(check); }
 
   /// Sends to[n] to each rank n. Returns what came from each.
   std::vector<Bytes> exchange(std::vector<Bytes> to);
-  /// The same, for messages that are large and many. What a rank has for itself stays where it is, in `to`.
+  /// Exchanges messages that are large and many. What a rank has for itself stays where it is, in `to`.
   void exchange(const Messages& to, Messages& from);
   /// Returns at rank 0 what each rank has given, [rank]; elsewhere nothing.
   std::vector<Bytes> gather(Bytes bytes);
-  /// What rank 0 has given.
+  /// Returns what rank 0 has given.
   Bytes broadcast(Bytes bytes);
   /// Returns when all ranks have called it.
   void barrier();

@@ -1,8 +1,8 @@
 // manifest.json: describes a cache's contents, for people and for the reader; stream/FORMAT.md lists its
 // keys. It is written last, by rename: a cache folder without it is unfinished.
 //
-// A cache has features, by names in the manifest: a reader must know those that it requires. They also say
-// how the cells at the borders of the cache are drawn (borderStyleOf()). Plain data and pure functions: any
+// The manifest names the features of the cache; a reader must know those that it requires. They also say how
+// the cells at the borders of the cache are drawn (borderStyleOf()). Plain data and pure functions: any
 // thread may use them.
 #pragma once
 
@@ -34,8 +34,8 @@ struct StepInfo {
   std::vector<uint32_t> variables;  // numbers
 };
 
-/// Scalars that have values at other samples than the cache's own variables. They are in a cache by itself, with the
-/// geometry of these samples, in a folder of the cache (ownBlanksFolderName() in series.h).
+/// Scalars that have values at other samples than the cache's own variables. They form a cache of their own,
+/// with the geometry of these samples, in a folder of the cache (ownBlanksFolderName() in series.h).
 struct OwnBlanks {
   std::vector<std::string> variables;  // names; those of all sets and the cache's own are distinct
   uint64_t checksum = 0;               // of all bytes of the folder's manifest
@@ -60,8 +60,8 @@ class OtherVersion : public Error {
   using Error::Error;
 };
 
-// The features of caches, which a reader must know to read one that requires them. Only caches of version 2
-// have any; apart from them, these are like caches of version 1. border_code.h and growth_code.h are in
+// The features of caches. A reader must know those that a cache requires. Only caches of version 2 have
+// features; apart from these, they are like caches of version 1. border_code.h and growth_code.h are in
 // stream/model.
 inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut at faces (border_code.h)
 inline constexpr const char* kCellGrowth = "cell-growth";    // kernels are skewed (growth_code.h)
@@ -77,18 +77,20 @@ inline constexpr const char* kSteps = "steps";  // a series of time steps (serie
 /// (preprocess/splats/node_splats.h). A reader need not do anything, but a program that adds scalars has to
 /// make the same splats.
 inline constexpr const char* kCellOctants = "cell-octants";
-/// Some scalars have values at other samples: Manifest::own_blanks. A program that does not know it would miss them.
+/// Some scalars have values at other samples: Manifest::own_blanks. A program that does not know the feature
+/// would miss them.
 inline constexpr const char* kOwnBlanks = "own-blanks";
 
-// Manifest::overlap.
+// Values of Manifest::overlap.
 inline constexpr const char* kOverlapAll = "all";      // every block is drawn
 inline constexpr const char* kOverlapOwner = "owner";  // each point is drawn once (preprocess/overset)
-inline constexpr const char* kOverlapNone = "none";    // that would have been done, but no blocks overlap
+inline constexpr const char* kOverlapNone = "none";    // as kOverlapOwner, but no blocks overlap
 
-// Manifest::stretch.
+// Values of Manifest::stretch.
 inline constexpr const char* kSteepStretch = "steep";  // by StretchFit::kSteep (preprocess/splats/stretch.h)
-/// The same, and splats weigh as much as their dual cells (preprocess/splats/dual_cell.h), collapsed ones have their
-/// shape, and rows go on across joints (preprocess/seams/joined_rows.h).
+/// What kSteepStretch says, and besides, splats weigh as much as their dual cells
+/// (preprocess/splats/dual_cell.h), collapsed ones have their shape, and rows go on across joints
+/// (preprocess/seams/joined_rows.h).
 inline constexpr const char* kDualCells = "dual-cells";
 
 struct Manifest {
@@ -108,8 +110,8 @@ struct Manifest {
   uint64_t bricks = 0;
   uint32_t levels = 0;  // deepest level + 1
   double volume = 0;    // sum of the finest level's weights
-  /// What was done where the grid's blocks overlap: kOverlapAll, ...; empty if it has one block, or that is
-  /// not known.
+  /// How overlapping blocks of the grid were treated: kOverlapAll, ...; empty if it has one block, or if that
+  /// is not known.
   std::string overlap;
   std::string
       stretch;  // how splats are made where cells grow: kDualCells, kSteepStretch; empty: by StretchFit::kGentle
@@ -120,7 +122,7 @@ struct Manifest {
   std::string calendar;   // of the time unit, by the CF conventions; may be empty
   std::vector<VariableInfo> variables;
   std::vector<StepInfo> steps;
-  std::vector<OwnBlanks> own_blanks;  // some only with kOwnBlanks
+  std::vector<OwnBlanks> own_blanks;  // empty without kOwnBlanks
   std::vector<FileInfo> files;        // all files of the cache except the manifest, and without folders'
 
   bool hasFeature(const char* feature) const;
@@ -134,7 +136,7 @@ struct Manifest {
   static Manifest fromJson(const std::string& text, const std::filesystem::path& path);
 };
 
-/// How finely its values are stored, and those are that are added (stream/codec/values_codec.h).
+/// The precision of its values, also of those that are added later (stream/codec/values_codec.h).
 enum class ValuePrecision;
 ValuePrecision precisionOf(const Manifest& manifest);
 

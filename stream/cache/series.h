@@ -55,7 +55,7 @@ struct StepPosition {
   bool operator==(const StepPosition&) const = default;
 };
 
-/// The steps of a cache. One without the feature `steps` has one.
+/// The steps of a cache. A cache without the feature `steps` has one.
 struct Series {
   std::vector<SeriesStep> steps;
   std::vector<uint64_t> first_steps;  // [geometry]: its first step
@@ -82,9 +82,9 @@ std::string stepValuesName(const Series& series, uint64_t step, uint32_t number)
 /// the manifest. Costs one read and no allocation per value.
 Series readSeries(const std::filesystem::path& cache, const Manifest& manifest);
 
-/// Appends the last step of `series` to steps.bin, which it writes anew where the manifest does not list it,
-/// and syncs it. Cuts off what an interrupted addition has left after the size in the manifest. Returns the
-/// manifest's entry.
+/// Appends the last step of `series` to steps.bin and syncs the file, which is written anew if the manifest
+/// does not list it. Cuts off what an interrupted addition has left after the size in the manifest. Returns
+/// the manifest's entry.
 FileInfo appendStep(const std::filesystem::path& cache, const Manifest& manifest, const Series& series);
 
 /// Cuts off what appendStep() has appended and no manifest lists. `manifest`: that of the cache. If that

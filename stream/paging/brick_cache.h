@@ -33,14 +33,14 @@ namespace curvisplat {
 /// neighbouring holes. A page that was never used takes no memory. One thread at a time.
 class Arena {
  public:
-  /// Blocks begin at multiples of it.
+  /// Blocks begin at multiples of this.
   static constexpr uint64_t kBlockAlignment = 64;
 
   explicit Arena(uint64_t capacity);
 
   /// Returns null if no hole is large enough.
   std::byte* allocate(uint64_t bytes);
-  /// `bytes` as in allocate().
+  /// Frees a block. `bytes`: as given to allocate().
   void free(std::byte* block, uint64_t bytes);
 
   /// The memory in bytes that a block of `bytes` takes up.

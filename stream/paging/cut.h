@@ -5,7 +5,7 @@
 // is a leaf; what is outside the image or transparent is left out with all that lies below it. The result's
 // cells are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree
 // node the child farther along every axis comes first), so that bricks which are needed about the same time
-// are named so. Splats are drawn in an order of their own (render/sweep/sweep_buffer.h).
+// are listed near one another. Splats are drawn in an order of their own (render/sweep/sweep_buffer.h).
 //
 // Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant
 // by octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
@@ -48,8 +48,8 @@ struct ValueBounds {
   float largest_deviation = 0;  // of √r
 };
 
-/// [brick], each with all below it: an inner brick's means are averages, so its own bounds promise nothing
-/// about its children.
+/// [brick] the bounds of the brick and all bricks below it: an inner brick's means are averages, so its own
+/// bounds promise nothing about its children.
 std::vector<ValueBounds> subtreeBounds(std::span<const Brick> bricks,
                                        std::span<const BrickVariable> variables);
 
@@ -65,11 +65,11 @@ struct CutOptions {
   static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
   double lod_pixels = 1;  // error allowed on the screen; at 0 only leaves are taken
-  /// A brick's error counts this much, from 0 to 1, when it is compared with lod_pixels; not in the order of
-  /// refinement. Null: all errors count whole.
+  /// The factor, 0 to 1, of a brick's error when it is compared with lod_pixels; the order of refinement does
+  /// not depend on it. Null: all errors count whole.
   std::function<double(uint32_t brick)> error_weight = nullptr;
-  /// What the cut may hold, and what its bricks' streams may take on disk. The root is drawn even where it
-  /// alone is more.
+  /// Limits of the splats in the cut, and of the bytes of its bricks' streams on disk. The root is drawn even
+  /// if it alone exceeds them.
   uint64_t max_splats = kNoLimit, max_bytes = kNoLimit;
 };
 
@@ -79,8 +79,8 @@ struct Cut {
   uint64_t bytes = 0;  // of the parts' bricks
   uint32_t deepest_level = 0;
   bool complete = true;  // false: a limit keeps some of it coarser than lod_pixels asks for
-  /// On the screen, of what is drawn; at most lod_pixels where its weight makes it fine enough. Infinite
-  /// around a perspective eye.
+  /// The largest error on the screen of what is drawn, capped at lod_pixels where a brick's weight makes it
+  /// fine enough. Infinite around a perspective eye.
   double largest_error_px = 0;
   uint64_t out_of_image = 0;  // bricks left out, each standing for all below it
   uint64_t transparent = 0;
@@ -89,6 +89,7 @@ struct Cut {
 /// Whether a brick with such values is entirely transparent.
 using TransparentBounds = std::function<bool(const ValueBounds&)>;
 
+/// Chooses the cut of one view. Pure; any thread.
 Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds& transparent,
               const CutOptions& options);
 

@@ -78,7 +78,7 @@ class PagedBrick {
         sequence_(sequence),
         readable_(streams.has_value()),
         streams_(streams.value_or(Streams())) {}
-  /// One that was not read because it was not needed any more.
+  /// A brick that was not read because it was not needed any more.
   static PagedBrick leftOut() { return PagedBrick(); }
   ~PagedBrick();
   PagedBrick(PagedBrick&& other) noexcept;
@@ -86,7 +86,7 @@ class PagedBrick {
 
   /// False where a read failed or the file ended: there are no bytes.
   bool readable() const { return readable_; }
-  /// Nobody wants it: there are no bytes.
+  /// True if nobody needs the brick any more: there are no bytes.
   bool isLeftOut() const { return left_out_; }
   std::span<const std::byte> geometry() const { return streams_[0]; }
   std::span<const std::byte> values() const { return streams_[1]; }
@@ -116,26 +116,27 @@ class BrickPager {
   /// Opens the files of `cache`, which outlives it, and starts the thread "pager". Throws
   /// Error.
   BrickPager(const CacheReader& cache, const ReadVariables& variables, const PagerOptions& options);
-  /// stop(), and waits for the reads under way.
+  /// Stops, and waits for the reads under way.
   ~BrickPager();
   BrickPager(const BrickPager&) = delete;
   BrickPager& operator=(const BrickPager&) = delete;
 
-  /// The buffer that the largest brick needs: it can then be read, one after the other.
+  /// The bytes of the smallest buffer: with the space of the largest brick, bricks can be read one after the
+  /// other.
   static uint64_t leastBufferBytes(const CacheReader& cache, const ReadVariables& variables);
 
-  /// Says of a brick that nobody needs it any more; it stays so.
+  /// Returns whether nobody needs a brick any more. Once true, it stays so.
   using Unneeded = std::function<bool(uint32_t brick)>;
 
-  /// Begins to read `bricks`. What was begun before is stopped, and all of it must have been given back.
+  /// Begins to read `bricks`. Stops what was begun before, all of which must have been given back.
   /// `unneeded`, if there is one, is asked on the pager's thread, just before a brick would be read, and not
   /// after stop().
   void start(std::vector<uint32_t> bricks, Unneeded unneeded = {});
-  /// The cache is at another step of the same geometry: reads its values from the next start() on. What was begun
-  /// before is stopped, and all of it must have been given back. Throws Error.
+  /// Declares that the cache is at another step of the same geometry, whose values are read from the next
+  /// start() on. Stops what was begun before, all of which must have been given back. Throws Error.
   void stepChanged();
-  /// Waits for the `sequence`-th of the bricks; each once, by any thread. Nothing once stopped. Throws Error
-  /// where reading broke off altogether.
+  /// Waits for the `sequence`-th of the bricks. Each may be taken once, by any thread. nullopt once stopped.
+  /// Throws Error where reading broke off altogether.
   std::optional<PagedBrick> take(uint64_t sequence);
   /// Wakes all who wait: nothing is handed out until the next start(). Any thread, any number of times.
   void stop();

@@ -45,7 +45,7 @@ struct OpenGridOptions {
   std::vector<std::string> select = {};  // "month=3": of a dimension of NetCDF, the one value to read
   std::optional<std::filesystem::path> names_folder = {};  // of the files that `grid` names; nullopt: its own
 
-  /// What names in `grid` are relative to.
+  /// The folder that names in `grid` are relative to.
   std::filesystem::path namesFolder() const { return names_folder.value_or(grid.parent_path()); }
 };
 

@@ -1,6 +1,6 @@
 // Opens a file of any format, structured or unstructured, and matches scalars by name. The format is
 // detected by the contents of the file; its name counts only for file series and for HDF5 files named .cgns.
-// Files of formats that are not read are refused by the name of their format. Any thread may call these
+// A file of a format that is not read is refused with the format's name. Any thread may call these
 // functions.
 #pragma once
 
@@ -14,7 +14,8 @@
 
 namespace curvisplat {
 
-/// A GridSource or a MeshSource. Throws Error with the file, and with what was expected and found.
+/// Opens the files as a GridSource or a MeshSource. Throws Error with the file, and with what was expected
+/// and found.
 std::unique_ptr<DataSource> openData(const OpenGridOptions& options);
 
 /// Whether openData() opens this folder, an OpenFOAM case, or refuses it by the name of its format.
