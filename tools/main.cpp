@@ -116,7 +116,7 @@ std::string namesOf(const CLI::App& app) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// What other programs call our options.
+/// The names of our options in other programs.
 constexpr std::pair<const char*, const char*> kForeignOptions[] = {
     {"--colormap", "--tf"},     {"--colourmap", "--tf"},        {"--cmap", "--tf"},
     {"--palette", "--tf"},      {"--time-step", "--step"},      {"--timestep", "--step"},
@@ -147,7 +147,7 @@ std::string leftOver(const CLI::App& app, const CLI::App* command) {
   return "unexpected argument";
 }
 
-/// What is wrong with the command line: CLI11's texts, without those that leave out the reason.
+/// Describes what is wrong with the command line: CLI11's texts, without those that leave out the reason.
 std::string describe(const CLI::App& app, const CLI::App* command, const CLI::ParseError& error) {
   const std::string text = error.what();
   std::smatch found;

@@ -73,7 +73,7 @@ std::filesystem::path temporaryFolder(const AddStepOptions& options) {
   return options.temporary_folder.empty() ? folderOf(options.cache) : options.temporary_folder;
 }
 
-/// What the scatter pass learns about a grid of node-centred scalars on its way.
+/// Facts that the scatter pass learns about a grid of node-centred scalars on its way.
 struct SlabSurvey {
   GridChecksum grid_checksum;
   std::vector<ScalarRange> ranges;

@@ -37,7 +37,7 @@ AdditionWorkspace::~AdditionWorkspace() {
 
 namespace {
 
-/// What an addition's temporary folder is called, up to its process: for this cache alone, wherever it is.
+/// The name of an addition's temporary folder, up to its process: for this cache alone, wherever it is.
 std::string scratchName(const std::filesystem::path& cache) {
   const std::string place = std::filesystem::canonical(cache).string();
   return fmt::format("{}.add-{:016x}", ScratchFolder::beginOfName(cache),

@@ -45,7 +45,7 @@ class ValueBuilder {
   };
 
   std::vector<Leaf> leavesOf(const LoadedValues& loaded) const;
-  /// What a thread needs; kept, since it is large.
+  /// Scratch memory of a thread; kept, since it is large.
   struct Scratch {
     OctantMerger merger;
     BrickSplats brick;

@@ -33,7 +33,7 @@ struct SeriesEvent {
   std::string reason;
 };
 
-/// What takeStep() (series_steps.h) needs to know of a step that was converted.
+/// Facts about a converted step that takeStep() (series_steps.h) needs.
 struct StepOrigin {
   bool states_time = true;
   std::vector<std::string> sources;

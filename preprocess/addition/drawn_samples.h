@@ -44,15 +44,15 @@ class DrawnNodes {
   InputFile bits_;  // bit n % 8 of byte n / 8
 };
 
-/// What the conversion that made a cache did with coincident halves of unlike thickness.
+/// How the conversion that made a cache treated coincident halves of unlike thickness.
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest);
 
 /// A structured grid of which nodes without a splat in the cache are blanked. With cell-centred scalars,
 /// cells without a splat in the cache have the value NaN.
 class CacheGrid : public GridSource {
  public:
-  /// What the grid itself blanks: iblank, and coordinates that are not finite. Enough for a cache whose
-  /// scalars had values everywhere else. `source` must outlive it.
+  /// Blanks what the grid itself blanks: iblank, and coordinates that are not finite. Enough for a cache
+  /// whose scalars had values everywhere else. `source` must outlive it.
   explicit CacheGrid(const GridSource& source);
 
   /// Blanks nodes that `cache` has no splat of, too. Throws Error if a disk fails.

@@ -33,7 +33,7 @@ fs::path recordPath(const fs::path& folder, const SeriesPart& part) {
   return folder / (nameOf(part) + ".json");
 }
 
-/// What writePartRecord() has noted.
+/// The facts that writePartRecord() has noted.
 struct PartRecord {
   uint64_t steps = 0;  // of the whole series
   std::vector<StepOrigin> origins;

@@ -61,7 +61,7 @@ inline constexpr uint64_t kStepGroup = 3;
 std::vector<uint64_t> referenceSteps(const Series& series, uint32_t geometry, uint64_t next,
                                      bool leaves_out_first = false);
 
-/// What a brick has in the steps that a new one is predicted from. Immutable; any thread.
+/// The values of a brick in the steps that a new one is predicted from. Immutable; any thread.
 class StepReferences {
  public:
   /// For a step that is about to be added to the series, on the geometry that `cache` is open at. Throws

@@ -29,7 +29,7 @@ struct StepSpan {
   uint64_t begin = 0, end = 0;
 };
 
-/// What a rank has converted in a round.
+/// The steps that a rank has converted in a round.
 struct ConvertedSteps {
   struct Step {
     bool states_time = true, new_geometry = false;
@@ -48,7 +48,7 @@ std::vector<StepSpan> dealSteps(uint64_t next, uint64_t count, uint64_t in_group
 /// otherwise. The rank's number follows.
 std::string scratchNameOfRanks(const std::filesystem::path& cache);
 
-/// What is appended to the cache's name for a folder beside it; it ends with kPartialSuffix.
+/// The ending that is appended to the cache's name for a folder beside it; it ends with kPartialSuffix.
 inline constexpr const char* kRanksSuffix = ".ranks.partial";
 
 /// Parts of a series in a folder beside it, removed in the end.

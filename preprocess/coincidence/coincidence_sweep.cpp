@@ -25,7 +25,7 @@ double toleranceOf(const SweptNode& node, int coordinate_bytes) {
   return std::max(1e-3 * node.spacing, std::min(rounding, 0.4 * node.spacing));
 }
 
-/// What rounding may do to `along` and `across`.
+/// The error that rounding may make in `along` and `across`.
 double slackOf(const SweptNode& node) {
   const glm::dvec3 size = glm::abs(node.position);
   return 4 * std::numeric_limits<double>::epsilon() * (size.x + size.y + size.z);

@@ -26,11 +26,11 @@ struct SeamPosition {
 };
 SeamPosition seamPosition(const glm::dvec3& position);
 
-/// What rounding may have done to a coordinate, in world units: 4 units in the last place of the largest, as
-/// stored in `coordinate_bytes`.
+/// The error that rounding may have made in a coordinate, in world units: 4 units in the last place of the
+/// largest, as stored in `coordinate_bytes`.
 double coordinateRounding(const glm::dvec3& position, int coordinate_bytes);
 
-/// What decides whether a node coincides with others.
+/// The facts that decide whether a node coincides with others.
 struct SweptNode {
   SeamPosition sweep;
   glm::dvec3 position{0.0};

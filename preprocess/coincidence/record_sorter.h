@@ -39,7 +39,7 @@ class RecordSorter {
   /// Adds whole records. Any thread; one of them may write those of a full half meanwhile.
   void add(std::span<const double> records);
 
-  // What follows is not for several threads at once, except for visit().
+  // The functions below are not for several threads at once, except for visit().
 
   /// Visits all that was added, by (along, number), and forgets it.
   void drain(const Visit& visit);

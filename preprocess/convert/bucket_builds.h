@@ -106,7 +106,7 @@ struct CellJob {
   RecordSpan records;
 };
 
-/// What is built of a bucket, in Morton order.
+/// The jobs that build a bucket, in Morton order.
 struct BucketJobs {
   std::vector<CellJob> cells;
   // The records of cells that began in earlier buckets, and the places of these records.

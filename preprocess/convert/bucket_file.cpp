@@ -224,7 +224,7 @@ struct BucketFile::State {
     return checksum.value();
   }
 
-  /// What is in the file at `offset` must be as it was written.
+  /// Throws LostBuckets unless the file is as it was written at `offset`: `condition` says so.
   void require(bool condition, uint64_t offset) const {
     if (!condition)
       throw LostBuckets("{}: is damaged at byte {}; run the same command again", path.string(), offset);

@@ -32,7 +32,7 @@ class LostBuckets : public Error {
   using Error::Error;
 };
 
-/// What reading a file again takes, beside the file.
+/// The chains that reading a file again takes, beside the file.
 struct BucketChains {
   static constexpr size_t kCount = 4;  // of a bucket
   static constexpr uint64_t kNoChunk = UINT64_MAX;

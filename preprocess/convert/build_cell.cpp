@@ -108,7 +108,8 @@ void sortByNode(RecordSpan records) {
 }
 
 struct CellBuilder::State {
-  /// What a thread needs to make a brick; kept, since it is large. Never held across a wait for other tasks.
+  /// Scratch memory of a thread for making a brick; kept, since it is large. Never held across a wait for
+  /// other tasks.
   struct Scratch {
     BrickSplats brick;
     OctantMerger merger;

@@ -27,7 +27,7 @@
 
 namespace curvisplat {
 
-/// What bricks are built of, and with.
+/// The data that bricks are built of, and the means.
 struct OctreePlan {
   const RootCube& root;
   const std::vector<GridBlock>& blocks;
@@ -52,7 +52,7 @@ class OctreeBuilder {
   void buildShare(const BucketFile& file, uint32_t first, uint32_t end);
 
  private:
-  /// What was appended for a node of the tree.
+  /// The bricks that were appended for a node of the tree.
   struct Built {
     uint64_t first_brick = 0, bricks = 0;
     double error = 0;

@@ -251,7 +251,7 @@ class Conversion {
     return of_rank == 0 ? splats_.buckets : splats_.buckets_of_ranks[of_rank - 1];
   }
 
-  /// What rank 0's journal notes, at every rank.
+  /// Brings the facts in rank 0's journal to every rank.
   void shareSplats() {
     std::string text;
     if (isFirst()) text = journalText(workspace_->journal());

@@ -28,7 +28,7 @@ void reportCache(const Manifest& written, ConvertReport& report);
 /// The nodes, or of an unstructured grid the points or cells, whichever are more.
 uint64_t samplesOf(const GridDescription& description);
 
-/// What a conversion asks for beside its passes; both may be empty.
+/// Functions that a conversion calls beside its passes; both may be empty.
 struct FurtherParts {
   EstimateNeeds estimate;  // where the disk may be too small
   /// Makes the caches of scalars with blanks of their own, in the folder of the unfinished cache. Before the passes, which

@@ -27,7 +27,8 @@
 
 namespace curvisplat {
 
-/// What the passes up to "seams" leave for those that build: the splats on disk, and what is known of them.
+/// The result of the passes up to "seams" for those that build: the splats on disk, and what is known of
+/// them.
 struct ScatteredSplats {
   GridSurvey survey;
   ScatterCounts counts;
@@ -47,7 +48,7 @@ struct ScatteredSplats {
   }
 };
 
-/// What a scatter pass notes for a run that goes on from there; that run reads the slabs that were done
+/// Notes of a scatter pass for a run that goes on from there; that run reads the slabs that were done
 /// again, but makes only those of their splats that wait for the seams. Notes are due every `interval`, or
 /// less often: writing them takes a twentieth of the time at most. `write` gets what there is to note.
 /// `from`: see ScatterNotes; must outlive them.

@@ -66,7 +66,7 @@ std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& r
 /// All have to call it. Throws Error if it cannot.
 std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Ranks& ranks);
 
-/// What to do about an unfinished conversion to the same output.
+/// How to treat an unfinished conversion to the same output.
 enum class Unfinished {
   kRefuse,  // it is an error, if there is something to lose
   kResume,
@@ -123,8 +123,8 @@ class ConversionWorkspace {
   bool resumed_ = false;
 };
 
-/// What the conversion will need on disk, from a sample that is converted within `folder`, a new one in the
-/// conversion's own. nullopt: that is not known. Throws Interrupted.
+/// Estimates the disk space that the conversion will need, from a sample that is converted within `folder`, a
+/// new one in the conversion's own. nullopt: that is not known. Throws Interrupted.
 using EstimateNeeds = std::function<std::optional<DiskNeeds>(const std::filesystem::path& folder)>;
 
 /// A conversion that has not begun its passes, or takes up what an interrupted one has left in its folders.

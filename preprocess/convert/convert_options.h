@@ -95,7 +95,7 @@ struct FileReport {
   uint64_t bytes = 0;
 };
 
-/// What a conversion did, and what was unusual about the grid.
+/// The results of a conversion, and what was unusual about the grid.
 struct ConvertReport {
   Centring centring = Centring::kNode;  // of the scalars: `nodes` and `blanked` count nodes, or cells
   uint64_t nodes = 0;

@@ -50,7 +50,7 @@ unsigned bucketReadersFor(unsigned threads) {
   return std::min(threads, static_cast<unsigned>(BucketChains::kCount));
 }
 
-/// What the threads of build need beside the buckets. The first reader's chunk is the program's.
+/// The memory that the threads of build need beside the buckets. The first reader's chunk is the program's.
 uint64_t threadBytes(unsigned threads, size_t variables) {
   const uint64_t gaps = threads > kHeapsOfConversion ? (threads - kHeapsOfConversion) * kGapBytes : 0;
   return threads * brickScratchBytes(variables) + (bucketReadersFor(threads) - 1) * kMaxChunkBytes + gaps;

@@ -47,7 +47,7 @@ struct MemoryPlan {
   /// The limit at which a mesh gets this much.
   static uint64_t capForMesh(uint64_t mesh_bytes);
 
-  /// What the search for overlaps may take.
+  /// The memory that the search for overlaps may take.
   OverlapMemory forOverlaps() const { return {slab_bytes, overlap_bytes, capForOverlaps}; }
 
   /// Throws Error that names a sufficient limit if a row of `bytes` does not fit beside the slabs. `block`: the name of

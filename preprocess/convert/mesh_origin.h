@@ -62,7 +62,7 @@ class MeshOrigin final : public SplatOrigin {
   uint64_t drawn_cells_ = 0, chunk_bytes_ = 0;
 };
 
-/// What is in an unstructured grid.
+/// The contents of an unstructured grid.
 struct MeshSurvey {
   GridSurvey grid;                     // samples: points or cells, as the reader's scalars are
   std::array<uint64_t, 6> cells_of{};  // [CellKind]; kNone: hidden ones and those that are not solid

@@ -18,8 +18,8 @@
 namespace curvisplat {
 namespace {
 
-// What a node with one scalar takes in the cache, levels of detail included, on grids that compress badly;
-// and each further scalar.
+// The bytes that a node with one scalar takes in the cache, levels of detail included, on grids that compress
+// badly; and each further scalar.
 constexpr uint64_t kCacheBytesPerNode = 16, kCacheBytesPerScalar = 5;
 // Chunk headers, chunks that are not full, and the records of borders and seams, which are a fifth longer.
 constexpr uint64_t kTemporaryMarginPercent = 8;

@@ -29,8 +29,8 @@ DiskNeeds with(const TemporaryNeeds& temporary, DiskNeeds needs);
 /// The same for adding variables to a cache; `record_bytes`: what a splat takes in the temporary file.
 DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables, size_t record_bytes);
 
-/// What conversion with one scalar takes, as a rule of thumb from grids that were measured: it differs with
-/// the grid's shape, the scalar and the machine.
+/// The costs of a conversion with one scalar, as a rule of thumb from grids that were measured: it differs
+/// with the grid's shape, the scalar and the machine.
 struct ConversionEstimate {
   uint64_t cache_bytes = 0, bytes_per_further_scalar = 0;
   double seconds = 0;
@@ -57,7 +57,7 @@ void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
 bool hasDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                   const std::filesystem::path& temporary_folder);
 
-/// What is reported of a disk that fills up during a conversion.
+/// The report about a disk that fills up during a conversion.
 RoomNeeded roomNeeded(const ConvertOptions& options);
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
-// What a sample of a conversion's splats says of its scalars: how their values are coded, and by which bins their percentiles
-// are counted.
+// Facts about scalars from a sample of a conversion's splats: how their values are coded, and by which bins
+// their percentiles are counted.
 #pragma once
 
 #include <cstddef>

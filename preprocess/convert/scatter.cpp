@@ -108,7 +108,7 @@ class SplatStream {
   }
 
  private:
-  /// What a thread has for itself.
+  /// Scratch memory and results of a thread.
   struct Worker {
     NodeSplats splats;
     NodeScratch nodes;

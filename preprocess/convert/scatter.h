@@ -45,7 +45,7 @@ class RecordRouter {
   std::vector<std::byte> gathered_;  // for the leaf's bucket
 };
 
-/// What a pass over a grid's slabs reports to.
+/// The receivers of a pass over a grid's slabs.
 struct SlabPass {
   SlabPass(Progress& of_pass) : progress(of_pass) {}  // implicit: most passes report nothing else
   SlabPass(Progress& of_pass, std::function<void(const LoadedSlab&)> of_slab)

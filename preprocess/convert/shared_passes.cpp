@@ -172,7 +172,7 @@ class BrickFiles {
   std::vector<InputFile> values_;
 };
 
-/// What a rank has built, as rank 0 sees it.
+/// The part that a rank has built, as rank 0 sees it.
 struct Part {
   BrickFiles files;
   std::vector<AppendedBrick> bricks;  // [as appended]

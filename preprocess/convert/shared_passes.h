@@ -1,4 +1,4 @@
-// What the ranks that convert together tell each other: in the passes up to "seams" plans, surveys, counts
+// The exchange between ranks that convert together: in the passes up to "seams" plans, surveys, counts
 // and trees; and how their bricks become one cache. The cache's bytes are those of one rank. All ranks have
 // to call a function that takes a Ranks& which is not const.
 //
@@ -65,7 +65,7 @@ std::vector<BucketRange> dealBuckets(const BucketTree& tree, uint32_t buckets, u
 /// The cache that a rank writes its bricks to, which never gets a manifest: NAME of NAME.partial.
 std::filesystem::path bricksOfRank(const std::filesystem::path& scratch, unsigned rank);
 
-/// What joinBricks() needs to know of the build.
+/// The facts that joinBricks() needs about the build.
 struct SharedBuild {
   RootCube root;
   const std::vector<VariableInfo>& variables;

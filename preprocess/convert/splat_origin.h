@@ -74,8 +74,8 @@ struct ScatterCounts {
   uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
 };
 
-/// What it returns depends on its files, scalars and blank value alone: not on threads or memory. All functions
-/// throw Error if a file or the disk fails, and Interrupted if the progress is stopped.
+/// Makes splats of a grid. Results depend on its files, scalars and blank value alone: not on threads or
+/// memory. All functions throw Error if a file or the disk fails, and Interrupted if the progress is stopped.
 class SplatOrigin {
  public:
   virtual ~SplatOrigin() = default;
@@ -100,9 +100,9 @@ class SplatOrigin {
 
   /// Throws Error if there is nothing to draw.
   virtual GridSurvey survey(Progress& progress) = 0;
-  /// What is odd about the grid, a line each.
+  /// Warnings about what is odd in the grid, a line each.
   virtual std::vector<std::string> warnings() { return {}; }
-  /// What was chosen for it, a line each.
+  /// Notes about what was chosen for the grid, a line each.
   virtual std::vector<std::string> notes() { return {}; }
   /// Manifest::overlap.
   virtual std::string overlap() const { return ""; }

@@ -31,7 +31,7 @@ class ValueSample {
   explicit ValueSample(size_t variables)
       : columns_(kValues + variables), splats_(std::min(kSplats, kMaxNumbers / columns_)) {}
 
-  /// What one thread adds.
+  /// The splats that one thread adds.
   class Adder {
    public:
     explicit Adder(ValueSample& sample) : sample_(&sample) {}

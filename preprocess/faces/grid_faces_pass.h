@@ -37,11 +37,12 @@ struct FacesJob {
   uint64_t sort_bytes = 0;
 };
 
-/// What it takes on disk besides the result.
+/// The disk space that the pass takes besides the result.
 uint64_t temporaryBytesOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes,
                                size_t scalars);
 
-/// What it takes in memory at the most, besides its slabs: grows with the length of faces, also where they are narrow.
+/// The most memory that the pass takes besides its slabs: grows with the length of faces, also where they are
+/// narrow.
 uint64_t memoryOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes);
 
 /// Throws Error for a plane that is not in the grid: which indices there are.

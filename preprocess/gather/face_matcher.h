@@ -32,7 +32,7 @@ namespace curvisplat {
 /// The lowest three corners of a face, rising.
 using FaceCorners = std::array<uint64_t, 3>;
 
-/// What is done with the faces that come together.
+/// Functions for the faces that come together.
 struct FaceCalls {
   /// Makes the record of face n, of FaceMatcher's size. Any thread.
   std::function<void(size_t n, std::span<std::byte> to)> put;

@@ -107,7 +107,7 @@ uint64_t facesOfCell(const MeshCells& cells, size_t n) {
   return count;
 }
 
-/// What is known from some chunks.
+/// The counts of some chunks.
 struct Sample {
   uint64_t cells = 0, drawn = 0, corners = 0, face_words = 0, faces = 0, chunk_bytes = 0;
 };

@@ -90,8 +90,8 @@ struct GatherNeeds {
 /// The most that may be needed, whatever the order of the cells. Reads a few chunks of them; `reader` needs
 /// no scalars.
 GatherNeeds boundOfGather(const MeshReader& reader, const GatherJob& job);
-/// What will be needed. Reads all cells. Points that several pieces share count as different ones, so that
-/// this is too much for many small pieces.
+/// Forecasts what will be needed. Reads all cells. Points that several pieces share count as different ones,
+/// so that this is too much for many small pieces.
 GatherNeeds forecastOfGather(const MeshReader& reader, const GatherJob& job, const Progress& progress);
 
 /// The counts that both functions make, and the bytes that follow from them.

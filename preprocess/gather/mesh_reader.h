@@ -37,7 +37,7 @@ struct LoadedCells {
   BlankCounts blanked;
 };
 
-/// What a chunk of cells takes in memory.
+/// The memory of a chunk of cells.
 uint64_t bytesOf(const MeshCells& cells);
 
 /// Any number of threads may read concurrently.

@@ -21,8 +21,8 @@ glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
 }
 
-/// What puts records of one number into an order; the number of the face, which depends on memory, is none
-/// of it.
+/// The fields by which records of one number are ordered. The number of the face is not among them, since it
+/// depends on memory.
 template <typename Record>
 auto contentOf(const Record& record) {
   return std::tie(record.touches, record.inward, record.point);

@@ -87,7 +87,7 @@ class PointPages {
     return pageOf(point).values.data() + (point & (kPoints - 1)) * fields_;
   }
 
-  /// What decides which pages are in memory: PageSlots::hold(points, kMaxAgain) of these.
+  /// Decides which pages are in memory: PageSlots::hold(points, kMaxAgain) of these.
   static PageSlots slotsFor(uint64_t points, size_t fields, uint64_t memory_bytes) {
     return {points, kShift, memory_bytes / (sizeof(glm::dvec3) + fields * sizeof(float)) / kPoints};
   }

@@ -36,7 +36,7 @@ class PointSums {
     uint64_t cell_bytes() const { return sum_bytes / 4; }  // of streams of cells that wait
   };
   static Shares sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes);
-  /// What a cell takes that waits for the sums of a range.
+  /// The bytes of a cell that waits for the sums of a range.
   static uint64_t bytesOfWaiting(uint64_t corners, uint64_t face_words, size_t fields);
 
   /// Cells in the mesh's order.
@@ -54,7 +54,7 @@ class PointSums {
     uint64_t first, end;
   };
   void sum(const GatheredCells& cells);
-  /// What they give to the points of the range, which are in memory.
+  /// Adds the cells' shares to the points of the range, which are in memory.
   void accumulate(const GatheredCells& cells, const PointRange& range);
   void write(const GatheredCells& cells);
   void sumWaiting(size_t stream, const PointRange& range, const Progress& progress);

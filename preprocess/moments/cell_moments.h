@@ -37,7 +37,7 @@ struct CellView {
   std::span<const uint32_t> faces;  // of a polyhedron: MeshCells::faces
 };
 
-/// What dualMoments() needs for a while; keeps its capacity.
+/// Scratch memory of dualMoments(); keeps its capacity.
 struct DualScratch {
   std::vector<glm::dvec3> at;
   std::vector<double> values, of_face, sums;

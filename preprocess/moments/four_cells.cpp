@@ -49,7 +49,7 @@ struct Vertex {
   Four values[kMaxFields];
 };
 
-/// What the moments of a piece are weighted with.
+/// The weights of a piece's moments.
 struct PieceWeights {
   Four volume, first, second;
 };

@@ -230,7 +230,7 @@ class BlockOwners::SlabCover {
     });
   }
 
-  /// What the neighbours of a sample and it have in common, and what any of them has.
+  /// The states that a sample and all its neighbours have in common, and those that any of them has.
   std::pair<uint8_t, uint8_t> statesAround(size_t sample, uint64_t j, uint64_t k) const {
     const uint64_t i = around_.i0 + (sample - samples_.elementOf(around_.i0, j, k));
     uint8_t all = 0xff, any = 0;

@@ -74,8 +74,8 @@ class BlockOwners {
   uint64_t kept_bytes_ = 0;
 };
 
-/// What BlockOwners reads for the samples of `reader`. `everywhere`: they all have values where the grid has
-/// nodes.
+/// The reader of what BlockOwners needs for the samples of `reader`. `everywhere`: they all have values where
+/// the grid has nodes.
 NodeReader ownersReader(const NodeReader& reader, bool everywhere);
 
 }  // namespace curvisplat

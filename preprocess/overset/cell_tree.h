@@ -89,7 +89,7 @@ class CellTree {
   };
 
   static constexpr uint64_t kLeafCells = 8;
-  // What a point may lie outside of a cell that holds it, in the cell's local coordinates: on the face
+  // The tolerance for a point outside of a cell that holds it, in the cell's local coordinates: on the face
   // between two cells it is in both.
   static constexpr double kOnFace = 1e-9;
 

@@ -35,7 +35,7 @@ class SampleCells {
   /// No less than the size of any of the sample's points (pointOf): kNoCell where a cell around it is none.
   CellSize largestAround(size_t sample) const;
 
-  /// What a sample's points need to know of it.
+  /// Facts about a sample that its points need.
   struct Piece {
     size_t sample = 0;
     glm::dvec3 middle{0.0};

@@ -13,7 +13,7 @@
 namespace curvisplat {
 namespace {
 
-// What a point may lie outside of a cell that has it, in the cell's own coordinates.
+// The tolerance for a point outside of a cell that has it, in the cell's own coordinates.
 constexpr double kOutside = 1e-6;
 
 using Tetrahedron = std::array<glm::dvec3, 4>;

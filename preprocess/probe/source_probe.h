@@ -20,7 +20,7 @@ struct NearSample {
   std::array<uint64_t, 3> at{};
 };
 
-/// What the grid has at a point.
+/// The values of the grid at a point.
 struct SourceValues {
   uint32_t block = 0;  // from 0
   std::array<uint64_t, 3>

@@ -96,7 +96,7 @@ class BendOfParts {
   std::vector<Sums> sums_;
 };
 
-/// What is done with coincident halves of unlike thickness.
+/// How coincident halves of unlike thickness are treated.
 enum class UnlikeHalves {
   kApart,
   kApartInCells,  // the same, by JointFrames::kCells

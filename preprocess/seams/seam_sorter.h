@@ -39,7 +39,7 @@ class SeamSorter {
   /// MiB serve 10^11 nodes.
   SeamSorter(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder);
 
-  /// What a node takes on disk.
+  /// The bytes of a node on disk.
   static size_t recordBytes(size_t variables);
 
   /// Appends a node to `records`, of recordBytes() each, in doubles. Any thread.
@@ -48,7 +48,7 @@ class SeamSorter {
   /// Adds packed records, of this or of another process. Any thread.
   void add(std::span<const double> records);
 
-  // What follows is not for several threads at once.
+  // The functions below are not for several threads at once.
 
   /// Visits all that was added, by (along, node), and forgets it.
   void drain(const Visit& visit);

@@ -42,7 +42,7 @@ class SeamMerger {
   /// disk fails.
   void add(std::span<const double> records);
 
-  // What follows is called by one thread, when all splats are added.
+  // The functions below are called by one thread, when all splats are added.
 
   /// Brings what the mergers of all ranks were given to rank 0's, a bounded amount at a time. All have to
   /// call it.

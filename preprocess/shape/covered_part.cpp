@@ -54,7 +54,7 @@ PartMoments momentsOf(uint64_t left) {
   return part;
 }
 
-/// What is left of a cell, in its lattice's directions.
+/// The remainder of a cell, in its lattice's directions.
 struct Remainder {
   PartMoments part;
   double shift = 0;       // how far its middle is from the cell's

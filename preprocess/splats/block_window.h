@@ -1,4 +1,4 @@
-// What the splats of a box of nodes are made from: a window of a block, and its nodes with the neighbours
+// The input of the splats of a box of nodes: a window of a block, and its nodes with the neighbours
 // that are there along i, j and k. Views of memory that the caller has; any thread may read them.
 #pragma once
 
@@ -18,7 +18,7 @@
 
 namespace curvisplat {
 
-/// What is read around the nodes of a box.
+/// The nodes that are read around a box of nodes.
 inline constexpr Halo kNodeSplatHalo{kStretchReach, kStretchReach};
 
 /// A window of one block: `nodes` holds `window`, which is `box` and its halo (kNodeSplatHalo) inside the
@@ -34,7 +34,7 @@ struct BlockWindow {
   uint64_t endOfPart(uint64_t count) const { return std::min(i1, count); }
 };
 
-/// What computeNodeSplats() (node_splats.h) needs for a while; keeps its capacity.
+/// Scratch memory of computeNodeSplats() (node_splats.h); keeps its capacity.
 struct NodeScratch {
   std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
   std::array<std::vector<JointLine>, 3> lines;               // the same, of nodes at faces and one away

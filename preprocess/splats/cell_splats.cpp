@@ -26,7 +26,7 @@ uint32_t singleAxes(const GridBlock& block, const NodeSplatCorrections& correcti
   return (block.ni == 2 ? 1u : 0u) | (block.nj == 2 ? 2u : 0u) | (block.nk == 2 ? 4u : 0u);
 }
 
-/// What the cells of a box have in common.
+/// Makes the splats of the cells of a box.
 class Cells {
  public:
   Cells(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends,

@@ -23,16 +23,17 @@
 
 namespace curvisplat {
 
-/// What is beyond the ends of a block.
+/// The surroundings of a block's ends.
 struct BlockEnds {
   size_t block = 0;
   const AbuttingFaces* faces = nullptr;  // null: no cell ends at a border
 };
 
-/// What is read around the cells of a box: two cells on either side, and the nodes behind the last.
+/// The nodes that are read around the cells of a box: two cells on either side, and the nodes behind the
+/// last.
 inline constexpr Halo kCellSplatHalo{2, 3};
 
-/// What computeCellSplats() needs for a while; keeps its capacity.
+/// Scratch memory of computeCellSplats(); keeps its capacity.
 struct CellScratch {
   std::vector<glm::dvec3> centre;
   std::vector<uint8_t> there;

@@ -45,7 +45,7 @@ inline constexpr uint32_t kAllCellsAround = (1u << kCellsAround) - 1;
 uint32_t cellsAround(const NodeLattice& nodes, ptrdiff_t at, const std::array<ptrdiff_t, 3>& strides,
                      const std::array<uint64_t, 3>& index, const std::array<uint64_t, 3>& count);
 
-/// What is there of a dual cell.
+/// The part of a dual cell that is there.
 struct DualPiece {
   double volume = 0;               // signed
   glm::dvec3 first{0.0};           // the integral of x - X, X the node's position

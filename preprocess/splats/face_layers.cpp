@@ -140,7 +140,7 @@ CutBehindFaces FacesBehind::cutAtSeveral(const NodeBehind& behind, const std::ar
 
 namespace {
 
-/// What counts of x, by the row of a cell one away from the face.
+/// The excess that counts of x, by the row of a cell one away from the face.
 double excessOf(const CellRow& row) {
   constexpr double kLeft = 0.08, kFaded = 0.12, kMost = 0.25;
   const Stretch stretch = stretchOfRow(row, StretchFit::kSteep);

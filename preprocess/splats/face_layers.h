@@ -54,7 +54,7 @@ inline int latticeAxis(uint8_t layers, int n) {
   return (layers >> 2 * n & 3) - 1;
 }
 
-/// What is left of `border` if the faces across some axes of the lattice are seams: bit n, axis n.
+/// The rest of `border` if the faces across some axes of the lattice are seams: bit n, axis n.
 LayeredBorder withoutSeams(const LayeredBorder& border, uint32_t axes);
 
 /// The faces of a block that a node is one away from: along i, j and k 1 from the lower one, -1 from the
@@ -155,7 +155,7 @@ LayerFit fitBehindFace(const JointLine& line);
 /// The fit of a half cell at the face.
 LayerFit fitAtFace(const JointLine& line);
 
-/// What a node's cell ends at and is behind along i, j and k, as computeNodeSplats() has it.
+/// The faces that a node's cell ends at and is behind along i, j and k, as computeNodeSplats() has it.
 struct CellAtFaces {
   const std::array<double, 3>& inwards;  // borderCode()'s
   const Layers& layers;

@@ -123,7 +123,7 @@ struct alignas(64) StagedScalar {
   double mean[kAtOnce], slope[3][kAtOnce];
 };
 
-/// What the scalars need of the geometry.
+/// The numbers of the geometry that the scalars need.
 struct Cells {
   V3 stretch, middle, bend_in_cells, aside_in_cells;
   std::array<V, 3> stretch2;

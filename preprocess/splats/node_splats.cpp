@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-/// What the nodes of a box of a window have in common.
+/// Makes the splats of the nodes of a box of a window.
 class Window {
  public:
   Window(const BlockWindow& in, const NodeBox& box, const NodeSplatCorrections& corrections,

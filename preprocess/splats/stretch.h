@@ -83,7 +83,7 @@ inline constexpr double kDrift = 0.14;
 /// were made without them, and so are cells of cell-centred data.
 enum class StretchFit : uint8_t { kGentle, kSteep };
 
-/// What the extents along an axis tell of a splat.
+/// The corrections of a splat that follow from the extents along an axis.
 struct Stretch {
   float factor = 1;  // s: between 0.74 and 1.57
   float growth = 0;  // g

@@ -205,7 +205,7 @@ class OverlapSearch {
     return std::span(slabs_).subspan(first_slab_[block], first_slab_[block + 1] - first_slab_[block]);
   }
 
-  /// What points may take: the pairs get a quarter, or what they have and an eighth.
+  /// The memory that points may take: the pairs get a quarter, or what they have and an eighth.
   uint64_t bytesForPoints() const {
     const uint64_t all = memory_.point_bytes;
     return all - std::min(all, std::max(all / 4, shared_.bytes() + all / 8));

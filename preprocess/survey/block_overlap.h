@@ -30,7 +30,7 @@ struct BlockOverlap {
   double share = 0;                // volume / volume of the smaller block
 };
 
-/// What the search may take, beside some hundred bytes a block.
+/// The memory that the search may take, beside some hundred bytes a block.
 struct OverlapMemory {
   uint64_t slab_bytes = 0;   // each of two
   uint64_t point_bytes = 0;  // the points that are located at a time, and pairs of blocks

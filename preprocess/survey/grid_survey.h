@@ -93,7 +93,7 @@ class GridChecksum {
   std::vector<Row> rows_;  // of the last slab's box, if that has parts of rows
 };
 
-/// What a survey fills beside its result; a null one is not filled.
+/// Objects that a survey fills beside its result; a null one is not filled.
 struct SurveyExtras {
   AbuttingFaces* faces = nullptr;  // of cells
   PositionSample* sample = nullptr;

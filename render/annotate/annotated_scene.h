@@ -1,4 +1,4 @@
-// What annotations are drawn of: the view, the box around the data, the functions of the scalar bars; and
+// The subject of annotations: the view, the box around the data, the functions of the scalar bars; and
 // the titles and ticks that name them. All of it is independent of Cairo, and pure; any thread.
 #pragma once
 
@@ -16,7 +16,7 @@
 
 namespace curvisplat {
 
-/// What a scalar bar shows. The function is borrowed for the call.
+/// The function that a scalar bar shows, and how. The function is borrowed for the call.
 struct ShownFunction {
   enum class Part {
     kColours,    // alone: the picture's opacities are not this function's
@@ -32,7 +32,7 @@ struct ShownFunction {
 /// The title of a scalar: "density [kg/m3]", or "density" if the unit is unknown.
 std::string scalarTitle(const std::string& name, const std::string& unit);
 
-/// What to annotate.
+/// The scene to annotate.
 struct AnnotatedScene {
   ImageSize picture;  // the whole picture
   ScreenView view;    // has dataSize() (annotations.h)

@@ -1,4 +1,4 @@
-// What annotations are drawn with: pictures in memory that Cairo draws on (CairoSurface, Canvas), ink, text,
+// The means of drawing annotations: pictures in memory that Cairo draws on (CairoSurface, Canvas), ink, text,
 // and lines in space.
 //
 // Sizes and places are in pixels, from the top left. A surface belongs to one thread at a time, and a Canvas

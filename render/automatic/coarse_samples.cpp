@@ -37,7 +37,7 @@ class CubePoints {
   std::array<double, 4> at_{};
 };
 
-/// What the points of several steps have in common.
+/// The settings that the points of several steps have in common.
 struct Sampling {
   size_t variable;
   glm::dvec3 scale;

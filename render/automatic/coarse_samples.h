@@ -30,8 +30,8 @@ struct CoarseSamples {
 /// The bricks of the coarsest level with at least `min_splats` splats, including leaves above that level.
 std::vector<uint32_t> bricksAtALevel(const CacheReader& cache, uint64_t min_splats);
 
-/// What a choice is made for: the step that the reader is at, or the whole series, of which five steps at
-/// most stand for all.
+/// The range that a choice is made for: the step that the reader is at, or the whole series, of which five
+/// steps at most stand for all.
 enum class ChosenFor { kStep, kSeries };
 
 /// The variable's range at the step, or over the series.

@@ -246,8 +246,8 @@ struct FewSamples {
   }
 };
 
-/// What is seen of rare values from the side of a camera: over all pixels, the light that each sample takes of what
-/// comes through to it, times its extinction.
+/// How much is seen of rare values from the side of a camera: over all pixels, the light that each sample
+/// takes of what comes through to it, times its extinction.
 double rareSeen(const FewSamples& few, const Camera& camera) {
   constexpr int kPixels = 48;  // of the longer side: a dozen samples for each
   const SeenSamples seen(few.samples, camera);

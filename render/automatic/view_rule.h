@@ -42,13 +42,13 @@ constexpr double kChosenViewAngle = 30;  // degrees, of a view in perspective
 /// `lower`, `upper`: the box that the camera shows where it shows all.
 Camera cameraOf(const ViewChoice& choice, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size);
 
-/// What a picture shows, apart from what can be seen in it.
+/// The part of the data that a picture shows, apart from what can be seen in it.
 enum class Framed {
   kSeen,  // all samples, or the small part of them in which there is something to be seen
   kBox    // the box of the data, which is drawn
 };
 
-/// What is drawn; borrows all.
+/// The samples that are drawn; borrows all.
 struct DrawnSamples {
   const CoarseSamples& samples;
   const std::vector<double>& depths;  // [sample]: volume times extinction, 1/area

@@ -88,7 +88,7 @@ constexpr size_t kEntriesASplat = 4;
 constexpr float kBefore = -1e30f, kHardly = 1e-5f;
 constexpr float kMinOpacity = 1.0f / 510;  // of a pixel that has values
 
-/// What is found at a tile's pixels, and where they are among their layers.
+/// The values found at a tile's pixels, and the pixels' places among their layers.
 struct FoundTile {
   std::array<std::array<float, 4>, HalfTile::kPixels> values;
   std::array<uint8_t, HalfTile::kPixels> layers{};  // the next

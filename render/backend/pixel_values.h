@@ -1,5 +1,5 @@
-// What lies where a picture's pixels have half of their opacity: depth, scalar and normal. For compositing
-// programs.
+// Finds the values where a picture's pixels have half of their opacity: depth, scalar and normal. For
+// compositing programs.
 //
 //   picture, layers -> makeValueBackend: splats are drawn again -> image -> pixelValuesOf -> PixelValues
 //
@@ -40,7 +40,7 @@ glm::dvec3 placeOf(const ScreenView& view, int x, int y, double depth);
 inline constexpr float kOfLayer = 2;
 PixelValues pixelValuesOf(const Image& painted, const ScreenView& view, double depth_origin);
 
-/// What the painter needs to know; borrowed.
+/// The inputs of the painter; borrowed.
 struct ValueInputs {
   const Image& picture;       // that has been drawn, over a transparent background: its opacities
   const PixelLayers* layers;  // the real ones; may be null

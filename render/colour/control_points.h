@@ -23,9 +23,9 @@ struct ColourPoint {
   glm::dvec3 rgb;  // 0..1, display values
 };
 
-/// What depends only on a pair of neighbouring points is resolved when the map is built: the shorter way
-/// round the circle of hues, and the white that a diverging map inserts between two saturated colours. After
-/// that each segment is linear in its space.
+/// A map of colours. What depends only on a pair of neighbouring points is resolved when the map is built:
+/// the shorter way round the circle of hues, and the white that a diverging map inserts between two saturated
+/// colours. After that each segment is linear in its space.
 class ColourMap {
  public:
   ColourMap() = default;

@@ -37,7 +37,7 @@ class CpuPainter final : public Painter {
   uint64_t hiddenSplats() const override;
   bool isOverfull() const override;
 
-  /// What it takes for a frame beside the picture itself.
+  /// The memory for a frame beside the picture itself.
   static uint64_t frameBytes(ImageSize size);
   static uint64_t batchBytes(ImageSize size, const PaintResources& resources);
   static uint64_t layerBytes(const PixelLayers& layers);

@@ -57,7 +57,7 @@ struct HalfSplat {
   const FootprintSkew* skew;  // or null
 };
 
-/// What happens at pixels of the tile.
+/// Gets the events at pixels of the tile.
 class HalfEvents {
  public:
   virtual ~HalfEvents() = default;

@@ -78,8 +78,8 @@ HWY_INLINE V absorbedOf(V x) {
   return hn::Div(absorbed, hn::Max(x, hn::Set(d, 1e-30f)));
 }
 
-/// What is seen of a splat lies nearer than its middle: so many half widths of its depths, L(tau / 2), where its
-/// optical depth is tau and its extinction constant. L(x) = coth x - 1 / x.
+/// The number of half widths of its depths, L(tau / 2), by which what is seen of a splat lies nearer than its
+/// middle, where its optical depth is tau and its extinction constant. L(x) = coth x - 1 / x.
 HWY_INLINE V nearSide(V tau) {
   const Floats d;
   const V two = hn::Set(d, 2.0f), thin = hn::Mul(tau, hn::Set(d, 1.0f / 6));
@@ -257,13 +257,13 @@ struct LookedUp {
   alignas(64) float integrals[4 * kLanes];  // of one pixel after the other
 };
 
-/// What pixels are looked up in: the integrals of the classification, and footprintPolynomial().
+/// The tables for looking pixels up: the integrals of the classification, and footprintPolynomial().
 struct Tables {
   const ShadingTable& shading;
   const float* footprint;
 };
 
-/// What was looked up becomes what is seen of it: by the intervals of the nearer side.
+/// Replaces what was looked up by what is seen of it: by the intervals of the nearer side.
 HWY_INLINE void showNearSides(const ShadingTable& table, const Intervals& nearer, LookedUp& out) {
   const Floats d;
   alignas(64) float integrals[4 * kLanes];

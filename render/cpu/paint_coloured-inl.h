@@ -126,7 +126,7 @@ HWY_INLINE Channel channelOf(const ShadingTable& table, const Fits& fits, size_t
   return channel;
 }
 
-/// What is left of some pixels along the ray: moments as those of an Interval.
+/// The rest of some pixels along the ray: moments as those of an Interval.
 struct Remaining {
   V mean, lost_variance;
 };

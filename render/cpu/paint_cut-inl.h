@@ -46,7 +46,8 @@ HWY_INLINE V secondTo(V x, V x2) {
   return hn::Mul(hn::Mul(x, x2), series);
 }
 
-/// What the faces leave of the pixels: an interval of depths, over kReach deviations; so are its moments.
+/// The part of the pixels' depths that the faces leave: an interval of depths, over kReach deviations; so are
+/// its moments.
 struct Interval {
   V lo, hi;
 
@@ -83,7 +84,7 @@ struct Window {
   const float* HWY_RESTRICT farther = nullptr;
 };
 
-/// What cuts a splat in a block.
+/// The cuts of a splat in a block.
 struct Cuts {
   const Faces& faces;
   const DepthLine& depth;

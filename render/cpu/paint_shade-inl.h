@@ -1,4 +1,4 @@
-// What a splat's pixels see of the transfer function, over a piece of the splat: a colour, a parabola along
+// Applies the transfer function to a splat's pixels, over a piece of the splat: a colour, a parabola along
 // the scalar's slope, or every pixel for itself. Included once for every instruction set.
 #if defined(CURVISPLAT_PAINT_SHADE_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef CURVISPLAT_PAINT_SHADE_INL_H
@@ -63,8 +63,8 @@ HWY_INLINE hn::Vec<Ints> element(V x) {
   return hn::ConvertTo(Ints(), hn::Clamp(hn::Add(x, hn::Set(d, 1.0f)), hn::Zero(d), hn::Set(d, kLast)));
 }
 
-/// What pixels with these means see, in cells: never less than a cell. An interval beyond an end of the
-/// table sees the same wherever it lies there; it begins where float still tells cells apart.
+/// The intervals that pixels with these means see, in cells: never less than a cell. An interval beyond an
+/// end of the table sees the same wherever it lies there; it begins where float still tells cells apart.
 HWY_INLINE Range locate(const ShadingTable& table, V mean, V half_width, size_t lane, Intervals& out) {
   static_assert(sizeof(ShadingTable::Cell) == 8 * sizeof(float));
   const Floats d;
@@ -118,7 +118,7 @@ struct Pieces {
 
 enum Fit : int32_t { kNothing, kConstant, kParabola, kOther };
 
-/// What does for a piece: at + s (by + s bend), with s = -1 to 1 from end to end.
+/// The fit of a piece: at + s (by + s bend), with s = -1 to 1 from end to end.
 struct Fits {
   Values at, by, bend;
   Row most;    // extinction

@@ -80,8 +80,8 @@ HWY_INLINE V cellsAScalar(const ShadingTable& table, V scalar) {
   return hn::Div(scale, hn::Max(hn::Abs(scalar), hn::Set(d, ClassificationTable::kMinLogarithmic)));
 }
 
-/// What the cells of splats have along the ray: the footprints of neighbours add up to one, so it is the amplitude
-/// without the low-pass.
+/// The depth of splats' cells along the ray: the footprints of neighbours add up to one, so it is the
+/// amplitude without the low-pass.
 HWY_INLINE V cellDepth(const TileWork& work, V amplitude, V l11, V l21, V l22) {
   const Floats d;
   const V low_pass = hn::Set(d, work.shading.low_pass_px2);
@@ -295,8 +295,8 @@ HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks,
   return saturated;
 }
 
-/// What is seen of splats that hide some of themselves, in the place of the colours in `fits`: those of their nearer
-/// sides. The optical depths stay. By the extinction in their middles.
+/// Replaces the colours in `fits`, for splats that hide some of themselves, by what is seen of them: those of
+/// their nearer sides. The optical depths stay. By the extinction in their middles.
 HWY_INLINE void fitNearSides(const ShadingTable& table, Visits& visits, size_t count, Fits& fits) {
   const Floats d;
   const V zero = hn::Zero(d);

@@ -108,8 +108,8 @@ struct TileWindows {
   std::array<uint8_t, 64> open;  // of each block: how many windows, from the first, take more
 };
 
-/// What a thread may keep of prepared splats, of up to half a kilobyte each. A wake of 2.3 M splats took 1.5 times the
-/// processor time with 1 MiB, 1.1 times with 2, and with 4 what it takes without a bound.
+/// The bytes that a thread may keep of prepared splats, of up to half a kilobyte each. A wake of 2.3 M splats
+/// took 1.5 times the processor time with 1 MiB, 1.1 times with 2, and with 4 what it takes without a bound.
 inline constexpr uint64_t kMinPreparedBytes = uint64_t{1} << 19, kMaxPreparedBytes = uint64_t{4} << 20;
 
 /// Splats to be painted under what a tile holds.

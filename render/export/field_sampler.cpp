@@ -125,7 +125,7 @@ class Sums {
   };
   static_assert(sizeof(Sum) + 2 * sizeof(float) == kSampleBytes);
 
-  /// What a piece at `centre` adds, blurred by `box`, as the share of a lattice's box that it is.
+  /// Adds a piece at `centre`, blurred by `box`, as the share of a lattice's box that it is.
   void addBlurred(const glm::dvec3& centre, const SplatPiece& piece, const glm::dmat3& a,
                   const glm::dvec3& box) {
     glm::dmat3 s = a * glm::transpose(a);

@@ -68,7 +68,7 @@ double surfaceOf(const glm::dvec3& a) {
   return 4 * std::numbers::pi * std::pow((ab + ac + bc) / 3, 1 / kPower);
 }
 
-/// What classifies the splats of bricks.
+/// Classifies the splats of bricks.
 struct Classifier {
   const CacheReader& cache;
   size_t variable;

@@ -34,7 +34,8 @@ SampleLattice latticeOf(const Manifest& manifest, uint32_t voxels) {
   return lattice;
 }
 
-/// What two grids take of which every voxel is filled: leaves of 8 voxels along each axis and the nodes above them, of 16 and 32.
+/// The bytes of two grids of which every voxel is filled: leaves of 8 voxels along each axis and the nodes
+/// above them, of 16 and 32.
 uint64_t filledBytes(const SampleLattice& lattice) {
   constexpr uint64_t kLeaf = 2400, kNode = 48 << 10, kUpperNode = 384 << 10;
   const auto count = [&](uint32_t side) {

@@ -27,7 +27,8 @@ constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16
                                   BrickProjector::kMaxSplats * (sizeof(ScreenSplat) + sizeof(float)) +
                                   BrickProjector::kMaxSplats * (4 + 2 * sizeof(DepthItem)) +
                                   SweepBuffer::kMaxBatch * 2 * sizeof(DepthItem) + (1 << 20);
-// What pictures of two scalars take in addition: the second one's values, and a record for each splat.
+// The memory that pictures of two scalars take in addition: the second one's values, and a record for each
+// splat.
 constexpr uint64_t kSecondScalarBytes =
     uint64_t{kMaxBrickSplats} * (5 * sizeof(float) + sizeof(ScreenSplat) + 8 + 2 * sizeof(DepthItem));
 // These have what they need first. More workers take half of the memory at most: where little is left for splats, the picture is
@@ -39,7 +40,7 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
 constexpr uint64_t kMaxWaitingBytes = 96 << 20;
-// What a waiting splat takes in the queues of tiles (render/tiles/tile_queues.h) and prepared.
+// The bytes of a waiting splat in the queues of tiles (render/tiles/tile_queues.h) and prepared.
 constexpr uint64_t kWaitingSplatBytes =
     sizeof(ScreenSplat) + sizeof(uint64_t) + PaintResources::kPreparedBytesASplat;
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
@@ -93,9 +94,10 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
 namespace {
 
 constexpr uint32_t kNumbers[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, kMaxRegions};
-// What a layer may fill of the sweep's memory, by the estimate: pages are not full, and parts are swept ahead.
+// The share of the sweep's memory that a layer may fill, by the estimate: pages are not full, and parts are
+// swept ahead.
 constexpr double kLayerShare = 0.7;
-// What a slab has of it, on average, where the layer does not fit.
+// The share of it that a slab fills, on average, where the layer does not fit.
 constexpr double kSlabShare = 0.6;
 // The wait of threads for one another between regions: as long as preparing this number of splats takes.
 constexpr double kSplatsARegion = 100e3;
@@ -128,7 +130,7 @@ double shareOf(float from, float to, int first, int last) {
   return to > from && std::isfinite(to - from) ? (high - low) / (double{to} - from) : 1;
 }
 
-/// What drawing a region with such a layer takes, in splats to be prepared.
+/// The work of drawing a region with such a layer, in splats to be prepared.
 double workOf(const std::vector<PartInRegion>& parts, double layer, double sweep_splats) {
   double all = 0, seen = 0, depth_first = std::numeric_limits<double>::infinity(), depth_last = 0;
   for (const PartInRegion& part : parts) {

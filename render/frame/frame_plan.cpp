@@ -175,7 +175,8 @@ std::vector<SlicePlan> FramePlanner::planSlices(const ProjectionSettings& settin
   return slices;
 }
 
-/// What is transparent in the volume is there. In the order of the bricks, which is the same for all painters.
+/// Plans the bricks for isosurfaces, with those that are transparent in the volume. In the order of the
+/// bricks, which is the same for all painters.
 void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions& limits,
                                    FramePlan& plan) const {
   if (!options.scene || options.scene->isovalues.empty()) return;
@@ -319,7 +320,7 @@ namespace {
 
 constexpr double kMaxHiddenPixels = 4;
 constexpr double kMinWeight = 0.25;
-// What counts as shown, as the opacity of the optical depth (bench/README.md, "Rendering from growing caches").
+// The opacity of the optical depth that counts as shown (bench/README.md, "Rendering from growing caches").
 constexpr double kShownChange = 0.05;
 constexpr double kShownRipple = 1;
 constexpr double kMaxShare = 1.0 / 48;

@@ -152,7 +152,7 @@ class FramePlanner {
 /// 4 pixels: borders show with any function. At 4 pixels and more, and at 0, everything counts (1).
 double leastErrorWeight(double lod_pixels);
 
-/// What merging into one voxel loses. The scalar inside a voxel is known only to within the deviation that
+/// The loss by merging into one voxel. The scalar inside a voxel is known only to within the deviation that
 /// its slope leaves, so the transfer function is wrong by at most its change within that deviation. And
 /// merged kernels do not add up to one: they ripple with the voxels' lattice, which shows where a ray passes
 /// many voxels at the same place.

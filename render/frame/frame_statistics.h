@@ -70,7 +70,7 @@ struct FrameStatistics : PlanStatistics, FetchStatistics, PrepareStatistics, Dra
   uint64_t memory_used_bytes = 0;  // of memory_bytes: by the stages and by decoded bricks that are kept
 };
 
-/// What the whole has of a number, where several threads or ranks have one each.
+/// How the whole's number is made where several threads or ranks have one each.
 enum class Combined { kSum, kLargest };
 
 /// One number of FrameStatistics, or of a stage.

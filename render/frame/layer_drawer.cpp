@@ -24,13 +24,14 @@ namespace {
 
 constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
 
-/// What the splats of isosurfaces may take; where it is too little they are found in several parts of the picture.
+/// The memory that the splats of isosurfaces may take; where it is too little they are found in several parts
+/// of the picture.
 uint64_t isoSplatBytes(const FrameOptions& options) {
   constexpr uint64_t kMinBytes = 4 << 20;
   return std::max(kMinBytes, options.memory_bytes / 8);
 }
 
-/// What finding where rays meet them may take; where it is too little fewer threads do.
+/// The memory that finding where rays meet isosurfaces may take; where it is too little fewer threads do.
 uint64_t isoTracerBytes(const FrameOptions& options) {
   constexpr uint64_t kTracerBytes = 2 << 20;
   return std::max(kTracerBytes * threadsOrCores(options.threads), options.memory_bytes / 16);

@@ -29,7 +29,7 @@ class GlPainter final : public Painter {
   CardWork cardWork() const override;
   bool isOverfull() const override;
 
-  /// What it takes for a frame beside the picture itself.
+  /// The memory for a frame beside the picture itself.
   static uint64_t bytes(ImageSize size, const PaintResources& resources);
 
  private:

@@ -20,7 +20,8 @@ namespace curvisplat {
 
 class GlTilePainter final : public Painter {
  public:
-  /// What it takes: `splats` of a batch, in memory and on the card, and `entries` of tiles' lists, 24 bytes each, there.
+  /// The capacity of the painter: `splats` of a batch, in memory and on the card, and `entries` of tiles'
+  /// lists, 24 bytes each, there.
   struct Capacity {
     size_t splats, entries;
     /// For a card, or for OpenGL in software, which the processor's memory holds.
@@ -46,7 +47,7 @@ class GlTilePainter final : public Painter {
   CardWork cardWork() const override;
   bool isOverfull() const override;
 
-  /// What it takes for a frame beside the picture itself.
+  /// The memory for a frame beside the picture itself.
   static uint64_t bytes(ImageSize size, const PaintResources& resources, const Capacity& capacity);
 
  private:

@@ -28,7 +28,8 @@ uniform bool colour_log_scale;
 uniform sampler2D layers;  // depths of the pixel's layers, nearest first; infinite beyond the last
 )";
 
-// What the pixels of a splat share: from the vertices to the fragments, or variables of a compute shader.
+// The variables that the pixels of a splat share: from the vertices to the fragments, or variables of a
+// compute shader.
 constexpr const char* kPerSplat = R"(
 PER_SPLAT vec2 centre;
 PER_SPLAT vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
@@ -173,8 +174,8 @@ vec3 integralsTo(float x) {
               x * x2 * (0.3125 + x2 * (-0.375 + 0.13392857 * x2)));
 }
 
-// What the faces leave between two depths: the share, the mean and the variance of the depths, those over kReach
-// deviations.
+// The remainder between two depths that the faces leave: the share, the mean and the variance of the depths,
+// those over kReach deviations.
 vec3 remainder(vec2 u, float lo, float hi) {
   vec3 a = vec3(1.0, u) * faces / kReach;
   int far_sides = int(cut.x);
@@ -219,7 +220,7 @@ vec2 intervalOf(vec4 of, float correlation, vec2 u, vec2 left, bool log_scale, v
   return interval(mean, width, log_scale, cells_from);
 }
 
-// What is seen of a splat with this optical depth per extinction, between two depths.
+// The colour that is seen of a splat with this optical depth per extinction, between two depths.
 vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
   vec3 left = vec3(1.0, 0.0, 0.0);
   if (amplitude < 0.0) left = remainder(u, lo, hi);
@@ -249,7 +250,7 @@ vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
 }
 
 #if WINDOWS > 1 || LAYERED
-// What is seen in the window between layers n - 1 and n.
+// The colour that is seen in the window between layers n - 1 and n.
 vec4 seenIn(int n, vec2 u, float depth, vec4 ends) {
   float lo = n > 0 ? clamp(ends[max(n - 1, 0)], -1.0, 1.0) : -1.0, hi = n < 4 ? clamp(ends[min(n, 3)], -1.0, 1.0) : 1.0;
   if (lo >= hi) return vec4(0.0);

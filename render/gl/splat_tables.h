@@ -1,5 +1,5 @@
-// What the painters by OpenGL have in common: the tables and the layers that their shaders read, as textures, and what
-// becomes of a picture's windows of depth at the end.
+// The common part of the painters by OpenGL: the tables and the layers that their shaders read, as textures,
+// and what becomes of a picture's windows of depth at the end.
 //
 // On the context's thread.
 #pragma once
@@ -31,7 +31,7 @@ class SplatTables {
 
   /// Loads the tables of a frame. `table` and what `shading` borrows are borrowed until the frame ends.
   void load(ImageSize size, const ClassificationTable& table, const PixelShading& shading);
-  /// What the frame's splats are drawn by.
+  /// The kind of program that draws the frame's splats.
   SplatShaderKind kind() const;
   int windows() const { return layers_ ? layers_->windows() : 1; }
   /// Sets the frame's uniforms of a program of that kind, which is then in use.

@@ -1,4 +1,4 @@
-// What a splat leaves on the screen: the footprint F of its kernel K, an ellipse under a linear map, the
+// The image of a splat on the screen: the footprint F of its kernel K, an ellipse under a linear map, the
 // skew of the ellipse where the cells around the splat grow, and the box around it. DESIGN.md, "Splats" and
 // "Projection"; Crawfis and Max, "Texture Splats for 3D Scalar and Vector Field Visualization", 1993.
 //
@@ -75,8 +75,8 @@ struct Ellipse {
   float l11, l21, l22, amplitude, slope0, slope1, half_width, along;
 };
 
-/// What is added to covariances on the screen, in pixels²: to the footprint's, and to that which gives the
-/// slope.
+/// The low-pass that is added to covariances on the screen, in pixels²: to the footprint's, and to that which
+/// gives the slope.
 struct LowPass {
   float footprint_px2, slope_px2;
 };

@@ -31,7 +31,7 @@ struct PaintResources {
   ComputePermits* permits =
       nullptr;  // held by threads that compute; outlive the frame. Null: there is no further bound
 
-  /// What all threads together may keep of splats that they have prepared, and need again.
+  /// The bytes that all threads together may keep of splats that they have prepared, and need again.
   uint64_t preparedBytes() const { return kPreparedBytesASplat * waiting_splats; }
   static constexpr uint64_t kPreparedBytesASplat = 32;  // that may wait
 };
@@ -48,7 +48,8 @@ struct PixelShading {
   float low_pass_px2 = static_cast<float>(kLowPass);  // ScreenView's
 };
 
-/// What OpenGL did for a frame, by its own clock, without waits for splats. The parts are those of compute shaders.
+/// The work of OpenGL for a frame, by its own clock, without waits for splats. The parts are those of compute
+/// shaders.
 struct CardWork {
   double draw_s = 0;  // all of it
   double list_s = 0, sort_s = 0, paint_s = 0;

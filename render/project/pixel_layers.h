@@ -1,5 +1,5 @@
-// What lies in the volume, pixel by pixel: surfaces and slices, as layers from the nearest to the farthest. Each
-// has a depth and a colour. Layers divide the ray of a pixel into windows of depth:
+// The contents of the volume besides splats, pixel by pixel: surfaces and slices, as layers from the nearest
+// to the farthest. Each has a depth and a colour. Layers divide the ray of a pixel into windows of depth:
 //
 //   viewer | window 0 | layer 0 | window 1 | layer 1 | ... behind an opaque layer there is nothing
 //

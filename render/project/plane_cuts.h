@@ -42,7 +42,7 @@ bool isUsable(const ClipPlane& plane);
 /// The planes, and the six faces of the box if there is one, with normals that point inwards.
 std::vector<ClipPlane> clipPlanesOf(std::span<const ClipPlane> planes, const std::optional<WorldBox>& box);
 
-/// What a clip box leaves of a box; all of it where that is nothing, or there is none.
+/// The part of a box inside a clip box; all of it where that part is empty, or there is no clip box.
 WorldBox leftBy(const std::optional<WorldBox>& clip_box, const WorldBox& box);
 
 /// The side of the clip planes on which a splat lies.
@@ -72,7 +72,7 @@ class LocalClipPlanes {
   std::vector<Plane> planes_;
 };
 
-// What a face leaves of a splat along a ray. With n the face's normal, n · (x - X0) is a linear field like
+// Cutting at a face along a ray. With n the face's normal, n · (x - X0) is a linear field like
 // the scalar. At a given pixel it therefore has a mean and a deviation, as the scalar has. In the frame of
 // A, with q the normal, B the rows of the map times A, and S2' = B Bᵀ + λ (λ is the low-pass, which
 // antialiases a face that is seen edge-on):

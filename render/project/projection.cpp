@@ -126,7 +126,7 @@ void computeSkews(const Map& map, const GeometryArrays<const float>& geometry, s
   }
 }
 
-/// What parts and cutting may still give for a brick: pieces that are drawn, and looks at any.
+/// The budget that parts and cutting may still use for a brick: pieces that are drawn, and looks at any.
 struct CutBudget {
   size_t pieces = BrickProjector::kMaxPieces;
   size_t looks = 16 * BrickProjector::kMaxPieces;
@@ -165,7 +165,7 @@ void keepScalarOf(const Ellipse& cell, float mean, float x, float y, ScreenSplat
   cut.correlation = 0;
 }
 
-/// What cuts the splats of a brick.
+/// The cuts of the splats of a brick.
 struct Cutting {
   const BorderStyle* borders;  // null: cells at borders are drawn as any cell, and clip planes do not cut
   LocalClipPlanes clip;

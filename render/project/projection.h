@@ -32,7 +32,7 @@ namespace curvisplat {
 
 class GradientOpacity;
 
-/// What became of the splats; these counts explain an empty picture.
+/// Counts of splats by what became of them; these counts explain an empty picture.
 struct ProjectionCounts {
   uint64_t read = 0;         // in the bricks, or the parts of them that are drawn
   uint64_t clipped = 0;      // outside of a clip plane

@@ -1,4 +1,4 @@
-// What becomes of a splat once its place on the screen is known: beside which layers of the picture it lies,
+// Decides about a splat once its place on the screen is known: beside which layers of the picture it lies,
 // its record of the scalar that gives the colours, and whether it can be seen at all.
 //
 //   LocalLayers::sideOf -> cuts and records (plane_cuts.h, colourOf) -> SplatChooser: what can be seen
@@ -33,7 +33,7 @@
 
 namespace curvisplat {
 
-/// What the gradient of a splat's scalar gives it.
+/// The light and opacity that the gradient of a splat's scalar gives it.
 struct BySlope {
   Lit lit;
   float opacity = 1;  // factor of the extinction
@@ -105,7 +105,7 @@ class SplatChooser {
     return Fate::kKept;
   }
 
-  /// What a splat has besides itself; null: none.
+  /// The records of a splat besides itself; null: none.
   struct Records {
     const ScreenCut* cut = nullptr;
     const ScreenDepth* along_ray = nullptr;

@@ -86,7 +86,7 @@ struct PerspectiveMap {
   glm::vec3 depthRow(float x, float y, float z) const { return depthRowAt(centreOf(x, y, z)); }
   /// Depth along the view in pixels, those at the centre, per unit of the data.
   glm::vec3 depthPixels(float x, float y, float z) const { return focal_px / centreOf(x, y, z).z * forward; }
-  /// What orders splats: 1 / order_base - 1 / z, without cancellation.
+  /// The number that orders splats: 1 / order_base - 1 / z, without cancellation.
   float orderAt(const Centre& c, float x, float y, float z) const {
     return (from_base + forward.x * x + forward.y * y + forward.z * z) / (order_base * c.z);
   }

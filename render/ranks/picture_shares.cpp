@@ -108,7 +108,7 @@ double paintCost(const PartCost& part, const Painted& painted) {
   return (part.sort * painted.splats + part.paint * painted.inside) / part.splats;
 }
 
-/// What each rank's tiles cost it before any splat is painted.
+/// The cost of each rank's tiles before any splat is painted.
 std::vector<RankWork> workOfTiles(ImageSize size, const std::vector<uint32_t>& owners, uint32_t ranks) {
   std::vector<RankWork> work(ranks);
   const int columns = TileSet::tilesAlong(size.width, kSharedTileSide),

@@ -37,7 +37,7 @@ PictureShares sharePicture(std::span<const PartCost> parts, ImageSize size, uint
 /// every round.
 std::vector<size_t> roundEnds(size_t parts, uint32_t ranks);
 
-/// What one rank has to do.
+/// The work of one rank.
 struct RankWork {
   double prepare = 0;          // and send
   double paint = 0;            // and receive

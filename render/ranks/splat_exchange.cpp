@@ -17,12 +17,13 @@ constexpr uint64_t kCancelAhead = 1024;
 // Boxes of more tiles are compared with the ranks' rectangles instead.
 constexpr size_t kMaxTiles = 16;
 
-/// What a rank tells the others when a slab begins; then comes a bit for each part, of those that it needs.
+/// The message of a rank to the others when a slab begins; then comes a bit for each part, of those that it
+/// needs.
 struct RequestHeader {
   TileBox tiles;
   int32_t has_slab = 0;
 };
-/// What a rank tells another before splats are sent; then come the cancelled parts, then the offers.
+/// The message of a rank to another before splats are sent; then come the cancelled parts, then the offers.
 struct OfferHeader {
   uint64_t left = 0;       // parts that the sender still waits for
   uint32_t cancelled = 0;  // numbers

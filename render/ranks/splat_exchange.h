@@ -62,7 +62,7 @@ class SplatExchange {
   /// `ranks` and `shared` outlive the exchange.
   SplatExchange(Ranks& ranks, const SharedParts& shared, uint64_t buffer_bytes);
 
-  /// What a rank needs for a slab of a region of its tiles.
+  /// The parts that a rank needs for a slab of a region of its tiles.
   struct Request {
     TileBox tiles;  // that it paints in it; no other rank does
     // Numbers in SharedParts, increasing: all parts whose splats may touch those tiles.

@@ -57,7 +57,7 @@ std::vector<uint32_t> dealTiles(std::span<const double> tile_costs, ImageSize si
 /// The costs of tiles: [shared tile] sorting and painting the splats in it, and the tile itself.
 std::vector<double> tileCosts(std::span<const PartCost> parts, ImageSize size);
 
-// What tiles and splats cost their painter, and a part as shared tiles see it: for this dealer and that of
+// Costs of tiles and splats for their painter, and a part as shared tiles see it: for this dealer and that of
 // parts (picture_shares.cpp) only.
 
 // Nanoseconds by nanoseconds of one core, of a brick in memory (bench/README.md, "Several processes"):

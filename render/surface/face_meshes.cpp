@@ -14,8 +14,8 @@ namespace curvisplat {
 namespace {
 
 constexpr double kFinestPixels = 0.5;
-// What an edge leaves out lies within half its length of a node that is drawn: edges of twice the error, as far as that
-// is to be seen only by their number. Beyond, smooth normals would suffer.
+// Edges may be this many times as long as the error: what an edge leaves out lies within half its length of a
+// node that is drawn. With longer ones, smooth normals would suffer.
 constexpr double kFreeEdges = 2;
 constexpr size_t kMinNodes = 1 << 16;
 // Bytes while a mesh is made: nodes, triangles, the mesh itself, and the last picture's vertices on the

@@ -39,7 +39,7 @@ constexpr double kSameLayer = 8;     // pixels, between the rays of one pixel
 constexpr double kOwnLayers = 1e-3;  // of what still comes through
 constexpr uint64_t kAlone = 2;  // times the memory, for a tile that one thread traces while the others wait
 
-/// What a pixel's middle ray has found, to be compared with its neighbours.
+/// The finding of a pixel's middle ray, to be compared with its neighbours.
 struct Seen {
   size_t count = 0;
   double depth = 0;
@@ -59,7 +59,7 @@ class IsoLayers::Tracer {
         light_(look.light, view_),
         rays_(splats.settings()) {}
 
-  /// What draw() takes for a tile's splats.
+  /// The memory that draw() takes for a tile's splats.
   static uint64_t bytes(std::span<const IsoSplats::Placed> splats, int x0, int y0) {
     const auto counts = countRows(splats, y0);
     return kOwnBytes +
@@ -155,8 +155,8 @@ class IsoLayers::Tracer {
     int x0, y0, x1, y1;
   };
 
-  /// What the neighbours' outermost pixels see, so that an outline on the edge of two tiles is found by both. Their
-  /// splats are this tile's, too.
+  /// Traces the neighbours' outermost pixels, so that an outline on the edge of two tiles is found by both.
+  /// Their splats are this tile's, too.
   void traceAround() {
     constexpr int kLong = kTileSide / 2;
     static_assert(kLong == int{IsoPacket::kRays});

@@ -72,7 +72,7 @@ class IsoRays {
   void trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats);
   const Hits& hits(size_t ray) const { return hits_[ray]; }
 
-  /// What makeRoom() takes, in bytes.
+  /// The bytes that makeRoom() takes.
   static constexpr uint64_t bytes(size_t splats) {
     return splats * (sizeof(IsoCrossed) + 2 * sizeof(const IsoCrossed*));
   }

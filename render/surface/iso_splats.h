@@ -72,7 +72,7 @@ class IsoSplats {
   /// Whether they take more than the memory: some are missing then.
   bool overflowed() const { return bytes_.load(std::memory_order_relaxed) > settings_.most_bytes; }
   const Settings& settings() const { return settings_; }
-  /// What means are counted from.
+  /// The value that means are counted from.
   double base() const { return settings_.values.front(); }
 
   struct Placed {

@@ -41,7 +41,7 @@ class SampledLayers {
   /// Adds the layers of a pixel's samples. `hidden`: the samples behind something opaque, which are left
   /// out; adds to it.
   void append(const PixelSamples& samples, int x, int y, unsigned& hidden);
-  /// What is appended next is the next pixel's.
+  /// Ends a pixel: what is appended next is the next one's.
   void endPixel() { ends_.push_back(unshaded_.size()); }
   /// Shades all samples, after the last pixel.
   void shade();
@@ -299,8 +299,8 @@ class PixelSlices {
   }
 
  private:
-  /// What clip planes leave of a slice at a point. They keep what lies in them: a slice in a clip plane
-  /// shows the cut, and coverageAt() would leave half of it.
+  /// The share of a slice at a point that clip planes leave. They keep what lies in them: a slice in a clip
+  /// plane shows the cut, and coverageAt() would leave half of it.
   float leftOf(size_t slice, const glm::dvec3& at, double pixel) const {
     constexpr double kParallel = 1e-6, kInPlane = 0.01;  // of an angle; pixels
     const glm::dvec3 normal = glm::normalize(scene_.slices[slice].normal);

@@ -33,7 +33,7 @@ struct ScreenVertex {
 /// The vertices of each surface.
 using ScreenVertices = std::vector<std::vector<ScreenVertex>>;
 
-/// What of a triangle lies behind the near plane: a polygon of 3 or 4 vertices, or none.
+/// The part of a triangle behind the near plane: a polygon of 3 or 4 vertices, or none.
 struct NearPolygon {
   std::array<ScreenVertex, 4> vertices;
   size_t count = 0;
@@ -100,7 +100,7 @@ struct SamplePlaces {
 };
 inline constexpr SamplePlaces kSamplePlaces;
 
-/// What the samples of a pixel see: the triangle's number, and its value there.
+/// The triangles that the samples of a pixel see: the triangle's number, and its value there.
 struct PixelSamples {
   static constexpr uint32_t kNothing = std::numeric_limits<uint32_t>::max();
 

@@ -1,4 +1,5 @@
-// What is shown in a volume, or in its place: surfaces of triangles, slices and isosurfaces that have the scalar's colours.
+// A scene in a volume, or in its place: surfaces of triangles, slices and isosurfaces that have the scalar's
+// colours.
 #pragma once
 
 #include <algorithm>

@@ -80,7 +80,7 @@ struct SurfaceShader::Corners {
   std::array<Row, 3> scalar, other;  // NaN: none
 };
 
-/// What they make together at the spots.
+/// The values that the corners make together at the spots.
 struct SurfaceShader::Mixed {
   using Row = std::array<float, kAtOnce>;
   alignas(64) Row normal_x, normal_y, normal_z;

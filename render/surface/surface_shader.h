@@ -1,4 +1,4 @@
-// What surfaces look like where they are seen: SurfaceShader finds the colours, normals and opacities of
+// Shades surfaces where they are seen: SurfaceShader finds the colours, normals and opacities of
 // triangles at points of the picture, and SurfaceLight lights them, as it lights slices and isosurfaces.
 // Clip planes cut all of them along the rays of pixels: towardsViewer(), pixelSide() and coverageAt().
 //
@@ -56,7 +56,7 @@ class SurfaceLight {
   glm::vec3 towards_{0};
 };
 
-/// What triangles look like where they are seen: colour, normal and opacity at points of the picture.
+/// Shades triangles where they are seen: colour, normal and opacity at points of the picture.
 class SurfaceShader {
  public:
   /// The picture's tables. `opacities`: null, if no surface has the function's.
@@ -73,7 +73,7 @@ class SurfaceShader {
     uint32_t number;
     float x, y;
   };
-  /// What light falls on.
+  /// A point that light falls on.
   struct Point {
     glm::vec3 colour{0.0f}, normal{0.0f};
     float opacity = 0;
@@ -122,7 +122,7 @@ inline double pixelSide(const ScreenView& view, double distance) {
          std::max({view.scale.x, view.scale.y, view.scale.z});
 }
 
-/// What clip planes leave of a sheet at a point, smoothed over a pixel.
+/// The share of a sheet at a point that clip planes leave, smoothed over a pixel.
 inline float coverageAt(std::span<const ClipPlane> planes, const glm::dvec3& at, double pixel) {
   double coverage = 1;
   for (const ClipPlane& plane : planes)

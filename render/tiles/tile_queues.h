@@ -32,7 +32,7 @@
 
 namespace curvisplat {
 
-/// What is to be painted of a tile.
+/// The splats to be painted in a tile.
 struct OrderedTile {
   std::span<const ScreenSplat> splats;                        // one that is cut behind its records
   std::span<const uint32_t> order;                            // of `splats`

@@ -131,7 +131,7 @@ std::optional<Moment> momentIn(const std::string& text) {
   return moment;
 }
 
-/// What a unit counts, and from when.
+/// A clock: the calendar, the length of a unit, and the date from which it counts.
 struct Clock {
   Calendar calendar;
   double seconds = 1;           // of the unit

@@ -35,7 +35,7 @@ class DiskFull : public OutputError {
   const std::filesystem::path& file() const { return file_; }
   /// The system's text for the error.
   std::string reason() const;
-  /// What the user can do: `of_full_disk`, unless the limit of file sizes was reached.
+  /// Advice for the user: `of_full_disk`, unless the limit of file sizes was reached.
   std::string advice(const std::string& of_full_disk) const;
 
  private:
@@ -47,7 +47,7 @@ class DiskFull : public OutputError {
 /// room for the name, otherwise an OutputError. `error`: a value of errno.
 [[noreturn]] void failToRename(int error, const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// What some work writes, and the folders that the user gave for it.
+/// The room that some work needs, and the folders that the user gave for it.
 struct RoomNeeded {
   std::vector<std::filesystem::path> folders;
   std::string what;    // "the cache and its temporary files"

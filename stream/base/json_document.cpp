@@ -36,7 +36,8 @@ void requireShallow(std::string_view text, const std::string& file) {
   }
 }
 
-/// What is wrong with a text that is not JSON. `error`: what the parser threw, whose own text is for programmers.
+/// Describes what is wrong with a text that is not JSON. `error`: what the parser threw, whose own text is
+/// for programmers.
 std::string faultOf(std::string_view text, const Json::exception& error) {
   const auto* const syntax = dynamic_cast<const Json::parse_error*>(&error);
   if (!syntax) return "a number that is too large";  // nothing else is thrown while parsing

@@ -53,8 +53,8 @@ void returnFreedMemory(size_t large = size_t{4} << 20);
 /// begin: the heaps of those that have begun stay.
 void limitHeaps(int most);
 
-/// What conversions pass to limitHeaps(). With a heap for each of 16 threads, a conversion with a budget of
-/// 512 MiB took 576 to 590 MiB; with two heaps it took 496, in the same time.
+/// The limit that conversions pass to limitHeaps(). With a heap for each of 16 threads, a conversion with a
+/// budget of 512 MiB took 576 to 590 MiB; with two heaps it took 496, in the same time.
 inline constexpr int kHeapsOfConversion = 2;
 
 /// Empties a vector and frees its memory. `values = {}` does not: that assigns no elements, and the capacity

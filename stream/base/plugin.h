@@ -1,5 +1,5 @@
-// What lies beside the program: plug-ins, which are loaded only when they are needed since the libraries that they link would delay
-// each start, and files of a bundle (tools/packaging/bundle.sh).
+// Finds files beside the program: plug-ins, which are loaded only when they are needed since the libraries
+// that they link would delay each start, and files of a bundle (tools/packaging/bundle.sh).
 #pragma once
 
 #include <filesystem>

@@ -115,8 +115,9 @@ class Ranks {
   RankTransport* transport() { return transport_.get(); }
 
  private:
-  /// What the transport reads and writes during a call. Stays there if the call is left by an exception, until this object ends: MPI
-  /// works on what was begun whenever it is called, also to announce the failure.
+  /// The memory that the transport reads and writes during a call. Stays there if the call is left by an
+  /// exception, until this object ends: MPI works on what was begun whenever it is called, also to announce
+  /// the failure.
   struct Call {
     std::vector<uint64_t> out_bytes, in_bytes;  // [rank]
     std::vector<Bytes> to, from;                // [rank]

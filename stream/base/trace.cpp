@@ -90,7 +90,7 @@ class TraceFile {
   }
 
  private:
-  /// What is traced goes on after a failure: close() reports it.
+  /// Appends to the file. After a failure work goes on, and close() reports it.
   void append(const std::string& text) {
     if (failure_) return;
     try {
@@ -121,7 +121,7 @@ Registry& registry() {
   return all;
 }
 
-/// What a thread has kept.
+/// The events that a thread has kept.
 class ThreadEvents {
  public:
   ThreadEvents() {

@@ -18,7 +18,7 @@ namespace curvisplat {
 
 enum class TraceKind { kStage, kWork, kWait };
 
-/// What a scope works on; bench/replay_frame.py needs it. Negative: not written.
+/// Numbers of what a scope works on; bench/replay_frame.py needs it. Negative: not written.
 struct TraceNumbers {
   int64_t number = -1;  // of a brick or a batch
   int64_t splats = -1;

@@ -50,7 +50,7 @@ Manifest manifestAtStep(const GeometryFolder& folder, const Manifest& of_series,
 
 }  // namespace
 
-/// What is decoded, and what that costs and may use.
+/// A brick's values to be decoded, and what that costs and may use.
 struct BrickOfVariable {
   uint32_t brick;
   size_t variable;

@@ -55,7 +55,7 @@ class CacheWriter {
   /// added. Any thread may add.
   HistogramSums& histograms();
 
-  /// What append() has noted of a brick.
+  /// The record that append() has noted of a brick.
   AppendedBrick appended(uint64_t id) const;
   /// Syncs the streams and the log: what was appended outlasts a crash of the machine. Not while something
   /// is appended.

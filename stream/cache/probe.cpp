@@ -23,7 +23,7 @@ glm::dvec3 inFootprint(const SplatGeometry& g, size_t s, const glm::dvec3& d) {
   return {b0 / g.axis0[s], b1 / g.axis1[s], b2 / g.axis2[s]};
 }
 
-/// What is known of a point so far.
+/// The facts about a point so far.
 struct Probed {
   std::optional<ProbeResult> nearest;
   std::vector<ReachingSample> near;  // [block that has a splat there]

@@ -88,7 +88,7 @@ struct StepRange {
   double min = 0, max = 0;
 };
 
-/// What is new about a step besides its values.
+/// The facts about a new step besides its values.
 struct NewStep {
   double time = 0;
   std::vector<StepRange> ranges;     // [variable]

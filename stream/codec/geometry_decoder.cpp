@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-/// What a splat has beside its place.
+/// The numbers of a splat beside its place.
 struct Shape {
   double a0, a1, a2, l10, l20, l21, weight;
 

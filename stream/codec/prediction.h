@@ -79,8 +79,9 @@ void predictRows(Predictor predictor, std::span<const Row> rows, const uint32_t*
   }
 }
 
-/// What predictRows() leaves of values that are known: zigzag(values[n] - predicted) for all n of `rows`, one row after the other.
-/// The same numbers without waiting for one before the next, by vector instructions. `out` must not overlap `values`.
+/// The residuals zigzag(values[n] - predicted) that predictRows() leaves of known values, for all n of
+/// `rows`, one row after the other. The same numbers without waiting for one before the next, by vector
+/// instructions. `out` must not overlap `values`.
 void residualsOf(Predictor predictor, std::span<const Row> rows, const uint32_t* values, uint32_t* out);
 
 /// A sample of `rows`, large enough to choose a predictor by.

@@ -86,7 +86,7 @@ PackedRotation packRotation(const glm::dquat& rotation) {
   return packed;
 }
 
-/// What the codes of a quaternion's numbers stand for.
+/// The numbers that the codes of a quaternion stand for.
 class RotationNumbers {
  public:
   RotationNumbers() {

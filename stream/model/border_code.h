@@ -157,8 +157,9 @@ double borderReach(uint32_t border_code);
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code);
 /// The same, for the inwardAxes() of the code.
 double drawnSlope(const glm::dvec3& slope, const InwardAxes& inward);
-/// What half cells that shrink inwards add to the size of a cut (render/project/splat_pieces.cpp). Caches
-/// without kMergedBorders recorded slopes without it: drawnSlope() is at most kEarlierSlopes times as large.
+/// The amount that half cells which shrink inwards add to the size of a cut
+/// (render/project/splat_pieces.cpp). Caches without kMergedBorders recorded slopes without it: drawnSlope()
+/// is at most kEarlierSlopes times as large.
 inline constexpr double kWidening = 0.13;
 inline constexpr double kEarlierSlopes = 1 + kWidening / kHalfCellStyle.cut.size;
 

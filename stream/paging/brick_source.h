@@ -26,7 +26,7 @@
 
 namespace curvisplat {
 
-/// What the bricks of one frame cost. Seconds of several workers are summed.
+/// The costs of the bricks of one frame. Seconds of several workers are summed.
 struct FetchStatistics {
   double read_s = 0;  // with a read under way
   double verify_s = 0, decode_s = 0;

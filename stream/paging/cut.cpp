@@ -16,7 +16,7 @@ ValueBounds boundsOf(const BrickVariable& variable) {
   return {variable.min, variable.max, variable.largest_slope, variable.largest_deviation};
 }
 
-/// What a view says of single bricks.
+/// Questions about single bricks in a view.
 class BrickView {
  public:
   BrickView(const CutTree& tree, const CutView& view, const TransparentBounds& transparent,

@@ -53,7 +53,7 @@ struct PagerOptions {
   std::function<std::unique_ptr<AsyncReads>(unsigned depth)> reads;
 };
 
-/// What was read since the pager was made.
+/// Counts of what was read since the pager was made.
 struct PagerStatistics {
   double reading_s = 0;            // with a read under way
   uint64_t bytes = 0;              // from the files, with what lies between streams

@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-/// What the plug-in provides.
+/// The functions that the plug-in provides.
 struct VdbFunctions {
   decltype(&brickGridsFile) brick_grids_file;
   decltype(&brickGridsMemory) brick_grids_memory;

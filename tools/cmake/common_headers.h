@@ -1,5 +1,5 @@
-// What most sources include, parsed once: CURVISPLAT_PRECOMPILE, and tools/check_clang.py. Nobody includes it, and every
-// source compiles without (tests/structure/check_standard_headers.py).
+// Headers that most sources include, parsed once: CURVISPLAT_PRECOMPILE, and tools/check_clang.py. Nobody
+// includes it, and every source compiles without (tests/structure/check_standard_headers.py).
 #pragma once
 
 #include <algorithm>

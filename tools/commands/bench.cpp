@@ -161,7 +161,7 @@ std::vector<uint32_t> parseRanks(const std::string& text) {
   return counts;
 }
 
-/// What a picture takes of several processes, found from the index and the view. Nothing is drawn.
+/// Reports the cost of a picture for several processes, found from the index and the view. Nothing is drawn.
 void benchRanks(const BenchArguments& arguments) {
   FrameOptions options;
   options.size = parseImageSize("--size", arguments.size);

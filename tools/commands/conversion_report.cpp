@@ -92,7 +92,7 @@ void finish(const Forecast& forecast, const ConvertOptions& options, const Conve
   writeStatistics(arguments.statistics, json);
 }
 
-/// What the conversion of one step takes, from `report` of its sample.
+/// Forecasts the conversion of one step, from `report` of its sample.
 Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, const SampleScale& scale,
                     const ConvertOptions& options) {
   Forecast forecast;

@@ -72,7 +72,7 @@ std::vector<std::string> warningsOf(const GridInfo& info) {
   return warnings;
 }
 
-/// What blanks nodes, in words; empty if nothing does.
+/// Describes what blanks nodes; empty if nothing does.
 std::string blankingRule(const GridDescription& description) {
   if (!description.blanking.empty()) return description.blanking;
   const bool any = std::any_of(description.blocks.begin(), description.blocks.end(),

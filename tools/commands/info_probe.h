@@ -35,14 +35,14 @@ struct ProbedPoints {
 /// Throws UsageError, or Error if a line of a file has no point.
 ProbedPoints parseProbe(const ProbeArguments& arguments);
 
-/// What was found at one step.
+/// The values found at one step.
 struct ProbedStep {
   uint64_t step = 0;
   double time = 0;
   std::vector<std::optional<PointValues>> found;  // [point]
 };
 
-/// What is printed.
+/// The probe that is printed.
 struct Probe {
   ProbedPoints asked;
   bool of_source = false;
@@ -57,7 +57,8 @@ struct Probe {
 /// The probe as JSON: an object for a point, null outside; of a table an array of them; of several steps an
 /// array for each.
 nlohmann::ordered_json probeAsJson(const CacheReader& reader, const Probe& probe);
-/// What several sets of scalars have at the same points, as joinedValues() has it. `readers`: of the probes.
+/// Joins the values that several sets of scalars have at the same points, as joinedValues() does. `readers`:
+/// of the probes.
 Probe joinedProbe(std::span<const CacheReader> readers, std::vector<Probe> probes);
 /// `probe`: joinedProbe() of the readers, the cache's own first. In words; a table with commas.
 void printProbe(std::span<const CacheReader> readers, const Probe& probe);

@@ -70,13 +70,14 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture, ImageS
   return bytes;
 }
 
-/// What the program and MPI take before anything is drawn. On a cluster the limit of a rank is the job's, which includes it.
+/// The memory that the program and MPI take before anything is drawn. On a cluster the limit of a rank is the
+/// job's, which includes it.
 uint64_t programBytes() {
   returnFreedMemory();
   return ProcessUsage::now().memory_bytes;
 }
 
-/// What a stopped run has done, and left.
+/// Describes what a stopped run has done, and left.
 std::string howFar(const RenderReport& report, uint64_t frames, bool several) {
   const std::string output = report.output.string();
   if (!several) return fmt::format("interrupted; {} was not written", output);

@@ -57,7 +57,7 @@ void checkRenderArguments(const RenderArguments& arguments, ImageSize size);
 /// draws a share, which must be of the same data.
 void requireSameCache(const CacheReader& cache, Ranks& ranks);
 
-/// What the frames are drawn from, and where pictures and statistics go.
+/// The inputs of the frames, and the destination of pictures and statistics.
 struct FrameJob {
   const RenderArguments& arguments;
   const Manifest& manifest;

@@ -63,7 +63,7 @@ FaceServices faceServices() {
           }};
 }
 
-/// What needs a cache from the beginning.
+/// Refuses options that need a cache from the beginning.
 void checkGridOptions(const ViewArguments& arguments) {
   if (arguments.surfaces.given() || arguments.steps.step || arguments.steps.time)
     throw UsageError("--surface, --slice, --iso, --step and --time need a cache: convert {} first",

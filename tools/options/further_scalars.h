@@ -14,8 +14,8 @@ struct FurtherScalar {
   bool derived = false;  // computed from others
 };
 
-/// What `files` have and `cache` lacks, of the same centring, in the order of the files; of a series, what its first step has.
-/// Opens the files. Throws Error if they cannot be opened.
+/// The scalars that `files` have and `cache` lacks, of the same centring, in the order of the files; of a
+/// series, those of its first step. Opens the files. Throws Error if they cannot be opened.
 std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
                                             const std::vector<std::filesystem::path>& files);
 

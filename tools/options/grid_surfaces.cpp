@@ -97,7 +97,7 @@ bool isWall(const FaceRegion& region) {
   return region.type.starts_with("BCWall");
 }
 
-/// What the cache has, for messages.
+/// Lists the faces of the cache, for messages.
 std::string whatThereIs(const FacesReader& faces) {
   std::vector<std::string> names;
   std::set<std::string> known;

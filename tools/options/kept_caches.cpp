@@ -43,7 +43,7 @@ uint64_t checksumOfText(const std::string& text) {
   return checksumOf(std::as_bytes(std::span(text)));
 }
 
-/// What tells that a file is unchanged without reading it.
+/// A stamp that tells whether a file is unchanged, without reading it.
 std::string stampOf(const fs::path& file) {
   struct stat found {};
   if (::stat(file.c_str(), &found) != 0) return {};
@@ -164,8 +164,8 @@ std::string smallText(const fs::path& file) {
   return fs::file_size(unpacked.path(), error) > kMaxText || error ? "" : readTextFile(unpacked.path());
 }
 
-/// What may be names of files in a text: what stands between the quotes of XML (.pvd, .vtm) and JSON (.p3d), and the words
-/// of an EnSight case.
+/// The words that may be names of files in a text: what stands between the quotes of XML (.pvd, .vtm) and
+/// JSON (.p3d), and the words of an EnSight case.
 std::set<std::string> namesIn(const std::string& text) {
   std::set<std::string> names;
   const std::string_view begin = trimmed(text).substr(0, 6);
@@ -250,8 +250,8 @@ class StampedFiles {
   std::vector<std::string> stamps_;
 };
 
-/// What makes two grids the same: the program, the bytes of the files, and their names, since names of scalars can lie
-/// beside a file, and the grid's name becomes the cache's.
+/// A checksum of what makes two grids the same: the program, the bytes of the files, and their names, since
+/// names of scalars can lie beside a file, and the grid's name becomes the cache's.
 uint64_t contentsOf(const std::vector<fs::path>& files, const StampedFiles& stamped, const fs::path& known,
                     Progress& progress) {
   progress.begin("looking for a kept cache", 0, "bytes");

@@ -41,7 +41,7 @@ std::filesystem::path keptCacheOf(const std::vector<std::filesystem::path>& file
 /// `kept`, and those that are being made.
 void limitKeptCaches(const std::filesystem::path& folder, uint64_t limit, const std::filesystem::path& kept);
 
-/// What messages and menus call the files: their names without folders.
+/// The name of the files in messages and menus: their names without folders.
 std::string namesOf(const std::vector<std::filesystem::path>& files);
 
 }  // namespace curvisplat

@@ -14,7 +14,7 @@ const std::string& nameOf(const OpacityArguments& arguments) {
   return arguments.by.scalar.empty() ? arguments.iso_scalar : arguments.by.scalar;
 }
 
-/// What the opacities' function is chosen from.
+/// The arguments that the opacities' function is chosen from.
 ScalarArguments opacitiesOf(const OpacityArguments& arguments, const ScalarArguments& scalar) {
   ScalarArguments of = arguments.by;
   of.scalar = nameOf(arguments);

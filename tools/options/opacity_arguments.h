@@ -36,7 +36,7 @@ struct ScalarChoice {
   PictureChoice picture;
   std::string chosen_colours;  // of two scalars: as PictureChoice::chosenOptions(), of the colours
 
-  /// What was filled in, of all.
+  /// The options that were filled in, for all scalars.
   std::string chosenOptions() const;
 };
 

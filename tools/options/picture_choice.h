@@ -68,7 +68,7 @@ class PictureChoice {
   /// again. To be called before frames are drawn.
   void release() { data_.reset(); }
 
-  /// What was filled in, for a shell: "--tf viridis --range 0,1"; empty if nothing was.
+  /// The options that were filled in, for a shell: "--tf viridis --range 0,1"; empty if nothing was.
   const std::string& chosenOptions() const { return chosen_; }
 
  private:

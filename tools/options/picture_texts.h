@@ -7,7 +7,7 @@
 
 namespace curvisplat {
 
-/// What the fields {time}, {step}, {frame}, {scalar} and {units} stand for.
+/// The values of the fields {time}, {step}, {frame}, {scalar} and {units}.
 struct TextFields {
   double time = 0;
   uint64_t step = 0, frame = 0;  // counted from 0

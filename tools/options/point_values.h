@@ -30,7 +30,7 @@ struct PointSource {
   GasModel gas;
 };
 
-/// What is at a point.
+/// The values at a point.
 struct PointValues {
   uint32_t block = 0;  // of the nearest sample: a node or a cell; block, i, j and k count from 0
   uint64_t i = 0, j = 0, k = 0;
@@ -47,15 +47,16 @@ std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
                                                  std::span<const glm::dvec3> points,
                                                  const PointSource* source);
 
-/// What a set of scalars (a cache's own, or CacheReader::ownBlanks()) has at points: valuesAt().
+/// The values of a set of scalars (a cache's own, or CacheReader::ownBlanks()) at points: valuesAt().
 struct SetValues {
   const CacheReader* reader = nullptr;
   const PointSource* source = nullptr;
   std::vector<std::optional<PointValues>> found;  // [point]
 };
 
-/// What several sets have at the same points, with the scalars of all. The sample and its place are those of the first set that
-/// has values at the point; PointValues::sample has what the others have at that place. NaN: a scalar has no value there.
+/// The values of several sets at the same points, with the scalars of all. The sample and its place are those
+/// of the first set that has values at the point; PointValues::sample has what the others have at that place.
+/// NaN: a scalar has no value there.
 std::vector<std::optional<PointValues>> joinedValues(std::span<const SetValues> sets);
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// What every long command sets up around its work: a progress bar (percentage, remaining time and rate),
+// Sets up what every long command has around its work: a progress bar (percentage, remaining time and rate),
 // signals that stop the work in order, and the trace of --trace FILE. For the main thread; a Progress calls
 // its display on any thread.
 #pragma once

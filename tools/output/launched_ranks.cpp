@@ -98,7 +98,7 @@ Ranks& launchedRanks() {
 
 namespace {
 
-/// What all ranks have to be told alike, by its name.
+/// The options that all ranks have to be given alike, by name.
 std::map<std::string, std::string> sharedOptions(const CLI::App& command) {
   static const std::set<std::string> own{"GRID",      "SOLUTION", "CACHE",  "--tmp",
                                          "--threads", "--stats",  "--trace"};

@@ -34,7 +34,7 @@ void requireThreads();
 /// Whether `error` says that a thread could not be started: those of the C++ library and of TBB do.
 bool isForLackOfThreads(const std::exception& error);
 
-/// What a call of std::filesystem has failed at, in one line.
+/// Describes in one line what a call of std::filesystem has failed at.
 std::string textOf(const std::filesystem::filesystem_error& error);
 
 /// The message where isForLackOfThreads().

@@ -18,8 +18,8 @@ class FunctionPanel {
  public:
   explicit FunctionPanel(const CacheReader& cache) : cache_(cache) {}
 
-  /// What a panel shows of its function. In a picture of two scalars, each function gives only colours or
-  /// only opacities.
+  /// The aspects of its function that a panel shows. In a picture of two scalars, each function gives only
+  /// colours or only opacities.
   enum class Shows { kAll, kColours, kOpacities };
   struct Result {
     bool changed = false;

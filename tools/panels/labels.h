@@ -1,5 +1,6 @@
-// What all panels share: PanelActions, into which they write what the user did during a frame, and widgets
-// with their labels before them, where they are read. For the window's thread, within a frame of Dear ImGui.
+// The common parts of all panels: PanelActions, into which they write what the user did during a frame, and
+// widgets with their labels before them, where they are read. For the window's thread, within a frame of Dear
+// ImGui.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,7 @@
 
 namespace curvisplat {
 
-/// What the user did in the panels and menus during a frame.
+/// The user's actions in the panels and menus during a frame.
 struct PanelActions {
   bool changed = false;           // the picture must be drawn again
   bool function_changed = false;  // implies `changed`

@@ -91,7 +91,7 @@ void drawElsewhere(const std::vector<std::string>& names, PanelActions& actions)
   }
 }
 
-/// What the sources have besides, at the end of the list of scalars.
+/// Draws the scalars that the sources have besides, at the end of the list of scalars.
 void drawFurther(const FurtherScalars& further, PanelActions& actions) {
   if (further.from.empty()) {
     if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());

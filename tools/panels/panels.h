@@ -18,7 +18,7 @@
 
 namespace curvisplat {
 
-/// What the shown picture took: times, splats, bytes.
+/// The costs of the shown picture: times, splats, bytes.
 struct ShownStatistics {
   const FrameStatistics* statistics = nullptr;  // of the shown picture; null if there is none
   bool is_final = false;
@@ -32,7 +32,7 @@ const char* stateOfPicture(const ShownStatistics& shown);
 /// Draws a table of the statistics into the current Dear ImGui window.
 void drawStatistics(const ViewState& state, const ShownStatistics& shown);
 
-/// What the panels display but cannot change.
+/// Facts that the panels display but cannot change.
 struct PanelFacts {
   ShownStatistics shown;
   bool flies = false;

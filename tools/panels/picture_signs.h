@@ -1,4 +1,4 @@
-// What is drawn over the picture at places of the data: clip planes and slices, which are dragged by a
+// Draws signs over the picture at places of the data: clip planes and slices, which are dragged by a
 // handle, the edges of the clip box, and markers, with their list. For the window's thread, within a frame;
 // nothing here reads the cache.
 #pragma once

@@ -23,7 +23,7 @@ struct BlockArrays {
   pybind11::object blank;  // None, or an array of bool: true where a node is not there
 };
 
-/// What a scalar is called, and its unit.
+/// The name of each scalar, and its unit.
 using ScalarNames = std::vector<std::pair<std::string, std::string>>;
 
 /// Throws UsageError for arrays of other types or shapes. Reading needs no lock: the arrays must not change meanwhile.
@@ -31,9 +31,9 @@ using ScalarNames = std::vector<std::pair<std::string, std::string>>;
 std::unique_ptr<GridSource> sourceOfArrays(std::vector<BlockArrays> blocks, const ScalarNames& names,
                                            std::optional<double> time = {});
 
-/// What reads a grid in Python, box by box: called with (block, k0, k1, j0, j1, [scalar]), returns (x, y, z, values, blank), arrays
-/// of shape (k1 - k0, j1 - j0, ni), `values` a list of them, `blank` None or of bool. `parts_of_rows`: it takes i0 and i1, too,
-/// and the arrays have i1 - i0 elements along i.
+/// A function that reads a grid in Python, box by box: called with (block, k0, k1, j0, j1, [scalar]), returns
+/// (x, y, z, values, blank), arrays of shape (k1 - k0, j1 - j0, ni), `values` a list of them, `blank` None or
+/// of bool. `parts_of_rows`: it takes i0 and i1, too, and the arrays have i1 - i0 elements along i.
 struct PythonRead {
   pybind11::object function;
   bool parts_of_rows = false;

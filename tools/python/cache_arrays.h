@@ -15,7 +15,8 @@
 
 namespace curvisplat::python {
 
-/// What to take the data from. The level is the octree's, or, if there is none, chosen for the lattice; of points it is the finest.
+/// The choice of the data to take. The level is the octree's, or, if there is none, chosen for the lattice;
+/// of points it is the finest.
 struct DataChoice {
   std::string scalar;
   std::array<double, 3> lower{}, upper{};
@@ -32,9 +33,10 @@ pybind11::tuple sampledArrays(const CacheReader& cache, const DataChoice& choice
 pybind11::tuple pointArrays(const CacheReader& cache, const DataChoice& choice,
                             const pybind11::object& progress);
 
-/// What is at points: for each scalar its values at the points and at the samples next to them, and of these the block, the indices
-/// and the places, as joinedValues() has them; NaN, and block 0, outside of the data. `sets`: the cache, and those of its scalars with
-/// blanks of their own. `source`: null for the caches alone, or files; none: those that they name.
+/// The values at points: for each scalar its values at the points and at the samples next to them, and of
+/// these the block, the indices and the places, as joinedValues() has them; NaN, and block 0, outside of the
+/// data. `sets`: the cache, and those of its scalars with blanks of their own. `source`: null for the caches
+/// alone, or files; none: those that they name.
 pybind11::tuple probedArrays(const std::vector<const CacheReader*>& sets,
                              const std::vector<std::array<double, 3>>& points,
                              const std::optional<std::vector<std::filesystem::path>>& source);

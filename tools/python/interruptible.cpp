@@ -40,7 +40,7 @@ class LatestState {
   std::optional<Progress::State> state_ GUARDED_BY(mutex_);
 };
 
-/// What runs in all threads of this process.
+/// The work that runs in all threads of this process.
 class AllWork {
  public:
   void add(Progress* progress) {

@@ -156,7 +156,7 @@ py::array_t<float> arrayOf(Image image) {
   return py::array_t<float>({image.size.height, image.size.width, 4}, data, owner);
 }
 
-/// What the command says of such a picture.
+/// The warnings that the command prints about such a picture.
 std::vector<std::string> warningsOf(const PictureArguments& arguments, const Image& image,
                                     const RenderedScene& scene) {
   std::vector<std::string> warnings =

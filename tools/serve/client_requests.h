@@ -1,5 +1,5 @@
-// What comes in from browsers: who may talk to the server (the token, Host and Origin), what a page says
-// (ClientMessage), and how often it may say something (MessageRate).
+// Checks what comes in from browsers: who may talk to the server (the token, Host and Origin), what a page
+// says (ClientMessage), and how often it may say something (MessageRate).
 //
 // The token keeps other users of the machine out. Host and Origin keep other pages in the same browser out:
 // a page of another site may send requests here, also under a name of its own that it makes resolve to this
@@ -50,7 +50,7 @@ std::string readToken(const std::filesystem::path& path);
 /// Compares two tokens in the same time, wherever they differ.
 bool isSameToken(std::string_view given, std::string_view expected);
 
-/// What a request asks for: "/socket?token=abc" is path "/socket" and token "abc".
+/// The parts of a request's target: "/socket?token=abc" is path "/socket" and token "abc".
 struct RequestTarget {
   std::string_view path, token;  // the token is empty if there is none
 };

@@ -39,7 +39,7 @@ std::string_view viewOf(beast::string_view text) {
   return {text.data(), text.size()};
 }
 
-/// What the page may load: itself, its own socket, and pictures that it has been sent.
+/// The policy that says what the page may load: itself, its own socket, and pictures that it has been sent.
 std::string policyFor(const std::string& nonce) {
   return "default-src 'none'; script-src 'nonce-" + nonce + "'; style-src 'nonce-" + nonce +
          "'; connect-src 'self'; img-src blob: data:; base-uri 'none'; form-action 'none'";

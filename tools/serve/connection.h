@@ -24,7 +24,7 @@ namespace curvisplat {
 
 class Connection;
 
-/// What connections share.
+/// The server, as its connections see it.
 class ConnectionHost {
  public:
   virtual ~ConnectionHost() = default;

@@ -40,7 +40,7 @@ struct Asked {
   ImageSize picture, data;
 };
 
-/// What pictures take beside the frame that is drawn.
+/// The memory that pictures take beside the frame that is drawn.
 struct PictureMemory {
   bool one_at_a_time;  // while one is encoded, no other is drawn
   uint64_t bytes;
@@ -64,7 +64,7 @@ PictureMemory memoryFor(ImageSize picture, const Annotations& annotations, uint6
 
 }  // namespace
 
-/// What belongs to the viewer's thread.
+/// The part of a viewer that belongs to its thread.
 class RemoteViewer::Work {
  public:
   explicit Work(RemoteViewer& viewer) : viewer_(viewer), caches_(viewer.caches_), limits_(viewer.limits_) {}

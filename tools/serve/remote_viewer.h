@@ -27,7 +27,7 @@
 
 namespace curvisplat {
 
-/// What the server allows each viewer.
+/// The limits of each viewer.
 struct ViewerLimits {
   uint64_t memory_bytes = 512 << 20;  // for drawing
   double target_s = 0.04;             // to draw a picture while the camera moves

@@ -30,12 +30,12 @@ class ServedCaches {
 
   /// The names of all caches and colour maps.
   std::string helloText() const;
-  /// What a page has to know of a cache, and the first view.
+  /// The facts about a cache that a page needs, and the first view.
   std::string cacheText(const OpenRequest& request) const;
   /// Throw UsageError for a scalar or map that does not exist, Error as reading does.
   std::string functionText(const FunctionRequest& request) const;
   std::string histogramText(const HistogramRequest& request) const;
-  /// What the data have at a point, of a scalar at a step. UsageError outside of the data.
+  /// The values of the data at a point, of a scalar at a step. UsageError outside of the data.
   struct MarkedScalar {
     std::string name;
     uint64_t step = 0;

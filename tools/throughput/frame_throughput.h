@@ -27,8 +27,8 @@
 
 namespace curvisplat {
 
-/// What `curvisplat bench` draws: a cache, a scalar, a transfer function, and cameras around the data. It
-/// refers to objects of the subcommand.
+/// The scene that `curvisplat bench` draws: a cache, a scalar, a transfer function, and cameras around the
+/// data. It refers to objects of the subcommand.
 struct ThroughputScene {
   const CacheReader& cache;
   size_t variable;

@@ -1,5 +1,6 @@
-// What a picture would take of 1, 2, ... 1024 processes: simulated from a cache's index and a view, shared out
-// by the function that shares out real pictures (render/ranks/picture_shares.h). Nothing is read but the index. Pure.
+// The cost of a picture for 1, 2, ... 1024 processes: simulated from a cache's index and a view, shared out by
+// the function that shares out real pictures (render/ranks/picture_shares.h). Nothing is read but the index.
+// Pure.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +33,7 @@ struct SimulatedRanks {
   double balance() const { return largest_work > 0 ? mean_work / largest_work : 1; }
   /// Speed-up by the number of ranks: less than the balance, since some splats are painted by several ranks.
   double efficiency() const { return speed_up / ranks; }
-  /// What is sent, in parts of what `splats` take.
+  /// The number of splats sent, as a multiple of `splats`.
   double exchange(uint64_t splats) const {
     return splats == 0 ? 0 : sent_splats / static_cast<double>(splats);
   }

@@ -108,7 +108,7 @@ struct StageEffort {
   uint64_t max_read_bytes = 128 << 20;  // size of the sample of stages/read
 };
 
-/// What the report and the verdict need besides the measurements.
+/// Facts that the report and the verdict need besides the measurements.
 struct StageReport {
   uint64_t frame_splats = 0, sampled_splats = 0;
   std::string read_by;  // "io_uring, direct"

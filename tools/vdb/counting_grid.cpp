@@ -17,7 +17,7 @@ using Lower = CountTree::RootNodeType::ChildNodeType::ChildNodeType;
 using Upper = CountTree::RootNodeType::ChildNodeType;
 
 constexpr int32_t kFull = std::numeric_limits<int32_t>::max();
-// What an allocated leaf takes: the node, its buffer and the allocator's share.
+// The bytes of an allocated leaf: the node, its buffer and the allocator's share.
 constexpr uint64_t kLeafBytes = sizeof(Leaf) + Leaf::SIZE * sizeof(int32_t) + 64;
 constexpr uint64_t kSmallestTreeBytes = sizeof(Upper) + sizeof(Lower) + kLeafBytes;
 

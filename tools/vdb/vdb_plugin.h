@@ -1,5 +1,5 @@
-// What curvisplat-vdb.so is made of. Its functions have the names of those that load it (brick_grids.h, counting_grid.h,
-// fog_volume.h), in a namespace of their own.
+// The functions of curvisplat-vdb.so. They have the names of those that load it (brick_grids.h,
+// counting_grid.h, fog_volume.h), in a namespace of their own.
 #pragma once
 
 #include <cstddef>

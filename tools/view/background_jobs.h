@@ -1,4 +1,4 @@
-// What goes on beside the window, on threads of low priority: a job with its progress (BackgroundJob), a
+// Jobs beside the window, on threads of low priority: a job with its progress (BackgroundJob), a
 // conversion with its messages and previews (Opening), and the search for scalars that a cache's sources
 // have and the cache lacks (FurtherScalarList).
 //
@@ -44,8 +44,8 @@ struct SourceScalar {
   bool derived = false;  // computed from others
 };
 
-/// What the window asks of conversion. The functions run on threads of their own, except for sources_of, and
-/// throw Error; those with a Progress throw Interrupted once it is stopped.
+/// The functions of conversion that the window needs. The functions run on threads of their own, except for
+/// sources_of, and throw Error; those with a Progress throw Interrupted once it is stopped.
 struct ConversionServices {
   using Paths = std::vector<std::filesystem::path>;
   /// Makes a cache of the files of a grid and returns its path; returns the path of a cache as it is.
@@ -102,7 +102,7 @@ class Opening {
   const BackgroundJob& job() const { return job_; }
   /// Warnings and notes since the last call.
   std::vector<std::string> takeMessages();
-  /// What can be shown already, once.
+  /// The preview that can be shown already, once.
   std::optional<Preview> takePreview();
   bool isDone() const { return job_.isDone(); }
   /// The cache, once. Throws Error as converting does. Only if isDone().
@@ -115,7 +115,7 @@ class Opening {
   BackgroundJob job_;  // last: its thread uses the others
 };
 
-/// What is known so far of the scalars that a cache's sources have and the cache lacks.
+/// The scalars, known so far, that a cache's sources have and the cache lacks.
 struct FurtherScalars {
   std::string from;                          // the names of the files; empty: there are none
   bool is_looking = false, is_busy = false;  // busy: one is being added

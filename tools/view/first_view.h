@@ -1,7 +1,7 @@
-// What is shown before anything is chosen: the function and the view that `render` chooses from the data.
-// Choosing a function reads a coarse level of the cache, for 0.1 to 0.3 s: FunctionChooser does so on
-// another thread, and the other functions on the caller's. They keep no state: any thread may call them. A
-// FunctionChooser is for the window's thread.
+// Chooses what is shown before the user chooses anything: the function and the view that `render` chooses
+// from the data. Choosing a function reads a coarse level of the cache, for 0.1 to 0.3 s: FunctionChooser
+// does so on another thread, and the other functions on the caller's. They keep no state: any thread may call
+// them. A FunctionChooser is for the window's thread.
 #pragma once
 
 #include <array>

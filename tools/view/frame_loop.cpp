@@ -52,7 +52,7 @@ std::vector<GridSurface> facesWithLooks(std::vector<GridSurface> faces,
   return faces;
 }
 
-/// What the loop's thread keeps between requests.
+/// State that the loop's thread keeps between requests.
 struct FrameLoop::Drawing {
   explicit Drawing(uint64_t coarsest) : effort(coarsest) {}
 

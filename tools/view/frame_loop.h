@@ -89,7 +89,7 @@ struct ShownFrame {
   WorldBox data;    // where the step's data lie
 };
 
-/// What lies under each pixel of a picture that is shown, for the mouse. Of half as many pixels each way.
+/// The values under each pixel of a picture that is shown, for the mouse. Of half as many pixels each way.
 struct ShownValues {
   PixelValues values;
   uint64_t request = 0;  // of the picture

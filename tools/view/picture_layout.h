@@ -39,7 +39,7 @@ class ShownFunctions {
 /// The part of a picture that shows the data.
 ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize picture);
 
-/// What is annotated in a frame that was drawn for this state.
+/// The annotations of a frame that was drawn for this state.
 AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
                        ImageSize picture);
 

@@ -50,7 +50,7 @@ class Playback {
   bool setInterpolates(bool interpolates);
   void setStepsPerSecond(double steps_per_s) { steps_per_s_ = steps_per_s; }
 
-  /// What comes next while it plays; nullopt at the end, or when it does not play.
+  /// The position that comes next while it plays; nullopt at the end, or when it does not play.
   std::optional<StepPosition> next() const;
   /// The picture of the current position has been shown at `now_s`: goes on if it is time. Returns whether
   /// it did.

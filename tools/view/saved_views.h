@@ -21,7 +21,7 @@ std::optional<std::filesystem::path> configFolder();
 /// The state file of this cache, named by the cache's name and a hash of its path; nullopt without a folder.
 std::optional<std::filesystem::path> rememberedStateOf(const std::filesystem::path& cache);
 
-/// What the window remembers of itself, whatever it shows.
+/// The window's own settings, whatever it shows.
 struct WindowSettings {
   bool light_theme = false;
   double text_scale = 1;
@@ -44,7 +44,7 @@ std::filesystem::path savedViewOf(const std::filesystem::path& cache, const std:
 /// Writes `text` to `file` and creates the folder if necessary. Throws Error.
 void writeState(const std::filesystem::path& file, const std::string& text);
 
-/// What the command draws besides the state.
+/// The inputs of the command besides the state.
 struct CommandOptions {
   std::filesystem::path cache;
   ImageSize size;

@@ -68,7 +68,7 @@ Camera cameraFrom(const JsonField& fields) {
   return camera;
 }
 
-/// What options can state of a function; null if they cannot.
+/// The parts of a function as options state them; null if they cannot.
 Json partsOf(const EditedFunction& function) {
   const auto parts = function.parts();
   if (!parts) return nullptr;

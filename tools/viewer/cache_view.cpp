@@ -198,7 +198,7 @@ void CacheView::giveUpRequest() {
   was_moving_ = false;  // that it rests now is no reason to try again
 }
 
-/// What is to be saved will not come.
+/// Gives up saving: the picture will not come.
 void CacheView::giveUpSaving() {
   if (std::exchange(save_to_, std::nullopt)) say("The picture was not saved, because it could not be drawn.");
 }

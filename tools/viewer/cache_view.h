@@ -37,7 +37,8 @@ struct WindowLayout {
   bool shows_panels = true;
 };
 
-/// What one view of a grid hands to the next: from a preview to the whole, or when a scalar was added.
+/// The state that one view of a grid hands to the next: from a preview to the whole, or when a scalar was
+/// added.
 struct CarriedView {
   ViewState state;
   History history;
@@ -150,7 +151,8 @@ class CacheView {
   bool isRefining() const { return frames_->busy() && !(was_moving_ && isShown()); }
   bool isFinal() const { return isShown() && shown_->is_final && !chooser_.busy(); }
   void say(const std::string& text) { reports_.say(text); }
-  /// What the picture that is shown lacks, for a sentence: ", without 3 damaged bricks"; empty if nothing.
+  /// Describes what the picture that is shown lacks, for a sentence: ", without 3 damaged bricks"; empty if
+  /// nothing.
   std::string lacks() const;
   const Manifest& manifest() const { return cache_.manifest(); }
 

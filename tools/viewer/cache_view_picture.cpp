@@ -232,7 +232,7 @@ void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
   wanted_movie_->state.camera = holding(state_.camera, data_size_, dataSizeOf(state_, manifest(), size));
 }
 
-/// What is shown now, whatever is changed while it is drawn.
+/// Saves a movie of what is shown now, whatever is changed while it is drawn.
 void CacheView::saveMovieTo(const fs::path& file) {
   wanted_movie_ = newMovie(file);
 }
@@ -445,7 +445,7 @@ void CacheView::takeSurface() {
   changed_ = true;
 }
 
-/// What the chooser has found. What the user has edited meanwhile stays.
+/// Takes the function that the chooser has found. What the user has edited meanwhile stays.
 void CacheView::takeFunction() {
   const auto found = chooser_.take();
   if (!found) return;

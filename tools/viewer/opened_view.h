@@ -1,6 +1,6 @@
-// What is open in the window: the view of it, and how another takes its place. OpenedView opens caches at
-// once and converts grids in the background, shows previews meanwhile, and adds scalars to the cache that is
-// shown. JobDisplay shows such jobs.
+// The view that is open in the window, and how another takes its place. OpenedView opens caches at once and
+// converts grids in the background, shows previews meanwhile, and adds scalars to the cache that is shown.
+// JobDisplay shows such jobs.
 //
 // For the main thread. A view that is replaced ends on a thread of its own, and the new one draws when its
 // memory is free.
@@ -39,7 +39,7 @@ class JobDisplay {
   float below_ = 0;  // of those before
 };
 
-/// What a view is shown in and reports to.
+/// The objects that a view is shown in and reports to.
 struct ViewSurroundings {
   Window& window;
   Reports& reports;

@@ -1,4 +1,4 @@
-// What a view of a cache begins with, from the options of `curvisplat view` and from the data.
+// Prepares a view of a cache, from the options of `curvisplat view` and from the data.
 //
 // Finding it reads the cache, for 0.1 to 0.3 s and more on a busy machine. So it is found on the thread that
 // opens the cache, and the window's own thread answers meanwhile.

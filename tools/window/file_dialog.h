@@ -13,7 +13,7 @@
 
 namespace curvisplat {
 
-/// What a folder has to show.
+/// An entry of a folder.
 struct FolderEntry {
   std::string name;
   bool is_folder = false;  // to go into; a cache is none

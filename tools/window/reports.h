@@ -1,6 +1,6 @@
-// What the window says: messages over the picture, which go away by themselves (Toasts), and Reports, the
-// one place that decides what happens to an error, wherever it comes from: it is shown over the picture and
-// printed, and the window goes on with what it has. Only Interrupted passes, which ends the program.
+// The messages of the window: messages over the picture, which go away by themselves (Toasts), and Reports,
+// the one place that decides what happens to an error, wherever it comes from: it is shown over the picture
+// and printed, and the window goes on with what it has. Only Interrupted passes, which ends the program.
 //
 // A message stays long enough to be read. An error stays until it is clicked away, or for a minute. Nothing
 // here knows the window. For the window's thread.

@@ -1,4 +1,4 @@
-// What we add to Dear ImGui: a number for what a frame looks like, the window's font, fields for numbers,
+// Additions to Dear ImGui: a number for what a frame looks like, the window's font, fields for numbers,
 // and the places of widgets for tests. For the window's thread. Only loadFont() reads a file.
 #pragma once
 

@@ -106,7 +106,8 @@ class Window {
   bool isDragging() const { return dragged_button_ >= 0; }
   /// Where the picture is, in Dear ImGui units.
   void setPicture(const Rectangle& place) { picture_ = place; }
-  /// What begins in this rectangle is not for the picture under it: call in every frame that it is there.
+  /// Keeps clicks and drags that begin in this rectangle from the picture under it: call in every frame that
+  /// it is there.
   void cover(const Rectangle& place) { covers_.push_back(place); }
   /// The same of the current Dear ImGui window.
   void coverCurrent();

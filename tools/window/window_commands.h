@@ -1,4 +1,4 @@
-// What the window does on a key or a menu item: one table of commands, from which menus, keys and the page
+// The commands of the window, by key or menu item: one table of commands, from which menus, keys and the page
 // of keys are made, so that they agree; and the menus, messages and pages that are drawn with it.
 //
 // The table is constant: any thread may read it. What draws is for the window's thread, within a frame.
@@ -78,7 +78,7 @@ const CommandInfo& infoOf(Command command);
 /// The command of a key; nullopt if it has none.
 std::optional<Command> commandOf(const Window::Key& key);
 
-/// What the menus show.
+/// The contents of the menus.
 struct MenuFacts {
   std::function<bool(Command)> is_enabled, is_checked;
   std::vector<std::vector<std::string>> recent;
@@ -87,7 +87,7 @@ struct MenuFacts {
   FurtherScalars further;
 };
 
-/// What was chosen in the menus.
+/// The choices made in the menus.
 struct MenuChoice {
   std::vector<Command> commands;
   std::optional<std::vector<std::string>> open;  // files

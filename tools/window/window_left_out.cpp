@@ -1,4 +1,4 @@
-// What `info --system` says of the window in a program that was built without it.
+// The line about the window that `info --system` prints in a program that was built without it.
 #include "tools/window/window.h"
 
 namespace curvisplat {

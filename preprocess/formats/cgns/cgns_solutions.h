@@ -1,4 +1,4 @@
-// What a CGNS file tells about the solutions of a zone: which solutions and coordinates belong to a time
+// Reads the facts about the solutions of a CGNS zone: which solutions and coordinates belong to a time
 // step, and the units of their arrays. The functions read small nodes alone. Any number of threads may call
 // them; their calls into CgnsFile run one after the other.
 #pragma once

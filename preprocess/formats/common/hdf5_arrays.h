@@ -70,7 +70,7 @@ class Hdf5Array {
   bool isSigned() const { return signed_; }
   /// Bytes of a number: 4 or 8, of integers 1 or 2, too.
   size_t bytes() const { return bytes_; }
-  /// What it takes in the file, packed; numbers that were never written take nothing.
+  /// The bytes that the array takes in the file, packed; numbers that were never written take nothing.
   uint64_t storedBytes() const { return stored_bytes_; }
 
   /// The numbers [first, first + to.size()), in the order of the file. Throws Error.

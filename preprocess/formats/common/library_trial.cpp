@@ -177,7 +177,7 @@ void walk(const std::filesystem::path& path) {
   leads_out |= file && H5Ovisit2(file.id(), H5_INDEX_NAME, H5_ITER_NATIVE, visit, &read, H5O_INFO_ALL) < 0;
 }
 
-/// What leads out of an HDF5 file, found without following it.
+/// Finds what leads out of an HDF5 file, without following it.
 class Hdf5Exits {
  public:
   struct VirtualSource {

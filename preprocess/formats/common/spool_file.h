@@ -107,7 +107,7 @@ class NumberSpool {
     if (pending_.size() == kPending) flush();
   }
   uint64_t size() const { return added_; }
-  /// What has been added; more may follow.
+  /// The numbers that have been added; more may follow.
   SpooledNumbers soFar() {
     flush();
     return numbers_;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr uint64_t kPieceNodes = 48 << 10;
-/// What a sample's own values give, without its neighbours.
+/// Inputs that a sample's own values give, without its neighbours.
 constexpr unsigned kOwn = kNeedsDensity | kNeedsVelocity | kNeedsPressure;
 
 /// Cuts `box` into pieces: whole planes if several fit, else strips of equal length along j and k.

@@ -1,4 +1,4 @@
-// What derived scalars are computed from: the scalars of a source that give the flow (FlowInputs), and the
+// The inputs of derived scalars: the scalars of a source that give the flow (FlowInputs), and the
 // gas; and FlowWindow, the flow and its gradients at the samples of a few rows of a structured grid.
 // FlowWindow needs memory for its rows and their halo alone. Each thread has a FlowWindow of its own; any
 // thread may call the functions.
@@ -43,7 +43,7 @@ FlowState flowFrom(const FlowInputs& inputs, const PerfectGas& gas, const Input&
   return flow;
 }
 
-/// What the user says about derived scalars.
+/// The user's options for derived scalars.
 struct DerivedOptions {
   GasModel gas;                       // overrides the files' values; the defaults are 1.4 and 1
   std::optional<double> blank_value;  // samples with this value are blanked

@@ -29,7 +29,7 @@ struct EnsightList {
   std::vector<double> all() const;
 };
 
-/// What the readers of a case share, so that any number of variables takes few open files.
+/// Temporary files that the readers of a case share, so that any number of variables takes few open files.
 struct EnsightScratch {
   explicit EnsightScratch(const std::filesystem::path& folder) : spools(folder) {}
 

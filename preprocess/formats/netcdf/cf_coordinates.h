@@ -1,7 +1,7 @@
-// What a coordinate variable means by the CF conventions: its role (longitude, latitude, depth, time, or
-// none), the length or pressure of its unit, its direction, and the height of a pressure level that has no
-// geopotential. All functions look at attributes and numbers alone, read no file, and may be called by any
-// thread.
+// Finds the meaning of a coordinate variable by the CF conventions: its role (longitude, latitude, depth,
+// time, or none), the length or pressure of its unit, its direction, and the height of a pressure level that
+// has no geopotential. All functions look at attributes and numbers alone, read no file, and may be called by
+// any thread.
 #pragma once
 
 #include <cmath>

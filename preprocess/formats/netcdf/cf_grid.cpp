@@ -238,9 +238,10 @@ class GridFinder {
     return true;
   }
 
-  /// What no place on the Earth has at most of the nodes, or all nodes alike, as idealised runs of WRF write it; empty if there
-  /// is nothing wrong. Looks at five rows. `usable_indices`: false if the numbers are positions in another unit, and the files
-  /// do not state the distance of nodes either.
+  /// Describes what is implausible about longitude and latitude: values that no place on the Earth has at
+  /// most of the nodes, or all nodes alike, as idealised runs of WRF write them; empty if nothing is. Looks
+  /// at five rows. `usable_indices`: false if the numbers are positions in another unit, and the files do not
+  /// state the distance of nodes either.
   std::string implausibleDegrees(const CfGrid& grid, bool& usable_indices) const {
     CfRange row{{0, 0, 0}, {1, 1, 1}};
     std::vector<size_t> varying;

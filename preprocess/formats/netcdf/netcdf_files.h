@@ -75,8 +75,9 @@ class NetcdfFiles {
   std::vector<std::string> warnings_;
 };
 
-/// What the files hold if it is no structured grid by design, an unstructured mesh or plain HDF5: "an
-/// unstructured mesh (UGRID)", "an HDF5 file, but neither NetCDF-4 nor CGNS". nullopt for any other file.
+/// Describes the contents if the files are no structured grid by design, but an unstructured mesh or plain
+/// HDF5: "an unstructured mesh (UGRID)", "an HDF5 file, but neither NetCDF-4 nor CGNS". nullopt for any other
+/// file.
 std::optional<std::string> foreignNetcdf(const NetcdfFiles& file);
 
 }  // namespace curvisplat

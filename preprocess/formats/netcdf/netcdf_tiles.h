@@ -20,7 +20,7 @@
 
 namespace curvisplat {
 
-/// What the attributes DOMAIN_* say of a part: its place in the map, halos included.
+/// The place of a part in the map, halos included, by the attributes DOMAIN_*.
 struct NetcdfDomain {
   uint64_t total = 0;                // parts of the map
   std::array<size_t, 2> dims{};      // along x and y: indices into NetcdfFile::dimensions()

@@ -7,7 +7,7 @@
 
 namespace curvisplat {
 
-/// What a folder is that is not read: "a Zarr store, ..."; nullopt for other folders and for files.
+/// Describes a folder that is not read: "a Zarr store, ..."; nullopt for other folders and for files.
 std::optional<std::string> foreignFolder(const std::filesystem::path& folder);
 
 /// Throws Error with the name of the format if `path` is a folder or of a format that is not read here.

@@ -139,7 +139,7 @@ std::vector<uint32_t> candidatesFor(const GridDescription& description, const st
   return stored.empty() ? named(true) : stored;
 }
 
-/// What to do about files without any scalar.
+/// Advice about files without any scalar.
 std::string sourceOfScalars(const GridDescription& description) {
   const bool is_su2 = description.format.starts_with("SU2");
   if (!is_su2 && !description.pieces.empty()) return "";

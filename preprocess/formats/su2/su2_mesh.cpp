@@ -122,7 +122,7 @@ bool MeshParser::nextLine() {
   return false;
 }
 
-/// What follows `key=`, if the line begins so.
+/// The text after `key=`, if the line begins so.
 std::optional<std::string_view> MeshParser::valueOf(std::string_view key) const {
   if (!line_.starts_with(key)) return std::nullopt;
   const std::string_view rest = trimmed(line_.substr(key.size()));

@@ -158,7 +158,7 @@ std::string firstLineOf(const InputFile& file) {
   return "";
 }
 
-/// What follows "KEY =" in the line; nullopt if it has another key.
+/// The text after "KEY =" in the line; nullopt if it has another key.
 std::optional<std::string_view> valueOf(std::string_view line, std::string_view key) {
   if (!line.starts_with(key)) return std::nullopt;
   line = trimmed(line.substr(key.size()));

@@ -95,7 +95,7 @@ class Words {
   std::vector<std::byte> buffer_;
 };
 
-/// What the header says of a zone and its data need.
+/// The facts in a zone's header that its data need.
 struct ZoneLayout {
   bool point = false;  // packing
   uint64_t neighbours = 0;

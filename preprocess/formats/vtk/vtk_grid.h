@@ -1,4 +1,4 @@
-// What the readers of VTK files give, and VtkSource takes: a VtkGrid of pieces, each with its nodes and
+// The grids that readers of VTK files give to VtkSource: a VtkGrid of pieces, each with its nodes and
 // arrays, and the blocks into which the pieces are divided.
 //
 // A piece has an extent, a box of node indices. Where the extents of pieces overlap (by ghost levels),

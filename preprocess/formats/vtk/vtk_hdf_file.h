@@ -26,7 +26,7 @@ class VtkHdfFile {
   /// Throws Error: "FILE: PLACE: WHAT".
   [[noreturn]] void fail(const std::string& place, const std::string& what) const;
 
-  /// What the links of a group lead to, in the order of creation or by name; nothing without the group.
+  /// Names of the links in a group, in the order of creation or by name; nothing without the group.
   std::vector<std::string> names(const std::string& group) const;
   /// Whether there is an object with this path, and a number that it has under all of its paths.
   std::optional<uint64_t> identity(const std::string& place) const;

@@ -19,7 +19,7 @@
 namespace curvisplat {
 namespace {
 
-/// What becomes of VTK's cell types as cells of MeshSource.
+/// Groups of VTK's cell types, by what they become as cells of MeshSource.
 enum class VtkCellGroup : uint8_t {
   kLinear,
   kCurved,    // quadratic, Lagrange, Bezier

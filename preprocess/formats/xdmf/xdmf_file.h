@@ -60,8 +60,8 @@ struct XdmfFile {
   std::vector<std::string> files, warnings;
 };
 
-/// What a type of a Mixed topology stands for. `counted`: of polygons and the like the number of points comes before them, of
-/// polyhedra that of faces, and before each face that of its points.
+/// The meaning of a type of a Mixed topology. `counted`: of polygons and the like the number of points comes
+/// before them, of polyhedra that of faces, and before each face that of its points.
 struct XdmfCellType {
   const char* name;  // of a topology of this type alone, in lower case
   uint64_t number;

@@ -60,7 +60,7 @@ const XdmfAttribute* attributeNamed(const XdmfGrid& grid, const XdmfScalar& scal
   return same ? &*found : nullptr;
 }
 
-/// What is no number of a point becomes the largest, which is refused.
+/// The number of a point. Other numbers become the largest, which is refused.
 uint64_t pointOf(double number) {
   return number >= 0 && number <= 0x1p53 ? static_cast<uint64_t>(number)
                                          : std::numeric_limits<uint64_t>::max();
