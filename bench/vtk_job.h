@@ -1,4 +1,4 @@
-// What bench/peers/vtk_views.py needs to draw the same pictures with VTK.
+// The input of bench/peers/vtk_views.py, to draw the same pictures with VTK.
 #pragma once
 
 #include <filesystem>

@@ -74,8 +74,8 @@ inline constexpr const char* kBorderPairs =
     "border-pairs";                             // cells at faces are drawn as two splats (border_code.h)
 inline constexpr const char* kSteps = "steps";  // a series of time steps (series.h)
 /// Splats at nodes beside blanked ones lack the octants of their cells that lie in cells with a blanked node
-/// By kSteep as well, and splats weigh as much as their dual cells (preprocess/splats/dual_cell.h), collapsed
-/// ones have their shape, and rows go on across joints (preprocess/seams/joined_rows.h).
+/// (preprocess/splats/node_splats.h). A reader need not do anything, but a program that adds scalars has to
+/// make the same splats.
 inline constexpr const char* kCellOctants = "cell-octants";
 /// Some scalars have values at other samples: Manifest::own_blanks. A program that does not know the feature
 /// would miss them.
@@ -88,9 +88,8 @@ inline constexpr const char* kOverlapNone = "none";    // as kOverlapOwner, but 
 
 // Values of Manifest::stretch.
 inline constexpr const char* kSteepStretch = "steep";  // by StretchFit::kSteep (preprocess/splats/stretch.h)
-/// What kSteepStretch says, and besides, splats weigh as much as their dual cells
-/// (preprocess/splats/dual_cell.h), collapsed ones have their shape, and rows go on across joints
-/// (preprocess/seams/joined_rows.h).
+/// Steep as well, and splats weigh as much as their dual cells (preprocess/splats/dual_cell.h), collapsed
+/// ones have their shape, and rows go on across joints (preprocess/seams/joined_rows.h).
 inline constexpr const char* kDualCells = "dual-cells";
 
 struct Manifest {

@@ -1,4 +1,4 @@
-// What `render` draws over a picture, and the ways there are to draw it.
+// Annotations that `render` draws over a picture, and the ways there are to draw them.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

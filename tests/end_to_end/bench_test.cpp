@@ -20,7 +20,7 @@ class Bench : public ProgramTest {
   void writeCache() { writeLatticeCache(folder_ / "a.splats", 0.2, {0.01, 0.01, 0.01}); }
 };
 
-/// What compare.py relies on.
+/// Reads a report, and checks the fields that compare.py relies on.
 nlohmann::json readReport(const std::string& path) {
   const auto json = jsonOf(path);
   EXPECT_EQ(json["schema"], 1);

@@ -1,4 +1,4 @@
-// What each correction of the method is worth: with it a picture is as faithful as it must be, without it it
+// The worth of each correction of the method: with it a picture is as faithful as it must be, without it it
 // is not. So every threshold here is known to be one that a broken correction misses.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -103,7 +103,7 @@ TEST_F(Corrections, FacesOfBorders) {
               {source, SceneField(*constant), "smooth", halfAnnulusCamera()}, 57, {}, without);
 }
 
-/// What is drawn more than one pixel outside of the middle `side` x `side` pixels, of the whole.
+/// The share of what is drawn that lies more than one pixel outside of the middle `side` x `side` pixels.
 double shareOutside(const Image& over_white, int side) {
   double outside = 0, all = 0;
   for (int y = 0; y < over_white.size.height; ++y)

@@ -1,4 +1,4 @@
-// What must hold of pictures whatever the grid: convergence, and independence of how a grid is told, of how
+// Properties of pictures whatever the grid: convergence, and independence of how a grid is told, of how
 // it is cut into blocks and of how finely it samples; cameras inside of the data and wide ones.
 #include <fmt/format.h>
 #include <gtest/gtest.h>

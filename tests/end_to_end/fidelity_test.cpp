@@ -41,7 +41,8 @@ Image absoluteDifference(const Image& a, const Image& b) {
   return difference;
 }
 
-// What a person needs to see what went wrong: the picture, what it should be, and 20 times the difference.
+// Leaves what a person needs to see what went wrong: the picture, what it should be, and 20 times the
+// difference.
 void leavePictures(const std::string& name, const Image& picture, const Image& reference) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "curvisplat_fidelity";
   std::filesystem::create_directories(folder);

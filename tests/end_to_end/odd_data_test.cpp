@@ -92,8 +92,8 @@ TEST_F(OddDataTest, NodesInOnePointHaveNoVolumeWhichIsReported) {
   expectEmpty({}, "are flat and have no volume");
 }
 
-// What `convert` says of flat samples is what `render` says of a picture of nothing else, and what is seen of some of them
-// beside others. From the front the flat ones would cover the right half.
+// `convert` says of flat samples what `render` says of a picture of nothing else, and what is seen of some of
+// them beside others. From the front the flat ones would cover the right half.
 TEST_F(OddDataTest, FlatSamplesAreInvisibleAndBothCommandsSaySo) {
   for (const bool all : {true, false}) {
     SCOPED_TRACE(all);

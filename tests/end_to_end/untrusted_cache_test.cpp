@@ -147,7 +147,7 @@ class UntrustedCache : public ProgramTest {
     EXPECT_EQ(render(cache, {"--keep-going"}).status, 0);
   }
 
-  /// What `info --verify` finds. Splats are random, so that some findings are about weights.
+  /// The findings of `info --verify`. Splats are random, so that some findings are about weights.
   static std::string findingsIn(const fs::path& cache) {
     return runWithLittleMemory({"info", cache.string(), "--verify"}).out;
   }
@@ -342,7 +342,7 @@ TEST_F(UntrustedCache, ItsNumbersAreFinite) {
   });
 }
 
-/// What a program reads of one file.
+/// Watches what a program reads of one file.
 class ReadWatch {
  public:
   explicit ReadWatch(const fs::path& file) : fd_(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK)) {

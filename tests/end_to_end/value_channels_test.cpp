@@ -1,5 +1,5 @@
-// What lies where pixels have half of their opacity: against rays through the scene, for the volume, an isosurface and a
-// plane in it; with any threads; and the channels of .exr files.
+// Values where pixels have half of their opacity: against rays through the scene, for the volume, an
+// isosurface and a plane in it; with any threads; and the channels of .exr files.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

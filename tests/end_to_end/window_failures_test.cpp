@@ -92,7 +92,7 @@ TEST_F(NoWindow, FromAStateFileThatIsWrong) {
   expectFailure(runProgram({"view", "a.splats", "--state", "none.json"}), {"none.json"});
 }
 
-/// What the window reads for its second scalar was not read before.
+/// A cache of its own: what the window reads for its second scalar was not read before.
 class WindowOnACopy : public NoWindow {
  protected:
   void SetUp() override {
@@ -205,7 +205,7 @@ class WindowLimitsTest : public ProgramSuite<WindowLimitsTest> {
   std::optional<VirtualDisplay> display_;
 };
 
-// What leaks is for the address sanitizer to say, which then ends the program with another status.
+// Leaks are for the address sanitizer to find, which then ends the program with another status.
 TEST_F(WindowLimitsTest, ClosesWhileItLoads) {
   for (const char* zoom : {"0", "3", "9"}) {
     SCOPED_TRACE(zoom);

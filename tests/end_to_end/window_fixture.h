@@ -191,7 +191,7 @@ class WindowTest : public ProgramSuite<WindowTest> {
     run(command);
     EXPECT_GE(difference(readImage("picture.png"), picture), 50) << testing::PrintToString(command);
   }
-  /// What follows `option` in a command: "--option value" or "--option=value"; empty if it is not there.
+  /// The word after `option` in a command: "--option value" or "--option=value"; empty if it is not there.
   static std::string valueOf(const Words& command, const std::string& option) {
     for (size_t n = 0; n < command.size(); ++n) {
       if (command[n] == option) return n + 1 < command.size() ? command[n + 1] : "";

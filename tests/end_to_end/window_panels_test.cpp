@@ -1,4 +1,4 @@
-// What panels and menus of the window do: values and markers, planes in the picture, two scalars, undo, saved views,
+// Panels and menus of the window: values and markers, planes in the picture, two scalars, undo, saved views,
 // messages, keys.
 #include <fstream>
 #include <iterator>

@@ -96,7 +96,8 @@ TEST_F(WindowPictures, HaveTheSizeThatWasTypedDuringOneFrame) {
   close();
 }
 
-/// What is typed before the dialog has been drawn: the keys that open it and the name come during one frame.
+/// A name is typed before the dialog has been drawn: the keys that open it and the name come during one
+/// frame.
 TEST_F(WindowPictures, HaveTheNameThatWasTypedBeforeTheDialogOpened) {
   open();
   save();

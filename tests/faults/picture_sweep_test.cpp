@@ -89,7 +89,7 @@ TEST_F(RenderSweep, APictureIsRightOrNotThere) {
   }
 }
 
-/// What cannot be read is not taken for a damaged brick; what has been cut off is.
+/// A brick that cannot be read is not taken for a damaged one; one that has been cut off is.
 TEST_F(RenderSweep, KeepGoingIsForDamageNotForAFailingDisk) {
   keep_going_ = true;
   for (const Fault& fault : {faults::kFailsOnce, faults::kFailsFromThenOn}) {

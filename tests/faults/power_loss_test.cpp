@@ -1,5 +1,5 @@
-// What is left when the power goes at any moment of a conversion, an addition, or the writing of a picture:
-// a cache that is whole, or none; the old one or the new one. Calls are recorded as they are made, and
+// The state after the power goes at any moment of a conversion, an addition, or the writing of a picture: a
+// cache that is whole, or none; the old one or the new one. Calls are recorded as they are made, and
 // replayed on a model of a disk that keeps for certain only what was synced:
 //
 //   a file's bytes      as they were at its last fsync, or later ones, or zeros in their place, or half of them

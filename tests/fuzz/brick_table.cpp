@@ -45,7 +45,7 @@ void mend(Tables& tables, uint8_t flags) {
   }
 }
 
-/// What the manifest says of these tables.
+/// A manifest that fits these tables.
 Manifest manifestOf(const Tables& tables, const RootCube& root, uint64_t bricks) {
   Manifest manifest;
   manifest.root = root;

@@ -81,7 +81,7 @@ std::vector<std::byte> logOf(std::span<const std::byte> bytes, size_t variables,
   return log;
 }
 
-// What an interrupted conversion has left: its log of bricks and their streams. Checksums are made right
+// The leavings of an interrupted conversion: its log of bricks and their streams. Checksums are made right
 // here.
 //
 //   variables u8 | bytes of the log u16 | log without checksums | bytes of the files of streams

@@ -1,4 +1,4 @@
-// What conversions leave on disk: journals, and records of the parts of a series.
+// Files that conversions leave on disk: journals, and records of the parts of a series.
 #include <fmt/format.h>
 
 #include <string>
@@ -47,7 +47,7 @@ bool copyCaches() {
   return true;
 }
 
-// What processes have noted of their parts of a series, which join_series joins: one record, or two of them,
+// Notes of processes about their parts of a series, which join_series joins: one record, or two of them,
 // beside caches that are as they should be.
 //
 //   length u16 | record of part 1 | record of part 2, if there is more

@@ -1,4 +1,4 @@
-// What a fuzz target is: a function of bytes that returns, or throws an Error of one line, whatever they are.
+// Defines fuzz targets: a function of bytes that returns, or throws an Error of one line, whatever they are.
 // Anything else (a signal, a failed check, another exception, a finding of a sanitizer) is a finding.
 //
 // The same function is run by libFuzzer (preset "fuzz", a program for each target), and on every input of corpus/<target>/ by the

@@ -1,4 +1,4 @@
-// What targets of grid formats do with a file that opens: read all of it.
+// Reads all of a file that opens, for targets of grid formats.
 #pragma once
 
 #include <algorithm>

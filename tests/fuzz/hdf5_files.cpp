@@ -27,7 +27,7 @@ class Writer {
     H5Pset_create_intermediate_group(parents_.id(), 1);
   }
 
-  /// What HDF5 refuses to write is left out.
+  /// Adds an object. Those that HDF5 refuses to write are left out.
   void add(FuzzInput& input) {
     const auto kind = input.take<uint8_t>() % 4;
     const std::string path = takeText(input);

@@ -1,4 +1,4 @@
-// What libFuzzer calls: the program's one target.
+// The function that libFuzzer calls: the program's one target.
 //
 // A target may try a library on its input in a process of its own, which may crash (library_trial.h). That process inherits
 // libFuzzer's callback, which would keep the input as a finding. Here its crash is a finding only if no function of such a
@@ -42,7 +42,7 @@ void beginTrial() {
 
 }  // namespace
 
-/// What libcgns loses when a damaged file is refused is not ours.
+/// Leaks of libcgns, when a damaged file is refused, are not ours.
 extern "C" const char* __lsan_default_suppressions() {
   return "leak:libcgns\n";
 }

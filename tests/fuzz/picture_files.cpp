@@ -1,4 +1,4 @@
-// What a picture is made of: splats, colour maps, camera paths, pictures, surfaces and curves.
+// Inputs of pictures: splats, colour maps, camera paths, pictures, surfaces and curves.
 #include <algorithm>
 #include <cmath>
 #include <limits>

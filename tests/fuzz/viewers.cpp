@@ -1,4 +1,4 @@
-// What viewers read: the state of a view that the window remembers, and what pages send to the server.
+// Inputs of viewers: the state of a view that the window remembers, and what pages send to the server.
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -34,8 +34,8 @@ bool isSame(const nlohmann::json& a, const nlohmann::json& b) {
   return std::abs(x - y) <= 1e-9 * std::max({1.0, std::abs(x), std::abs(y)});
 }
 
-// What the window remembers. What is read is written and read again as the same, but for rounding, and told
-// as a command.
+// The state that the window remembers. What is read is written and read again as the same, but for rounding,
+// and told as a command.
 void fuzzViewState(std::span<const std::byte> bytes) {
   const Manifest of = manifest();
   const ViewState state = viewStateFromJson(std::string(textOf(bytes)), "state.json", of);
@@ -49,7 +49,7 @@ void fuzzViewState(std::span<const std::byte> bytes) {
 
 const RegisteredFuzzTarget view_state_target("view_state", fuzzViewState);
 
-// What pages send to the server. The state of a view is read as the server reads it.
+// Messages of pages to the server. The state of a view is read as the server reads it.
 void fuzzClientMessage(std::span<const std::byte> bytes) {
   const std::string_view text = textOf(bytes);
   // The same bytes as the headers of a request: these refuse, and never throw.

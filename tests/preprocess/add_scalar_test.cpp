@@ -64,7 +64,7 @@ void changeManifest(const fs::path& cache, const std::function<void(nlohmann::or
   writeFileAtomically(cache / "manifest.json", manifest.dump());
 }
 
-/// What adding throws, as text; empty if it does not.
+/// The text of the exception that adding throws; empty if it does not.
 std::string refusal(const GridSource& source, const AddScalarOptions& options) {
   return curvisplat::errorOf([&] { added(source, options); });
 }

@@ -1,4 +1,4 @@
-// What is built and appended, of buckets that these tests make up: their cells hold no records.
+// Building and appending buckets that these tests make up: their cells hold no records.
 #include "preprocess/convert/bucket_builds.h"
 
 #include <gtest/gtest.h>

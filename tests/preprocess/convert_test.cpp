@@ -36,7 +36,7 @@ double weightOf(const SplatGeometry& geometry) {
   return sum;
 }
 
-/// What holds of every cache: its leaves hold `splats` nodes, each once; inner bricks weigh what their
+/// Checks what holds of every cache: its leaves hold `splats` nodes, each once; inner bricks weigh what their
 /// children do, and their error is not below theirs.
 void checkCache(const std::filesystem::path& path, uint64_t splats) {
   const CacheReader cache(path);

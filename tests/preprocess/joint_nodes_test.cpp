@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kSteps = 24;  // of a logarithm to the base of 2
 
-/// What a length becomes that is kept.
+/// The length as it is kept.
 double kept(double length, double unit) {
   const double steps = std::clamp(std::round(kSteps * std::log2(length / unit)), -127.0, 127.0);
   return unit * std::exp2(steps / kSteps);

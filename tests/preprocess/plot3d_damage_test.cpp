@@ -32,7 +32,7 @@ std::string errorOf(const TestFolder& folder, const Bytes& grid, const Bytes* so
   return curvisplat::errorOf([&] { open(folder, grid, solution); });
 }
 
-/// What is read of a file's first bytes must be what is read of the whole file.
+/// Expects that a file's first bytes are read as those of the whole file.
 void expectSameNodes(const GridSource& truncated, const GridSource& whole) {
   NodeArrays found, expected;
   ASSERT_EQ(truncated.description().blocks.size(), whole.description().blocks.size());

@@ -130,7 +130,7 @@ class Resume : public ::testing::Test {
   fs::path partial() const { return work_ / "a.splats.partial"; }
   fs::path scratch() const { return readJournal(partial())->scratch; }
 
-  /// What is there now is the cache, as if nothing had happened, and nothing else.
+  /// Expects that the cache is there, as if nothing had happened, and nothing else.
   void expectWhole() const {
     for (const auto& entry : fs::directory_iterator(work_)) EXPECT_EQ(entry.path(), output_);
     const Files files = allFilesOf(output_);

@@ -67,7 +67,7 @@ struct Ending {
   std::string error;
 };
 
-/// What a damaged file ends in; fails the test where it must not end so.
+/// The ending of reading a damaged file; fails the test where it must not end so.
 Ending endingOf(const std::filesystem::path& path, const Content& whole, const std::string& what) {
   Ending ending;
   try {

@@ -221,7 +221,7 @@ TEST(VtkSets, FilesThatNameOthersOverAndOverAreRefused) {
   expectSays(errorOf(folder.path() / "0.vtm"), "refers to more than 100000 files");
 }
 
-/// What `info` reads of a set that names one file `times` times: opened files, and reads.
+/// Counts for `info` of a set that names one file `times` times: opened files, and reads.
 std::pair<int64_t, int64_t> readForInfo(const TestFolder& folder, int times) {
   std::string members;
   for (int n = 0; n < times; ++n) members += "<DataSet file='one.vts'/>";

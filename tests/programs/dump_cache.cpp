@@ -1,4 +1,4 @@
-// What the program decodes from a cache, for tests/stream/read_cache_test.py to compare with.
+// Dumps what the program decodes from a cache, for tests/stream/read_cache_test.py to compare with.
 //
 //    dump_cache CACHE           writes every brick to standard output, little-endian:
 //

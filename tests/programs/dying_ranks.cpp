@@ -25,7 +25,7 @@ namespace {
 
 using namespace curvisplat;
 
-/// What conversions and additions have in common.
+/// The options that conversions and additions have in common.
 template <typename Options>
 Options optionsOf(Ranks& ranks, uint32_t scalar) {
   Options options;

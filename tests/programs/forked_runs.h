@@ -19,8 +19,8 @@ namespace curvisplat {
 /// The variable of the environment that names the socket to serve_runs.
 inline constexpr const char* kSocketVariable = "CURVISPLAT_SERVE_RUNS";
 
-/// What comes before the text: `words` arguments and `variables` of the environment, each with its '\0'. With it go the descriptors
-/// 0, 1, 2 and that of the working directory.
+/// The header before the text: `words` arguments and `variables` of the environment, each with its '\0'. With
+/// it go the descriptors 0, 1, 2 and that of the working directory.
 struct RunRequest {
   uint32_t words = 0, variables = 0, bytes = 0;
   uint32_t umask = 0;

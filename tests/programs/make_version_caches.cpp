@@ -54,7 +54,7 @@ FunctionGridSource blocks() {
   });
 }
 
-/// What must be read from the cache, in files whose names begin with `beside`.
+/// Writes what must be read from the cache, in files whose names begin with `beside`.
 void summarise(const CacheReader& reader, const std::string& beside) {
   nlohmann::json json = summaryOf(reader);
   writeFileDurably(beside + ".json", json.dump(1) + "\n");

@@ -1,4 +1,5 @@
-// What the reference renderer marches through: a scalar over a bounded part of space, known at any point.
+// The field that the reference renderer marches through: a scalar over a bounded part of space, known at any
+// point.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -59,7 +60,7 @@ class SceneField : public ReferenceField {
   const Scene& scene_;
 };
 
-/// What clip planes leave of a field, which outlives it.
+/// The part of a field that clip planes leave. The field outlives it.
 class ClippedField : public ReferenceField {
  public:
   ClippedField(const ReferenceField& whole, std::vector<ClipPlane> planes)

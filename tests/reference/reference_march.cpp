@@ -60,7 +60,7 @@ std::optional<std::pair<double, double>> partInBox(const Ray& ray, const glm::dv
 
 using PointColour = std::function<glm::dvec3(const glm::dvec3& world)>;
 
-/// What lights the field, what lies in it, and its colours where they are another scalar's.
+/// The surroundings of a field: its light, what lies in it, and its colours where they are another scalar's.
 struct Surroundings {
   const ReferenceLight* light = nullptr;
   const ReferenceLayers& layers;
@@ -174,7 +174,7 @@ class Marcher {
 
   bool inside(double t) { return probe_->at(ray_.at(t)).has_value(); }
 
-  /// What the field is at a place on the ray. A colour without extinction counts nothing, and is not lit.
+  /// The field at a place on the ray. A colour without extinction counts nothing, and is not lit.
   struct Sample {
     bool is_inside = false;
     OpticalProperties optical;
@@ -236,7 +236,7 @@ class Marcher {
     return in;
   }
 
-  /// What a step adds, by Simpson's rule: exact where colour and extinction are constant.
+  /// The gain of a step, by Simpson's rule: exact where colour and extinction are constant.
   struct Gain {
     double depth = 0;        // optical
     double error = 0;        // of the depth and of each channel by the midpoint rule; far above Simpson's

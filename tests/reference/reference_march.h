@@ -73,7 +73,7 @@ struct ReferenceLayer {
   glm::dvec3 colour{0.0};  // not premultiplied
   double opacity = 1;
 };
-/// What a ray meets, in any order.
+/// The layers that a ray meets, in any order.
 using ReferenceLayers =
     std::function<std::vector<ReferenceLayer>(const glm::dvec3& origin, const glm::dvec3& direction)>;
 
@@ -94,7 +94,7 @@ struct ReferenceIsosurface {
 ReferenceLayers isoLayer(const Scene& scene, const ReferenceIsosurface& surface);
 ReferenceLayers isoLayer(const Scene& scene, double value, const glm::dvec3& colour, double opacity = 1);
 
-/// What a picture has besides the field: light on it, layers in it, and a factor of its extinction, by the
+/// Extras of a picture besides the field: light on it, layers in it, and a factor of its extinction, by the
 /// magnitude of its gradient.
 struct ReferenceExtras {
   const ReferenceLight* light = nullptr;

@@ -30,7 +30,7 @@ double biweight(int power, double x) {
   }
 }
 
-/// What is left along the ray at u; `mean` and `variance` of its depths.
+/// The remainder along the ray at u; `mean` and `variance` of its depths.
 struct Remainder {
   double share = 1, mean = 0, variance = 1;
 };
@@ -88,7 +88,7 @@ glm::dvec2 inFootprint(const ScreenSplat& splat, int x, int y) {
   return {u0, (y + 0.5 - splat.y - splat.l21 * u0) / splat.l22};
 }
 
-/// What one splat adds at a place of its footprint, premultiplied.
+/// The share of one splat at a place of its footprint, premultiplied.
 glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, const glm::dvec2& at,
                         const ClassificationTable& table, PixelShading shading) {
   const double u0 = at.x, u1 = at.y;

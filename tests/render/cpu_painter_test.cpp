@@ -154,8 +154,8 @@ TEST(CpuPainter, LeavesUntouchedPixelsAlone) {
     }
 }
 
-// What tile.h promises of constants and parabolas, one splat after the other: optical depths are read off the
-// alpha of a frame without a background.
+// The bounds that tile.h promises of constants and parabolas, one splat after the other: optical depths are
+// read off the alpha of a frame without a background.
 TEST_P(OnEveryTarget, FitsKeepTheirBound) {
   const ImageSize size{32, 32};  // a tile
   double largest = 0;            // in what is allowed

@@ -89,7 +89,8 @@ TEST(FirstChoice, RareValuesAreMoreOpaqueAndTheModeIsClear) {
   EXPECT_GT(curve.at(0.75), 0.5);
 }
 
-/// What is cleared lies beyond the range, whose end has an opacity of its own: as the far field of a vortex.
+/// The cleared values lie beyond the range, whose end has an opacity of its own: as the far field of a
+/// vortex.
 TEST(FirstChoice, WhatIsClearedBeyondTheRangeStaysClear) {
   CoarseSamples samples;
   for (int n = 0; n < 200; ++n) add(samples, 0, 50);  // the far field

@@ -88,7 +88,7 @@ TEST(ReducedSize, SmallImagesStayImages) {
   }
 }
 
-// What a camera shows at a pixel of the whole image is at the same place of the enlarged one: a plane of
+// The enlarged image has at the same place what a camera shows at a pixel of the whole image: a plane of
 // values in the world stays that plane.
 TEST(ReducedSize, ShowsWhatTheCameraShowsInTheWholeImage) {
   Camera camera;

@@ -202,7 +202,7 @@ TEST_P(FrameOrderTest, IsThatOfOneSortWithClipPlanesAndLight) {
   EXPECT_GT(most_slabs, 1u);
 }
 
-// What stands in for a damaged brick, too; and each is reported once.
+// The order includes what stands in for a damaged brick; and each is reported once.
 TEST_P(FrameOrderTest, IsTheSameInSlabsWhereBricksAreDamaged) {
   if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
   TemporaryFolder folder;

@@ -124,7 +124,7 @@ TEST(Png, ClampsWhatItCannotHold) {
   EXPECT_EQ(decodePng(encodePng(image), "back").rgba, (std::vector<float>{0, 1, 0, 1}));
 }
 
-// What other programs write, by libpng's other interface.
+// A PNG file as other programs write it, by libpng's other interface.
 Bytes simplePng(png_uint_32 format, int width, const void* pixels, const void* palette = nullptr,
                 png_uint_32 palette_entries = 0) {
   png_image image{};

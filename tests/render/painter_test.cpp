@@ -1,4 +1,4 @@
-// What every painter must do, with each backend that there is; and what those by OpenGL must do beside it.
+// Duties of every painter, with each backend that there is; and what those by OpenGL must do beside it.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -169,7 +169,8 @@ TEST_F(ProgressiveTest, ReportsHowManySplatsTheCoarsestPictureTakes) {
   }
 }
 
-/// What the sweep holds when a part has entered: its splats, and of the earlier parts those behind its first key.
+/// The splats that the sweep holds when a part has entered: its splats, and of the earlier parts those behind
+/// its first key.
 double layerByDefinition(const std::vector<PartInRegion>& parts) {
   double largest = 0;
   for (size_t n = 0; n < parts.size(); ++n) {

@@ -1,4 +1,4 @@
-// What the codec's rounding costs in the picture: the same splats of the half-annulus, drawn as they were
+// The cost of the codec's rounding in the picture: the same splats of the half-annulus, drawn as they were
 // computed and as a cache gives them back, against the reference march. Painter, order and levels are the
 // same for both.
 #include <fmt/format.h>
@@ -28,7 +28,7 @@ struct Splats {
   SplatVariable variable;
 };
 
-/// What a brick of double-precision splats is in the arrays that are projected.
+/// A brick of double-precision splats as the arrays that are projected.
 Splats inArrays(const RootCube& root, const BrickSplats& brick) {
   Splats out;
   SplatGeometry& geometry = out.geometry;

@@ -75,7 +75,7 @@ double valueAt(const std::array<ScreenVertex, 3>& v, double x, double y) {
          cross(dx1, dy1, px, py) / area * (double{v[2].value} - double{v[0].value});
 }
 
-/// What lies behind the near plane, as the rasterizer has it.
+/// The parts behind the near plane, as the rasterizer has them.
 std::vector<std::array<ScreenVertex, 3>> partsOf(const SceneTriangles& triangles, size_t surface,
                                                  uint32_t n) {
   const auto& corners = triangles.scene().surfaces[surface].mesh->triangles[n];

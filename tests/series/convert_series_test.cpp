@@ -126,7 +126,7 @@ TEST(ConvertSeries, AStepThatWasConvertedAloneHasItsTime) {
   }
 }
 
-/// What converting throws, as text.
+/// The text of the exception that converting throws.
 std::string refusal(const std::vector<StepKind>& kinds, const SeriesOptions& options) {
   return curvisplat::errorOf([&] { convertQuietly(inputOf(kinds), options); });
 }

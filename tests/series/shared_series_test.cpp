@@ -192,7 +192,8 @@ TEST(SharedSeries, CanBeInterruptedInAnyRound) {
   }
 }
 
-/// What `work` throws on a disk that is full from each `stride`-th write on; until it is not full any more.
+/// Expects what `work` throws on a disk that is full from each `stride`-th write on; until it is not full any
+/// more.
 void expectGivenFoldersOnFullDisks(const fs::path& given, int64_t stride, const std::function<void()>& work) {
   int64_t failures = 0;
   for (int64_t at = 0;; at += stride) {

@@ -16,7 +16,7 @@ namespace curvisplat {
 
 namespace fs = std::filesystem;
 
-/// What a step of the test series is made of.
+/// The properties of a step of the test series.
 struct StepKind {
   double time = 0;
   double shift = 0;  // of the grid

@@ -1,4 +1,4 @@
-// What pages send to the server, and what is refused: tokens, hosts and origins, and messages.
+// Messages of pages to the server, and what is refused: tokens, hosts and origins, and messages.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

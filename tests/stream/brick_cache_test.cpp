@@ -233,7 +233,7 @@ bool refuse(std::initializer_list<long> calls, int error) {
          ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
 }
 
-/// What `run` returns in a process of its own; the negative signal if that kills it, as after a hang.
+/// The result of `run` in a process of its own; the negative signal if that kills it, as after a hang.
 int inProcess(const std::function<int()>& run) {
   const pid_t child = ::fork();
   if (child == 0) {

@@ -109,7 +109,7 @@ void expectValuesHeld(const std::vector<SplatScalar>& in, const std::vector<Spla
   }
 }
 
-/// What decoding gives is what encoding said it would.
+/// Expects that decoding gives what encoding said it would.
 void expectDecodes(const RootCube& root, const EncodedBrick& encoded, const BrickSplats& said) {
   const BrickSplats back =
       decodeForMerging(root, encoded.brick, encoded.geometry, encoded.variables, encoded.values);

@@ -1,4 +1,4 @@
-// What verifyCache() finds, and what probing finds; and bricks.vdb, read by OpenVDB itself.
+// Findings of verifyCache(), and of probing; and bricks.vdb, read by OpenVDB itself.
 #include <gtest/gtest.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>

@@ -161,7 +161,7 @@ TEST(CutLimits, RefinesTheLargestErrorFirst) {
   }
 }
 
-/// What a cut under limits is, by its definition: all totals are counted anew after each step.
+/// A cut under limits, by its definition: all totals are counted anew after each step.
 std::map<uint32_t, uint8_t> refinedStepByStep(const CutTestTree& tree, const CutView& view,
                                               const TransparentBounds& transparent,
                                               const CutOptions& options) {

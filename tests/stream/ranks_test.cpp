@@ -1,4 +1,5 @@
-// What two ranks exchange is tested where it is used (tests/preprocess, tests/render). Here: calls that an exception leaves.
+// Exchanges of two ranks are tested where they are used (tests/preprocess, tests/render). Here: calls that an
+// exception leaves.
 #include "stream/base/ranks.h"
 
 #include <gtest/gtest.h>

@@ -183,7 +183,7 @@ TEST(JsonDocument, FieldsThatAreNullAreNotThere) {
   EXPECT_EQ(document.root().names(), (std::vector<std::string>{"list", "none", "deep", "flag"}));
 }
 
-// What is shown of a long text ends between two characters.
+// The part of a long text that is shown ends between two characters.
 TEST(JsonDocument, ShowsTheBeginningOfLongTexts) {
   std::string text = "\"";
   for (int n = 0; n < 50; ++n) text += "\xc3\xa9";

@@ -22,7 +22,7 @@ import sys
 from check_parameters import FOLDERS, without_text
 
 CONTINUES = set("Also And As But Else Given It Its Kept Likewise None Nor Not Noted Of Or Same Seen So Such Taken Than That Their "
-                "Them Then They Those Too Which Whose".split())
+                "Them Then They Those Too What Which Whose".split())
 OPENS = set("Across After Against Along Around At Because Before Behind Below Beside Besides Between Beyond By During For From If In "
             "Inside Into Like On Once Outside Over Past Per Since Through Towards Under Unless Until When Where While With Within "
             "Without".split())

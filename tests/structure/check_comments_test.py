@@ -14,6 +14,7 @@ class Checks(unittest.TestCase):
         self.assertEqual(self.fragments("/// Of a face: its rows.\nint rows();\n"), [(1, "Of a face:")])
         self.assertEqual(self.fragments("struct A {\n  // As text(), but in small letters.\n  int word();\n};\n"),
                          [(2, "As text(), but in small letters.")])
+        self.assertEqual(self.fragments("/// What the rows need.\nint rows();\n"), [(1, "What the rows need.")])
         self.assertEqual(self.fragments("/// Offsets of rows.\nint rows();\n"), [])
 
     def test_words_that_may_open_a_sentence(self):

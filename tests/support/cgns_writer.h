@@ -24,7 +24,7 @@ struct CgnsWriterField {
   CgnsNumbers numbers = CgnsNumbers::kDoublePrecision;
 };
 
-/// What follows on from a call is added to what that call began: a zone to the last base, a solution to the
+/// Writes CGNS files. Each call adds to what the last one began: a zone to the last base, a solution to the
 /// last zone.
 class CgnsWriter {
  public:

@@ -17,13 +17,13 @@ namespace curvisplat {
 struct DamageReport {
   int same = 0, changed = 0;  // read; as the whole file, or with other values
   int refused = 0;            // an Error of one line that names the file
-  /// What must not be: which copy, and how it ended.
+  /// Faults, none of which must be: which copy, and how it ended.
   std::vector<std::string> failures;
   /// Crashes inside of a library that reads the format.
   std::vector<std::string> library_crashes;
 };
 
-/// What is to be done with a copy: opens it as a grid.
+/// Opens a copy as a grid.
 using OpenDamaged = std::function<std::unique_ptr<GridSource>(const std::filesystem::path& file)>;
 
 /// The first bytes of `file`, cut at `count` places all over it.

@@ -1,5 +1,5 @@
-// What a text, or an Error, says: expectSays() and expectError() expect parts of it, and report a failure at
-// the caller's line; errorOf() is an Error's text.
+// Expectations about a text, or an Error: expectSays() and expectError() expect parts of it, and report a
+// failure at the caller's line; errorOf() is an Error's text.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -32,7 +32,7 @@ inline int64_t nextInSweep(int64_t place, int64_t stride) {
   return place + (place < kFirstOnes || isWholeSweep() ? 1 : stride);
 }
 
-/// What goes wrong at the n-th call of a kind.
+/// A fault at the n-th call of a kind.
 struct Fault {
   const char* name;
   int64_t FaultySystemCalls::*at;
@@ -53,7 +53,7 @@ inline constexpr Fault kFaults[] = {kFailsOnce,   kFailsFromThenOn, kIsFull,  kH
 /// "a.splats.tmp.17.0" and "curvisplat.0123abcd.tmp".
 bool namesTemporaryFile(const std::string& message);
 
-/// What came of a job.
+/// The outcome of a job.
 struct FaultOutcome {
   std::string error;                 // what it threw; empty: it says that it has done its work
   bool has_refused_removal = false;  // so something may be left

@@ -18,7 +18,7 @@ uint32_t hdf5Checksum(std::string_view bytes);
 /// `changed` right, and returns true.
 bool renewChecksum(std::string_view whole, size_t begin, std::string& changed);
 
-/// What stands where a short fixed text should.
+/// Contents that stand where a short fixed text should.
 enum class HostileAttribute {
   kMissing,
   kStringOf34,  // one more than any text of CGNS's has

@@ -1,4 +1,4 @@
-// What a test may judge of memory: how much address space this process has, a limit on how much more it may
+// The memory that tests may judge: how much address space this process has, a limit on how much more it may
 // take, and whether this is a build with sanitizers, of GCC or Clang. What these need of memory is not the
 // program's, so tests that limit or measure memory leave that out.
 #pragma once

@@ -31,7 +31,7 @@ class RunningProgram {
 
   void signal(int number) const;
   pid_t process() const { return child_; }
-  /// What it said, once it has ended. To be called once.
+  /// Waits for the end of the program and returns what it said. Call it once.
   ProgramResult wait();
 
  private:

@@ -29,7 +29,7 @@ std::string describe(const Variation& variation) {
   return text;
 }
 
-/// What conversions and additions have in common.
+/// Varies the options that conversions and additions have in common.
 template <typename Options>
 Options varied(Options options, const Variation& variation) {
   if (variation.threads) options.threads = *variation.threads;

@@ -29,7 +29,7 @@ AddScalarReport addedByRanks(unsigned ranks, const DataSource& source, const Add
 void expectSameFiles(const Files& found, const Files& expected,
                      std::initializer_list<std::string_view> but = {});
 
-/// What must not change a byte. Fields that are left out are as in the options.
+/// A variation that must not change a byte. Fields that are left out are as in the options.
 struct Variation {
   std::optional<unsigned> threads = {};
   std::optional<uint64_t> memory_bytes = {};

@@ -24,7 +24,7 @@
 
 namespace curvisplat {
 
-/// What random bricks are like.
+/// The properties of random bricks.
 struct RandomBrick {
   size_t splats = 1000;
   double unit = 1;     // size of the root cube

@@ -13,8 +13,8 @@
 namespace curvisplat {
 namespace {
 
-/// What the ranks share. A call is made of two meetings: when all have come, each takes what is for it; when all
-/// have taken it, the call ends.
+/// The memory that the ranks share. A call is made of two meetings: when all have come, each takes what is
+/// for it; when all have taken it, the call ends.
 struct Meeting {
   explicit Meeting(unsigned ranks) : sent(ranks) {}
 

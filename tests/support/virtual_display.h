@@ -13,7 +13,7 @@ namespace curvisplat {
 
 class VirtualDisplay {
  public:
-  /// What is not installed of what it needs, or empty.
+  /// The programs that it needs and that are not installed; empty if all are.
   static std::string missing();
 
   /// Starts it, and sets DISPLAY for programs to come; the destructor ends it. `options` of Xvfb, beside
@@ -23,7 +23,7 @@ class VirtualDisplay {
 
   /// xdotool's words: {"mousemove", "10", "20"}, {"key", "p"}. Throws where it fails.
   void act(const std::vector<std::string>& words) const;
-  /// What is on the screen.
+  /// A picture of the screen.
   Image screenshot() const;
 
  private:

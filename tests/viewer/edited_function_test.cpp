@@ -107,7 +107,7 @@ class FunctionChooserTest : public testing::Test {
   }
   static void TearDownTestSuite() { folder_.reset(); }
 
-  /// What is answered until nothing is to come.
+  /// The questions that are answered until nothing is to come.
   static std::vector<FunctionChooser::Question> answersOf(FunctionChooser& chooser) {
     std::vector<FunctionChooser::Question> answers;
     while (chooser.busy()) {

@@ -211,7 +211,7 @@ TEST_F(FrameLoopTest, OneAtATimeDrawsTheSamePictures) {
   wait();  // the loop ends although its picture is not taken
 }
 
-/// What `render --keep-going` draws.
+/// The picture is the one that `render --keep-going` draws.
 TEST_F(FrameLoopTest, CoarserDataIsDrawnWhereABrickIsDamaged) {
   const std::filesystem::path copy = *folder_ / "leaf.splats";
   std::filesystem::copy(*folder_ / "scene.splats", copy);

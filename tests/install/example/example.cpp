@@ -22,7 +22,7 @@ using namespace curvisplat;
 
 constexpr uint64_t kNi = 64, kNj = 24, kNk = 16;
 
-/// What a simulation has in memory: a bent duct of kNi x kNj x kNk nodes, i fastest, and a temperature at each.
+/// The memory of a simulation: a bent duct of kNi x kNj x kNk nodes, i fastest, and a temperature at each.
 struct Simulation {
   std::vector<double> x, y, z;
   std::vector<float> temperature;
