@@ -276,7 +276,7 @@ class Measurement {
     return options;
   }
 
-  /// By the cache, or of splats that are merged into voxels here.
+  /// The picture of the cache, or of splats that are merged into voxels here.
   Image drawn(const OpenGrid& grid, const std::filesystem::path& cache, const NamedView& view,
               const TransferFunction& function) const {
     if (settings_.voxel_pixels == 0) return drawCache(cache, function, view.camera, frame());

@@ -52,9 +52,9 @@ bool finishStandardOutput() {
   return false;
 }
 
-// Where the machine has no threads left (ulimit -u, ulimit -v), the program ends with one line and exit
-// status 1, wherever that shows: libraries start threads before main() and in places where no exception may
-// leave.
+// The stack of threads that are started while libraries are loaded. If the machine has no threads left
+// (ulimit -u, ulimit -v), the program ends with one line and exit status 1, wherever that shows: libraries
+// start threads before main() and in places where no exception may leave.
 constexpr size_t kLoadingStackBytes = 256 << 10;
 size_t stack_bytes = 0;  // the system's
 

@@ -84,8 +84,8 @@ std::vector<FileInfo> firstStepFiles(const CacheReader& cache) {
   return files;
 }
 
-/// In what two parts, open at step 0, were not converted alike; empty if they were. The first step, which all parts have,
-/// shows it.
+/// Describes in what two parts, open at step 0, were not converted alike; empty if they were. The first step,
+/// which all parts have, shows it.
 std::string differenceOf(const CacheReader& a, const CacheReader& b) {
   const Manifest &of_a = a.seriesManifest(), &of_b = b.seriesManifest();
   const auto sameVariable = [](const VariableInfo& x, const VariableInfo& y) {

@@ -64,8 +64,8 @@ std::vector<uint64_t> referenceSteps(const Series& series, uint32_t geometry, ui
 /// The values of a brick in the steps that a new one is predicted from. Immutable; any thread.
 class StepReferences {
  public:
-  /// For a step that is about to be added to the series, on the geometry that `cache` is open at. Throws
-  /// Error.
+  /// Takes the values for a step that is about to be added to the series, on the geometry that `cache` is
+  /// open at. Throws Error.
   explicit StepReferences(const CacheReader& cache, bool leaves_out_first = false);
 
   /// A thread's memory for what of() lends.

@@ -88,8 +88,8 @@ inline constexpr size_t maxValueRecordBytes(size_t variables) {
   return minValueRecordBytes(variables) + 4 * variables;
 }
 
-/// Where `position` is in `cell`, which holds it: the highest kPlaceBits bits of each axis. The cell's level
-/// is at most kMaxLevel.
+/// The place of `position` in `cell`, which holds it: the highest kPlaceBits bits of each axis. The cell's
+/// level is at most kMaxLevel.
 inline std::array<uint32_t, 3> placeInCell(const RootPosition& position, const Cell& cell) {
   std::array<uint32_t, 3> place;
   for (int axis = 0; axis < 3; ++axis)

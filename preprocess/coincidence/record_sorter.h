@@ -99,8 +99,8 @@ class RecordSorter {
   uint64_t memory_bytes_;
   size_t half_;  // records of a half
   std::filesystem::path folder_;
-  // While records are added, for the thread that holds the mutex; a half that is being written, and the
-  // file, for the one that writes it.
+  // The members below belong, while records are added, to the thread that holds the mutex; a half that is
+  // being written, and the file, to the one that writes it.
   Mutex mutex_;
   ConditionVariable changed_;
   std::unique_ptr<double[]> records_;

@@ -94,8 +94,8 @@ class BucketLoader {
   bool ended_ = false;
   std::unique_ptr<WorkerTeam> team_;  // of all readers but the first, which is the thread that reads ahead
   std::vector<Reader> readers_;
-  // By the record's place in the bucket over the least bytes of a record, which no two share: 2 x its part
-  // among its reader's, and 1 if it is irregular.
+  // Tags of records, by the record's place in the bucket over the least bytes of a record, which no two
+  // share: 2 x its part among its reader's, and 1 if it is irregular.
   UnfilledArray<uint32_t> tags_;
   ReadAhead<LoadedBucket> ahead_;  // last: its thread uses the others
 };

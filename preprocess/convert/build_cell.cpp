@@ -31,9 +31,9 @@ bool coincide(const RecordSpan& records) {
   return true;
 }
 
-/// If another task of an enclosing loop has thrown, TBB cancels the loops within a cell, too, which then
-/// return normally with work left undone. The cell must not be built from the rest; of the two exceptions
-/// the first one is reported.
+/// Throws where a cell was not built: if another task of an enclosing loop has thrown, TBB cancels the loops
+/// within a cell, too, which then return normally with work left undone. The cell must not be built from the
+/// rest; of the two exceptions the first one is reported.
 [[noreturn]] void throwNotAllBuilt() {
   throw Error("the bricks of a cell were not all built");
 }

@@ -298,8 +298,8 @@ class Conversion {
     removeSplats();
   }
 
-  /// In a thread, beside the faces: a disk may take half a second for gigabytes. The bricks are synced before, so that a
-  /// crash of the machine does not lose both.
+  /// Removes the splats in a thread, beside the faces: a disk may take half a second for gigabytes. The
+  /// bricks are synced before, so that a crash of the machine does not lose both.
   void removeSplats() {
     try {
       splats_removed_ = std::async(std::launch::async, [this, file = std::move(file_)]() mutable {

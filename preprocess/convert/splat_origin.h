@@ -117,7 +117,8 @@ class SplatOrigin {
                                 Progress& progress) = 0;
   /// Returns how many samples became part of another one's splat.
   virtual uint64_t finish(const SinkOfThread&, Progress&) { return 0; }
-  /// At any time, after a resumed conversion too: writes the surfaces of what the splats fill, if it has any.
+  /// Writes the surfaces of what the splats fill, if it has any. Call it at any time, after a resumed
+  /// conversion too.
   virtual std::optional<FileInfo> writeFaces(const FacesJob&, Progress&) { return std::nullopt; }
 };
 

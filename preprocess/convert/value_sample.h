@@ -49,7 +49,7 @@ class ValueSample {
   std::vector<double> rows() const;
   /// Any thread.
   void add(std::span<const double> rows);
-  /// At rank 0, the sample of all ranks; elsewhere it stays. All ranks have to call it.
+  /// Gathers, at rank 0, the sample of all ranks; elsewhere the sample stays. All ranks have to call it.
   void gatherFrom(Ranks& ranks);
 
   /// How a variable's values are spread: from 5 to 95 % of the volume.

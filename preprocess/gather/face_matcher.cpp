@@ -92,7 +92,7 @@ uint32_t FaceMatcher::newEntry(const FaceCalls& calls) {
   return entry;
 }
 
-/// Where cells have more faces than was expected, such as polyhedra of thousands.
+/// Doubles the table for cells with more faces than was expected, such as polyhedra of thousands.
 void FaceMatcher::growTable() {
   buckets_.assign(2 * buckets_.size(), kNone);
   for (uint32_t entry = 0; entry < waiting_.size(); ++entry) {

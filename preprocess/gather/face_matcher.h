@@ -41,7 +41,7 @@ struct FaceCalls {
   std::function<void(std::span<const std::byte> first, size_t second)> pair_with_earlier = {};
 };
 
-/// For one thread, except for FaceCalls::put.
+/// Matches the faces of cells. One thread at a time, except for FaceCalls::put.
 class FaceMatcher {
  public:
   using TakePair = std::function<void(std::span<const std::byte>, std::span<const std::byte>)>;

@@ -67,7 +67,7 @@ class PointBorders {
 
   /// Cells in the mesh's order.
   void add(const GatheredCells& cells);
-  /// Once, after all cells; then load().
+  /// Ends adding, once, after all cells; then load().
   void finish(const Progress& progress);
   OuterPlanes::OfRange load(size_t range) { return planes_.load(range); }
 

@@ -91,7 +91,7 @@ class PointPages {
   static PageSlots slotsFor(uint64_t points, size_t fields, uint64_t memory_bytes) {
     return {points, kShift, memory_bytes / (sizeof(glm::dvec3) + fields * sizeof(float)) / kPoints};
   }
-  // With streams a reference is written and read, and its point, too.
+  // The bound of reading pages again: with streams a reference is written and read, and its point, too.
   static constexpr double kMaxAgain = 4;
 
  private:

@@ -64,8 +64,8 @@ class ReadAhead {
     return take();
   }
 
-  /// In the place of next(), for callers that process several values at a time: the value is valid until it is given back. Waits
-  /// for ever where all values are taken. One thread at a time.
+  /// Takes the next value, in place of next(), for callers that process several values at a time: it is valid
+  /// until it is given back. Waits for ever where all values are taken. One thread at a time.
   T* take() {
     if (!isNextThere()) awaitNext();
     const MutexLock lock(mutex_);

@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-/// With fewer planes than this besides the halo's two, strips re-read fewer rows than slabs of whole planes.
+/// Planes besides the halo's two below which strips re-read fewer rows than slabs of whole planes.
 constexpr uint64_t kMinPlanes = 4;
 
 /// The nodes along i, j and k of the box of a slab.

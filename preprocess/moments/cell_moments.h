@@ -57,7 +57,7 @@ struct CellBody {
 /// The volume, centre and covariance of a cell. If it has no volume, its centre is the mean of its corners,
 /// and the covariance 0.
 CellBody bodyOf(const CellView& cell);
-/// From the moments 0 to 9 of the whole cell about `middle`, the mean of its corners.
+/// The body from the moments 0 to 9 of the whole cell about `middle`, the mean of its corners.
 CellBody bodyFrom(const glm::dvec3& middle, std::span<const double, 10> moments);
 
 /// Cells that dualMomentsOfFour() and setBodiesOfFour() take at once.

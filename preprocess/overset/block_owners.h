@@ -35,7 +35,7 @@ enum class Overlap {
   kAll,    // by every block
 };
 
-/// For one thread, which calls; its functions are parallel loops.
+/// Finds the owners of samples. One thread calls; the functions are parallel loops.
 class BlockOwners {
  public:
   /// Reads the blocks that overlap once. `reader` gives the samples that are there. Memory: `memory_bytes`,

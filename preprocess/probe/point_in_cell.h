@@ -1,6 +1,7 @@
-// Where in a cell a point lies, and the weights of the cell's corners there: trilinear in hexahedra, linear in tetrahedra, and what
-// hexahedra with collapsed edges give in wedges and pyramids, as VTK's cells do. Polyhedra are cut into tetrahedra between their centre, those of
-// their faces and their edges. Pure: any thread.
+// Finds where in a cell a point lies, and the weights of the cell's corners there: trilinear in hexahedra,
+// linear in tetrahedra, and what hexahedra with collapsed edges give in wedges and pyramids, as VTK's cells
+// do. Polyhedra are cut into tetrahedra between their centre, those of their faces and their edges. Pure: any
+// thread.
 #pragma once
 
 #include <glm/vec3.hpp>

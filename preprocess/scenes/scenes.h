@@ -37,8 +37,8 @@ std::vector<std::string> sceneNames();
 /// (0, 20], and for a clustering of a scene without one.
 std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
                                                      std::optional<double> clustering = std::nullopt);
-/// When a scene is, for those that change: wake. Its vortices move down the street by a wave length per unit of
-/// time. `moving`: the grid sways along y as well, fixed at the cylinder's upstream side.
+/// The time of a scene, for those that change: wake. Its vortices move down the street by a wave length per
+/// unit of time. `moving`: the grid sways along y as well, fixed at the cylinder's upstream side.
 struct SceneTime {
   double time = 0;
   bool moving = false;

@@ -115,7 +115,7 @@ void BendOfParts::correct(std::span<SplatScalar> merged) const {
 
 namespace {
 
-// Where more nodes meet than this, the grid has collapsed (a pole), and all of them are merged.
+// The number of nodes at a point beyond which the grid has collapsed (a pole), and all of them are merged.
 constexpr size_t kMaxParts = 64;
 constexpr double kStraight = -0.9;  // cosine of halves on about one line
 

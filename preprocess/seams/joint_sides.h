@@ -39,7 +39,8 @@ enum class JointFrames : uint8_t {
 std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::span<const size_t> group,
                                JointFrames frames);
 
-/// By how much a half was made longer along a direction to fit where it is cut (LayerFit, face_layers.h).
+/// The factor by which a half was made longer along a direction to fit where it is cut (LayerFit,
+/// face_layers.h).
 double fittedFactor(const NodeSplat& half, const glm::dvec3& inward);
 
 /// Makes the halves of `half`, which has `sides`, those of an unstretched cell: their borders stay. Only

@@ -187,8 +187,8 @@ glm::dvec3 solveFactor(const Splat& splat, const glm::dvec3& h) {
   return {v0 / splat.axis[0], v1 / splat.axis[1], v2 / splat.axis[2]};
 }
 
-/// By the roots of the characteristic polynomial, in closed form: 1e-8 at worst (two equal largest ones). Or
-/// a bound of it that is not above `least`.
+/// The largest eigenvalue by the roots of the characteristic polynomial, in closed form: 1e-8 at worst (two
+/// equal largest ones). Or a bound of it that is not above `least`.
 double largestEigenvalue(const Symmetric3& s, double least) {
   const double third = (s.xx + s.yy + s.zz) / 3;
   const double x = s.xx - third, y = s.yy - third, z = s.zz - third;

@@ -42,7 +42,7 @@ struct NodeScratch {
   std::vector<uint8_t> near_blank;                           // [node of a row's part]
 };
 
-/// Where a node's neighbours are, counted in elements of NodeArrays. A missing neighbour is the node itself:
+/// The neighbours of a node, counted in elements of NodeArrays. A missing neighbour is the node itself:
 /// half the difference of the two is then the Jacobian's column in every case.
 struct Neighbours {
   std::array<ptrdiff_t, 3> before{}, after{};  // along i, j, k; <= 0 and >= 0

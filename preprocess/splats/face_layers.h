@@ -161,7 +161,7 @@ struct CellAtFaces {
   const Layers& layers;
   const std::array<JointLine, 3>& lines;
 };
-/// Where its middle is from the node, how much longer its splat is, and how it grows.
+/// The middle of the cell from the node, how much longer its splat is, and how it grows.
 struct CellOnLattice {
   glm::dvec3 &middle, &stretch;
   std::array<float, 3>& growth;

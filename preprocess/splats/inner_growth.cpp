@@ -2,7 +2,8 @@
 
 #include "stream/model/growth_code.h"
 
-// Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
+// The code from here to HWY_AFTER_NAMESPACE is compiled once for every instruction set that a processor may
+// have.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "preprocess/splats/inner_growth.cpp"
 #include <hwy/foreach_target.h>  // before highway.h

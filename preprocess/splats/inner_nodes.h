@@ -16,17 +16,18 @@ namespace curvisplat {
 
 inline constexpr size_t kInnerNodesAtOnce = 8;
 
-/// By how many of its own cells the grid bends at a node, at the most, for its scalars to be carried to the middle of
-/// the cell by their slopes. Where thin layers bend by more than they are thick (layers of 1 km on a sphere of
-/// 5 degrees: 48 cells), the middle lies below layers that have nothing to do with the node.
+/// The most that a grid may bend at a node, in its own cells, for its scalars to be carried to the middle of
+/// the cell by their slopes. Where thin layers bend by more than they are thick (layers of 1 km on a sphere
+/// of 5 degrees: 48 cells), the middle lies below layers that have nothing to do with the node.
 inline constexpr double kMaxBend = 4;
 
 /// How much of a cell's volume the corrections of dual_cell.h are at the most.
 inline constexpr double kMaxCorrection = 1.0 / 512;
 
-/// Where cells become wider along an axis by e from one to the next (dual_cell.h), a splat moves by kWidthDrift e of the
-/// cell's length, and is shorter by the factor 1 - kWidthShare e². By least squares around a pole, which is even to 5 %
-/// then, and a dot on the axis 1.1 to 1.4 times too dense; without, 2 to 5 times.
+/// The drift and the shortening of splats where cells become wider along an axis by e from one to the next
+/// (dual_cell.h): a splat moves by kWidthDrift e of the cell's length, and is shorter by the factor 1 -
+/// kWidthShare e². By least squares around a pole, which is even to 5 % then, and a dot on the axis 1.1 to
+/// 1.4 times too dense; without, 2 to 5 times.
 inline constexpr double kWidthDrift = 0.12, kWidthShare = 0.13;
 
 /// Nodes that follow one another in a row.

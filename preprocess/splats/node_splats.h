@@ -53,8 +53,8 @@ namespace curvisplat {
 /// Half the variance of the kernel along an axis.
 inline constexpr double kBend = 0.5 * kKernelSigma * kKernelSigma;
 
-/// Where a cell ends, as stream/border_code.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
-/// `faces`: whether the borders are faces to be cut at; `rotate` gives Q's image of a vector.
+/// The code of where a cell ends, as stream/border_code.h has it. `inwards`: along i, j, k, 1 or -1 from a
+/// border; `faces`: whether the borders are faces to be cut at; `rotate` gives Q's image of a vector.
 template <typename Rotate>
 uint32_t borderCode(const std::array<double, 3>& inwards, bool faces, const Rotate& rotate) {
   std::array<glm::dvec3, 3> axes;
@@ -106,7 +106,8 @@ struct NodeSplat {
   bool isForSeams() const { return on_block_face || behind_face || layers != 0; }
   /// The line that leads along a direction of the splat's frame; null if there is none.
   const JointLine* lineAlong(const glm::dvec3& inward) const;
-  /// After keepUncovered() (covered_part.h), which has left a part of the cell that has this code.
+  /// Makes the splat one of a part: keepUncovered() (covered_part.h) has left a part of the cell that has
+  /// this code.
   void becomePart(uint32_t code) {
     border_code = code;
     growth_code = kNoGrowth;

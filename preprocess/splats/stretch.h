@@ -104,9 +104,9 @@ inline constexpr float kLargestGrowth = 0.65f;
   return 0.34657359f * static_cast<float>(power) + t * (1 + t2 * (1.0f / 3 + t2 * (1.0f / 5)));
 }
 
-/// From the squared extents of five cells in a row, the third of which is the splat's own. s is 1 where it
-/// is nearly 1 (a stored shape cannot be told from it); all is as in an even grid where a cell has no
-/// extent.
+/// The stretch from the squared extents of five cells in a row, the third of which is the splat's own. s is 1
+/// where it is nearly 1 (a stored shape cannot be told from it); all is as in an even grid where a cell has
+/// no extent.
 [[gnu::always_inline]] inline Stretch stretchOf(double before2, double before, double own, double after,
                                                 double after2, StretchFit fit = StretchFit::kSteep) {
   constexpr float kNearlyOne = 2e-4f;
@@ -178,8 +178,8 @@ void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, si
 /// Twice the extents, squared, of five cells in a row.
 using SquaredExtents = std::array<double, 5>;
 
-/// Around the node `at`, which has `before` neighbours in a row on one side and `after` on the other; more
-/// than kStretchReach count as kStretchReach. All zero if it has none.
+/// The squared extents around the node `at`, which has `before` neighbours in a row on one side and `after`
+/// on the other; more than kStretchReach count as kStretchReach. All zero if it has none.
 SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before,
                              int after);
 

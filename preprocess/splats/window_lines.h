@@ -45,7 +45,8 @@ class WindowLines {
   }
   /// Fills the scratch with the stretch of the nodes of a row's part, and with their lines.
   void stretchRow(uint64_t j, uint64_t k) const;
-  /// After stretchRow(), of a node of the row: the lines across the faces of the block that it is on, or one away from.
+  /// The lines, at a node of the row, across the faces of the block that it is on, or one away from. Call it
+  /// after stretchRow().
   std::array<JointLine, 3> atJoints(const std::array<uint64_t, 3>& ijk) const;
 
  private:

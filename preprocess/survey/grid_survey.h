@@ -50,7 +50,7 @@ GridSurvey unitedSurvey(GridSurvey a, const GridSurvey& b);
 /// buckets by, so that the coordinates need not be read once more for counting them.
 class PositionSample {
  public:
-  /// For a grid of `nodes` nodes, of which it takes `most` at the most.
+  /// Samples a grid of `nodes` nodes, of which it takes `most` at most.
   PositionSample(uint64_t nodes, uint64_t most);
 
   /// How many nodes each of the positions stands for.

@@ -159,7 +159,7 @@ class PointHolders {
   uint64_t metInVain() const { return met_in_vain_; }
 
   static constexpr uint8_t kMaxHolders = 16;
-  /// For each point, beside the point.
+  /// Bytes of each point, beside the point.
   static constexpr uint64_t kBytesEach = 160;
 
  private:

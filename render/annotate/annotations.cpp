@@ -107,7 +107,7 @@ struct ScalarBar {
   double width;  // of the strip, whole pixels
 };
 
-/// From the strip's left edge, in pixels.
+/// Pixels from the strip's left edge.
 double leftOf(const ShownFunction& shown, double font) {
   return (kBarLeft + (shown.part == ShownFunction::Part::kBoth ? kCurveWidth : 0)) * font;
 }
@@ -209,7 +209,8 @@ void drawScalarBars(cairo_t* cairo, ImageSize picture, std::span<const ShownFunc
 
 // --------------------------------------------------------------------------------------- title, label
 
-/// From `at`, the left end of its baseline; on a rim of the other ink, since it lies over the data.
+/// Draws text from `at`, the left end of its baseline; on a rim of the other ink, since it lies over the
+/// data.
 void drawOverData(cairo_t* cairo, const glm::dvec2& at, const std::string& text, double font,
                   const glm::dvec3& ink) {
   cairo_move_to(cairo, at.x, at.y);

@@ -101,7 +101,7 @@ inline void setInk(cairo_t* cairo, const glm::dvec3& rgb, double alpha = 1) {
   cairo_set_source_rgba(cairo, rgb.x, rgb.y, rgb.z, alpha);
 }
 
-/// In pixels, for a picture of this size.
+/// The font's size in pixels, for a picture of this size.
 inline double fontSize(ImageSize size) {
   return std::clamp(size.height / 42.0, 9.0, 96.0);
 }

@@ -134,7 +134,7 @@ class PixelSums {
 };
 
 constexpr double kPreferIso = 1.3, kPreferEarlier = 1.03;
-// From the other side, a silhouette is as large.
+// The views that are compared. A silhouette is as large from the other side.
 constexpr std::string_view kViews[] = {"iso", "+x", "+y", "+z"};
 
 }  // namespace
@@ -281,7 +281,7 @@ double rareSeen(const FewSamples& few, const Camera& camera) {
   return sum * width * width;
 }
 
-/// From `from`, at the data's middle, z up.
+/// A camera that looks from `from` at the data's middle, z up.
 Camera obliqueCamera(const glm::dvec3& from, const glm::dvec3& lower, const glm::dvec3& upper) {
   Camera camera;
   camera.focal_point = 0.5 * (lower + upper);
@@ -291,7 +291,7 @@ Camera obliqueCamera(const glm::dvec3& from, const glm::dvec3& lower, const glm:
   return camera;
 }
 
-/// Where a camera stands, in the view space of `seen`, that shows the points in perspective as large as it can.
+/// Finds a camera, in the view space of `seen`, that shows the points in perspective as large as it can.
 class PerspectiveFit {
  public:
   /// `margin`: of the picture's size.

@@ -27,7 +27,7 @@ struct PixelValues {
   ImageSize size;
   std::vector<float> depth;   // from the eye; orthographic: along the view, from the camera's position
   std::vector<float> scalar;  // NaN on surfaces without one
-  // Towards the viewer, in coordinates after --scale; length 1, or 0 if unknown.
+  // The normal towards the viewer, in coordinates after --scale; length 1, or 0 if unknown.
   std::vector<glm::vec3> normal;
 };
 

@@ -6,7 +6,8 @@
 #include "render/cpu/tile.h"
 #include "render/project/footprint.h"
 
-// Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
+// The code from here to HWY_AFTER_NAMESPACE is compiled once for every instruction set that a processor may
+// have.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/cpu/half_depths.cpp"
 #include <hwy/foreach_target.h>  // before highway.h
@@ -21,7 +22,7 @@ using Doubles = hn::CappedTag<double, 8>;
 using Whole = hn::RebindToUnsigned<Doubles>;
 using V = hn::Vec<Doubles>;
 
-/// Below x deviations, the biweight's share.
+/// The biweight's share below x deviations.
 HWY_INLINE V shareBelow(V x) {
   const Doubles d;
   constexpr double kPerReach = 0.3779644730092272;  // 1 / √7

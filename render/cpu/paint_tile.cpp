@@ -9,7 +9,8 @@
 #include "render/cpu/tile.h"
 #include "stream/base/threads.h"
 
-// Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
+// The code from here to HWY_AFTER_NAMESPACE is compiled once for every instruction set that a processor may
+// have.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/cpu/paint_tile.cpp"
 #include <hwy/foreach_target.h>  // before highway.h

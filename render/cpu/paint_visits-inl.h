@@ -93,8 +93,8 @@ HWY_INLINE V cellDepth(const TileWork& work, V amplitude, V l11, V l21, V l22) {
   return hn::Mul(amplitude, hn::Div(passed, hn::Sqrt(hn::Max(determinant, least))));
 }
 
-/// By how much the scalar that is seen of splats may differ from their mean, since their nearer sides hide the others:
-/// at the most.
+/// The most by which the scalar that is seen of splats may differ from their mean, since their nearer sides
+/// hide the others.
 HWY_INLINE V hidesItself(const TileWork& work, V cell_depth, V along) {
   const Floats d;
   const V tau = hn::Mul(cell_depth, hn::Set(d, work.table.mostExtinction()));

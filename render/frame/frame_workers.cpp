@@ -185,7 +185,7 @@ void FrameWorkers::sharedLoop(Worker& worker) {
   }
 }
 
-/// For the ranks that need it, this one or others.
+/// Prepares a part for the ranks that need it, this one or others.
 bool FrameWorkers::prepareShared(Worker& worker, size_t index) {
   SplatExchange& exchange = *work_->exchange;
   const uint32_t number = exchange.toPrepare()[index];

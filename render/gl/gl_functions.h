@@ -221,7 +221,7 @@ class GlTimers {
   /// Waits until all is done that was measured.
   void finish();
   void reset();
-  /// Since reset(), of what is done.
+  /// The seconds of what is done, since reset().
   double seconds(size_t kind) const { return seconds_[kind]; }
 
  private:

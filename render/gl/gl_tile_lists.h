@@ -21,9 +21,9 @@ class CardBuffer {
   explicit CardBuffer(const GlFunctions& gl) : gl_(gl), object_(makeBuffer(gl)) {}
 
   void reserve(uint64_t bytes);
-  /// For shaders, at the binding.
+  /// Binds the buffer for shaders, at the binding.
   void bind(GLuint binding) const { gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, object_.name()); }
-  /// For glBufferSubData and the like, at GL_SHADER_STORAGE_BUFFER.
+  /// Binds the buffer for glBufferSubData and the like, at GL_SHADER_STORAGE_BUFFER.
   void bind() const { gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, object_.name()); }
   /// Sets it all to 0.
   void clear() const;

@@ -254,7 +254,7 @@ void GlTilePainter::State::upload() {
   gl.check("sending splats");
 }
 
-/// In halves, if there are more entries than there is space for.
+/// Paints a box, in halves if there are more entries than there is space for.
 void GlTilePainter::State::paintBox(const ListedSplats& listed, const CardTiles& tiles, const TileBox& box) {
   const uint64_t entries = lists.count(listed, tiles, box);
   if (entries == 0) return;

@@ -24,7 +24,7 @@ class GlTilePainter final : public Painter {
   /// lists, 24 bytes each, there.
   struct Capacity {
     size_t splats, entries;
-    /// For a card, or for OpenGL in software, which the processor's memory holds.
+    /// The capacity for a card, or for OpenGL in software, which the processor's memory holds.
     static Capacity of(bool software) {
       return software ? Capacity{65536, 1 << 19} : Capacity{1 << 18, 1 << 22};
     }

@@ -23,7 +23,7 @@
 
 namespace curvisplat {
 
-/// In data coordinates, before ScreenView::scale.
+/// A box in data coordinates, before ScreenView::scale.
 struct WorldBox {
   glm::dvec3 lower{0.0}, upper{0.0};
 };

@@ -56,7 +56,7 @@ struct ScreenCut {
   static ScreenCut of(const ScreenSplat& record);
 };
 
-/// Where a splat lies along the ray, for those that may meet the layers of their pixels (pixel_layers.h).
+/// The place of a splat along the ray, for those that may meet the layers of their pixels (pixel_layers.h).
 /// The middle's depth at u is middle + by[0] u0 + by[1] u1; a layer at the depth z is (z - that) per_depth
 /// deviations behind it. A window between two layers is one more interval that the splat is cut to, together
 /// with those of its faces. A splat without this record lies in front of all layers.

@@ -197,7 +197,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
 size_t partsAtBorder(const SplatPiece& whole, const InwardAxes& inward, uint32_t layers,
                      const BorderStyle& style, BorderPieces& pieces);
 
-/// Where a piece lies on the screen, and the map that is linear there.
+/// The place of a piece on the screen, and the map that is linear there.
 struct PlacedPiece {
   float x, y, depth, volume;
   ScreenRows rows;

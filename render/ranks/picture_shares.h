@@ -50,8 +50,8 @@ struct RankWork {
 
 struct SharedWork {
   std::vector<RankWork> ranks;
-  /// Until the last rank is done, if all wait after each round until all have prepared theirs, and paint
-  /// what they have got while they wait, or afterwards.
+  /// The time until the last rank is done, if all wait after each round until all have prepared theirs, and
+  /// paint what they have got while they wait, or afterwards.
   double longest = 0;
 };
 

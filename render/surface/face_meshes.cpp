@@ -70,7 +70,7 @@ class Stitches {
   Stitches(const FacesReader& faces, const ChosenPatches& chosen, std::vector<PatchNodes>& nodes)
       : faces_(faces), chosen_(chosen), nodes_(nodes) {}
 
-  /// From the coarsest on, so that what a patch follows is in its place.
+  /// Joins patches from the coarsest on, so that what a patch follows is in its place.
   void join() {
     std::vector<size_t> order(chosen_.size());
     for (size_t n = 0; n < order.size(); ++n) order[n] = n;

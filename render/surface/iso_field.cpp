@@ -6,7 +6,8 @@
 
 #include "render/project/footprint.h"
 
-// Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
+// The code from here to HWY_AFTER_NAMESPACE is compiled once for every instruction set that a processor may
+// have.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/surface/iso_field.cpp"
 #include <hwy/foreach_target.h>  // before highway.h

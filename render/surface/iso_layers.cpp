@@ -295,7 +295,7 @@ class IsoLayers::Tracer {
     return pixels_[static_cast<size_t>(pixel.y * kTileSide + pixel.x)];
   }
   double side(double depth) const { return (perspective_ ? depth : 1) / view_.focal_px; }
-  /// In view axes, at the depth 1.
+  /// The ray in view axes, at the depth 1.
   glm::vec3 rayOf(float x, float y) const {
     return {(double{x} - 0.5 * view_.size.width) / view_.focal_px,
             (double{y} - 0.5 * view_.size.height) / view_.focal_px, 1};

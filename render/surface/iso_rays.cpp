@@ -10,7 +10,8 @@ namespace {
 
 constexpr size_t kMaxSteps = 4096;   // of a packet
 constexpr float kMinWeight = 0.02f;  // below it there is no field
-// Inside the data the weights add up to about 1, less what the neighbours have that do not hold the value.
+// The least weight inside the data, where weights add up to about 1, less what the neighbours have that do
+// not hold the value.
 constexpr float kMinInside = 0.15f;
 constexpr float kHidden = 1.0f / 4096, kClear = 1.0f / 1024;
 constexpr int kRefinements = 4;
@@ -123,7 +124,7 @@ void IsoRays::fieldAt(Place& place) const {
   sumField(active_, place.z, place.field);
 }
 
-/// Between begin and end, where the field is on either side of the value. `rays`: bits.
+/// Refines a crossing between begin and end, where the field is on either side of the value. `rays`: bits.
 void IsoRays::refine(float value, const Place& begin, const Place& end, unsigned rays, Row& z) const {
   Row low = begin.z, high = end.z, below{}, above{};
   for (size_t ray = 0; ray < kRays; ++ray) {
@@ -256,7 +257,8 @@ void IsoRays::findCrossings(const IsoPacket& packet, const Place& begin, const P
   }
 }
 
-/// Where the field comes near a value and turns back, it may have crossed it twice: by the parabola through three places.
+/// Finds turns by the parabola through three places: where the field comes near a value and turns back, it
+/// may have crossed it twice.
 void IsoRays::findTurns(const IsoPacket& packet, const Place& first, const Place& second,
                         const Place& third) {
   for (size_t value = 0; value < settings_.values.size(); ++value) {

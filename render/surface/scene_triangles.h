@@ -85,7 +85,7 @@ class SceneTriangles {
 /// Pixels: the tiles in which samples are drawn.
 inline constexpr int kSampleTileWidth = 128, kSampleTileHeight = 32;
 inline constexpr size_t kSamples = 8;
-/// From the pixel's centre, in 1/16 pixel.
+/// The samples' offsets from the pixel's centre, in 1/16 pixel.
 inline constexpr std::array<std::array<int, 2>, kSamples> kSampleOffsets{
     {{1, -3}, {-1, 3}, {5, 1}, {-3, -5}, {-5, 5}, {-7, -1}, {3, 7}, {7, -7}}};
 /// The offsets in floats, for vectors.

@@ -17,7 +17,8 @@ constexpr double kOwn = 0.9;
 constexpr double kMax = 1e5;           // pixels, or ranges of the scalar a pixel
 constexpr double kMaxRatio = 1000;     // of V to √det S: beyond it a splat is degenerate
 constexpr double kSeenAtLeast = 1e-6;  // of the plane's normal along a ray
-// Inside the data the weights add up to 1, to within a tenth; at an end without a face to half of that.
+// Sums of weights: inside the data they add up to 1, to within a tenth; at an end without a face to half of
+// that.
 constexpr double kOutside = 0.25, kInside = 0.5;
 
 void addTo(int64_t& sum, double value) {

@@ -1,6 +1,7 @@
 #include "render/surface/rasterizer.h"
 
-// Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
+// The code from here to HWY_AFTER_NAMESPACE is compiled once for every instruction set that a processor may
+// have.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/surface/small_triangles.cpp"
 #include <hwy/foreach_target.h>  // before highway.h

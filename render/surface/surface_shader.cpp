@@ -14,7 +14,7 @@ SurfaceLight::SurfaceLight(const std::optional<Light>& light, const ScreenView& 
   if (light_.towards) towards_ = glm::vec3(glm::normalize(*light_.towards));
 }
 
-/// Without a branch, so that compilers make vectors of a loop of it.
+/// Lights a colour without a branch, so that compilers make vectors of a loop of it.
 template <bool kAtViewer>
 inline glm::vec3 SurfaceLight::litBy(const glm::vec3& colour, const glm::vec3& normal,
                                      const glm::vec3& towards_viewer) const {

@@ -91,8 +91,8 @@ class PaintLoop {
 /// there were. Tiles can be closed: they take no more, and splats that touch no other tiles are left out.
 class SplatBins {
  public:
-  /// For batches of at most `splats` splats and their records, or up to three more where the last is a splat
-  /// with its records, which touch `entries` tiles in all.
+  /// Takes batches of at most `splats` splats and their records, or up to three more where the last is a
+  /// splat with its records, which touch `entries` tiles in all.
   SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pieces);
   static uint64_t bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces);
 

@@ -14,7 +14,7 @@
 
 namespace curvisplat {
 
-/// Along a painter's tile, and in it; row by row.
+/// Order tiles along a painter's tile, and in it; row by row.
 inline constexpr int kOrderTilesAlong = kTileSide / kOrderSide;
 inline constexpr size_t kOrderTiles = size_t{kOrderTilesAlong} * kOrderTilesAlong;
 /// Bit n: order tile n of a tile.

@@ -46,7 +46,7 @@ class TileQueues {
   static constexpr uint64_t kAllOpen = ~uint64_t{0};
   static_assert(kOrderTiles <= 64);
 
-  /// At most `splats` wait in all tiles together, records counted; `threads` paint.
+  /// Holds at most `splats` that wait in all tiles together, records counted; `threads` paint.
   TileQueues(ImageSize size, size_t splats, unsigned threads);
   static uint64_t bytes(ImageSize size, size_t splats, unsigned threads);
 

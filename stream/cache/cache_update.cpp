@@ -20,7 +20,7 @@
 namespace curvisplat {
 namespace {
 
-/// Where the new manifest is written, and where the old one lies until the folder is synced.
+/// The path of the new manifest until it is complete, and of the old one until the folder is synced.
 std::filesystem::path partOf(const std::filesystem::path& manifest) {
   std::filesystem::path part = manifest;
   part += ".part";

@@ -64,7 +64,7 @@ class CacheWriter {
   /// follow.
   void closeStreams();
 
-  /// In place of append(), for bricks whose streams other processes write: sets the offsets of all of them,
+  /// Sets the offsets of bricks whose streams other processes write, in place of append(), for all of them,
   /// which must come in the same order. Nothing may have been appended. The streams have to be in the files
   /// before finish().
   void reserve(std::vector<AppendedBrick>& bricks);

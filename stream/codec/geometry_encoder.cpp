@@ -135,7 +135,7 @@ class GeometryEncoder {
                });
   }
 
-  /// Where the codes of logarithms start, and what they decode to.
+  /// The start of the codes of logarithms, and what they decode to.
   struct DecodedLogs {
     double& base;
     LogTable& table;

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-// Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
+// The code from here to HWY_AFTER_NAMESPACE is compiled once for every instruction set that a processor may
+// have.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "stream/codec/log_codes.cpp"
 #include <hwy/foreach_target.h>  // before the others

@@ -46,7 +46,7 @@ inline const char* wordOf(ValuePrecision precision) {
   return kWords[static_cast<size_t>(precision)];
 }
 
-/// Where the values of a scalar lie and how far they spread, by volume: half of it is below `centre`, and from 5
+/// The centre and the spread of a scalar's values, by volume: half of it is below `centre`, and from 5
 /// to 95 % they differ by `scale`. A value's own scale is that, plus its distance from the centre.
 struct ValueSpread {
   double centre = 0, scale = 0;  // scale 0: not known, or there is one value

@@ -1,8 +1,8 @@
-// Where a cell ends at a border, or at a face that it is behind, in a code of 32 bits; and how the renderer
-// draws such a cell: in parts, cut, or as a pair. A node at the end of its block, or beside a blank one,
-// owns half a cell along one axis, two or three; its splat remembers in which directions the data goes on.
-// So does the splat of a cell of cell-centred data, though that cell is whole. All functions are pure: any
-// thread may call them.
+// The border code: where a cell ends at a border, or at a face that it is behind, in 32 bits; and how the
+// renderer draws such a cell: in parts, cut, or as a pair. A node at the end of its block, or beside a blank
+// one, owns half a cell along one axis, two or three; its splat remembers in which directions the data goes
+// on. So does the splat of a cell of cell-centred data, though that cell is whole. All functions are pure:
+// any thread may call them.
 #pragma once
 
 #include <glm/vec3.hpp>

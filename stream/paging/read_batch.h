@@ -19,7 +19,7 @@
 namespace curvisplat {
 
 inline constexpr size_t kBrickStreams = 3;  // geometry, then the values of one variable or two
-/// Where one brick's streams lie, each in a file of its own. One of length 0 is not read.
+/// The extents of one brick's streams, each in a file of its own. One of length 0 is not read.
 using BrickExtents = std::array<Extent, kBrickStreams>;
 
 /// Reading a gap of this many bytes takes less time than one more request.

@@ -73,7 +73,7 @@ void writeCgns(const fs::path& path) {
                   {{"Density", [](int64_t i, int64_t j, int64_t) { return static_cast<double>(i + j); }}});
 }
 
-/// Where the headers of HDF5's objects, groups and heaps begin.
+/// The offsets at which the headers of HDF5's objects, groups and heaps begin.
 std::vector<size_t> structures(const std::string& bytes) {
   std::vector<size_t> found;
   for (const char* mark : {"OHDR", "OCHK", "TREE", "SNOD", "HEAP", "FRHP", "FHDB", "BTHD", "BTLF"})

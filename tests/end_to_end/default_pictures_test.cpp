@@ -240,8 +240,8 @@ TEST_F(DefaultDetail, HoldsFiftyDecibelsAgainstTheFinestLevel) {
   }
 }
 
-/// Where only the geometry counts, as in lit pictures, the error on the screen alone decides. Along an axis of the lattice its
-/// ripples would show.
+/// The error on the screen alone decides where only the geometry counts, as in lit pictures. Along an axis of
+/// the lattice its ripples would show.
 TEST_F(DefaultDetail, DrawsFewerSplatsWhereTheFunctionHidesTheirDetail) {
   const auto splatsOf = [](const Words& options, const Words& more) {
     return draw("half-annulus", "drawn", options, more);

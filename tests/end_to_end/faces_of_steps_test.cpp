@@ -54,7 +54,7 @@ ConvertOptions optionsFor(const std::filesystem::path& output, std::vector<uint3
   return options;
 }
 
-/// Where the faces are in sight, without the volume.
+/// A view in which the faces are in sight, without the volume.
 const Words kView = {"--size",         "160x120", "--position",       "40,-50,60", "--focal-point", "15,6,6",
                      "--view-up",      "0,0,1",   "--parallel-scale", "16",        "--range",       "-1,1",
                      "--opacity-unit", "5",       "--volume",         "off"};

@@ -334,7 +334,8 @@ TEST_F(Corrections, SpreadOfMergedShapes) {
               with, without);
 }
 
-/// Along the rows of a uniform medium in cells 0.02 apart, in voxels of 0.06: two or three cells each.
+/// Expects this worth of even blur along the rows of a uniform medium in cells 0.02 apart, in voxels of 0.06:
+/// two or three cells each.
 void expectEvenMergedSplatsWorth(const std::string& what, double parallel_scale, double least_db) {
   const FunctionGridSource source({gridBlock(51, 51, 51)}, 1, [](const GridNode& n) {
     const glm::dvec3 at(static_cast<double>(n.i), static_cast<double>(n.j), static_cast<double>(n.k));

@@ -29,7 +29,7 @@ namespace {
 
 class FidelityProperties : public testing::Test {
  protected:
-  /// Through a cache, as the program does it.
+  /// Draws through a cache, as the program does it.
   Image draw(const GridSource& source, const Camera& camera, const std::string& function, ImageSize size,
              double low_pass_px2 = kLowPass) {
     const std::filesystem::path cache = folder_ / "grid.splats";
@@ -123,7 +123,7 @@ TEST_F(FidelityProperties, BlocksThatAbutLookLikeOne) {
   }
 }
 
-/// From four pixels a node to a node a pixel, with tools/test.sh --whole two.
+/// Sampling goes from four pixels a node to a node a pixel, with tools/test.sh --whole two.
 TEST_F(FidelityProperties, OpacityDoesNotDependOnSampling) {
   constexpr ImageSize kSize{64, 64};
   // f = 0.5 has no blue, so that the blue over white is the transmittance.

@@ -27,7 +27,7 @@ namespace {
 
 constexpr ImageSize kSize{256, 256};
 const glm::vec3 kGrey{0.6f, 0.7f, 0.8f};
-// Across the half-annulus, obliquely.
+// A plane across the half-annulus, obliquely.
 const ClipPlane kPlane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
 const glm::dvec3 kCentre{-0.6, 0.1, 0.55};
 constexpr double kRadius = 0.35;
@@ -293,7 +293,7 @@ TEST_F(Surfaces, TranslucentSlicesLieInTheVolume) {
 }
 
 constexpr ImageSize kSheetSize{160, 160};
-// Across the half-annulus, obliquely; one behind the other.
+// Sheets across the half-annulus, obliquely; one behind the other.
 const glm::dvec3 kNormal{0.6, 0.5, -0.7};
 const glm::dvec3 kPoints[] = {{-0.4, 0, 0.5}, {-0.55, -0.1, 0.7}, {-0.3, 0.1, 0.3}};
 

@@ -278,7 +278,7 @@ TEST_F(CellFidelity, IsNearThatOfNodes) {
   }
 }
 
-// Across the half-annulus, obliquely.
+// A plane across the half-annulus, obliquely.
 const ClipPlane kPlane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
 
 struct Row {

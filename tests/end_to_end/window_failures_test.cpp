@@ -1,6 +1,6 @@
-// Where the window cannot open, it ends with one line and status 1; where its cache goes bad under it, it
-// lives and says so. Then odd circumstances: it is closed while it loads, has too little memory, or nowhere
-// to remember the view.
+// Failures of the window: if it cannot open, it ends with one line and status 1; if its cache goes bad under
+// it, it lives and says so. Then odd circumstances: it is closed while it loads, has too little memory, or
+// nowhere to remember the view.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

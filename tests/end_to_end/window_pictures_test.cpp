@@ -252,7 +252,7 @@ class WindowSession : public WindowTest {
     fs::remove_all(folder());
     fs::create_directories(folder());
   }
-  /// Beside the program, in the build's folder.
+  /// A folder beside the program, in the build's folder.
   static fs::path folder() {
     return fs::path(CURVISPLAT_PROGRAM).parent_path().parent_path() / "window_session";
   }

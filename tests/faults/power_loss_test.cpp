@@ -46,7 +46,7 @@ struct DiskCall {
 /// Does the calls, but for syncing, and writes them down. Put in place with ScopedSystemCalls; any thread.
 class RecordingSystemCalls : public SystemCalls {
  public:
-  /// In their order, when no more are made.
+  /// The calls in their order, when no more are made.
   const std::vector<DiskCall>& calls() const { return calls_; }
 
   int open(const char* path, int flags, unsigned mode) override;

@@ -1,4 +1,4 @@
-// Where the seeds of fuzzing go, and how their bytes are put together.
+// Writes the seeds of fuzzing, and puts their bytes together.
 #pragma once
 
 #include <filesystem>

@@ -218,7 +218,7 @@ TEST(BlockOverlap, OfOneBlockManyTimesIsFoundInFewPairs) {
   EXPECT_EQ(overlapsIn(source, 2'000).size(), overlaps.size());  // however it is read
 }
 
-// In time that grows as n log n, not as the square: every pair would take minutes.
+// The time grows as n log n, not as the square: every pair would take minutes.
 TEST(BlockOverlap, IsFoundAmongAHundredThousandBlocks) {
   std::vector<TestBox> many;
   for (int n = 0; n < 99'999; ++n)

@@ -121,7 +121,7 @@ class Gate {
   bool is_open_ = false;
 };
 
-/// With as many threads of TBB's, whatever the machine has.
+/// Runs `work` with as many threads of TBB's, whatever the machine has.
 template <typename Work>
 void withThreads(int threads, const Work& work) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism,

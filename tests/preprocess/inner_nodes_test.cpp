@@ -53,7 +53,7 @@ NodeSplats splatsOf(const BlockWindow& window) {
   return splats;
 }
 
-/// Where the splat of a node may be a part, all nodes are computed one by one.
+/// Computes all nodes one by one, as where the splat of a node may be a part.
 NodeSplats oneByOne(BlockWindow window) {
   const std::vector<uint64_t> covered(window.nodes->x.size());
   window.covered = covered.data();

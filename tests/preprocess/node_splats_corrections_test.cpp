@@ -144,7 +144,7 @@ TEST(NodeSplats, OfAnUnevenGridAreStretchedButKeepVolumeAndMiddle) {
   }
 }
 
-// Towards the larger cells, the scalar along with it; half cells stay.
+// Splats drift towards the larger cells, the scalar along with them; half cells stay.
 TEST(NodeSplats, OfAGrowingGridDrift) {
   MappedBlock grid(13, 5, 5, [](double i, double j, double k) { return glm::dvec3(std::pow(1.2, i), j, k); });
   grid.addScalar([](const glm::dvec3& p) { return p.x; });

@@ -112,7 +112,8 @@ struct TestPoint {
 
 using Corners = std::array<glm::dvec3, 8>;
 
-/// With edges `size` long along three directions that no axis is parallel to, corners moved by up to `twist` of it.
+/// A hexahedron with edges `size` long along three directions that no axis is parallel to, corners moved by
+/// up to `twist` of it.
 Corners slanted(const glm::dvec3& lower, const glm::dvec3& size, double twist, std::mt19937& random) {
   std::uniform_real_distribution<double> moved(-twist, twist);
   const glm::dvec3 u = glm::normalize(glm::dvec3(1, 1, 1)), v = glm::normalize(glm::dvec3(1, -2, 1)),

@@ -188,7 +188,7 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
   expectWhole();
 }
 
-/// Where all is one bucket, its bricks are worth nothing until the topmost is there; unless the splats are
+/// Bricks of a grid in one bucket are worth nothing until the topmost is there; unless the splats are
 /// lost, and the new plan knows smaller cells.
 TEST_F(Resume, ContinuesOrDropsTheBricksOfALargeCell) {
   dying_bucket_splats_ = 1'000'000;

@@ -108,7 +108,7 @@ class Marcher {
       marchSearching(begin, end, steps_.step);
   }
 
-  /// From one of `ends` to the next the field is there throughout, or nowhere.
+  /// Marches from one of `ends` to the next, between which the field is there throughout, or nowhere.
   void marchBetween(std::vector<double> ends, double begin, double end) {
     std::erase_if(ends, [&](double t) { return !(t > begin && t < end); });
     ends.push_back(begin);
@@ -167,7 +167,7 @@ class Marcher {
     }
   }
 
-  /// From the point asked about last, which was inside.
+  /// The step from the point asked about last, which was inside.
   double stepFromHere(double largest) const {
     return std::clamp(steps_.cells * probe_->cellLength(ray_.direction), kMinStep * largest, largest);
   }
@@ -227,7 +227,7 @@ class Marcher {
            glm::dvec3(strength * light_->specular * std::pow(shine, 32));
   }
 
-  // Where the field ends between a point inside and one outside, to the last bits.
+  // The place where the field ends between a point inside and one outside, to the last bits.
   double face(double in, double out) {
     for (int n = 0; n < 60; ++n) {
       const double middle = 0.5 * (in + out);

@@ -55,8 +55,8 @@ struct MarchSteps {
   double tolerance = 1e-5;
 };
 
-/// For a field of about unit size and the functions of DESIGN.md, "Fidelity". Where it knows its crossings: so
-/// long that pictures are within 100 dB of the truth (reference_march_test); else MarchSteps().
+/// Steps for a field of about unit size and the functions of DESIGN.md, "Fidelity". Where it knows its
+/// crossings: so long that pictures are within 100 dB of the truth (reference_march_test); else MarchSteps().
 MarchSteps stepsFor(const ReferenceField& field);
 
 /// Light on the field's level surfaces, by the formulas of render/project/light.h, with the field's own
@@ -83,7 +83,7 @@ ReferenceLayers sphereLayer(const glm::dvec3& centre, double radius, const glm::
 /// A slice through the field, in the colours of the function.
 ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& function,
                            const glm::dvec3& point, const glm::dvec3& normal, double opacity = 1);
-/// Where a scalar crosses a value, lit as a sphere is.
+/// A surface where a scalar crosses a value, lit as a sphere is.
 struct ReferenceIsosurface {
   std::function<double(const glm::dvec3& world)> scalar;
   double value = 0;
@@ -108,7 +108,7 @@ struct ReferenceExtras {
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
                               const ReferenceExtras& extras = {});
-/// In steps of `step`, or as stepsFor().
+/// Marches in steps of `step`, or as stepsFor().
 ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
                               ImageSize size, std::optional<double> step = {});
 

@@ -54,7 +54,7 @@ TEST(Camera, NamedViewsHoldTheBoxAndFillTheImage) {
         }
 }
 
-/// From any direction as named views do, and from a named view's direction as that view.
+/// Cameras fit the box from any direction as named views do, and from a named view's direction as that view.
 TEST(Camera, FitsTheBoxFromWhereItLooks) {
   const ImageSize size{300, 200};
   for (const auto projection : {Projection::kOrthographic, Projection::kPerspective}) {

@@ -157,7 +157,7 @@ struct Classes {
     const glm::dvec4 d = glm::abs(a - b);
     return std::max({d.x, d.y, d.z, d.w});
   }
-  /// Between any two elements from `from` to `to`, in cells.
+  /// The largest change between any two elements from `from` to `to`, in cells.
   double spread(double from, double to) const {
     const auto last = static_cast<double>(values.size() - 1);
     glm::dvec4 least(1e300), most(-1e300);

@@ -119,8 +119,8 @@ TEST_F(DepthKeysTest, StayInTheirBricksRangeWhateverTheDepth) {
     }
 }
 
-// In whichever tile that it touches, a splat has the depth at which its plane meets the tile's middle; and it is taken
-// before all of those.
+// A splat has in each tile that it touches the depth at which its plane meets the tile's middle; and it is
+// taken before all of those.
 TEST_F(DepthKeysTest, ASplatThatLeansHasItsPlanesDepthInEveryTile) {
   const RootCube& root = cache_->manifest().root;
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
@@ -174,7 +174,7 @@ TEST_F(DepthKeysTest, ASplatThatLeansHasItsPlanesDepthInEveryTile) {
   }
 }
 
-// Where splats are cut into pieces, their depths are still their own.
+// Splats that are cut into pieces still have depths of their own.
 TEST_F(DepthKeysTest, RangesHoldThePiecesOfWideSplats) {
   Camera camera;
   camera.position = {16.3, 15.8, 16.1};

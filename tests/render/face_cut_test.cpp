@@ -45,7 +45,8 @@ struct Example {
   Ellipse ellipse() const { return ellipseOf(rows, piece.shape, piece.slope, 0, 1, {kLowPass2, 0.01f}); }
 };
 
-// By the shape's matrix and the face's normal in the world, as one would write it down.
+// The expected distance is from the shape's matrix and the face's normal in the world, as one would write it
+// down.
 TEST(FaceCut, IsTheConditionalDistanceFromTheFace) {
   int cut_ones = 0;
   for (uint32_t seed = 0; seed < 300; ++seed) {

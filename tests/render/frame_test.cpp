@@ -17,7 +17,7 @@
 namespace curvisplat {
 namespace {
 
-/// From outside, at the middle of the lattice.
+/// A camera outside, looking at the middle of the lattice.
 Camera cameraFrom(const glm::dvec3& direction, double parallel_scale = 24) {
   Camera camera;
   camera.focal_point = glm::dvec3(0.5 * kLatticeSide);

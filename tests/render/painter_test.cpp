@@ -193,7 +193,7 @@ TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
   }
 }
 
-// With constant extinction, what is seen of a splat of optical depth tau lies L(tau / 2) = coth(tau / 2) - 2 / tau half
+// A splat of optical depth tau with constant extinction is seen L(tau / 2) = coth(tau / 2) - 2 / tau half
 // widths of its depths before its middle: DESIGN.md, "What a splat hides of itself".
 TEST_P(PainterTest, ASplatShowsItsNearerSide) {
   const ClassificationTable grey([](double f) { return TransferFunction::Value{glm::dvec3(f), 1}; }, 0, 1);

@@ -118,7 +118,7 @@ Camera randomCamera(Random& random, Projection projection) {
 constexpr ImageSize kSize{4000, 3000};  // the least low-pass, 0.01 px², is next to nothing then
 constexpr double kMinLowPass = 0.01;
 
-// Where a ray through a pixel meets the splat, its optical depth must be what the screen splat says.
+// The optical depth of a ray through a pixel that meets the splat must be what the screen splat says.
 void checkOpticalDepths(Projection projection, double size, double tolerance) {
   Random random(11);
   for (int n = 0; n < 200; ++n) {

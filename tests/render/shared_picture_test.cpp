@@ -130,7 +130,7 @@ TEST_F(SharedPicture, HasTheBitsUnderALimitAndInLittleMemory) {
   expectSameBits({scene_.get(), camera(*scene_), small});
 }
 
-// In the least memory that is enough, ranks divide their tiles into regions, each another number of them.
+// Ranks divide their tiles into regions in the least memory that is enough, each into another number of them.
 TEST_F(SharedPicture, HasTheBitsWhereRanksDrawRegions) {
   const TemporaryFolder folder;
   convertGrid(SceneGridSource(makeScene("half-annulus"), {96, 48, 48}), folder / "fine.splats");

@@ -109,7 +109,7 @@ TEST(Cut, TakesTheCoarsestBrickWhoseErrorIsAllowed) {
   }
 }
 
-/// By the corners of the box of centres, one after the other.
+/// Whether a brick is out of the image, by the corners of the box of centres, one after the other.
 bool outOfImage(const Brick& brick, const CutView& view) {
   const double radius = brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
   return std::any_of(view.planes.begin(), view.planes.end(), [&](const CutView::Plane& plane) {

@@ -201,7 +201,7 @@ TEST(BorderCode, ItsPartsHaveItsWeight) {
 using Axes = std::array<glm::dvec3, 3>;
 using Growth = std::array<double, 3>;
 
-/// At right angles, of either handedness.
+/// Axes at right angles, of either handedness.
 Axes turnedAxes(std::mt19937& random) {
   std::normal_distribution<double> normal;
   const glm::dmat3 turn = glm::mat3_cast(

@@ -8,8 +8,7 @@ only the declaration beside it, so that its first sentence names its subject: "T
 Noun phrases are sentences here ("Number of splats"), as are verbs without a subject ("Reads a brick"). A first
 sentence ends at a full stop, a colon or a semicolon, and is a fragment if it begins with
 
-  a word of CONTINUES, which goes on with something that was not said
-  a word of OPENS, and no comma follows: "For tests.", but not "For a scene of one block, the second list is empty."
+  a word of FRAGMENTS: a preposition, conjunction, relative or pronoun, which goes on with something that was not said
   a small letter, unless the word is a name: of code (`quoted`, snake_case, camelCase, call(), a::b, one letter, any of the
   declaration's), a label (out:), a file's (manifest.json) or one of PROGRAMS
 
@@ -21,11 +20,10 @@ import sys
 
 from check_parameters import FOLDERS, without_text
 
-CONTINUES = set("Also And As But Else Given It Its Kept Likewise None Nor Not Noted Of Or Same Seen So Such Taken Than That Their "
-                "Them Then They Those Too What Which Whose".split())
-OPENS = set("Across After Against Along Around At Because Before Behind Below Beside Besides Between Beyond By During For From If In "
-            "Inside Into Like On Once Outside Over Past Per Since Through Towards Under Unless Until When Where While With Within "
-            "Without".split())
+FRAGMENTS = set("Across After Against Along Also And Around As At Because Before Behind Below Beside Besides Between Beyond But By During "
+                "Else For From Given If In Inside Into It Its Kept Like Likewise None Nor Not Noted Of On Once Or Outside Over Past Per "
+                "Same Seen Since So Such Taken Than That Their Them Then They Those Through Too Towards Under Unless Until What When "
+                "Where Which While Whose With Within Without".split())
 PROGRAMS = set("clang false ffmpeg gcc glibc libcgns libjpeg llvmpipe nullopt nullptr true xdotool zlib zstd".split())
 
 COMMENT = re.compile(r"\s*///?(?:\s(.*))?$")
@@ -38,11 +36,9 @@ SCOPE = re.compile(r"(?:^|[\s>])(?:class|struct|enum|union|namespace|extern)\b[^
 def is_fragment(sentence, declaration=""):
     """Whether the first sentence of the comment above the line `declaration` is a fragment."""
     word = re.match(r"[A-Za-z]*", sentence)[0]
-    if word in OPENS:
-        return "," not in sentence
     if word[:1].islower():
         return not (NAME.match(sentence) or TABLE.match(sentence) or word in PROGRAMS or re.search(rf"\b{word}\b", declaration))
-    return word in CONTINUES
+    return word in FRAGMENTS
 
 
 def begin_declarations(code):

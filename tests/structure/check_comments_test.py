@@ -10,17 +10,17 @@ class Checks(unittest.TestCase):
         return [(line, sentence) for line, sentence, declaration in check_comments.first_sentences(source)
                 if check_comments.is_fragment(sentence, declaration)]
 
-    def test_continuing_words(self):
+    def test_words_that_go_on(self):
         self.assertEqual(self.fragments("/// Of a face: its rows.\nint rows();\n"), [(1, "Of a face:")])
         self.assertEqual(self.fragments("struct A {\n  // As text(), but in small letters.\n  int word();\n};\n"),
                          [(2, "As text(), but in small letters.")])
         self.assertEqual(self.fragments("/// What the rows need.\nint rows();\n"), [(1, "What the rows need.")])
         self.assertEqual(self.fragments("/// Offsets of rows.\nint rows();\n"), [])
 
-    def test_words_that_may_open_a_sentence(self):
+    def test_prepositions(self):
         self.assertEqual(self.fragments("/// For tests.\nint rows();\n"), [(1, "For tests.")])
-        self.assertEqual(self.fragments("/// For a scene of one block, the list is\n/// empty. In metres.\nint rows();\n"), [])
         self.assertEqual(self.fragments("/// After close(): reads, and waits.\nint rows();\n"), [(1, "After close():")])
+        self.assertEqual(self.fragments("/// Reads. For a scene of one block, too.\nint rows();\n"), [])
 
     def test_small_letters(self):
         self.assertEqual(self.fragments("/// in world units\nint rows();\n"), [(1, "in world units")])

@@ -31,7 +31,7 @@ std::string padded(const std::vector<std::string>& names) {
   return all;
 }
 
-/// At the node that was gone to, a name a column.
+/// Writes names at the node that was gone to, a name a column.
 void writeNames(const char* array, const std::vector<std::string>& names) {
   const cgsize_t dims[2] = {kName, static_cast<cgsize_t>(names.size())};
   check(cg_array_write(array, CGNS_ENUMV(Character), 2, dims, padded(names).data()));

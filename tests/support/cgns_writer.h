@@ -53,7 +53,7 @@ class CgnsWriter {
   /// `iterations`, times are told as whole numbers of those.
   void baseSteps(const std::vector<double>& times, const std::vector<std::vector<std::string>>& zones = {},
                  bool iterations = false);
-  /// For each step the name of a solution and, unless `grids` is empty, of coordinates.
+  /// Writes for each step the name of a solution and, unless `grids` is empty, of coordinates.
   void zoneSteps(const std::vector<std::string>& solutions, const std::vector<std::string>& grids = {});
   /// A further table of solutions for each step, such as IOSS' CellCenterSolutionPointers; after zoneSteps().
   void pointers(const std::string& name, const std::vector<std::string>& solutions);

@@ -14,8 +14,8 @@ namespace curvisplat {
 /// The checksum of HDF5's structures of version 2: Bob Jenkins' lookup3, of the bytes before it.
 uint32_t hdf5Checksum(std::string_view bytes);
 
-/// Where the structure that begins there in `whole` has its checksum at its end, puts that of the same place in
-/// `changed` right, and returns true.
+/// Renews a checksum: if the structure that begins there in `whole` has its checksum at its end, puts that of
+/// the same place in `changed` right, and returns true.
 bool renewChecksum(std::string_view whole, size_t begin, std::string& changed);
 
 /// Contents that stand where a short fixed text should.

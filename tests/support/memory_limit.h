@@ -43,8 +43,8 @@ inline uint64_t mappedBytes() {
   return pages * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-/// Until its end, this process may not take more than `more_bytes` of address space beside what it has. Not for programs
-/// with a sanitizer, which takes much more for itself.
+/// A limit of memory: until its end, this process may not take more than `more_bytes` of address space beside
+/// what it has. Not for programs with a sanitizer, which takes much more for itself.
 class MemoryLimit {
  public:
   explicit MemoryLimit(uint64_t more_bytes) {

@@ -18,7 +18,7 @@ namespace curvisplat {
 
 /// Converts without showing progress.
 ConvertReport converted(const DataSource& source, const ConvertOptions& options);
-/// By several ranks, which are threads; the report of the first.
+/// Converts by several ranks, which are threads; the report of the first.
 ConvertReport convertedByRanks(unsigned ranks, const DataSource& source, const ConvertOptions& options);
 
 /// Adds without showing progress.

@@ -107,8 +107,8 @@ Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, c
   return forecast;
 }
 
-/// Where the sample was the whole grid, this process has taken as much memory as the conversion will. The
-/// plan of memory knows only what grows with the grid, and what is bounded by --memory.
+/// Uses this process's peak of memory if the sample was the whole grid: it has taken as much as the
+/// conversion will. The plan of memory knows only what grows with the grid, and what is bounded by --memory.
 void useOwnPeak(Forecast& forecast, const GridDescription& whole, const GridDescription& sample) {
   if (nodesOf(whole) == nodesOf(sample)) forecast.memory_bytes = ProcessUsage::now().peak_memory_bytes;
 }

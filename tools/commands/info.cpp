@@ -141,7 +141,8 @@ struct PictureError {
   double lower = 0, upper = 0, largest = 0, typical = 0;
 };
 
-/// At a splat's standard deviation from its centre, where most of what is seen of it is. nullopt for a constant.
+/// The error of a picture at a splat's standard deviation from its centre, where most of what is seen of it
+/// is. nullopt for a constant.
 std::optional<PictureError> pictureErrorOf(const CacheReader& reader, size_t variable,
                                            const StreamErrors& errors) {
   if (isNearlyConstant(reader.manifest().variables[variable])) return std::nullopt;

@@ -21,7 +21,7 @@ using std::chrono::milliseconds;
 
 // A file that has not changed for this long has been written.
 constexpr milliseconds kSettled{2000};
-// If no change is reported for so long, look whether one was missed.
+// The time without a report of changes after which files are looked at, in case one was missed.
 constexpr milliseconds kLongestWait{30'000};
 constexpr size_t kWatchedAhead = 64;  // steps
 

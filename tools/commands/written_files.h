@@ -43,7 +43,8 @@ class WrittenFiles {
     uintmax_t bytes;
     std::chrono::steady_clock::time_point since;
   };
-  /// Until no file of the step has changed for a while, as far as it was watched; 0 or less where that is so.
+  /// The time until no file of the step has changed for a while, as far as it was watched; 0 or less where
+  /// that is so.
   std::chrono::milliseconds untilSettled(const StepFiles& step);
 
   const OpenGridOptions& options_;

@@ -39,7 +39,7 @@ void requireSameSamples(const CacheReader& reader, const GridDescription& descri
     throw Error("{}: {}", grid.grid.string(), kOtherGrid);
 }
 
-/// By name, of the cache's centring.
+/// The grid's scalars like those of the cache, by name, of the cache's centring.
 std::vector<uint32_t> scalarsLike(const CacheReader& reader, const GridDescription& description,
                                   const OpenGridOptions& grid) {
   const Centring centring = reader.manifest().cells ? Centring::kCell : Centring::kNode;

@@ -24,7 +24,7 @@ std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std
 void setSource(const CacheReader& reader, const std::vector<std::filesystem::path>& files,
                OpenGridOptions& grid);
 
-/// Where exact values come from, beside a cache.
+/// The source of exact values, beside a cache.
 struct PointSource {
   OpenGridOptions grid;  // with its files
   GasModel gas;

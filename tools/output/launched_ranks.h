@@ -39,8 +39,9 @@ class StopRanksWith {
   Ranks& ranks_;
 };
 
-/// Where several ranks were started, and a command has failed with `status`: prints the line, unless another rank
-/// does, and ends all ranks. Returns if there is one rank, or none was started; then the caller prints.
+/// Prints the line of a command that has failed with `status` where several ranks were started, unless
+/// another rank does, and ends all ranks. Returns if there is one rank, or none was started; then the caller
+/// prints.
 void endRanksAfter(const std::string& line, int status);
 
 /// Ends the ranks in good order, if some were started.

@@ -15,7 +15,7 @@ namespace curvisplat {
 /// Whether the name ends in .html, in letters of any case.
 bool isPageName(const std::filesystem::path& path);
 
-/// Unless finish() was called, the destructor removes the unfinished page.
+/// A page that is being written. The destructor removes it unless finish() was called.
 class PicturePage {
  public:
   /// Follows a link at `path`. Throws Error if it cannot be written.

@@ -18,7 +18,7 @@
 
 namespace curvisplat {
 
-/// Where a point of the data is in the window, in Dear ImGui units; nullopt if it is behind the viewer.
+/// The place of a point of the data in the window, in Dear ImGui units; nullopt if it is behind the viewer.
 using PlaceInWindow = std::function<std::optional<glm::dvec2>(const glm::dvec3&)>;
 
 /// Clip planes and slices in the picture: a frame in the data with a handle in its middle, which is dragged

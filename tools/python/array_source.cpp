@@ -249,7 +249,7 @@ class CallableSource : public GridSource {
 
   const GridDescription& description() const override { return description_; }
 
-  /// In pieces, since Python's arrays take as much memory as `out`.
+  /// Reads in pieces, since Python's arrays take as much memory as `out`.
   void read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
     const uint64_t ni = description_.blocks[number].ni, end = box.endOfRow(ni);

@@ -65,8 +65,8 @@ struct HistogramArguments {
   size_t bins = 0;
 };
 
-/// While one thread uses the cache, another one gets a UsageError, as does a process that was forked, which
-/// lacks the threads.
+/// An open cache. While one thread uses it, another one gets a UsageError, as does a process that was forked,
+/// which lacks the threads.
 class OpenCache {
  public:
   explicit OpenCache(CacheReader reader);

@@ -34,7 +34,7 @@ struct ViewerLimits {
   Backend backend = Backend::kAutomatic;
 };
 
-/// Where a server listens, and what it allows.
+/// The address at which a server listens, and what it allows.
 struct ServerOptions {
   std::string address = "127.0.0.1";
   uint16_t port = 8642;  // 0: one that is free

@@ -222,7 +222,7 @@ void FrameLoop::loop() {
   }
 }
 
-/// Where a brick is damaged, coarser ones are drawn from then on. Not from the beginning: then nothing is
+/// Draws coarser bricks in place of damaged ones, once one was found. Not from the beginning: then nothing is
 /// left out because it is hidden (FrameWorkers::prepare()).
 void FrameLoop::serveDamaged(Drawing& drawing, FrameRequest& request, const std::function<void()>& serve) {
   request.options.keep_going |= drawing.keeps_going;

@@ -224,7 +224,7 @@ std::string text(const SheetOpacity& opacity) {
   return opacity.factor == 1 ? "function" : "function*" + number(opacity.factor);
 }
 
-/// Once for each surface, where any is not opaque.
+/// Adds an option for each surface, if any is not opaque.
 void addSurfaceOpacities(const ViewState& state, Words& words) {
   std::vector<SheetOpacity> opacities;
   for (const SurfaceFile& surface : state.surfaces) opacities.push_back({surface.opacity});

@@ -95,7 +95,7 @@ struct ViewState {
   bool hasSheets() const {
     return !(surfaces.empty() && faces.empty() && slices.empty() && isovalues.empty());
   }
-  /// Without anything else the volume is drawn, whatever `volume` says.
+  /// Whether the volume is drawn: always if there is nothing else, whatever `volume` says.
   bool drawsVolume() const { return volume || !hasSheets(); }
   /// The opacity of faces as they are drawn: without a scalar there is no function.
   SheetOpacity opacityOf(const NamedFaces& named) const;

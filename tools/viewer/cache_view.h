@@ -65,7 +65,8 @@ class CacheView {
   /// Applies a command that is not the window's own.
   void run(Command command);
   void choose(const MenuChoice& choice);
-  /// Where the function is chosen from the data, with the function, as soon as that is found.
+  /// Shows another scalar. If the function is chosen from the data, it changes with the function, as soon as
+  /// that is found.
   void chooseScalar(const std::string& name);
   void showScalar(const std::string& name);
   /// An empty name: the opacities are of the same scalar.
@@ -80,8 +81,8 @@ class CacheView {
   /// Saves the state for the next time; that of a preview only if the user has changed it.
   void remember() const;
 
-  /// For another view of the same grid, without what is of scalars that its cache lacks. nullptr if this is a preview that the
-  /// user has left as it was.
+  /// The view as it is carried to another one of the same grid, without what is of scalars that its cache
+  /// lacks. nullptr if this is a preview that the user has left as it was.
   std::shared_ptr<const CarriedView> carriedTo(const PreparedView& next) const;
   const std::optional<Preview>& preview() const { return preview_; }
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }

@@ -78,7 +78,7 @@ void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
   list->PopClipRect();
 }
 
-/// Where the mouse rests, the values there are found: first the depth of the picture's pixels, then what the data have
+/// Finds the values where the mouse rests: first the depth of the picture's pixels, then what the data have
 /// at that point. A click makes a marker of it.
 void CacheView::probe(const WindowLayout& layout) {
   const double width = (1 - shown_strip_) * layout.picture.width;

@@ -244,7 +244,7 @@ void FileDialog::take(std::vector<std::string> names) {
   taken_text_ = name_;
 }
 
-/// By a click, as long as nothing was typed since, or because it was typed.
+/// Whether a name was taken by a click, as long as nothing was typed since, or because it was typed.
 bool FileDialog::isTaken(const std::string& name) const {
   if (name_ != taken_text_) return name_ == name;
   return std::find(taken_.begin(), taken_.end(), name) != taken_.end();

@@ -127,8 +127,8 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   applyLook();
 }
 
-/// Where the window system counts the mouse in larger units than pixels, the content's scale is in them
-/// already.
+/// Applies theme and scale. If the window system counts the mouse in larger units than pixels, the content's
+/// scale is in them already.
 void Window::applyLook() {
   constexpr double kTextPixels = 14;  // at scale 1
   const double units = std::max(0.5, content_scale_ / pixelScale() * text_scale_);

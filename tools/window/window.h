@@ -25,7 +25,7 @@ struct GLFWwindow;
 
 namespace curvisplat {
 
-/// In Dear ImGui units, from the upper left corner.
+/// A rectangle in Dear ImGui units, from the upper left corner.
 struct Rectangle {
   double x = 0, y = 0, width = 0, height = 0;
   bool contains(const glm::dvec2& point) const {
@@ -104,7 +104,7 @@ class Window {
   glm::dvec2 mouseInPicture() const { return pixelScale() * (mouse_ - glm::dvec2(picture_.x, picture_.y)); }
   /// Whether a drag is in progress.
   bool isDragging() const { return dragged_button_ >= 0; }
-  /// Where the picture is, in Dear ImGui units.
+  /// Sets where the picture is, in Dear ImGui units.
   void setPicture(const Rectangle& place) { picture_ = place; }
   /// Keeps clicks and drags that begin in this rectangle from the picture under it: call in every frame that
   /// it is there.

@@ -115,8 +115,8 @@ std::optional<size_t> stepOfIoss(const CgnsFile& file, const CgnsNode& solution)
   return step;
 }
 
-/// By the steps of IOSS, the first of `count` or, where there is no count, the first that there is; empty if
-/// a solution has none.
+/// Numbers nodes by the steps of IOSS, the first of `count` or, where there is no count, the first that there
+/// is; empty if a solution has none.
 std::vector<std::vector<CgnsNode>> asIossNumbers(const CgnsFile& file, const std::vector<CgnsNode>& zone,
                                                  size_t count) {
   std::map<size_t, std::vector<CgnsNode>> numbered;

@@ -19,8 +19,8 @@ bool isColumnsGrid(const OpenGridOptions& options);
 /// Points and cells are numbered as the scalars are stored: layer by layer, or column by column.
 class ColumnsSource final : public MeshSource {
  public:
-  /// Where heights differ between columns, spools those of the nodes: the mean of the faces around each. That takes 24
-  /// bytes a face of the map, at most. Throws Error.
+  /// Spools, if heights differ between columns, those of the nodes: the mean of the faces around each. That
+  /// takes 24 bytes a face of the map, at most. Throws Error.
   explicit ColumnsSource(const OpenGridOptions& options);
 
   const GridDescription& description() const override { return description_; }

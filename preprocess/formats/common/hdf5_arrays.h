@@ -44,7 +44,7 @@ class Hdf5Sets {
   std::list<Open> open_;
 };
 
-/// Where a part of an array begins, its step and its count along each dimension.
+/// The start of a part of an array, its step and its count along each dimension.
 struct Hdf5Part {
   std::vector<uint64_t> start, stride, count;
 };

@@ -100,7 +100,7 @@ void GeometryReader::readCoordinates(EnsightPart& part) {
   part.coordinates = file_.floats(3 * part.points);
 }
 
-/// Where each of some lists begins, from their lengths.
+/// The starts of some lists, from their lengths.
 SpooledNumbers GeometryReader::beginsOf(const EnsightList& lengths) {
   NumberSpool<uint64_t> begins(scratch_.spools.begins);
   file_.finish();
@@ -261,7 +261,7 @@ class ValuesReader {
 
  private:
   void readPart(size_t number);
-  /// Where the values under a keyword belong, and how many they are.
+  /// The place of the values under a keyword, and how many they are.
   std::pair<size_t, uint64_t> placeOf(const EnsightPart& part, const std::string& keyword) const;
 
   const EnsightVariable& variable_;

@@ -30,7 +30,7 @@ class CfNodes {
   /// Values of one variable, NaN where it is missing, to the beginning of `to`.
   void readScalar(const CfRange& range, size_t scalar, std::span<float> to) const;
 
-  /// On the unit sphere (or the map), of the nodes of a range with a single level.
+  /// The positions on the unit sphere (or the map) of the nodes of a range with a single level.
   std::vector<glm::dvec3> points(const CfRange& range) const;
 
  private:

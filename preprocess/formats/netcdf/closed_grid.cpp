@@ -19,7 +19,8 @@ constexpr uint64_t kMaxHalo = 4;
 constexpr uint64_t kRowsLookedAt = 9;
 // Shares of a row's nodes that must fit, since land may have no coordinates.
 constexpr double kMinMatching = 0.9;
-// Where parts of rows are put together from several places, this many nodes are read at a time, which bounds the buffers.
+// Nodes that are read at a time where parts of rows are put together from several places, which bounds the
+// buffers.
 constexpr uint64_t kNodesAtATime = 1 << 16;
 
 /// A row of points, of which a part is in memory.
@@ -242,7 +243,7 @@ void ClosedGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32
   blankHalfRow(box, out);
 }
 
-/// Where the nodes [i0, i1) of a row lie in the source's row, or in the one that is mirrored.
+/// The places of the nodes [i0, i1) of a row in the source's row, or in the one that is mirrored.
 std::vector<ClosedGrid::Columns> ClosedGrid::columnsOf(uint64_t i0, uint64_t i1, bool mirrored) const {
   const uint64_t distinct = description_.blocks[0].ni - 1;
   std::vector<Columns> parts;

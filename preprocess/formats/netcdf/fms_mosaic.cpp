@@ -50,7 +50,7 @@ namespace {
 
 using std::filesystem::path;
 
-/// By its units, else by its name: MOM6's are "degrees".
+/// Whether a variable has a role by its units, else by its name: MOM6's are "degrees".
 bool hasRole(const NetcdfFiles& file, const NetcdfVariable& variable, CfRole role) {
   if (!variable.numeric) return false;
   const CfRole own = cfRole(file, variable);

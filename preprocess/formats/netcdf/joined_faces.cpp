@@ -319,8 +319,8 @@ class JoinedFaces final : public GridSource {
     for (size_t s = 0; s < scalars.size(); ++s) copy(part.scalars[s], out.scalars[s]);
   }
 
-  /// Across, the block goes the way that i or j goes on the face of `a`; along, so that it has the face's
-  /// handedness.
+  /// Reads a joint's block. Across, the block goes the way that i or j goes on the face of `a`; along, so
+  /// that it has the face's handedness.
   void readJoint(const FaceJoint& joint, const NodeBox& box, std::span<const uint32_t> scalars,
                  NodeArrays& out) const {
     const uint64_t length = lengthOf(joint.a), rows = box.j1 - box.j0;

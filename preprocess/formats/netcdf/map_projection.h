@@ -64,7 +64,7 @@ class Globe {
   bool sphere() const { return sphere_; }
   bool degrees() const { return degrees_; }
 
-  /// From degrees east and north, or from kilometres if the grid has lengths.
+  /// A column from degrees east and north, or from kilometres if the grid has lengths.
   GlobeColumn column(double longitude, double latitude) const;
 
   GlobePlace place(const GlobeColumn& column, double height_km) const {

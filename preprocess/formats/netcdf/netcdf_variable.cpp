@@ -109,8 +109,8 @@ double NetcdfPacking::wrapped(double value) const {
   return (value < wraps_at_) == (wraps_by_ > 0) ? value + wraps_by_ : value;
 }
 
-/// By NetCDF's conventions a valid range is in stored units, unless it has the type of scale_factor and
-/// add_offset (the wider of the two) and that is wider than the variable's: then it is in unpacked units.
+/// Adds a valid range. NetCDF's conventions have it in stored units, unless it has the type of scale_factor
+/// and add_offset (the wider of the two) and that is wider than the variable's: then it is in unpacked units.
 /// Such a range is converted to stored units here.
 /// Source: NetCDF User's Guide, appendix A, valid_range.
 void NetcdfPacking::addRange(const NetcdfVariable& variable) {

@@ -37,7 +37,7 @@ std::vector<uint32_t> sampleBlocks(size_t blocks) {
   return sample;
 }
 
-/// At most `most` rows along i, spread over a block.
+/// Rows along i, at most `most`, spread over a block.
 std::vector<NodeBox> sampleRows(const Plot3dBlock& block, uint64_t most) {
   const uint64_t rows = block.nj * block.nk;
   const uint64_t step = std::max<uint64_t>(1, rows / most);
@@ -73,7 +73,7 @@ class NoiseTest {
       before_ = size;
     }
   }
-  /// If they do, one of them.
+  /// An example of the numbers if they look like noise; nullopt if they look like a field.
   std::optional<double> example() const {
     const double limit = kNoiseShare * static_cast<double>(finite_);
     // Among numbers of usual magnitude, tiny ones are rounding errors of zero.
@@ -240,7 +240,7 @@ class Detection {
     return !fit.layout.two_dimensional && sameDimensions(fit.blocks, grid_blocks);
   }
 
-  /// If any fit has the grid's dimensions, drops the others.
+  /// Drops fits without the grid's dimensions, if any has them.
   static void keepMatching(std::vector<Plot3dFit>& fits, const std::vector<Plot3dBlock>& grid_blocks) {
     const auto suits = [&](const Plot3dFit& fit) { return matches(fit, grid_blocks); };
     if (std::any_of(fits.begin(), fits.end(), suits))
