@@ -196,7 +196,7 @@ class ValueLoader {
   void forEach(const BucketFile& file, uint32_t begin, uint32_t end, uint32_t grouped,
                const std::function<void(LoadedValues&)>& use);
 
-  /// How many buckets each number of a file takes, of so many.
+  /// How many of the buckets each number of a file takes.
   static uint32_t grouping(uint32_t buckets, const MemoryPlan& plan) {
     return (buckets + plan.most_buckets - 1) / plan.most_buckets;
   }

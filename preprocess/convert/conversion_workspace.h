@@ -1,5 +1,5 @@
 // The folders that a conversion works in: its own, those that ranks share, the files of an interrupted
-// conversion that it finds there, and whether the disks have room for it.
+// conversion that it finds there, and whether the disks have space for it.
 //
 //    NAME.splats.partial/  beside the output, locked: the cache as it grows, and
 //      journal             what is converted, where the scratch folder is, and the splats once all are there
@@ -136,7 +136,7 @@ struct UncheckedConversion {
   const EstimateNeeds& estimate;  // called only where the most that it may need does not fit; may be empty
 };
 
-/// Checks the space on disk before the first pass. Throws Error if the disks have too little room, unless
+/// Checks the space on disk before the first pass. Throws Error if the disks have too little space, unless
 /// options.check_disk_space is false; Interrupted.
 void checkDiskOf(const UncheckedConversion& conversion, Progress& progress);
 

@@ -1,5 +1,5 @@
 // Checks before a long conversion what would make it fail at its end: that the output may be written, that
-// its folders are writable, and that their disks have room.
+// its folders are writable, and that their disks have space.
 #pragma once
 
 #include <algorithm>
@@ -50,7 +50,7 @@ inline constexpr const char* kFullDiskHint = "make room, or name a folder on ano
 inline constexpr const char* kSmallDiskHint =
     "make room, name a folder on another disk with --tmp, or skip this check with --no-preflight";
 
-/// Throws Error if the disks of `output` and `temporary_folder` have too little room; the second function returns false.
+/// Throws Error if the disks of `output` and `temporary_folder` have too little space; the second function returns false.
 /// `hint` says what to do if both are one disk.
 void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                     const std::filesystem::path& temporary_folder, const std::string& hint = kSmallDiskHint);

@@ -2,7 +2,7 @@
 // convert's BucketFile, which any thread may append to and whose order says nothing. Sums that follow the order of
 // a stream are the same for any number of threads and any memory.
 //
-// A stream is a chain of chunks; the first chunks stay in memory as long as there is room, and a small mesh makes
+// A stream is a chain of chunks; the first chunks stay in memory as long as there is space, and a small mesh makes
 // no file at all.
 #pragma once
 

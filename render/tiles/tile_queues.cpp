@@ -35,7 +35,7 @@ constexpr size_t kAhead = 16;
 
 }  // namespace
 
-/// Each thread has room for a round, beside what waits.
+/// Each thread has space for a round, beside what waits.
 size_t TileQueues::chunksFor(size_t splats, unsigned threads) {
   return (splats + threads * kPlacesOfARound + kChunk - 1) / kChunk;
 }
@@ -71,7 +71,7 @@ uint32_t TileQueues::nextFor(const Queue& queue, uint32_t count, uint32_t places
   return count;
 }
 
-/// Makes room for `places` at queue.count. Whether there is memory for them.
+/// Makes space for `places` at queue.count. Whether there is memory for them.
 bool TileQueues::reserve(Queue& queue, uint32_t places) {
   queue.count = nextFor(queue, queue.count, places);
   if (queue.count < queue.chunks.size() * kChunk) return true;

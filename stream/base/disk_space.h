@@ -1,4 +1,4 @@
-// The room on a disk: how much there is, and the error where there is none.
+// The free space on a disk: how much there is, and the error where there is none.
 //
 // A failed write is a DiskFull if the disk is full, a quota is used up, or the limit of file sizes is
 // reached. It may name a temporary file that the user has never heard of. Whoever knows which folders the
@@ -21,14 +21,14 @@ namespace curvisplat {
 /// some file systems (ramfs, some on FUSE or a network) say that they have no blocks at all.
 std::optional<uint64_t> freeBytes(const std::filesystem::path& folder) noexcept;
 
-/// There is no room for a file or a folder, or for its name.
+/// There is no space for a file or a folder, or for its name.
 class DiskFull : public OutputError {
  public:
-  /// Whether `error`, a value of errno, says that there is no room.
+  /// Whether `error`, a value of errno, says that there is no space.
   static bool is(int error);
 
-  /// `file`: the file or folder that there is no room for. `shown`: what the message names instead of it.
-  /// `what`: what needs the room.
+  /// `file`: the file or folder that there is no space for. `shown`: what the message names instead of it.
+  /// `what`: what needs the space.
   DiskFull(std::filesystem::path file, const std::filesystem::path& shown, const std::string& what,
            int error);
 
@@ -44,10 +44,10 @@ class DiskFull : public OutputError {
 };
 
 /// Throws the error for a file or folder `from` that could not be renamed to `to`: DiskFull if there is no
-/// room for the name, otherwise an OutputError. `error`: a value of errno.
+/// space for the name, otherwise an OutputError. `error`: a value of errno.
 [[noreturn]] void failToRename(int error, const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// The room that some work needs, and the folders that the user gave for it.
+/// The space that some work needs, and the folders that the user gave for it.
 struct RoomNeeded {
   std::vector<std::filesystem::path> folders;
   std::string what;    // "the cache and its temporary files"

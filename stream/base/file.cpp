@@ -46,7 +46,7 @@ bool stoppedBeingDirect(int fd) {
   return flags >= 0 && (flags & O_DIRECT) != 0 && ::fcntl(fd, F_SETFL, flags & ~O_DIRECT) == 0;
 }
 
-/// Throws the error of `file` for a value of errno: DiskFull if there is no room for `what`, otherwise an
+/// Throws the error of `file` for a value of errno: DiskFull if there is no space for `what`, otherwise an
 /// OutputError that says what `cannot` be done. Messages name `shown`.
 [[noreturn]] void fail(int error, const std::filesystem::path& file, const std::filesystem::path& shown,
                        const std::string& what, const std::string& cannot) {

@@ -6,7 +6,7 @@
 // (CGNS, HDF5, NetCDF).
 //
 // Every failure is an Error that names the path, the byte offset and the system's reason; it is a DiskFull
-// (stream/base/disk_space.h) where there is no room. Short transfers and EINTR are not failures: they are
+// (stream/base/disk_space.h) where there is no space. Short transfers and EINTR are not failures: they are
 // retried. Any thread may call the functions; the classes say what their threads may do.
 #pragma once
 

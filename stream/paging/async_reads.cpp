@@ -41,7 +41,7 @@ namespace {
 
 constexpr uint64_t kWakeTag = ~uint64_t{0};
 
-// The kernel answers EAGAIN or EBUSY if it has no memory. After so many answers in a row, reading has
+// The kernel answers EAGAIN or EBUSY if it has no memory. After this many in a row, reading has
 // failed.
 constexpr unsigned kMaxPutOff = 1000;
 

@@ -16,7 +16,7 @@ namespace {
 // The buffer is shared by this many batches, or twice as many: some are read while some are decoded.
 constexpr uint64_t kBatchesInBuffer = 8;
 
-// A read that the kernel puts off (EAGAIN, EINTR) so many times in a row has failed.
+// A read that the kernel puts off (EAGAIN, EINTR) this many times in a row has failed.
 constexpr uint8_t kMaxPutOff = 100;
 
 BrickExtents extentsOf(const CacheReader& cache, const ReadVariables& variables, uint32_t brick) {

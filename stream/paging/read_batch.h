@@ -46,7 +46,7 @@ struct BatchBrick {
 
 struct ReadBatch {
   std::vector<BatchRead> reads;    // in the order in which their bricks come
-  std::vector<BatchBrick> bricks;  // the first so many of those asked for
+  std::vector<BatchBrick> bricks;  // the first of those asked for
   uint32_t bytes = 0;              // of the buffer
 };
 

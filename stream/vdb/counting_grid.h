@@ -55,7 +55,7 @@ class VoxelRuns {
       runs_.push_back({cell.at, 0});
     ++runs_.back().count;
   }
-  /// Each position stands for so many.
+  /// Makes each position stand for `factor` positions.
   void multiply(uint32_t factor) {
     for (VoxelRun& run : runs_)
       run.count = static_cast<uint32_t>(std::min<uint64_t>(uint64_t{run.count} * factor, UINT32_MAX));

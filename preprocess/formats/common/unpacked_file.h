@@ -19,7 +19,7 @@ class UnpackedFile {
   static bool recognises(const InputFile& file);
 
   /// Decompresses `path` into `folder`. Throws Error with `path` if it is damaged, truncated or needs more
-  /// memory, and with `folder` if there is no room. What killed processes have left in `folder` is removed.
+  /// memory, and with `folder` if there is no space. What killed processes have left in `folder` is removed.
   UnpackedFile(const std::filesystem::path& path, const std::filesystem::path& folder);
 
   /// The compressed file.

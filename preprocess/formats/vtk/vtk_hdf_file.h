@@ -32,7 +32,7 @@ class VtkHdfFile {
   std::optional<uint64_t> identity(const std::string& place) const;
   bool has(const std::string& place) const { return identity(place).has_value(); }
 
-  /// The numbers of an attribute, `count` of them. Throws Error unless it has so many.
+  /// The numbers of an attribute, `count` of them. Throws Error unless it has as many.
   std::vector<double> numbers(const std::string& group, const char* attribute, size_t count) const;
   bool hasAttribute(const std::string& group, const char* attribute) const;
   /// Empty without the attribute.
