@@ -16,6 +16,7 @@
 
 namespace curvisplat {
 
+/// The options of an addition of scalars.
 struct AddScalarOptions {
   std::filesystem::path cache;             // that gets the scalars
   std::vector<uint32_t> scalars;           // positions in the source's description
@@ -36,6 +37,7 @@ struct AddScalarOptions {
   std::optional<uint64_t> slab_bytes;
 };
 
+/// The results of an addition of scalars.
 struct AddScalarReport {
   std::vector<std::string> scalars;  // as the cache calls them
   uint64_t nodes = 0, splats = 0;

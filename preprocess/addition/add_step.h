@@ -19,6 +19,7 @@
 
 namespace curvisplat {
 
+/// The options of an addition of a time step.
 struct AddStepOptions {
   std::filesystem::path cache;
   std::optional<double> time;              // otherwise the source's, or one more than the last step's
@@ -37,6 +38,7 @@ struct AddStepOptions {
   std::optional<uint64_t> bucket_splats, slab_bytes;
 };
 
+/// The results of an addition of a time step.
 struct AddStepReport {
   uint64_t step = 0;  // its number
   double time = 0;

@@ -16,6 +16,7 @@
 
 namespace curvisplat {
 
+/// The options of the conversion of a series.
 struct SeriesOptions {
   ConvertOptions convert;               // of the first step; `scalars` is not used
   bool keep_going = false;              // leave out steps that do not fit
@@ -39,6 +40,7 @@ struct StepOrigin {
   std::vector<std::string> sources;
 };
 
+/// The results of the conversion of a series.
 struct SeriesReport {
   uint64_t steps = 0;      // of the cache now
   uint64_t converted = 0;  // by this run

@@ -39,11 +39,13 @@ void removePartRecord(const std::filesystem::path& folder, const SeriesPart& par
 void writePartRecord(const std::filesystem::path& folder, const SeriesPart& part, uint64_t steps,
                      const std::vector<StepOrigin>& origins);
 
+/// The folder with the parts of a series, and the cache that they are joined to.
 struct JoinOptions {
   std::filesystem::path folder, output;
   bool overwrite = false;
 };
 
+/// Counts of what was joined.
 struct JoinReport {
   uint64_t parts = 0, steps = 0, geometries = 0;
 };

@@ -27,6 +27,7 @@ enum class DifferingScalars {
   kKeepApart  // as kLeaveOut, and each other set becomes a cache in the folder of the cache (Manifest::own_blanks)
 };
 
+/// The options of convert(). Only `output` has to be set.
 struct ConvertOptions {
   std::filesystem::path output;   // NAME.splats, without a trailing slash
   bool check_disk_space = true;   // before the work

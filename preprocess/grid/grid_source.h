@@ -29,6 +29,7 @@ struct NodeBox {
   uint64_t rowNodes(uint64_t ni) const { return endOfRow(ni) - i0; }
 };
 
+/// A structured block of ni x nj x nk nodes.
 struct GridBlock {
   std::string name;  // "block 1", or the file's own name for it
   uint64_t ni = 0, nj = 0, nk = 0;
@@ -46,6 +47,7 @@ struct MeshPiece {
 /// The places of a scalar's samples: nodes or cells.
 enum class Centring { kNode, kCell };
 
+/// A scalar that a source can read.
 struct GridScalar {
   std::string name;                  // "density"; for vectors "Velocity:mag", "Velocity:x", ...
   std::string unit;                  // may be empty

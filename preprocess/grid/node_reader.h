@@ -19,6 +19,7 @@ std::string notFiniteText(const GridDescription& description);
 /// A number for telling samples apart by their positions.
 uint64_t idOfPosition(double x, double y, double z);
 
+/// Counts of blanked samples, by the reason.
 struct BlankCounts {
   uint64_t by_grid = 0;     // iblank 0
   uint64_t by_value = 0;    // --blank

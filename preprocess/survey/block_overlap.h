@@ -24,6 +24,7 @@
 
 namespace curvisplat {
 
+/// A pair of blocks that overlap, and by how much.
 struct BlockOverlap {
   uint32_t first = 0, second = 0;  // blocks, first < second
   double volume = 0;               // of the intersection, estimated

@@ -14,6 +14,7 @@
 
 namespace curvisplat {
 
+/// The statistics of a block.
 struct BlockStatistics {
   BlankCounts blank;        // of its nodes
   uint64_t cells = 0;       // cells without blanked corners
@@ -22,6 +23,7 @@ struct BlockStatistics {
   double volume = 0;        // sum over the trilinear hexahedra
 };
 
+/// The statistics of a structured grid.
 struct GridStatistics {
   std::vector<BlockStatistics> blocks;
   std::array<ScalarRange, 3> bounds;    // of the nodes that are not blanked, along x, y, z

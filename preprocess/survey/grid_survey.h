@@ -23,6 +23,7 @@
 
 namespace curvisplat {
 
+/// The range of a scalar; empty (min > max) if there are no values.
 struct ScalarRange {
   double min = std::numeric_limits<double>::infinity();
   double max = -std::numeric_limits<double>::infinity();

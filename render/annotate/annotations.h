@@ -17,6 +17,7 @@
 
 namespace curvisplat {
 
+/// The annotations that are drawn over a picture.
 struct Annotations {
   bool scalar_bar = false;
   bool axes = false;

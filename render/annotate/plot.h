@@ -10,6 +10,7 @@
 
 namespace curvisplat {
 
+/// A line of a plot.
 struct PlotLine {
   std::string name;
   struct Point {
@@ -27,6 +28,7 @@ struct LinePanel {
   bool is_profile = false;                     // many points: linear axes around the values, and lines alone
 };
 
+/// A bar of a BarPanel.
 struct Bar {
   std::string label;
   double value;

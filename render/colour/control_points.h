@@ -18,6 +18,7 @@ namespace curvisplat {
 /// Step, where a segment has the colour of its upper end.
 enum class ColourSpace { kRgb, kHsv, kHsvNoWrap, kLab, kDiverging, kStep };
 
+/// A control point of a colour map.
 struct ColourPoint {
   double x;
   glm::dvec3 rgb;  // 0..1, display values
@@ -56,6 +57,7 @@ struct OpacityPoint {
   double sharpness = 0.0;  // 0..1
 };
 
+/// Opacities between control points, as VTK's piecewise function.
 class OpacityCurve {
  public:
   OpacityCurve() = default;

@@ -34,6 +34,7 @@ DefaultMaps mapsOn(const glm::vec4& background);
 /// #15171c, the background of pictures that name none.
 constexpr glm::vec4 kDefaultBackground{0x15 / 255.0f, 0x17 / 255.0f, 0x1c / 255.0f, 1};
 
+/// A transfer function in the terms of the options of `render`.
 struct FunctionParts {
   std::string map = kMapsOnDark.sequential;  // a preset
   std::pair<double, double> range{0, 1};

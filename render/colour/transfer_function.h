@@ -39,6 +39,7 @@ struct TransferFunctionDefinition {
   std::vector<std::string> notes;                  // for the user
 };
 
+/// A transfer function over a range of the scalar. Immutable; any thread.
 class TransferFunction {
  public:
   struct Value {

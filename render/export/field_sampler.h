@@ -47,6 +47,7 @@ std::vector<uint32_t> bricksOfLevel(const CacheReader& cache, uint32_t level);
 std::vector<uint32_t> bricksInBox(const CacheReader& cache, std::span<const uint32_t> bricks,
                                   const glm::dvec3& lower, const glm::dvec3& upper);
 
+/// Samples bricks on a regular lattice, slab by slab.
 class FieldSampler {
  public:
   /// `cache` must outlive it. The lattice must have a spacing above zero.

@@ -30,6 +30,7 @@
 
 namespace curvisplat {
 
+/// A 3D Gaussian with one colour and one opacity.
 struct GaussianSplat {
   glm::vec3 position{0.0f};   // world units
   glm::vec3 deviation{0.0f};  // standard deviations along its axes, world units

@@ -17,12 +17,14 @@
 
 namespace curvisplat {
 
+/// The options of writeIsoMesh().
 struct IsoMeshOptions {
   double value = 0;
   uint32_t voxels = 256;  // cubes along the longest side of the data
   uint64_t memory_bytes = 512 << 20;
   unsigned threads = 0;
 };
+/// The results of writeIsoMesh().
 struct IsoMeshReport {
   uint64_t vertices = 0, triangles = 0;
   double voxel_size = 0;  // world units

@@ -16,11 +16,13 @@
 
 namespace curvisplat {
 
+/// The options of writeVdb().
 struct VdbOptions {
   uint32_t voxels = 256;              // along the longest side
   uint64_t memory_bytes = 512 << 20;  // for voxels, while they are sampled and in the grids
   unsigned threads = 0;
 };
+/// The results of writeVdb().
 struct VdbReport {
   uint64_t active = 0;  // voxels
   glm::dvec3 lower{0.0};

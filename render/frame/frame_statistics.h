@@ -65,6 +65,7 @@ struct DrawStatistics {
   uint64_t iso_splats = 0, iso_bricks = 0;  // that isosurfaces may lie in; in whole or in part
 };
 
+/// The times and counts of a frame.
 struct FrameStatistics : PlanStatistics, FetchStatistics, PrepareStatistics, DrawStatistics {
   double total_s = 0;
   uint64_t memory_used_bytes = 0;  // of memory_bytes: by the stages and by decoded bricks that are kept

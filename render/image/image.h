@@ -34,6 +34,7 @@ struct Image {
   const float* pixel(int x, int y) const { return &rgba[4 * (static_cast<size_t>(y) * size.width + x)]; }
 };
 
+/// How far two images are apart.
 struct ImageDifference {
   double psnr_db = 0;  // over red, green and blue, relative to a peak of 1; infinite if the images are equal
   double largest = 0;  // absolute difference of one channel

@@ -9,6 +9,7 @@
 
 namespace curvisplat {
 
+/// Thrown if a picture does not fit into its memory.
 class TooLittleMemory : public UsageError {
  public:
   /// `least`: bytes that suffice for all parts of the picture that are known by then; 0 if none are.

@@ -16,6 +16,7 @@
 
 namespace curvisplat {
 
+/// Lines and points, one line after the other.
 struct CurveSet {
   glm::dvec3 origin{0.0};            // of the positions, in the data's coordinates
   std::vector<glm::vec3> positions;  // from the origin; of one line after the other

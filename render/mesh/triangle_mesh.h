@@ -17,6 +17,7 @@
 
 namespace curvisplat {
 
+/// A surface of triangles that share vertices.
 struct TriangleMesh {
   glm::dvec3 origin{0.0};            // of the positions, in the data's coordinates
   std::vector<glm::vec3> positions;  // from the origin

@@ -20,6 +20,7 @@
 
 namespace curvisplat {
 
+/// The light of a picture.
 struct Light {
   float ambient = 0.3f, diffuse = 0.7f, specular = 0.25f;  // each 0 to 1; ambient + diffuse at most 1
   std::optional<glm::dvec3> towards;  // towards the light, a direction; nullopt: towards the viewer

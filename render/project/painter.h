@@ -58,6 +58,7 @@ struct CardWork {
   uint64_t bytes = 0;          // the most that was taken of its memory so far
 };
 
+/// Draws the splats of a frame. One frame at a time.
 class Painter {
  public:
   virtual ~Painter() = default;

@@ -22,6 +22,7 @@
 
 namespace curvisplat {
 
+/// A surface, slice or isosurface at a pixel.
 struct PixelLayer {
   float depth;       // PixelLayers::depthOrigin() away; perspective: from the eye
   glm::vec4 colour;  // premultiplied
@@ -39,6 +40,7 @@ struct PixelResult {
   }
 };
 
+/// The layers of all pixels of a picture, from the nearest to the farthest.
 class PixelLayers {
  public:
   static constexpr int kMaxLayers = 4, kMaxWindows = kMaxLayers + 1;

@@ -28,6 +28,7 @@ inline constexpr double kSlopeLowPass = 0.01;
 /// one is off by at most 2 % of the splat's size at one deviation from the centre.
 inline constexpr double kWidest = 0.4;
 
+/// A view as the projection uses it. "Stretched" space is scale * data.
 struct ScreenView {
   Projection projection = Projection::kOrthographic;
   ImageSize size;

@@ -90,6 +90,7 @@ struct Curves {
   double opacity = 1;
 };
 
+/// The surfaces, slices, isosurfaces and curves of a picture, and whether the volume is drawn.
 struct SurfaceScene {
   std::vector<Surface> surfaces;
   std::vector<GridSurface> grid_surfaces;

@@ -68,6 +68,7 @@ class JsonField {
   const nlohmann::ordered_json* value_;
 };
 
+/// A parsed JSON text. Its fields must not outlive it.
 class JsonDocument {
  public:
   /// Parses `text`, the contents of `file`. Throws Error, which says that `what` ("a camera path") was expected, with

@@ -10,6 +10,7 @@
 
 namespace curvisplat {
 
+/// The results of verifyCache().
 struct CacheVerification {
   std::vector<std::string> findings;  // errors, one line each, at most 100; empty for an intact cache
   std::vector<std::string> notes;     // checks that were impossible, and why

@@ -23,6 +23,7 @@
 
 namespace curvisplat {
 
+/// Writes one cache. One thread at a time.
 class CacheWriter {
  public:
   /// Throws Error if `cache` exists and `overwrite` is false, if `cache` exists and is not a cache, if the

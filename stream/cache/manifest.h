@@ -20,6 +20,7 @@
 
 namespace curvisplat {
 
+/// A variable: a scalar as the cache holds it.
 struct VariableInfo {
   uint32_t number = 0;      // var.<number>.bin
   std::string name;         // unique in the cache
@@ -49,6 +50,7 @@ struct FileInfo {
   uint64_t checksum = 0;
 };
 
+/// A block of the grid, with its numbers of nodes along i, j and k.
 struct BlockInfo {
   std::string name;
   uint64_t ni = 0, nj = 0, nk = 0;
@@ -92,6 +94,7 @@ inline constexpr const char* kSteepStretch = "steep";  // by StretchFit::kSteep 
 /// ones have their shape, and rows go on across joints (preprocess/seams/joined_rows.h).
 inline constexpr const char* kDualCells = "dual-cells";
 
+/// The contents of manifest.json.
 struct Manifest {
   std::vector<std::string> requirements;  // "requires"; none: version 1
   std::string title;

@@ -11,6 +11,7 @@
 
 namespace curvisplat {
 
+/// A variable at a point.
 struct ProbeVariable {
   float mean = 0;  // of the sample's splat, at its centre
   float value =
@@ -24,6 +25,7 @@ struct ReachingSample {
   double distance = 0;
 };
 
+/// The sample nearest to a point, and the values there.
 struct ProbeResult {
   uint32_t brick = 0;  // index in reader.bricks(); a leaf
   uint32_t splat = 0;

@@ -40,6 +40,7 @@ struct StepValues {
   uint64_t size = 0, checksum = 0;  // of the file of values, as in FileInfo
 };
 
+/// A time step as steps.bin records it.
 struct SeriesStep {
   double time = 0;  // increases from step to step
   uint32_t geometry = 0;

@@ -24,6 +24,7 @@
 
 namespace curvisplat {
 
+/// An encoded brick: its record and its streams.
 struct EncodedBrick {
   Brick brick;  // without parent, children, error and file offset
   std::vector<std::byte> geometry;

@@ -37,6 +37,7 @@ struct GridFace {
   uint32_t root = kNoPatch;         // the coarsest patch, which covers the whole face
 };
 
+/// A patch of a face at one level of detail: every stride-th node from `first` on.
 struct FacePatch {
   uint32_t face = 0;
   std::array<uint64_t, 2> first{};   // node of the lattice

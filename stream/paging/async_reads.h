@@ -42,6 +42,7 @@ class DirectFile {
   int direct_fd_ = -1, buffered_fd_ = -1;
 };
 
+/// A read to be submitted.
 struct AsyncRead {
   int fd = -1;
   uint64_t offset = 0;
@@ -50,6 +51,7 @@ struct AsyncRead {
   uint64_t tag = 0;  // the caller's, not ~0
 };
 
+/// The end of a read.
 struct AsyncReadEnd {
   uint64_t tag = 0;
   int64_t result = 0;  // bytes read, 0 at the file's end; -errno where it failed

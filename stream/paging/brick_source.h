@@ -41,6 +41,7 @@ struct FetchStatistics {
   std::string read_by;                                  // for example "io_uring, direct"
 };
 
+/// Serves the decoded bricks of one frame after another.
 class BrickSource {
  public:
   using Variables = ReadVariables;

@@ -61,6 +61,7 @@ struct CutTree {
   std::span<const ValueBounds> subtrees;  // from subtreeBounds()
 };
 
+/// The options of chooseCut().
 struct CutOptions {
   static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
@@ -73,6 +74,7 @@ struct CutOptions {
   uint64_t max_splats = kNoLimit, max_bytes = kNoLimit;
 };
 
+/// The parts of bricks that a view draws, in the order described above.
 struct Cut {
   std::vector<BrickPart> parts;  // each brick once
   uint64_t splats = 0;

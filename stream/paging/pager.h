@@ -42,6 +42,7 @@
 
 namespace curvisplat {
 
+/// How a BrickPager reads.
 struct PagerOptions {
   enum class Way { kAutomatic, kIoUring, kThreads };
 
@@ -111,6 +112,7 @@ struct ReadVariables {
   ReadVariables(size_t of_both, std::optional<size_t> other) : first(of_both), second(other) {}
 };
 
+/// Reads a frame's bricks ahead, on a thread of its own.
 class BrickPager {
  public:
   /// Opens the files of `cache`, which outlives it, and starts the thread "pager". Throws

@@ -28,6 +28,7 @@ inline constexpr uint64_t kMaxGapBytes = 32 << 10;
 inline constexpr uint64_t kMaxJoinedBytes = 1 << 20;
 inline constexpr size_t kMaxBatchBricks = 256;
 
+/// One read of a batch.
 struct BatchRead {
   uint8_t stream = 0;   // which file
   uint64_t offset = 0;  // a multiple of kPageBytes
@@ -37,6 +38,7 @@ struct BatchRead {
   uint32_t first = 0;   // the first brick in the batch that waits for it
 };
 
+/// The places of one brick's streams in a batch.
 struct BatchBrick {
   static constexpr uint32_t kNoRead = 0xffffffff;
 
@@ -44,6 +46,7 @@ struct BatchBrick {
   std::array<uint32_t, kBrickStreams> read;   // that brings them
 };
 
+/// The reads that fetch the next bricks.
 struct ReadBatch {
   std::vector<BatchRead> reads;    // in the order in which their bricks come
   std::vector<BatchBrick> bricks;  // the first of those asked for

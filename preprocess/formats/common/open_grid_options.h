@@ -32,6 +32,7 @@ struct GlobeOptions {
   double vertical_scale = 1;
 };
 
+/// The options of openData(). Only `grid` has to be set.
 struct OpenGridOptions {
   std::filesystem::path grid;
   std::vector<std::filesystem::path> solutions;  // PLOT3D Q and function files; may be empty
