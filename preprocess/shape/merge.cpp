@@ -91,7 +91,7 @@ VoxelPlanes MergedFaces::of(size_t voxel) const {
 
 namespace {
 
-/// Of a splat between two opposite faces that both touch most of it; else kNoBorder.
+/// The code of a splat between two opposite faces that both touch most of it; else kNoBorder.
 uint32_t plateCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged) {
   constexpr double kParallel = -0.9, kCovered = 0.6, kThinner = 0.75, kThicker = 1.33;
   for (size_t n = 0; n < planes.count; ++n) {
