@@ -90,13 +90,13 @@ def compared(arguments, a, b):
 
 def check_pictures(arguments, backends, out):
     """Prints how like the processor's pictures those of the backends are. Returns whether all are like enough."""
-    size = "48x32x24" if arguments.quick else "128x96x64"
+    size = "24x16x12" if arguments.quick else "128x96x64"
     wake = arguments.folder / f"wake_{size}"
     cache = wake.with_suffix(".splats")
     if not (cache / "manifest.json").exists():
         results.run([arguments.program, "generate", "wake", "--size", size, "-o", wake])
         results.run([arguments.program, "convert", f"{wake}.xyz", f"{wake}.fun", "-o", cache, "--overwrite", "--scalar", "f,jacobian"])
-    picture = "160x120" if arguments.quick else "1920x1080"
+    picture = "80x60" if arguments.quick else "1920x1080"
 
     def draw(backend, name, options):
         file = arguments.folder / f"{name}.pfm"
