@@ -19,6 +19,7 @@ failures = []
 PAGE = "window.curvisplatPage"
 FINAL = f"{PAGE}.header && {PAGE}.header.final && {PAGE}.idle()"
 MIDDLE = (800, 400)
+RATIO = 0.5  # pixels of a picture to one of the page: a quarter of the work
 
 
 def expect(condition, what):
@@ -72,7 +73,7 @@ def drag_until(tab, condition):
 
 
 def opened(browser, url, size=(1280, 800)):
-    tab = browser.tab(url, size)
+    tab = browser.tab(url, size, RATIO)
     tab.wait(f"{PAGE} && {PAGE}.pictures > 0", "a first picture")
     return tab
 
@@ -130,7 +131,7 @@ def navigation(browser, server, caches):
     tab.key("h")
     tab.wait("document.getElementById('panel').offsetWidth === 0", "the panel to hide")
     rest(tab)
-    expect(tab.run(f"{PAGE}.header.width") == 1280, "the picture takes the panel's place")
+    expect(tab.run(f"{PAGE}.header.width") == 1280 * RATIO, "the picture takes the panel's place")
     tab.key("h")
     expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
     return tab
@@ -193,7 +194,7 @@ def sizes(tab):
     rest(tab)
     shot(tab, "phone")
     expect(tab.run(f"{PAGE}.state.camera.parallel_scale") < 0.9 * turned["parallel_scale"], "two fingers zoom")
-    tab.resize(1280, 800)
+    tab.resize(1280, 800, RATIO)
 
 
 def time_steps(browser, server):

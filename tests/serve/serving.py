@@ -230,14 +230,14 @@ class Chromium:
         wait_for(lambda: file.is_file() and "\n" in file.read_text(), "Chromium to start")
         self.port = int(file.read_text().split()[0])
 
-    def tab(self, url="about:blank", size=(1280, 800)):
+    def tab(self, url="about:blank", size=(1280, 800), ratio=1):
         with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/json/version", timeout=PATIENCE_S) as answer:
             browser = Tab(json.load(answer)["webSocketDebuggerUrl"])
         target = browser.call("Target.createTarget", url="about:blank", newWindow=True)["targetId"]
         browser.socket.close()
         tab = Tab(f"ws://127.0.0.1:{self.port}/devtools/page/{target}")
         tab.call("Page.enable")
-        tab.resize(*size)
+        tab.resize(*size, ratio)
         tab.call("Page.navigate", url=url)
         return tab
 
