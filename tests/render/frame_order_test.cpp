@@ -15,6 +15,7 @@
 #include "stream/base/error.h"
 #include "tests/reference/global_order.h"
 #include "tests/reference/known_pictures.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
 
@@ -141,6 +142,8 @@ TEST_P(FrameOrderTest, IsThatOfOneSortAtAnyLevelAndWithPartsOfBricks) {
 }
 
 TEST_P(FrameOrderTest, IsThatOfOneSortInAnyMemoryWithAnyThreads) {
+  if (GetParam() == Backend::kEgl && !faults::isWholeSweep())
+    GTEST_SKIP() << "as OSMesa's; with clip planes it is drawn in slabs, too";
   uint64_t most_slabs = 0, again = 0;
   for (const CacheReader* cache : {scene_.get(), slabbed()}) {
     const TransferFunction transfer_function = function(*cache);
@@ -151,6 +154,9 @@ TEST_P(FrameOrderTest, IsThatOfOneSortInAnyMemoryWithAnyThreads) {
       for (const uint64_t memory : {least, least + (3 << 20), least + (40 << 20)})
         for (const unsigned threads : {1u, 3u}) {
           if (GetParam() != Backend::kCpu && (memory != least || threads == 1)) continue;
+          // Usually each amount once, and the least with both.
+          const bool is_usual = memory == least || (threads == 1) == (memory > least + (3 << 20));
+          if (!is_usual && !faults::isWholeSweep()) continue;
           FrameOptions wanted = options();
           wanted.memory_bytes = memory;
           wanted.threads = threads;
