@@ -185,8 +185,10 @@ std::array<double, 3> widthGrowth(const NodeLattice& nodes, ptrdiff_t at, const 
 
 std::optional<PieceSplat> splatOfPiece(const CollapsedNode& node, std::span<const float* const> scalars,
                                        std::span<SplatScalar> values) {
+  // Nodes that all coincide have no volume: their moments, which take far longer, are not needed.
+  if (!(std::abs(dualPiece(node.nodes, node.at, node.strides, node.there, false).volume) > 0))
+    return std::nullopt;
   const DualPiece piece = dualPiece(node.nodes, node.at, node.strides, node.there, true);
-  if (!(std::abs(piece.volume) > 0)) return std::nullopt;
   PieceSplat out;
   const glm::dvec3 middle = piece.first / piece.volume;
   const auto spread = [&](size_t n, double product) {

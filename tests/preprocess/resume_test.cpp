@@ -321,15 +321,18 @@ TEST_F(Resume, RebuildsWhatTheDiskHasLost) {
       {"the end of the journal", [&] { cut(partial() / "journal", 300); }},
       {"the journal", [&] { fs::remove(partial() / "journal"); }},
   };
+  killInBuild();
+  const fs::path temporary = scratch(), killed = folder_ / "killed";
+  ASSERT_EQ(temporary.parent_path(), work_);
+  fs::copy(work_, killed, fs::copy_options::recursive);
   for (const auto& [what, lose] : losses) {
     SCOPED_TRACE(what);
-    killInBuild();
-    const fs::path temporary = scratch();
+    fs::remove_all(work_);
+    fs::copy(killed, work_, fs::copy_options::recursive);
     lose();
     convertNow({true, false, std::nullopt});
     fs::remove_all(temporary);  // without the journal no one knows of it
     expectWhole();
-    fs::remove_all(output_);
   }
 }
 
