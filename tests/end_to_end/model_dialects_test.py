@@ -4,9 +4,10 @@
 NetCDF files as particular models and archives write them: CESM's POP, COSMO, MERRA-2, ERA5. model_files.py says how. Exit status 77
 (skipped) without python3-netcdf4.
 """
+import subprocess
 import unittest
 
-from model_files import RADIUS, RANDOM, ModelFileTest, np, sphere, standard_altitude
+from model_files import PROGRAM, RADIUS, RANDOM, ModelFileTest, np, sphere, standard_altitude
 
 
 class ModelDialects(ModelFileTest):
@@ -241,6 +242,10 @@ class Places(ModelFileTest):
             info = self.info()
             np.testing.assert_allclose(info["bounds"]["upper"], [5.5, 3.5, 1.5])
             self.assertIn("metres are assumed", "".join(info["warnings"]))
+        # `convert` prints what `info` warns of.
+        done = subprocess.run([PROGRAM, "convert", str(self.folder / "file.nc"), "-o", str(self.folder / "a.splats")], capture_output=True,
+                              text=True, check=False)
+        self.assertEqual([done.stderr.count(line) for line in info["warnings"]], [1, 1], done.stderr)
 
     def test_the_nearest_variable_is_named(self):
         with self.file(ncells=8, nv=3, depth=3, time=1) as f:

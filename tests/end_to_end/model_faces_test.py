@@ -10,6 +10,7 @@ import subprocess
 import unittest
 
 from model_files import PROGRAM, RADIUS, RANDOM, ModelFileTest, np, volume
+from sweep import IS_WHOLE
 
 BOTTOM, TOP = 0.0, 500.0  # kilometres
 SHELL = 4 / 3 * np.pi * ((RADIUS + TOP) ** 3 - (RADIUS + BOTTOM) ** 3)
@@ -184,7 +185,8 @@ class ModelFaces(ModelFileTest):
             self.assertEqual("joined at" in info["format"], joined)
             line = f"the faces are not joined: their edges have {12 * (nodes + 2)} points; at most 1048576 are compared"
             self.assertEqual(info["warnings"].count(line), not joined, info["warnings"])
-        self.assertEqual(self.converted()[1].count(line), 1)
+        if IS_WHOLE:  # two million nodes; model_dialects_test.py has a smaller file that `convert` warns of
+            self.assertEqual(self.converted()[1].count(line), 1)
 
 
 if __name__ == "__main__":
