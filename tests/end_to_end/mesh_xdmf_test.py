@@ -4,6 +4,7 @@
 XDMF's unstructured grids, by h5py, in binary files and in the XML, and as meshio writes them: mesh_formats.py says how. Exit status
 77 (skipped) without python3-vtk9 or python3-h5py.
 """
+import os
 import sys
 import unittest
 
@@ -97,6 +98,50 @@ class XdmfMeshes(MeshFormats):
         runs = [(names[run.shape[1]], run) for run in mesh.runs()]
         ends = np.cumsum([0] + [len(run) for _, run in runs])
         meshio.write(path, meshio.Mesh(mesh.points, runs, {"p": mesh.p}, {"c": [mesh.c[a:b] for a, b in zip(ends, ends[1:])]}))
+        self.expect_same([path], mesh.vtk())
+
+    def included(self, mesh, head, prefix, pointer):
+        """A mesh as a grid of its own, which both of its steps include; at the second one p is twice as large."""
+        name, elements, numbers = self.mixed(mesh)
+        parts = (f'<Topology TopologyType="{name}" NumberOfElements="{elements}">{self.item(numbers)}</Topology>'
+                 f'<Geometry GeometryType="XYZ">{self.item(mesh.points)}</Geometry>')
+        steps = "".join(f'''<Grid Name="u" GridType="Uniform">
+          <{prefix}:include xpointer="{pointer}" />
+          <Time Value="{n}" />
+          <Attribute Name="p" AttributeType="Scalar" Center="Node">{self.item(mesh.p * (n + 1))}</Attribute></Grid>''' for n in range(2))
+        grids = [f'<Grid Name="mesh" GridType="Uniform">{parts}</Grid>',
+                 f'<Grid Name="u" GridType="Collection" CollectionType="Temporal">{steps}</Grid>']
+        self.path.write_text(f'<?xml version="1.0"?>\n<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>\n<Xdmf {head}>\n<Domain>'
+                             f'{"".join(grids if prefix == "xi" else reversed(grids))}</Domain></Xdmf>')
+        return self.path
+
+    def test_meshes_that_steps_include(self):
+        """As dolfinx writes functions, as legacy FEniCS does, and as meshio's TimeSeriesWriter does with its odd prefix."""
+        mesh = Mesh(2)
+        parts = "*[self::Topology or self::Geometry]"
+        for head, prefix, pointer in (
+                ('Version="3.0" xmlns:xi="https://www.w3.org/2001/XInclude"', "xi", f"xpointer(/Xdmf/Domain/Grid[@GridType='Uniform'][1]/{parts})"),
+                ('Version="3.0" xmlns:xi="http://www.w3.org/2001/XInclude"', "xi", f"xpointer(/Xdmf/Domain/Grid[@Name=&quot;mesh&quot;]/{parts})"),
+                ('xmlns:ns0="http://www.w3.org/2003/XInclude" Version="3.0"', "ns0", f"xpointer(//Grid[@Name=&quot;mesh&quot;]/{parts})")):
+            self.included(mesh, head, prefix, pointer)
+            info = self.info(self.path)
+            self.assertEqual((info["times"], len(info["pieces"]), info["cells"]["count"]), ([0, 1], 1, len(mesh.cells)))
+            self.expect_same([self.path], mesh.vtk(), {"c": None})
+            self.assertAlmostEqual(self.info(self.path, "--time-step", 1)["scalars"][0]["max"], 2 * mesh.p.max(), places=5)
+        for pointer, told in (("xpointer(/Xdmf/Domain/Grid[@Name='fish']/Topology)", "does not have"), ("element(/1/1)", "is not read"),
+                              ("xpointer(count(//*))", "is not read"), ("xpointer(//Grid[@Name='mesh']/Topology[", "includes xpointer")):
+            self.expect_line(self.included(mesh, 'Version="3.0"', "xi", pointer), words=told)
+
+    @unittest.skipUnless(meshio, "no meshio")
+    def test_series_by_meshio(self):
+        mesh = Mesh(2, (8,))
+        path = self.folder / "m.xdmf"
+        os.chdir(self.folder)
+        with meshio.xdmf.TimeSeriesWriter("m.xdmf") as writer:
+            writer.write_points_cells(mesh.points, [("hexahedron", np.array(mesh.cells))])
+            for time in (0.0, 0.5):
+                writer.write_data(time, point_data={"p": mesh.p}, cell_data={"c": [mesh.c]})
+        self.assertEqual(self.info(path)["times"], [0, 0.5])
         self.expect_same([path], mesh.vtk())
 
     def test_quadratic_cells(self):

@@ -310,7 +310,7 @@ class Xdmf(StructuredFormats):
                               (text.replace(f'Dimensions="{shape} 3"', 'Dimensions="1e12 1e12 1e12"'), "impossible dimensions"),
                               ('<Grid><Topology Reference="/Xdmf/Domain/Grid/Topology"/></Grid>', "refers to itself"),
                               ('<Grid><Topology Reference="//*[//*]"/></Grid>', "refers to"),
-                              ('<Grid><xi:include href="b.xmf"/></Grid>', "XInclude"), ("", "has no Grid"), (text[:-9], "not valid XML")):
+                              ('<Grid><xi:include href="b.xmf"/></Grid>', "another file (XInclude)"), ("", "has no Grid"), (text[:-9], "not valid XML")):
             self.expect_line(self.write(damaged), words=told)
         bad = self.new("Binary")
         path = self.write(grid(bad, block))

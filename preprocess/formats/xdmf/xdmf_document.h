@@ -33,7 +33,7 @@ class XdmfDocument {
 
   /// "FILE: Grid NAME", for messages.
   std::string describe(const pugi::xml_node& node) const;
-  /// The element that `node` refers to, or itself.
+  /// The element that `node` refers to or includes, or itself.
   pugi::xml_node resolved(pugi::xml_node node) const;
 
   /// A finite number, numbers, or whole numbers from 0 in a text of `node`.
@@ -42,9 +42,13 @@ class XdmfDocument {
   std::vector<uint64_t> countsIn(const pugi::xml_node& node, const std::string& text) const;
 
  private:
+  /// Puts empty elements in the place of XInclude's, which refer to what they include.
+  void replaceIncludes();
+
   std::filesystem::path path_;
   pugi::xml_document document_;
   mutable std::map<std::string, pugi::xml_node> referred_;  // by their paths
+  std::map<pugi::xml_node, pugi::xml_node> included_;
   pugi::xml_node domain_;
 };
 

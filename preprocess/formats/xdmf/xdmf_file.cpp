@@ -63,6 +63,7 @@ class Reader {
     for (const pugi::xml_node grid : document_.domain().children("Grid")) findLeaves(grid, std::nullopt, 0);
     if (leaves_.empty()) throw Error("{}: has no Grid", name());
     chooseStep(options);
+    leaveOutBareMeshes();
   }
 
   XdmfFile run() {
@@ -123,7 +124,7 @@ class Reader {
   const Times& timesOf(const pugi::xml_node& collection) {
     const auto [found, is_new] = times_.try_emplace(collection);
     Times& times = found->second;
-    const pugi::xml_node time = collection.child("Time"), given = time.child("DataItem");
+    const pugi::xml_node time = document_.resolved(collection.child("Time")), given = time.child("DataItem");
     const std::string type = lowerCase(xdmfAttribute(time, {"TimeType", "Type"}));
     if (!is_new || !given || (type != "list" && type != "hyperslab")) return times;
     const pugi::xml_node item = document_.resolved(given);
@@ -151,8 +152,9 @@ class Reader {
     if (++visited_ > kMaxGrids) throw Error("{}: has more than {} grids", name(), kMaxGrids);
     const pugi::xml_node grid = document_.resolved(given);
     const std::string type = lowerCase(xdmfAttribute(grid, {"GridType", "Type"}));
-    const std::string value = xdmfAttribute(grid.child("Time"), {"Value"});
-    if (!value.empty()) time = document_.numberIn(grid.child("Time"), value);
+    const pugi::xml_node own_time = document_.resolved(grid.child("Time"));
+    const std::string value = xdmfAttribute(own_time, {"Value"});
+    if (!value.empty()) time = document_.numberIn(own_time, value);
     if (type == "subset") throw Error("{} is a SubSet, which is not read", document_.describe(grid));
     if (type.empty() || type == "uniform") {
       leaves_.push_back({grid, time});
@@ -178,6 +180,26 @@ class Reader {
     if (times.empty()) return;
     const double time = file_.times[file_.time_step];
     std::erase_if(leaves_, [&](const Leaf& leaf) { return leaf.time && *leaf.time != time; });
+  }
+
+  /// Of grids that share cells or points, those without attributes: dolfinx and meshio write the mesh as a
+  /// grid of its own, which each step includes, and it would be drawn twice.
+  void leaveOutBareMeshes() {
+    std::set<pugi::xml_node> drawn;  // topologies, and geometries of solid cells, of grids with attributes
+    for (const Leaf& leaf : leaves_) {
+      const pugi::xml_node topology = document_.resolved(leaf.node.child("Topology"));
+      const XdmfCellType* const type =
+          typeNamed(lowerCase(xdmfAttribute(topology, {"TopologyType", "Type"})));
+      if (!leaf.node.child("Attribute") || (type && type->shape == CellKind::kNone)) continue;
+      drawn.insert(topology);
+      drawn.insert(document_.resolved(leaf.node.child("Geometry")));
+    }
+    drawn.erase(pugi::xml_node());
+    std::erase_if(leaves_, [&](const Leaf& leaf) {
+      return !leaf.node.child("Attribute") &&
+             (drawn.contains(document_.resolved(leaf.node.child("Topology"))) ||
+              drawn.contains(document_.resolved(leaf.node.child("Geometry"))));
+    });
   }
 
   XdmfGrid readGrid(const pugi::xml_node& node) {

@@ -6,8 +6,9 @@
 //       <Geometry GeometryType="XYZ"> <DataItem Dimensions="NK NJ NI 3" Format="HDF">grid.h5:/xyz</DataItem> </Geometry>
 //       <Attribute Name="p" Center="Node"> <DataItem ...>grid.h5:/p</DataItem> </Attribute>
 //
-// Parsed as a whole: at most 16 MiB. Elements may refer to others by a simple path (Reference="/Xdmf/Domain/..."). XInclude
-// and items by Coordinates are refused; attributes computed by a Function other than JOIN are left out.
+// Parsed as a whole: at most 16 MiB. Elements may refer to others by a simple path (Reference="/Xdmf/Domain/...") or
+// include others (xi:include xpointer="xpointer(...)"), all of the same file. Items by Coordinates are refused; attributes
+// computed by a Function other than JOIN are left out.
 #pragma once
 
 #include <array>
