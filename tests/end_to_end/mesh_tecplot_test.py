@@ -75,11 +75,31 @@ class TecplotMeshes(MeshFormats):
                 self.assertIn("2 zones of finite elements", info["format"])
                 self.assertAlmostEqual(self.volume([self.path], "c"), 2, delta=4e-3)
 
+    def test_surfaces_beside_the_volume(self):
+        """As solvers save the walls and the volume in one file: the walls come first, and have lines of their own."""
+        mesh = Mesh(2, (8,))
+        surfaces = [("FETRIANGLE", [[0, 1, 4]]), ("FEQUADRILATERAL", [[0, 1, 4, 3], [1, 2, 5, 4]]), ("FELINESEG", [[0, 1]])]
+        wall = [*mesh.points[:9].T, mesh.p[:9]]
+        zones = [(f'T="wall", N=9, E={len(cells)}, ZONETYPE={name}, DATAPACKING=BLOCK, VARLOCATION=([5]=CELLCENTERED)',
+                  [*wall, np.ones(len(cells)), *(np.array(cells) + 1)]) for name, cells in surfaces]
+        zones.insert(2, (self.words(mesh, 8), self.blocks(mesh)))
+        self.expect_same([self.write_text(zones)], mesh.vtk())
+        self.assertIn("3 of 4 zones are flat and left out, such as zone 1 (wall) of FETRIANGLE", self.info(self.path)["warnings"])
+        self.expect_line(self.write_text(zones[:2]), words="has no zone with volume: zone 1 (wall) of FETRIANGLE")
+        for version, neighbours in ((112, False), (107, True)):
+            file = Binary(["X", "Y", "Z", "p", "c"], version=version)
+            for number, (_, cells) in zip((2, 3, 1), surfaces):
+                file.zone(9, [*map(np.ascontiguousarray, wall), np.ones(len(cells))], centrings=[0, 0, 0, 0, 1], zone_type=number,
+                          elements=cells, face_neighbours=neighbours)
+            file.zone(len(mesh.points), [*mesh.points.T.copy(), mesh.p, mesh.c], centrings=[0, 0, 0, 0, 1], zone_type=5, elements=mesh.cells)
+            file.write(self.path)
+            self.expect_same([self.path], mesh.vtk())
+
     def test_what_is_refused(self):
         mesh = Mesh(2, (8,))
         words, rows = self.words(mesh, 8), self.blocks(mesh)
         for changed, told in (((words.replace("E=8", "E=9"), rows), "numbers; expected"), ((words.replace("E=8", "E=99999999999999"), rows), "unknown value"),
-                              ((words.replace("FEBRICK", "FEQUADRILATERAL"), rows), "a kind of elements"), ((words.replace("E=8, ", ""), rows), "without NODES"),
+                              ((words.replace("FEBRICK", "FEPOLYHEDRON"), rows), "a kind of elements"), ((words.replace("E=8, ", ""), rows), "without NODES"),
                               ((words, rows[:-1] + [[1, 2, 3, 4, 5, 6, 7, 99]]), "refers to point 98"), ((words, rows[:-1] + [[0, 2, 3, 4, 5, 6, 7, 8]]), "refers to point"),
                               ((words + ", CONNECTIVITYSHAREZONE=3", rows[:-8]), "unknown value")):
             self.expect_line(self.write_text([changed]), words=told)

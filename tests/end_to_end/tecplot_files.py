@@ -99,7 +99,7 @@ class Binary:
         if elements is not None and elements_of < 0:
             self.data += self.ints(*np.ravel(elements))
             if face_neighbours:
-                self.data += self.ints(*[-1] * (len(elements) * {4: 4, 8: 6}[len(elements[0])]))
+                self.data += self.ints(*[-1] * (len(elements) * {2: 2, 3: 3, 4: 4, 8: 6}[len(elements[0])]))
         self.zones += 1
         assert len(arrays) == count
 

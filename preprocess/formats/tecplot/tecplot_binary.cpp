@@ -183,9 +183,7 @@ class Reader {
     words_.integer();  // colour
     const int32_t type = words_.integer();
     if (type > 0 && static_cast<size_t>(type) < std::size(kTypeNames))
-      zone.element_nodes = tecplotElementNodes(kTypeNames[type]);
-    if (type > 0 && static_cast<size_t>(type) < std::size(kTypeNames) && zone.element_nodes == 0)
-      refuseTecplotZone(words_.name(), zone, number, kTypeNames[type]);
+      setTecplotElements(words_.name(), zone, number, kTypeNames[type]);
     if (type != 0 && zone.element_nodes == 0) words_.damaged("the type of a zone", type, "0 to 7");
     if (has_packing_) layout.point = words_.flag("the packing of a zone");
     checkTecplotCounts(words_.name(), number + 1, data_.variables.size());
@@ -301,7 +299,7 @@ class Reader {
     values.stride = 4;
     words_.skip(4 * zone.elements * zone.element_nodes);
     if (layouts_[number].has_face_neighbours)
-      words_.skip(4 * zone.elements * (zone.element_nodes == 4 ? 4 : 6));
+      words_.skip(4 * zone.elements * (zone.element_nodes == 8 ? 6 : zone.element_nodes));
   }
 
   static bool hasCells(const std::vector<TecplotValues*>& stored) {

@@ -101,7 +101,8 @@ void shareTecplotValues(const std::string& file, TecplotData& data, size_t from,
 void shareTecplotElements(const std::string& file, TecplotData& data, size_t from, size_t to) {
   TecplotZone& zone = data.zones[to];
   if (from >= to || data.zones[from].elements != zone.elements ||
-      data.zones[from].element_nodes != zone.element_nodes)
+      data.zones[from].element_nodes != zone.element_nodes ||
+      data.zones[from].flat_elements != zone.flat_elements)
     throw Error(
         "{}: {} shares the elements of zone {}; expected one of the zones before it, with as many of the "
         "same kind",
@@ -109,9 +110,27 @@ void shareTecplotElements(const std::string& file, TecplotData& data, size_t fro
   zone.connectivity = data.zones[from].connectivity;
 }
 
-uint64_t tecplotElementNodes(std::string_view type) {
-  if (type == "FETETRAHEDRON" || type == "TETRAHEDRON") return 4;
-  return type == "FEBRICK" || type == "BRICK" ? 8 : 0;
+void setTecplotElements(const std::string& file, TecplotZone& zone, size_t number, const std::string& type) {
+  struct Kind {
+    std::string_view name;
+    uint64_t nodes;
+    bool flat;
+  };
+  constexpr Kind kKinds[] = {{"FETETRAHEDRON", 4, false},
+                             {"FEBRICK", 8, false},
+                             {"FELINESEG", 2, true},
+                             {"FETRIANGLE", 3, true},
+                             {"FEQUADRILATERAL", 4, true}};
+  const auto kind = std::find_if(std::begin(kKinds), std::end(kKinds), [&](const Kind& one) {
+    return type == one.name || type == one.name.substr(2);
+  });
+  if (kind == std::end(kKinds))
+    throw Error(
+        "{}: is a Tecplot file whose {} is {}, a kind of elements that is not read; expected ORDERED, "
+        "FETETRAHEDRON or FEBRICK",
+        file, zone.describe(number), printable(type));
+  zone.element_nodes = kind->nodes;
+  if (kind->flat) zone.flat_elements = kind->name;
 }
 
 void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most) {
@@ -124,14 +143,6 @@ void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t n
   throw Error(
       "{}: {} declares {}x{}x{} nodes, more than a file of this size can hold; it is truncated or damaged",
       file, zone.describe(number), ni, nj, nk);
-}
-
-void refuseTecplotZone(const std::string& file, const TecplotZone& zone, size_t number,
-                       const std::string& type) {
-  throw Error(
-      "{}: is a Tecplot file whose {} is {}, a kind of elements that is not read; expected ORDERED, "
-      "FETETRAHEDRON or FEBRICK",
-      file, zone.describe(number), printable(type));
 }
 
 }  // namespace curvisplat

@@ -50,13 +50,16 @@ struct TecplotZone {
   std::array<uint64_t, 3> nodes{1, 1, 1};
   std::optional<double> time;         // of a zone that belongs to a series; nullopt: it belongs to every step
   std::vector<TecplotValues> values;  // [variable]
-  // The cells of a zone of finite elements, which has nodes[0] nodes: tetrahedra or bricks.
+  // The cells of a zone of finite elements, which has nodes[0] nodes: tetrahedra or bricks; lines and faces are left out.
   uint64_t elements = 0, element_nodes = 0;  // 0: the zone is ordered
   TecplotValues connectivity;                // element_nodes numbers of nodes for each
   uint64_t first_node = 0;                   // the lowest of these
+  std::string flat_elements;                 // "FETRIANGLE": they have no volume
 
   uint64_t nodeCount() const { return nodes[0] * nodes[1] * nodes[2]; }
-  bool flat() const { return elements == 0 && (nodes[0] < 2 || nodes[1] < 2 || nodes[2] < 2); }
+  bool flat() const {
+    return elements == 0 ? nodes[0] < 2 || nodes[1] < 2 || nodes[2] < 2 : !flat_elements.empty();
+  }
   /// "zone 2 (wing)", for messages; `number` from 0.
   std::string describe(size_t number) const;
 };
@@ -78,15 +81,12 @@ void checkTecplotCounts(const std::string& file, size_t zones, uint64_t variable
 /// The same for the elements of a zone.
 void shareTecplotElements(const std::string& file, TecplotData& data, size_t from, size_t to);
 
-/// Nodes of an element of this type of zone ("FEBRICK"); 0 if it is not of tetrahedra or bricks.
-uint64_t tecplotElementNodes(std::string_view type);
+/// Sets the nodes of an element of this type of zone ("FEBRICK"), and whether it has a volume. Throws Error if
+/// it is of polygons or polyhedra, or unknown.
+void setTecplotElements(const std::string& file, TecplotZone& zone, size_t number, const std::string& type);
 
 /// Throws Error if the zone's dimensions are not positive, or if it has more than `most` nodes.
 void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most);
-
-/// Refuses a zone of other finite elements by its name.
-[[noreturn]] void refuseTecplotZone(const std::string& file, const TecplotZone& zone, size_t number,
-                                    const std::string& type);
 
 /// Whether the file is a text that begins with a record of Tecplot.
 bool isTecplotText(const InputFile& file);

@@ -77,8 +77,9 @@ void TecplotGrid::leaveOutZones() {
   std::string flat;
   for (size_t n = 0; n < data.zones.size() && flat.empty(); ++n)
     if (const TecplotZone& zone = data.zones[n]; zone.flat())
-      flat =
-          fmt::format("{} of {}x{}x{} nodes", zone.describe(n), zone.nodes[0], zone.nodes[1], zone.nodes[2]);
+      flat = zone.elements > 0 ? fmt::format("{} of {}", zone.describe(n), zone.flat_elements)
+                               : fmt::format("{} of {}x{}x{} nodes", zone.describe(n), zone.nodes[0],
+                                             zone.nodes[1], zone.nodes[2]);
   const size_t all = data.zones.size();
   std::erase_if(data.zones, [](const TecplotZone& zone) { return zone.flat(); });
   if (data.zones.empty())

@@ -253,11 +253,9 @@ class Reader {
       text.point = word.ends_with("POINT");
       text.has_packing = true;
     } else if (key == "ZONETYPE") {
-      zone.element_nodes = tecplotElementNodes(word);
-      if (word != "ORDERED" && zone.element_nodes == 0) refuseTecplotZone(file_->name(), zone, index, word);
+      if (word != "ORDERED") setTecplotElements(file_->name(), zone, index, word);
     } else if (key == "ET") {
-      zone.element_nodes = tecplotElementNodes(word);
-      if (zone.element_nodes == 0) refuseTecplotZone(file_->name(), zone, index, word);
+      setTecplotElements(file_->name(), zone, index, word);
     } else if (key == "NODES" || key == "N") {
       zone.nodes[0] = count();
     } else if (key == "ELEMENTS" || key == "E") {
