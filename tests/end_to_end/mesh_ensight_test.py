@@ -131,6 +131,52 @@ class EnsightCases(MeshFormats):
                 mesh.p /= 2
                 mesh.c /= 2
 
+    def file_set(self, mesh, order, sizes_differ, with_c_binary=False):
+        """Both steps of each file in one, as Ansys' solvers and Code_Aster write them."""
+        self.write(mesh, order)
+        record = (lambda words: words.encode().ljust(80, b"\0")) if order else (lambda words: words.encode() + b"\n")
+        c_binary = record("C Binary") if order else b""
+        for name, steps in (("mesh.geo", ["mesh.geo"] * 2), ("p.set", ["p.003", "p.007"]), ("c.set", ["c.003", "c.007"])):
+            contents = [(self.folder / step).read_bytes() for step in steps]
+            if name == "mesh.geo":
+                contents = [content[len(c_binary):] for content in contents]
+            data = c_binary if name == "mesh.geo" or with_c_binary else b""
+            for number, content in enumerate(contents):
+                data += record("BEGIN TIME STEP") + content + record("END TIME STEP")
+                data += record("a comment") * (sizes_differ and number == 0)
+            (self.folder / name).write_bytes(data)
+        self.path.write_text("FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: 1 1 mesh.geo\nVARIABLE\nscalar per node: 1 1 p p.set\n"
+                             "scalar per element: 1 1 c c.set\n" + self.STEPS + "FILE\nfile set: 1\nnumber of steps: 2\n")
+
+    def test_file_sets(self):
+        mesh = self.rounded(Mesh(2))
+        for order, differ, c_binary in ((None, False, False), ("<", False, False), (">", True, True)):
+            with self.subTest(order=order):
+                self.file_set(mesh, order, differ, c_binary)
+                self.assertEqual(self.info(self.path)["times"], [0.5, 1.5])
+                expected = self.as_written(mesh, order)
+                self.expect_same([self.path], expected.vtk())
+                expected = copy.copy(expected)
+                expected.p, expected.c = 2 * mesh.p, 2 * mesh.c
+                self.expect_same([self.path], expected.vtk(), options=("--time-step", "1"))
+        text = self.path.read_text()
+        for old, new, words in (("number of steps: 2\nfile", "", ""), ("FILE\nfile set: 1", "FILE\nfile set: 2", "file set 1, which FILE does not have"),
+                                ("set: 1\nnumber of steps: 2\n", "set: 1\nnumber of steps: 1\n", "file set 1 has fewer steps than time set 1")):
+            at = text.rfind(old)
+            if at >= 0:
+                self.path.write_text(text[:at] + new + text[at + len(old):])
+                self.expect_line(self.path, "--time-step", "1", words=words)
+        self.path.write_text(text)
+        self.assertGreater(self.expect_damage("c.set"), 3)
+        # Over two files, whose numbers are in their names.
+        for name, step in (("p", "p.003"), ("p", "p.007")):
+            data = b"C Binary".ljust(80, b"\0") + b"BEGIN TIME STEP".ljust(80) + (self.folder / step).read_bytes() + b"END TIME STEP".ljust(80)
+            (self.folder / f"{name}.{'1' if step == 'p.003' else '2'}").write_bytes(data)
+        self.path.write_text(text.replace("1 1 p p.set", "1 2 p p.*") + "file set: 2\nfilename index: 1\nnumber of steps: 1\n"
+                             "filename index: 2\nnumber of steps: 1\n")
+        info = self.info(self.path, "--time-step", 1)
+        self.assertAlmostEqual(info["scalars"][0]["max"], 2 * mesh.p.max(), places=5)
+
     def test_polyhedra(self):
         mesh = self.rounded(Mesh())
         faces, _, of_cells = mesh.faces()
@@ -285,7 +331,7 @@ class EnsightCases(MeshFormats):
             self.assertGreater(self.expect_damage("mesh.geo"), 20 if IS_WHOLE else 6)
             self.assertGreater(self.expect_damage("c.003"), 10 if IS_WHOLE else 3)
         for old, new, words in (("ensight gold", "ensight", "expected 'ensight gold'"), ("mesh.geo", "none.geo", "none.geo"),
-                                ("model: 1 mesh.geo", "model: 1 1 mesh.geo", "file sets"), ("steps: 2", "steps: 3", "time set 1"),
+                                ("model: 1 mesh.geo", "model: 1 1 mesh.geo", "which FILE does not have"), ("steps: 2", "steps: 3", "time set 1"),
                                 ("p p.***", "p", "which does not exist"), ("1.5", "-1.5", "time set 1"), ("1.5", "nan", "time set 1"),
                                 ("1.5", "inf", "time set 1"), ("scalar per node: 1 p p.***", "scalar per \33node: p", "scalar per ?node")):
             text = self.path.read_text()

@@ -20,6 +20,11 @@ namespace {
 constexpr uint64_t kLooked = 2048;
 constexpr double kMaxSteps = 1 << 20;
 
+/// The steps of each file. Numbers are in the names where there are several.
+struct FileSet {
+  std::vector<double> numbers, steps;
+};
+
 struct TimeSet {
   std::vector<double> times, numbers;  // numbers: in the names of files
   double steps = 0, start = 0, increment = 1;
@@ -28,7 +33,7 @@ struct TimeSet {
 /// A line of GEOMETRY or VARIABLE: the sets of times and of files, if any, then words.
 struct Entry {
   size_t time_set = 0;  // 0: none
-  bool file_set = false;
+  size_t file_set = 0;  // 0: none
   std::vector<std::string> words;
 };
 
@@ -52,8 +57,7 @@ Entry entryOf(std::string_view value, size_t least) {
   for (; numbers < 2 && words.size() > least + numbers; ++numbers) {
     double number = 0;
     if (!parseNumber(words[numbers], number) || number < 1 || number > kMaxSteps) break;
-    if (numbers == 0) entry.time_set = static_cast<size_t>(number);
-    entry.file_set = numbers == 1;
+    (numbers == 0 ? entry.time_set : entry.file_set) = static_cast<size_t>(number);
   }
   entry.words.assign(words.begin() + static_cast<ptrdiff_t>(numbers), words.end());
   return entry;
@@ -70,7 +74,9 @@ class CaseReader {
   void takeLine(std::string_view key, std::string_view value);
   void takeTime(std::string_view key, std::string_view value);
   void takeVariable(std::string_view key, std::string_view value);
-  std::filesystem::path fileOf(const Entry& entry, const std::string& name, double time) const;
+  void takeFileSet(std::string_view key, std::string_view value);
+  EnsightPlace placeOf(const Entry& entry, const std::string& name, double time) const;
+  size_t stepOf(const Entry& entry, const std::string& name, double time) const;
 
   const std::filesystem::path &path_, &folder_;
   std::string section_, key_;
@@ -83,6 +89,8 @@ class CaseReader {
   std::vector<Variable> variables_;
   std::map<size_t, TimeSet> sets_;
   TimeSet* set_ = nullptr;
+  std::map<size_t, FileSet> file_sets_;
+  FileSet* file_set_ = nullptr;
   std::vector<std::string> skipped_;
 };
 
@@ -113,6 +121,18 @@ void CaseReader::takeLine(std::string_view key, std::string_view value) {
     skipped_.push_back(fmt::format("{} geometry", printable(key)));
   if (section_ == "variable") takeVariable(key, value);
   if (section_ == "time") takeTime(key, value);
+  if (section_ == "file") takeFileSet(key, value);
+}
+
+void CaseReader::takeFileSet(std::string_view key, std::string_view value) {
+  double number = 0;
+  if (!parseNumber(wordsOf(value).empty() ? "" : wordsOf(value)[0], number) ||
+      !(number >= 0 && number <= kMaxSteps))
+    return;
+  if (key == "file set") file_set_ = &file_sets_[static_cast<size_t>(number)];
+  if (!file_set_) return;
+  if (key == "filename index") file_set_->numbers.push_back(number);
+  if (key == "number of steps") file_set_->steps.push_back(number);
 }
 
 void CaseReader::takeTime(std::string_view key, std::string_view value) {
@@ -154,32 +174,53 @@ void CaseReader::takeVariable(std::string_view key, std::string_view value) {
   variables_.push_back(std::move(variable));
 }
 
-/// The file of the time. Stars stand for the number of its step.
-std::filesystem::path CaseReader::fileOf(const Entry& entry, const std::string& name, double time) const {
-  if (entry.file_set)
-    throw Error(
-        "{}: has all steps of {} in one file (file sets), which is not read; write a file for each step",
-        path_.string(), printable(name));
+/// The last step of the entry's time set that is not later.
+size_t CaseReader::stepOf(const Entry& entry, const std::string& name, double time) const {
+  const auto found = sets_.find(std::max<size_t>(entry.time_set, 1));
+  if (found == sets_.end() || found->second.times.empty())
+    throw Error("{}: {} is of several steps, but there is no time set", path_.string(), printable(name));
+  const std::vector<double>& times = found->second.times;
+  const auto next = std::upper_bound(times.begin(), times.end(), time);
+  return static_cast<size_t>(std::max<ptrdiff_t>(0, next - times.begin() - 1));
+}
+
+/// Where the values of the time are. Stars stand for the number of its step, or of the file that has it.
+EnsightPlace CaseReader::placeOf(const Entry& entry, const std::string& name, double time) const {
+  EnsightPlace place;
   std::string file = name;
   const size_t star = file.find('*');
+  double number = 0;
+  if (entry.file_set > 0) {
+    const auto found = file_sets_.find(entry.file_set);
+    if (found == file_sets_.end() || found->second.steps.empty())
+      throw Error("{}: {} is of file set {}, which FILE does not have; the file is damaged", path_.string(),
+                  printable(name), entry.file_set);
+    const FileSet& set = found->second;
+    auto step = static_cast<double>(stepOf(entry, name, time));
+    size_t of_set = 0;
+    while (of_set + 1 < set.steps.size() && step >= set.steps[of_set]) step -= set.steps[of_set++];
+    if (step >= set.steps[of_set])
+      throw Error("{}: file set {} has fewer steps than time set {}; the file is damaged", path_.string(),
+                  entry.file_set, std::max<size_t>(entry.time_set, 1));
+    place.step = static_cast<uint64_t>(step);
+    place.steps = static_cast<uint64_t>(set.steps[of_set]);
+    number = of_set < set.numbers.size() ? set.numbers[of_set] : 0;
+  } else if (star != std::string::npos) {
+    const size_t step = stepOf(entry, name, time);
+    const TimeSet& set = sets_.at(std::max<size_t>(entry.time_set, 1));
+    number =
+        step < set.numbers.size() ? set.numbers[step] : set.start + static_cast<double>(step) * set.increment;
+  }
   if (star != std::string::npos) {
     const size_t stars = std::min(file.find_first_not_of('*', star), file.size()) - star;
-    const auto found = sets_.find(std::max<size_t>(entry.time_set, 1));
-    if (found == sets_.end() || found->second.times.empty())
-      throw Error("{}: {} is of several steps, but there is no time set", path_.string(), printable(name));
-    const TimeSet& set = found->second;
-    // The last step that is not later.
-    const auto next = std::upper_bound(set.times.begin(), set.times.end(), time);
-    const auto step = static_cast<size_t>(std::max<ptrdiff_t>(0, next - set.times.begin() - 1));
-    const double number =
-        step < set.numbers.size() ? set.numbers[step] : set.start + static_cast<double>(step) * set.increment;
     if (!(number >= 0 && number < 1e15))
       throw Error("{}: the files of {} have the number {}; expected 0 or more", path_.string(),
                   printable(name), number);
     file = file.substr(0, star) + fmt::format("{:0{}}", static_cast<uint64_t>(number), stars) +
            file.substr(star + stars);
   }
-  return existingFile(path_.string() + ':', folder_, file);
+  place.file = existingFile(path_.string() + ':', folder_, file);
+  return place;
 }
 
 EnsightCase CaseReader::run(std::optional<uint32_t> step) {
@@ -205,9 +246,9 @@ EnsightCase CaseReader::run(std::optional<uint32_t> step) {
   result.times.erase(std::unique(result.times.begin(), result.times.end()), result.times.end());
   result.time_step = chosenTimeStep(path_.string(), result.times, step);
   const double time = result.times.empty() ? 0 : result.times[result.time_step];
-  result.geometry = fileOf(*model_, model_->words[0], time);
+  result.geometry = placeOf(*model_, model_->words[0], time);
   for (Variable& one : variables_) {
-    one.variable.file = fileOf(one.entry, one.entry.words[1], time);
+    one.variable.place = placeOf(one.entry, one.entry.words[1], time);
     result.variables.push_back(std::move(one.variable));
   }
   if (!skipped_.empty())

@@ -6,6 +6,8 @@
 //                                                                                     filename start number: 0
 //                                                                                     filename increment: 1
 //                                                                                     time values: 0.0 0.5
+//
+// With a second number before a name ("model: 1 1 mesh.geo") the file has several steps, as the file set (FILE) says.
 #pragma once
 
 #include <cstdint>
@@ -22,23 +24,30 @@ namespace curvisplat {
 /// Whether the text begins with FORMAT and a type of EnSight.
 bool isEnsightCase(const InputFile& file);
 
+/// A file, or a step of a file set's.
+struct EnsightPlace {
+  std::filesystem::path file;
+  std::optional<uint64_t> step;  // in the file; nullopt: the file is of one step
+  uint64_t steps = 0;            // of the file
+};
+
 struct EnsightVariable {
   std::string name;
   size_t components = 1;  // 1 or 3
   Centring centring = Centring::kNode;
-  std::filesystem::path file;  // of the open step
+  EnsightPlace place;  // of the open step
 };
 
 struct EnsightCase {
-  std::filesystem::path geometry;  // of the open step
+  EnsightPlace geometry;  // of the open step
   std::vector<EnsightVariable> variables;
   std::vector<double> times;
   uint32_t time_step = 0;
   std::vector<std::string> warnings;  // of what is left out
 };
 
-/// Names are relative to `folder`. Throws Error if the case is damaged, of another version than Gold, has all steps in one
-/// file, or names a file that does not exist.
+/// Names are relative to `folder`. Throws Error if the case is damaged, of another version than Gold, or names a file that
+/// does not exist.
 EnsightCase readEnsightCase(const std::filesystem::path& path, const std::filesystem::path& folder,
                             std::optional<uint32_t> step);
 

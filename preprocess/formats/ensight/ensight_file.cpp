@@ -56,9 +56,10 @@ std::vector<double> EnsightList::all() const {
   return values;
 }
 
-EnsightFile::EnsightFile(std::shared_ptr<const PooledFile> file, std::optional<bool> binary,
-                         const EnsightScratch& scratch)
-    : file_(std::move(file)), spool_(scratch.spools.items) {
+EnsightFile::EnsightFile(const EnsightPlace& place, std::optional<bool> binary, const EnsightScratch& scratch)
+    : file_(std::make_shared<const PooledFile>(scratch.pool, place.file)),
+      end_(file_->size()),
+      spool_(scratch.spools.items) {
   std::array<char, kTextBytes> begin{};
   const size_t shown = std::min<uint64_t>(begin.size(), file_->size());
   file_->readAt(0, std::as_writable_bytes(std::span(begin).first(shown)));
@@ -66,12 +67,61 @@ EnsightFile::EnsightFile(std::shared_ptr<const PooledFile> file, std::optional<b
   if (first.find("ortran") != std::string::npos || begin[4] == 'F')
     throw Error("{}: is Fortran Binary, which is not read; write C Binary or ASCII", name());
   binary_ = binary.value_or(first.starts_with("C Binary") || first.starts_with("C binary"));
-  if (!binary_) text_.emplace(file_, 0, file_->size());
   if (!binary && binary_) at_ = kTextBytes;
+  if (place.step) findStep(place);
+  if (!binary_) text_.emplace(file_, at_, end_);
+}
+
+/// Where the words begin, from there on.
+std::optional<uint64_t> EnsightFile::find(std::string_view words, uint64_t from) const {
+  std::string chunk;
+  for (uint64_t at = from; at < file_->size(); at += kChunk) {
+    chunk.resize(static_cast<size_t>(std::min(kChunk + words.size(), file_->size() - at)));
+    file_->readAt(at, std::as_writable_bytes(std::span(chunk)));
+    if (const size_t found = chunk.find(words); found != std::string::npos) return at + found;
+  }
+  return std::nullopt;
+}
+
+/// Sets where the step begins and ends. In binary files, whose steps mostly are of the same size, it is looked up
+/// where it must be then; else all before it are passed.
+void EnsightFile::findStep(const EnsightPlace& place) {
+  constexpr std::string_view kBegin = "BEGIN TIME STEP", kEnd = "END TIME STEP";
+  const auto fail = [&] {
+    throw Error("{}: has no step {} of {}; the file is truncated", name(), *place.step + 1, place.steps);
+  };
+  const auto last = [&](uint64_t begin) {
+    const std::optional<uint64_t> end = find(kEnd, begin);
+    if (!end) fail();
+    return *end;
+  };
+  std::optional<uint64_t> begin = find(kBegin, 0);
+  if (!begin) fail();
+  const uint64_t first = *begin;
+  uint64_t passed = 0;
+  if (binary_ && *place.step > 0) {
+    const uint64_t bytes = last(first) + kTextBytes - first;
+    const uint64_t guess = first + *place.step * bytes;
+    if (bytes * place.steps == file_->size() - first && find(kBegin, guess) == guess) {
+      begin = guess;
+      passed = *place.step;
+    }
+  }
+  for (; passed < *place.step; ++passed) {
+    begin = find(kBegin, last(*begin));
+    if (!begin) fail();
+  }
+  end_ = last(*begin);
+  at_ = *begin + kTextBytes;
+  if (!binary_) {
+    TextReader line(file_, *begin, end_);
+    line.line();
+    at_ = line.offset();
+  }
 }
 
 uint64_t EnsightFile::left() const {
-  return file_->size() - std::min(binary_ ? at_ : text_->offset(), file_->size());
+  return end_ - std::min(binary_ ? at_ : text_->offset(), end_);
 }
 
 std::string EnsightFile::text() {
@@ -81,7 +131,7 @@ std::string EnsightFile::text() {
   }
   std::array<char, kTextBytes> text{};
   if (left() < text.size()) {
-    at_ = file_->size();
+    at_ = end_;
     return "";
   }
   file_->readAt(at_, std::as_writable_bytes(std::span(text)));

@@ -8,11 +8,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/ensight/ensight_case.h"
 
 namespace curvisplat {
 
@@ -41,8 +43,7 @@ struct EnsightScratch {
 class EnsightFile {
  public:
   /// `binary`: whether it has to be; nullopt: as a geometry file itself tells, whose first text says so.
-  EnsightFile(std::shared_ptr<const PooledFile> file, std::optional<bool> binary,
-              const EnsightScratch& scratch);
+  EnsightFile(const EnsightPlace& place, std::optional<bool> binary, const EnsightScratch& scratch);
 
   bool binary() const { return binary_; }
   bool swap() const { return swap_; }
@@ -65,12 +66,14 @@ class EnsightFile {
   void finish();
 
  private:
+  void findStep(const EnsightPlace& place);
+  std::optional<uint64_t> find(std::string_view words, uint64_t from) const;
   EnsightList list(uint64_t count, bool integers);
   uint64_t left() const;
 
   std::shared_ptr<const PooledFile> file_;
   bool binary_ = false, swap_ = false;
-  uint64_t at_ = 0;  // of a binary file
+  uint64_t at_ = 0, end_ = 0;  // of a binary file
   std::optional<TextReader> text_;
   NumberSpool<double> spool_;
   std::shared_ptr<SpooledNumbers> spooled_ = std::make_shared<SpooledNumbers>();

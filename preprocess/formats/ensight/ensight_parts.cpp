@@ -51,9 +51,8 @@ EnsightElements elementsOf(const std::string& type) {
 
 class GeometryReader {
  public:
-  GeometryReader(const std::filesystem::path& path, const EnsightScratch& scratch)
-      : file_(std::make_shared<const PooledFile>(scratch.pool, path), std::nullopt, scratch),
-        scratch_(scratch) {}
+  GeometryReader(const EnsightPlace& place, const EnsightScratch& scratch)
+      : file_(place, std::nullopt, scratch), scratch_(scratch) {}
 
   EnsightGeometry run();
 
@@ -241,8 +240,8 @@ EnsightGeometry GeometryReader::run() {
 
 }  // namespace
 
-EnsightGeometry readEnsightGeometry(const std::filesystem::path& path, const EnsightScratch& scratch) {
-  return GeometryReader(path, scratch).run();
+EnsightGeometry readEnsightGeometry(const EnsightPlace& place, const EnsightScratch& scratch) {
+  return GeometryReader(place, scratch).run();
 }
 
 namespace {
@@ -251,9 +250,7 @@ class ValuesReader {
  public:
   ValuesReader(const EnsightVariable& variable, const EnsightGeometry& geometry,
                const EnsightScratch& scratch)
-      : variable_(variable),
-        geometry_(geometry),
-        file_(std::make_shared<const PooledFile>(scratch.pool, variable.file), geometry.binary, scratch) {
+      : variable_(variable), geometry_(geometry), file_(variable.place, geometry.binary, scratch) {
     file_.setSwap(geometry.swap);
   }
 

@@ -52,7 +52,7 @@ struct EnsightGeometry {
 };
 
 /// Reads the parts of a geometry file. Throws Error if it is damaged.
-EnsightGeometry readEnsightGeometry(const std::filesystem::path& path, const EnsightScratch& scratch);
+EnsightGeometry readEnsightGeometry(const EnsightPlace& place, const EnsightScratch& scratch);
 
 /// The values of a variable on a part. Values at nodes have one list; values in elements have one for each
 /// of EnsightPart::elements, or one for a structured part. A list has all values of a component, then those

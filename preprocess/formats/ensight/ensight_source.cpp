@@ -70,13 +70,13 @@ EnsightData::EnsightData(const OpenGridOptions& options) {
   EnsightCase found = readEnsightCase(options.grid, options.namesFolder(), options.time_step);
   const EnsightScratch scratch(options.temporary_folder);
   geometry_ = readEnsightGeometry(found.geometry, scratch);
-  description_.files = {options.grid.string(), found.geometry.string()};
+  description_.files = {options.grid.string(), found.geometry.file.string()};
   description_.times = std::move(found.times);
   description_.time_step = found.time_step;
   description_.warnings = std::move(found.warnings);
   description_.coordinate_bytes = 4;
   for (const EnsightVariable& variable : found.variables) {
-    description_.files.push_back(variable.file.string());
+    description_.files.push_back(variable.place.file.string());
     values_.push_back(readEnsightValues(variable, geometry_, scratch));
   }
   chooseParts();
