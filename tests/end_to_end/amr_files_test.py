@@ -74,6 +74,32 @@ class AmrFiles(unittest.TestCase):
                     self.assertEqual(converted["splats"], len(values))
                     self.assertAlmostEqual(converted["volume"], volumes.sum(), delta=1e-3 * volumes.sum())
 
+    def test_the_first_version(self):
+        """vtkHierarchicalBoxDataSet 0.1, in a file .vtm: no blocks, but groups; as VTK 5 wrote chombo's example."""
+        amr = pulse()
+        writer = vtk.vtkXMLUniformGridAMRWriter()
+        writer.SetFileName(str(self.path))
+        writer.SetInputData(amr)
+        self.assertEqual(writer.Write(), 1)
+        text, ratio = self.path.read_text(), amr.GetRefinementRatio(0)
+        sets, level = [], -1
+        for line in text.splitlines():
+            if "<Block" in line:
+                level += 1
+            if "<DataSet" in line:
+                sets.append(line.replace("<DataSet index=", f'<DataSet group="{level}" dataset=').replace('">', '"/>'))
+        ratios = "\n".join(f'    <RefinementRatio level="{n}" refinement="{ratio}"/>' for n in range(level))
+        old = self.folder / "pulse.vtm"
+        old.write_text('<?xml version="1.0"?>\n<VTKFile type="vtkHierarchicalBoxDataSet" version="0.1" byte_order="LittleEndian" '
+                       'compressor="vtkZLibDataCompressor">\n  <vtkHierarchicalBoxDataSet>\n' + ratios + "\n" + "\n".join(sets)
+                       + "\n  </vtkHierarchicalBoxDataSet>\n</VTKFile>\n")
+        values, volumes = leaf_cells(amr, "Gaussian-Pulse")
+        statistics = self.folder / "statistics.json"
+        self.run_program("convert", old, "-o", self.folder / "pulse.splats", "--scalar", "Gaussian-Pulse", "--stats", statistics)
+        converted = json.loads(statistics.read_text())
+        self.assertEqual(converted["splats"], len(values))
+        self.assertAlmostEqual(converted["volume"], volumes.sum(), delta=1e-3 * volumes.sum())
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -170,6 +170,11 @@ class VtkHdf(MeshFormats):
             self.assertEqual(found.GetNumberOfCells(), len(mesh.cells))
             np.testing.assert_array_equal(vtk_to_numpy(found.GetPointData().GetArray("p")), mesh.p)
             self.expect_same([self.path], mesh.vtk())
+        # Prototypes of the format (the can's among VTK's own examples) do not state the type.
+        with h5py.File(self.path, "a") as f:
+            del f["VTKHDF"].attrs["Type"]
+        self.assertEqual(self.read_by_vtk().GetNumberOfCells(), len(mesh.cells))
+        self.expect_same([self.path], mesh.vtk())
 
     def test_parts(self):
         mesh = Mesh()

@@ -33,7 +33,7 @@ class HdfGatherer {
     const double version = file_.numbers(kRoot, "Version", 2)[0];
     if (version != 1 && version != 2)
       file_.fail(kRoot, fmt::format("is of version {}; expected 1 or 2", version));
-    type_ = file_.text(kRoot, "Type");
+    type_ = typeOf(kRoot);
     if (type_ == "MultiBlockDataSet" || type_ == "PartitionedDataSetCollection")
       addSet();
     else if (!addDataSet(kRoot, ""))
@@ -49,6 +49,13 @@ class HdfGatherer {
   }
 
  private:
+  /// The type of a group. Prototypes of version 1.0 do not state it; all of them are meshes.
+  std::string typeOf(const std::string& group) const {
+    std::string type = file_.text(group, "Type");
+    if (type.empty() && file_.has(group + "/Connectivity")) type = "UnstructuredGrid";
+    return type;
+  }
+
   /// The place of an open data set's step in its arrays.
   struct Step {
     std::string group;  // Steps; empty without
@@ -116,7 +123,7 @@ class HdfGatherer {
 
   /// Returns false if it is of a type that is not read.
   bool addDataSet(const std::string& group, const std::string& name) {
-    const std::string type = file_.text(group, "Type");
+    const std::string type = typeOf(group);
     if (type == "ImageData")
       addImage(group, name);
     else if (type == "UnstructuredGrid")

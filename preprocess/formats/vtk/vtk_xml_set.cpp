@@ -260,33 +260,42 @@ class Gatherer {
     std::vector<size_t> pieces;  // [patch]
     std::map<size_t, Node> levels;
     for (const Node& node : file.content().children("Block")) {
-      const double level = file.numbers(node, "level", 1)[0];
-      if (!(level >= 0 && level < kMaxAmrLevels) || level != std::floor(level))
-        file.fail(fmt::format("has a level {}; expected 0 to {}", level, kMaxAmrLevels - 1));
-      if (!levels.emplace(static_cast<size_t>(level), node).second)
-        file.fail(fmt::format("has two levels {}", level));
+      const size_t level = levelOf(file, node, "level");
+      if (!levels.emplace(level, node).second) file.fail(fmt::format("has two levels {}", level));
     }
+    std::vector<std::pair<size_t, Node>> sets;
     for (const auto& [level, block] : levels)
-      for (const Node& node : block.children("DataSet")) {
-        if (!node.attribute("file")) continue;
-        if (patches.size() == kMaxAmrPatches)
-          file.fail(fmt::format("has more than {} patches", kMaxAmrPatches));
-        const fs::path path = pathOf(file, node, "file");
-        const size_t before = grid_.pieces.size();
-        add(path, name + (name.empty() ? "" : "/") + path.stem().string());
-        if (grid_.pieces.size() == before) continue;  // empty, or left out
-        const AmrPatch patch{level, boxOf(file, node)};
-        const VtkPiece& piece = grid_.pieces.back();
-        for (size_t axis = 0; axis < 3; ++axis)
-          if (grid_.pieces.size() > before + 1 ||
-              piece.extent.nodesAlong(axis) != patch.cells.nodesAlong(axis) + 1)
-            file.fail(fmt::format("{} has {} nodes, which is not its amr_box and a node more along each axis",
-                                  path.string(), piece.extent.describe()));
-        patches.push_back(patch);
-        pieces.push_back(before);
-      }
+      for (const Node& node : block.children("DataSet")) sets.emplace_back(level, node);
+    // Version 0.1 has no blocks; the levels are called groups.
+    for (const Node& node : file.content().children("DataSet"))
+      sets.emplace_back(levelOf(file, node, "group"), node);
+    for (const auto& [level, node] : sets) {
+      if (!node.attribute("file")) continue;
+      if (patches.size() == kMaxAmrPatches)
+        file.fail(fmt::format("has more than {} patches", kMaxAmrPatches));
+      const fs::path path = pathOf(file, node, "file");
+      const size_t before = grid_.pieces.size();
+      add(path, name + (name.empty() ? "" : "/") + path.stem().string());
+      if (grid_.pieces.size() == before) continue;  // empty, or left out
+      const AmrPatch patch{level, boxOf(file, node)};
+      const VtkPiece& piece = grid_.pieces.back();
+      for (size_t axis = 0; axis < 3; ++axis)
+        if (grid_.pieces.size() > before + 1 ||
+            piece.extent.nodesAlong(axis) != patch.cells.nodesAlong(axis) + 1)
+          file.fail(fmt::format("{} has {} nodes, which is not its amr_box and a node more along each axis",
+                                path.string(), piece.extent.describe()));
+      patches.push_back(patch);
+      pieces.push_back(before);
+    }
     const auto refined = refinedCellsOf(patches, ratiosOf(file, levels));
     for (size_t n = 0; n < patches.size(); ++n) grid_.pieces[pieces[n]].refined = refined[n];
+  }
+
+  static size_t levelOf(const VtkXmlFile& file, const Node& node, const char* attribute) {
+    const double level = file.numbers(node, attribute, 1)[0];
+    if (!(level >= 0 && level < kMaxAmrLevels) || level != std::floor(level))
+      file.fail(fmt::format("has a level {}; expected 0 to {}", level, kMaxAmrLevels - 1));
+    return static_cast<size_t>(level);
   }
 
   static VtkExtent boxOf(const VtkXmlFile& file, const Node& node) {
@@ -299,6 +308,11 @@ class Gatherer {
   static std::vector<std::array<int64_t, 3>> ratiosOf(const VtkXmlFile& file,
                                                       const std::map<size_t, Node>& levels) {
     std::vector<std::array<int64_t, 3>> ratios(kMaxAmrLevels, {2, 2, 2});
+    for (const Node& node : file.content().children("RefinementRatio")) {  // of version 0.1
+      const size_t level = levelOf(file, node, "level");
+      ratios[level] =
+          refinementOf(file.name(), level, std::vector<double>(3, file.numbers(node, "refinement", 1)[0]));
+    }
     for (const auto& [level, block] : levels) {
       const auto next = levels.find(level + 1);
       if (next == levels.end()) continue;
