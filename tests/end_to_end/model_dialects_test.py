@@ -259,6 +259,34 @@ class Places(ModelFileTest):
         self.assertIn("S has 2 (depth, ncells), the cells of an unstructured map: give the grid file that has their faces", line)
 
 
+    def test_what_a_message_must_not_say(self):
+        """Maps of two dimensions whose coordinates have other names than they (NCL); forecasts by lead time; MPAS' bare mesh."""
+        with self.file(time=2, latitude=4, longitude=5) as f:
+            f.add("time", "time", [1, 2], units="Month")
+            f.add("lat", "latitude", np.arange(4), units="degrees_north")
+            f.add("lon", "longitude", np.arange(5), units="degrees_east")
+            f.add("sst", "time latitude longitude", np.zeros((2, 4, 5)), "f4")
+        line = self.info(fails=True)
+        self.assertIn("sst has 2 (latitude, longitude)", line)
+        self.assertNotIn("unstructured", line)
+        with self.file(frtime=3, level=4, lat=5, lon=6) as f:
+            f.add("frtime", "frtime", [0, 12, 24], units="hours")
+            f.add("level", "level", [1000, 850, 500, 100], units="hPa")
+            f.add("lat", "lat", np.arange(5), units="degrees_north")
+            f.add("lon", "lon", np.arange(6), units="degrees_east")
+            f.add("T", "frtime level lat lon", np.ones((3, 4, 5, 6)), "f4")
+            f.add("Psl", "frtime lat lon", np.ones((3, 5, 6)), "f4")
+        self.assertNotIn("expected a length", "".join(self.info()["warnings"]))
+        with self.file(nCells=4, nVertices=6, maxEdges=3, vertexDegree=3) as f:
+            for place, of in (("Cell", "nCells"), ("Vertex", "nVertices")):
+                for name in ("lon", "lat"):
+                    f.add(name + place, of, np.linspace(0, 1, 4 if of == "nCells" else 6))
+            f.add("verticesOnCell", "nCells maxEdges", np.ones((4, 3)), "i4")
+            f.add("nEdgesOnCell", "nCells", [3] * 4, "i4")
+            f.add("kiteAreasOnVertex", "nVertices vertexDegree", np.ones((6, 3)))
+        self.assertIn("a grid of MPAS without a variable of faces or nodes and layers", self.info(fails=True))
+
+
 class Fields(ModelFileTest):
     """Which variables are taken where none is asked for."""
 

@@ -193,6 +193,12 @@ bool isBounds(const NetcdfFiles& file, const NetcdfVariable& variable) {
                      [&](const NetcdfVariable& other) { return other.text("bounds") == variable.name; });
 }
 
+/// Sides and corners of MPAS' faces: no layers.
+bool isOfMapAlone(std::string_view dimension) {
+  constexpr std::string_view kNames[] = {"maxEdges", "maxEdges2", "vertexDegree", "TWO"};
+  return std::find(std::begin(kNames), std::end(kNames), dimension) != std::end(kNames);
+}
+
 }  // namespace
 
 std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file) {
@@ -253,6 +259,7 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     }
     if (isBounds(file, variable)) continue;
     if (others.size() == 1 && &variable == heightsOfNodes(file, map, others[0])) continue;
+    if (others.size() == 1 && isOfMapAlone(file.dimensions()[others[0]].name)) continue;
     const uint64_t layers = others.size() == 1 ? file.dimensions()[others[0]].length : 0;
     if (layers < 2 || layers > kMaxLevels || &variable == map.nodes_of_face) continue;
     const Centring centring = faces ? Centring::kCell : Centring::kNode;

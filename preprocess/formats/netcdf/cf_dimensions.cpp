@@ -43,12 +43,16 @@ bool isTime(const NetcdfFiles& file, size_t dim, size_t rank) {
   return dimension.unlimited && rank > 3;
 }
 
+bool hasUnitOfTime(const NetcdfVariable& coordinate) {
+  static const std::set<std::string> units{"hours", "hour", "h", "days", "day", "minutes", "seconds", "s"};
+  return units.contains(lowerCase(coordinate.text("units")));
+}
+
 bool isLeadTime(const NetcdfFiles& file, size_t dim) {
   static const std::set<std::string> names{"step",         "lead", "lead_time", "leadtime", "forecast_period",
                                            "forecast_hour"};
-  static const std::set<std::string> units{"hours", "hour", "h", "days", "day", "minutes", "seconds", "s"};
   const NetcdfVariable* const coordinate = file.find(file.dimensions()[dim].name);
-  return coordinate && coordinate->numeric && units.contains(lowerCase(coordinate->text("units"))) &&
+  return coordinate && coordinate->numeric && hasUnitOfTime(*coordinate) &&
          (coordinate->text("standard_name") == "forecast_period" ||
           names.contains(lowerCase(coordinate->name)));
 }

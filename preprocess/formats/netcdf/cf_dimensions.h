@@ -14,6 +14,9 @@ namespace curvisplat {
 /// has three others: `rank` counts all.
 bool isTime(const NetcdfFiles& file, size_t dim, size_t rank);
 
+/// Hours, days and the like, whatever the coordinate is called.
+bool hasUnitOfTime(const NetcdfVariable& coordinate);
+
 /// Lead times of a forecast: hours since its start.
 bool isLeadTime(const NetcdfFiles& file, size_t dim);
 

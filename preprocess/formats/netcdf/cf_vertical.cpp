@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
+#include "preprocess/formats/netcdf/cf_dimensions.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -50,7 +51,7 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
   std::string reason = fmt::format("no depth, height or pressure along {}", levels);
   if (auto found = byNodeGeopotential(file, block)) return {std::move(found), ""};
   const NetcdfVariable* const along = file.find(levels);
-  if (along && !along->text("units").empty()) reason = notALength(*along);
+  if (along && !along->text("units").empty() && !hasUnitOfTime(*along)) reason = notALength(*along);
   // The formula may be that of the dimension's coordinate, or of another one along it (the levels' heights beside their numbers).
   std::vector<const NetcdfVariable*> formulas;
   if (along) formulas.push_back(along);

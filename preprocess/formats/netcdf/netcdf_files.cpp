@@ -254,6 +254,7 @@ std::optional<std::string> foreignNetcdf(const NetcdfFiles& file) {
     return mentions(file, {"source", "title"}, "ICON") ? "an unstructured grid (ICON)"
                                                        : "an unstructured grid";
   if (hasDimensions(file, {"nCells", "nVertices"})) return "an unstructured mesh (MPAS)";
+  if (mentions(file, {"Type", "Origin"}, "TUFLOWFV")) return "an unstructured mesh (TUFLOW FV)";
   const std::vector<std::string>& groups = file.groups();
   const auto has = [&](const char* group) {
     return std::find(groups.begin(), groups.end(), group) != groups.end();

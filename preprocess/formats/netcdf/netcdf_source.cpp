@@ -110,13 +110,17 @@ std::string nearestToGrid(const NetcdfFiles& file) {
   if (!nearest || dims.empty()) return "no variable has three dimensions in space";
   std::string text = fmt::format("no variable has three dimensions in space; {} has {} ({})", nearest->name,
                                  dims.size(), fmt::join(dims, ", "));
-  for (const NetcdfVariable& variable : file.variables())
-    if (dims.size() == 2 && variable.dims.size() == 1 && file.dimension(variable, 0).name == dims.back() &&
-        cfRole(file, variable) == CfRole::kLongitude && variable.name != dims.back())
-      return text +
-             fmt::format(
-                 ", the cells of an unstructured map: give the grid file that has their faces after it "
-                 "(ICON's icon_grid.nc, MPAS' or UGRID's mesh)");
+  // Both longitude and latitude along one dimension.
+  const auto along_last = [&](CfRole role) {
+    return std::any_of(file.variables().begin(), file.variables().end(), [&](const NetcdfVariable& variable) {
+      return variable.dims.size() == 1 && file.dimension(variable, 0).name == dims.back() &&
+             variable.name != dims.back() && cfRole(file, variable) == role;
+    });
+  };
+  if (dims.size() == 2 && along_last(CfRole::kLongitude) && along_last(CfRole::kLatitude))
+    text +=
+        ", the cells of an unstructured map: give the grid file that has their faces after it (ICON's "
+        "icon_grid.nc, MPAS' or UGRID's mesh)";
   return text;
 }
 
