@@ -266,6 +266,35 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
     write("a.bdf", text);
     expectNamed("a.bdf", "a Nastran mesh");
   }
+  write("a.neu", "        CONTROL INFO 1.2.1\n** GAMBIT NEUTRAL FILE\nExample\n");
+  expectNamed("a.neu", "a neutral file of GAMBIT");
+  write("a.frd", "    1C\n    1UUSER                                                              \n");
+  expectNamed("a.frd", "a result of CalculiX (.frd)");
+  write("a.vrt", "PROSTAR_VERTEX\n     4020         0         0\n");
+  expectNamed("a.vrt", "a mesh of STAR-CD");
+  write("a.nek5000", "filetemplate: eddy_uv%01d.f%05d\nfirsttimestep: 1\nnumtimesteps: 11\n");
+  expectNamed("a.nek5000", "a list of Nek5000's field files");
+  write("a.2dm", "MESH2D\nE3T 1 1 2 3 1\nND 1 0 0 0\n");
+  expectNamed("a.2dm", "a mesh of SMS (.2dm), which has no volume");
+  write("a.ply", "ply\r\nformat ascii 1.0\r\n");
+  expectNamed("a.ply", "a surface without a volume");
+  write("a.mhd", "NDims = 3\nDimSize = 48 62 42\n");
+  expectNamed("a.mhd", "a MetaImage, which is not read");
+  write("b.mhd", "ObjectType = Image\nNDims = 3\n");
+  expectNamed("b.mhd", "a MetaImage, which is not read");
+  write("a.nrrd", "NRRD0004\n# Complete NRRD file format specification\ntype: short\n");
+  expectNamed("a.nrrd", "an NRRD image, which is not read");
+  write("a.nii", "\x5c\1\0\0"s + std::string(340, '\0') + "n+1\0"s + std::string(400, '\2'));
+  expectNamed("a.nii", "a NIfTI image, which is not read");
+  // Double precision, whose title may be empty but for a D.
+  for (const bool big : {false, true}) {
+    const auto marker = [&](char bytes) {
+      return big ? std::string(3, '\0') + bytes : bytes + std::string(3, '\0');
+    };
+    write("a.slf", marker(80) + std::string(79, ' ') + "D" + marker(80) + marker(8) + marker(2) + marker(0) +
+                       marker(8) + std::string(900, '\0'));
+    expectNamed("a.slf", "a SELAFIN file of Telemac");
+  }
   write("b.inp", "# by AVS\n4 1 0 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n1 0 tet 1 2 3 4\n");
   expectNamed("b.inp", "an AVS UCD mesh");
   // Binary, as AVS/Express writes it: a byte 7, then counts, here of a tetrahedron with a value at each node.

@@ -64,6 +64,8 @@ constexpr Magic kMagics[] = {
     {"!<<PDB:"sv, "a file of PDB or Silo, which is not read (save it as VTK, with VisIt)"},
     {"#std "sv, "a field file of Nek5000, which is not read (save it as VTK with VisIt or pymech)"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
+    {"NRRD000"sv, "an NRRD image, which is not read (save it as VTK's .vti, with 3D Slicer or ParaView)"},
+    {"PROSTAR_"sv, "a mesh of STAR-CD, which is not read (save it as CGNS or EnSight Gold)"},
     {"{"sv,
      "a JSON file, but no .p3d file that can be read (one is given alone, instead of the grid; it has no "
      "control characters)"},
@@ -186,22 +188,56 @@ bool isEclipseText(std::string_view begin) {
   return false;
 }
 
+/// A record of 80 bytes, the title, which says so or is followed by one of two counts; of either byte order.
+bool isSelafin(std::string_view begin) {
+  constexpr size_t kTitle = 80;
+  for (const bool big : {false, true}) {
+    const auto marker = [&](char bytes) {
+      return big ? std::string(3, '\0') + bytes : bytes + std::string(3, '\0');
+    };
+    const std::string counts = marker(kTitle) + marker(8);
+    if (!begin.starts_with(marker(kTitle)) || begin.size() < 4 + kTitle) continue;
+    if (begin.substr(4, kTitle).find("SERAFIN") != std::string_view::npos) return true;
+    const std::string_view behind = begin.substr(4 + kTitle);
+    if (behind.size() > counts.size() + 8 && behind.starts_with(counts) &&
+        behind.substr(counts.size() + 8).starts_with(marker(8)))
+      return true;
+  }
+  return false;
+}
+
+/// Words that a text begins with, in small letters.
+constexpr Magic kFirstWords[] = {
+    {"<?xml"sv, "an XML file"},
+    {"*heading"sv, "an Abaqus mesh, which is not read (meshio convert FILE mesh.vtu)"},
+    {"meshversionformatted"sv, "a Medit mesh, which is not read (meshio convert FILE mesh.vtu)"},
+    {"solid "sv, "a surface without a volume (render --surface FILE draws it)"},
+    {"ply\n"sv, "a surface without a volume (render --surface FILE draws it)"},
+    {"ply\r"sv, "a surface without a volume (render --surface FILE draws it)"},
+    {"mesh2d"sv, "a mesh of SMS (.2dm), which has no volume"},
+    {"mesh3d"sv, "a mesh of SMS (.3dm), which is not read"},
+    {"control info"sv, "a neutral file of GAMBIT, which is not read (save it as CGNS or EnSight Gold)"},
+    {"1c\n"sv, "a result of CalculiX (.frd), which is not read (ccx2paraview FILE vtu)"},
+    {"1c\r"sv, "a result of CalculiX (.frd), which is not read (ccx2paraview FILE vtu)"},
+    {"filetemplate:"sv,
+     "a list of Nek5000's field files, which are not read (save them as VTK with VisIt or pymech)"},
+    {"ndims = "sv, "a MetaImage, which is not read (save it as VTK's .vti, with ParaView)"},
+    {"objecttype = "sv, "a MetaImage, which is not read (save it as VTK's .vti, with ParaView)"},
+};
+
 /// The formats that are text, by the words that they begin with. `begin`: the first bytes of the file.
 std::optional<std::string> foreignText(std::string begin) {
   if (std::any_of(begin.begin(), begin.end(), [](char c) { return c == '\0'; })) return std::nullopt;
   begin = lowerCase(begin);
-  if (begin.starts_with("<?xml")) return "an XML file";
-  if (begin.starts_with("*heading"))
-    return "an Abaqus mesh, which is not read (meshio convert FILE mesh.vtu)";
-  if (begin.starts_with("meshversionformatted"))
-    return "a Medit mesh, which is not read (meshio convert FILE mesh.vtu)";
+  const std::string_view words =
+      std::string_view(begin).substr(std::min(begin.find_first_not_of(' '), begin.size()));
+  for (const Magic& first : kFirstWords)
+    if (words.starts_with(first.bytes)) return first.words;
   if (isFluent(begin)) return "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)";
   if (auto geometry = ensightGeometry(begin)) return geometry;
   if (isEclipseText(begin)) return "an ECLIPSE grid (GRDECL), which is not read";
   if (begin.starts_with("foamfile") || begin.find("\nfoamfile\n") != std::string::npos)
     return "a file of an OpenFOAM case (give the case's folder instead)";
-  if (begin.starts_with("solid ") || begin.starts_with("ply\n"))
-    return "a surface without a volume (render --surface FILE draws it)";
   if (isNastran(begin)) return "a Nastran mesh, which is not read (meshio convert FILE mesh.vtu)";
   if (isAvsUcd(begin)) return kAvsUcd;
   return std::nullopt;
@@ -226,10 +262,10 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
           block);
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
-  // A record of Fortran with the title, of either byte order.
-  if ((begin.starts_with("\0\0\0\x50"sv) || begin.starts_with("\x50\0\0\0"sv)) &&
-      begin.substr(4, 80).find("SERAFIN") != std::string::npos)
-    return "a SELAFIN file of Telemac, which is not read (save it as VTK)";
+  // NIfTI's mark is behind a header of 344 bytes.
+  if (begin.size() > 348 && begin.compare(344, 3, "n+1") == 0)
+    return "a NIfTI image, which is not read (save it as VTK's .vti, with ParaView)";
+  if (isSelafin(begin)) return "a SELAFIN file of Telemac, which is not read (save it as VTK)";
   if (isAvsUcdBinary(begin)) return kAvsUcd;
   // The first four bytes of an ADF file differ between versions.
   if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
