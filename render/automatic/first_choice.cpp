@@ -5,7 +5,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <iterator>
 #include <numeric>
+#include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,9 +48,26 @@ bool isNearlyConstant(const VariableInfo& variable) {
            kConstant * std::max(std::abs(variable.min), std::abs(variable.max)));
 }
 
+namespace {
+
+/// Numbers of points, cells and blocks, as VTK and ParaView keep them beside the fields.
+bool isNumbering(const VariableInfo& variable) {
+  constexpr std::string_view kNames[] = {"GlobalNodeId",        "GlobalElementId",    "PedigreeNodeId",
+                                         "PedigreeElementId",   "ObjectId",           "GlobalIds",
+                                         "vtkOriginalPointIds", "vtkOriginalCellIds", "vtkCompositeIndex"};
+  return std::find(std::begin(kNames), std::end(kNames), variable.name) != std::end(kNames);
+}
+
+}  // namespace
+
 size_t firstVaryingVariable(const Manifest& manifest) {
-  const auto found = std::find_if_not(manifest.variables.begin(), manifest.variables.end(), isNearlyConstant);
-  return found == manifest.variables.end() ? 0 : static_cast<size_t>(found - manifest.variables.begin());
+  std::optional<size_t> first;
+  for (size_t n = 0; n < manifest.variables.size(); ++n) {
+    if (isNearlyConstant(manifest.variables[n])) continue;
+    if (!isNumbering(manifest.variables[n])) return n;
+    if (!first) first = n;
+  }
+  return first.value_or(0);
 }
 
 FirstChoice::FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale, ChosenFor what)

@@ -191,6 +191,14 @@ TEST(FirstChoice, ConstantScalarsAreRecognised) {
   EXPECT_EQ(firstVaryingVariable(manifest), 0u);
 }
 
+TEST(FirstChoice, NumbersOfPointsAreTheLastScalarToDraw) {
+  Manifest manifest;
+  manifest.variables = {{0, "GlobalNodeId", "", 1, 6724}, {1, "ObjectId", "", 1, 2}, {2, "EQPS", "", 0, 3}};
+  EXPECT_EQ(firstVaryingVariable(manifest), 2u);
+  manifest.variables[2].max = 0;
+  EXPECT_EQ(firstVaryingVariable(manifest), 0u);
+}
+
 TEST(FirstChoice, NumbersAreRoundedToDigitsOfTheScale) {
   EXPECT_EQ(roundedTo(0.123456, 0.5, 3), 0.123);
   EXPECT_EQ(roundedTo(101.23456, 0.5, 2), 101.23);
