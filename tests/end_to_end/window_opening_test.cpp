@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "render/colour/function_parts.h"
+#include "stream/base/file.h"
 #include "tests/end_to_end/window_fixture.h"
 
 namespace curvisplat {
@@ -419,6 +420,17 @@ TEST_F(WindowOpening, AScalarWithOwnBlanksIsShownWhenItIsChosen) {
     EXPECT_EQ(valueOf(commands[n], "--position"), valueOf(commands[0], "--position"));
     expectDraws(commands[n], pictures[n]);
   }
+  // A state that shows such a scalar opens its cache.
+  for (const auto& remembered : fs::directory_iterator("config/curvisplat/views"))
+    if (readTextFile(remembered.path()).find("\"s3\"") != std::string::npos)
+      fs::copy_file(remembered.path(), "s3.json", fs::copy_options::overwrite_existing);
+  fs::remove_all("config");
+  open({"--state", "s3.json"});
+  saveAndCopy();
+  const auto of_state = close();
+  ASSERT_EQ(of_state.size(), 1u);
+  EXPECT_EQ(valueOf(of_state[0], "--scalar"), "s3");
+  EXPECT_TRUE(of_state[0].at(1).ends_with("sets.splats")) << of_state[0][1];
 }
 
 /// All steps get it: the series is converted again beside the window.

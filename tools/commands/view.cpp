@@ -28,6 +28,7 @@
 #include "tools/output/command_run.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/start_checks.h"
+#include "tools/viewer/prepared_view.h"
 #include "tools/viewer/viewer.h"
 
 namespace curvisplat {
@@ -140,7 +141,7 @@ void view(const ViewArguments& arguments) {
     return std::make_unique<MovieFile>(file, size, frames_per_s);
   };
   if (!arguments.files.empty() && !isGrid(arguments.files)) {
-    cache = openAtStep(arguments.files.front(), arguments.steps, arguments.scalar.value_or(""));
+    cache = openAtStep(arguments.files.front(), arguments.steps, wantedScalar(options));
     takeScene(arguments, *cache, options);
   } else if (!arguments.files.empty()) {
     options.files = arguments.files;

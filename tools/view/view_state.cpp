@@ -373,6 +373,11 @@ std::string toJson(const ViewState& state) {
   return json.dump(1) + "\n";
 }
 
+std::string scalarOfViewState(const std::string& text, const std::filesystem::path& path) {
+  const JsonDocument document(text, path.string(), "the state of a window");
+  return document.root().at("variable").text();
+}
+
 ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
                             const Manifest& manifest) {
   const JsonDocument document(text, path.string(), "the state of a window");

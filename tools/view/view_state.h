@@ -125,6 +125,9 @@ std::string toJson(const ViewState& state);
 ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
                             const Manifest& manifest);
 
+/// The name of the scalar that the state shows. Throws Error as above.
+std::string scalarOfViewState(const std::string& text, const std::filesystem::path& path);
+
 /// Undo and redo: the states of a view that were at rest, the newest last.
 class History {
  public:

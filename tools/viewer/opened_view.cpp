@@ -52,7 +52,7 @@ struct OpenedView::Preparation {
   std::shared_ptr<const PreparedView> prepared;  // once the thread has ended
 
   void prepare(const fs::path& cache) {
-    CacheReader with_scalar = CacheReader::ofScalar(cache, options.scalar.value_or(""));
+    CacheReader with_scalar = CacheReader::ofScalar(cache, wantedScalar(options));
     prepared = std::make_shared<const PreparedView>(prepareView(std::move(with_scalar), options, picture));
   }
 };

@@ -59,6 +59,16 @@ std::vector<std::string> scalarsElsewhere(const CacheReader& cache) {
 
 }  // namespace
 
+std::string wantedScalar(const ViewerOptions& options) {
+  if (options.scalar) return *options.scalar;
+  if (!options.state) return "";
+  try {
+    return scalarOfViewState(readTextFile(*options.state), *options.state);
+  } catch (const Error&) {
+    return "";
+  }
+}
+
 PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageSize picture) {
   ViewState state = firstViewOf(cache, options.scalar.value_or(""), picture);
   const std::string scalar = state.variable;

@@ -67,6 +67,10 @@ struct PreparedView {
   std::vector<std::string> elsewhere;   // scalars of the whole cache that have values at other samples
 };
 
+/// The scalar to show first: the one that the options name, or that of their state; empty for any. A state that cannot be read
+/// is reported by prepareView().
+std::string wantedScalar(const ViewerOptions& options);
+
 /// The first view, or the one that was left last time, with what `options` except `carried` ask for.
 /// `picture`: its size in pixels. Any thread. Throws Error as reading the cache or the state does.
 PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageSize picture);
