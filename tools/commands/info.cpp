@@ -242,7 +242,6 @@ Json asJson(const CacheReader& reader, const InfoOptions& options, const Finding
     json["findings"] = found.verification.findings;
     json["notes"] = found.verification.notes;
   }
-  if (options.probe.any()) json["probe"] = probeAsJson(reader, found.probe);
   return json;
 }
 
@@ -337,6 +336,7 @@ void printCacheInfo(const InfoOptions& options) {
   std::vector<Probe> probes;
   for (Findings& of_reader : found) probes.push_back(std::move(of_reader.probe));
   const Probe joined = joinedProbe(readers, std::move(probes));
+  if (options.json && options.probe.any()) json["probe"] = probeAsJson(readers, joined);
   if (!options.probe.plot.empty()) plotLine(readers, joined, options.probe.plot);
   if (options.json) fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
   if (options.probe.any() && !options.json) printProbe(readers, joined);

@@ -21,7 +21,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json jsonOf(const CacheReader& reader, const PointValues& found, bool of_source) {
+std::vector<VariableInfo> variablesOf(std::span<const CacheReader> readers) {
+  std::vector<VariableInfo> variables;
+  for (const CacheReader& reader : readers)
+    variables.insert(variables.end(), reader.manifest().variables.begin(), reader.manifest().variables.end());
+  return variables;
+}
+
+Json jsonOf(const std::vector<VariableInfo>& variables, const PointValues& found, bool of_source) {
   const char* const at = of_source ? "place" : "centre";
   Json json = {{"block", found.block},
                {"i", found.i},
@@ -32,9 +39,8 @@ Json jsonOf(const CacheReader& reader, const PointValues& found, bool of_source)
                {"from", of_source ? "source" : "cache"}};
   json["values"] = Json::array();
   for (size_t v = 0; v < found.values.size(); ++v)
-    json["values"].push_back({{"name", reader.manifest().variables[v].name},
-                              {"value", found.values[v]},
-                              {"mean", found.sample[v]}});
+    json["values"].push_back(
+        {{"name", variables[v].name}, {"value", found.values[v]}, {"mean", found.sample[v]}});
   return json;
 }
 
@@ -42,13 +48,6 @@ Json jsonOf(const CacheReader& reader, const PointValues& found, bool of_source)
 std::string numberText(double value, bool of_source) {
   if (std::isnan(value)) return "";
   return of_source ? fmt::format("{}", value) : fmt::format("{}", static_cast<float>(value));
-}
-
-std::vector<VariableInfo> variablesOf(std::span<const CacheReader> readers) {
-  std::vector<VariableInfo> variables;
-  for (const CacheReader& reader : readers)
-    variables.insert(variables.end(), reader.manifest().variables.begin(), reader.manifest().variables.end());
-  return variables;
 }
 
 void printTable(std::span<const CacheReader> readers, const Probe& probe) {
@@ -137,12 +136,13 @@ ProbedPoints parseProbe(const ProbeArguments& arguments) {
   return {true, parsePointList(readTextFile(text, uint64_t{1} << 30), text), {}};
 }
 
-Json probeAsJson(const CacheReader& reader, const Probe& probe) {
+Json probeAsJson(std::span<const CacheReader> readers, const Probe& probe) {
+  const std::vector<VariableInfo> variables = variablesOf(readers);
   Json steps = Json::array();
   for (const ProbedStep& step : probe.steps) {
     Json all = Json::array();
     for (const auto& of_point : step.found)
-      all.push_back(of_point ? jsonOf(reader, *of_point, probe.of_source) : Json(nullptr));
+      all.push_back(of_point ? jsonOf(variables, *of_point, probe.of_source) : Json(nullptr));
     Json of_step = probe.asked.is_table ? all : all[0];
     if (!probe.of_steps) return of_step;
     steps.push_back({{"step", step.step}, {"time", step.time}, {"probe", std::move(of_step)}});

@@ -54,13 +54,13 @@ struct Probe {
   bool isOutside() const { return !isTable() && !steps.front().found.front(); }
 };
 
-/// The probe as JSON: an object for a point, null outside; of a table an array of them; of several steps an
-/// array for each.
-nlohmann::ordered_json probeAsJson(const CacheReader& reader, const Probe& probe);
 /// Joins the values that several sets of scalars have at the same points, as joinedValues() does. `readers`:
 /// of the probes.
 Probe joinedProbe(std::span<const CacheReader> readers, std::vector<Probe> probes);
-/// `probe`: joinedProbe() of the readers, the cache's own first. In words; a table with commas.
+/// A probe as JSON. `probe`: joinedProbe() of the readers, the cache's own first: an object for a point, null outside; of a table an
+/// array of them; of several steps an array for each. Values that a set does not have there are null.
+nlohmann::ordered_json probeAsJson(std::span<const CacheReader> readers, const Probe& probe);
+/// The same in words; a table with commas.
 void printProbe(std::span<const CacheReader> readers, const Probe& probe);
 /// A PNG file of the values of all scalars along a line. Throws UsageError if the program was built without plots.
 void plotLine(std::span<const CacheReader> readers, const Probe& probe, const std::filesystem::path& file);
