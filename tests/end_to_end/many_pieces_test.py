@@ -14,8 +14,8 @@ import tempfile
 import unittest
 
 PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
-FILES = 100  # may be open; the readers themselves keep 64 that they read from
-MANY = 90    # a file that is kept for each takes two descriptors
+FILES = 64  # may be open; the readers themselves keep a quarter of them
+MANY = 90   # a file that is kept for each takes two descriptors
 CUBE = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
 CORNERS = (0, 1, 3, 2, 4, 5, 7, 6)  # of a hexahedron
 FACES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
@@ -141,6 +141,18 @@ class ManyPieces(unittest.TestCase):
             text += array("connectivity", "Int32", range(10)) + array("offsets", "Int32", [10]) + array("types", "UInt8", [24]) + "</Cells></Piece>"
         path = self.write("a.vtu", f'<VTKFile type="UnstructuredGrid" version="0.1"><UnstructuredGrid>{text}</UnstructuredGrid></VTKFile>')
         self.expect_ranges(path, {"s": [0, MANY + 8]})
+
+    def test_files_of_vtk(self):
+        points = words(value for point in CUBE for value in point)
+        for n in range(MANY):
+            data = f'<PointData><DataArray type="Float32" Name="s" format="ascii">{words(range(n, n + 8))}</DataArray></PointData>'
+            data += f'<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">{points}</DataArray></Points>'
+            piece = f'<Piece Extent="0 1 0 1 {n} {n + 1}">{data}</Piece>'
+            self.write(f"p{n}.vts", '<VTKFile type="StructuredGrid" version="0.1" byte_order="LittleEndian">'
+                       f'<StructuredGrid WholeExtent="0 1 0 1 {n} {n + 1}">{piece}</StructuredGrid></VTKFile>')
+        blocks = "".join(f'<DataSet index="{n}" file="p{n}.vts"/>' for n in range(MANY))
+        path = self.write("a.vtm", f'<VTKFile type="vtkMultiBlockDataSet" version="1.0"><vtkMultiBlockDataSet>{blocks}</vtkMultiBlockDataSet></VTKFile>')
+        self.expect_ranges(path, {"s": [0, MANY + 6]})
 
     def test_processors_of_openfoam(self):
         def file(kind, name, text):

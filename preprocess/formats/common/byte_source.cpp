@@ -1,5 +1,7 @@
 #include "preprocess/formats/common/byte_source.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <string>
 #include <system_error>
@@ -8,6 +10,13 @@
 #include "stream/base/file.h"
 
 namespace curvisplat {
+
+OpenFiles::OpenFiles() : most_([] {
+  constexpr rlim_t kMaxOpen = 64;
+  rlimit may{};
+  if (getrlimit(RLIMIT_NOFILE, &may) != 0) may.rlim_cur = 4 * kMaxOpen;
+  return static_cast<size_t>(std::clamp<rlim_t>(may.rlim_cur / 4, 1, kMaxOpen));
+}()) {}
 
 std::shared_ptr<const InputFile> OpenFiles::at(const std::filesystem::path& path) {
   const MutexLock lock(mutex_);

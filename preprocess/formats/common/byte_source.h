@@ -100,7 +100,8 @@ void convertStored(const std::byte* from, size_t count, bool swap, Value* to) {
 /// A bounded pool of open input files, most recently used first. Thread-safe.
 class OpenFiles {
  public:
-  explicit OpenFiles(size_t most = 64) : most_(most) {}
+  /// Keeps at most 64 files open, or a quarter of those that the process may open (`ulimit -n`).
+  OpenFiles();
 
   /// Opens `path` unless it is open. It stays open while anybody holds the result. Throws Error as InputFile
   /// does.
