@@ -135,6 +135,17 @@ TEST_F(OddFiles, InputsAreNotOverwritten) {
                 {"would overwrite"});
 }
 
+TEST_F(OddFiles, WrongUsageLeavesNoTrace) {
+  expectRefused({"render", cache(), "-o", file("a.png"), "--trace", file("trace.json"), "--tf", "none"}, 2,
+                {"--tf: unknown transfer function 'none'"});
+  expectRefused({"convert", file("cube.xyz"), file("cube.fun"), "-o", file("b.splats"), "--trace",
+                 file("trace.json"), "--memory", "none"},
+                2, {"--memory"});
+  EXPECT_FALSE(fs::exists(file("trace.json")));
+  expectRefused({"render", file("none.splats"), "-o", file("a.png"), "--trace", file("trace.json")}, 1, {});
+  EXPECT_TRUE(fs::exists(file("trace.json")));
+}
+
 TEST_F(OddFiles, AFullStandardErrorIsNoReasonToFail) {
   EXPECT_EQ(shell("render nothing.splats -o a.png 2>/dev/full").status, 1);
   EXPECT_EQ(shell("render nothing.splats -o a.png 2>&-").status, 1);

@@ -363,13 +363,13 @@ void addConvert(CLI::App& app) {
           "--dry-run: is for a new cache; leave out --add-scalar, --add-steps, --to and --follow");
     if (arguments->dry_run && !launchedRanks().alone())
       throw UsageError("--dry-run runs in one process; start curvisplat without mpirun");
-    TraceOfRun trace(arguments->trace, gridAndCaches(*arguments));
-    if (series)
-      runConvertSeries(*arguments);
-    else
-      adds ? runAddScalar(*arguments) : runConvert(*arguments);
-    noteForeign(*arguments);
-    trace.end();
+    runTraced(arguments->trace, gridAndCaches(*arguments), [&] {
+      if (series)
+        runConvertSeries(*arguments);
+      else
+        adds ? runAddScalar(*arguments) : runConvert(*arguments);
+      noteForeign(*arguments);
+    });
   });
 }
 

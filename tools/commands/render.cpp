@@ -428,9 +428,7 @@ void addRender(CLI::App& app) {
     requireSameOptions(*command);
     std::vector<std::filesystem::path> others = inputsOf(*arguments);
     others.insert(others.end(), {arguments->output, arguments->statistics});
-    TraceOfRun trace(arguments->trace, others);
-    render(*arguments);
-    trace.end();
+    runTraced(arguments->trace, others, [&] { render(*arguments); });
   });
 }
 

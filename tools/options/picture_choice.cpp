@@ -127,7 +127,11 @@ void checkFunctionArguments(const ScalarArguments& arguments) {
                      arguments.range ? "--range" : "--asinh");
   if (arguments.asinh && isFile(arguments))
     throw UsageError("--asinh cannot be combined with a file (--tf {})", *arguments.transfer_function);
-  if (arguments.transfer_function && !isFile(arguments)) presetDefinition(*arguments.transfer_function);
+  if (arguments.transfer_function && !isFile(arguments)) try {
+      presetDefinition(*arguments.transfer_function);
+    } catch (const UsageError& error) {
+      throw UsageError("--tf: {}", error.what());
+    }
 }
 
 const FirstChoice& PictureChoice::data() {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "stream/base/trace.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/start_checks.h"
@@ -91,25 +92,32 @@ void ignoreFileSizeSignal() {
   ::sigaction(SIGXFSZ, &action, nullptr);
 }
 
-TraceOfRun::TraceOfRun(const std::filesystem::path& path, const std::vector<std::filesystem::path>& others) {
-  if (path.empty()) return;
+void runTraced(const std::filesystem::path& path, const std::vector<std::filesystem::path>& others,
+               const std::function<void()>& command) {
+  if (path.empty()) return command();
   const Ranks& ranks = launchedRanks();
   std::filesystem::path own = path;
   if (!ranks.alone())
     own.replace_filename(
         fmt::format("{}.{}{}", path.stem().string(), ranks.rank(), path.extension().string()));
   checkOutputFile("--trace", own, others);
+  const auto endQuietly = [] {
+    try {
+      Trace::end();
+    } catch (const Error&) {  // what ended the command is reported
+    }
+  };
   Trace::begin(own, ranks.rank());
-}
-
-TraceOfRun::~TraceOfRun() {
   try {
-    end();
-  } catch (const Error&) {  // what ended the command is reported
+    command();
+  } catch (const UsageError&) {
+    endQuietly();
+    removeAll(own);
+    throw;
+  } catch (...) {
+    endQuietly();
+    throw;
   }
-}
-
-void TraceOfRun::end() {
   Trace::end();
 }
 

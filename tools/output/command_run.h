@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "stream/base/progress.h"
@@ -34,19 +35,11 @@ inline constexpr const char* kTraceHelp =
     "several "
     "ranks FILE.json becomes FILE.0.json, FILE.1.json, ...";
 
-/// The trace of a command (--trace FILE), whose format stream/base/trace.h describes.
-class TraceOfRun {
- public:
-  /// Begins the trace, unless `path` is empty. `others`: the files and caches that the command reads and
-  /// writes. Throws Error if the trace cannot be written, or is one of them.
-  TraceOfRun(const std::filesystem::path& path, const std::vector<std::filesystem::path>& others);
-  /// Ends it, for a command that has failed: what was traced until then stays.
-  ~TraceOfRun();
-  TraceOfRun(const TraceOfRun&) = delete;
-  TraceOfRun& operator=(const TraceOfRun&) = delete;
-
-  /// Ends it. Throws Error if it could not be written whole.
-  void end();
-};
+/// Runs a command and traces it into the file `path` (--trace FILE), whose format stream/base/trace.h describes, unless it is
+/// empty. `others`: the files and caches that the command reads and writes. Throws Error if the trace cannot be written
+/// whole or is one of them, and what the command throws: of a command that fails what was traced until then stays,
+/// but after a UsageError no file.
+void runTraced(const std::filesystem::path& path, const std::vector<std::filesystem::path>& others,
+               const std::function<void()>& command);
 
 }  // namespace curvisplat
