@@ -107,7 +107,7 @@ void addGenerate(CLI::App& app) {
                       "Number of nodes along i, j and k: NIxNJxNK, such as 128x64x64; required");
   command
       ->add_option("-o,--output", options->prefix,
-                   "Prefix of the files to write: PREFIX.xyz, PREFIX.fun and PREFIX.nam")
+                   "Prefix of the files to write, in place of any that exist: PREFIX.xyz, PREFIX.fun and PREFIX.nam")
       ->required();
   command->add_option(
       "--clustering", options->clustering,

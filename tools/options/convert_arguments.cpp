@@ -33,14 +33,14 @@ constexpr const char* kGlobeGroup = "Longitude-latitude grids (NetCDF), in kilom
 
 /// Adds an option that accepts the keys of `values` and sets `target` to the value of the given key.
 template <typename Value>
-void addChoice(CLI::App& app, const char* name, const char* help, const std::map<std::string, Value>& values,
-               std::optional<Value>& target) {
+CLI::Option* addChoice(CLI::App& app, const char* name, const char* help,
+                       const std::map<std::string, Value>& values, std::optional<Value>& target) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : values) keys.push_back(key);
-  app.add_option_function<std::string>(
-         name, [values, &target](const std::string& key) { target = values.at(key); }, help)
-      ->check(CLI::IsMember(keys))
-      ->group(kGroup);
+  return app
+      .add_option_function<std::string>(
+          name, [values, &target](const std::string& key) { target = values.at(key); }, help)
+      ->check(CLI::IsMember(keys));
 }
 
 void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
@@ -86,17 +86,22 @@ void addGridOptions(CLI::App& app, OpenGridOptions& options) {
   addGlobeOptions(app, options.globe);
   Plot3dForce& force = options.force;
   addChoice<ByteOrder>(app, "--byte-order", "Byte order of binary files",
-                       {{"little", ByteOrder::kLittle}, {"big", ByteOrder::kBig}}, force.byte_order);
+                       {{"little", ByteOrder::kLittle}, {"big", ByteOrder::kBig}}, force.byte_order)
+      ->group(kGroup);
   addChoice<RecordMarkers>(
       app, "--records", "Size of Fortran record markers in bytes; none: C binary",
       {{"none", RecordMarkers::kNone}, {"4", RecordMarkers::kBytes4}, {"8", RecordMarkers::kBytes8}},
-      force.records);
+      force.records)
+      ->group(kGroup);
   addChoice<int>(app, "--precision", "Floating-point precision", {{"single", 4}, {"double", 8}},
-                 force.precision_bytes);
+                 force.precision_bytes)
+      ->group(kGroup);
   addChoice<bool>(app, "--blocks", "multi: the file begins with a block count",
-                  {{"single", false}, {"multi", true}}, force.multi_block);
+                  {{"single", false}, {"multi", true}}, force.multi_block)
+      ->group(kGroup);
   addChoice<bool>(app, "--iblank", "Whether the grid file has an iblank array",
-                  {{"no", false}, {"yes", true}}, force.blanking);
+                  {{"no", false}, {"yes", true}}, force.blanking)
+      ->group(kGroup);
   CLI::Option* const ascii = app.add_flag_callback(
                                     "--ascii", [&force] { force.ascii = true; }, "Read as ASCII")
                                  ->group(kGroup);
