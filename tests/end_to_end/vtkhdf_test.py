@@ -458,6 +458,12 @@ class VtkHdf(MeshFormats):
                 self.expect_line(self.path, scalar="p", words=told)
             else:
                 self.expect_same([self.path], mesh.vtk())
+        # Nowhere.
+        for write in (lambda group: write_mesh(group, [mesh]), Image().write):
+            with self.file() as f:
+                write(f.create_group("VTKHDF"))
+                f["VTKHDF/PointData/q"] = h5py.SoftLink("/none")
+            self.expect_line(self.path, scalar="p", words="PointData/q: is missing")
         # A tree that contains itself.
         with self.file() as f:
             root = f.create_group("VTKHDF")

@@ -240,7 +240,7 @@ class HdfGatherer {
   /// An array of (step,) k, j, i (and component).
   VtkArray imageArray(const Step& step, const VtkExtent& extent, const std::string& place,
                       const std::string& name, bool of_cells) const {
-    const auto array = file_.array(place);
+    const auto array = file_.required(place);
     std::vector<uint64_t> expected;
     if (step.count > 0) expected.push_back(array->dims()[0]);
     for (const size_t axis : {2, 1, 0}) expected.push_back(extent.nodesAlong(axis) - (of_cells ? 1 : 0));

@@ -158,9 +158,14 @@ std::shared_ptr<const Hdf5Array> VtkHdfFile::array(const std::string& place) con
   return arrays_.emplace(place, std::move(found)).first->second;
 }
 
-VtkArray VtkHdfFile::tuples(const std::string& place, uint64_t first, uint64_t tuples) const {
+std::shared_ptr<const Hdf5Array> VtkHdfFile::required(const std::string& place) const {
   auto of = array(place);
   if (!of) fail(place, "is missing; the file is damaged, or was never completed");
+  return of;
+}
+
+VtkArray VtkHdfFile::tuples(const std::string& place, uint64_t first, uint64_t tuples) const {
+  auto of = required(place);
   const uint64_t rows = of->dims().front(), components = rows == 0 ? 1 : of->size() / rows;
   if (first > rows || tuples > rows - first)
     fail(place, fmt::format("has {} tuples; expected {} from number {} on; the file is damaged", rows, tuples,
@@ -172,8 +177,7 @@ VtkArray VtkHdfFile::tuples(const std::string& place, uint64_t first, uint64_t t
 }
 
 std::vector<int64_t> VtkHdfFile::integers(const std::string& place, uint64_t first, uint64_t count) const {
-  const auto of = array(place);
-  if (!of) fail(place, "is missing; the file is damaged, or was never completed");
+  const auto of = required(place);
   if (first > of->size() || count > of->size() - first)
     fail(place, fmt::format("has {} numbers; expected {} from number {} on; the file is damaged", of->size(),
                             count, first));

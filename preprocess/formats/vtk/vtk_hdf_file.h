@@ -40,6 +40,8 @@ class VtkHdfFile {
 
   /// Null without the data set. Throws Error if it has no numbers.
   std::shared_ptr<const Hdf5Array> array(const std::string& place) const;
+  /// The same, but throws Error without the data set: also where a link that is listed leads nowhere.
+  std::shared_ptr<const Hdf5Array> required(const std::string& place) const;
   /// Tuples [first, first + tuples) of a data set, whose first dimension counts them. Throws Error if it does not have them.
   VtkArray tuples(const std::string& place, uint64_t first, uint64_t tuples) const;
   /// Some numbers of a list of integers. Throws Error if it does not have them.
