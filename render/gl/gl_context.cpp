@@ -4,8 +4,13 @@
 
 #include <GL/osmesa.h>
 #include <dlfcn.h>
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -127,11 +132,49 @@ std::unique_ptr<GlContext> makeOsMesaContext() {
   return std::make_unique<OsMesaContext>();
 }
 
+namespace {
+
+/// The folder that Mesa makes its own in, unless MESA_SHADER_CACHE_DIR names it.
+std::filesystem::path folderOfMesasCache() {
+  for (const char* const name : {"MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME"})
+    if (const char* const folder = std::getenv(name); folder && *folder) return folder;
+  const char* const home = std::getenv("HOME");
+  return home ? std::filesystem::path(home) / ".cache" : std::filesystem::path();
+}
+
+/// True if that cannot be tried.
+bool hasRoomForMesasCache() {
+  constexpr off_t kBytes = off_t{4} << 20;  // its index takes 1.3 MB
+  std::filesystem::path folder = folderOfMesasCache();
+  int file = -1;
+  do {
+    file = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+    if (file >= 0 || errno != ENOENT) break;
+    folder = folder.parent_path();
+  } while (folder.has_relative_path());
+  if (file < 0) return errno != ENOSPC && errno != EDQUOT;
+  const int error = ::posix_fallocate(file, 0, kBytes);
+  ::close(file);
+  return error != ENOSPC && error != EDQUOT;
+}
+
+}  // namespace
+
+void keepMesaOffAFullDisk() {
+  [[maybe_unused]] static const bool looked = [] {
+    if (hasRoomForMesasCache()) return true;
+    for (const char* const name : {"MESA_SHADER_CACHE_DISABLE", "MESA_GLSL_CACHE_DISABLE"})
+      ::setenv(name, "true", 1);
+    return true;
+  }();
+}
+
 std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library) {
   return library == GlLibrary::kEgl ? makeEglContext() : makeOsMesaContext();
 }
 
 GlThread::GlThread(GlLibrary library) : library_(library) {
+  keepMesaOffAFullDisk();
   const Job first = [this](const GlContext& context) {
     context_name_ = context.name();
     software_ = context.isSoftware();

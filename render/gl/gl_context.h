@@ -41,6 +41,11 @@ class GlContext {
   bool software_ = true;
 };
 
+/// Mesa keeps compiled shaders in the user's cache folder, in a file that is mapped into memory before the disk has room for it:
+/// on a full disk, or where the user's quota is used up, SIGBUS would end the process. Looks, once, whether there is room, and
+/// where there is none sets the variable that keeps Mesa from it. Call it before the first context is made.
+void keepMesaOffAFullDisk();
+
 /// The libraries that give a context without a window.
 enum class GlLibrary { kOsmesa, kEgl };
 

@@ -6,6 +6,7 @@ O_DIRECT or O_TMPFILE, a clock that runs backwards, and a stand-in for a network
 The same files are made everywhere, byte for byte. What the machine lacks (localedef, the right to mount, a C compiler) is
 skipped and said.
 """
+import contextlib
 import ctypes
 import hashlib
 import json
@@ -342,7 +343,26 @@ class OddHosts(unittest.TestCase):
         if not tried:
             self.skipTest("no file system can be mounted here")
 
-    def in_namespace(self, folder, mount):
+    def test_a_full_disk_for_the_shaders_of_mesa(self):
+        def draw(folder):
+            os.sync()
+            with open(folder / "full", "wb", buffering=0) as file:
+                with contextlib.suppress(OSError):
+                    while True:
+                        file.write(bytes(65536))
+            for backend in ("osmesa", "egl-quads"):
+                done = subprocess.run([PROGRAM, "render", self.folder / "plain" / "o.splats", "-o", self.folder / "full.png", "--size", "40x40",
+                                       "--backend", backend], env={**os.environ, "XDG_CACHE_HOME": str(folder)},
+                                      capture_output=True, text=True, check=False)
+                if done.returncode != 1 or "libEGL" not in done.stderr:
+                    self.assertEqual((done.returncode, done.stderr), (0, ""), backend)
+
+        folder = self.folder / "mesa"
+        folder.mkdir()
+        if not self.in_namespace(folder, f"mount -t tmpfs -o size=512k none '{folder}'", draw):
+            self.skipTest("no file system can be mounted here")
+
+    def in_namespace(self, folder, mount, check=None):
         """Whether it can be mounted. In a child, so that this process stays in its namespace."""
         new_namespace, not_mounted = 0x00020000, 77
         pid = os.fork()
@@ -358,7 +378,7 @@ class OddHosts(unittest.TestCase):
                                                     ("O_TMPFILE", os.O_TMPFILE | os.O_RDWR))
                            if opens(folder if name == "O_TMPFILE" else folder / "probe", flags)]
                     print(f"{folder.name}: has {', '.join(has) or 'neither O_DIRECT nor O_TMPFILE'}", flush=True)
-                    self.expect_same(folder)
+                    (check or self.expect_same)(folder)
                     status = 0
             except BaseException as error:  # the child must not go on
                 print(error, file=sys.stderr, flush=True)

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <utility>
 
+#include "render/gl/gl_context.h"
 #include "stream/base/error.h"
 #include "tools/window/widgets.h"
 
@@ -32,6 +33,7 @@ void onError(int, const char* description) {
 
 struct Window::Library {
   Library() {
+    keepMesaOffAFullDisk();
     glfwSetErrorCallback(onError);
     if (!glfwInit())
       throw Error(
