@@ -184,7 +184,7 @@ size_t CaseReader::stepOf(const Entry& entry, const std::string& name, double ti
   return static_cast<size_t>(std::max<ptrdiff_t>(0, next - times.begin() - 1));
 }
 
-/// Where the values of the time are. Stars stand for the number of its step, or of the file that has it.
+/// The place of the values of the time. Stars stand for the number of its step, or of the file that has it.
 EnsightPlace CaseReader::placeOf(const Entry& entry, const std::string& name, double time) const {
   EnsightPlace place;
   std::string file = name;

@@ -72,7 +72,7 @@ EnsightFile::EnsightFile(const EnsightPlace& place, std::optional<bool> binary, 
   if (!binary_) text_.emplace(file_, at_, end_);
 }
 
-/// Where the words begin, from there on.
+/// The place of the first byte of the words, from `from` on; nullopt if they do not come.
 std::optional<uint64_t> EnsightFile::find(std::string_view words, uint64_t from) const {
   std::string chunk;
   for (uint64_t at = from; at < file_->size(); at += kChunk) {

@@ -182,7 +182,7 @@ class Reader {
     std::erase_if(leaves_, [&](const Leaf& leaf) { return leaf.time && *leaf.time != time; });
   }
 
-  /// Of grids that share cells or points, those without attributes: dolfinx and meshio write the mesh as a
+  /// Leaves out grids without attributes that share cells or points with others: dolfinx and meshio write the mesh as a
   /// grid of its own, which each step includes, and it would be drawn twice.
   void leaveOutBareMeshes() {
     std::set<pugi::xml_node> drawn;  // topologies, and geometries of solid cells, of grids with attributes
