@@ -148,7 +148,7 @@ cp -r "$program"/{bin,share,lib} "$bundle/"
 cp -rl "$lib/." "$bundle/lib/" 2> /dev/null || cp -r "$lib/." "$bundle/lib/"  # links, where both folders are of one file system
 doc=$bundle/share/doc/curvisplat
 cp -r "$licences" "$doc/licences"
-cp "$root"/{GLOSSARY.md,tools/REFERENCE.md,tools/FORMATS.md,tools/cluster.md} "$doc/"
+cp "$root"/{GLOSSARY.md,tools/REFERENCE.md,tools/FORMATS.md,tools/FROM_PARAVIEW.md,tools/cluster.md} "$doc/"
 mkdir -p "$bundle"/share/curvisplat/examples
 cp "$font" "$bundle/share/curvisplat/"
 cp "$root"/tools/pictures/*.json "$root"/tools/python/examples/*.py "${examples[@]}" "$bundle/share/curvisplat/examples/"
