@@ -203,7 +203,10 @@ class StepAddition {
     checkRanges(survey, source_.description(), scalars_);
     ranges_ = survey.ranges;
     const auto geometry = cache_.series().geometryOf(survey.grid_checksum);
-    if (!geometry) return addGeometry();
+    if (!geometry) {
+      report_.warnings = warningsOfValues(survey, source_.description(), scalars_);
+      return addGeometry();
+    }
     const CacheReader cache = cache_.atStep(cache_.series().first_steps[*geometry]);
     if (grid_) makeScratch();
     ValuePasses passes(cache, scalars_.size(), plan_, scratch_->path(), progress_);

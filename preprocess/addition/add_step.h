@@ -45,6 +45,7 @@ struct AddStepReport {
   bool new_geometry = false;
   uint64_t nodes = 0;
   std::vector<FileReport> files;  // the new ones
+  std::vector<std::string> warnings;
 };
 
 /// statedTime() in the unit of the series, where both have one: each file of a model may count from a date

@@ -146,8 +146,8 @@ ConvertedSteps SharedSteps::convertPart(const Start& start) const {
       const AddStepReport added = addStep(*source, options, progress_);
       last = added.time;
       options.expect_new_geometry = added.new_geometry;
-      converted.steps.push_back(
-          {stated.has_value(), added.new_geometry, bytesOf(added.files), source->description().files});
+      converted.steps.push_back({stated.has_value(), added.new_geometry, bytesOf(added.files),
+                                 source->description().files, added.warnings});
     }
   } catch (const Interrupted&) {
     throw;
@@ -174,6 +174,7 @@ bool SharedSteps::take(unsigned of, const StepSpan& range, const ConvertedSteps&
     report.new_geometry = step.new_geometry;
     report.nodes = part.manifest().nodes;
     report.files = {{"", step.bytes}};
+    report.warnings = step.warnings;
     took(range.begin + n, report);
   }
   return converted.error.empty();
@@ -182,7 +183,7 @@ bool SharedSteps::take(unsigned of, const StepSpan& range, const ConvertedSteps&
 Ranks::Bytes toBytes(const ConvertedSteps& converted) {
   nlohmann::json json{{"error", converted.error}, {"steps", nlohmann::json::array()}};
   for (const ConvertedSteps::Step& step : converted.steps)
-    json["steps"].push_back({step.states_time, step.new_geometry, step.bytes, step.sources});
+    json["steps"].push_back({step.states_time, step.new_geometry, step.bytes, step.sources, step.warnings});
   // Names of files may be of any bytes, which no JSON text has.
   const std::vector<std::uint8_t> packed = nlohmann::json::to_cbor(json);
   return toBytes(packed);
@@ -193,7 +194,8 @@ ConvertedSteps convertedFrom(const Ranks::Bytes& bytes) {
   ConvertedSteps converted;
   converted.error = json["error"];
   for (const auto& step : json["steps"])
-    converted.steps.push_back({step[0], step[1], step[2], step[3].get<std::vector<std::string>>()});
+    converted.steps.push_back({step[0], step[1], step[2], step[3].get<std::vector<std::string>>(),
+                               step[4].get<std::vector<std::string>>()});
   return converted;
 }
 

@@ -34,7 +34,7 @@ struct ConvertedSteps {
   struct Step {
     bool states_time = true, new_geometry = false;
     uint64_t bytes = 0;
-    std::vector<std::string> sources;
+    std::vector<std::string> sources, warnings;
   };
   std::vector<Step> steps;
   std::string error;  // that has ended it; empty: none

@@ -323,6 +323,22 @@ class EnsightCases(MeshFormats):
             self.assertEqual(info["cells"]["count"], len(mesh.cells))
             np.testing.assert_allclose([info["scalars"][0][end] for end in ("min", "max")], [mesh.c.min(), mesh.c.max()], rtol=1e-7)
             self.assertAlmostEqual(self.volume([self.path], "c"), 1, delta=2e-3)
+            # A part may lack a variable: it is drawn where it is, and the other everywhere.
+            values = EnsightFile(order)
+            values.text("values")
+            values.text("part")
+            values.ints([4])
+            values.text("hexa8")
+            values.floats(parts[0][2])
+            (self.folder / "d").write_bytes(values.data)
+            self.path.write_text(self.path.read_text() + "scalar per element: d d\n")
+            cache = self.folder / "parts.splats"
+            result = self.run_program("convert", self.path, "-o", cache, "--overwrite")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            whole = self.manifest(cache)
+            self.assertAlmostEqual(whole["volume"], 1, delta=2e-3)
+            # Where parts meet, the border of what is there is thicker by some percent of a cell.
+            self.assertAlmostEqual(self.manifest(cache / "blanks.1")["volume"], half / len(mesh.cells), delta=0.02)
 
     def test_damage(self):
         mesh = self.rounded(Mesh(2))

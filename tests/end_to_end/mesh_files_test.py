@@ -190,6 +190,27 @@ class MeshFiles(MeshCase):
                 result = self.run_program("convert", path, "-o", cache, "--overwrite", "--scalar", "c,a")
                 self.assertEqual([p["variables"][0]["name"] for p in self.info(cache)["own_blanks"]], ["a"], result.stderr)
 
+    def test_blanks_of_a_later_step_are_counted(self):
+        """A scalar that lacks values at one step alone: what the others lose there is said, with the step."""
+        x = (np.arange(225) % 9).astype(float)
+        for step in range(3):
+            image = vtk.vtkImageData()
+            image.SetDimensions(9, 5, 5)
+            for name, values in (("low", np.where((x > 4) & (step == 1), np.nan, x)), ("all", x + step)):
+                array = numpy_to_vtk(values, deep=True)
+                array.SetName(name)
+                image.GetPointData().AddArray(array)
+            writer = vtk.vtkXMLImageDataWriter()
+            writer.SetFileName(str(self.folder / f"run_{step}.vti"))
+            writer.SetInputData(image)
+            writer.Write()
+        files = [self.folder / f"run_{step}.vti" for step in range(3)]
+        result = self.run_program("convert", *files, "-o", self.folder / "run.splats")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        warnings = [line for line in result.stderr.splitlines() if "warning" in line]
+        self.assertEqual(len(warnings), 1, result.stderr)
+        self.assertIn("run_1.vti: 100 of the values of all are left out, since other scalars of the cache have none there", warnings[0])
+
     def test_own_blanks_are_drawn_and_checked(self):
         """Scalars that have a value nowhere together, and one that has none."""
         image = vtk.vtkImageData()
@@ -216,6 +237,11 @@ class MeshFiles(MeshCase):
         point = self.run_program("info", cache, "--probe", "7,2,2")
         self.assertEqual(point.returncode, 0, point.stderr)
         self.assertRegex(point.stdout, "(?s)nearest node i 7, j 2, k 2 .*low +no value at the point.*high +7.* at the point")
+        told = json.loads(self.run_program("info", cache, "--probe", "7,2,2", "--json").stdout)
+        self.assertEqual([value["name"] for value in told["probe"]["values"]], ["low", "high"])
+        self.assertIsNone(told["probe"]["values"][0]["value"])
+        self.assertAlmostEqual(told["probe"]["values"][1]["value"], 7, delta=0.01)
+        self.assertNotIn("probe", told["own_blanks"][0])
         points = self.folder / "points.csv"
         points.write_text("x,y,z\n2,2,2\n7,2,2\n20,2,2\n")
         table = self.run_program("info", cache, "--probe", points)
@@ -466,6 +492,31 @@ class MeshFiles(MeshCase):
                     reader.Update()
                     of_hexahedra = reader.GetOutput().GetBlock(0).GetBlock(0)
                     self.assertEqual(of_hexahedra.GetNumberOfCells(), 40)
+
+    def test_exodus_variables_of_some_blocks(self):
+        """By the truth table, a second variable is in the hexahedra alone: it is drawn there, and the first everywhere."""
+        import netCDF4
+        path = self.folder / "mesh.e"
+        points, _, blocks = self.write_exodus(path, "NETCDF4")
+        with netCDF4.Dataset(path, "a") as f:
+            f.renameDimension("num_elem_var", "one")
+            f.renameVariable("name_elem_var", "unused")
+            f.renameVariable("elem_var_tab", "unused_table")
+            f.createDimension("num_elem_var", 2)
+            names = f.createVariable("name_elem_var", "S1", ("num_elem_var", "len_name"))
+            for n, name in enumerate(("density", "stress")):
+                names[n] = np.array(list(name.ljust(33, "\0")), "S1")
+            f.createVariable("elem_var_tab", "i4", ("num_el_blk", "num_elem_var"))[:] = [[1, 1], [1, 0], [0, 0]]
+            f.createVariable("vals_elem_var2eb1", "f8", ("time_step", "num_el_in_blk1"))[:] = np.ones((2, 40)) * np.arange(40)
+        cache = self.folder / "blocks.splats"
+        for scalar, volume in (("density", 1), ("stress", 40 / 64)):
+            result = self.run_program("convert", path, "-o", cache, "--overwrite", "--scalar", "density,stress")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            part = cache if scalar == "density" else cache / "blanks.1"
+            found = json.loads((part / "manifest.json").read_text())
+            self.assertEqual([v["name"] for v in found["variables"]], [scalar])
+            # Where two kinds of cells meet, the border of what is there is thicker by some percent of a cell.
+            self.assertAlmostEqual(found["volume"], volume, delta=2e-3 if volume == 1 else 0.02)
 
     def test_damaged_exodus_files_get_one_line(self):
         path = self.folder / "mesh.e"

@@ -104,6 +104,9 @@ class StepLog {
     if (event.source && event.converted)
       for (const auto* warnings : {&event.source->warnings, &event.converted->warnings})
         for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
+    if (event.added)
+      for (const std::string& warning : event.added->warnings)
+        printMessage("warning: {}: {}", event.name, warning);
     const std::vector<FileReport>& files = event.added ? event.added->files : event.converted->files;
     const bool is_new = !event.added || event.added->new_geometry;
     steps_.push_back(
