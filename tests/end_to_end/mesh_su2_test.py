@@ -64,9 +64,15 @@ class Su2Meshes(MeshFormats):
                 self.assertIn("boundaries: lower, upper", info["notes"])
                 self.expect_same([self.path, self.restart], grid, {"c": None})
 
-    def test_a_mesh_alone_asks_for_its_restart(self):
-        self.write(Mesh(2))
-        self.expect_line(self.path, scalar="p", words="the files contain no scalar; give a restart file as well")
+    def test_a_mesh_alone_is_drawn_and_asks_for_its_restart(self):
+        mesh = Mesh(2)
+        self.write(mesh)
+        info = self.info(self.path)
+        self.assertEqual([s["name"] for s in info["scalars"]], ["constant"])
+        self.assertIn("SU2's scalars are in its restart file: give it as well", "".join(info["warnings"]))
+        self.assertAlmostEqual(self.volume([self.path], "constant"), 1, delta=2e-3)
+        result = self.run_program("convert", self.path, "-o", self.folder / "d.splats", "--scalar", "p")
+        self.assertIn("there is no scalar 'p'; give a restart file as well; available: constant", result.stderr)
 
     def test_derived_scalars(self):
         mesh = Mesh(2)

@@ -1,5 +1,7 @@
 #include "preprocess/formats/derived/derived_source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -140,14 +142,16 @@ DerivedMeshSource::DerivedMeshSource(std::unique_ptr<MeshSource> source, const D
     if (quantity.needs != 0 && (quantity.needs & ~kOwn) == 0 && offers(inputs_, quantity) &&
         addQuantity(quantity, inputs_.centring, stored, description_))
       quantities_.push_back(quantity);
-  constant_ = description_.scalars.empty() && !description_.format.starts_with("SU2");
+  constant_ = description_.scalars.empty();
   if (!constant_) return;
   GridScalar scalar;
   scalar.name = "constant";
   scalar.centring = Centring::kCell;
   description_.scalars.push_back(std::move(scalar));
-  description_.warnings.emplace_back(
-      "the files contain no scalar; a constant, 1 in all cells, takes its place");
+  description_.warnings.push_back(fmt::format(
+      "the files contain no scalar; a constant, 1 in all cells, takes its place{}",
+      description_.format.starts_with("SU2") ? "; SU2's scalars are in its restart file: give it as well"
+                                             : ""));
 }
 
 std::vector<uint32_t> DerivedMeshSource::neededFor(std::span<const uint32_t> scalars) const {

@@ -283,7 +283,10 @@ std::vector<uint32_t> scalarsNamed(const GridDescription& description,
     if (candidates.empty()) {
       std::vector<std::string> known;
       for (const GridScalar& scalar : description.scalars) known.push_back(scalar.name);
-      throw UsageError("there is no scalar '{}'{}; {}", name, didYouMean(name, known), namesIn(description));
+      const bool no_restart =
+          description.format.starts_with("SU2 mesh") && known == std::vector<std::string>{"constant"};
+      throw UsageError("there is no scalar '{}'{}{}; {}", name, didYouMean(name, known),
+                       no_restart ? "; give a restart file as well" : "", namesIn(description));
     }
     if (std::find(positions.begin(), positions.end(), candidates.front()) != positions.end())
       throw UsageError("scalar '{}' is requested twice", name);
