@@ -185,6 +185,14 @@ class Levels(ModelFileTest):
         self.expect_heights(1e-3 * ght)
         self.levels("num_metgrid_levels", None, lambda f: f.add("PRES", "num_metgrid_levels lat lon", 1e5 - 8 * ght, units="Pa"))
         self.expect_heights(standard_altitude(1e5 - 8 * ght))
+        # Its first level is the ground's, which lies above the next ones in mountains: its nodes are not drawn.
+        ground = ght.copy()
+        ground[0] = ght[1] + 500 * (self.LON > 20)
+        self.levels("num_metgrid_levels", None, lambda f: f.add("GHT", "num_metgrid_levels lat lon", ground, units="meters MSL"))
+        info = self.info()
+        self.assertIn("the first level of num_metgrid_levels is that of the ground, above others; it is left out", info["warnings"])
+        self.assertEqual(info["cells"]["inverted"], 0)
+        self.assertEqual(info["blanked"]["by_grid"], 96)
 
 
 class Places(ModelFileTest):

@@ -66,6 +66,27 @@ double indexSpacing(const NetcdfFiles& file, size_t axis) {
   return std::isfinite(spacing) && spacing > 0 ? spacing : 1000;
 }
 
+/// Whether the first level is that of the ground, as met_em's is, and lies above the second somewhere.
+bool beginsWithSurface(const NetcdfFiles& file, const CfGrid& grid) {
+  const NetcdfDimension& levels = file.dimensions()[grid.dims.axes[grid.levels]];
+  if (levels.name != "num_metgrid_levels" || levels.length < 3) return false;
+  constexpr uint64_t kColumns = 4;
+  for (uint64_t n = 0; n < kColumns * kColumns; ++n) {
+    CfRange two{{}, {2, 2, 2}};
+    uint64_t part = n;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (axis == grid.levels) continue;
+      two.begin[axis] =
+          (file.dimensions()[grid.dims.axes[axis]].length - 1) * (part % kColumns) / (kColumns - 1);
+      two.end[axis] = two.begin[axis] + 1;
+      part /= kColumns;
+    }
+    const std::vector<double> heights = grid.vertical.heights(file, two).values;
+    if (heights.size() == 2 && heights[0] > heights[1]) return true;
+  }
+  return false;
+}
+
 class GridFinder {
  public:
   GridFinder(const NetcdfFiles& file, size_t time_step) : file_(file), time_step_(time_step) {}
@@ -184,6 +205,7 @@ class GridFinder {
       return std::nullopt;
     }
     grid.vertical = *vertical;
+    grid.surface_first = beginsWithSurface(file_, grid);
     grid.mask = CfMask::of(file_, variable, dims, grid.levels, isOcean(file_, grid));
     return grid;
   }

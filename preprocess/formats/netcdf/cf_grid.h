@@ -28,7 +28,8 @@ struct CfGrid {
   CfVertical vertical;
   size_t levels = 2;  // the axis along which longitude and latitude do not vary
   std::optional<CfMask> mask;
-  std::string steps_of;  // the dimension whose values are the steps, if it is not one of time: "month"
+  bool surface_first = false;  // the first level is the ground's, above others: its nodes are blanked
+  std::string steps_of;        // the dimension whose values are the steps, if it is not one of time: "month"
 
   /// Sets the face (of dims.face, from 0) whose nodes the terms read, in a grid of several faces. At first it
   /// is face 0.

@@ -1,6 +1,7 @@
 #include "preprocess/formats/netcdf/cf_nodes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/trigonometric.hpp>
 
@@ -62,6 +63,16 @@ void CfNodes::read(const CfRange& range, std::span<const uint32_t> scalars, Node
   else
     readBlank(range, out.blank);
   if (grid_.mask) applyMask(range, out.blank);
+  if (grid_.surface_first && range.begin[grid_.levels] == 0) blankFirstLevel(range, out.blank);
+}
+
+void CfNodes::blankFirstLevel(const CfRange& range, std::vector<uint8_t>& blank) const {
+  size_t n = 0;
+  std::array<uint64_t, 3> at{};
+  for (at[2] = range.begin[2]; at[2] < range.end[2]; ++at[2])
+    for (at[1] = range.begin[1]; at[1] < range.end[1]; ++at[1])
+      for (at[0] = range.begin[0]; at[0] < range.end[0]; ++at[0], ++n)
+        if (at[grid_.levels] == 0) blank[n] = 1;
 }
 
 void CfNodes::applyMask(const CfRange& range, std::vector<uint8_t>& blank) const {

@@ -37,6 +37,7 @@ class CfNodes {
   void readPlaces(const CfRange& range, NodeArrays& out) const;
   void readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const;
   void readMiddles(const CfRange& range, std::vector<GlobeColumn>& columns) const;
+  void blankFirstLevel(const CfRange& range, std::vector<uint8_t>& blank) const;
   void applyMask(const CfRange& range, std::vector<uint8_t>& blank) const;
   void readBlank(const CfRange& range, std::vector<uint8_t>& blank) const;
   bool projects() const { return grid_.projection && globe_.degrees(); }

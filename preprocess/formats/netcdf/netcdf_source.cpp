@@ -244,6 +244,10 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   if (grid_.mask)
     description_.blanking +=
         fmt::format("{}{}", description_.blanking.empty() ? "" : ", or where ", grid_.mask->description());
+  if (grid_.surface_first)
+    description_.warnings.push_back(
+        fmt::format("the first level of {} is that of the ground, above others; it is left out",
+                    file_.dimensions()[grid_.dims.axes[grid_.levels]].name));
   for (const auto* warnings : {&grid_.vertical.warnings(), &file_.warnings()})
     description_.warnings.insert(description_.warnings.end(), warnings->begin(), warnings->end());
   if (!grid_.degrees && !grid_.indices && isUnitless(grid_.longitude.variable().text("units")))
