@@ -245,8 +245,8 @@ class Messages(FormatCase):
         self.assertIn("1 wedge\n", self.run_program("info", good).stdout)
         self.expect_error(["info", self.su2("b.su2", "13 0 1 2 3 4 5 0 1 0")], "line 3: an element of type 13 has 9 numbers; "
                           "expected 6 points and at most its own number")
-        message = self.expect_error(["convert", good, "-o", self.folder / "a.splats"],
-                                    "the files contain no scalar; give a restart file as well")
+        message = self.expect_error(["convert", good, "-o", self.folder / "a.splats", "--scalar", "p"],
+                                    "there is no scalar 'p'; give a restart file as well")
         self.assertNotIn("derived", message)
 
     def test_openfoam_names_the_plain_file(self):

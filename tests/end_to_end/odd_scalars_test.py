@@ -94,7 +94,7 @@ class OddScalars(MeshCase):
                 self.assertEqual(self.info(path)["warnings"], [])
 
     def test_a_mesh_without_scalars(self):
-        """Its volume is drawn as a constant, which a warning says. A mesh of SU2 asks for its restart file instead."""
+        """Its volume is drawn as a constant, which a warning says. A mesh of SU2 asks for its restart file beside that."""
         points, grid = vtk.vtkPoints(), vtk.vtkUnstructuredGrid()
         for point in lattice(3):
             points.InsertNextPoint(point)

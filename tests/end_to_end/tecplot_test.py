@@ -132,7 +132,7 @@ class TecplotText(StructuredFormats):
     def test_what_is_refused(self):
         block = Block()
         arrays = [*block.places, block.p]
-        for words, told in (("N=4, E=1, F=FEPOINT, ET=TRIANGLE", "a kind of elements"),
+        for words, told in (("N=4, E=1, F=FEPOINT, ET=POLYGON", "a kind of elements"),
                             ("NODES=4 ELEMENTS=1 ZONETYPE=FEPOLYHEDRON DATAPACKING=BLOCK", "a kind of elements"),
                             ("I=9 J=9 K=1", "is flat"),
                             ("I=9 J=9 K=9", "expected 2916"),
