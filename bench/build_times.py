@@ -3,23 +3,27 @@
 
     bench/build_times.py build [--target curvisplat] [--define CURVISPLAT_UNITY=OFF]    a build from nothing
     bench/build_times.py headers [--top 30]      each header parsed alone, and the sources that include it
-    bench/build_times.py tests [CTEST OPTIONS]   the built test suite
+    bench/build_times.py tests [CTEST OPTIONS]   the built test suite, each test by the clock
+    bench/build_times.py each [CTEST OPTIONS]    each test alone: its processor time, with that of all processes that it leaves
 
 `build` configures and builds in a temporary folder, and prints the sum, the rooms and the slowest of what was compiled: several
-sources at once, unless CURVISPLAT_UNITY is off. `headers` and `tests` use build/release, which tools/build.sh makes. The machine
+sources at once, unless CURVISPLAT_UNITY is off. `headers`, `tests` and `each` use build/release, which tools/build.sh makes. The machine
 should be idle otherwise: other work slows the processor down.
 """
 import argparse
 import collections
+import ctypes
 import json
 import os
 import pathlib
 import re
 import resource
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import xml.etree.ElementTree as xml
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -131,12 +135,45 @@ def tests(options):
     print_table(cases, "By test (by the clock)", options.top)
 
 
+def end_orphans():
+    """Ends the processes that a test has left, such as the one that forks (tests/programs/serve_runs.cpp), and waits for them."""
+    me = os.getpid()
+    while True:
+        try:
+            ended, _ = os.waitpid(-1, os.WNOHANG)
+        except ChildProcessError:
+            return
+        if ended == 0:
+            for process in pathlib.Path(f"/proc/{me}/task/{me}/children").read_text().split():
+                os.kill(int(process), signal.SIGKILL)
+            time.sleep(0.005)
+
+
+def each(options):
+    becomes_parent_of_orphans = 36  # PR_SET_CHILD_SUBREAPER
+    ctypes.CDLL(None).prctl(becomes_parent_of_orphans, 1, 0, 0, 0)
+    listed = subprocess.run(["ctest", "--test-dir", str(RELEASE), "--show-only=json-v1", *options.arguments], capture_output=True, check=True)
+    rows = []
+    for test in json.loads(listed.stdout)["tests"]:
+        properties = {one["name"]: one["value"] for one in test["properties"]}
+        if "command" not in test or "whole" in properties.get("LABELS", []):
+            continue
+        environment = dict(os.environ, **dict(one.split("=", 1) for one in properties.get("ENVIRONMENT", [])))
+        before = processor_seconds()
+        status = subprocess.run(test["command"], cwd=properties.get("WORKING_DIRECTORY", RELEASE), env=environment, stdin=subprocess.DEVNULL,
+                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
+        end_orphans()
+        rows.append((processor_seconds() - before, test["name"] + (f"  (exit status {status})" if status else "")))
+        print(f"{rows[-1][0]:8.1f} s  {rows[-1][1]}", flush=True)
+    print_table(rows, f"{sum(seconds for seconds, _ in rows):.0f} s of processor time, {len(rows)} tests", options.top)
+
+
 def main():
     if sys.argv[1:2] == ["--launch"]:
         compile_and_log(sys.argv[2], sys.argv[3:])
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(required=True)
-    for function in (build, headers, tests):
+    for function in (build, headers, tests, each):
         command = commands.add_parser(function.__name__)
         command.set_defaults(call=function)
         command.add_argument("--top", type=int, default=25, help="rows of each table (default 25)")
@@ -145,7 +182,7 @@ def main():
             command.add_argument("--target", nargs="+", default=["curvisplat"], help="what to build (default curvisplat)")
             command.add_argument("--define", action="append", default=[], help="CMake option, as NAME=VALUE")
     options, rest = parser.parse_known_args()
-    if rest and options.call is not tests:
+    if rest and options.call not in (tests, each):
         parser.error(f"unknown argument {rest[0]}")
     options.arguments = rest
     options.call(options)
