@@ -92,7 +92,7 @@ class AroundBackends : public DrawnWake, public testing::WithParamInterface<std:
     for (const auto& backend : report.at("backends"))
       if (backend.at("name") == GetParam() && !backend.at("works").get<bool>())
         GTEST_SKIP() << backend.dump();
-    madeCache(file("wake"), "wake", "48x32x24", {"--scalar", "f,jacobian"});
+    madeCache(file("wake"), "wake", "36x24x18", {"--scalar", "f,jacobian"});
     std::ofstream(file("sheet.obj")) << "v -3 -2 1\nv 6 -2 2.5\nv 6 2 3\nv -3 2 1.5\nf 1 2 3 4\n";
   }
 };

@@ -187,7 +187,7 @@ TEST_F(Fidelity, Step) {
 
 TEST_F(Fidelity, IsTheSameBytesForAnyThreadsAndAgain) {
   for (const std::string backend : {"osmesa", "cpu"}) {
-    const std::string lod_pixels = backend == "cpu" ? "0" : "8";
+    const std::string lod_pixels = backend == "cpu" ? "0" : "16";
     render("half-annulus", "smooth", file("one.exr"), {"--threads", "1", "--backend", backend}, lod_pixels);
     render("half-annulus", "smooth", file("two.exr"), {"--threads", "2", "--backend", backend}, lod_pixels);
     render("half-annulus", "smooth", file("again.exr"), {"--threads", "2", "--backend", backend}, lod_pixels);
@@ -206,7 +206,7 @@ void expectBackendsAlike(const std::string& cache, const Words& inside) {
       std::vector<Image> pictures;
       for (const std::string backend : {"osmesa", "cpu"}) {
         pictures.push_back(
-            pictureOf(cache, picture, Words{"--classify", classify, "--backend", backend} + view, "160x160"));
+            pictureOf(cache, picture, Words{"--classify", classify, "--backend", backend} + view, "100x100"));
       }
       const ImageDifference difference = compareImages(pictures[0], pictures[1]);
       EXPECT_GE(difference.psnr_db, 70) << classify;
@@ -215,7 +215,7 @@ void expectBackendsAlike(const std::string& cache, const Words& inside) {
 }
 
 TEST_F(Fidelity, BothBackendsDrawAbuttingBlocksAlike) {
-  runSilently({"generate", "duct", "--size", "48x24x24", "-o", file("duct")});
+  runSilently({"generate", "duct", "--size", "36x18x18", "-o", file("duct")});
   run({"convert", file("duct.xyz"), file("duct.fun"), "-o", file("duct.splats")});
   expectBackendsAlike(file("duct.splats"),
                       {"--position", "0.7,0.2,0.4", "--focal-point", "2.5,0.8,0.6", "--view-angle", "70"});

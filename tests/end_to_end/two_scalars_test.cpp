@@ -84,7 +84,9 @@ TEST_F(TwoScalarsTest, AreThoseOfTheRayMarchAtAllLevels) {
     const KnownFunction function = KnownFunction::of(name);
     const Image reference = marched(function.exact, field_);
     for (size_t level = 0; level < 3; ++level) {
-      if (level == 1 && name != "smooth" && !faults::isWholeSweep()) continue;
+      // Usually the smooth function where the picture is finest and coarsest, and the others at one level each.
+      const bool is_usual = name == "smooth" ? level != 1 : level == (name == "band" ? 1 : 2);
+      if (!is_usual && !faults::isWholeSweep()) continue;
       FrameOptions options = knownFrame(kSize);
       options.lod_pixels = std::array{0.0, 4.0, 8.0}[level];
       const double all = db(drawn(function.table, options), reference);
@@ -307,6 +309,7 @@ TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
   const TransferFunction opacity = KnownFunction::of("smooth").table;
   FrameOptions options = knownFrame(kSize);
   options.lod_pixels = 8;  // OpenGL takes a second for a hundred thousand splats
+  options.size = {128, 128};
   for (const bool full : {false, true}) {
     if (full) {
       auto scene = std::make_shared<SurfaceScene>();
