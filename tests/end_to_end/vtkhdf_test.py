@@ -6,9 +6,12 @@ byte by byte. VTK's own reader is asked, too, where this version of it reads the
 python3-vtk9 or python3-h5py.
 """
 import json
+import os
+import struct
 import sys
 import unittest
 
+from format_case import PROGRAM
 from mesh_formats import Mesh, MeshFormats, np, vtk, write_xml
 from sweep import some_of
 
@@ -479,6 +482,22 @@ class VtkHdf(MeshFormats):
         self.assertGreater(self.expect_harmless(self.path), 0.3)
         self.write_amr([pulse()])
         self.assertGreater(self.expect_harmless(self.path, scalar="pulse"), 0.3)
+
+    def test_chunk_of_a_gigabyte(self):
+        """That is what its size in the file says. HDF5 has it allocated before it finds that the file is shorter."""
+        with self.file() as f:
+            write_mesh(f.create_group("VTKHDF"), [Mesh(2)], chunks=True, compression="gzip")
+            chunk = f["VTKHDF/CellData/c"].id.get_chunk_info(0)
+        data = bytearray(self.path.read_bytes())
+        child = data.index(struct.pack("<QQQ", 0, 0, chunk.byte_offset)) - 8  # after the size and the filters
+        self.assertEqual(struct.unpack_from("<II", data, child), (chunk.size, 0))
+        struct.pack_into("<I", data, child, chunk.size | 1 << 30)
+        self.path.write_bytes(data)
+        pid = os.spawnv(os.P_NOWAIT, PROGRAM, [PROGRAM, "info", str(self.path)])
+        _, status, used = os.wait4(pid, 0)
+        self.assertEqual(os.waitstatus_to_exitcode(status), 1)
+        if "CURVISPLAT_SANITIZED" not in os.environ:
+            self.assertLess(used.ru_maxrss >> 10, 700)  # MiB, also of the process that tries the file
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <set>
@@ -66,8 +67,8 @@ void requireWholeHdf5(const InputFile& file) {
 
 namespace {
 
-// Processor time for a small file, and what a larger one may take: indices of chunks grow with the file.
-constexpr rlim_t kSeconds = 10, kBytesPerSecond = rlim_t{64} << 20;
+// Processor time and memory for a small file, and what a larger one may take: indices of chunks grow with the file.
+constexpr rlim_t kSeconds = 10, kBytesPerSecond = rlim_t{64} << 20, kBytes = rlim_t{512} << 20;
 constexpr size_t kMaxAttributeBytes = size_t{1} << 20, kMaxChunkBytes = size_t{1} << 18;
 constexpr size_t kMaxReadBytes = size_t{1} << 26;  // of all chunks
 
@@ -332,8 +333,25 @@ void requireStored(const std::filesystem::path& path, const std::vector<Hdf5Exit
 
 constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
 
+/// Lets this process allocate `bytes` more: a damaged file may state a chunk of gigabytes.
+void limitFurtherMemory([[maybe_unused]] rlim_t bytes) {
+#ifndef CURVISPLAT_SANITIZED
+  rlim_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  if (pages == 0) return;
+  const rlim_t most = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + bytes;
+  const rlimit limit{most, most};
+  ::setrlimit(RLIMIT_AS, &limit);
+#endif
+}
+
+/// What a trial may take.
+struct TrialLimits {
+  rlim_t seconds, bytes;
+};
+
 /// A process that has nobody's handlers, prints nothing, and ends with its parent.
-[[noreturn]] void runTrial(const std::function<void()>& work, rlim_t most_seconds, pid_t parent) {
+[[noreturn]] void runTrial(const std::function<void()>& work, TrialLimits limits, pid_t parent) {
   in_trial = true;
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(0);
@@ -342,9 +360,10 @@ constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
   for (const int signal : kStops) std::signal(signal, SIG_DFL);
   if (const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC); nowhere >= 0)
     for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
-  const rlimit no_core{0, 0}, seconds{most_seconds, most_seconds + 1};
+  const rlimit no_core{0, 0}, seconds{limits.seconds, limits.seconds + 1};
   ::setrlimit(RLIMIT_CORE, &no_core);
   ::setrlimit(RLIMIT_CPU, &seconds);
+  limitFurtherMemory(limits.bytes);
   // What is freed or used without having been set is junk: it crashes here rather than later.
   mallopt(M_PERTURB, 0xa5);
   try {
@@ -396,16 +415,17 @@ enum class Trial { kNone, kPassed, kLeadsOut };  // none: no process could be st
 /// Throws Error if the work crashes or takes too long.
 Trial tryWork(const char* library, const std::filesystem::path& path, const struct stat& before,
               const std::function<void()>& work) {
-  const rlim_t most_seconds = kSeconds + static_cast<rlim_t>(before.st_size) / kBytesPerSecond;
+  const auto file_bytes = static_cast<rlim_t>(before.st_size);
+  const TrialLimits limits{kSeconds + file_bytes / kBytesPerSecond, kBytes + file_bytes};
   const pid_t parent = ::getpid(), trial = forkTrial();
-  if (trial == 0) runTrial(work, most_seconds, parent);
+  if (trial == 0) runTrial(work, limits, parent);
   if (trial < 0) return Trial::kNone;
   int status = 0;
   while (::waitpid(trial, &status, 0) < 0)
     if (errno != EINTR) return Trial::kNone;  // somebody else has waited for it
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
     throw Error("{}: {} does not finish reading it within {} s; the file is damaged: copy or write it again",
-                path.string(), library, most_seconds);
+                path.string(), library, limits.seconds);
   const bool stopped =
       WIFSIGNALED(status) && std::find(kStops.begin(), kStops.end(), WTERMSIG(status)) != kStops.end();
   if (stopped) return Trial::kNone;  // the caller is told, too
