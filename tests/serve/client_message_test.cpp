@@ -10,9 +10,20 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tools/serve/client_requests.h"
+#include "tools/serve/served_caches.h"
 
 namespace curvisplat {
 namespace {
+
+TEST(ErrorText, HasNeitherFoldersNorOptionsOfTheServer) {
+  const std::string cache = CURVISPLAT_TEST_DATA "/caches/version_2/blocks.splats";
+  const ServedCaches caches({cache});
+  EXPECT_EQ(caches.errorText(cache + "/geometry.bin: is truncated"),
+            R"({"type":"error","text":"blocks/geometry.bin: is truncated"})");
+  EXPECT_EQ(
+      caches.errorText("OpenGL has no memory left; give --backend cpu"),
+      R"({"type":"error","text":"OpenGL has no memory left; have the server started with --backend cpu"})");
+}
 
 TEST(Access, TokensAreLongAndNew) {
   std::set<std::string> tokens;

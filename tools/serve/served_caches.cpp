@@ -179,6 +179,7 @@ std::string ServedCaches::errorText(std::string text) const {
   for (const Served& cache : caches_)
     for (const fs::path& path : {cache.reader.path(), cache.reader.cachePath()})
       replaceAll(path.string(), cache.name);
+  replaceAll("give --backend", "have the server started with --backend");  // a viewer has no options
   return textOf({{"type", "error"}, {"text", text}});
 }
 
