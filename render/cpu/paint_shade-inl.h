@@ -84,7 +84,7 @@ HWY_INLINE Range locate(const ShadingTable& table, V mean, V half_width, size_t 
   return {from, to};
 }
 
-/// The integrals over the first `count` intervals, one after the other.
+/// The integrals over the first `count` intervals, one after the other, of 4 * kLanes; the others are zero.
 HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t count,
                           float* HWY_RESTRICT out) {
   const Four d;
@@ -99,6 +99,7 @@ HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t
       hn::Store(sum, d, out + 4 * n + c);
     }
   }
+  std::fill(out + 4 * count, out + 4 * kLanes, 0.0f);
 }
 
 /// Makes means of integrals.
