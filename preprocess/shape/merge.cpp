@@ -52,7 +52,8 @@ void MergedFaces::add(size_t voxel, const glm::dvec3& position, const Splat& spl
   }
 }
 
-void MergedFaces::addFace(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatFace& face) {
+void MergedFaces::addFace(size_t voxel, const glm::dvec3& position, const Splat& splat,
+                          const SplatFace& face) {
   const glm::dvec3 per_length = gradientOf(splat, face.inward);
   const double thickness = 1 / glm::length(per_length);
   if (!(thickness > 0 && std::isfinite(thickness))) return;

@@ -71,7 +71,8 @@ inline constexpr const char* kMergedBorders =
     "merged-borders";  // merged splats are cut at faces (border_code.h), and have an even blur
 inline constexpr const char* kFaceLayers =
     "face-layers";  // cells are cut at more faces that they are behind (border_code.h)
-inline constexpr const char* kPlates = "plates";  // merged splats between two faces are drawn as thin (border_code.h)
+inline constexpr const char* kPlates =
+    "plates";  // merged splats between two faces are drawn as thin (border_code.h)
 inline constexpr const char* kBorderPairs =
     "border-pairs";                             // cells at faces are drawn as two splats (border_code.h)
 inline constexpr const char* kSteps = "steps";  // a series of time steps (series.h)

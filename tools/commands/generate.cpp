@@ -106,8 +106,9 @@ void addGenerate(CLI::App& app) {
   command->add_option("--size", options->size,
                       "Number of nodes along i, j and k: NIxNJxNK, such as 128x64x64; required");
   command
-      ->add_option("-o,--output", options->prefix,
-                   "Prefix of the files to write, in place of any that exist: PREFIX.xyz, PREFIX.fun and PREFIX.nam")
+      ->add_option(
+          "-o,--output", options->prefix,
+          "Prefix of the files to write, in place of any that exist: PREFIX.xyz, PREFIX.fun and PREFIX.nam")
       ->required();
   command->add_option(
       "--clustering", options->clustering,

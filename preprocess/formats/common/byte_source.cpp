@@ -11,12 +11,18 @@
 
 namespace curvisplat {
 
-OpenFiles::OpenFiles() : most_([] {
+namespace {
+
+size_t mostOpenFiles() {
   constexpr rlim_t kMaxOpen = 64;
   rlimit may{};
-  if (getrlimit(RLIMIT_NOFILE, &may) != 0) may.rlim_cur = 4 * kMaxOpen;
+  if (getrlimit(RLIMIT_NOFILE, &may) != 0) return kMaxOpen;
   return static_cast<size_t>(std::clamp<rlim_t>(may.rlim_cur / 4, 1, kMaxOpen));
-}()) {}
+}
+
+}  // namespace
+
+OpenFiles::OpenFiles() : most_(mostOpenFiles()) {}
 
 std::shared_ptr<const InputFile> OpenFiles::at(const std::filesystem::path& path) {
   const MutexLock lock(mutex_);

@@ -345,7 +345,7 @@ void limitFurtherMemory([[maybe_unused]] rlim_t bytes) {
 #endif
 }
 
-/// What a trial may take.
+/// The resources that a trial may take.
 struct TrialLimits {
   rlim_t seconds, bytes;
 };

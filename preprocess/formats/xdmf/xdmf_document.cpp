@@ -7,9 +7,11 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
@@ -173,126 +175,20 @@ bool isInclude(const pugi::xml_node& node) {
   return named == "include" || named.ends_with(":include");
 }
 
-/// Finds what a pointer selects: a path of names or *, from the root or (//) from anywhere, each with
-/// conditions [@NAME='VALUE'], [NUMBER] or [self::NAME or self::NAME].
-class Pointer {
- public:
-  Pointer(std::string_view text, size_t& looked_at) : text_(text), looked_at_(looked_at) {}
-
-  /// Nothing if the pointer is of another kind, or selects nothing.
-  std::vector<pugi::xml_node> select(const pugi::xml_node& root) {
-    constexpr std::string_view kScheme = "xpointer(";
-    if (text_.size() > kMaxPointer || !text_.starts_with(kScheme) || !text_.ends_with(')')) return {};
-    text_.remove_prefix(kScheme.size());
-    text_.remove_suffix(1);
-    std::vector<pugi::xml_node> selected{root};
-    do {
-      if (!take("/")) return {};
-      const bool anywhere = take("/");
-      if (anywhere && selected != std::vector{root}) return {};
-      const std::string_view named = untilOneOf("/[");
-      if (named.empty()) return {};
-      const std::vector<std::string_view> conditions = readConditions();
-      std::vector<pugi::xml_node> next;
-      for (const pugi::xml_node& parent : anywhere ? allIn(root) : selected)
-        if (!addChildren(parent, named, conditions, next)) return {};
-      selected = std::move(next);
-    } while (!text_.empty() && !selected.empty());
-    return selected;
+/// The elements that a pointer selects. None if it is not a path of names with conditions: XPath has functions
+/// that take as long as one likes.
+std::vector<pugi::xml_node> selectedBy(const std::string& pointer, const pugi::xml_document& document) {
+  static const std::regex path(R"(xpointer\((/?(?:/[\w*.-]+(?:\[(?:[^\[\]()/'"]|'[^']*'|"[^"]*")*\])*)+)\))");
+  std::smatch match;
+  if (pointer.size() > kMaxPointer || !std::regex_match(pointer, match, path)) return {};
+  std::vector<pugi::xml_node> selected;
+  try {
+    for (const pugi::xpath_node& found : document.select_nodes(match[1].str().c_str()))
+      if (found.node() && !isInclude(found.node())) selected.push_back(found.node());
+  } catch (const pugi::xpath_exception&) {
   }
-
- private:
-  bool take(std::string_view word) {
-    if (!text_.starts_with(word)) return false;
-    text_.remove_prefix(word.size());
-    return true;
-  }
-
-  std::string_view untilOneOf(std::string_view ends) {
-    const std::string_view word = text_.substr(0, text_.find_first_of(ends));
-    text_.remove_prefix(word.size());
-    return trimmed(word);
-  }
-
-  std::vector<std::string_view> readConditions() {
-    std::vector<std::string_view> conditions;
-    while (take("[")) {
-      conditions.push_back(untilOneOf("]"));
-      if (!take("]")) conditions.back() = {};
-    }
-    return conditions;
-  }
-
-  std::vector<pugi::xml_node> allIn(const pugi::xml_node& root) {
-    std::vector<pugi::xml_node> all{root};
-    for (size_t n = 0; n < all.size(); ++n)
-      for (const pugi::xml_node child : all[n].children())
-        if (child.type() == pugi::node_element) all.push_back(child);
-    lookedAt(all.size());
-    return all;
-  }
-
-  void lookedAt(size_t elements) {
-    looked_at_ += elements;
-    if (looked_at_ > kMaxLookedAt) throw Error("has too many includes; write the grids out");
-  }
-
-  bool addChildren(const pugi::xml_node& parent, std::string_view named,
-                   const std::vector<std::string_view>& conditions, std::vector<pugi::xml_node>& next) {
-    std::vector<pugi::xml_node> matching;
-    for (const pugi::xml_node child : parent.children()) {
-      lookedAt(1);
-      if (child.type() == pugi::node_element && !isInclude(child) && (named == "*" || named == child.name()))
-        matching.push_back(child);
-    }
-    for (const std::string_view condition : conditions) {
-      double number = 0;
-      if (parseNumber(condition, number)) {
-        const bool exists = number >= 1 && number < static_cast<double>(matching.size()) + 1;
-        matching =
-            exists ? std::vector{matching[static_cast<size_t>(number) - 1]} : std::vector<pugi::xml_node>();
-      } else if (!keepWhere(condition, matching)) {
-        return false;
-      }
-    }
-    next.insert(next.end(), matching.begin(), matching.end());
-    return true;
-  }
-
-  /// False if the condition cannot be read.
-  static bool keepWhere(std::string_view condition, std::vector<pugi::xml_node>& nodes) {
-    if (condition.starts_with('@')) {
-      const size_t equals = condition.find('=');
-      if (equals == std::string_view::npos) return false;
-      const std::string attribute(trimmed(condition.substr(1, equals - 1)));
-      const std::string_view quoted = trimmed(condition.substr(equals + 1));
-      if (quoted.size() < 2 || (quoted.front() != '\'' && quoted.front() != '"') ||
-          quoted.back() != quoted.front())
-        return false;
-      const std::string_view value = quoted.substr(1, quoted.size() - 2);
-      std::erase_if(nodes,
-                    [&](const pugi::xml_node& n) { return n.attribute(attribute.c_str()).value() != value; });
-      return true;
-    }
-    std::vector<std::string_view> names;
-    constexpr std::string_view kSelf = "self::", kOr = " or ";
-    for (std::string_view rest = condition;;) {
-      const size_t end = rest.find(kOr);
-      const std::string_view one = trimmed(rest.substr(0, end));
-      if (!one.starts_with(kSelf)) return false;
-      names.push_back(one.substr(kSelf.size()));
-      if (end == std::string_view::npos) break;
-      rest.remove_prefix(end + kOr.size());
-    }
-    std::erase_if(nodes, [&](const pugi::xml_node& n) {
-      return std::find(names.begin(), names.end(), n.name()) == names.end();
-    });
-    return true;
-  }
-
-  std::string_view text_;
-  size_t& looked_at_;
-};
+  return selected;
+}
 
 }  // namespace
 
@@ -329,11 +225,9 @@ void XdmfDocument::replaceIncludes() {
                   name());
     const auto [found, is_new] = selected.try_emplace(pointer);
     if (is_new) {
-      try {
-        found->second = Pointer(pointer, looked_at).select(document_);
-      } catch (const Error& error) {
-        throw Error("{}: {}", name(), error.what());
-      }
+      if ((looked_at += elements.size()) > kMaxLookedAt)
+        throw Error("{}: has too many includes; write the grids out", name());
+      found->second = selectedBy(pointer, document_);
     }
     if (found->second.empty())
       throw Error("{}: includes {}, which {}; write the grids out", name(), printable(pointer.substr(0, 200)),
