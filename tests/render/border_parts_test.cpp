@@ -229,13 +229,13 @@ TEST(BorderParts, OfAPlateAreOneAsThinAsIt) {
   EXPECT_EQ(piece.weight, kWhole.weight);
   EXPECT_EQ(piece.mean, kWhole.mean);
   EXPECT_EQ(piece.faces.count, 0);
-  // The deviation of the kernel across it is that of the plate; the gradient stays, and what it is along the plate.
+  // The kernel's deviation across it is that of the plate; the gradient stays, and so do the extents at right angles in its frame.
   const glm::dmat3 drawn = factorOf(piece.shape), whole = factorOf(kWhole.shape);
   const glm::dvec3 normal = glm::normalize(glm::inverse(glm::transpose(whole)) * glm::dvec3(q));
   const double length = glm::length(normal * whole);
   EXPECT_NEAR(glm::length(normal * drawn) * kKernelSigma, length / std::sqrt(12.0), 1e-4 * length);
-  const glm::dvec3 along = glm::cross(normal, glm::dvec3(0, 0, 1));
-  EXPECT_NEAR(glm::length(along * drawn), glm::length(along * whole), 1e-4 * glm::length(along * whole));
+  const glm::dvec3 in_plane = glm::normalize(glm::cross(glm::dvec3(q), glm::dvec3(0, 0, 1)));
+  EXPECT_NEAR(glm::length((glm::inverse(glm::transpose(whole)) * in_plane) * drawn), 1, 1e-4);
   const auto gradient = [](const glm::dmat3& factor, const Slope& w) {
     return glm::inverse(glm::transpose(factor)) * vectorOf(w);
   };
