@@ -200,9 +200,13 @@ void Window::showInput() {
   for (const Event& event : events_)
     if (event.key >= 0) io.KeysDown[event.key] = false;
   const bool clicks = !events_.empty() && events_.front().button >= 0;
+  const int modifiers = clicks && !holds_input_ ? events_.front().modifiers : 0;
   if (!std::exchange(holds_input_, false)) clicks ? showButton() : showTyped();
-  io.KeyCtrl = io.KeysDown[GLFW_KEY_LEFT_CONTROL] || io.KeysDown[GLFW_KEY_RIGHT_CONTROL];
-  io.KeyShift = io.KeysDown[GLFW_KEY_LEFT_SHIFT] || io.KeysDown[GLFW_KEY_RIGHT_SHIFT];
+  // Of a button's event as they were then: a slow frame may come after their release.
+  io.KeyCtrl = (modifiers & GLFW_MOD_CONTROL) != 0 || io.KeysDown[GLFW_KEY_LEFT_CONTROL] ||
+               io.KeysDown[GLFW_KEY_RIGHT_CONTROL];
+  io.KeyShift = (modifiers & GLFW_MOD_SHIFT) != 0 || io.KeysDown[GLFW_KEY_LEFT_SHIFT] ||
+                io.KeysDown[GLFW_KEY_RIGHT_SHIFT];
   std::copy(shown_buttons_.begin(), shown_buttons_.end(), io.MouseDown);
 }
 
@@ -356,7 +360,7 @@ void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
   if (button < static_cast<int>(self->shown_buttons_.size()))
-    self->events_.push_back(Event::ofButton(button, action == GLFW_PRESS, self->mouse_));
+    self->events_.push_back(Event::ofButton(button, action == GLFW_PRESS, mods, self->mouse_));
   if (action == GLFW_PRESS && !self->isDragging()) {
     // mouse_ is still the position of this event.
     if (!self->overPicture()) return;

@@ -168,13 +168,16 @@ class Window {
     unsigned letter = 0;
     int button = -1;
     bool presses = false;        // the button; else it was released
+    int modifiers = 0;           // GLFW_MOD_..., of a button
     glm::dvec2 at{0.0};          // the mouse then
     std::optional<Key> command;  // that the key may be
 
-    static Event ofKey(int key, std::optional<Key> command = {}) { return {key, 0, -1, false, {}, command}; }
-    static Event ofLetter(unsigned letter) { return {-1, letter, -1, false, {}, {}}; }
-    static Event ofButton(int button, bool presses, const glm::dvec2& at) {
-      return {-1, 0, button, presses, at, {}};
+    static Event ofKey(int key, std::optional<Key> command = {}) {
+      return {key, 0, -1, false, 0, {}, command};
+    }
+    static Event ofLetter(unsigned letter) { return {-1, letter, -1, false, 0, {}, {}}; }
+    static Event ofButton(int button, bool presses, int modifiers, const glm::dvec2& at) {
+      return {-1, 0, button, presses, modifiers, at, {}};
     }
   };
   std::deque<Event> events_;             // what Dear ImGui has yet to see, in order
