@@ -34,9 +34,8 @@ constexpr uint32_t kRatioBits = 0x1f;
 constexpr double kSmallestRatio = 0.75, kRatioSteps = 10;  // to a factor of 2
 constexpr uint32_t kMaxRatio = 21;                         // of 3
 constexpr double kLongestNext = 3;                         // splats behind, to a merged one's length
-// Codes in the place of a ratio: layers behind several faces.
-constexpr uint32_t kLayers = 24, kThreeLayers = 4;
-constexpr uint32_t kPlate = 22;  // in the place of a ratio
+// Numbers that stand where a merged splat has its ratio: a plate, and the layers behind several faces.
+constexpr uint32_t kPlate = 22, kLayers = 24, kThreeLayers = 4;
 
 /// Packs a unit vector into 16 bits: the octahedron |x| + |y| + |z| = 1, its lower half folded outwards.
 uint32_t packDirection(const glm::dvec3& q) {

@@ -60,7 +60,7 @@ Probe joinedProbe(std::span<const CacheReader> readers, std::vector<Probe> probe
 /// A probe as JSON. `probe`: joinedProbe() of the readers, the cache's own first: an object for a point, null outside; of a table an
 /// array of them; of several steps an array for each. Values that a set does not have there are null.
 nlohmann::ordered_json probeAsJson(std::span<const CacheReader> readers, const Probe& probe);
-/// The same in words; a table with commas.
+/// Prints a probe in words, and a table with commas. `probe`: as probeAsJson()'s.
 void printProbe(std::span<const CacheReader> readers, const Probe& probe);
 /// A PNG file of the values of all scalars along a line. Throws UsageError if the program was built without plots.
 void plotLine(std::span<const CacheReader> readers, const Probe& probe, const std::filesystem::path& file);

@@ -114,9 +114,8 @@ void loadSurfaces(ViewState& state);
 /// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the
 /// scalars if there is none of this name.
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name);
-/// Removes, for a view of another cache of the same grid, what is of scalars that it lacks (opacities,
-/// isosurfaces, colours of faces). `shown`: the scalar that takes the place of the one that is shown, if that
-/// is lacking.
+/// Removes opacities, isosurfaces and colours of faces by scalars that a cache does not have: `manifest` is of another
+/// cache of the same grid, which is shown next. `shown`: the scalar that is shown if the present one is not there.
 void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown);
 
 std::string toJson(const ViewState& state);

@@ -81,8 +81,8 @@ class CacheView {
   /// Saves the state for the next time; that of a preview only if the user has changed it.
   void remember() const;
 
-  /// The view as it is carried to another one of the same grid, without what is of scalars that its cache
-  /// lacks. nullptr if this is a preview that the user has left as it was.
+  /// The settings of this view that another view of the same grid takes over: all but those that name scalars which the
+  /// other's cache does not have. nullptr if this is a preview that the user has left as it was.
   std::shared_ptr<const CarriedView> carriedTo(const PreparedView& next) const;
   const std::optional<Preview>& preview() const { return preview_; }
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }

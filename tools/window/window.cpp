@@ -202,7 +202,7 @@ void Window::showInput() {
   const bool clicks = !events_.empty() && events_.front().button >= 0;
   const int modifiers = clicks && !holds_input_ ? events_.front().modifiers : 0;
   if (!std::exchange(holds_input_, false)) clicks ? showButton() : showTyped();
-  // Of a button's event as they were then: a slow frame may come after their release.
+  // A click has Control and Shift as they were when it happened: a slow frame may come after their release.
   io.KeyCtrl = (modifiers & GLFW_MOD_CONTROL) != 0 || io.KeysDown[GLFW_KEY_LEFT_CONTROL] ||
                io.KeysDown[GLFW_KEY_RIGHT_CONTROL];
   io.KeyShift = (modifiers & GLFW_MOD_SHIFT) != 0 || io.KeysDown[GLFW_KEY_LEFT_SHIFT] ||

@@ -7,7 +7,8 @@
 //                                                                                     filename increment: 1
 //                                                                                     time values: 0.0 0.5
 //
-// With a second number before a name ("model: 1 1 mesh.geo") the file has several steps, as the file set (FILE) says.
+// A second number before a name ("model: 1 1 mesh.geo") is that of a file set: the file has several steps, as many as
+// the section FILE says.
 #pragma once
 
 #include <cstdint>

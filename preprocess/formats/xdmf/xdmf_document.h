@@ -42,7 +42,7 @@ class XdmfDocument {
   std::vector<uint64_t> countsIn(const pugi::xml_node& node, const std::string& text) const;
 
  private:
-  /// Puts empty elements in the place of XInclude's, which refer to what they include.
+  /// Replaces each include by empty elements, one for each element that it selects; resolved() leads from the one to the other.
   void replaceIncludes();
 
   std::filesystem::path path_;
