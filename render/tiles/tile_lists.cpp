@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "render/project/footprint.h"
 #include "stream/base/vector_clones.h"
@@ -12,61 +13,49 @@
 namespace curvisplat {
 namespace {
 
-/// The pixels' centres in each row of order tiles that an ellipse covers, counted from the tile's first: from .. to.
-struct RowExtents {
-  float from[kOrderTilesAlong], to[kOrderTilesAlong];
+constexpr int kRows = 8;
+constexpr float kMargin = 0.01f;  // pixels, for rounding
+
+/// An ellipse as its rows of pixels need it: at dy it covers lean dy ± span √(reach² - dy²).
+struct EllipseRows {
+  float x, y;  // the centre, from that of the tile's first pixel
+  float lean, span, reach2;
 };
 
-/// `x`, `y`: the ellipse's centre, from the centre of the tile's first pixel.
-CURVISPLAT_VECTOR_CLONES void findExtents(float x, float y, const ScreenSplat& splat, RowExtents& out) {
-  // The ellipse covers lean dy ± span √(reach² - dy²) of the pixels at dy; it goes farthest right at dy = tip.
-  constexpr auto kSupport = static_cast<float>(kKernelSupport);
-  const float s11 = splat.l21 * splat.l21 + splat.l22 * splat.l22, over = splat.l11 / s11;
-  const float lean = over * splat.l21, span = over * splat.l22;
-  const float reach2 = kSupport * kSupport * s11, tip = kSupport * splat.l21;
-  for (int row = 0; row < kOrderTilesAlong; ++row) {
-    const float top = static_cast<float>(row * kOrderSide) - y, bottom = top + (kOrderSide - 1);
-    const float right = std::min(std::max(tip, top), bottom), left = std::min(std::max(-tip, top), bottom);
-    out.to[row] = x + lean * right + span * std::sqrt(std::max(reach2 - right * right, 0.0f));
-    out.from[row] = x + lean * left - span * std::sqrt(std::max(reach2 - left * left, 0.0f));
+/// For each of kRows rows of pixels, from `first` on: bit n if the ellipse has a centre of a pixel in the n-th four columns of
+/// the tile, or comes within a hundredth of a pixel.
+CURVISPLAT_VECTOR_CLONES void findColumns(const EllipseRows& rows, float first, uint32_t (&out)[kRows]) {
+  const auto [x, y, lean, span, reach2] = rows;
+  for (int n = 0; n < kRows; ++n) {
+    const float dy = first + static_cast<float>(n) - y;
+    const float middle = x + lean * dy;
+    const float half = span * std::sqrt(std::max(reach2 - dy * dy, 0.0f));
+    // The numbers of the first column, and of the one behind the last.
+    const float from = std::min(std::max(middle - half + (1 - kMargin), 0.0f), float{kTileSide});
+    const float end = std::min(std::max(middle + half + (1 + kMargin), 0.0f), float{kTileSide});
+    const auto column = static_cast<int32_t>(from), column_end = static_cast<int32_t>(end);
+    const int32_t tile = column / kOrderSide, tile_end = (column_end + kOrderSide - 1) / kOrderSide;
+    out[n] = column < column_end ? (1u << tile_end) - (1u << tile) : 0;
   }
 }
-
-struct OrderTileRange {
-  int first, last;
-
-  /// The order tiles along a tile with pixels' centres in from .. to, which count from the tile's first; none
-  /// where first > last.
-  static OrderTileRange of(float from, float to) {
-    constexpr float kPerPixel = 1.0f / kOrderSide, kMargin = 0.01f;  // for rounding
-    if (!(to >= -kMargin && from <= kTileSide - 1 + kMargin)) return {0, -1};
-    return {static_cast<int>(std::max(from - kMargin, 0.0f) * kPerPixel),
-            static_cast<int>(std::min((to + kMargin) * kPerPixel, kOrderTilesAlong - 1.0f))};
-  }
-};
 
 }  // namespace
 
 OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat) {
   constexpr auto kSupport = static_cast<float>(kKernelSupport);
-  const float x = splat.x - (tile.x + 0.5f), y = splat.y - (tile.y + 0.5f);
-  const float reach_x = kSupport * splat.l11;
-  const float reach_y = kSupport * std::sqrt(splat.l21 * splat.l21 + splat.l22 * splat.l22);
-  const auto rows = OrderTileRange::of(y - reach_y, y + reach_y);
-  const auto columns = OrderTileRange::of(x - reach_x, x + reach_x);
-  const auto maskOf = [](const OrderTileRange& range) -> OrderTileMask {
-    return range.first > range.last ? 0 : (2u << range.last) - (1u << range.first);
-  };
+  const float s11 = splat.l21 * splat.l21 + splat.l22 * splat.l22, over = splat.l11 / s11;
+  const EllipseRows rows{splat.x - (tile.x + 0.5f), splat.y - (tile.y + 0.5f), over * splat.l21,
+                         over * splat.l22, kSupport * kSupport * s11};
+  const float reach = std::sqrt(rows.reach2) + kMargin;
+  const int first = static_cast<int>(std::ceil(std::clamp(rows.y - reach, 0.0f, kTileSide + 0.0f)));
+  const int last = static_cast<int>(std::floor(std::clamp(rows.y + reach, -1.0f, kTileSide - 1.0f)));
   OrderTileMask tiles = 0;
-  if (rows.last - rows.first <= 1 || columns.first >= columns.last) {
-    const OrderTileMask of_row = maskOf(columns);
-    for (int row = rows.first; row <= rows.last; ++row) tiles |= of_row << row * kOrderTilesAlong;
-    return tiles;
+  for (int begin = first; begin <= last; begin += kRows) {
+    uint32_t columns[kRows];
+    findColumns(rows, static_cast<float>(begin), columns);
+    for (int n = 0; n < std::min(kRows, last + 1 - begin); ++n)
+      tiles |= OrderTileMask{columns[n]} << (begin + n) / kOrderSide * kOrderTilesAlong;
   }
-  RowExtents extents;
-  findExtents(x, y, splat, extents);
-  for (int row = rows.first; row <= rows.last; ++row)
-    tiles |= maskOf(OrderTileRange::of(extents.from[row], extents.to[row])) << row * kOrderTilesAlong;
   return tiles;
 }
 
