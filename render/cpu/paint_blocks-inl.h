@@ -56,26 +56,27 @@ struct Corner {
   float x, y;
 };
 
-/// 1 - exp(-x), x >= 0, over x: relative error below 1e-6. `kThin`: for x <= ln 2 / 2, with the same bits.
-template <bool kThin>
+/// 1 - exp(-x), x >= 0, over x: relative error below 1e-6. Each lane's bits are its own: most splats are thin, and a vector
+/// of these is quicker.
 HWY_INLINE V absorbedOf(V x) {
   const Floats d;
-  // exp(-x) = 2^-n exp(r), |r| <= ln 2 / 2
-  V r = hn::Neg(x), scale = hn::Set(d, 1.0f);
-  if constexpr (!kThin) {
-    const V held = hn::Min(x, hn::Set(d, 80.0f));
-    const V n = hn::Round(hn::Mul(held, hn::Set(d, 1.44269504f)));
-    r = hn::MulSub(n, hn::Set(d, 0.693147181f), held);
-    scale = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(Ints(), 127), hn::ConvertTo(Ints(), n))));
-  }
-  V series = hn::MulAdd(r, hn::Set(d, 1.0f / 720), hn::Set(d, 1.0f / 120));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 24));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 6));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 2));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f));
-  if constexpr (kThin) return series;
-  const V absorbed = hn::NegMulAdd(hn::Mul(scale, series), r, hn::Sub(hn::Set(d, 1.0f), scale));
-  return hn::Div(absorbed, hn::Max(x, hn::Set(d, 1e-30f)));
+  const auto series = [&](V r) HWY_ATTR {  // (exp(r) - 1) / r, |r| <= ln 2 / 2
+    V sum = hn::MulAdd(r, hn::Set(d, 1.0f / 720), hn::Set(d, 1.0f / 120));
+    sum = hn::MulAdd(sum, r, hn::Set(d, 1.0f / 24));
+    sum = hn::MulAdd(sum, r, hn::Set(d, 1.0f / 6));
+    sum = hn::MulAdd(sum, r, hn::Set(d, 1.0f / 2));
+    return hn::MulAdd(sum, r, hn::Set(d, 1.0f));
+  };
+  const V thin = series(hn::Neg(x));
+  const auto is_thin = hn::Lt(x, hn::Set(d, 0.34f));
+  if (hn::AllTrue(d, is_thin)) return thin;
+  // exp(-x) = 2^-n exp(r)
+  const V held = hn::Min(x, hn::Set(d, 80.0f));
+  const V n = hn::Round(hn::Mul(held, hn::Set(d, 1.44269504f)));
+  const V r = hn::MulSub(n, hn::Set(d, 0.693147181f), held);
+  const V scale = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(Ints(), 127), hn::ConvertTo(Ints(), n))));
+  const V absorbed = hn::NegMulAdd(hn::Mul(scale, series(r)), r, hn::Sub(hn::Set(d, 1.0f), scale));
+  return hn::IfThenElse(is_thin, thin, hn::Div(absorbed, x));
 }
 
 /// The number of half widths of its depths, L(tau / 2), by which what is seen of a splat lies nearer than its
@@ -83,7 +84,7 @@ HWY_INLINE V absorbedOf(V x) {
 HWY_INLINE V nearSide(V tau) {
   const Floats d;
   const V two = hn::Set(d, 2.0f), thin = hn::Mul(tau, hn::Set(d, 1.0f / 6));
-  const V part = absorbedOf<false>(tau), absorbed = hn::Mul(part, tau);
+  const V part = absorbedOf(tau), absorbed = hn::Mul(part, tau);
   const V sum = hn::NegMulAdd(two, part, hn::Sub(two, absorbed));
   const V side = hn::Div(sum, hn::Max(absorbed, hn::Set(d, 1e-30f)));
   return hn::IfThenElse(hn::Lt(tau, hn::Set(d, 0.02f)), thin, side);
@@ -108,16 +109,30 @@ HWY_INLINE void showNearSide(const V (&seen)[4], V (&value)[4]) {
     value[c] = hn::Mul(factor, hn::MulAdd(hn::Set(d, 1.0f / 64), value[c], seen[c]));
 }
 
-/// Optical depth per unit of extinction, zero outside of the footprint; and p and q.
+/// Where pixels lie in an ellipse: p, q, and 1 - p² - q², which is above zero in the footprint.
 struct Pixels {
-  V depth, p, q;
+  V p, q, inside;
+
+  HWY_INLINE hn::Mask<Floats> inFootprint() const { return hn::Gt(inside, hn::Zero(Floats())); }
+  /// Most splats are small: they touch three to five pixels of a block, and so often one vector of two.
+  HWY_INLINE bool areOutside() const { return hn::AllFalse(Floats(), inFootprint()); }
 };
 
-HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint, V dx, V dy) {
+/// The pixels of a block, from `lane` on.
+HWY_INLINE Pixels pixelsAt(const Ellipse& e, Corner corner, size_t lane) {
   const Floats d;
+  const V dx = hn::Add(hn::Load(d, kLaneX + lane), hn::Set(d, corner.x - e.x));
+  const V dy = hn::Add(hn::Load(d, kLaneY + lane), hn::Set(d, corner.y - e.y));
   const V p = hn::Mul(hn::Set(d, e.a), dx);
   const V q = hn::MulAdd(hn::Set(d, e.b), dx, hn::Mul(hn::Set(d, e.c), dy));
-  const V x = hn::Max(hn::NegMulAdd(q, q, hn::NegMulAdd(p, p, hn::Set(d, 1.0f))), hn::Zero(d));
+  return {p, q, hn::NegMulAdd(q, q, hn::NegMulAdd(p, p, hn::Set(d, 1.0f)))};
+}
+
+/// Optical depth per unit of extinction: zero outside of the footprint.
+HWY_INLINE V depthAt(const Ellipse& e, const float* HWY_RESTRICT footprint, const Pixels& pixels) {
+  const Floats d;
+  const auto& [p, q, inside] = pixels;
+  const V x = hn::Max(inside, hn::Zero(d));
   const V x2 = hn::Mul(x, x), x4 = hn::Mul(x2, x2);
   const auto pair = [&](int n) HWY_ATTR {
     return hn::MulAdd(hn::Set(d, footprint[n + 1]), x, hn::Set(d, footprint[n]));
@@ -134,27 +149,25 @@ HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint
     const V factor = hn::MulAdd(by_p, p, hn::MulAdd(by_q, q, hn::Set(d, 1.0f)));
     depth = hn::Mul(depth, hn::Max(factor, hn::Zero(d)));
   }
-  return {depth, p, q};
+  return depth;
 }
 
 /// Blends one vector of pixels under the splats before, whose colours and transmittance these are.
-template <bool kThin>
 HWY_INLINE void blend(V depth, const V (&value)[4], V (&colour)[3], V& through) {
   // A parabola may end below zero, by its error.
   const V tau = hn::Max(hn::Mul(depth, value[3]), hn::Zero(Floats()));
-  const V part = absorbedOf<kThin>(tau);
+  const V part = absorbedOf(tau);
   const V weight = hn::Mul(hn::Mul(depth, part), through);
   for (int c = 0; c < 3; ++c) colour[c] = hn::MulAdd(value[c], weight, colour[c]);
   through = hn::NegMulAdd(hn::Mul(tau, part), through, through);
 }
 
 /// The same in a block. Returns the transmittance that is left.
-template <bool kThin>
 HWY_INLINE V blendUnder(float* HWY_RESTRICT at, V depth, const V (&value)[4]) {
   const Floats d;
   V colour[3], through = hn::Load(d, at + 3 * kBlockPixels);
   for (int c = 0; c < 3; ++c) colour[c] = hn::Load(d, at + c * kBlockPixels);
-  blend<kThin>(depth, value, colour, through);
+  blend(depth, value, colour, through);
   for (int c = 0; c < 3; ++c) hn::Store(colour[c], d, at + c * kBlockPixels);
   hn::Store(through, d, at + 3 * kBlockPixels);
   return through;
@@ -193,53 +206,20 @@ HWY_INLINE bool isSaturated(V transmittance) {
 }
 
 /// One block. Whether it is saturated now.
-template <bool kFitted, bool kThin>
+template <bool kFitted>
 HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HWY_RESTRICT footprint,
                            float* HWY_RESTRICT block, Corner corner) {
   const Floats d;
-  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Pixels pixels = pixelsAt(e, corner, lane);
+    if (pixels.areOutside()) {
+      most = hn::Max(most, hn::Load(d, block + 3 * kBlockPixels + lane));
+      continue;
+    }
     V value[4];
     shade.valuesAt<kFitted>(pixels, value);
-    most = hn::Max(most, blendUnder<kThin>(block + lane, pixels.depth, value));
-  }
-  return isSaturated(most);
-}
-
-HWY_INLINE V lookUp(const Row& row, hn::Vec<Ints> n) {
-  const Floats d;
-  if constexpr (hn::MaxLanes(d) == kLanes) {
-    return hn::TableLookupLanes(hn::Load(d, row.at), hn::IndicesFromVec(d, n));
-  } else if constexpr (2 * hn::MaxLanes(d) == kLanes) {
-    const auto half = hn::Set(Ints(), kLanes / 2);
-    const auto in_half = hn::IndicesFromVec(d, hn::And(n, hn::Set(Ints(), kLanes / 2 - 1)));
-    return hn::IfThenElse(hn::RebindMask(d, hn::Lt(n, half)),
-                          hn::TableLookupLanes(hn::Load(d, row.at), in_half),
-                          hn::TableLookupLanes(hn::Load(d, row.at + kLanes / 2), in_half));
-  } else {
-    return hn::GatherIndex(d, row.at, n);
-  }
-}
-
-/// One block, by a polyline. Whether it is saturated now.
-HWY_INLINE bool paintBlock(const Ellipse& e, const Polyline& line, const Along& along,
-                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, Corner corner) {
-  const Floats d;
-  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
-  V most = hn::Zero(d);
-  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
-    const V s = hn::Clamp(along.at(pixels), hn::Zero(d), hn::Set(d, Polyline::kParts));
-    const auto n = hn::ConvertTo(Ints(), s);
-    const V part = hn::Sub(s, hn::ConvertTo(d, n));
-    V value[4];
-    for (int c = 0; c < 4; ++c)
-      value[c] = hn::MulAdd(lookUp(line.step.of[c], n), part, lookUp(line.at.of[c], n));
-    most = hn::Max(most, blendUnder<false>(block + lane, pixels.depth, value));
+    most = hn::Max(most, blendUnder(block + lane, depthAt(e, footprint, pixels), value));
   }
   return isSaturated(most);
 }
@@ -251,8 +231,9 @@ struct Scalar {
   float nearer = 0, seen_half_width = 0;
 };
 
-/// A block of which every pixel is looked up.
+/// A block of which every pixel that the splat touches is looked up: one whose bit is set.
 struct LookedUp {
+  uint32_t touched;
   Row depth, scale;
   alignas(64) float integrals[4 * kLanes];  // of one pixel after the other
 };
@@ -267,8 +248,9 @@ struct Tables {
 HWY_INLINE void showNearSides(const ShadingTable& table, const Intervals& nearer, LookedUp& out) {
   const Floats d;
   alignas(64) float integrals[4 * kLanes];
-  integrate(table, nearer, kLanes, integrals);
+  integrateEach(table, nearer, out.touched, integrals);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    if (!anyOf(out.touched, lane)) continue;
     V seen[4], value[4];
     meansOf(integrals, hn::Load(d, nearer.scale.at + lane), lane, seen);
     meansOf(out.integrals, hn::Load(d, out.scale.at + lane), lane, value);
@@ -282,14 +264,16 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Tables
                             LookedUp& out) {
   const float* HWY_RESTRICT footprint = tables.footprint;
   const Floats d;
-  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   Intervals intervals, nearer;
   const bool hides = scalar.nearer != 0;
+  out.touched = 0;
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Pixels pixels = pixelsAt(e, corner, lane);
+    const uint32_t touched = bitsOf(pixels.inFootprint());
+    if (touched == 0) continue;
+    out.touched |= touched << lane;
     const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
-    hn::Store(pixels.depth, d, out.depth.at + lane);
+    hn::Store(depthAt(e, footprint, pixels), d, out.depth.at + lane);
     const V mean = hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean));
     locate(tables.shading, mean, hn::Set(d, scalar.half_width), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
@@ -297,7 +281,8 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Tables
       locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)), hn::Set(d, scalar.seen_half_width),
              lane, nearer);
   }
-  integrate(tables.shading, intervals, kLanes, out.integrals);
+  if (out.touched == 0) return false;
+  integrateEach(tables.shading, intervals, out.touched, out.integrals);
   if (hides) showNearSides(tables.shading, nearer, out);
   return true;
 }
@@ -306,11 +291,15 @@ HWY_INLINE bool paintLookedUp(const LookedUp& in, const Lit& lit, float* HWY_RES
   const Floats d;
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    if (!anyOf(in.touched, lane)) {
+      most = hn::Max(most, hn::Load(d, block + 3 * kBlockPixels + lane));
+      continue;
+    }
     V value[4];
     meansOf(in.integrals, hn::Load(d, in.scale.at + lane), lane, value);
     const V white = hn::Mul(value[3], hn::Set(d, lit.specular));
     for (int c = 0; c < 3; ++c) value[c] = hn::MulAdd(value[c], hn::Set(d, lit.diffuse), white);
-    most = hn::Max(most, blendUnder<false>(block + lane, hn::Load(d, in.depth.at + lane), value));
+    most = hn::Max(most, blendUnder(block + lane, hn::Load(d, in.depth.at + lane), value));
   }
   return isSaturated(most);
 }

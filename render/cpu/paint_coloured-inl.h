@@ -176,15 +176,13 @@ struct Coloured {
 HWY_NOINLINE bool paintBlock(Coloured& splat, const Window& window, const float* HWY_RESTRICT footprint,
                              float* HWY_RESTRICT block, Corner corner) {
   const Floats d;
-  const V from_x = hn::Set(d, corner.x - splat.e.x), from_y = hn::Set(d, corner.y - splat.e.y);
   const Cuts cuts{splat.faces, splat.line, window};
   Intervals of_opacity, of_colour;
   Row depths;
   V deepest = hn::Zero(d);
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(splat.e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
-    V depth = pixels.depth;
+    const Pixels pixels = pixelsAt(splat.e, corner, lane);
+    V depth = depthAt(splat.e, footprint, pixels);
     Remaining left{hn::Zero(d), hn::Zero(d)};
     if (splat.is_cut) {
       const Interval interval = intervalAt(cuts, pixels, lane);
@@ -212,7 +210,7 @@ HWY_NOINLINE bool paintBlock(Coloured& splat, const Window& window, const float*
     const V white = hn::Mul(extinction, hn::Set(d, splat.lit.specular));
     for (int c = 0; c < 3; ++c) value[c] = hn::MulAdd(hn::Max(value[c], hn::Zero(d)), coloured, white);
     value[3] = extinction;
-    most = hn::Max(most, blendUnder<false>(block + lane, hn::Load(d, depths.at + lane), value));
+    most = hn::Max(most, blendUnder(block + lane, hn::Load(d, depths.at + lane), value));
   }
   return isSaturated(most);
 }

@@ -129,13 +129,15 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const CutShade& c
                            const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, Corner corner) {
   const Shade& shade = cut_shade.whole;
   const Floats d;
-  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
-    const Interval left = intervalAt(cuts, pixels, lane);
-    const V share = left.share();
+    const Pixels pixels = pixelsAt(e, corner, lane);
+    Interval left{hn::Zero(d), hn::Zero(d)};
+    V share = hn::Zero(d);
+    if (!pixels.areOutside()) {
+      left = intervalAt(cuts, pixels, lane);
+      share = left.share();
+    }
     if (hn::AllTrue(d, hn::Eq(share, hn::Zero(d)))) {
       most = hn::Max(most, hn::Load(d, block + 3 * kBlockPixels + lane));
       continue;
@@ -149,7 +151,7 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const CutShade& c
     } else {
       for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
     }
-    most = hn::Max(most, blendUnder<false>(block + lane, hn::Mul(pixels.depth, share), value));
+    most = hn::Max(most, blendUnder(block + lane, hn::Mul(depthAt(e, footprint, pixels), share), value));
   }
   return isSaturated(most);
 }
@@ -159,20 +161,21 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
                             Corner corner, LookedUp& out) {
   const Floats d;
   const float* HWY_RESTRICT footprint = tables.footprint;
-  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   const Faces& faces = cuts.faces;
   Intervals intervals, nearer;
   const bool hides = scalar.nearer != 0;
   const float hidden2 =
       scalar.half_width * scalar.half_width - scalar.seen_half_width * scalar.seen_half_width;
-  V most = hn::Zero(d);
+  out.touched = 0;
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Pixels pixels = pixelsAt(e, corner, lane);
+    if (pixels.areOutside()) continue;
     const Interval left = intervalAt(cuts, pixels, lane);
-    const V share = left.share(), moved = left.mean(share);
-    const V depth = hn::Mul(pixels.depth, share);
-    most = hn::Max(most, depth);
+    const V share = left.share(), depth = hn::Mul(depthAt(e, footprint, pixels), share);
+    const uint32_t touched = bitsOf(hn::Gt(depth, hn::Zero(d)));
+    if (touched == 0) continue;
+    out.touched |= touched << lane;
+    const V moved = left.mean(share);
     const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
     hn::Store(depth, d, out.depth.at + lane);
     const V mean = hn::MulAdd(hn::Set(d, faces.mean_per_deviation * ScreenCut::kReach), moved,
@@ -186,8 +189,8 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
       locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)),
              hn::Sqrt(hn::Max(hn::Sub(width2, hn::Set(d, hidden2)), hn::Zero(d))), lane, nearer);
   }
-  if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return false;
-  integrate(tables.shading, intervals, kLanes, out.integrals);
+  if (out.touched == 0) return false;
+  integrateEach(tables.shading, intervals, out.touched, out.integrals);
   if (hides) showNearSides(tables.shading, nearer, out);
   return true;
 }

@@ -10,6 +10,9 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
+#include <bit>
+
 #include "render/cpu/tile.h"
 #include "render/project/light.h"
 
@@ -84,22 +87,47 @@ HWY_INLINE Range locate(const ShadingTable& table, V mean, V half_width, size_t 
   return {from, to};
 }
 
-/// The integrals over the first `count` intervals, one after the other, of 4 * kLanes; the others are zero.
-HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t count,
-                          float* HWY_RESTRICT out) {
+/// The integral over interval n.
+HWY_INLINE void integrateOne(const ShadingTable& table, const Intervals& in, size_t n,
+                             float* HWY_RESTRICT out) {
   const Four d;
   constexpr size_t kDensity = 4, kNext = 8;  // from a cell's start
   const float* cells = table.cells()->start.of;
-  for (size_t n = 0; n < count; ++n) {
-    const float *from = cells + in.from.at[n], *to = cells + in.to.at[n];
-    for (size_t c = 0; c < 4; c += hn::Lanes(d)) {
-      auto sum = hn::Sub(hn::Load(d, to + c), hn::Load(d, from + kNext + c));
-      sum = hn::MulAdd(hn::Load(d, from + kDensity + c), hn::Set(d, in.first.at[n]), sum);
-      sum = hn::MulAdd(hn::Load(d, to + kDensity + c), hn::Set(d, in.last.at[n]), sum);
-      hn::Store(sum, d, out + 4 * n + c);
-    }
+  const float *from = cells + in.from.at[n], *to = cells + in.to.at[n];
+  for (size_t c = 0; c < 4; c += hn::Lanes(d)) {
+    auto sum = hn::Sub(hn::Load(d, to + c), hn::Load(d, from + kNext + c));
+    sum = hn::MulAdd(hn::Load(d, from + kDensity + c), hn::Set(d, in.first.at[n]), sum);
+    sum = hn::MulAdd(hn::Load(d, to + kDensity + c), hn::Set(d, in.last.at[n]), sum);
+    hn::Store(sum, d, out + 4 * n + c);
   }
+}
+
+/// The integrals over the first `count` intervals, one after the other, of 4 * kLanes; the others are zero.
+HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t count,
+                          float* HWY_RESTRICT out) {
+  for (size_t n = 0; n < count; ++n) integrateOne(table, in, n, out);
   std::fill(out + 4 * count, out + 4 * kLanes, 0.0f);
+}
+
+/// The same of the intervals with a bit in `wanted`.
+HWY_INLINE void integrateEach(const ShadingTable& table, const Intervals& in, uint32_t wanted,
+                              float* HWY_RESTRICT out) {
+  const Floats d;
+  for (size_t n = 0; n < 4 * kLanes; n += hn::Lanes(d)) hn::Store(hn::Zero(d), d, out + n);
+  for (; wanted != 0; wanted &= wanted - 1)
+    integrateOne(table, in, static_cast<size_t>(std::countr_zero(wanted)), out);
+}
+
+/// Bit n: lane n.
+HWY_INLINE uint32_t bitsOf(hn::Mask<Floats> mask) {
+  uint8_t bytes[8] = {};
+  hn::StoreMaskBits(Floats(), mask, bytes);
+  return bytes[0] | uint32_t{bytes[1]} << 8;
+}
+
+/// Whether any of the lanes of the vector that begins at `lane` has its bit.
+HWY_INLINE bool anyOf(uint32_t bits, size_t lane) {
+  return (bits >> lane & ((1u << hn::Lanes(Floats())) - 1)) != 0;
 }
 
 /// Makes means of integrals.
@@ -122,8 +150,6 @@ enum Fit : int32_t { kNothing, kConstant, kParabola, kOther };
 /// The fit of a piece: at + s (by + s bend), with s = -1 to 1 from end to end.
 struct Fits {
   Values at, by, bend;
-  Row most;    // extinction
-  Row excess;  // of kOther: the error, in what is allowed
   IntRow fit;
 
   /// Colours become what is seen of them in this light.
@@ -217,101 +243,10 @@ HWY_INLINE void fitPieces(const ShadingTable& table, const Pieces& pieces, size_
     fit = hn::IfThenElse(hn::Eq(most, hn::Zero(d)), code(kNothing), fit);
     fit = hn::IfThenElse(hn::Le(off, allowed), fit, code(kOther));
     hn::Store(hn::ConvertTo(Ints(), fit), Ints(), fits.fit.at + lane);
-    hn::Store(hn::Div(off, allowed), d, fits.excess.at + lane);
-    // A parabola's most lies between its three points.
-    hn::Store(hn::Mul(hn::Set(d, 1.25f), most), d, fits.most.at + lane);
   }
 }
 
-/// A line that stands in where a parabola does not do for a piece: a line of fifteen parts, at[n] + (s - n)
-/// step[n], n the whole part of s, with s = 0 to 15 from end to end.
-struct Polyline {
-  static constexpr float kParts = kLanes - 1;
-
-  Values at, step;
-
-  /// Does what Fits::light() does.
-  HWY_INLINE void light(const Lit& lit) {
-    const Floats d;
-    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
-      for (Values* values : {&at, &step}) {
-        const V white = hn::Mul(hn::Load(d, values->of[3].at + lane), hn::Set(d, lit.specular));
-        for (int c = 0; c < 3; ++c) {
-          float* const value = values->of[c].at + lane;
-          hn::Store(hn::MulAdd(hn::Load(d, value), hn::Set(d, lit.diffuse), white), d, value);
-        }
-      }
-  }
-};
-
-/// A row, and its last element again: to be read from its second.
-struct alignas(64) LongRow {
-  float at[2 * kLanes];
-
-  HWY_INLINE void repeatLast() { at[kLanes] = at[kLanes - 1]; }
-};
-
-/// Fits a line to one piece, and returns whether it is good enough. Over a move by h cells a straight line is
-/// off by at most 0.25 h m sum of |second differences| (ShadingTable); and on a logarithmic scale, where the
-/// move itself is bent, by an eighth of r (of twice that, since r <= 0.3 changes within the move) times the
-/// largest slope.
-HWY_INLINE bool fitPolyline(const ShadingTable& table, const Pieces& pieces, size_t n, Polyline& line) {
-  const Floats d;
-  const float from = pieces.from.at[n], per_part = (pieces.to.at[n] - from) / Polyline::kParts;
-  const V mean = hn::Set(d, pieces.mean.at[n]), reach = hn::Set(d, pieces.reach.at[n]);
-  const V half_width = hn::Set(d, pieces.half_width.at[n]);
-  Intervals intervals;
-  LongRow begins, ends, values[4];
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    const V t = hn::MulAdd(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, per_part), hn::Set(d, from));
-    const Range range = locate(table, hn::MulAdd(reach, t, mean), half_width, lane, intervals);
-    hn::Store(range.from, d, begins.at + lane);
-    hn::Store(range.to, d, ends.at + lane);
-  }
-  begins.repeatLast();
-  ends.repeatLast();
-  alignas(64) float integrals[4 * kLanes];
-  integrate(table, intervals, kLanes, integrals);
-  V most = hn::Zero(d);
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    V value[4];
-    meansOf(integrals, hn::Load(d, intervals.scale.at + lane), lane, value);
-    for (size_t c = 0; c < 4; ++c) hn::Store(value[c], d, values[c].at + lane);
-    most = hn::Max(most, value[3]);
-  }
-  for (LongRow& row : values) row.repeatLast();
-
-  V error = hn::Zero(d);
-  const float* bends = &table.bends()->second;
-  const V quarter = hn::Set(d, 0.25f), log_unit = hn::Set(d, table.logScale() ? 1 / table.scale() : 0.0f);
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    V change = hn::Zero(d);
-    for (size_t c = 0; c < 4; ++c) {
-      const V at = hn::Load(d, values[c].at + lane);
-      const V step = hn::Sub(hn::LoadU(d, values[c].at + lane + 1), at);
-      hn::Store(at, d, line.at.of[c].at + lane);
-      hn::Store(step, d, line.step.of[c].at + lane);
-      change = hn::Max(change, hn::Abs(step));
-    }
-    const V begin = hn::Load(d, begins.at + lane), end = hn::LoadU(d, ends.at + lane + 1);
-    const V move = hn::Max(hn::Sub(hn::LoadU(d, begins.at + lane + 1), begin),
-                           hn::Sub(end, hn::Load(d, ends.at + lane)));
-    const auto first = hn::ShiftLeft<1>(element(hn::Sub(begin, hn::Set(d, 1.0f))));
-    const auto last = hn::ShiftLeft<1>(hn::Add(element(hn::Add(end, hn::Set(d, 1.0f))), hn::Set(Ints(), 1)));
-    const V second = hn::Sub(hn::GatherIndex(d, bends, last), hn::GatherIndex(d, bends, first));
-    const V m = hn::Min(hn::Mul(move, hn::Load(d, intervals.scale.at + lane)), hn::Set(d, 1.0f));
-    const V bend = hn::Mul(hn::Mul(move, m), second);
-    const V r = hn::Mul(move, log_unit);
-    V off = hn::Mul(quarter, hn::MulAdd(r, hn::Add(change, bend), bend));
-    off = hn::IfThenElse(hn::Gt(r, hn::Set(d, 0.3f)), hn::Set(d, 1e30f), off);
-    error = hn::Max(error, off);
-  }
-  const float largest = hn::GetLane(hn::MaxOfLanes(d, most));
-  const float allowed = std::max(kRelativeError * largest, kDepthError / (kPeak * pieces.amplitude.at[n]));
-  return hn::GetLane(hn::MaxOfLanes(d, error)) <= allowed;
-}
-
-/// Flat splats: `at`, `most` and `fit`, of their means alone.
+/// Flat splats: `at` and `fit`, of their means alone.
 HWY_INLINE void fitMeans(const ShadingTable& table, const Pieces& pieces, size_t count, Fits& fits) {
   const Floats d;
   Intervals intervals;
@@ -323,7 +258,6 @@ HWY_INLINE void fitMeans(const ShadingTable& table, const Pieces& pieces, size_t
     V value[4];
     meansOf(integrals, hn::Load(d, intervals.scale.at + lane), lane, value);
     for (size_t c = 0; c < 4; ++c) hn::Store(value[c], d, fits.at.of[c].at + lane);
-    hn::Store(value[3], d, fits.most.at + lane);
     const V fit = hn::IfThenElse(hn::Gt(value[3], hn::Zero(d)), hn::Set(d, static_cast<float>(kConstant)),
                                  hn::Set(d, static_cast<float>(kNothing)));
     hn::Store(hn::ConvertTo(Ints(), fit), Ints(), fits.fit.at + lane);

@@ -31,27 +31,23 @@ namespace hn = hwy::HWY_NAMESPACE;
 struct alignas(64) Plain {
   Ellipse e;
   Shade shade;
-  bool fitted, thin;
+  bool fitted;
 };
 static_assert(sizeof(Plain) == 128);
 
 /// blend() of some pixels of a block.
 HWY_INLINE void blendPlain(const Plain& plain, const float* footprint, Corner corner, size_t lane,
                            V (&colour)[3], V& through) {
-  const Floats d;
-  const auto& [e, shade, fitted, thin] = plain;
-  const Pixels pixels =
-      pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), hn::Set(d, corner.x - e.x)),
-               hn::Add(hn::Load(d, kLaneY + lane), hn::Set(d, corner.y - e.y)));
+  const auto& [e, shade, fitted] = plain;
+  const Pixels pixels = pixelsAt(e, corner, lane);
+  if (pixels.areOutside()) return;
+  const V depth = depthAt(e, footprint, pixels);
   V value[4];
   if (fitted)
     shade.valuesAt<true>(pixels, value);
   else
     shade.valuesAt<false>(pixels, value);
-  if (thin)
-    blend<true>(pixels.depth, value, colour, through);
-  else
-    blend<false>(pixels.depth, value, colour, through);
+  blend(depth, value, colour, through);
 }
 
 // These paint `blocks`, and return those of them that are saturated then.
@@ -62,12 +58,10 @@ HWY_INLINE BlockMask paintPlain(const TileWork& work, BlockMask blocks, const Pl
   while (blocks != 0) {
     const int block = takeFirst(blocks);
     float* const at = work.tile + block * kBlockFloats;
-    const auto& [e, shade, fitted, thin] = plain;
+    const auto& [e, shade, fitted] = plain;
     const Corner corner = cornerOf(block);
-    const bool full = fitted ? thin ? paintBlock<true, true>(e, shade, footprint, at, corner)
-                                    : paintBlock<true, false>(e, shade, footprint, at, corner)
-                      : thin ? paintBlock<false, true>(e, shade, footprint, at, corner)
-                             : paintBlock<false, false>(e, shade, footprint, at, corner);
+    const bool full = fitted ? paintBlock<true>(e, shade, footprint, at, corner)
+                             : paintBlock<false>(e, shade, footprint, at, corner);
     if (full) saturated |= BlockMask{1} << block;
   }
   return saturated;
@@ -87,31 +81,6 @@ HWY_INLINE Along along(const Pieces& pieces, size_t n, const Scalar& scalar, flo
   return {begin - from * per_t, per_t * scalar.tp, per_t * scalar.tq};
 }
 
-HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, const Ellipse& e,
-                                     const Polyline& line, const Along& s, const float* footprint) {
-  BlockMask saturated = 0;
-  while (blocks != 0) {
-    const int block = takeFirst(blocks);
-    if (paintBlock(e, line, s, footprint, work.tile + block * kBlockFloats, cornerOf(block)))
-      saturated |= BlockMask{1} << block;
-  }
-  return saturated;
-}
-
-/// Whether a polyline does for the splat. Its error is a 25th of a parabola's or so, where it does not fall much faster; and
-/// it is as much work as a block looked up. `several`: the splat touches more than one block, be they open or not: how a
-/// block is painted must not depend on others, of which another process may know.
-HWY_INLINE bool fitsPolyline(const TileWork& work, const Visit& visit, bool several, Polyline& line) {
-  if (!several || visit.fits.excess.at[visit.n] >= 25) return false;
-  if (!fitPolyline(work.table, visit.all.pieces, visit.n, line)) return false;
-  if (work.shading.lit) line.light(visit.all.lit(work, visit.n));
-  return true;
-}
-
-HWY_INLINE Along alongPolyline(const Visit& visit) {
-  return along(visit.all.pieces, visit.n, visit.scalar(), 0, Polyline::kParts);
-}
-
 HWY_INLINE bool isPlain(const Visit& visit) {
   return visit.fit() == kConstant || visit.fit() == kParabola;
 }
@@ -119,13 +88,11 @@ HWY_INLINE bool isPlain(const Visit& visit) {
 /// Writes it where it is to be: copying what has just been written in parts would wait for that.
 HWY_INLINE void makePlain(const Visit& visit, Plain* place) {
   const auto& [visits, fits, n] = visit;
-  Plain& plain = *new (place) Plain{visit.ellipse(), shadeOf(fits, n), visit.fit() == kParabola, false};
-  // A skewed footprint may be a tenth higher than F(0).
-  plain.thin = plain.e.amplitude * kPeak * fits.most.at[n] < (plain.e.skewed ? 0.3f : 0.34f);
+  Plain& plain = *new (place) Plain{visit.ellipse(), shadeOf(fits, n), visit.fit() == kParabola};
   if (plain.fitted) plain.shade.s = along(visits.pieces, n, visit.scalar(), -1, 1);
 }
 
-HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool several, const Visit& visit,
+HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visit& visit,
                                 const float* footprint) {
   if (isPlain(visit)) {
     alignas(Plain) std::byte place[sizeof(Plain)];
@@ -133,11 +100,8 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, bool sev
     makePlain(visit, plain);
     return paintPlain(work, blocks, *plain, footprint);
   }
-  const Ellipse e = visit.ellipse();
-  Polyline line;
-  if (fitsPolyline(work, visit, several, line))
-    return paintPolyline(work, blocks, e, line, alongPolyline(visit), footprint);
-  return paintPixelByPixel(work, blocks, e, visit.scalar(), visit.all.lit(work, visit.n), footprint);
+  return paintPixelByPixel(work, blocks, visit.ellipse(), visit.scalar(), visit.all.lit(work, visit.n),
+                           footprint);
 }
 
 /// Sixteen splats, prepared.
@@ -175,8 +139,7 @@ struct Prepared {
   }
 
   /// Paints splat n in `blocks`, some of those touched; returns those of them that are saturated then.
-  HWY_INLINE BlockMask paint(const TileWork& work, BlockMask blocks, BlockMask touched, size_t n,
-                             const float* footprint) const {
+  HWY_INLINE BlockMask paint(const TileWork& work, BlockMask blocks, size_t n, const float* footprint) const {
     const auto number = static_cast<size_t>(numbers.at[n]);
     if (work.colours) return paintColoured(work, blocks, {visits, fits, colours, n}, number, footprint);
     const Visit visit{visits, fits, n};
@@ -185,7 +148,7 @@ struct Prepared {
       makeCut(work, visit, number, cut);
       return paintCut(work, blocks, cut, footprint);
     }
-    return paintVisit(work, blocks, std::popcount(touched) > 1, visit, footprint);
+    return paintVisit(work, blocks, visit, footprint);
   }
 };
 
@@ -196,8 +159,8 @@ BlockMask paintInOrder(const TileWork& work) {
   for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
     prepared.prepare(work, begin);
     for (size_t n = 0; n < prepared.count; ++n) {
-      const BlockMask touched = prepared.touched(n), blocks = touched & open;
-      if (blocks != 0) open &= ~prepared.paint(work, blocks, touched, n, footprint);
+      const BlockMask blocks = prepared.touched(n) & open;
+      if (blocks != 0) open &= ~prepared.paint(work, blocks, n, footprint);
     }
   }
   return open;
@@ -227,6 +190,7 @@ class Listed {
         const uint32_t number = numberOf(some[n]);
         if (places_[number].way == kUnknown) prepare(number / kLanes);
         const auto [way, at] = places_[number];
+        if (n + 1 < some.size()) prefetch(places_[numberOf(some[n + 1])]);
         if (way == kPixels)
           found[n] = lookUpBlock(pixelwise_[at].e, pixelwise_[at].scalar, {work_->table, footprint_},
                                  cornerOf(block), looked_up[n]);
@@ -249,39 +213,38 @@ class Listed {
   }
 
   uint64_t preparedBytes() const {
-    return plains_.size() * sizeof(Plain) + lines_.size() * sizeof(LineSplat) +
-           pixelwise_.size() * sizeof(PixelwiseSplat) + cuts_.size() * sizeof(CutSplat) +
-           coloured_.size() * sizeof(Prepared);
+    return plains_.size() * sizeof(Plain) + pixelwise_.size() * sizeof(PixelwiseSplat) +
+           cuts_.size() * sizeof(CutSplat) + coloured_.size() * sizeof(Prepared);
   }
 
   void forget() {
     std::fill(places_.begin(), places_.end(), Place{});
     plains_.clear();
-    lines_.clear();
     pixelwise_.clear();
     cuts_.clear();
     coloured_.clear();
   }
 
  private:
-  enum Way : uint32_t { kUnknown, kPlain, kLine, kPixels, kCutPixels, kCut, kColoured, kNoWay };
+  enum Way : uint32_t { kUnknown, kPlain, kPixels, kCutPixels, kCut, kColoured, kNoWay };
   /// The place of a splat's preparation: `at` counts in the vector of its way; of kColoured, in lanes of
   /// coloured_.
   struct Place {
     Way way = kUnknown;
     uint32_t at = 0;
   };
-  struct LineSplat {
-    Ellipse e;
-    Along s;
-    Polyline line;
-  };
-  struct PixelwiseSplat {
+  struct alignas(64) PixelwiseSplat {
     Ellipse e;
     Scalar scalar;
     Lit lit;
   };
 
+  HWY_INLINE void prefetch(Place place) const {
+    if (place.way != kPixels) return;
+    const auto* const at = reinterpret_cast<const std::byte*>(&pixelwise_[place.at]);
+    hwy::Prefetch(at);
+    hwy::Prefetch(at + 64);
+  }
   HWY_INLINE float* placeOf(int block) const { return work_->tile + block * kBlockFloats; }
 
   HWY_INLINE bool paintFound(const LookedUp& found, Place place, int block) const {
@@ -291,17 +254,13 @@ class Listed {
 
   HWY_NOINLINE bool paintOther(Place place, int block) {
     switch (place.way) {
-      case kLine: {
-        const LineSplat& line = lines_[place.at];
-        return paintBlock(line.e, line.line, line.s, footprint_, placeOf(block), cornerOf(block));
-      }
       case kCut:
         return paintCutBlock(*work_, cuts_[place.at], footprint_, block);
       case kColoured: {
         const BlockMask bit = BlockMask{1} << block;
         const Prepared& group = coloured_[place.at / kLanes];
         const size_t n = place.at % kLanes;
-        return (group.touched(n) & bit) != 0 && group.paint(*work_, bit, bit, n, footprint_) != 0;
+        return (group.touched(n) & bit) != 0 && group.paint(*work_, bit, n, footprint_) != 0;
       }
       default:
         return false;
@@ -350,14 +309,13 @@ class Listed {
     group.prepare(*work_, begin);
     for (size_t n = 0; n < group.count; ++n) {
       const Visit visit{group.visits, group.fits, n};
-      const BlockMask touched = group.touched(n);
       places_[begin + n] =
-          touched == 0 ? Place{kNoWay} : make(visit, touched, static_cast<size_t>(group.numbers.at[n]));
+          group.touched(n) == 0 ? Place{kNoWay} : make(visit, static_cast<size_t>(group.numbers.at[n]));
     }
   }
 
   /// `splat`: in the splats of the tile.
-  HWY_INLINE Place make(const Visit& visit, BlockMask touched, size_t splat) {
+  HWY_INLINE Place make(const Visit& visit, size_t splat) {
     const auto last = [](const auto& prepared) { return static_cast<uint32_t>(prepared.size() - 1); };
     if (work_->colours)
       return {kColoured, last(coloured_) * uint32_t{kLanes} + static_cast<uint32_t>(visit.n)};
@@ -369,11 +327,6 @@ class Listed {
       makePlain(visit, &plains_.emplace_back());
       return {kPlain, last(plains_)};
     }
-    Polyline line;
-    if (fitsPolyline(*work_, visit, std::popcount(touched) > 1, line)) {
-      lines_.push_back({visit.ellipse(), alongPolyline(visit), line});
-      return {kLine, last(lines_)};
-    }
     pixelwise_.push_back({visit.ellipse(), visit.scalar(), visit.all.lit(*work_, visit.n)});
     return {kPixels, last(pixelwise_)};
   }
@@ -383,7 +336,6 @@ class Listed {
   Prepared group_;
   std::vector<Place> places_;  // [splat]
   std::vector<Plain> plains_;
-  std::vector<LineSplat> lines_;
   std::vector<PixelwiseSplat> pixelwise_;
   std::vector<CutSplat> cuts_;
   std::vector<Prepared> coloured_;  // in pictures of two scalars

@@ -356,8 +356,6 @@ HWY_INLINE void fitNearSides(const ShadingTable& table, Visits& visits, size_t c
     const auto fit = hn::Load(Ints(), fits.fit.at + lane), of_seen = hn::Load(Ints(), seen.fit.at + lane);
     const auto worse = hn::IfThenElseZero(hn::Gt(fit, hn::Set(Ints(), kNothing)), hn::Max(fit, of_seen));
     hn::Store(hn::IfThenElse(hn::RebindMask(Ints(), hides), worse, fit), Ints(), fits.fit.at + lane);
-    const V excess = hn::Load(d, fits.excess.at + lane);
-    hn::Store(hn::IfThenElse(hides, hn::Set(d, 1e9f), excess), d, fits.excess.at + lane);
   }
 }
 

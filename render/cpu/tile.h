@@ -88,7 +88,7 @@ inline constexpr int kTileBlocks = kTileSide / kBlockSide;  // along a side
 inline constexpr int kTileFloats = 4 * kTileSide * kTileSide;
 
 // A splat's mean extinction, and colour times extinction, are looked up for every pixel, unless a constant
-// or a parabola over the splat (or over 4x4 of its pixels) is known to differ by less than this part of the
+// or a parabola over the splat, as far as it is in the tile, is known to differ by less than this part of the
 // largest extinction there (which changes the opacity of all splats together by less than e^-1 / 256), or by
 // less than this optical depth. A flat splat, which has one colour throughout, is a constant.
 inline constexpr float kRelativeError = 1.0f / 256;
