@@ -109,7 +109,7 @@ HWY_INLINE void showNearSide(const V (&seen)[4], V (&value)[4]) {
     value[c] = hn::Mul(factor, hn::MulAdd(hn::Set(d, 1.0f / 64), value[c], seen[c]));
 }
 
-/// Where pixels lie in an ellipse: p, q, and 1 - p² - q², which is above zero in the footprint.
+/// The place of some pixels in an ellipse: p, q, and 1 - p² - q², which is above zero in the footprint.
 struct Pixels {
   V p, q, inside;
 

@@ -22,8 +22,8 @@ struct EllipseRows {
   float lean, span, reach2;
 };
 
-/// For each of kRows rows of pixels, from `first` on: bit n if the ellipse has a centre of a pixel in the n-th four columns of
-/// the tile, or comes within a hundredth of a pixel.
+/// Asks each of kRows rows of pixels, from `first` on, which columns of order tiles the ellipse touches in it: bit n, if it
+/// has a pixel's centre in column n, or comes within a hundredth of a pixel of one.
 CURVISPLAT_VECTOR_CLONES void findColumns(const EllipseRows& rows, float first, uint32_t (&out)[kRows]) {
   const auto [x, y, lean, span, reach2] = rows;
   for (int n = 0; n < kRows; ++n) {
