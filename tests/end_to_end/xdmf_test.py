@@ -317,6 +317,18 @@ class Xdmf(StructuredFormats):
         (self.folder / "a.bin").write_bytes(bad.binary[:-1])
         self.expect_line(path, words="truncated")
 
+    def test_limits_of_included_parts(self):
+        block = Block()
+        text = grid(self.new(), block).replace("<Grid", '<Grid Name="a"', 1)
+        include = lambda *pointers: "".join(f'<xi:include xpointer="xpointer({pointer})"/>' for pointer in pointers)
+        for included, told in ((include("//a[1]"), "which the file does not have"), (include("//*[count(//*) > 1]"), "which is not read"),
+                               (include("//Grid" + "[@Name='a']" * 100), "which is not read"), (include("//Grid[@Name='own']"), "Grid own has no Topology"),
+                               ("<b/>" * 1100 + include("//b") * 1000, "includes more than 1000000 elements"),
+                               ("<b/>" * 5000 + include(*(f"//b[{n}]" for n in range(1, 4500))), "has too many includes")):
+            path = self.write(f'{text}<Grid Name="own">{included}</Grid>')
+            with self.subTest(told=told):
+                self.expect_line(path, words=told)
+
     def test_where_hdf5_files_lead(self):
         block = Block((3, 4, 5))
         (self.folder / "in").mkdir()

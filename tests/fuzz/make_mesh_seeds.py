@@ -382,6 +382,10 @@ def xdmf_seeds():
     put("xdmf", "inline", f"{head}{grid}</Domain></Xdmf>".encode())
     steps = f'<Grid GridType="Collection" CollectionType="Temporal"><Time TimeType="List">{item.format(2, "0 1")}</Time>{grid}{grid}</Grid>'
     put("xdmf", "steps", f"{head}{steps}</Domain></Xdmf>".encode())
+    included = "".join(f'<xi:include xpointer="xpointer({pointer})"/>'
+                       for pointer in ("//Grid[@Name='a']/*[self::Topology or self::Geometry]", "//Attribute[@Name='p']"))
+    named, times = grid.replace("<Grid", '<Grid Name="a"'), f"<Grid>{included}</Grid>" * 2
+    put("xdmf", "includes", f'{head}{named}<Grid GridType="Collection" CollectionType="Temporal">{times}</Grid></Domain></Xdmf>'.encode())
     binary = '<DataItem Dimensions="{}" Precision="4" Format="Binary" Seek="{}" Endian="Little">a.bin</DataItem>'
     axes = "".join(binary.format(n, 8 * n) for n in (4, 3, 2))
     put("xdmf", "axes", (f'{head}<Grid>{topology.replace("3DSMesh", "3DRectMesh")}<Geometry GeometryType="VXVYVZ">{axes}</Geometry>'

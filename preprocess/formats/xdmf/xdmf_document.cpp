@@ -175,17 +175,19 @@ bool isInclude(const pugi::xml_node& node) {
   return named == "include" || named.ends_with(":include");
 }
 
-/// The elements that a pointer selects. None if it is not a path of names with conditions: XPath has functions
+/// The elements that a pointer selects. nullopt if it is not a path of names with conditions: XPath has functions
 /// that take as long as one likes.
-std::vector<pugi::xml_node> selectedBy(const std::string& pointer, const pugi::xml_document& document) {
+std::optional<std::vector<pugi::xml_node>> selectedBy(const std::string& pointer,
+                                                      const pugi::xml_document& document) {
   static const std::regex path(R"(xpointer\((/?(?:/[\w*.-]+(?:\[(?:[^\[\]()/'"]|'[^']*'|"[^"]*")*\])*)+)\))");
   std::smatch match;
-  if (pointer.size() > kMaxPointer || !std::regex_match(pointer, match, path)) return {};
+  if (pointer.size() > kMaxPointer || !std::regex_match(pointer, match, path)) return std::nullopt;
   std::vector<pugi::xml_node> selected;
   try {
     for (const pugi::xpath_node& found : document.select_nodes(match[1].str().c_str()))
       if (found.node() && !isInclude(found.node())) selected.push_back(found.node());
   } catch (const pugi::xpath_exception&) {
+    return std::nullopt;
   }
   return selected;
 }
@@ -227,11 +229,12 @@ void XdmfDocument::replaceIncludes() {
     if (is_new) {
       if ((looked_at += elements.size()) > kMaxLookedAt)
         throw Error("{}: has too many includes; write the grids out", name());
-      found->second = selectedBy(pointer, document_);
+      const auto parts = selectedBy(pointer, document_);
+      if (!parts || parts->empty())
+        throw Error("{}: includes {}, which {}; write the grids out", name(),
+                    printable(pointer.substr(0, 200)), parts ? "the file does not have" : "is not read");
+      found->second = *parts;
     }
-    if (found->second.empty())
-      throw Error("{}: includes {}, which {}; write the grids out", name(), printable(pointer.substr(0, 200)),
-                  pointer.starts_with("xpointer(/") ? "the file does not have" : "is not read");
     if ((included += found->second.size()) > kMaxIncluded)
       throw Error("{}: includes more than {} elements; write the grids out", name(), kMaxIncluded);
     pugi::xml_node parent = include.parent();
