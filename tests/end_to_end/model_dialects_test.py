@@ -185,6 +185,12 @@ class Levels(ModelFileTest):
         self.expect_heights(1e-3 * ght)
         self.levels("num_metgrid_levels", None, lambda f: f.add("PRES", "num_metgrid_levels lat lon", 1e5 - 8 * ght, units="Pa"))
         self.expect_heights(standard_altitude(1e5 - 8 * ght))
+        # Both come before the fields in the file, and after them in the list.
+        with self.file(lon=12, lat=8, time=None, num_metgrid_levels=4) as f:
+            self.air(f)
+            for name, values, unit in (("PRES", 1e5 - 8 * ght, "Pa"), ("GHT", ght, "meters MSL"), ("TT", self.T, "K")):
+                f.add(name, "num_metgrid_levels lat lon", values, units=unit)
+        self.assertEqual([scalar["name"] for scalar in self.info()["scalars"]], ["TT", "PRES", "GHT"])
         # Its first level is the ground's, which lies above the next ones in mountains: its nodes are not drawn.
         ground = ght.copy()
         ground[0] = ght[1] + 500 * (self.LON > 20)

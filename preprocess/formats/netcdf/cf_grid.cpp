@@ -358,6 +358,7 @@ bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const CfGr
   if (std::any_of(found.grids.begin(), found.grids.end(),
                   [&](const CfGrid& grid) { return grid.vertical.uses(variable); }))
     return false;
+  if (CfVertical::isNamedForNodes(variable)) return false;
   // NEMO's meshes: sizes and depths of cells at the points t, u, v, w and f.
   const std::string name = lowerCase(variable.name);
   const bool of_point = name.size() > 2 && std::string_view("tuvwf").find(name[2]) != std::string_view::npos;

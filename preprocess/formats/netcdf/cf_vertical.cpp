@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <sstream>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
@@ -16,6 +18,8 @@ namespace {
 constexpr double kWrfGravity = 9.81;
 constexpr double kStandardGravity = 9.80665;
 constexpr double kEarthRadius = 6371;  // kilometres
+constexpr std::array<const char*, 5> kHeightsOfNodes{"GHT", "ght", "gh", "zg", "height"};
+constexpr std::array<const char*, 3> kPressuresOfNodes{"PRES", "pres", "pressure"};
 
 /// Whether any variable is a longitude: then lengths are those of the Earth's.
 bool isGeographic(const NetcdfFiles& file) {
@@ -194,19 +198,25 @@ std::string CfVertical::setPlausible(const NetcdfFiles& file, const NetcdfVariab
   return "";
 }
 
+bool CfVertical::isNamedForNodes(const NetcdfVariable& variable) {
+  const auto is = [&](const char* name) { return variable.name == name; };
+  const std::string unit = variable.text("units");
+  return (std::ranges::any_of(kHeightsOfNodes, is) && kilometresOf(unit)) ||
+         (std::ranges::any_of(kPressuresOfNodes, is) && pascalsOf(unit));
+}
+
 /// Heights and pressures of nodes that only their names tell, beside numbered levels: met_em's GHT and PRES.
 std::optional<CfVertical> CfVertical::byNamesOfFields(const NetcdfFiles& file, const CfDimensions& block,
                                                       size_t axis) {
   for (const bool pressure : {false, true})
-    for (const char* const name : {"GHT", "ght", "gh", "zg", "height", "PRES", "pres", "pressure"}) {
+    for (const char* const name :
+         pressure ? std::span<const char* const>(kPressuresOfNodes) : kHeightsOfNodes) {
       const NetcdfVariable* const variable = file.find(name);
-      if (!variable || !variable->numeric) continue;
+      if (!variable || !variable->numeric || !isNamedForNodes(*variable)) continue;
       const std::string unit = variable->text("units");
       const auto kilometres = kilometresOf(unit), pascals = pascalsOf(unit);
       const auto term = CfTerm::of(file, *variable, block);
-      if (!(pressure ? pascals : kilometres) || !term || !term->exact() || term->axes() != 3 ||
-          !term->varies(axis))
-        continue;
+      if (!term || !term->exact() || term->axes() != 3 || !term->varies(axis)) continue;
       CfVertical vertical;
       vertical.terms_.push_back(*term);
       vertical.kind_ = pressure ? Kind::kPressure : Kind::kLevels;

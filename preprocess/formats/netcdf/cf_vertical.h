@@ -60,6 +60,9 @@ class CfVertical {
   /// Whether the heights are made of this variable.
   bool uses(const NetcdfVariable& variable) const;
 
+  /// Whether name and unit tell that the variable can serve as heights or pressures of the nodes: met_em's GHT and PRES.
+  static bool isNamedForNodes(const NetcdfVariable& variable);
+
  private:
   enum class Kind {
     kLevels,
