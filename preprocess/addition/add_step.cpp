@@ -37,11 +37,6 @@ constexpr size_t kNodesPerTask = 16384;
 
 CacheReader openAtLastStep(const std::filesystem::path& path) {
   CacheReader first(path);
-  if (const std::vector<OwnBlanks>& sets = first.seriesManifest().own_blanks; !sets.empty())
-    throw UsageError(
-        "{}: {} has values at other samples than {}, and a cache of steps has scalars of the same samples "
-        "alone: convert its steps anew, with --scalar",
-        path.string(), sets[0].variables[0], first.seriesManifest().variables[0].name);
   const uint64_t last = first.series().steps.size() - 1;
   return last == 0 ? std::move(first) : first.atStep(last);
 }
@@ -104,10 +99,12 @@ struct SlabSurvey {
 /// A step on its way into the cache: what each pass leaves for the next.
 class StepAddition {
  public:
-  StepAddition(const DataSource& source, const AddStepOptions& options, Progress& progress)
+  /// `lock`: of options.cache.
+  StepAddition(const DataSource& source, const AddStepOptions& options, const CacheLock& lock,
+               Progress& progress)
       : options_(options),
         progress_(progress),
-        lock_(options.cache),
+        lock_(lock),
         cache_(openAtLastStep(options.cache)),
         reordered_(inOrderOf(cache_.seriesManifest(), source)),
         source_(reordered_ ? *reordered_ : source),
@@ -284,7 +281,7 @@ class StepAddition {
 
   const AddStepOptions& options_;
   Progress& progress_;
-  const CacheLock lock_;  // before the cache is read
+  const CacheLock& lock_;
   const CacheReader cache_;
   const std::unique_ptr<GridSource> reordered_;  // null: the source's blocks are in the cache's order
   const DataSource& source_;
@@ -295,6 +292,62 @@ class StepAddition {
   std::unique_ptr<NodeReader> reader_;      // of a structured grid
   std::unique_ptr<MeshOrigin> origin_;      // of an unstructured one
   std::vector<ScalarRange> ranges_;
+  AddStepReport report_;
+};
+
+/// Adds the step to the sets of scalars with blanks of their own.
+class SetsAddition {
+ public:
+  SetsAddition(const DataSource& source, const AddStepOptions& options, const CacheLock& lock,
+               Progress& progress)
+      : source_(source), options_(options), lock_(lock), progress_(progress), whole_(options.cache) {}
+
+  /// The files and warnings.
+  AddStepReport run() {
+    const std::vector<OwnBlanks>& sets = whole_.seriesManifest().own_blanks;
+    std::vector<size_t> going_on;
+    for (size_t n = 0; n < sets.size(); ++n) {
+      const CacheReader set = whole_.ownBlanks(n);
+      if (set.series().steps.size() < whole_.series().steps.size()) continue;
+      scalarsOf(source_.description(), set.seriesManifest());  // before any set is changed
+      going_on.push_back(n);
+    }
+    for (const size_t n : going_on) add(n, sets[n].variables);
+    return std::move(report_);
+  }
+
+ private:
+  void add(size_t set, const std::vector<std::string>& names) {
+    const CacheLock lock(lock_, set);
+    AddStepOptions options = options_;
+    options.cache = lock.cache();
+    options.temporary_folder = temporaryFolder(options_);
+    const Series series = CacheReader(options.cache).series();
+    options.expect_new_geometry =
+        series.geometries() > 1 && series.first_steps.back() == series.steps.size() - 1;
+    try {
+      AddStepReport added = StepAddition(source_, options, lock, progress_).run();
+      for (FileReport& file : added.files) report_.files.push_back(std::move(file));
+      for (std::string& warning : added.warnings) report_.warnings.push_back(std::move(warning));
+    } catch (const NothingToDraw&) {
+      end(names);
+    } catch (const DifferingBlanks&) {
+      end(names);
+    }
+  }
+
+  void end(const std::vector<std::string>& names) {
+    const bool one = names.size() == 1;
+    report_.warnings.push_back(fmt::format("{}: no sample has {} at this step; {} kept up to the step before",
+                                           fmt::join(names, ", "), one ? "a value" : "values of all of them",
+                                           one ? "it is" : "they are"));
+  }
+
+  const DataSource& source_;
+  const AddStepOptions& options_;
+  const CacheLock& lock_;
+  Progress& progress_;
+  const CacheReader whole_;
   AddStepReport report_;
 };
 
@@ -320,7 +373,16 @@ AddStepReport addStep(const DataSource& source, const AddStepOptions& options, P
   checkWritable(options.cache, "; name a splat cache that you may change");
   RoomNeeded room{options.given_folders, "the step and its temporary files", kFullDiskHint};
   if (room.folders.empty()) room.folders = {options.cache, temporaryFolder(options)};
-  return room.during([&] { return StepAddition(source, options, progress).run(); });
+  return room.during([&] {
+    prepareSets(options.cache);
+    const CacheLock lock(options.cache);
+    StepAddition addition(source, options, lock, progress);  // checks the step before a set is changed
+    const AddStepReport of_sets = SetsAddition(source, options, lock, progress).run();
+    AddStepReport report = addition.run();
+    report.files.insert(report.files.end(), of_sets.files.begin(), of_sets.files.end());
+    report.warnings.insert(report.warnings.end(), of_sets.warnings.begin(), of_sets.warnings.end());
+    return report;
+  });
 }
 
 }  // namespace curvisplat

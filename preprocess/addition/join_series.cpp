@@ -91,13 +91,17 @@ std::string differenceOf(const CacheReader& a, const CacheReader& b) {
   const auto sameVariable = [](const VariableInfo& x, const VariableInfo& y) {
     return x.number == y.number && x.name == y.name && x.unit == y.unit;
   };
+  const auto sameSet = [](const OwnBlanks& x, const OwnBlanks& y) { return x.variables == y.variables; };
   if (!std::equal(of_a.variables.begin(), of_a.variables.end(), of_b.variables.begin(), of_b.variables.end(),
                   sameVariable) ||
+      !std::equal(of_a.own_blanks.begin(), of_a.own_blanks.end(), of_b.own_blanks.begin(),
+                  of_b.own_blanks.end(), sameSet) ||
       of_a.cells != of_b.cells)
     return "set of scalars";
   const auto features = [](const Manifest& manifest) {
     std::set<std::string> all(manifest.requirements.begin(), manifest.requirements.end());
     all.erase(kSteps);
+    all.erase(kOwnBlanksOfSteps);
     return all;
   };
   if (features(of_a) != features(of_b) || of_a.overlap != of_b.overlap)
@@ -109,6 +113,8 @@ std::string differenceOf(const CacheReader& a, const CacheReader& b) {
   if (a.series().steps[0].time != b.series().steps[0].time ||
       !std::equal(files_a.begin(), files_a.end(), files_b.begin(), files_b.end(), sameFile))
     return "first step";
+  for (size_t n = 0; n < of_a.own_blanks.size(); ++n)
+    if (std::string what = differenceOf(a.ownBlanks(n), b.ownBlanks(n)); !what.empty()) return what;
   return "";
 }
 
@@ -130,6 +136,7 @@ class Joining {
     JoinReport report{count_, 0, 0};
     progress_.begin("join", records_[0].steps, "steps");
     copyFirst(partial.path());
+    prepareSets(partial.path());
     for (uint64_t index = 1; index < count_; ++index) add(partial.path(), index);
     const CacheReader joined(partial.path());
     report.steps = joined.series().steps.size();

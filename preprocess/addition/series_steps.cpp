@@ -190,7 +190,24 @@ class Taking {
 
 }  // namespace
 
-void makePart(const CacheReader& series, const fs::path& path, const Progress& progress) {
+namespace {
+
+/// Removes the steps of sets that the cache does not have.
+void cutSets(const CacheLock& lock, const CacheReader& whole) {
+  const uint64_t steps = whole.series().steps.size();
+  for (size_t n = 0; n < whole.seriesManifest().own_blanks.size(); ++n) {
+    const CacheLock of_set(lock, n);
+    const CacheReader set(of_set.cache());
+    if (set.series().steps.size() > steps) removeStepsFrom(steps, of_set, set);
+  }
+}
+
+void require(const char* feature, Manifest& manifest) {
+  if (!manifest.hasFeature(feature)) manifest.requirements.emplace_back(feature);
+}
+
+/// makePart() with the time of its step 0.
+void makePartAt(double time, const CacheReader& series, const fs::path& path, const Progress& progress) {
   const uint32_t geometry = series.series().steps[series.step()].geometry;
   const CacheReader first = series.atStep(series.series().first_steps[geometry]);
   makeFolder(path);
@@ -198,11 +215,51 @@ void makePart(const CacheReader& series, const fs::path& path, const Progress& p
   std::erase_if(manifest.files, [](const FileInfo& file) { return file.name.starts_with("faces.step"); });
   for (const FileInfo& file : manifest.files)
     linkOrCopy(cacheFile(first.path(), file.name), path / file.name, progress);
+  manifest.steps.front().time = time;
+  manifest.own_blanks = series.seriesManifest().own_blanks;
+  for (size_t n = 0; n < manifest.own_blanks.size(); ++n) {
+    const fs::path folder = path / ownBlanksFolderName(n);
+    makePartAt(time, series.ownBlanks(n), folder, progress);
+    manifest.own_blanks[n].checksum = firstStepChecksum(CacheReader(folder).series());
+    require(kOwnBlanks, manifest);
+    require(kOwnBlanksOfSteps, manifest);
+  }
   replaceManifest(path, manifest);  // a file of its own: it is what locks a cache
 }
 
+}  // namespace
+
+void prepareSets(const fs::path& cache) {
+  if (readManifest(cache).own_blanks.empty()) return;
+  const CacheLock lock(cache);
+  const CacheReader whole(cache);
+  cutSets(lock, whole);
+  Manifest manifest = whole.seriesManifest();
+  if (manifest.hasFeature(kOwnBlanksOfSteps)) return;
+  for (size_t n = 0; n < manifest.own_blanks.size(); ++n)
+    manifest.own_blanks[n].checksum = firstStepChecksum(whole.ownBlanks(n).series());
+  require(kOwnBlanksOfSteps, manifest);
+  replaceManifest(cache, manifest);
+}
+
+void makePart(const CacheReader& series, const fs::path& path, const Progress& progress) {
+  makePartAt(series.time(), series, path, progress);
+}
+
 bool takeStep(const CacheLock& lock, const PartStep& step, const Progress& progress) {
-  return Taking(lock, step, progress).take();
+  const CacheReader whole(lock.cache());
+  bool fits = true;
+  for (size_t n = 0; n < whole.seriesManifest().own_blanks.size() && fits; ++n) {
+    const CacheReader set = whole.ownBlanks(n), of_part = step.part.ownBlanks(n);
+    const bool has_ended = set.series().steps.size() < whole.series().steps.size() ||
+                           of_part.series().steps.size() <= step.number;
+    if (has_ended) continue;
+    const CacheLock of_set(lock, n);
+    fits = Taking(of_set, {of_part, step.number, step.sources, step.states_time}, progress).take();
+  }
+  if (fits && Taking(lock, step, progress).take()) return true;
+  cutSets(lock, whole);
+  return false;
 }
 
 void linkOrCopy(const fs::path& from, const fs::path& to, const Progress& progress) {

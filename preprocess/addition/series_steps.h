@@ -10,6 +10,9 @@
 //                             steps that are predicted from each other
 //           steps 1, 2, ...   the part's own; groups (kStepGroup) begin with step 1
 //
+// Sets of scalars with blanks of their own (Manifest::own_blanks) are series by themselves, in parts as well. A step is added to them
+// before it is added to the cache, so that readers, which see the steps that the cache has, never miss one.
+//
 // Same bytes: a step's files depend on its grid and on the steps that it is predicted from. takeStep()
 // checks that these are the same steps in the part as in the whole series, and otherwise takes nothing. One
 // thread calls, except for StepReferences.
@@ -28,8 +31,13 @@
 
 namespace curvisplat {
 
+/// Prepares the sets of scalars with blanks of their own for a further step: the manifest's checksums of them become such that hold
+/// however many steps they have (kOwnBlanksOfSteps), and a step is removed that a killed or failed addition has left in some of
+/// them. Throws Error.
+void prepareSets(const std::filesystem::path& cache);
+
 /// Makes a part in the folder `path`, which must not exist. Its step 0 is the first step of the geometry
-/// that `series` is open at. Throws Error and Interrupted.
+/// that `series` is open at, with the time of the step that it is open at. Throws Error and Interrupted.
 void makePart(const CacheReader& series, const std::filesystem::path& path, const Progress& progress);
 
 /// Step `number` of a part, from 1 on.
@@ -40,7 +48,7 @@ struct PartStep {
   bool states_time = true;           // otherwise it was counted on from the step before
 };
 
-/// Adds the step to the locked cache, after its last. Returns false, and changes nothing, if the step that
+/// Adds the step to the locked cache, after its last; prepareSets() comes before. Returns false, and changes nothing, if the step that
 /// one process would have added is another one: then it has to be converted again. Throws Error if a file
 /// cannot be written, and Interrupted; then, too, the cache is what it was. After NameNotSynced
 /// (durable_file.h) it has the step.

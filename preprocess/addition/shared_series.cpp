@@ -87,6 +87,7 @@ SharedSteps::SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ra
       progress_(progress),
       folder_(besideCache(add_.cache, kRanksSuffix)) {
   if (ranks_.isFirst()) locked_ = std::make_unique<PartialFolder>(besideCache(add_.cache, ".ranks"), false);
+  if (ranks_.isFirst()) prepareSets(add_.cache);
   ranks_.barrier();
   if (!fs::is_directory(folder_))
     throw Error("{}: does not exist here; several ranks need a file system that they share",

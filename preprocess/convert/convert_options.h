@@ -23,8 +23,7 @@ namespace curvisplat {
 /// How scalars are treated that have values at different samples.
 enum class DifferingScalars {
   kBlankAll,  // a sample is blanked where any of them has no value
-  kLeaveOut,  // the largest set of scalars that agree is kept, and the others are left out
-  kKeepApart  // as kLeaveOut, and each other set becomes a cache in the folder of the cache (Manifest::own_blanks)
+  kKeepApart  // each set of scalars that agree but the largest becomes a cache in the folder of the cache (Manifest::own_blanks)
 };
 
 /// The options of convert(). Only `output` has to be set.
@@ -64,6 +63,12 @@ struct ConvertOptions {
   std::optional<uint64_t> slab_bytes;
   /// Test seam: how often scatter notes what is on disk.
   std::chrono::milliseconds note_interval{10'000};
+};
+
+/// Thrown where no sample is drawn.
+class NothingToDraw final : public Error {
+ public:
+  using Error::Error;
 };
 
 /// Thrown once the grid has been read, unless all scalars are blanked alike: a cache has the same samples for all of its own

@@ -89,25 +89,18 @@ class SetsConversion {
  public:
   SetsConversion(const DataSource& source, const ConvertOptions& options, ScalarSets found,
                  const ConvertScalars& convert)
-      : description_(source.description()),
-        options_(options),
-        found_(std::move(found)),
-        are_kept_(options.differing == DifferingScalars::kKeepApart),
-        convert_(convert) {
+      : description_(source.description()), options_(options), found_(std::move(found)), convert_(convert) {
     options_.scalars = found_.sets.front().scalars;
     options_.differing = DifferingScalars::kBlankAll;
   }
 
   ConvertReport run() {
-    decltype(FurtherParts::own_blanks) own_blanks;
-    if (are_kept_)
-      own_blanks = [&](const std::filesystem::path& folder) {
-        std::vector<OwnBlanks> made;
-        for (size_t n = 1; n < found_.sets.size(); ++n)
-          made.push_back(convertSet(found_.sets[n].scalars, folder / ownBlanksFolderName(n - 1)));
-        return made;
-      };
-    ConvertReport report = convert_(options_, own_blanks);
+    ConvertReport report = convert_(options_, [&](const std::filesystem::path& folder) {
+      std::vector<OwnBlanks> made;
+      for (size_t n = 1; n < found_.sets.size(); ++n)
+        made.push_back(convertSet(found_.sets[n].scalars, folder / ownBlanksFolderName(n - 1)));
+      return made;
+    });
     addOwnBlanksTo(report);
     warnOfLeftOut(report);
     return report;
@@ -156,17 +149,6 @@ class SetsConversion {
     if (!found_.without_values.empty())
       report.warnings.push_back(
           fmt::format("left out: {}, without a value at any sample", listed(found_.without_values)));
-    Scalars left_out;
-    for (size_t n = 1; n < found_.sets.size() && !are_kept_; ++n)
-      left_out.insert(left_out.end(), found_.sets[n].scalars.begin(), found_.sets[n].scalars.end());
-    if (left_out.empty()) return;
-    std::sort(left_out.begin(), left_out.end());
-    const bool one = left_out.size() == 1;
-    report.warnings.push_back(fmt::format(
-        "left out: {}, which {} no values at some samples where {} does; convert {} to a cache of {} own, "
-        "with --scalar NAME",
-        listed(left_out), one ? "has" : "have", description_.scalars[options_.scalars.front()].name,
-        one ? "it" : "them", one ? "its" : "their"));
   }
 
   std::string listed(const Scalars& scalars) const {
@@ -176,7 +158,6 @@ class SetsConversion {
   const GridDescription& description_;
   ConvertOptions options_;  // of the first set
   const ScalarSets found_;
-  const bool are_kept_;
   const ConvertScalars& convert_;
   ConvertReport of_sets_;  // of all others
 };

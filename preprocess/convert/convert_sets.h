@@ -1,6 +1,6 @@
 // Scalars that have values at different samples. A cache has the same samples for all of its own scalars, so that each set of
 // scalars with values at the same samples is converted to a cache by itself: those of further sets in the folder of the first
-// one's (Manifest::own_blanks), or not at all (DifferingScalars). One thread calls.
+// one's (Manifest::own_blanks). One thread calls.
 #pragma once
 
 #include <functional>

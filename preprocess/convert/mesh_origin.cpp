@@ -131,8 +131,8 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
     counts = sums.finish(take, progress);
   }
   if (counts.splats == 0)
-    throw Error("{}: every cell has a blanked point: there is nothing to draw",
-                description().files.empty() ? description().format : description().files.front());
+    throw NothingToDraw("{}: every cell has a blanked point: there is nothing to draw",
+                        description().files.empty() ? description().format : description().files.front());
   return {counts.degenerate, 0};
 }
 

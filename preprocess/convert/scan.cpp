@@ -91,7 +91,7 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description) {
   const bool all_blanked = survey.nodes == survey.blanked.total();
   if (all_blanked && !survey.blanked.lost.empty()) throw DifferingBlanks(survey.blanked.lost, false);
   if (all_blanked)
-    throw Error(
+    throw NothingToDraw(
         "{}: all {} samples are blanked ({} by the grid, {} by value, {} not finite in single "
         "precision): there is nothing to draw{}",
         file, survey.nodes, survey.blanked.by_grid, survey.blanked.by_value, survey.blanked.not_finite,

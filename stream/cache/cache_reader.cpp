@@ -90,6 +90,17 @@ struct CacheReader::State {
       values.push_back(folder->values(*series, number, v));
   }
 
+  /// Keeps the steps that the whole cache has: another may be on its way into it.
+  void keepStepsOf(const Series& of_whole) {
+    auto kept = std::make_shared<Series>(*series);
+    kept->cutTo(of_whole.steps.size());
+    for (size_t step = 0; step < kept->steps.size(); ++step)
+      if (kept->steps[step].time != of_whole.steps[step].time)
+        throw Error("{}: step {} has the time {}, in {} {}; the cache is damaged: convert again",
+                    cache.string(), step, kept->steps[step].time, whole.string(), of_whole.steps[step].time);
+    series = std::move(kept);
+  }
+
   void blendWithNext(double part) {
     next = std::make_unique<const State>(*this, StepPosition{position.step + 1});
     if (next->folder != folder)
@@ -308,7 +319,9 @@ std::optional<size_t> CacheReader::ownBlanksOf(std::string_view name) const {
 CacheReader CacheReader::ownBlanks(size_t set) const {
   CacheReader reader(ownBlanksFolder(cachePath(), seriesManifest(), set));
   reader.state_->whole = cachePath();
-  return reader;
+  reader.state_->keepStepsOf(series());
+  const uint64_t steps = reader.series().steps.size();
+  return reader.at(position().step < steps ? position() : StepPosition{steps - 1});
 }
 
 std::vector<std::string> CacheReader::allScalars() const {

@@ -49,7 +49,8 @@ class CacheReader {
   static CacheReader ofScalar(const std::filesystem::path& cache, std::string_view name);
   /// The set of seriesManifest().own_blanks that has the scalar `name`, which its unit may follow; nullopt for all other names.
   std::optional<size_t> ownBlanksOf(std::string_view name) const;
-  /// Opens the cache of the scalars in seriesManifest().own_blanks[set]. Throws Error as the constructor.
+  /// Opens the cache of the scalars in seriesManifest().own_blanks[set], with those of its steps that this cache has, at this
+  /// reader's position; at its last step if the set ends before (AddStepReport). Throws Error as the constructor.
   CacheReader ownBlanks(size_t set) const;
   /// The names of all scalars: of the cache's own, then of each set of seriesManifest().own_blanks.
   std::vector<std::string> allScalars() const;

@@ -44,6 +44,15 @@ void requireWhole(const std::filesystem::path& cache) {
 
 CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manifest_(cache / "manifest.json") {
   requireWhole(cache_);
+  lock();
+}
+
+CacheLock::CacheLock(const CacheLock& whole, size_t set)
+    : cache_(whole.cache() / ownBlanksFolderName(set)), manifest_(cache_ / "manifest.json") {
+  lock();
+}
+
+void CacheLock::lock() {
   // Opened for writing because network file systems require that for an exclusive lock.
   fd_ = openRetrying(manifest_, O_RDWR);
   if (fd_ < 0)

@@ -39,7 +39,7 @@ struct StepInfo {
 /// with the geometry of these samples, in a folder of the cache (ownBlanksFolderName() in series.h).
 struct OwnBlanks {
   std::vector<std::string> variables;  // names; those of all sets and the cache's own are distinct
-  uint64_t checksum = 0;               // of all bytes of the folder's manifest
+  uint64_t checksum = 0;  // of all bytes of the folder's manifest; with kOwnBlanksOfSteps firstStepChecksum()
 };
 
 /// Size and checksum (64-bit XXH3) of one of the cache's files. A payload file's checksum covers the table
@@ -83,6 +83,8 @@ inline constexpr const char* kCellOctants = "cell-octants";
 /// Some scalars have values at other samples: Manifest::own_blanks. A program that does not know the feature
 /// would miss them.
 inline constexpr const char* kOwnBlanks = "own-blanks";
+/// These scalars' caches have time steps, too: the cache's own, unless a set ends before, and perhaps one that is being added.
+inline constexpr const char* kOwnBlanksOfSteps = "own-blanks-steps";
 
 // Values of Manifest::overlap.
 inline constexpr const char* kOverlapAll = "all";      // every block is drawn

@@ -52,8 +52,9 @@ uint64_t recordBytes(size_t variables) {
 
 template <typename Record>
 void put(const Record& record, std::vector<std::byte>& out) {
-  const auto bytes = std::as_bytes(std::span(&record, 1));
-  out.insert(out.end(), bytes.begin(), bytes.end());
+  const size_t at = out.size();
+  out.resize(at + sizeof record);
+  std::memcpy(out.data() + at, &record, sizeof record);
 }
 
 void putStep(const SeriesStep& step, std::vector<std::byte>& out) {
@@ -203,6 +204,11 @@ void Series::add(SeriesStep step) {
   steps.push_back(std::move(step));
 }
 
+void Series::cutTo(uint64_t count) {
+  steps.resize(std::min<uint64_t>(count, steps.size()));
+  std::erase_if(first_steps, [count](uint64_t step) { return step >= count; });
+}
+
 std::string geometryFolderName(uint32_t geometry) {
   return geometry == 0 ? "" : fmt::format("geometry.{}", geometry);
 }
@@ -229,6 +235,17 @@ FileInfo appendStep(const fs::path& cache, const Manifest& manifest, const Serie
   file.truncate(bytes.size());
   file.close();
   return {kStepsFileName, bytes.size(), checksumOf(bytes)};
+}
+
+FileInfo stepsFileOf(const Series& series, size_t variables) {
+  const std::vector<std::byte> bytes = bytesOf(series, variables);
+  return {kStepsFileName, bytes.size(), checksumOf(bytes)};
+}
+
+uint64_t firstStepChecksum(const Series& series) {
+  Series first = series;
+  first.cutTo(1);
+  return stepsFileOf(first, first.steps.front().values.size()).checksum;
 }
 
 void cutAppended(const fs::path& cache, const Manifest& manifest) noexcept {
@@ -291,14 +308,17 @@ GeometryFolder::GeometryFolder(fs::path folder, Manifest manifest)
 
 namespace {
 
-/// The text of the manifest of a folder in a cache, which states its checksum.
-std::string checkedText(const fs::path& manifest, uint64_t expected) {
-  std::string text = readTextFile(manifest);
-  const uint64_t found = checksumOf(std::as_bytes(std::span(text)));
+void requireChecksum(const fs::path& manifest, uint64_t found, uint64_t expected) {
   if (found != expected)
     throw Error(
         "{}: has a wrong checksum (found {:016x}, expected {:016x}); the cache is damaged: convert again",
         manifest.string(), found, expected);
+}
+
+/// The text of the manifest of a folder in a cache, which states its checksum.
+std::string checkedText(const fs::path& manifest, uint64_t expected) {
+  std::string text = readTextFile(manifest);
+  requireChecksum(manifest, checksumOf(std::as_bytes(std::span(text))), expected);
   return text;
 }
 
@@ -310,7 +330,12 @@ std::string ownBlanksFolderName(size_t set) {
 
 fs::path ownBlanksFolder(const fs::path& cache, const Manifest& manifest, size_t set) {
   const fs::path folder = cacheFolder(cache, ownBlanksFolderName(set));
-  checkedText(cacheFile(folder, "manifest.json"), manifest.own_blanks.at(set).checksum);
+  const fs::path path = cacheFile(folder, "manifest.json");
+  const uint64_t expected = manifest.own_blanks.at(set).checksum;
+  if (manifest.hasFeature(kOwnBlanksOfSteps))
+    requireChecksum(path, firstStepChecksum(readSeries(folder, readManifest(folder))), expected);
+  else
+    checkedText(path, expected);
   return folder;
 }
 

@@ -72,6 +72,8 @@ struct Series {
   std::optional<uint32_t> geometryOf(uint64_t grid_checksum) const;
   /// Appends a step. Its geometry is one of those before or the next.
   void add(SeriesStep step);
+  /// Removes the steps from number `count` on, at least one of which stays.
+  void cutTo(uint64_t count);
 };
 
 /// "geometry.3", or "" for geometry 0.
@@ -87,6 +89,12 @@ Series readSeries(const std::filesystem::path& cache, const Manifest& manifest);
 /// does not list it. Cuts off what an interrupted addition has left after the size in the manifest. Returns
 /// the manifest's entry.
 FileInfo appendStep(const std::filesystem::path& cache, const Manifest& manifest, const Series& series);
+
+/// The manifest's entry for steps.bin.
+FileInfo stepsFileOf(const Series& series, size_t variables);
+
+/// The checksum of what steps.bin has, or would have, of the first step: the same however many steps are added.
+uint64_t firstStepChecksum(const Series& series);
 
 /// Cuts off what appendStep() has appended and no manifest lists. `manifest`: that of the cache. If that
 /// fails, the bytes stay there without harm.
@@ -131,8 +139,8 @@ class GeometryFolder {
 
 /// "blanks.1": the folder of Manifest::own_blanks[0].
 std::string ownBlanksFolderName(size_t set);
-/// The path of that folder in the folder `cache`, whose manifest is `manifest`. Throws Error if its manifest
-/// is not the one that `manifest` states.
+/// The path of that folder in the folder `cache`, whose manifest is `manifest`. Throws Error if it is not the one that
+/// `manifest` states.
 std::filesystem::path ownBlanksFolder(const std::filesystem::path& cache, const Manifest& manifest,
                                       size_t set);
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <set>
 #include <span>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -252,6 +254,38 @@ void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewS
   lock.requireStillThere();
   syncDirectory(lock.cache());
   putStep(lock, cache.seriesManifest(), series, std::move(step), added, {});
+}
+
+void removeStepsFrom(uint64_t count, const CacheLock& lock, const CacheReader& cache) {
+  const Series& series = cache.series();
+  Series kept = series;
+  kept.cutTo(count);
+  Manifest manifest = cache.seriesManifest();
+  for (size_t v = 0; v < manifest.variables.size(); ++v) {
+    VariableInfo& variable = manifest.variables[v];
+    variable.min = kept.steps.front().values[v].min;
+    variable.max = kept.steps.front().values[v].max;
+    for (const SeriesStep& step : kept.steps) {
+      variable.min = std::min(variable.min, step.values[v].min);
+      variable.max = std::max(variable.max, step.values[v].max);
+    }
+  }
+  std::vector<fs::path> removed;
+  std::set<std::string> names{kStepsFileName};
+  for (uint64_t step = kept.steps.size(); step < series.steps.size(); ++step) {
+    const fs::path folder = lock.cache() / geometryFolderName(series.steps[step].geometry);
+    if (series.isFirstOfGeometry(step)) removed.push_back(folder);
+    for (const VariableInfo& variable : manifest.variables)
+      removed.push_back(folder / stepValuesName(series, step, variable.number));
+    names.insert(facesFileOfStep(step));
+    removed.push_back(lock.cache() / facesFileOfStep(step));
+  }
+  std::erase_if(manifest.files, [&](const FileInfo& file) { return names.contains(file.name); });
+  manifest.files.push_back(stepsFileOf(kept, manifest.variables.size()));
+  lock.requireStillThere();
+  replaceManifest(lock.cache(), manifest);
+  for (const fs::path& path : removed) removeAll(path);
+  cutAppended(lock.cache(), manifest);
 }
 
 }  // namespace curvisplat

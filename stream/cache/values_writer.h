@@ -147,4 +147,8 @@ void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep 
 /// Error as StepWriter::finish().
 void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added);
 
+/// Removes the steps from number `count` on, at least one of which stays. `cache`: opened under the lock. A kill leaves the cache
+/// as it was, or without the steps. Throws Error.
+void removeStepsFrom(uint64_t count, const CacheLock& lock, const CacheReader& cache);
+
 }  // namespace curvisplat

@@ -211,6 +211,37 @@ class MeshFiles(MeshCase):
         self.assertEqual(len(warnings), 1, result.stderr)
         self.assertIn("run_1.vti: 100 of the values of all are left out, since other scalars of the cache have none there", warnings[0])
 
+    def test_own_blanks_of_a_series(self):
+        """Each set of scalars has the steps; one without any value at a later step ends before it."""
+        x = (np.arange(225) % 9).astype(float)
+        for step in range(3):
+            image = vtk.vtkImageData()
+            image.SetDimensions(9, 5, 5)
+            for name, values in (("low", np.where(x > 4, np.nan, x + step)), ("all", x + step), ("high", x * (np.nan if step == 2 else 1))):
+                array = numpy_to_vtk(np.where((name == "high") & (x < 3), np.nan, values), deep=True)
+                array.SetName(name)
+                image.GetPointData().AddArray(array)
+            writer = vtk.vtkXMLImageDataWriter()
+            writer.SetFileName(str(self.folder / f"set_{step}.vti"))
+            writer.SetInputData(image)
+            writer.Write()
+        cache = self.folder / "set.splats"
+        result = self.run_program("convert", *(self.folder / f"set_{step}.vti" for step in range(3)), "-o", cache)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("set_2.vti: high: no sample has a value at this step; it is kept up to the step before", result.stderr)
+        whole = self.info(cache, "--verify", "--step", "2")
+        of_sets = {part["variables"][0]["name"]: part for part in (whole, *whole["own_blanks"])}
+        self.assertEqual({name: (len(part["steps"]), part["variables"][0]["max"]) for name, part in of_sets.items()},
+                         {"low": (3, 6), "all": (3, 10), "high": (2, 8)})
+        for name, splats in (("low", 125), ("all", 225)):
+            drawn = self.run_program("render", cache, "-o", self.folder / "p.png", "--size", "40x40", "--scalar", name, "--step", "2")
+            self.assertIn(f"{splats} splats of {name}", drawn.stdout, drawn.stderr)
+        self.assertIn("--step 2: is out of range", self.run_program("render", cache, "-o", self.folder / "p.png", "--scalar", "high", "--step", "2").stderr)
+        rows = [line.split(",") for line in self.run_program("info", cache, "--probe", "3,2,2", "--steps", "all").stdout.splitlines()]
+        columns = [rows[0].index(name) for name in ("low", "all", "high")]
+        found = [[float(row[at] or "nan") for at in columns] for row in rows[1:]]
+        np.testing.assert_allclose(found, [[3, 3, 3], [4, 4, 3], [5, 5, np.nan]], atol=0.01)
+
     def test_own_blanks_are_drawn_and_checked(self):
         """Scalars that have a value nowhere together, and one that has none."""
         image = vtk.vtkImageData()
@@ -262,8 +293,6 @@ class MeshFiles(MeshCase):
         self.assertIn("already has a scalar 'high'", refused.stderr)
         refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache / "blanks.1", "--add-scalar", "volume")
         self.assertIn("is a part of", refused.stderr)
-        refused = self.run_program("convert", self.folder / "apart.vti", "--to", cache, "--add-steps")
-        self.assertIn("high has values at other samples than low", refused.stderr)
         manifest = cache / "blanks.1" / "manifest.json"
         manifest.write_text(manifest.read_text().replace('"apart"', '"other"'))
         refused = self.run_program("render", cache, "-o", self.folder / "p.png", "--scalar", "high")

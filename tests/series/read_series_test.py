@@ -2,7 +2,7 @@
 """read_series_test.py PROGRAM DUMP_CACHE FOLDER_OF_READ_CACHE
 
 Decodes series of time steps with read_cache.py and compares every number with what the program decodes: one on a
-fixed grid, whose values are predicted in time, and one on a grid that moves.
+fixed grid, whose values are predicted in time, one on a grid that moves, and one whose second scalar has values at other samples.
 Exit status 77 (skipped) without the packages that read_cache.py needs.
 """
 import io
@@ -13,6 +13,7 @@ import tempfile
 
 sys.path.insert(0, sys.argv[3])
 try:
+    import numpy as np
     import read_cache
     import read_cache_test
 except ModuleNotFoundError as error:
@@ -44,6 +45,15 @@ def main(program, dump_cache):
                     for brick in table:
                         header = ours.stream(ours.values_name(number, step), brick)[:40]
                         back.add(tuple(header[38:40]))
+        for path in folder.glob("w_*.fun"):
+            data = path.read_bytes()
+            values = np.frombuffer(data[16:], "<f4")
+            path.write_bytes(data[:12] + b"\2\0\0\0" + data[16:] + np.where(np.arange(len(values)) < 100, np.nan, values).astype("<f4").tobytes())
+        run(program, "convert", folder / "w.xyz", folder / "w_%04d.fun", "-o", folder / "sets.splats")
+        read_cache.Cache(folder / "sets.splats", 4)  # and the checksum of the set
+        for step in range(5):
+            ours = read_cache.Cache(folder / "sets.splats/blanks.1", step)
+            read_cache_test.compare(ours, io.BytesIO(run(dump_cache, ours.folder, step)), set())
     if back != {(0, 0), (1, 0), (1, 2)}:
         sys.exit(f"streams have references {sorted(back)}; expected none, one and two")
 

@@ -9,7 +9,7 @@ import numpy as np
 import zstandard
 from xxhash import xxh3_64_intdigest as checksum
 
-FEATURES = set("steps fine-values cell-growth merged-borders face-layers plates border-pairs border-faces cell-octants scaled-values own-blanks".split())
+FEATURES = set("steps fine-values cell-growth merged-borders face-layers plates border-pairs border-faces cell-octants scaled-values own-blanks own-blanks-steps".split())
 SHAPE, VALUES = ["a0", "a1", "a2", "l10", "l20", "l21"], ["mean", "slope0", "slope1", "slope2", "variance"]
 
 
@@ -170,6 +170,19 @@ def decode_values(data, count, reference):
     return dict(zip(VALUES, ((centre if scaled_means else lower) + numbers[0], *numbers[1:4], numbers[4]**2)))
 
 
+def first_step(folder, manifest):
+    """The bytes that steps.bin begins with, or would begin with if the cache was a series."""
+    variables, files = manifest["variables"], {file["name"]: file for file in manifest["files"]}
+    if "steps" in manifest["requires"]:
+        return (folder / "steps.bin").read_bytes()[:48 + 32 * len(variables)]
+    data = struct.pack("<8sIIdIIQQ", b"CVSsteps", 1, len(variables), manifest["steps"][0]["time"], 0, 0, 0,
+                       int(manifest.get("grid_checksum", "0"), 16))
+    for variable in variables:
+        file = files[f"var.{variable['number']}.bin"]
+        data += struct.pack("<ddQQ", variable["min"], variable["max"], file["size"], int(file["checksum"], 16))
+    return data
+
+
 class Cache:
     """Opens a cache and verifies all of it but the streams, which are verified when they are read."""
     def __init__(self, folder, step=0):
@@ -192,7 +205,10 @@ class Cache:
         found = format(checksum(re.sub(r',"checksum":"[0-9a-f]{16}"}$', "}", packed)), "016x")
         need(self.manifest.get("checksum", found) == found, "checksum of the manifest")
         for n, own in enumerate(self.manifest.get("own_blanks", []), 1):
-            need(checksum((self.folder / f"blanks.{n}/manifest.json").read_bytes()) == int(own["checksum"], 16), "checksum of a set")
+            data = (self.folder / f"blanks.{n}/manifest.json").read_bytes()
+            if "own-blanks-steps" in requires:
+                data = first_step(self.folder / f"blanks.{n}", json.loads(data))
+            need(checksum(data) == int(own["checksum"], 16), "checksum of a set")
         self.files = {file["name"]: (file["size"], int(file["checksum"], 16)) for file in self.manifest["files"]}
         return text
 

@@ -82,7 +82,7 @@ SeriesOptions seriesOptions(const ConvertArguments& arguments) {
   options.convert.title = titleOf(arguments.grid);
   applyCommonOptions(arguments, options.convert);
   applyGridUse(arguments, options.convert);
-  if (arguments.scalars.empty()) options.convert.differing = DifferingScalars::kLeaveOut;
+  options.convert.differing = DifferingScalars::kKeepApart;
   options.keep_going = arguments.keep_going;
   options.add = arguments.adds_steps;
   return options;
@@ -104,6 +104,8 @@ class StepLog {
     if (event.source && event.converted)
       for (const auto* warnings : {&event.source->warnings, &event.converted->warnings})
         for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
+    if (event.converted)
+      for (const std::string& note : event.converted->notes) printMessage("note: {}", note);
     if (event.added)
       for (const std::string& warning : event.added->warnings)
         printMessage("warning: {}: {}", event.name, warning);

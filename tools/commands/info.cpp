@@ -172,7 +172,9 @@ struct Findings {
   Probe probe;
 };
 
-Probe probed(const CacheReader& reader, const InfoOptions& options) {
+/// `positions`: of the cache; a set of scalars with blanks of its own has no values after its last step.
+Probe probed(const CacheReader& reader, const std::vector<StepPosition>& positions,
+             const InfoOptions& options) {
   Probe probe{parseProbe(options.probe),
               options.probe.of_source,
               {options.grid, options.gas},
@@ -186,21 +188,28 @@ Probe probed(const CacheReader& reader, const InfoOptions& options) {
     inputs.insert(inputs.end(), {options.grid.grid, source.grid});
     checkOutputFile("-o", options.probe.plot, inputs);
   }
-  for (const StepPosition& position : chosenSteps(options.steps, reader)) {
-    const CacheReader at = reader.at(position);
-    probe.steps.push_back({position.step, reader.series().steps[position.step].time,
-                           valuesAt(at, probe.asked.points, probe.of_source ? &probe.source : nullptr)});
+  for (const StepPosition& position : positions) {
+    ProbedStep of_step{position.step, 0, {}};
+    if (position.step < reader.series().steps.size()) {
+      const CacheReader at = reader.at(position);
+      of_step.time = reader.series().steps[position.step].time;
+      of_step.found = valuesAt(at, probe.asked.points, probe.of_source ? &probe.source : nullptr);
+    } else {
+      of_step.found.resize(probe.asked.points.size());
+    }
+    probe.steps.push_back(std::move(of_step));
   }
   return probe;
 }
 
-Findings examine(const CacheReader& reader, const InfoOptions& options) {
+Findings examine(const CacheReader& reader, const std::vector<StepPosition>& positions,
+                 const InfoOptions& options) {
   Findings found;
   if (options.verify) {
     Progress progress{progressBar()};
     found.verification = verifySteps(reader, progress);
   }
-  if (options.probe.any()) found.probe = probed(reader, options);
+  if (options.probe.any()) found.probe = probed(reader, positions, options);
   return found;
 }
 
@@ -328,7 +337,8 @@ void printCacheInfo(const InfoOptions& options) {
   for (size_t n = 0; n < readers[0].seriesManifest().own_blanks.size(); ++n)
     readers.push_back(readers[0].ownBlanks(n));
   std::vector<Findings> found;
-  for (const CacheReader& reader : readers) found.push_back(examine(reader, options));
+  const std::vector<StepPosition> positions = chosenSteps(options.steps, readers[0]);
+  for (const CacheReader& reader : readers) found.push_back(examine(reader, positions, options));
   Json json;
   if (options.json) json = asJson(readers[0], options, found[0]);
   for (size_t n = 1; n < readers.size() && options.json; ++n)

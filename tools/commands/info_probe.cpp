@@ -154,11 +154,16 @@ Probe joinedProbe(std::span<const CacheReader> readers, std::vector<Probe> probe
   Probe joined = std::move(probes.front());
   if (probes.size() == 1) return joined;
   for (size_t step = 0; step < joined.steps.size(); ++step) {
+    std::vector<CacheReader> at_step;
+    at_step.reserve(probes.size());
     std::vector<SetValues> sets;
     for (size_t n = 0; n < probes.size(); ++n) {
       Probe& of_set = n == 0 ? joined : probes[n];
-      sets.push_back(
-          {&readers[n], of_set.of_source ? &of_set.source : nullptr, std::move(of_set.steps[step].found)});
+      const uint64_t number = joined.steps[step].step;
+      const bool has_ended = number >= readers[n].series().steps.size();
+      at_step.push_back(has_ended ? readers[n].at(readers[n].position()) : readers[n].atStep(number));
+      sets.push_back({&at_step[n], of_set.of_source ? &of_set.source : nullptr,
+                      std::move(of_set.steps[step].found), has_ended});
     }
     joined.steps[step].found = joinedValues(sets);
   }

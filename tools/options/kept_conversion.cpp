@@ -180,7 +180,7 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
   options.convert.precision = precision;
-  options.convert.differing = DifferingScalars::kLeaveOut;
+  options.convert.differing = DifferingScalars::kKeepApart;
   const SeriesInput input = seriesInput(arguments, steps);
   makePreviewOfFirstStep(input, optionsFor(output, title), progress, events);
   convertSeries(input, options, progress, [&](const SeriesEvent& event) {

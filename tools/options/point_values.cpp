@@ -158,7 +158,7 @@ std::vector<std::optional<PointValues>> joinedValues(std::span<const SetValues> 
   for (const SetValues& set : sets) {
     const std::vector<double> none(set.reader->manifest().variables.size(),
                                    std::numeric_limits<double>::quiet_NaN());
-    const auto there = valuesAt(*set.reader, places, set.source);
+    const auto there = set.has_ended ? set.found : valuesAt(*set.reader, places, set.source);
     const auto append = [](std::vector<double>& to, const std::vector<double>& values) {
       to.insert(to.end(), values.begin(), values.end());
     };

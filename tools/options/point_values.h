@@ -52,6 +52,7 @@ struct SetValues {
   const CacheReader* reader = nullptr;
   const PointSource* source = nullptr;
   std::vector<std::optional<PointValues>> found;  // [point]
+  bool has_ended = false;                         // before the step that is asked for: it has no values
 };
 
 /// The values of several sets at the same points, with the scalars of all. The sample and its place are those

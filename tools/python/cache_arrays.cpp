@@ -172,8 +172,16 @@ py::tuple probedArrays(const std::vector<const CacheReader*>& sets,
   PointSource from;
   const PointSource* const exact = source ? &from : nullptr;
   if (source) setSource(*sets.front(), *source, from.grid);
+  std::vector<CacheReader> at_step;
+  at_step.reserve(sets.size());
   for (const CacheReader* const set : sets) {
-    of_sets.push_back({set, exact, valuesAt(*set, at, exact)});
+    const StepPosition& position = sets.front()->position();
+    const bool has_ended = position.step >= set->series().steps.size();
+    at_step.push_back(set->at(has_ended ? set->position() : position));
+    SetValues of_set{&at_step.back(), exact, {}, has_ended};
+    of_set.found.resize(at.size());
+    if (!has_ended) of_set.found = valuesAt(*of_set.reader, at, exact);
+    of_sets.push_back(std::move(of_set));
     for (const VariableInfo& variable : set->manifest().variables) names.push_back(variable.name);
   }
   const auto found = sets.size() == 1 ? std::move(of_sets.front().found) : joinedValues(of_sets);

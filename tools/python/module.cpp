@@ -196,8 +196,7 @@ void beginThreads(unsigned count) {
 }
 
 py::dict convertSource(const DataSource& source, ConvertOptions options, const py::object& progress) {
-  // All scalars of a step to which others will be added have the same samples.
-  if (!options.time) options.differing = DifferingScalars::kKeepApart;
+  options.differing = DifferingScalars::kKeepApart;
   ConvertReport report;
   beginThreads(options.threads);
   runInterruptibly(progress, [&](Progress& of_work) { report = convert(source, options, of_work); });
