@@ -715,6 +715,13 @@ class Arrays(PythonTest):
         self.assertEqual(single["values"]["t"], found["values"]["t"][1])
         opened.close()
         self.assertEqual(opened.render("half", size=(40, 40)).statistics["splats_drawn"], counts[1])
+        # A step is added to both.
+        curvisplat.append_arrays(cache, curvisplat.Block(x, y, z, {"t": t + 1, "half": half + 1}))
+        later = curvisplat.open(cache)
+        for name, count in zip(("t", "half"), counts):
+            self.assertEqual(later.render(name, size=(40, 40), step=1).statistics["splats_drawn"], count)
+            change = later.points(name, step=1).values.mean() - later.points(name).values.mean()
+            self.assertAlmostEqual(change, 1, delta=0.01)
 
     def test_of_xarray_say_what_is_missing(self):
         try:
