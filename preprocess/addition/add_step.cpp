@@ -309,14 +309,23 @@ class SetsAddition {
     for (size_t n = 0; n < sets.size(); ++n) {
       const CacheReader set = whole_.ownBlanks(n);
       if (set.series().steps.size() < whole_.series().steps.size()) continue;
-      scalarsOf(source_.description(), set.seriesManifest());  // before any set is changed
-      going_on.push_back(n);
+      if (isInStep(set.seriesManifest()))
+        going_on.push_back(n);
+      else
+        end(sets[n].variables, "missing");
     }
     for (const size_t n : going_on) add(n, sets[n].variables);
     return std::move(report_);
   }
 
  private:
+  bool isInStep(const Manifest& set) const {
+    const std::vector<GridScalar>& scalars = source_.description().scalars;
+    return std::ranges::all_of(set.variables, [&](const VariableInfo& variable) {
+      return std::ranges::find(scalars, variable.name, &GridScalar::name) != scalars.end();
+    });
+  }
+
   void add(size_t set, const std::vector<std::string>& names) {
     const CacheLock lock(lock_, set);
     AddStepOptions options = options_;
@@ -330,17 +339,15 @@ class SetsAddition {
       for (FileReport& file : added.files) report_.files.push_back(std::move(file));
       for (std::string& warning : added.warnings) report_.warnings.push_back(std::move(warning));
     } catch (const NothingToDraw&) {
-      end(names);
+      end(names, "no sample has a value");
     } catch (const DifferingBlanks&) {
-      end(names);
+      end(names, "no sample has values of all of them");
     }
   }
 
-  void end(const std::vector<std::string>& names) {
-    const bool one = names.size() == 1;
-    report_.warnings.push_back(fmt::format("{}: no sample has {} at this step; {} kept up to the step before",
-                                           fmt::join(names, ", "), one ? "a value" : "values of all of them",
-                                           one ? "it is" : "they are"));
+  void end(const std::vector<std::string>& names, const char* reason) {
+    report_.warnings.push_back(
+        fmt::format("{}: {} at this step; kept up to the step before", fmt::join(names, ", "), reason));
   }
 
   const DataSource& source_;

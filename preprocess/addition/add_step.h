@@ -58,8 +58,8 @@ std::optional<double> timeOf(const GridDescription& description, const TimeUnit&
 /// the process, everything included, is options.memory_bytes.
 ///
 /// The step is added to each set of scalars with blanks of its own (Manifest::own_blanks), too, before it is added to the cache.
-/// A set that has a value at no sample of the step ends with the step before: a warning says so, and later steps are not added to
-/// it.
+/// A set that the step lacks, or that has a value at none of its samples, ends with the step before: a warning says so, and later
+/// steps are not added to it.
 AddStepReport addStep(const DataSource& source, const AddStepOptions& options, Progress& progress);
 
 /// The steps of a series, in the order in which they are converted.

@@ -228,7 +228,7 @@ class MeshFiles(MeshCase):
         cache = self.folder / "set.splats"
         result = self.run_program("convert", *(self.folder / f"set_{step}.vti" for step in range(3)), "-o", cache)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn("set_2.vti: high: no sample has a value at this step; it is kept up to the step before", result.stderr)
+        self.assertIn("set_2.vti: high: no sample has a value at this step; kept up to the step before", result.stderr)
         whole = self.info(cache, "--verify", "--step", "2")
         of_sets = {part["variables"][0]["name"]: part for part in (whole, *whole["own_blanks"])}
         self.assertEqual({name: (len(part["steps"]), part["variables"][0]["max"]) for name, part in of_sets.items()},

@@ -24,6 +24,7 @@ struct Parts {
   size_t steps = 5;
   size_t none = 99;
   size_t changes = 3;
+  size_t lacks = 99;  // from this step on there is no s2
 };
 
 class PartsSource : public GridSource {
@@ -45,6 +46,7 @@ class PartsSource : public GridSource {
               }),
         description_(grid_.description()) {
     description_.times = {static_cast<double>(step)};
+    if (step >= parts.lacks) description_.scalars[2].name = "other";
     description_.files = {"step " + std::to_string(step)};
   }
   const GridDescription& description() const override { return description_; }
@@ -114,8 +116,8 @@ TEST(OwnBlanksSeries, AddsStepsResumesAndTakesUpAKilledAddition) {
     const fs::path cache = folder / "more.splats", more = folder / "one_more.splats";
     fs::remove_all(cache);
     fs::remove_all(more);
-    convertSets({before, 99, 3}, cache);
-    convertSets({before + 1, 99, 3}, more);
+    convertSets({before, 99, 3, 99}, cache);
+    convertSets({before + 1, 99, 3, 99}, more);
     // Killed after the first set had the step, which no reader sees.
     fs::remove_all(cache / "blanks.1");
     fs::copy(more / "blanks.1", cache / "blanks.1", fs::copy_options::recursive);
@@ -132,7 +134,7 @@ TEST(OwnBlanksSeries, StepsAreAddedToACacheOfOne) {
   const TemporaryFolder folder;
   convertSets({}, folder / "all.splats");
   const fs::path cache = folder / "more.splats";
-  convertSets({1, 99, 3}, cache);
+  convertSets({1, 99, 3, 99}, cache);
   EXPECT_FALSE(CacheReader(cache).seriesManifest().hasFeature("own-blanks-steps"));
   SeriesOptions adding = apart(cache);
   adding.add = true;
@@ -140,19 +142,17 @@ TEST(OwnBlanksSeries, StepsAreAddedToACacheOfOne) {
   EXPECT_TRUE(allFilesOf(cache) == allFilesOf(folder / "all.splats"));
 }
 
-TEST(OwnBlanksSeries, ASetEndsWhereItHasNoValues) {
+void expectS2EndsAfterTwo(const Parts& parts, const char* reason) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "all.splats";
   std::vector<std::string> warnings;
   Progress progress;
-  convertSeries(inputOf({5, 2, 99}), apart(cache), progress, [&](const SeriesEvent& event) {
+  convertSeries(inputOf(parts), apart(cache), progress, [&](const SeriesEvent& event) {
     if (event.added)
       warnings.insert(warnings.end(), event.added->warnings.begin(), event.added->warnings.end());
   });
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_NE(warnings[0].find("s2: no sample has a value at this step; it is kept up to the step before"),
-            std::string::npos)
-      << warnings[0];
+  EXPECT_EQ(warnings[0], fmt::format("s2: {} at this step; kept up to the step before", reason));
   const CacheReader whole(cache);
   EXPECT_EQ(whole.series().steps.size(), 5u);
   EXPECT_EQ(whole.ownBlanks(0).series().steps.size(), 5u);
@@ -160,8 +160,13 @@ TEST(OwnBlanksSeries, ASetEndsWhereItHasNoValues) {
   EXPECT_EQ(whole.atStep(4).ownBlanks(1).step(), 1u);
 }
 
+TEST(OwnBlanksSeries, ASetEndsWhereItHasNoValuesOrIsMissing) {
+  expectS2EndsAfterTwo({5, 2, 99, 99}, "no sample has a value");
+  expectS2EndsAfterTwo({5, 99, 99, 2}, "missing");
+}
+
 TEST(OwnBlanksSeries, RanksAndPartsMakeTheSameBytes) {
-  for (const Parts& parts : {Parts{8, 99, 7}, Parts{8, 7, 99}, Parts{8, 99, 3}}) {
+  for (const Parts& parts : {Parts{8, 99, 7, 99}, Parts{8, 7, 99, 99}, Parts{8, 99, 3, 99}}) {
     SCOPED_TRACE(parts.changes);
     const TemporaryFolder folder;
     convertSets(parts, folder / "one.splats");
@@ -200,7 +205,7 @@ TEST(OwnBlanksSeries, RanksAndPartsMakeTheSameBytes) {
 TEST(OwnBlanksSeries, AnotherSetIsRefused) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "all.splats";
-  convertSets({2, 99, 3}, cache);
+  convertSets({2, 99, 3, 99}, cache);
   fs::remove_all(cache / "blanks.1");
   fs::copy(cache / "blanks.2", cache / "blanks.1", fs::copy_options::recursive);
   expectError([&] { CacheReader(cache).ownBlanks(0); }, {"blanks.1", "convert again"});

@@ -104,8 +104,6 @@ class StepLog {
     if (event.source && event.converted)
       for (const auto* warnings : {&event.source->warnings, &event.converted->warnings})
         for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
-    if (event.converted)
-      for (const std::string& note : event.converted->notes) printMessage("note: {}", note);
     if (event.added)
       for (const std::string& warning : event.added->warnings)
         printMessage("warning: {}: {}", event.name, warning);
