@@ -7,10 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/open/series_files.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "tests/support/cgns_writer.h"
 #include "tests/support/earth_files.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/faulty_system_calls.h"
 #include "tests/support/netcdf_writer.h"
 #include "tests/support/program_test.h"
 #include "tests/support/vts_writer.h"
@@ -339,6 +343,34 @@ TEST_F(SeriesFormats, ZonesOfOtherNamesAreTakenInOrderAndSaid) {
   ASSERT_NE(said, std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("names do not tell", said + 70), std::string::npos) << "once: " << result.err;
   EXPECT_EQ(CacheReader(file("n.splats")).series().steps.size(), 3u);
+}
+
+TEST_F(SeriesFormats, NumbersOfATecplotTextAreCountedOnce) {
+  {
+    std::ofstream text(file("a.dat"));
+    text << "VARIABLES = X Y Z p\n";
+    for (int step = 0; step < 5; ++step) {
+      text << "ZONE I=20, J=20, K=40, DATAPACKING=POINT, STRANDID=1, SOLUTIONTIME=" << step << "\n";
+      for (int n = 0; n < 16000; ++n)
+        text << fmt::format("{:.15f} {:.15f} {:.15f} {:.15f}\n", 1.0 * (n % 20), 1.0 * (n / 20 % 20),
+                            1.0 * (n / 400), 0.1 * n + step);
+    }
+  }
+  OpenGridOptions options;
+  options.grid = file("a.dat");
+  const std::vector<StepFiles> steps = stepsOf(options);
+  ASSERT_EQ(steps.size(), 5u);
+  const auto reads = [](const OpenGridOptions& of_step) {
+    faults::FaultySystemCalls disk;
+    const ScopedSystemCalls in_place(disk);
+    EXPECT_EQ(openData(of_step)->description().times.size(), 5u);
+    return disk.reads.load();
+  };
+  options.time_step = 3;
+  EXPECT_LT(2 * reads(steps[3].options), reads(options));
+  // The text is another one: what was counted before is not used.
+  std::ofstream(file("a.dat"), std::ios::app) << "ZONE I=2, J=2, K=2, STRANDID=1, SOLUTIONTIME=9\n0 0 0\n";
+  expectError([&] { openData(steps[3].options); }, {"3 numbers; expected 32"});
 }
 
 TEST_F(SeriesFormats, CellCentredFilesAndTheirCollections) {

@@ -4,11 +4,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/file_index.h"
 
 namespace curvisplat {
 
@@ -42,8 +44,9 @@ struct OpenGridOptions {
   std::vector<std::string> function_names = {};  // variables of function files; override their .nam files
   GlobeOptions globe = {};                       // for grids in degrees
   std::vector<std::string> scalars = {};         // requested; select one of several grids in a file
-  std::optional<bool> cut_curved = {};   // cells of higher order (default); false: drawn by their corners
-  std::vector<std::string> select = {};  // "month=3": of a dimension of NetCDF, the one value to read
+  std::optional<bool> cut_curved = {};    // cells of higher order (default); false: drawn by their corners
+  std::vector<std::string> select = {};   // "month=3": of a dimension of NetCDF, the one value to read
+  std::shared_ptr<FileIndex> index = {};  // of files whose steps are opened one after the other; may be null
   std::optional<std::filesystem::path> names_folder = {};  // of the files that `grid` names; nullopt: its own
 
   /// The folder that names in `grid` are relative to.

@@ -68,7 +68,7 @@ EnsightFile::EnsightFile(const EnsightPlace& place, std::optional<bool> binary, 
     throw Error("{}: is Fortran Binary, which is not read; write C Binary or ASCII", name());
   binary_ = binary.value_or(first.starts_with("C Binary") || first.starts_with("C binary"));
   if (!binary && binary_) at_ = kTextBytes;
-  if (place.step) findStep(place);
+  if (place.step) findStep(place, scratch.index);
   if (!binary_) text_.emplace(file_, at_, end_);
 }
 
@@ -83,38 +83,52 @@ std::optional<uint64_t> EnsightFile::find(std::string_view words, uint64_t from)
   return std::nullopt;
 }
 
-/// Sets where the step begins and ends. In binary files, whose steps mostly are of the same size, it is looked up
-/// where it must be then; else all before it are passed.
-void EnsightFile::findStep(const EnsightPlace& place) {
-  constexpr std::string_view kBegin = "BEGIN TIME STEP", kEnd = "END TIME STEP";
-  const auto fail = [&] {
-    throw Error("{}: has no step {} of {}; the file is truncated", name(), *place.step + 1, place.steps);
-  };
-  const auto last = [&](uint64_t begin) {
-    const std::optional<uint64_t> end = find(kEnd, begin);
-    if (!end) fail();
-    return *end;
-  };
-  std::optional<uint64_t> begin = find(kBegin, 0);
-  if (!begin) fail();
-  const uint64_t first = *begin;
-  uint64_t passed = 0;
-  if (binary_ && *place.step > 0) {
-    const uint64_t bytes = last(first) + kTextBytes - first;
-    const uint64_t guess = first + *place.step * bytes;
-    if (bytes * place.steps == file_->size() - first && find(kBegin, guess) == guess) {
-      begin = guess;
-      passed = *place.step;
+namespace {
+
+constexpr std::string_view kBeginStep = "BEGIN TIME STEP", kEndStep = "END TIME STEP";
+
+}  // namespace
+
+void EnsightFile::lacksStep(const EnsightPlace& place) const {
+  throw Error("{}: has no step {} of {}; the file is truncated", name(), *place.step + 1, place.steps);
+}
+
+uint64_t EnsightFile::endOfStep(const EnsightPlace& place, uint64_t begin) const {
+  const std::optional<uint64_t> end = find(kEndStep, begin);
+  if (!end) lacksStep(place);
+  return *end;
+}
+
+/// A step of a binary file whose steps are of the same size, as they mostly are.
+std::optional<FilePart> EnsightFile::guessedStep(const EnsightPlace& place) const {
+  const std::optional<uint64_t> first = find(kBeginStep, 0);
+  if (!binary_ || *place.step == 0 || !first) return std::nullopt;
+  const uint64_t bytes = endOfStep(place, *first) + kTextBytes - *first;
+  const uint64_t begin = *first + *place.step * bytes;
+  if (bytes * place.steps != file_->size() - *first || find(kBeginStep, begin) != begin) return std::nullopt;
+  return FilePart{begin, endOfStep(place, begin), 0, 0};
+}
+
+/// Sets where the step begins and ends. `index`: has the places of the steps that were passed before.
+void EnsightFile::findStep(const EnsightPlace& place, FileIndex* index) {
+  std::optional<FilePart> step = guessedStep(place);
+  if (!step) {
+    const FileVersion version = FileVersion::of(file_->path());
+    const auto known = index ? index->find(version) : nullptr;
+    FileParts steps = known ? *known : FileParts();
+    const size_t before = steps.size();
+    while (steps.size() <= *place.step) {
+      const std::optional<uint64_t> begin = find(kBeginStep, steps.empty() ? 0 : steps.back().end);
+      if (!begin) lacksStep(place);
+      steps.push_back({*begin, endOfStep(place, *begin), 0, 0});
     }
+    step = steps[*place.step];
+    if (index && steps.size() > before) index->keep(version, std::move(steps));
   }
-  for (; passed < *place.step; ++passed) {
-    begin = find(kBegin, last(*begin));
-    if (!begin) fail();
-  }
-  end_ = last(*begin);
-  at_ = *begin + kTextBytes;
+  end_ = step->end;
+  at_ = step->begin + kTextBytes;
   if (!binary_) {
-    TextReader line(file_, *begin, end_);
+    TextReader line(file_, step->begin, end_);
     line.line();
     at_ = line.offset();
   }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/file_index.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/ensight/ensight_case.h"
@@ -33,10 +34,12 @@ struct EnsightList {
 
 /// Temporary files that the readers of a case share, so that any number of variables takes few open files.
 struct EnsightScratch {
-  explicit EnsightScratch(const std::filesystem::path& folder) : spools(folder) {}
+  explicit EnsightScratch(const std::filesystem::path& folder, FileIndex* of_steps = nullptr)
+      : spools(folder), index(of_steps) {}
 
   std::shared_ptr<OpenFiles> pool = std::make_shared<OpenFiles>();
   ListSpools spools;  // items: numbers of all files; begins: of polyhedra
+  FileIndex* index;   // of the places of steps in files; may be null
 };
 
 /// Reads texts and lists in their order. One thread at a time.
@@ -66,7 +69,10 @@ class EnsightFile {
   void finish();
 
  private:
-  void findStep(const EnsightPlace& place);
+  void findStep(const EnsightPlace& place, FileIndex* index);
+  std::optional<FilePart> guessedStep(const EnsightPlace& place) const;
+  uint64_t endOfStep(const EnsightPlace& place, uint64_t begin) const;
+  [[noreturn]] void lacksStep(const EnsightPlace& place) const;
   std::optional<uint64_t> find(std::string_view words, uint64_t from) const;
   EnsightList list(uint64_t count, bool integers);
   uint64_t left() const;

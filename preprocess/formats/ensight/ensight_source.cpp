@@ -68,7 +68,7 @@ void keepOnly(const std::vector<size_t>& kept, std::vector<Element>& all) {
 
 EnsightData::EnsightData(const OpenGridOptions& options) {
   EnsightCase found = readEnsightCase(options.grid, options.namesFolder(), options.time_step);
-  const EnsightScratch scratch(options.temporary_folder);
+  const EnsightScratch scratch(options.temporary_folder, options.index.get());
   geometry_ = readEnsightGeometry(found.geometry, scratch);
   description_.files = {options.grid.string(), found.geometry.file.string()};
   description_.times = std::move(found.times);

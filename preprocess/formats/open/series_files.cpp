@@ -281,6 +281,12 @@ std::vector<StepFiles> stepsAt(size_t times, const StepFiles& files) {
   return steps;
 }
 
+/// The file is opened for its steps and then for each of them.
+OpenGridOptions indexed(OpenGridOptions options) {
+  options.index = std::make_shared<FileIndex>();
+  return options;
+}
+
 }  // namespace
 
 StepSelection parseSteps(const std::string& option, const std::string& text) {
@@ -367,14 +373,16 @@ std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
 
 std::vector<StepFiles> stepsIn(const StepFiles& files) {
   try {
-    return stepsAt(openData(files.options)->description().times.size(), files);
+    const StepFiles of_index{indexed(files.options), files.name};
+    return stepsAt(openData(of_index.options)->description().times.size(), of_index);
   } catch (const Error&) {
     return {files};  // the error is reported where the step is converted, or left out there
   }
 }
 
 std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
-  const std::vector<StepFiles> files = stepsByName(options);
+  std::vector<StepFiles> files = stepsByName(options);
+  files.front().options = indexed(std::move(files.front().options));
   const size_t times = openData(files.front().options)->description().times.size();
   // Files of one kind are alike. Those of a kind that has no times, of which there may be many, are not opened.
   if (times == 0) return files;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/file_index.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
@@ -102,8 +103,10 @@ bool isTecplotText(const InputFile& file);
 /// A zone's values are in blocks (all values of a variable, then those of the next), or by points (all
 /// variables of a node). If the header does not say which, they are by points, as in the first Tecplot, or
 /// in blocks if some values belong to cells.
+///
+/// `index`: where numbers are not counted again that it has, and which gets those of this file; null: none.
 TecplotData readTecplotText(const std::shared_ptr<const PooledFile>& file,
-                            const std::filesystem::path& folder);
+                            const std::filesystem::path& folder, FileIndex* index = nullptr);
 
 /// Whether the file begins with the signature of a binary file.
 bool isTecplotBinary(const InputFile& file);

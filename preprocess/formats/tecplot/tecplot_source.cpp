@@ -34,8 +34,9 @@ bool isTecplot(const InputFile& file) {
 TecplotGrid::TecplotGrid(const OpenGridOptions& options) {
   const auto file = std::make_shared<const PooledFile>(std::make_shared<OpenFiles>(), options.grid);
   description.files = {options.grid.string()};
-  data = isTecplotBinary(InputFile(options.grid)) ? readTecplotBinary(file)
-                                                  : readTecplotText(file, options.temporary_folder);
+  data = isTecplotBinary(InputFile(options.grid))
+             ? readTecplotBinary(file)
+             : readTecplotText(file, options.temporary_folder, options.index.get());
   if (data.zones.empty()) throw Error("{}: is a Tecplot file without zones; expected a grid", file->name());
   chooseStep(options);
   leaveOutZones();

@@ -45,14 +45,9 @@ bool forEachNumber(std::string_view word, const Add& add) {
   return true;
 }
 
-struct Numbers {
-  uint64_t begin = 0, count = 0;
-  int digits = 0;  // the most significant ones among the first
-};
-
 /// Passes over the numbers at the reader's position.
-Numbers countNumbers(TextReader& text) {
-  Numbers numbers;
+FilePart countNumbers(TextReader& text) {
+  FilePart numbers;
   numbers.begin = text.offset();
   uint64_t& count = numbers.count;
   size_t sampled = 0;
@@ -62,7 +57,10 @@ Numbers countNumbers(TextReader& text) {
       text.line();
       continue;
     }
-    if (!beginsNumber(word)) return numbers;
+    if (!beginsNumber(word)) {
+      numbers.end = text.offset();
+      return numbers;
+    }
     const uint64_t before = count;
     forEachNumber(word, [&](std::string_view number, uint64_t times) {
       count += std::min(times, kMaxDimension);
@@ -126,15 +124,24 @@ class Reader {
         spool_(std::make_shared<SpoolFile>(folder)),
         text_(file_, 0, file_->size()) {}
 
+  /// Takes what `index` knows of the numbers instead of counting them, or gives it to the index; null: neither.
+  void use(FileIndex* index) {
+    if (!index) return;
+    index_ = index;
+    version_ = FileVersion::of(file_->path());
+    known_ = index->find(version_);
+  }
+
   TecplotData run() {
     for (;;) {
       TecplotTokens tokens(takeHeader());
       if (tokens.done()) break;
       const bool data_of_zone = readRecords(tokens);
-      const Numbers numbers = countNumbers(text_);
+      const FilePart numbers = passNumbers();
       if (data_of_zone) placeValues(numbers);
     }
     placeEmpty();
+    if (index_ && !known_) index_->keep(version_, std::move(passed_));
     data_.encoding = "ASCII";
     return std::move(data_);
   }
@@ -148,6 +155,16 @@ class Reader {
     for (const TecplotToken& token : value) shown += token.raw;
     fail(fmt::format("{} has the unknown value {} = {}", data_.zones.back().describe(data_.zones.size() - 1),
                      key, printable(shown.substr(0, 40))));
+  }
+
+  FilePart passNumbers() {
+    if (known_ && passed_.size() < known_->size() && (*known_)[passed_.size()].begin == text_.offset()) {
+      passed_.push_back((*known_)[passed_.size()]);
+      text_.seek(passed_.back().end);
+    } else {
+      passed_.push_back(countNumbers(text_));
+    }
+    return passed_.back();
   }
 
   /// The tokens up to the next numbers.
@@ -324,12 +341,12 @@ class Reader {
 
   /// The last zone, if no numbers followed it: it shares all that it has.
   void placeEmpty() {
-    if (placed_ < data_.zones.size()) placeValues({text_.offset()});
+    if (placed_ < data_.zones.size()) placeValues({text_.offset(), text_.offset(), 0, 0});
   }
 
   /// The positions of the last zone's values in the spool file, which is filled when it is first read.
-  void placeValues(const Numbers& numbers) {
-    const auto [begin, count, digits] = numbers;
+  void placeValues(const FilePart& numbers) {
+    const uint64_t count = numbers.count;
     const size_t index = data_.zones.size() - 1;
     TecplotZone& zone = data_.zones[index];
     const TextZone& text = zones_[index];
@@ -341,7 +358,8 @@ class Reader {
         shareTecplotValues(file_->name(), data_, static_cast<size_t>(text.shared[n]), index, n);
       } else if (!zone.values[n].passive) {
         stored.push_back(&zone.values[n]);
-        zone.values[n].from_single = digits <= kDigitsOfFloat || (n < text.single.size() && text.single[n]);
+        zone.values[n].from_single =
+            numbers.digits <= kDigitsOfFloat || (n < text.single.size() && text.single[n]);
         cells = cells || zone.values[n].centring == Centring::kCell;
       }
     }
@@ -416,6 +434,10 @@ class Reader {
   TecplotData data_;
   std::vector<TextZone> zones_;
   size_t placed_ = 0;  // zones
+  FileIndex* index_ = nullptr;
+  FileVersion version_;
+  std::shared_ptr<const FileParts> known_;
+  FileParts passed_;
 };
 
 }  // namespace
@@ -441,8 +463,10 @@ bool isTecplotText(const InputFile& file) {
 }
 
 TecplotData readTecplotText(const std::shared_ptr<const PooledFile>& file,
-                            const std::filesystem::path& folder) {
-  return Reader(file, folder).run();
+                            const std::filesystem::path& folder, FileIndex* index) {
+  Reader reader(file, folder);
+  reader.use(index);
+  return reader.run();
 }
 
 }  // namespace curvisplat
