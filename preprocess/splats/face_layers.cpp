@@ -8,6 +8,7 @@
 
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
+#include "stream/model/fits.h"
 
 namespace curvisplat {
 
@@ -163,16 +164,18 @@ CellRow rowOfNext(const JointLine& line) {
   return {row[1], row[2], row[3], row[4], last};
 }
 
+LayerFit fitOf(const ShortLastCell& cell, double x) {
+  return {std::exp(cell.length * x), cell.growth * x, cell.drift * x};
+}
+
 }  // namespace
 
 LayerFit fitBehindFace(const JointLine& line) {
-  const double x = excessOf(line.row());
-  return {std::exp(-0.34 * x), 1.25 * x, 0.13 * x};
+  return fitOf(kShortBehindFace, excessOf(line.row()));
 }
 
 LayerFit fitAtFace(const JointLine& line) {
-  const double x = excessOf(rowOfNext(line));
-  return {std::exp(-0.4 * x), x, 0};
+  return fitOf(kShortAtFace, excessOf(rowOfNext(line)));
 }
 
 bool fitToLayers(const CellAtFaces& at, const CellOnLattice& cell) {

@@ -125,22 +125,8 @@ class FacesBehind {
 /// the face is nearer: at 0.83 where the last cell is half as long as the one before. The part beyond it, a
 /// hundredth of the cell's weight, is seen as a fringe. With x, the logarithm of the factor by which the
 /// cell is too long, cells become shorter and move inwards, by half of what would fit, and the half cells
-/// at the face follow, so that a uniform medium is as even as before:
-///
-///                      ln s       growth inwards    drift inwards
-///     one behind     -0.34 x          1.25 x          0.13 x
-///     at the face    -0.4 x              x
-///
-/// The numbers are by least squares in one dimension, over lines whose last cell is shorter, of the density
-/// and of the length beyond the face, which counts 0.13; then 1.3 times as much, so that less than 0.1 %
-/// lies outside of multi_bin. Share outside, rms and p98/p2 of multi_bin:
-///
-///     nothing      0.32 %    2.64 %    1.126
-///     1 times      0.13      2.74      1.131
-///     1.3 times    0.09      2.79      1.134
-///     1.5 times    0.05      2.86      1.136
-///
-/// Cells that fit exactly leave 0.01 %, but make a band along the edges of the block, rms 4.4 %.
+/// at the face follow, so that a uniform medium is as even as before (kShortBehindFace and kShortAtFace,
+/// stream/model/fits.h).
 ///
 /// Where the face turns out to be a joint of blocks, all of it is undone
 /// (preprocess/seams/joint_sides.cpp), so x is found from the row that is known there, too (JointLine,

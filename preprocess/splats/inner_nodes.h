@@ -24,12 +24,6 @@ inline constexpr double kMaxBend = 4;
 /// How much of a cell's volume the corrections of dual_cell.h are at the most.
 inline constexpr double kMaxCorrection = 1.0 / 512;
 
-/// The drift and the shortening of splats where cells become wider along an axis by e from one to the next
-/// (dual_cell.h): a splat moves by kWidthDrift e of the cell's length, and is shorter by the factor 1 -
-/// kWidthShare e². By least squares around a pole, which is even to 5 % then, and a dot on the axis 1.1 to
-/// 1.4 times too dense; without, 2 to 5 times.
-inline constexpr double kWidthDrift = 0.12, kWidthShare = 0.13;
-
 /// Nodes that follow one another in a row.
 struct InnerRow {
   NodePositions positions{};                       // of the window's nodes

@@ -17,6 +17,7 @@
 #include "preprocess/splats/inner_nodes.h"
 #include "preprocess/splats/window_lines.h"
 #include "stream/base/error.h"
+#include "stream/model/fits.h"
 
 namespace curvisplat {
 namespace {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "stream/model/border_code.h"
+#include "stream/model/fits.h"
 
 namespace curvisplat {
 
@@ -115,30 +116,28 @@ void reshape(SplatPiece& piece, const Cholesky& l) {
 
 constexpr float kAlong = 0.5f;  // of the cosine: a lattice's axis that is this direction
 
-/// How a cell at a border is cut where cells grow from the border inwards by e^g: by least squares in one dimension, for
-/// g from -0.25 to 0.5. Of half cells, and of whole ones. The slopes and reaches of border_code.h allow for it.
+/// `a` + g `b`.
+BorderPart changed(const BorderPart& a, float g, const BorderPart& b) {
+  return {a.offset + g * b.offset, a.size + g * b.size, a.share + g * b.share};
+}
+
+/// How a cell at a border is cut where cells grow from the border inwards by e^g. The slopes and reaches of
+/// border_code.h allow for it.
 BorderPart cutOfGrowing(const BorderPart& cut, float g) {
   if (g == 0) return cut;
   const bool half = cut.size == kHalfCellStyle.cut.size;
   g = std::max(g, -0.25f);
-  if (half) {
-    const float curved = std::min(g, 0.3f);
-    return {cut.offset + g * (0.52f + 0.4f * curved), cut.size - g * (0.63f + 0.45f * curved),
-            cut.share - g * (0.76f + 0.9f * curved)};
-  }
-  const float more = std::max(g, 0.0f), less = std::min(g, 0.0f);
-  return {cut.offset + 0.08f * more + 0.02f * less, cut.size + 0.07f * more + 0.12f * less,
-          cut.share + 0.065f * less};
+  if (half) return changed(cut, g, changed(kHalfCutByGrowth, std::min(g, 0.3f), kHalfCutByGrowth2));
+  return changed(cut, g, g > 0 ? kWholeCutByGrowth : kWholeCutByShrinking);
 }
 
 /// Number `n`, 0 or 1, of the two splats that a whole cell at a face is cut as: the next cell beyond the face, as long as the
 /// cells' growth makes it, and the cell itself. They are as in the middle of the grid: drifted (preprocess/splats/stretch.h).
 BorderPart pairOfGrowing(size_t n, float g) {
-  constexpr float kDriftOfGrowth = 0.14f;
   g = std::clamp(g, -0.5f, 0.5f);
-  if (n != 0) return {kDriftOfGrowth * g, 1, 1};
+  if (n != 0) return {kDrift * g, 1, 1};
   const float next = std::exp(-g);
-  return {-0.5f - 0.5f * next + kDriftOfGrowth * g * next, next, next};
+  return {-0.5f - 0.5f * next + kDrift * g * next, next, next};
 }
 
 /// The growth along q.
@@ -152,7 +151,7 @@ float growthAlong(const GrowthAxes& growth, const glm::vec3& q) {
 }
 
 /// Lengthens what the growth's axes have along A q by the part's size. Half cells that are cut are skewed by less along
-/// that axis, by least squares in one dimension; cells that are drawn in two parts are not skewed along it. `skew`: the
+/// that axis; cells that are drawn in two parts are not skewed along it. `skew`: the
 /// factor.
 void resize(GrowthAxes& growth, const Shape& shape, const glm::vec3& q, const BorderPart& part, float skew) {
   const glm::vec3 along = inSpace(shape, q);
@@ -204,7 +203,6 @@ size_t partsAtBorder(const SplatPiece& whole, const InwardAxes& inward, uint32_t
                               : pairs            ? pairOfGrowing(choice & 1, growthAlong(whole.growth, q))
                                                  : cutOfGrowing(style.cut, growthAlong(whole.growth, q));
       if (pairs || !cut) choice >>= 1;
-      constexpr float kSkewOfCut = 0.6f;
       resize(growth, whole.shape, q, part, !cut ? 0 : pairs ? 1 : kSkewOfCut);
       offset += part.offset * q;
       share *= part.share;

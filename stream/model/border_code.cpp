@@ -199,9 +199,7 @@ bool isPossibleBorderCode(uint32_t border_code) {
 BorderPart mergedPart(const InwardAxes& inward) {
   const float thickness = 2 * inward.distance, w = 1 / inward.ratio;
   const float next = thickness * inward.ratio;  // the length of the splats behind
-  const float middle = next * (-0.498f + w * (0.951f + w * (-0.218f + w * 0.0226f)));
-  return {middle - inward.distance, next * (1 + w * (0.0203f + w * (0.2107f + w * 0.0311f))),
-          inward.ratio * (1 + w * (0.0938f + w * (0.4622f - w * 0.0497f)))};
+  return {next * kMergedDistance(w) - inward.distance, next * kMergedSize(w), inward.ratio * kMergedShare(w)};
 }
 
 double borderReach(uint32_t border_code) {

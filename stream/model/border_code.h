@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <span>
 
+#include "stream/model/fits.h"
 #include "stream/model/kernel.h"
 
 namespace curvisplat {
@@ -93,45 +94,16 @@ uint32_t layersOf(uint32_t border_code);
 /// How far such a face is from the cell's middle, in cells, where cells grow steadily inwards by e^growth.
 /// It is about one length of the cell: a hundredth of the weight is cut there.
 inline float layerDistance(float growth) {
-  return 1 - 0.106f * growth;
+  return 1 + kLayerDistanceByGrowth * growth;
 }
 
 /// Whether a code is kNoBorder or has one of the five forms. Only such codes may be passed to the other
 /// functions.
 bool isPossibleBorderCode(uint32_t border_code);
 
-/// A splat that stands for a cell at a border, in units of the cell's length in the direction from the
-/// border inwards: its offset from the cell's middle, its size, and its share of the cell's weight.
-struct BorderPart {
-  float offset, size, share;
-};
-/// How the renderer draws a cell at a border: cut, as one wider splat of which the part behind the face is
-/// not drawn (render/project/splat_pieces.h), or in two parts, a narrow one at the border and a wide one
-/// behind it.
-struct BorderStyle {
-  BorderPart cut;
-  std::array<BorderPart, 2> parts;  // their shares sum to one
-};
-
-// The styles of half cells, of nodes, and of whole cells, of cell-centred data. They are the least squares
-// in one dimension for a step, which is what a uniform medium is that ends at the border.
-//
-//                   squared error   outside of the border   density behind it
-//   half    one splat       0.048        0.079                 0.83 and more
-//           in parts        0.019        0.033                 0.87 to 1.07
-//           cut            0.0004        0.010, of the next layer's splats    0.989 to 1.004
-//   whole   one splat       0.083        0.138
-//           in parts        0.027        0.045                 0.87 and more
-//           cut            0.0008        0                     0.932 to 1.030
-inline constexpr BorderStyle kHalfCellStyle{{-0.646f, 2.13f, 2.31f},
-                                            {{{-0.286f, 0.336f, 0.264f}, {0.3f, 0.998f, 0.736f}}}};
-inline constexpr BorderStyle kWholeCellStyle{{-0.243f, 1.264f, 1.507f},
-                                             {{{-0.342f, 0.25f, 0.197f}, {0.111f, 0.769f, 0.803f}}}};
-
 /// The style of whole cells that are drawn as two splats: the cell itself, which is its `cut`, and the one
 /// that would be next to it beyond the face, as cells inside of the grid are drawn
-/// (render/project/splat_pieces.cpp). In one dimension, the density behind the border of an even grid is
-/// 0.999 to 1.001; it is 0.932 to 1.030 with one wider splat, and 0.928 to 1.033 where cells grow by 0.865.
+/// (render/project/splat_pieces.cpp).
 inline constexpr BorderStyle kWholeCellPairs{{0, 1, 1}, kWholeCellStyle.parts};
 
 inline bool isOfPairs(const BorderStyle& style) {
@@ -139,9 +111,7 @@ inline bool isOfPairs(const BorderStyle& style) {
 }
 
 /// How a merged splat with `inward.ratio` is drawn, in units of its length. It generalises `cut` above,
-/// which is the result for the ratios 2 (half cells) and 1 (whole cells): the same least squares for any
-/// ratio, as polynomials of its inverse. Squared errors are 0.004 at the smallest ratio, and 0.001 and less
-/// from 1 on.
+/// which is the result for the ratios 2 (half cells) and 1 (whole cells).
 BorderPart mergedPart(const InwardAxes& inward);
 
 /// How thick a plate is drawn, of its thickness: splats are drawn wider than their cells, by kKernelSigma √12, since
@@ -157,8 +127,7 @@ double borderReach(uint32_t border_code);
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code);
 /// The same, for the inwardAxes() of the code.
 double drawnSlope(const glm::dvec3& slope, const InwardAxes& inward);
-/// The amount that half cells which shrink inwards add to the size of a cut
-/// (render/project/splat_pieces.cpp). Caches without kMergedBorders recorded slopes without it: drawnSlope()
+/// The most that half cells which shrink inwards add to the size of a cut (kHalfCutByGrowth). Caches without kMergedBorders recorded slopes without it: drawnSlope()
 /// is at most kEarlierSlopes times as large.
 inline constexpr double kWidening = 0.13;
 inline constexpr double kEarlierSlopes = 1 + kWidening / kHalfCellStyle.cut.size;

@@ -10,11 +10,7 @@
 //
 // with ê_a the unit vectors of the lattice axes in the frame of the splat's A (at right angles, since J = A
 // Q) and σ = kKernelSigma: a Gram-Charlier series with the third moment that growth gives. Weight and middle
-// are as without. In a uniform medium in one dimension, p98/p2 of the density:
-//
-//     growth e^g             1.1     1.25    1.5
-//     symmetric kernel       1.027   1.062   1.116
-//     skewed                 1.003   1.008   1.025
+// are as without.
 //
 //   bits 0-5, 6-11, 12-17       g_a in steps of 1/32, -20 to 20, in two's complement
 //        18-21, 22-25, 26-29    x, y, z of the quaternion that takes the frame's axes to ê_a, in steps of
@@ -31,13 +27,12 @@
 #include <cstdint>
 #include <span>
 
+#include "stream/model/fits.h"
+
 namespace curvisplat {
 
 /// The code of a cell whose neighbours are about as long as itself.
 inline constexpr uint32_t kNoGrowth = 0;
-
-/// A kernel's third cumulant along an axis, over σ³, for g = 1. Least squares for growths from 1.1 to 1.5.
-inline constexpr float kSkewOfGrowth = 0.9f;
 
 struct CellGrowth {
   std::array<glm::vec3, 3> axis;  // unit length, at right angles

@@ -154,7 +154,7 @@ TEST(NodeSplats, OfAGrowingGridDrift) {
   for (uint64_t i = 0; i < 13; ++i) {
     const size_t n = grid.at(i, 2, 2);
     const Splat &before = without.splats[n].splat, &after = drifted.splats[n].splat;
-    const double moved = i == 0 || i == 12 ? 0 : kDrift * std::log(1.2) * before.axis[0];
+    const double moved = i == 0 || i == 12 ? 0 : static_cast<double>(kDrift) * std::log(1.2) * before.axis[0];
     EXPECT_NEAR(after.position.x, before.position.x + moved, 2e-3 * before.axis[0]) << i;
     EXPECT_EQ(after.weight, before.weight);
     EXPECT_NEAR(drifted.values[n].mean - without.values[n].mean, after.position.x - before.position.x,
