@@ -50,7 +50,7 @@ class Addition {
       : options_(options),
         plan_(plan),
         progress_(progress),
-        ranks_(options.ranks),
+        ranks_(*options.ranks),
         workspace_(options.cache, temporaryFolder(options), ranks_),
         cache_(options.cache),
         description_(source.description()) {
@@ -69,7 +69,7 @@ class Addition {
     } else {
       grid_ = std::make_unique<CacheGrid>(dynamic_cast<const GridSource&>(source));
       reader_ = std::make_unique<NodeReader>(*grid_, options.scalars, options.blank_value);
-      if (ranks_) plan_.slab_bytes = slabBytesOfRanks(*reader_, plan_.slab_bytes, *ranks_);
+      plan_.slab_bytes = slabBytesOfRanks(*reader_, plan_.slab_bytes, ranks_);
     }
     checkCentring();
     checkBlocks(mesh_ ? origin_->blocks() : description_.blocks, cache_);
@@ -132,9 +132,9 @@ class Addition {
                       fmt::join(report_.scalars, ", "), countText(values, "sample")));
   }
 
-  bool isFirst() const { return !ranks_ || ranks_->isFirst(); }
+  bool isFirst() const { return ranks_.isFirst(); }
   /// The nodes of this rank's share of a pass.
-  uint64_t nodesOfRank() const { return manifest().nodes / (ranks_ ? ranks_->count() : 1); }
+  uint64_t nodesOfRank() const { return manifest().nodes / ranks_.count(); }
 
   void survey() {
     if (grid_) {
@@ -142,7 +142,7 @@ class Addition {
       return;
     }
     if (isFirst()) survey_ = origin_->survey(progress_);
-    if (ranks_) survey_ = broadcastSurvey(survey_, *ranks_);
+    survey_ = broadcastSurvey(survey_, ranks_);
   }
   void newOrigin() {
     origin_ =
@@ -207,7 +207,7 @@ class Addition {
       writer_ = std::make_unique<VariableWriter>(workspace_.lock(), manifest(), this->variables());
     passes_ =
         std::make_unique<ValuePasses>(cache_, options_.scalars.size(), plan_, workspace_.own(), progress_);
-    if (ranks_) passes_->shareWith(*ranks_, workspace_.shared());
+    passes_->shareWith(ranks_, workspace_.shared());
     if (mesh_) return passes_->scatter(*origin_);
     passes_->setOverlaps(overlapsFor(manifest(), *grid_, plan_.forOverlaps(), progress_, ranks_));
     passes_->scatter(*reader_);
@@ -231,12 +231,12 @@ class Addition {
   }
 
   void finish() {
-    progress_.throwIfStopped();     // the last moment: a rank without work of its own does not look before
-    if (ranks_) ranks_->barrier();  // where another has failed, the cache stays as it is
+    progress_.throwIfStopped();  // the last moment: a rank without work of its own does not look before
+    ranks_.barrier();            // where another has failed, the cache stays as it is
     if (isFirst())
       for (const FileInfo& file : writer_->finish(description_.files))
         report_.files.push_back({file.name, file.size});
-    if (ranks_) ranks_->barrier();
+    ranks_.barrier();
   }
 
   std::vector<VariableInfo> variables() const {
@@ -253,7 +253,7 @@ class Addition {
   const AddScalarOptions& options_;
   MemoryPlan plan_;
   Progress& progress_;
-  Ranks* const ranks_;                 // null: this process alone
+  Ranks& ranks_;
   const AdditionWorkspace workspace_;  // before the cache is read, and before what has files in its folder
   const CacheReader cache_;
   const GridDescription& description_;
@@ -273,7 +273,7 @@ class Addition {
 AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& given_options,
                            Progress& progress) {
   AddScalarOptions options = given_options;
-  if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
+  if (!options.ranks) options.ranks = &oneRank();
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (const auto* const grid = dynamic_cast<const GridSource*>(&source))
     GridOrigin::requireMemory(*grid, options.scalars, plan);
@@ -281,9 +281,9 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& giv
   if (options.most_buckets) plan.most_buckets = *options.most_buckets;
   if (options.slab_bytes) plan.slab_bytes = *options.slab_bytes;
 
-  if (options.ranks) plan = commonPlan(plan, *options.ranks);
+  plan = commonPlan(plan, *options.ranks);
 
-  if (!options.ranks || options.ranks->isFirst()) {
+  if (options.ranks->isFirst()) {
     checkWritable(options.cache, "; name a splat cache that you may change");
     checkWritable(temporaryFolder(options), "; name another folder with --tmp");
     ConversionWorkspace::clearKilled(options.cache);

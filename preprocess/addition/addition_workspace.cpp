@@ -15,16 +15,15 @@
 namespace curvisplat {
 
 AdditionWorkspace::AdditionWorkspace(const std::filesystem::path& cache,
-                                     const std::filesystem::path& temporary_folder, Ranks* ranks) {
-  if (!ranks || ranks->isFirst()) {
+                                     const std::filesystem::path& temporary_folder, Ranks& ranks) {
+  if (ranks.isFirst()) {
     lock_.emplace(cache);
     folder_ =
         std::make_unique<ScratchFolder>(newScratch(cache, temporary_folder), ScratchFolder::Folder::kMake);
-    shared_ = own_ = folder_->path();
+    shared_ = folder_->path();
   }
-  if (!ranks) return;
-  shared_ = sharedFolder(shared_, *ranks);
-  own_ = makeFolderOfRank(shared_, *ranks);
+  shared_ = sharedFolder(shared_, ranks);
+  own_ = makeFolderOfRank(shared_, ranks);
 }
 
 AdditionWorkspace::~AdditionWorkspace() {
@@ -102,12 +101,11 @@ void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache) {
 }
 
 std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid,
-                                      const OverlapMemory& memory, const Progress& progress, Ranks* ranks) {
+                                      const OverlapMemory& memory, const Progress& progress, Ranks& ranks) {
   if (cache.overlap != kOverlapOwner) return {};
-  if (!ranks) return findOverlaps(grid, memory, progress);
   std::vector<BlockOverlap> overlaps;
-  if (ranks->isFirst()) overlaps = findOverlaps(grid, memory, progress);
-  return fromBytes<BlockOverlap>(ranks->broadcast(toBytes(overlaps)));
+  if (ranks.isFirst()) overlaps = findOverlaps(grid, memory, progress);
+  return fromBytes<BlockOverlap>(ranks.broadcast(toBytes(overlaps)));
 }
 
 std::filesystem::path newScratch(const std::filesystem::path& cache, const std::filesystem::path& folder) {

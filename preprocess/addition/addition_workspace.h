@@ -19,11 +19,10 @@ namespace curvisplat {
 /// The cache's lock and the temporary folder.
 class AdditionWorkspace {
  public:
-  /// `ranks`: all of them have to call it, and the cache is locked when it returns; null: this process
-  /// alone. Removes the temporary files of additions that were killed. Throws Error if another program is
+  /// All ranks have to call it, and the cache is locked when it returns. Removes the temporary files of additions that were killed. Throws Error if another program is
   /// changing the cache, or if a rank does not see the folder.
   AdditionWorkspace(const std::filesystem::path& cache, const std::filesystem::path& temporary_folder,
-                    Ranks* ranks);
+                    Ranks& ranks);
   /// Removes the folder.
   ~AdditionWorkspace();
   AdditionWorkspace(const AdditionWorkspace&) = delete;
@@ -50,11 +49,11 @@ void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache);
 /// besides.
 void checkBlocksOfStep(const std::vector<GridBlock>& grid, const Manifest& series);
 
-/// The overlaps of the grid's blocks where `cache` draws each point once; else none. With `ranks` rank 0
+/// The overlaps of the grid's blocks where `cache` draws each point once; else none. Rank 0
 /// looks for them, and all get them. Throws Error if the grid cannot be read.
 std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid,
                                       const OverlapMemory& memory, const Progress& progress,
-                                      Ranks* ranks = nullptr);
+                                      Ranks& ranks = oneRank());
 
 /// A new name in `folder` for the temporary files of an addition to `cache`, which is locked. Removes those
 /// of additions that were killed.

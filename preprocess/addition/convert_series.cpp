@@ -26,18 +26,21 @@ class SeriesConversion {
  public:
   SeriesConversion(const SeriesInput& input, const SeriesOptions& options, Progress& progress,
                    const std::function<void(const SeriesEvent&)>& report)
-      : input_(input), options_(options), progress_(progress), report_event_(report) {
+      : input_(input),
+        options_(options),
+        progress_(progress),
+        report_event_(report),
+        ranks_(options.convert.ranks ? *options.convert.ranks : oneRank()) {
     const std::filesystem::path& output = options.convert.output;
     const bool is_cache = std::filesystem::exists(output / "manifest.json") && !hasUnfinished(output);
     if (options.add || (options.convert.resume && is_cache)) openCache();
     if (!options.add) known_ = times_.size();
-    if (options.convert.ranks && !options.convert.ranks->alone()) ranks_ = options.convert.ranks;
   }
 
   SeriesReport run() {
     try {
-      if (ranks_) {
-        runTogether(*ranks_);
+      if (!ranks_.alone()) {
+        runTogether();
       } else {
         if (!options_.to_part) removeLeftOfRanks(options_.convert.output, options_.convert.temporary_folder);
         for (uint64_t number = stepsAddedBefore(); number < input_.count; ++number) takeOrLeaveOut(number);
@@ -79,17 +82,17 @@ class SeriesConversion {
   }
 
   /// All ranks together up to the first step, which decides what is converted; then in rounds (shared_series.h).
-  void runTogether(Ranks& ranks) {
+  void runTogether() {
     uint64_t next = stepsAddedBefore();
     for (; next < input_.count && (times_.empty() || next_ < known_); ++next)
-      if (const std::optional<OpenStep> step = openTogether(ranks, next)) useTogether(next, *step);
+      if (const std::optional<OpenStep> step = openTogether(next)) useTogether(next, *step);
     if (next == input_.count) return;
-    const SharedSteps shared(input_, stepOptions(), ranks, progress_);
-    while (next < input_.count) next = runRound(shared, ranks, next);
+    const SharedSteps shared(input_, stepOptions(), ranks_, progress_);
+    while (next < input_.count) next = runRound(shared, next);
   }
 
   /// open() at all ranks; nullopt if all have left the step out.
-  std::optional<OpenStep> openTogether(Ranks& ranks, uint64_t number) {
+  std::optional<OpenStep> openTogether(uint64_t number) {
     std::optional<OpenStep> step;
     std::string reason = "not all ranks can read it";
     try {
@@ -102,9 +105,9 @@ class SeriesConversion {
       reason = error.what();
     }
     std::vector<uint64_t> failed{step ? 0u : 1u};
-    ranks.sum(std::span(failed));
+    ranks_.sum(std::span(failed));
     if (failed[0] == 0) return step;
-    if (failed[0] < ranks.count()) throw Error("{}", refusal(number, reason));
+    if (failed[0] < ranks_.count()) throw Error("{}", refusal(number, reason));
     leaveOut(number, reason);
     return std::nullopt;
   }
@@ -126,18 +129,18 @@ class SeriesConversion {
   }
 
   /// Returns the number of the first step that is left for the next round.
-  uint64_t runRound(const SharedSteps& shared, Ranks& ranks, uint64_t next) {
+  uint64_t runRound(const SharedSteps& shared, uint64_t next) {
     using Start = SharedSteps::Start;
     std::vector<Start> starts(1);
-    if (ranks.isFirst()) starts[0] = startOfRound(next);
-    const Start start = fromBytes<Start>(ranks.broadcast(toBytes(starts)))[0];
-    const auto ranges = dealSteps(next, input_.count, start.in_group, ranks.count());
+    if (ranks_.isFirst()) starts[0] = startOfRound(next);
+    const Start start = fromBytes<Start>(ranks_.broadcast(toBytes(starts)))[0];
+    const auto ranges = dealSteps(next, input_.count, start.in_group, ranks_.count());
     ConvertedSteps converted;
-    if (ranks.isFirst())
+    if (ranks_.isFirst())
       for (; next < ranges[0].end; ++next) takeAfterOthers(next);
     else
       converted = shared.convertPart(start);
-    const std::vector<Ranks::Bytes> sent = ranks.gather(toBytes(converted));
+    const std::vector<Ranks::Bytes> sent = ranks_.gather(toBytes(converted));
     bool complete = true;
     for (unsigned rank = 1; rank < sent.size() && complete; ++rank) {
       const ConvertedSteps theirs = convertedFrom(sent[rank]);
@@ -149,7 +152,7 @@ class SeriesConversion {
         failed_elsewhere_ = FailedElsewhere{next, rank, theirs.error};
     }
     std::vector<uint64_t> nexts{next};
-    next = fromBytes<uint64_t>(ranks.broadcast(toBytes(nexts)))[0];
+    next = fromBytes<uint64_t>(ranks_.broadcast(toBytes(nexts)))[0];
     return next;
   }
 
@@ -173,8 +176,7 @@ class SeriesConversion {
   }
 
   void openCache() {
-    const Ranks* const ranks = options_.convert.ranks;
-    if (!ranks || ranks->isFirst()) ConversionWorkspace::clearKilled(options_.convert.output);
+    if (ranks_.isFirst()) ConversionWorkspace::clearKilled(options_.convert.output);
     const CacheReader cache(options_.convert.output);
     for (const SeriesStep& step : cache.series().steps) times_.push_back(step.time);
     for (const BlockInfo& block : cache.seriesManifest().blocks) names_.push_back(block.name);
@@ -275,7 +277,7 @@ class SeriesConversion {
     next_ = known_ = 1;
     sums_.nodes = converted.nodes;
     ++sums_.converted;
-    if (!ranks_ || ranks_->isFirst())
+    if (ranks_.isFirst())
       report_event_({input_.name(number), nullptr, &converted, &step.source->description(), ""});
   }
 
@@ -342,7 +344,7 @@ class SeriesConversion {
     const std::string step = fmt::format("step {} ({})", numberOf(number), input_.name(number));
     if (!options_.keep_going) throw Error("{}", refusal(number, reason));
     ++sums_.left_out;
-    if (!ranks_ || ranks_->isFirst()) report_event_({step, nullptr, nullptr, nullptr, reason});
+    if (ranks_.isFirst()) report_event_({step, nullptr, nullptr, nullptr, reason});
   }
 
   /// The number of a step in messages.
@@ -374,6 +376,7 @@ class SeriesConversion {
   const SeriesOptions& options_;
   Progress& progress_;
   const std::function<void(const SeriesEvent&)>& report_event_;
+  Ranks& ranks_;
   std::vector<double> times_;       // of the cache's steps
   TimeUnit unit_;                   // of these
   std::set<std::string> sources_;   // of a cache that is there
@@ -385,7 +388,6 @@ class SeriesConversion {
   uint64_t next_ = 0;          // of those, the next one
   std::optional<FailedElsewhere> failed_elsewhere_;
   bool expect_new_geometry_ = false;
-  Ranks* ranks_ = nullptr;  // null: this process alone
   SeriesReport sums_;
 };
 

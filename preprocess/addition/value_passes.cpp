@@ -40,22 +40,21 @@ std::filesystem::path ValuePasses::fileOf(unsigned rank) const {
 
 void ValuePasses::openFile() {
   const uint32_t numbers = (buckets_.size() + grouped_ - 1) / grouped_;
-  file_ =
-      std::make_unique<BucketFile>(fileOf(ranks_ ? ranks_->rank() : 0), numbers, plan_.chunkBytes(numbers));
+  file_ = std::make_unique<BucketFile>(fileOf(ranks_->rank()), numbers, plan_.chunkBytes(numbers));
 }
 
 /// Joins the ranks' files: rank 0's file then has the records of all.
 void ValuePasses::joinFiles() {
   const std::vector<BucketChains> others = gatherChains(file_->chains(), *ranks_);
   for (size_t n = 0; n < others.size(); ++n) file_->join(fileOf(static_cast<unsigned>(n + 1)), others[n]);
-  if (isFirst()) return;
+  if (ranks_->isFirst()) return;
   file_->leave();  // for rank 0
   file_.reset();
 }
 
 void ValuePasses::scatter(SplatOrigin& origin) {
   openFile();
-  if (!isFirst()) return;
+  if (!ranks_->isFirst()) return;
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
   const SinkOfThread sink_of_thread = [&]() -> SplatSink& { return sinks.local(); };
   origin.scatter(sink_of_thread, {}, *progress_);
@@ -85,8 +84,8 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
 }
 
 void ValuePasses::mergeSeams() {
-  if (seams_ && ranks_) seams_->sendToFirst(*ranks_);
-  if (seams_ && isFirst()) {
+  if (seams_) seams_->sendToFirst(*ranks_);
+  if (seams_ && ranks_->isFirst()) {
     tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
     seams_->finishInParallel(coordinate_bytes_,
                              [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
@@ -96,9 +95,9 @@ void ValuePasses::mergeSeams() {
     for (ValueSink& sink : sinks) sink.flush();
   }
   seams_.reset();
-  if (ranks_) sample_.gatherFrom(*ranks_);
-  file_->close(ranks_ != nullptr);
-  if (ranks_) joinFiles();
+  sample_.gatherFrom(*ranks_);
+  file_->close(!ranks_->alone());
+  joinFiles();
   if (file_) temporary_bytes_ = file_->size();
 }
 

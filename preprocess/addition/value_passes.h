@@ -65,7 +65,6 @@ class ValuePasses {
   uint64_t temporaryBytes() const { return temporary_bytes_; }
 
  private:
-  bool isFirst() const { return !ranks_ || ranks_->isFirst(); }
   std::filesystem::path fileOf(unsigned rank) const;
   void openFile();
   void joinFiles();
@@ -76,7 +75,7 @@ class ValuePasses {
   const MemoryPlan plan_;
   const std::filesystem::path scratch_;
   Progress* progress_;
-  Ranks* ranks_ = nullptr;        // null: this process alone
+  Ranks* ranks_ = &oneRank();
   std::filesystem::path shared_;  // of all ranks
   const ConversionOrder order_;
   const ValueBuckets buckets_;

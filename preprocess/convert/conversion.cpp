@@ -45,15 +45,18 @@ class Conversion {
  public:
   Conversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
              std::vector<ConversionFact> facts, FurtherParts parts, Progress& progress)
-      : parts_(std::move(parts)), options_(options), plan_(plan), progress_(progress), ranks_(options.ranks) {
-    if (isFirst())
+      : parts_(std::move(parts)),
+        options_(options),
+        plan_(plan),
+        progress_(progress),
+        ranks_(*options.ranks) {
+    if (ranks_.isFirst())
       workspace_.emplace(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
                          std::move(facts));
     shareFolders();
     scratch_files_.emplace(own_scratch_);
     origin_ = originOf(source, options, plan, *scratch_files_);
     nodes_ = nodesOf(*origin_);
-    if (ranks_) shares_splats_ = origin_->shareWith(*ranks_);
   }
 
   ConvertReport run() {
@@ -76,7 +79,7 @@ class Conversion {
         return end();
       } catch (const LostBuckets&) {
         // The machine went down before all was on its disk. The bricks that are whole still count.
-        if (ranks_) throw;
+        if (!ranks_.alone()) throw;
         forgetSplats();
       }
     }
@@ -102,7 +105,7 @@ class Conversion {
   void runPasses(std::span<const Pass> passes) {
     for (const Pass& pass : passes) {
       const TraceScope trace(pass.name, TraceKind::kStage);
-      progress_.begin(pass.name, pass.steps / (ranks_ ? ranks_->count() : 1), pass.unit);
+      progress_.begin(pass.name, pass.steps / ranks_.count(), pass.unit);
       (this->*pass.run)();
       // What a pass has freed goes back to the system: the next one counts on it.
       returnFreedMemory();
@@ -110,10 +113,9 @@ class Conversion {
     progress_.end();
   }
 
-  bool isFirst() const { return !ranks_ || ranks_->isFirst(); }
-  unsigned rank() const { return ranks_ ? ranks_->rank() : 0; }
+  bool isFirst() const { return ranks_.isFirst(); }
   /// Whether this rank calls the origin.
-  bool makesSplats() const { return isFirst() || shares_splats_; }
+  bool makesSplats() const { return isFirst() || origin_->isShared(); }
 
   /// Rank 0's folders, at every rank; and a folder for each rank's own temporary files.
   void shareFolders() {
@@ -121,27 +123,24 @@ class Conversion {
       scratch_ = std::filesystem::absolute(workspace_->scratch());
       partial_ = std::filesystem::absolute(workspace_->partial().path());
     }
-    own_scratch_ = scratch_;
-    if (!ranks_) return;
-    scratch_ = sharedFolder(scratch_, *ranks_);
-    partial_ = sharedFolder(partial_, *ranks_);
-    own_scratch_ = makeFolderOfRank(scratch_, *ranks_);
+    scratch_ = sharedFolder(scratch_, ranks_);
+    partial_ = sharedFolder(partial_, ranks_);
+    own_scratch_ = makeFolderOfRank(scratch_, ranks_);
   }
 
   /// Whether an interrupted conversion has left splats that are all there.
   bool hasSplats() {
-    if (!ranks_) return workspace_->hasAllSplats();
     std::vector<uint8_t> has(1);
     if (isFirst() && workspace_->hasAllSplats()) {
       try {
         splats_ = *workspace_->splats();
-        openSplats();
+        if (!ranks_.alone()) openSplats();  // otherwise once it is known whether they are needed
         has[0] = 1;
       } catch (const LostBuckets&) {
         forgetSplats();
       }
     }
-    return fromBytes<uint8_t>(ranks_->broadcast(toBytes(has)))[0] != 0;
+    return fromBytes<uint8_t>(ranks_.broadcast(toBytes(has)))[0] != 0;
   }
 
   ConvertReport end() {
@@ -154,7 +153,7 @@ class Conversion {
 
   void scan() {
     if (makesSplats()) splats_.survey = origin_->survey(progress_);
-    if (ranks_ && !shares_splats_) splats_.survey = broadcastSurvey(splats_.survey, *ranks_);
+    if (!origin_->isShared()) splats_.survey = broadcastSurvey(splats_.survey, ranks_);
     const auto& lost = splats_.survey.blanked.lost;
     if (options_.differing != DifferingScalars::kBlankAll && !lost.empty()) throw DifferingBlanks(lost, true);
     checkRanges(splats_.survey, origin_->description(), options_.scalars);
@@ -172,16 +171,16 @@ class Conversion {
     const auto counts = makeCountingGrid(countingLevel(counted, splats_.survey.upper - splats_.survey.lower),
                                          plan_.counting_bytes);
     if (makesSplats()) origin_->count(root_, *counts, progress_);
-    if (ranks_ && shares_splats_) sendCountsToFirst(*counts, *ranks_);
+    if (origin_->isShared()) sendCountsToFirst(*counts, ranks_);
     if (isFirst()) {
       counts->close();
       planBuckets(*counts, plan_, splats_.tree);
     }
-    if (ranks_) splats_.tree = broadcastTree(splats_.tree, *ranks_);
+    splats_.tree = broadcastTree(splats_.tree, ranks_);
     uint32_t buckets = 0;
     for (const uint32_t leaf : splats_.tree.leavesBelow(0))
       buckets = std::max(buckets, splats_.tree[leaf].bucket + 1);
-    file_ = std::make_unique<BucketFile>(ConversionWorkspace::splatsFileOf(scratch_, rank()), buckets,
+    file_ = std::make_unique<BucketFile>(ConversionWorkspace::splatsFileOf(scratch_, ranks_.rank()), buckets,
                                          plan_.chunkBytes(buckets));
     contents_.assign(splats_.tree.size(), {});
     sample_.emplace(options_.scalars.size());
@@ -189,7 +188,7 @@ class Conversion {
 
   /// Whether an interrupted conversion has left some of the splats, and this one adds the others.
   bool takeUpScattered() {
-    if (ranks_ || !workspace_->splats()) return false;
+    if (!ranks_.alone() || !workspace_->splats()) return false;
     const ScatteredSplats& left = *workspace_->splats();
     try {
       file_ = openScattered(workspace_->splatsFile(), left, plan_);
@@ -219,7 +218,7 @@ class Conversion {
   SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_, &*sample_}; }
 
   ScatterNotes scatterNotes() {
-    if (ranks_) return {};
+    if (!ranks_.alone()) return {};
     return timedNotes(options_.note_interval, splats_.unfinished ? &*splats_.unfinished : nullptr,
                       [this](const ScatterState& state) { noteScattered(state); });
   }
@@ -232,19 +231,19 @@ class Conversion {
 
   void mergeSeams() {
     if (makesSplats()) splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
-    file_->close(ranks_ != nullptr);
+    file_->close(!ranks_.alone());
     splats_.buckets = file_->chains();
-    if (ranks_) sample_->gatherFrom(*ranks_);
+    sample_->gatherFrom(ranks_);
     splats_.sample = sample_->rows();
-    if (ranks_) sumContents(contents_, *ranks_);
-    if (ranks_) splats_.buckets_of_ranks = gatherChains(splats_.buckets, *ranks_);
+    sumContents(contents_, ranks_);
+    splats_.buckets_of_ranks = gatherChains(splats_.buckets, ranks_);
     splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
     if (isFirst()) workspace_->noteSplats(splats_);
-    if (!ranks_) return;
     shareSplats();
     if (!isFirst()) file_->leave();  // it is to be resumed from
-    for (unsigned other = 0; other < ranks_->count(); ++other)
-      if (other != rank()) file_->join(ConversionWorkspace::splatsFileOf(scratch_, other), chainsOf(other));
+    for (unsigned other = 0; other < ranks_.count(); ++other)
+      if (other != ranks_.rank())
+        file_->join(ConversionWorkspace::splatsFileOf(scratch_, other), chainsOf(other));
   }
 
   const BucketChains& chainsOf(unsigned of_rank) const {
@@ -253,10 +252,10 @@ class Conversion {
 
   /// Brings the facts in rank 0's journal to every rank.
   void shareSplats() {
+    if (ranks_.alone()) return;
     std::string text;
     if (isFirst()) text = journalText(workspace_->journal());
-    const auto sent =
-        fromBytes<char>(ranks_->broadcast(toBytes(std::vector<char>(text.begin(), text.end()))));
+    const auto sent = fromBytes<char>(ranks_.broadcast(toBytes(std::vector<char>(text.begin(), text.end()))));
     if (isFirst()) return;
     splats_ = journalFrom(std::string(sent.begin(), sent.end()))->splats.value();
     readSample(scratch_, splats_);
@@ -265,11 +264,8 @@ class Conversion {
   /// Takes up, in place of all passes before, the splats of a conversion that was interrupted, which may have
   /// had another number of ranks.
   void takeUpSplats() {
-    if (ranks_)
-      shareSplats();
-    else
-      splats_ = *workspace_->splats();
-    if (ranks_ && !file_) openSplats();
+    shareSplats();
+    if (!isFirst()) openSplats();
     openWriter();
     if (isFirst()) warnOfValues();
   }
@@ -288,7 +284,7 @@ class Conversion {
     sample.add(splats_.sample);
     scalars_ = SampledScalars(sample, options_.scalars.size(), options_.precision);
     if (writer_) scalars_.divide(writer_->histograms());
-    if (ranks_) return buildTogether();
+    if (!ranks_.alone()) return buildTogether();
     const auto buckets = static_cast<uint32_t>(splats_.buckets.chains.size());
     OctreeBuilder builder(octreePlan(), splats_.tree, *writer_, progress_);
     if (const uint32_t first = builder.takeUpBricks(buckets); first < buckets) {
@@ -315,8 +311,8 @@ class Conversion {
 
   /// Bricks that were appended by an interrupted conversion are made again.
   void buildTogether() {
-    const BucketRange share = dealBuckets(splats_.tree, file_->buckets(), ranks_->count())[rank()];
-    PartialFolder own_folder(bricksOfRank(scratch_, rank()), true);
+    const BucketRange share = dealBuckets(splats_.tree, file_->buckets(), ranks_.count())[ranks_.rank()];
+    PartialFolder own_folder(bricksOfRank(scratch_, ranks_.rank()), true);
     Progress nothing_to_check;
     CacheWriter own(own_folder, root_, variables(), nothing_to_check);
     own.keep(0);
@@ -325,7 +321,7 @@ class Conversion {
     if (isFirst()) writer_->keep(0);
     const std::vector<VariableInfo> infos = variables();
     joinBricks({root_, infos, scalars_.codings, splats_.tree, scratch_, partial_}, own, writer_.get(),
-               *ranks_);
+               ranks_);
   }
 
   void writeFaces() {
@@ -344,7 +340,7 @@ class Conversion {
 
   void finish() {
     if (isFirst()) finishCache();
-    if (ranks_) ranks_->barrier();
+    ranks_.barrier();
   }
 
   void finishCache() {
@@ -369,7 +365,7 @@ class Conversion {
     root_ = RootCube::around(splats_.survey.lower, splats_.survey.upper);
     if (writer_ || !isFirst()) return;
     writer_ = std::make_unique<CacheWriter>(workspace_->partial(), root_, variables(), progress_);
-    report_.resumed_bricks = ranks_ ? 0 : writer_->bricks().size();
+    report_.resumed_bricks = ranks_.alone() ? writer_->bricks().size() : 0;
   }
 
   void warnOfValues() {
@@ -391,13 +387,12 @@ class Conversion {
   const ConvertOptions& options_;
   const MemoryPlan plan_;
   Progress& progress_;
-  Ranks* const ranks_;                            // null: this process alone
+  Ranks& ranks_;
   std::optional<ConversionWorkspace> workspace_;  // before what has files in it; rank 0's alone
   std::filesystem::path scratch_, partial_;       // rank 0's
   std::filesystem::path own_scratch_;
   std::optional<ScratchFiles> scratch_files_;
   std::unique_ptr<SplatOrigin> origin_;
-  bool shares_splats_ = false;
   uint64_t nodes_ = 0;
   ScatteredSplats splats_;
   RootCube root_;

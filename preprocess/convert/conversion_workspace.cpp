@@ -55,6 +55,7 @@ std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& r
 }
 
 std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Ranks& ranks) {
+  if (ranks.alone()) return shared;
   const std::filesystem::path own = shared / fmt::format("rank{}", ranks.rank());
   removeAll(own);
   makeFolder(own);
@@ -205,7 +206,7 @@ DiskNeeds leftOf(const UncheckedConversion& conversion, DiskNeeds needs, const T
   if (workspace.splats())
     needs.temporary_bytes -= std::min(needs.temporary_bytes, workspace.splats()->buckets.size);
   if (workspace.hasAllSplats()) needs.temporary_bytes = 0;
-  if (options.ranks)
+  if (!options.ranks->alone())
     needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
   if (options.surfaces)
     needs.temporary_bytes += temporaryBytesOfFaces(origin.blocks(), options.planes, options.scalars.size());

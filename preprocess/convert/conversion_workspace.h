@@ -62,8 +62,8 @@ class ScratchFolder {
 /// call it. Throws Error at a rank that does not see it.
 std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& ranks);
 
-/// Makes an empty folder for this rank's own temporary files in `shared`; returns when all ranks have theirs.
-/// All have to call it. Throws Error if it cannot.
+/// Makes an empty folder for this rank's own temporary files in `shared`, which is that folder where it is alone; returns when
+/// all ranks have theirs. All have to call it. Throws Error if it cannot.
 std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Ranks& ranks);
 
 /// How to treat an unfinished conversion to the same output.

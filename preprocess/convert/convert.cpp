@@ -82,7 +82,6 @@ bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>
     checkOutput(options.output, options.overwrite, temporaryFolder(options));
     return false;
   };
-  if (!options.ranks) return found();
   std::vector<uint8_t> finished(1);
   if (options.ranks->isFirst()) finished[0] = found();
   return fromBytes<uint8_t>(options.ranks->broadcast(toBytes(finished)))[0] != 0;
@@ -123,21 +122,20 @@ DiskNeeds sampledNeeds(const GridSource& grid, const ConvertOptions& options,
 
 namespace {
 
-ConvertReport convertScalars(const DataSource& source, const ConvertOptions& given_options,
-                             Progress& progress, const decltype(FurtherParts::own_blanks)& own_blanks) {
-  ConvertOptions options = given_options;
-  if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
+ConvertReport convertScalars(const DataSource& source, ConvertOptions options, Progress& progress,
+                             const decltype(FurtherParts::own_blanks)& own_blanks) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   plan.suit(samplesOf(source.description()), options.scalars.size());
   if (grid) GridOrigin::requireMemory(*grid, options.scalars, plan);
-  if (options.ranks) requireSameGrid(source.description(), options.scalars, *options.ranks);
-  if (options.ranks) plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
+  requireSameGrid(source.description(), options.scalars, *options.ranks);
+  if (!options.ranks->alone())
+    plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.owner_bytes) plan.owner_bytes = *options.owner_bytes;
   if (options.slab_bytes) plan.slab_bytes = *options.slab_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
-  if (options.ranks) plan = commonPlan(plan, *options.ranks);
+  plan = commonPlan(plan, *options.ranks);
 
   if (!grid) {
     if (!options.planes.empty())
@@ -181,7 +179,9 @@ uint64_t nodesOf(const GridDescription& description) {
 
 }  // namespace
 
-ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress) {
+ConvertReport convert(const DataSource& source, const ConvertOptions& given_options, Progress& progress) {
+  ConvertOptions options = given_options;
+  if (!options.ranks) options.ranks = &oneRank();
   return convertSets(
       source, options,
       [&](const ConvertOptions& of_set, const decltype(FurtherParts::own_blanks)& own_blanks) {

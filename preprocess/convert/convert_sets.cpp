@@ -117,7 +117,7 @@ class SetsConversion {
     options.overwrite = false;
     const std::filesystem::path manifest = folder / "manifest.json";
     std::vector<uint8_t> exists{options.resume && std::filesystem::exists(manifest)};
-    if (options.ranks) exists = fromBytes<uint8_t>(options.ranks->broadcast(toBytes(exists)));
+    exists = fromBytes<uint8_t>(options.ranks->broadcast(toBytes(exists)));
     if (exists[0] == 0) {
       const ConvertReport report = convert_(options, {});
       of_sets_.temporary_bytes = std::max(of_sets_.temporary_bytes, report.temporary_bytes);

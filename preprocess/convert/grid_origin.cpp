@@ -13,13 +13,15 @@
 
 namespace curvisplat {
 
-GridOrigin::GridOrigin(const GridSource& source, std::vector<uint32_t> scalars,
-                       std::optional<double> blank_value, Overlap overlap, const MemoryPlan& plan,
+GridOrigin::GridOrigin(const GridSource& source, const ConvertOptions& options, const MemoryPlan& plan,
                        std::filesystem::path scratch)
-    : reader_(source, std::move(scalars), blank_value),
-      overlap_(overlap),
+    : reader_(source, options.scalars, options.blank_value),
+      overlap_(options.overlap),
       plan_(plan),
-      scratch_(std::move(scratch)) {}
+      ranks_(*options.ranks),
+      scratch_(std::move(scratch)) {
+  plan_.slab_bytes = slabBytesOfRanks(reader_, plan_.slab_bytes, ranks_);
+}
 
 void GridOrigin::requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars,
                                const MemoryPlan& plan) {
@@ -67,12 +69,6 @@ PositionSample GridOrigin::newSample() const {
   return {nodes, std::clamp<uint64_t>(std::min(wanted, affordable), 1024, kMaxPositions)};
 }
 
-bool GridOrigin::shareWith(Ranks& ranks) {
-  ranks_ = &ranks;
-  plan_.slab_bytes = slabBytesOfRanks(reader_, plan_.slab_bytes, ranks);
-  return true;
-}
-
 GridSurvey GridOrigin::survey(Progress& progress) {
   if (centring() == Centring::kCell)
     faces_ = std::make_unique<AbuttingFaces>(blocks(), description().coordinate_bytes,
@@ -86,8 +82,8 @@ GridSurvey GridOrigin::survey(Progress& progress) {
                                  progress, ranks_);
   if (faces_) faces_->match(progress);
   has_values_everywhere_ = survey.blanked.by_value == 0 && survey.blanked.not_finite == 0;
-  if (!ranks_ || ranks_->isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.forOverlaps(), progress);
-  if (ranks_) overlaps_ = fromBytes<BlockOverlap>(ranks_->broadcast(toBytes(overlaps_)));
+  if (ranks_.isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.forOverlaps(), progress);
+  overlaps_ = fromBytes<BlockOverlap>(ranks_.broadcast(toBytes(overlaps_)));
   return survey;
 }
 
@@ -111,7 +107,7 @@ std::string GridOrigin::overlap() const {
 void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
   if (sample_) {
     const bool is_of_share = centring() == Centring::kNode;
-    if (!ranks_ || is_of_share || ranks_->isFirst()) countSample(*sample_, root, counts);
+    if (is_of_share || ranks_.isFirst()) countSample(*sample_, root, counts);
     sample_.reset();
     return;
   }
@@ -126,7 +122,7 @@ ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
   if (hasOwners())
     owners.emplace(ownersReader(reader_, has_values_everywhere_), overlaps_, plan_.owner_bytes);
   SlabPass pass(progress);
-  pass.ranks = ranks_;
+  pass.ranks = &ranks_;
   pass.notes = notes;
   pass.owners = owners ? &*owners : nullptr;
   const ScatterCounts counts =
@@ -136,8 +132,8 @@ ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
 }
 
 uint64_t GridOrigin::finish(const SinkOfThread& sink_of_thread, Progress& progress) {
-  if (ranks_) seams_->sendToFirst(*ranks_);
-  if (ranks_ && !ranks_->isFirst()) {
+  seams_->sendToFirst(ranks_);
+  if (!ranks_.isFirst()) {
     seams_.reset();
     return 0;
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "preprocess/coincidence/abutting_faces.h"
+#include "preprocess/convert/convert_options.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/grid/node_reader.h"
@@ -19,10 +20,10 @@ namespace curvisplat {
 
 class GridOrigin final : public SplatOrigin {
  public:
-  /// `source` must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and cell-centred
-  /// scalars are mixed.
-  GridOrigin(const GridSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
-             Overlap overlap, const MemoryPlan& plan, std::filesystem::path scratch);
+  /// `source` and the options' ranks must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and
+  /// cell-centred scalars are mixed.
+  GridOrigin(const GridSource& source, const ConvertOptions& options, const MemoryPlan& plan,
+             std::filesystem::path scratch);
 
   /// Throws Error that names a sufficient cap, where the source reads rows as a whole and they are too long.
   static void requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars,
@@ -33,7 +34,7 @@ class GridOrigin final : public SplatOrigin {
   const std::vector<GridBlock>& blocks() const override { return description().blocks; }
   TemporaryNeeds mostTemporaryNeeds() const override;
 
-  bool shareWith(Ranks& ranks) override;
+  bool isShared() const override { return true; }
   GridSurvey survey(Progress& progress) override;
   std::vector<std::string> warnings() override;
   std::vector<std::string> notes() override;
@@ -58,7 +59,7 @@ class GridOrigin final : public SplatOrigin {
   const NodeReader reader_;
   const Overlap overlap_;
   MemoryPlan plan_;
-  Ranks* ranks_ = nullptr;
+  Ranks& ranks_;
   const std::filesystem::path scratch_;
   std::vector<BlockOverlap> overlaps_;
   bool has_values_everywhere_ = false;    // where the grid has nodes

@@ -20,8 +20,8 @@ std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOpt
                                       const MemoryPlan& plan, const ScratchFiles& scratch) {
   if (const auto* mesh = dynamic_cast<const MeshSource*>(&source))
     return std::make_unique<MeshOrigin>(*mesh, options.scalars, options.blank_value, plan, scratch);
-  return std::make_unique<GridOrigin>(dynamic_cast<const GridSource&>(source), options.scalars,
-                                      options.blank_value, options.overlap, plan, scratch.folder());
+  return std::make_unique<GridOrigin>(dynamic_cast<const GridSource&>(source), options, plan,
+                                      scratch.folder());
 }
 
 }  // namespace curvisplat

@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-/// `source` must outlive it.
+/// `source` and the options' ranks must outlive it.
 std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOptions& options,
                                       const MemoryPlan& plan, const ScratchFiles& scratch);
 

@@ -104,7 +104,7 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description) {
 }
 
 GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const SurveyExtras& extras,
-                      Progress& progress, Ranks* ranks) {
+                      Progress& progress, Ranks& ranks) {
   if (reader.centring() == Centring::kCell) {
     const GridSurvey survey = surveyCells(reader, slabs.slab_bytes, extras, progress);
     checkExtent(survey, reader.source().description());
@@ -137,7 +137,7 @@ GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const 
     progress.advance(count);
   }
   survey.grid_checksum = checksum.value();
-  if (ranks) survey = combinedSurvey(survey, *ranks);
+  survey = combinedSurvey(survey, ranks);
   checkExtent(survey, reader.source().description());
   return survey;
 }

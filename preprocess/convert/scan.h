@@ -21,10 +21,10 @@ namespace curvisplat {
 /// Reads all nodes once. Memory: the slabs. Throws Error if no node is there, or if the grid is larger or
 /// smaller than single precision can say.
 ///
-/// With `ranks` each reads a share of the nodes, and all get the result; the sample is of the share. Cells are read by every
+/// Of several ranks each reads a share of the nodes, and all get the result; the sample is of the share. Cells are read by every
 /// rank as a whole.
 GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const SurveyExtras& extras,
-                      Progress& progress, Ranks* ranks = nullptr);
+                      Progress& progress, Ranks& ranks = oneRank());
 
 /// Throws Error if no sample is left, or if the grid is larger or smaller than single precision can say.
 void checkExtent(const GridSurvey& survey, const GridDescription& description);

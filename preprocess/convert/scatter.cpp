@@ -94,13 +94,11 @@ class SplatStream {
   }
 
   /// All ranks have to call it.
-  ScatterCounts counts(Ranks* ranks) const {
+  ScatterCounts counts(Ranks& ranks) const {
+    static_assert(sizeof(Handedness) == 2 * sizeof(uint64_t));
     ScatterState all = state();
-    if (ranks) {
-      static_assert(sizeof(Handedness) == 2 * sizeof(uint64_t));
-      ranks->sum(std::span(&all.degenerate, 1));
-      ranks->sum(std::span(&all.handedness.front().right, 2 * all.handedness.size()));
-    }
+    ranks.sum(std::span(&all.degenerate, 1));
+    ranks.sum(std::span(&all.handedness.front().right, 2 * all.handedness.size()));
     ScatterCounts counts{all.degenerate, 0};
     for (const Handedness& of_block : all.handedness)
       counts.inverted += std::min(of_block.right, of_block.left);
@@ -272,7 +270,7 @@ void RecordRouter::flush() {
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const SinkOfThread& sink_of_thread, SeamMerger& seams, const SlabPass& pass) {
   SplatStream splats(reader, faces, sink_of_thread, seams, pass);
-  SlabShare share = shareOf(pass.ranks);
+  SlabShare share = shareOf(*pass.ranks);
   share.whole_rows = pass.see != nullptr;  // a checksum of the grid needs them
   const bool cells = reader.centring() == Centring::kCell;
   if (pass.notes.from) slab_bytes = pass.notes.from->slab_bytes;
@@ -303,7 +301,7 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
     pass.notes.note(state);
   }
   splats.finish();
-  return splats.counts(pass.ranks);
+  return splats.counts(*pass.ranks);
 }
 
 ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, const ScatterNotes& notes,

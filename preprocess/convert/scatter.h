@@ -55,7 +55,7 @@ struct SlabPass {
   std::function<void(const LoadedSlab&)>
       see;                        // each slab, in order, before its splats are made; may be empty
   BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
-  Ranks* ranks = nullptr;         // of which each makes the splats of a share; the counts are the whole's
+  Ranks* ranks = &oneRank();      // of which each makes the splats of a share; the counts are the whole's
   ScatterNotes notes;             // of a scatter() without ranks
   bool octants = true;            // NodeSplatCorrections::octants
   bool steep = true;              // NodeSplatCorrections::steep

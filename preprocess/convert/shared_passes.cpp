@@ -57,6 +57,7 @@ GridSurvey unpackSurvey(const Ranks::Bytes& bytes) {
 
 uint64_t slabBytesOfRanks(const NodeReader& reader, uint64_t slab_bytes, const Ranks& ranks) {
   constexpr uint64_t kSlabsOfRank = 8;
+  if (ranks.alone()) return slab_bytes;
   const std::vector<GridBlock>& blocks = reader.source().description().blocks;
   uint64_t nodes = 0;
   for (const GridBlock& block : blocks) nodes += block.nodes();

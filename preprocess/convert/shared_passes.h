@@ -28,12 +28,12 @@
 
 namespace curvisplat {
 
-/// A rank's share of slabs; all, where `ranks` is null.
-inline SlabShare shareOf(const Ranks* ranks) {
-  return ranks ? SlabShare{ranks->rank(), ranks->count()} : SlabShare{};
+/// A rank's share of slabs.
+inline SlabShare shareOf(const Ranks& ranks) {
+  return {ranks.rank(), ranks.count()};
 }
 
-/// The size of slabs of which each rank gets about eight; at most `slab_bytes`, and as much as a row and its
+/// The size of slabs of which each of several ranks gets about eight; at most `slab_bytes`, and as much as a row and its
 /// halo need.
 uint64_t slabBytesOfRanks(const NodeReader& reader, uint64_t slab_bytes, const Ranks& ranks);
 

@@ -24,7 +24,6 @@
 #include "preprocess/splats/node_splats.h"
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
-#include "stream/base/ranks.h"
 #include "stream/model/octree.h"
 
 namespace curvisplat {
@@ -92,11 +91,10 @@ class SplatOrigin {
   /// Bytes of all temporary files together, and of those that are counted beside them, at the moment when they were the most.
   virtual uint64_t temporaryBytes() const { return 0; }
 
-  /// Several ranks convert together: each has an origin of the same files. Returns whether they can make the splats
-  /// together. Then all of them call the functions below: survey() returns the whole's result, count() and
+  /// Whether ranks make the splats together, each with an origin of the same files. Then all of them call the functions below: survey() returns the whole's result, count() and
   /// scatter() count and make the splats of a share, and finish() brings those that had to wait to rank 0, whose
   /// sink gets them. If not, rank 0 alone calls them.
-  virtual bool shareWith(Ranks&) { return false; }
+  virtual bool isShared() const { return false; }
 
   /// Throws Error if there is nothing to draw.
   virtual GridSurvey survey(Progress& progress) = 0;

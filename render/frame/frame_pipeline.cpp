@@ -174,16 +174,15 @@ bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, 
   if (exchange_) {
     for (const uint32_t number : exchange_->toPrepare()) parts.push_back(exchange_->parts()[number].part);
     pools_->source.start(parts, [this](uint32_t brick) { return exchange_->isUnneeded(brick); });
-    pools_->workers.startExchange();
-    return true;
+  } else {
+    for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
+    const bool may_hide = !options.keep_going;  // FrameWorkers::prepare() says why
+    pools_->source.start(parts, [this, may_hide, &plan](uint32_t brick) {
+      return (may_hide && hidden_.hides(brick)) ||
+             pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
+    });
   }
-  for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
-  const bool may_hide = !options.keep_going;  // FrameWorkers::prepare() says why
-  pools_->source.start(parts, [this, may_hide, &plan](uint32_t brick) {
-    return (may_hide && hidden_.hides(brick)) ||
-           pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
-  });
-  pools_->workers.start(region->tiles.get());
+  pools_->workers.start(region ? region->tiles.get() : nullptr);
   return true;
 }
 

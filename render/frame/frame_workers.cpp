@@ -44,14 +44,11 @@ void FrameWorkers::beginFrame(const FrameWork& work) {
 
 void FrameWorkers::start(const TileSet* tiles) {
   begin();
-  tiles_ = tiles;
-  run(Urgency::kUrgent, [this](Worker& worker) { loop(worker); });
-}
-
-void FrameWorkers::startExchange() {
-  begin();
-  tiles_ = nullptr;  // splats are chosen by the tiles of all ranks
-  exchanging_->start([this](unsigned) { exchangeLoop(); });
+  tiles_ = work_->exchange ? nullptr : tiles;
+  if (work_->exchange)
+    exchanging_->start([this](unsigned) { exchangeLoop(); });
+  else
+    run(Urgency::kUrgent, [this](Worker& worker) { loop(worker); });
 }
 
 void FrameWorkers::startSampling(const SamplingWork& work) {

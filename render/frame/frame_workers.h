@@ -61,12 +61,10 @@ class FrameWorkers {
 
   /// Begins a frame.
   void beginFrame(const FrameWork& work);
-  /// Starts the workers on the sweep's current slab. The source must have the slab's parts, and the ring must
-  /// be open. `tiles`: what is drawn of the picture, borrowed until finish(); null: all.
+  /// Starts the workers on the sweep's current slab. The source must have the slab's parts, and the ring must be open. `tiles`:
+  /// what is drawn of the picture, borrowed until finish(); null: all. Where ranks draw the picture together, the source must
+  /// have the parts that this one prepares for all, and the exchange, which knows the tiles of all, must have begun the slab.
   void start(const TileSet* tiles);
-  /// The same where ranks draw the picture together: the source must have the parts that this one prepares for all, and the
-  /// exchange must have begun the slab, which may have no parts.
-  void startExchange();
   /// Waits until the workers have ended. Either the whole slab is in the ring, which pauses after it; or the
   /// sweep, ring or source was stopped; or a worker failed, which stops all of them. Rethrows the first
   /// failure. Adds the workers' times and counts to `statistics`.

@@ -137,6 +137,9 @@ class Ranks {
   bool failed_first_ = false;
 };
 
+/// The one rank of a program that has no others. Any thread.
+Ranks& oneRank();
+
 /// Numbers, and structures of numbers, as a message; and back.
 template <typename T>
 Ranks::Bytes toBytes(const std::vector<T>& values) {
