@@ -277,10 +277,7 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& giv
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (const auto* const grid = dynamic_cast<const GridSource*>(&source))
     GridOrigin::requireMemory(*grid, options.scalars, plan);
-  if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
-  if (options.most_buckets) plan.most_buckets = *options.most_buckets;
-  if (options.slab_bytes) plan.slab_bytes = *options.slab_bytes;
-
+  plan.limitTo(options.limits, options.scalars.size());
   plan = commonPlan(plan, *options.ranks);
 
   if (options.ranks->isFirst()) {

@@ -30,11 +30,7 @@ struct AddScalarOptions {
   /// cache, and its report counts. Null: this process alone.
   Ranks* ranks = nullptr;
 
-  /// Test seam: smaller buckets than memory would allow, and fewer of them in a file.
-  std::optional<uint64_t> bucket_splats;
-  std::optional<uint32_t> most_buckets;
-  /// Test seam: smaller slabs, in which even the rows of a small grid are cut.
-  std::optional<uint64_t> slab_bytes;
+  TestLimits limits;
 };
 
 /// The results of an addition of scalars.

@@ -112,8 +112,7 @@ class StepAddition {
         plan_(MemoryPlan::ofOptions(options.memory_bytes, scalars_.size(), options.threads)),
         grid_(dynamic_cast<const GridSource*>(&source_)) {
     if (grid_) GridOrigin::requireMemory(*grid_, scalars_, plan_);
-    if (options.bucket_splats) plan_.limitBuckets(*options.bucket_splats, scalars_.size());
-    if (options.slab_bytes) plan_.slab_bytes = *options.slab_bytes;
+    plan_.limitTo(options.limits, scalars_.size());
     report_.step = cache_.series().steps.size();
     if (grid_) {
       report_.nodes = cache_.manifest().nodes;
@@ -266,7 +265,7 @@ class StepAddition {
     options.time = report_.time;
     options.time_unit = unit();
     if (cache_.manifest().overlap == kOverlapAll) options.overlap = Overlap::kAll;
-    options.bucket_splats = options_.bucket_splats;
+    options.limits = options_.limits;
     ConvertReport converted = convert(source_, options, progress_);
     report_.new_geometry = true;
     report_.files = std::move(converted.files);

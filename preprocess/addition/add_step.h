@@ -33,9 +33,7 @@ struct AddStepOptions {
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
   std::vector<std::filesystem::path> given_folders;  // the user's, if those above are temporary
 
-  /// Test seam: smaller buckets than memory would allow, and smaller slabs, in which even the rows of a small
-  /// grid are cut.
-  std::optional<uint64_t> bucket_splats, slab_bytes;
+  TestLimits limits;
 };
 
 /// The results of an addition of a time step.

@@ -293,7 +293,7 @@ class SeriesConversion {
     options.expect_new_geometry = expect_new_geometry_;
     options.temporary_folder = all.temporary_folder;
     options.given_folders = all.given_folders;
-    options.bucket_splats = all.bucket_splats;
+    options.limits = all.limits;
     options.to_part = options_.to_part;
     return options;
   }

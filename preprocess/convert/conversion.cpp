@@ -219,7 +219,7 @@ class Conversion {
 
   ScatterNotes scatterNotes() {
     if (!ranks_.alone()) return {};
-    return timedNotes(options_.note_interval, splats_.unfinished ? &*splats_.unfinished : nullptr,
+    return timedNotes(options_.limits.note_interval, splats_.unfinished ? &*splats_.unfinished : nullptr,
                       [this](const ScatterState& state) { noteScattered(state); });
   }
 

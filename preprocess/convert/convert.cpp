@@ -131,10 +131,7 @@ ConvertReport convertScalars(const DataSource& source, ConvertOptions options, P
   requireSameGrid(source.description(), options.scalars, *options.ranks);
   if (!options.ranks->alone())
     plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
-  if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
-  if (options.owner_bytes) plan.owner_bytes = *options.owner_bytes;
-  if (options.slab_bytes) plan.slab_bytes = *options.slab_bytes;
-  if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
+  plan.limitTo(options.limits, options.scalars.size());
   plan = commonPlan(plan, *options.ranks);
 
   if (!grid) {

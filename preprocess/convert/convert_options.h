@@ -1,13 +1,13 @@
 // The options of a conversion, and its report.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "preprocess/convert/memory_plan.h"
 #include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/node_reader.h"
@@ -52,17 +52,7 @@ struct ConvertOptions {
   /// Processes that convert together: each has the same source and options, and calls convert(). Null: this process alone.
   Ranks* ranks = nullptr;
 
-  /// Test seam: buckets smaller than memory would allow, so that a small grid has many.
-  std::optional<uint64_t> bucket_splats;
-  /// Test seam: a memory limit for unstructured grids, so that small ones are processed like large ones.
-  std::optional<uint64_t> mesh_bytes;
-  /// Test seam: a memory limit for the cells of overlapping blocks, so that small ones are read in several
-  /// parts.
-  std::optional<uint64_t> owner_bytes;
-  /// Test seam: slabs smaller than memory would allow, so that even the rows of a small grid are cut.
-  std::optional<uint64_t> slab_bytes;
-  /// Test seam: how often scatter notes what is on disk.
-  std::chrono::milliseconds note_interval{10'000};
+  TestLimits limits;
 };
 
 /// Thrown where no sample is drawn.

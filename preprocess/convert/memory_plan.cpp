@@ -189,6 +189,14 @@ void MemoryPlan::leaveIndex(uint64_t samples, size_t variables) {
   limitBuckets((bytes - index - threadBytes(threads, variables)) / a_splat, variables);
 }
 
+void MemoryPlan::limitTo(const TestLimits& limits, size_t variables) {
+  if (limits.slab_bytes) slab_bytes = *limits.slab_bytes;
+  if (limits.owner_bytes) owner_bytes = *limits.owner_bytes;
+  if (limits.mesh_bytes) mesh_bytes = *limits.mesh_bytes;
+  if (limits.most_buckets) most_buckets = *limits.most_buckets;
+  if (limits.bucket_splats) limitBuckets(*limits.bucket_splats, variables);
+}
+
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
   bucket_splats = std::min(bucket_splats, splats);
   bucket_bytes = bucket_splats * regularRecordBytes(variables);

@@ -12,13 +12,22 @@
 //                  index records, which grow with the samples
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "preprocess/survey/block_overlap.h"
 
 namespace curvisplat {
+
+/// Test seam: less than memory would allow, so that small grids are processed like large ones.
+struct TestLimits {
+  std::optional<uint64_t> bucket_splats, slab_bytes, owner_bytes, mesh_bytes;  // MemoryPlan's
+  std::optional<uint32_t> most_buckets;
+  std::chrono::milliseconds note_interval{10'000};  // how often scatter() notes what is on disk
+};
 
 struct MemoryPlan {
   uint64_t cap_bytes = 0;       // limit of the process
@@ -61,6 +70,7 @@ struct MemoryPlan {
   /// memory is used again instead of being asked for, which costs a page fault every 4 KiB. And leaves memory for
   /// the index of very many samples: throws Error that names a sufficient limit if there is none.
   void suit(uint64_t samples, size_t variables);
+  void limitTo(const TestLimits& limits, size_t variables);
   /// Makes buckets smaller than they could be.
   void limitBuckets(uint64_t splats, size_t variables);
   /// The size of a bucket's write buffer in a file of `buckets`.

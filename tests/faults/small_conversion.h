@@ -92,8 +92,8 @@ class SmallConversion : public ::testing::Test {
     options.resume = words.resume;
     options.title = "small";
     options.threads = 1;
-    options.bucket_splats = 9000;
-    options.mesh_bytes = mesh_bytes_;
+    options.limits.bucket_splats = 9000;
+    options.limits.mesh_bytes = mesh_bytes_;
     options.memory_bytes = leastMemory(2);
     Progress progress;
     convert(*source, options, progress);
@@ -105,7 +105,7 @@ class SmallConversion : public ::testing::Test {
     options.cache = output_;
     options.scalars = {first_ + 1};
     options.threads = 1;
-    options.bucket_splats = 9000;
+    options.limits.bucket_splats = 9000;
     options.memory_bytes = leastMemory(2);
     Progress progress;
     addScalars(*source, options, progress);
@@ -116,7 +116,7 @@ class SmallConversion : public ::testing::Test {
     AddStepOptions options;
     options.cache = output_;
     options.threads = 1;
-    options.bucket_splats = 9000;
+    options.limits.bucket_splats = 9000;
     options.memory_bytes = leastMemory(2);
     Progress progress;
     addStep(*source, options, progress);

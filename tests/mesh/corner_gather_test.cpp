@@ -188,7 +188,7 @@ Disk diskOf(const MeshSource& mesh, uint32_t scalar, uint64_t mesh_bytes) {
   ConvertOptions options;
   options.output = folder / "a.splats";
   options.scalars = {scalar};
-  options.mesh_bytes = mesh_bytes;
+  options.limits.mesh_bytes = mesh_bytes;
   options.memory_bytes = 512 << 20;
   Progress progress;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, 1, 2);

@@ -178,8 +178,8 @@ TEST_F(MeshConvert, InterruptedConversionsResumeToTheSameBytes) {
   const ArrayMesh mesh({shuffled(tetrahedraOf(*scene_, 30, 15, 15), 3)});
   for (const uint32_t scalar : {0u, 1u}) {
     ConvertOptions how = options(scalar);
-    how.bucket_splats = 9000;
-    how.mesh_bytes = 400'000;
+    how.limits.bucket_splats = 9000;
+    how.limits.mesh_bytes = 400'000;
     const Files expected = filesOf(mesh, how);
     removeAll(how.output);
     int interrupted = 0;

@@ -106,8 +106,8 @@ void expectAsAtOnce(const GridSource& source) {
     AddScalarOptions options = adding(cache, {1, 2});
     options.threads = way.threads;
     options.memory_bytes = way.memory_bytes;
-    options.bucket_splats = way.bucket_splats;
-    options.most_buckets = way.most_buckets;
+    options.limits.bucket_splats = way.bucket_splats;
+    options.limits.most_buckets = way.most_buckets;
     const AddScalarReport report = added(source, options);
     EXPECT_EQ(report.splats, expected.manifest().splats);
 
@@ -469,7 +469,7 @@ TEST_F(ToAnExistingCache, ClearsAConversionKilledAtItsEnd) {
 TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
   using faults::FaultySystemCalls;
   AddScalarOptions options = adding(cache, {1, 2});
-  options.bucket_splats = 20000;
+  options.limits.bucket_splats = 20000;
   FaultySystemCalls counting;
   const fs::path copy = folder / "copy.splats";
   fs::copy(cache, copy);

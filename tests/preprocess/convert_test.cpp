@@ -291,7 +291,7 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   const FunctionGridSource source = bentBoxSource(44, 44, 44);
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.overwrite = true;
-  options.bucket_splats = 20000;
+  options.limits.bucket_splats = 20000;
   faults::FaultySystemCalls disk;
   {
     const ScopedSystemCalls scope(disk);

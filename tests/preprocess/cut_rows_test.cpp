@@ -165,7 +165,7 @@ TEST_F(CutRows, OfAStepAreRecognisedAsTheSameGeometry) {
   converted(source, options);
   AddStepOptions adding;
   adding.cache = options.output;
-  adding.slab_bytes = bytesFor(1500, 2);
+  adding.limits.slab_bytes = bytesFor(1500, 2);
   Progress progress;
   EXPECT_FALSE(addStep(source, adding, progress).new_geometry);
   const FunctionGridSource moved(source.description().blocks, 2, [&](const GridNode& node) {

@@ -67,9 +67,9 @@ class ResumeScatter : public ::testing::Test {
     options.memory_bytes = memory_;
     options.threads = 2;
     options.resume = resume;
-    options.bucket_splats = 3000;
-    options.slab_bytes = slab_bytes_;
-    options.note_interval = std::chrono::milliseconds(0);
+    options.limits.bucket_splats = 3000;
+    options.limits.slab_bytes = slab_bytes_;
+    options.limits.note_interval = std::chrono::milliseconds(0);
     return options;
   }
 

@@ -91,7 +91,7 @@ class Resume : public ::testing::Test {
     options.memory_bytes = uint64_t{1} << 30;
     options.resume = words.resume;
     options.overwrite = words.overwrite;
-    options.bucket_splats = words.bucket_splats;
+    options.limits.bucket_splats = words.bucket_splats;
     options.surfaces = surfaces_;
     return options;
   }

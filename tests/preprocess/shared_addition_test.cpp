@@ -167,7 +167,7 @@ TEST_F(SharedAddition, TakesTheSmallestMemoryOfItsRanks) {
     AddScalarOptions of_rank = options();
     of_rank.ranks = &ranks;
     if (ranks.rank() == 1) of_rank.memory_bytes = leastMemory(2);
-    if (ranks.rank() == 2) of_rank.bucket_splats = 3000;
+    if (ranks.rank() == 2) of_rank.limits.bucket_splats = 3000;
     Progress progress;
     addScalars(source, of_rank, progress);
   });

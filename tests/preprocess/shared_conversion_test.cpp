@@ -117,7 +117,7 @@ TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
   for (const auto& [first, second] : {std::pair{3u, 1u}, {3u, 2u}, {1u, 3u}, {2u, 4u}}) {
     SCOPED_TRACE(fmt::format("{}, then {}", first, second));
     options.output = folder_ / "again.splats";
-    options.bucket_splats = 20000;
+    options.limits.bucket_splats = 20000;
     options.resume = false;
     // Stopped when the first bricks have been built.
     std::atomic<bool> building = false;

@@ -121,7 +121,7 @@ int main(int argc, char** argv) {
     grid.solutions = {words[2]};
     ConvertOptions options;
     options.output = words[3];
-    options.bucket_splats = std::stoull(words[4]);
+    options.limits.bucket_splats = std::stoull(words[4]);
     options.scalars = {0};
     options.memory_bytes = leastMemory(1);
     options.title = "killed";

@@ -95,7 +95,7 @@ TEST(ConvertSeries, BytesDependNeitherOnThreadsNorMemoryNorTheOrderOfAdding) {
   SeriesOptions other = optionsFor(folder / "b.splats");
   other.convert.threads = 1;
   other.convert.memory_bytes = leastMemory(2);
-  other.convert.bucket_splats.reset();
+  other.convert.limits.bucket_splats.reset();
   convertQuietly(inputOf(kinds), other);
   EXPECT_TRUE(allFilesOf(folder / "b.splats") == wanted);
 

@@ -85,7 +85,7 @@ inline SeriesOptions optionsFor(const fs::path& output) {
   options.convert.memory_bytes = uint64_t{1} << 30;
   options.convert.threads = 2;
   options.convert.title = "series";
-  options.convert.bucket_splats = 1200;
+  options.convert.limits.bucket_splats = 1200;
   return options;
 }
 

@@ -34,8 +34,8 @@ template <typename Options>
 Options varied(Options options, const Variation& variation) {
   if (variation.threads) options.threads = *variation.threads;
   if (variation.memory_bytes) options.memory_bytes = *variation.memory_bytes;
-  if (variation.bucket_splats) options.bucket_splats = variation.bucket_splats;
-  if (variation.slab_bytes) options.slab_bytes = variation.slab_bytes;
+  if (variation.bucket_splats) options.limits.bucket_splats = variation.bucket_splats;
+  if (variation.slab_bytes) options.limits.slab_bytes = variation.slab_bytes;
   return options;
 }
 
@@ -98,8 +98,8 @@ ConvertReport expectSameCaches(const DataSource& source, ConvertOptions options,
   for (const Variation& variation : variations) {
     SCOPED_TRACE(describe(variation));
     ConvertOptions other = varied(options, variation);
-    if (variation.mesh_bytes) other.mesh_bytes = variation.mesh_bytes;
-    if (variation.owner_bytes) other.owner_bytes = variation.owner_bytes;
+    if (variation.mesh_bytes) other.limits.mesh_bytes = variation.mesh_bytes;
+    if (variation.owner_bytes) other.limits.owner_bytes = variation.owner_bytes;
     const ConvertReport report =
         variation.ranks > 1 ? convertedByRanks(variation.ranks, source, other) : converted(source, other);
     expectSameFiles(allFilesOf(options.output), expected);
@@ -131,7 +131,7 @@ AddScalarReport expectSameAdditions(const DataSource& source, const fs::path& fi
     SCOPED_TRACE(describe(variation));
     copy();
     AddScalarOptions other = varied(adding, variation);
-    if (variation.most_buckets) other.most_buckets = variation.most_buckets;
+    if (variation.most_buckets) other.limits.most_buckets = variation.most_buckets;
     const AddScalarReport report =
         variation.ranks > 1 ? addedByRanks(variation.ranks, source, other) : added(source, other);
     expectSameFiles(allFilesOf(adding.cache), expected);
