@@ -19,7 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMaxIsosurfaces = 16;
 constexpr double kIdleWaitSeconds = 0.5;
 constexpr double kMovingWaitSeconds = 0.03;  // while flying, and until the camera is at rest
 
@@ -308,131 +307,6 @@ void CacheView::ask(bool moving) {
   request_ = frames_->request(std::move(request));
   values_.reset();
   values_failed_ = false;
-}
-
-void CacheView::run(Command command) {
-  const auto toggle = [&](bool& value) {
-    value = !value;
-    changed_ = true;
-  };
-  switch (command) {
-    case Command::kSavePicture:
-      saveTo({});
-      return;
-    case Command::kSavePictureAs:
-      return dialog_.openToSavePicture(cache_.wholePath().stem().string() + ".png", picture_size_);
-    case Command::kSaveTurnMovie:
-    case Command::kSaveStepsMovie:
-      movie_kind_ = command == Command::kSaveTurnMovie ? MovieKind::kOneTurn : MovieKind::kAllSteps;
-      return dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", textOf(newMovie({})));
-    case Command::kCopyCommand:
-    case Command::kCopyMovieCommand:
-      copy_requested_ = true;
-      copies_movie_ = command == Command::kCopyMovieCommand;
-      return;
-    case Command::kUndo:
-      history_.record(state_);  // a movement that has not come to rest is undone as a whole
-      return restore(history_.undo());
-    case Command::kRedo:
-      return restore(history_.redo());
-    case Command::kResetFunction:
-      return chooser_.ask({FunctionChooser::For::kSameScalar, state_.variable});
-    case Command::kSaveView:
-      return saveView(fmt::format("view {}", views_.size() + 1));
-    case Command::kLight:
-      return toggle(state_.lit);
-    case Command::kDarkBackground:
-      toggle(state_.dark);
-      state_.suitBackground();
-      ++function_version_;
-      return;
-    case Command::kScalarBar:
-      return toggle(state_.annotations.scalar_bar);
-    case Command::kAxes:
-      return toggle(state_.annotations.axes);
-    case Command::kAxesGrid:
-      return toggle(state_.annotations.axes_grid);
-    case Command::kOutline:
-      return toggle(state_.annotations.outline);
-    case Command::kAddClipPlane:
-    case Command::kAddSlice: {
-      auto& planes = command == Command::kAddSlice ? state_.slices : state_.clip_planes;
-      planes.push_back(planeBeforeViewer(manifest(), state_));
-      changed_ = true;
-      return;
-    }
-    case Command::kAddSurfaceFile:
-      return dialog_.open(FileDialog::Purpose::kOpenSurface);
-    case Command::kAddIsosurface: {
-      const auto [low, high] = (state_.opacity_by ? state_.opacity_by->function : state_.function).range();
-      state_.isovalues.push_back(0.5 * (low + high));
-      changed_ = true;
-      return;
-    }
-    case Command::kRemoveMarkers:
-      state_.markers.clear();
-      changed_ = true;
-      return;
-    case Command::kPlay:
-      playback_.toggle();
-      changed_ = true;
-      return;
-    case Command::kNextStep:
-    case Command::kPreviousStep:
-      changed_ |= playback_.advance(command == Command::kNextStep);
-      return;
-    default:
-      changed_ |= navigation_.run(command, state_.camera, data_size_);
-  }
-}
-
-bool CacheView::isEnabled(Command command) const {
-  switch (command) {
-    case Command::kUndo:
-      return history_.canUndo() || !rests_;
-    case Command::kRedo:
-      return history_.canRedo();
-    case Command::kPlay:
-    case Command::kNextStep:
-    case Command::kPreviousStep:
-    case Command::kSaveStepsMovie:
-      return playback_.steps() > 1;
-    case Command::kAddClipPlane:
-      return state_.clip_planes.size() < kMaxClipPlanes;
-    case Command::kAddSlice:
-      return state_.slices.size() < kMaxSlices;
-    case Command::kAddIsosurface:
-      return state_.isovalues.size() < kMaxIsosurfaces;
-    case Command::kRemoveMarkers:
-      return !state_.markers.empty();
-    default:
-      return true;
-  }
-}
-
-bool CacheView::isChecked(Command command) const {
-  switch (command) {
-    case Command::kLight:
-      return state_.lit;
-    case Command::kDarkBackground:
-      return state_.dark;
-    case Command::kScalarBar:
-      return state_.annotations.scalar_bar;
-    case Command::kAxes:
-      return state_.annotations.axes;
-    case Command::kAxesGrid:
-      return state_.annotations.axes_grid;
-    case Command::kOutline:
-      return state_.annotations.outline;
-    case Command::kOtherProjection:
-      return state_.camera.projection == Projection::kPerspective;
-    case Command::kFly:
-      return navigation_.flies();
-    case Command::kPlay:
-      return playback_.isPlaying();
-    default:
-      return false;
-  }
 }
 
 double CacheView::wait() const {

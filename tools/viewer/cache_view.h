@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -101,6 +102,13 @@ class CacheView {
   bool isOf(const CacheReader& cache) const;
 
  private:
+  static std::span<const CommandAction<CacheView>> actions();
+  void toggle(bool& value);
+  void addPlaneTo(std::vector<ClipPlane>& planes);
+  void saveMovieOf(MovieKind kind);
+  void copyLater(bool movie);
+  void moveCamera(Command command);
+
   ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
   void setBounds();
   void takeFrame();

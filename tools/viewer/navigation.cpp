@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace curvisplat {
 namespace {
@@ -192,26 +193,18 @@ bool Navigation::fly(const Window& window, Camera& camera) {
 }
 
 bool Navigation::run(Command command, Camera& camera, ImageSize size) {
-  const auto look = [&](const char* from) {
+  static constexpr std::pair<Command, const char*> kLooks[] = {
+      {Command::kLookPlusX, "+x"},  {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
+      {Command::kLookMinusY, "-y"}, {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"}};
+  for (const auto& [look, from] : kLooks) {
+    if (look != command) continue;
     camera = Camera::named(from, lower_, upper_, size, camera.projection, camera.view_angle_deg);
     return true;
-  };
+  }
   switch (command) {
     case Command::kFit:
       camera = refitted(camera, lower_, upper_, size);
       return true;
-    case Command::kLookPlusX:
-      return look("+x");
-    case Command::kLookMinusX:
-      return look("-x");
-    case Command::kLookPlusY:
-      return look("+y");
-    case Command::kLookMinusY:
-      return look("-y");
-    case Command::kLookPlusZ:
-      return look("+z");
-    case Command::kLookMinusZ:
-      return look("-z");
     case Command::kOtherProjection:
       camera = withOtherProjection(camera);
       flies_ = flies_ && camera.projection == Projection::kPerspective;

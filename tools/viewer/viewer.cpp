@@ -9,6 +9,7 @@
 #include <exception>
 #include <functional>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "stream/base/error.h"
@@ -201,74 +202,53 @@ class Viewer {
     }
   }
 
+  /// The commands that are not a view's.
+  static std::span<const CommandAction<Viewer>> actions() {
+    static constexpr CommandAction<Viewer> kActions[] = {
+        {Command::kOpen, [](Viewer& v) { v.dialog_.open(FileDialog::Purpose::kOpenData); }},
+        {Command::kQuit, [](Viewer& v) { v.window_.close(); }},
+        {Command::kPanels, [](Viewer& v) { v.panels_shown_ = !v.panels_shown_; }, nullptr,
+         [](const Viewer& v) { return v.panels_shown_; }},
+        {Command::kKeys, [](Viewer& v) { v.keys_shown_ = !v.keys_shown_; }, nullptr,
+         [](const Viewer& v) { return v.keys_shown_; }},
+        {Command::kMessages, [](Viewer& v) { v.messages_shown_ = !v.messages_shown_; }, nullptr,
+         [](const Viewer& v) { return v.messages_shown_; }},
+        {Command::kDismissMessages,
+         [](Viewer& v) {
+           if (!closeLists()) v.toasts_.removeAll();
+         }},
+        {Command::kLightTheme,
+         [](Viewer& v) {
+           v.settings_.light_theme = !v.settings_.light_theme;
+           v.look_changed_ = true;
+         },
+         nullptr, [](const Viewer& v) { return v.settings_.light_theme; }},
+        {Command::kLargerText, [](Viewer& v) { v.scaleText(kTextStep); }},
+        {Command::kSmallerText, [](Viewer& v) { v.scaleText(1 / kTextStep); }},
+    };
+    return kActions;
+  }
+
   bool isEnabled(Command command) const {
-    switch (command) {
-      case Command::kOpen:
-      case Command::kQuit:
-      case Command::kKeys:
-      case Command::kMessages:
-      case Command::kDismissMessages:
-      case Command::kLightTheme:
-      case Command::kLargerText:
-      case Command::kSmallerText:
-      case Command::kPanels:
-        return true;
-      case Command::kSaveTurnMovie:
-      case Command::kSaveStepsMovie:
-        if (movie_) return false;
-        [[fallthrough]];
-      default:
-        return opened_.view() && opened_.view()->isEnabled(command);
-    }
+    if (actionOf(actions(), command)) return true;
+    const bool is_movie = command == Command::kSaveTurnMovie || command == Command::kSaveStepsMovie;
+    return !(is_movie && movie_) && opened_.view() && opened_.view()->isEnabled(command);
   }
 
   bool isChecked(Command command) const {
-    switch (command) {
-      case Command::kPanels:
-        return panels_shown_;
-      case Command::kLightTheme:
-        return settings_.light_theme;
-      case Command::kKeys:
-        return keys_shown_;
-      case Command::kMessages:
-        return messages_shown_;
-      default:
-        return opened_.view() && opened_.view()->isChecked(command);
-    }
+    if (const auto* const action = actionOf(actions(), command))
+      return action->is_checked && action->is_checked(*this);
+    return opened_.view() && opened_.view()->isChecked(command);
   }
 
   void run(Command command) {
-    switch (command) {
-      case Command::kOpen:
-        return dialog_.open(FileDialog::Purpose::kOpenData);
-      case Command::kQuit:
-        return window_.close();
-      case Command::kPanels:
-        panels_shown_ = !panels_shown_;
-        return;
-      case Command::kKeys:
-        keys_shown_ = !keys_shown_;
-        return;
-      case Command::kMessages:
-        messages_shown_ = !messages_shown_;
-        return;
-      case Command::kDismissMessages:
-        if (!closeLists()) toasts_.removeAll();
-        return;
-      case Command::kLightTheme:
-        settings_.light_theme = !settings_.light_theme;
-        look_changed_ = true;
-        return;
-      case Command::kLargerText:
-      case Command::kSmallerText: {
-        const double factor = command == Command::kLargerText ? kTextStep : 1 / kTextStep;
-        settings_.text_scale = std::clamp(settings_.text_scale * factor, 0.5, 4.0);
-        look_changed_ = true;
-        return;
-      }
-      default:
-        if (CacheView* const view = opened_.view()) view->run(command);
-    }
+    if (const auto* const action = actionOf(actions(), command)) return action->run(*this);
+    if (CacheView* const view = opened_.view()) view->run(command);
+  }
+
+  void scaleText(double factor) {
+    settings_.text_scale = std::clamp(settings_.text_scale * factor, 0.5, 4.0);
+    look_changed_ = true;
   }
 
   void applyLook() {

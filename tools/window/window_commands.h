@@ -4,6 +4,7 @@
 // The table is constant: any thread may read it. What draws is for the window's thread, within a frame.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <span>
@@ -77,6 +78,22 @@ std::span<const CommandInfo> commands();
 const CommandInfo& infoOf(Command command);
 /// The command of a key; nullopt if it has none.
 std::optional<Command> commandOf(const Window::Key& key);
+
+/// A command as the class that carries it out knows it.
+template <typename Owner>
+struct CommandAction {
+  Command command;
+  void (*run)(Owner&);
+  bool (*is_enabled)(const Owner&) = nullptr;  // null: always
+  bool (*is_checked)(const Owner&) = nullptr;  // null: never
+};
+
+/// The action of a command in a class's table; nullptr if it has none.
+template <typename Owner>
+const CommandAction<Owner>* actionOf(std::span<const CommandAction<Owner>> table, Command command) {
+  const auto found = std::ranges::find(table, command, &CommandAction<Owner>::command);
+  return found == table.end() ? nullptr : &*found;
+}
 
 /// The contents of the menus.
 struct MenuFacts {

@@ -1,0 +1,131 @@
+// The commands of a view, by menu or key: what each does, when it can, and when the menu marks it.
+#include <GLFW/glfw3.h>
+#include <fmt/format.h>
+
+#include "tools/viewer/cache_view.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kMaxIsosurfaces = 16;
+
+}  // namespace
+
+std::span<const CommandAction<CacheView>> CacheView::actions() {
+  using View = CacheView;
+  constexpr auto kHasSteps = [](const View& v) { return v.playback_.steps() > 1; };
+  static constexpr CommandAction<View> kActions[] = {
+      {Command::kSavePicture, [](View& v) { v.saveTo({}); }},
+      {Command::kSavePictureAs,
+       [](View& v) {
+         v.dialog_.openToSavePicture(v.cache_.wholePath().stem().string() + ".png", v.picture_size_);
+       }},
+      {Command::kSaveTurnMovie, [](View& v) { v.saveMovieOf(MovieKind::kOneTurn); }},
+      {Command::kSaveStepsMovie, [](View& v) { v.saveMovieOf(MovieKind::kAllSteps); }, kHasSteps},
+      {Command::kCopyCommand, [](View& v) { v.copyLater(false); }},
+      {Command::kCopyMovieCommand, [](View& v) { v.copyLater(true); }},
+      {Command::kUndo,
+       [](View& v) {
+         v.history_.record(v.state_);  // a movement that has not come to rest is undone as a whole
+         v.restore(v.history_.undo());
+       },
+       [](const View& v) { return v.history_.canUndo() || !v.rests_; }},
+      {Command::kRedo, [](View& v) { v.restore(v.history_.redo()); },
+       [](const View& v) { return v.history_.canRedo(); }},
+      {Command::kResetFunction,
+       [](View& v) {
+         v.chooser_.ask({FunctionChooser::For::kSameScalar, v.state_.variable});
+       }},
+      {Command::kSaveView, [](View& v) { v.saveView(fmt::format("view {}", v.views_.size() + 1)); }},
+      {Command::kOtherProjection, [](View& v) { v.moveCamera(Command::kOtherProjection); }, nullptr,
+       [](const View& v) { return v.state_.camera.projection == Projection::kPerspective; }},
+      {Command::kFly, [](View& v) { v.moveCamera(Command::kFly); }, nullptr,
+       [](const View& v) { return v.navigation_.flies(); }},
+      {Command::kLight, [](View& v) { v.toggle(v.state_.lit); }, nullptr,
+       [](const View& v) { return v.state_.lit; }},
+      {Command::kDarkBackground,
+       [](View& v) {
+         v.toggle(v.state_.dark);
+         v.state_.suitBackground();
+         ++v.function_version_;
+       },
+       nullptr, [](const View& v) { return v.state_.dark; }},
+      {Command::kScalarBar, [](View& v) { v.toggle(v.state_.annotations.scalar_bar); }, nullptr,
+       [](const View& v) { return v.state_.annotations.scalar_bar; }},
+      {Command::kAxes, [](View& v) { v.toggle(v.state_.annotations.axes); }, nullptr,
+       [](const View& v) { return v.state_.annotations.axes; }},
+      {Command::kAxesGrid, [](View& v) { v.toggle(v.state_.annotations.axes_grid); }, nullptr,
+       [](const View& v) { return v.state_.annotations.axes_grid; }},
+      {Command::kOutline, [](View& v) { v.toggle(v.state_.annotations.outline); }, nullptr,
+       [](const View& v) { return v.state_.annotations.outline; }},
+      {Command::kAddClipPlane, [](View& v) { v.addPlaneTo(v.state_.clip_planes); },
+       [](const View& v) { return v.state_.clip_planes.size() < kMaxClipPlanes; }},
+      {Command::kAddSlice, [](View& v) { v.addPlaneTo(v.state_.slices); },
+       [](const View& v) { return v.state_.slices.size() < kMaxSlices; }},
+      {Command::kAddIsosurface,
+       [](View& v) {
+         const ViewState& state = v.state_;
+         const auto [low, high] = (state.opacity_by ? state.opacity_by->function : state.function).range();
+         v.state_.isovalues.push_back(0.5 * (low + high));
+         v.changed_ = true;
+       },
+       [](const View& v) { return v.state_.isovalues.size() < kMaxIsosurfaces; }},
+      {Command::kAddSurfaceFile, [](View& v) { v.dialog_.open(FileDialog::Purpose::kOpenSurface); }},
+      {Command::kRemoveMarkers,
+       [](View& v) {
+         v.state_.markers.clear();
+         v.changed_ = true;
+       },
+       [](const View& v) { return !v.state_.markers.empty(); }},
+      {Command::kPlay,
+       [](View& v) {
+         v.playback_.toggle();
+         v.changed_ = true;
+       },
+       kHasSteps, [](const View& v) { return v.playback_.isPlaying(); }},
+      {Command::kNextStep, [](View& v) { v.changed_ |= v.playback_.advance(true); }, kHasSteps},
+      {Command::kPreviousStep, [](View& v) { v.changed_ |= v.playback_.advance(false); }, kHasSteps},
+  };
+  return kActions;
+}
+
+void CacheView::run(Command command) {
+  const auto* const action = actionOf(actions(), command);
+  action ? action->run(*this) : moveCamera(command);
+}
+
+bool CacheView::isEnabled(Command command) const {
+  const auto* const action = actionOf(actions(), command);
+  return !action || !action->is_enabled || action->is_enabled(*this);
+}
+
+bool CacheView::isChecked(Command command) const {
+  const auto* const action = actionOf(actions(), command);
+  return action && action->is_checked && action->is_checked(*this);
+}
+
+void CacheView::toggle(bool& value) {
+  value = !value;
+  changed_ = true;
+}
+
+void CacheView::addPlaneTo(std::vector<ClipPlane>& planes) {
+  planes.push_back(planeBeforeViewer(manifest(), state_));
+  changed_ = true;
+}
+
+void CacheView::saveMovieOf(MovieKind kind) {
+  movie_kind_ = kind;
+  dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", textOf(newMovie({})));
+}
+
+void CacheView::copyLater(bool movie) {
+  copy_requested_ = true;
+  copies_movie_ = movie;
+}
+
+void CacheView::moveCamera(Command command) {
+  changed_ |= navigation_.run(command, state_.camera, data_size_);
+}
+
+}  // namespace curvisplat
