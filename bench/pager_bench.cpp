@@ -155,7 +155,7 @@ void pager(benchmark::State& state, bool large, PagerOptions::Way way) {
   for (auto _ : state) {
     pager.start(order);
     for (size_t n = 0; n < order.size(); ++n) {
-      const auto brick = pager.take(n);
+      const auto brick = pager.fetch(n);
       if (!brick->readable()) state.SkipWithError("a brick cannot be read");
     }
   }

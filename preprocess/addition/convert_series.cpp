@@ -69,7 +69,7 @@ class SeriesConversion {
 
   void takeOrLeaveOut(uint64_t number) {
     try {
-      take(number);
+      use(number, open(number));
     } catch (const Interrupted&) {
       throw;
     } catch (const UsageError&) {
@@ -144,7 +144,7 @@ class SeriesConversion {
     bool complete = true;
     for (unsigned rank = 1; rank < sent.size() && complete; ++rank) {
       const ConvertedSteps theirs = convertedFrom(sent[rank]);
-      complete = shared.take(rank, ranges[rank], theirs, [&](uint64_t number, const AddStepReport& added) {
+      complete = shared.join(rank, ranges[rank], theirs, [&](uint64_t number, const AddStepReport& added) {
         note(number, added);
         next = number + 1;
       });
@@ -211,8 +211,6 @@ class SeriesConversion {
       return false;  // which is reported where it is to be added
     }
   }
-
-  void take(uint64_t number) { use(number, open(number)); }
 
   /// Throws Error if the step cannot be opened, is not the one that the cache has, or cannot be the first.
   OpenStep open(uint64_t number) const {

@@ -94,9 +94,9 @@ class NewNames {
 };
 
 /// See takeStep().
-class Taking {
+class StepMove {
  public:
-  Taking(const CacheLock& lock, const PartStep& step, const Progress& progress)
+  StepMove(const CacheLock& lock, const PartStep& step, const Progress& progress)
       : lock_(lock),
         progress_(progress),
         to_(openAtLast(lock.cache())),
@@ -109,7 +109,7 @@ class Taking {
     fits_ = step.states_time ? taken_.time > last : taken_.time == last + 1;
   }
 
-  bool take() {
+  bool run() {
     if (!fits_) return false;
     const auto geometry = ours().geometryOf(taken_.grid_checksum);
     const bool is_first = theirs().isFirstOfGeometry(number_);
@@ -255,9 +255,9 @@ bool takeStep(const CacheLock& lock, const PartStep& step, const Progress& progr
                            of_part.series().steps.size() <= step.number;
     if (has_ended) continue;
     const CacheLock of_set(lock, n);
-    fits = Taking(of_set, {of_part, step.number, step.sources, step.states_time}, progress).take();
+    fits = StepMove(of_set, {of_part, step.number, step.sources, step.states_time}, progress).run();
   }
-  if (fits && Taking(lock, step, progress).take()) return true;
+  if (fits && StepMove(lock, step, progress).run()) return true;
   cutSets(lock, whole);
   return false;
 }

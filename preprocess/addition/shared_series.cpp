@@ -161,7 +161,7 @@ ConvertedSteps SharedSteps::convertPart(const Start& start) const {
   return converted;
 }
 
-bool SharedSteps::take(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
+bool SharedSteps::join(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
                        const std::function<void(uint64_t number, const AddStepReport&)>& took) const {
   if (range.begin == range.end || converted.steps.empty()) return converted.error.empty();
   const CacheReader part(partOf(of));

@@ -72,7 +72,7 @@ class SharedSteps {
   ConvertedSteps convertPart(const Start& start) const;
   /// Takes over, at rank 0, what rank `of` has converted; `took` is called after each step with its number of
   /// the input. Returns whether that was all of its range.
-  bool take(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
+  bool join(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
             const std::function<void(uint64_t number, const AddStepReport&)>& took) const;
 
  private:

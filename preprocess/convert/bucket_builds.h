@@ -72,7 +72,7 @@ class BucketLoader {
 
   /// The next bucket, until it is given back; null at the end. Throws Error if the disk fails. Two may be
   /// taken. One thread at a time.
-  LoadedBucket* take() { return ahead_.take(); }
+  LoadedBucket* acquire() { return ahead_.acquire(); }
   /// Gives back the bucket that was taken first of those not given back. Any thread.
   void giveBack() { ahead_.giveBack(); }
 

@@ -234,16 +234,16 @@ struct BucketFile::State {
 BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes)
     : state_(std::make_unique<State>(path, buckets, chunk_bytes)) {}
 
-BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains, Use use)
+BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains, Access access)
     : state_(std::make_unique<State>(path, chains)) {
   if (!std::filesystem::exists(path))
     throw LostBuckets("{}: was removed while it was needed; run the same command again", path.string());
   {
     InputFile input(path, Caching::kDirect);
     state_->require(input.size() >= chains.size, input.size());
-    if (use == Use::kRead) state_->input = std::move(input);
+    if (access == Access::kRead) state_->input = std::move(input);
   }
-  if (use == Use::kRead) return;
+  if (access == Access::kRead) return;
   state_->output.emplace(path, Caching::kDirect, OutputFile::Existing::kKeep);
   state_->output->truncate(chains.size);
   state_->writer.emplace(*state_->output);

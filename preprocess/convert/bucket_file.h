@@ -52,8 +52,8 @@ class BucketFile {
   BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes);
   /// Opens a file that another process has made, to read or to append more. Checks each chunk that is read: throws LostBuckets
   /// here or when reading if the file has changed.
-  enum class Use { kRead, kAppend };
-  BucketFile(const std::filesystem::path& path, BucketChains chains, Use use = Use::kRead);
+  enum class Access { kRead, kAppend };
+  BucketFile(const std::filesystem::path& path, BucketChains chains, Access access = Access::kRead);
   /// Removes the file, unless it is to be left.
   ~BucketFile();
   void leave();

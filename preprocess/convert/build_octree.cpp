@@ -248,7 +248,7 @@ void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint3
 std::optional<uint32_t> OctreeBuilder::buildLoaded(const BucketFile& file, const BucketRange& buckets) {
   built_.resize(tree_->size());  // now, since what asks it runs beside what appends
   BucketLoader loader(*tree_, file, variables_, buckets, plan_.bucket_bytes, plan_.bucketReaders());
-  BucketBuilds builds({[&] { return loader.take(); }, [&] { loader.giveBack(); },
+  BucketBuilds builds({[&] { return loader.acquire(); }, [&] { loader.giveBack(); },
                        [&](LoadedBucket& loaded) { return jobsOf(loaded); },
                        [&](const CellJob& job) { return cells_.build((*tree_)[job.unit].cell, job.records); },
                        [&](uint32_t unit, BuiltCell&& cell) {

@@ -35,7 +35,7 @@ std::unique_ptr<BucketFile> openScattered(const std::filesystem::path& file, con
   const auto buckets = static_cast<uint32_t>(left.buckets.chains.size());
   if (left.unfinished->slab_bytes > plan.slab_bytes || left.buckets.chunk_bytes > plan.chunkBytes(buckets))
     throw LostBuckets("there is less --memory than before the interruption: all splats are made again");
-  return std::make_unique<BucketFile>(file, left.buckets, BucketFile::Use::kAppend);
+  return std::make_unique<BucketFile>(file, left.buckets, BucketFile::Access::kAppend);
 }
 
 namespace {

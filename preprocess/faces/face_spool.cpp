@@ -97,13 +97,13 @@ void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progre
       end_face = first_face + of_block.size();
     }
     parallelInvoke([&] { addEnds(*loaded, abutting); },
-                   [&] { parallelFor(first_face, end_face, [&](size_t face) { take(*loaded, face); }); });
+                   [&] { parallelFor(first_face, end_face, [&](size_t face) { store(*loaded, face); }); });
     progress.advance(rowsOf(loaded->slab.box) *
                      loaded->slab.box.rowNodes(reader_.source().description().blocks[block].ni));
   }
 }
 
-void FaceSpool::take(const LoadedSlab& loaded, size_t face_number) {
+void FaceSpool::store(const LoadedSlab& loaded, size_t face_number) {
   const TraceScope trace("take faces");
   const GridFace& face = faces_[face_number];
   const NodeArrays& nodes = loaded.nodes;

@@ -72,7 +72,7 @@ class FaceSpool {
   struct Place {
     uint64_t positions, scalars;  // offsets of the face's arrays
   };
-  void take(const LoadedSlab& loaded, size_t face);
+  void store(const LoadedSlab& loaded, size_t face);
   void addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const;
   void addEndsIn(const LoadedSlab& loaded, const NodeBox& box, AbuttingFaces& abutting, Mutex& adding) const;
   std::vector<float> storedScalars(size_t face, uint64_t v, const RowRange& range) const;

@@ -112,7 +112,7 @@ CornerGather::CornerGather(const MeshReader& reader, const PointNumbers& numbers
       corner_fields_(reader.centring() == Centring::kNode ? reader.scalars() : 0),
       cell_fields_(reader.centring() == Centring::kCell ? reader.scalars() : 0) {}
 
-size_t CornerGather::take(const LoadedCells& loaded, size_t begin, GatheredCells& out) const {
+size_t CornerGather::gather(const LoadedCells& loaded, size_t begin, GatheredCells& out) const {
   out.clear();
   const MeshCells& cells = loaded.cells;
   uint64_t first_point = 0;
@@ -167,7 +167,7 @@ void CornerGather::gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& use
     for (size_t begin = 0, end = 0; begin < loaded.cells.size(); begin = end) {
       const TraceScope trace("gather corners");
       GatheredCells& cells = used.next();
-      end = take(loaded, begin, cells);
+      end = gather(loaded, begin, cells);
       if (!pages.hold(cells.corners)) {
         ranges[done].first += begin;
         ranges[done].number += begin;
@@ -212,7 +212,7 @@ void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedB
     Group& group = groups.back();
     uint64_t slot = group.first_slot + group.slots;
     for (size_t next = 0; next < loaded.cells.size();) {
-      next = take(loaded, next, cells);
+      next = gather(loaded, next, cells);
       for (const uint64_t point : cells.corners)
         references.appendRecord(point / range_points, Reference{point, slot++});
     }
@@ -275,7 +275,7 @@ void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedB
       for (size_t next = 0; next < loaded.cells.size();) {
         const TraceScope trace("gather corners");
         GatheredCells& gathered = used.next();
-        next = take(loaded, next, gathered);
+        next = gather(loaded, next, gathered);
         for (size_t n = 0; n < gathered.corners.size(); ++n, ++slot) {
           const std::byte* from = slots.data() + slot * point_bytes;
           std::memcpy(static_cast<void*>(&gathered.at[n]), from, sizeof(glm::dvec3));

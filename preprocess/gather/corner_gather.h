@@ -82,7 +82,7 @@ class CornerGather {
   void gatherByStreams(const std::vector<MeshRange>& of_cells, UsedBeside& used);
   /// Overwrites `out` with what is drawn of the cells from `begin` on, as many as go together, without positions and
   /// values. Returns the first of the others.
-  size_t take(const LoadedCells& loaded, size_t begin, GatheredCells& out) const;
+  size_t gather(const LoadedCells& loaded, size_t begin, GatheredCells& out) const;
   static void dropIfBlanked(GatheredCells& cells, size_t n);
 
   const MeshReader* reader_;

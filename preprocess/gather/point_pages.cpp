@@ -118,13 +118,13 @@ bool PointPages::hold(std::span<const uint64_t> points) {
     }
     const uint64_t from = missing[first] * kPoints;
     const uint64_t to = std::min((missing[end - 1] + 1) * kPoints, reader_->points());
-    reader_->readPoints(from, to - from, [&](const LoadedPoints& loaded) { take(loaded); });
+    reader_->readPoints(from, to - from, [&](const LoadedPoints& loaded) { add(loaded); });
     first = end;
   }
   return true;
 }
 
-void PointPages::take(const LoadedPoints& loaded) {
+void PointPages::add(const LoadedPoints& loaded) {
   const MeshPoints& points = loaded.points;
   parallelFor(tbb::blocked_range<size_t>(0, points.x.size(), kPointsPerTask),
               [&](const tbb::blocked_range<size_t>& part) {

@@ -102,7 +102,7 @@ class PointPages {
     std::vector<float> values;  // [point * fields + field]
   };
   const Page& pageOf(uint64_t point) const { return pages_[slots_.slotOf(point >> kShift)]; }
-  void take(const LoadedPoints& loaded);
+  void add(const LoadedPoints& loaded);
 
   const MeshReader* reader_;
   const size_t fields_;

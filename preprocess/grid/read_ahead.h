@@ -61,12 +61,12 @@ class ReadAhead {
       given_back_ = taken_;
     }
     changed_.notify_all();
-    return take();
+    return acquire();
   }
 
   /// Takes the next value, in place of next(), for callers that process several values at a time: it is valid
   /// until it is given back. Waits for ever where all values are taken. One thread at a time.
-  T* take() {
+  T* acquire() {
     if (!isNextThere()) awaitNext();
     const MutexLock lock(mutex_);
     if (taken_ < end_) {

@@ -84,7 +84,7 @@ std::vector<uint8_t> BlockOwners::fringeOf(const Slab& slab) const {
 
 std::shared_ptr<const CellTree> BlockOwners::treeOf(size_t tile) {
   const auto found =
-      std::find_if(kept_.begin(), kept_.end(), [&](const Kept& kept) { return kept.tile == tile; });
+      std::find_if(kept_.begin(), kept_.end(), [&](const TreeOfTile& kept) { return kept.tile == tile; });
   if (found != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, found);
     return kept_.front().tree;

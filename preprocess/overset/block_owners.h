@@ -55,7 +55,7 @@ class BlockOwners {
     // Whether all of its nodes are fringe, and its smallest cell; known once its tree has been built.
     std::optional<std::pair<bool, CellSize>> first;
   };
-  struct Kept {
+  struct TreeOfTile {
     size_t tile;
     std::shared_ptr<const CellTree> tree;
   };
@@ -70,7 +70,7 @@ class BlockOwners {
   std::vector<std::vector<uint32_t>> partners_;  // [block]: those that it overlaps, rising
   std::vector<Tile> tiles_;
   std::vector<std::vector<size_t>> tiles_of_;  // [block]
-  std::list<Kept> kept_;                       // the last used first
+  std::list<TreeOfTile> kept_;                 // the last used first
   uint64_t kept_bytes_ = 0;
 };
 

@@ -23,10 +23,10 @@ namespace curvisplat {
 namespace {
 
 /// Makes the splats of the nodes of a box of a window.
-class Window {
+class NodeWindow {
  public:
-  Window(const BlockWindow& in, const NodeBox& box, const NodeSplatCorrections& corrections,
-         NodeScratch& scratch, NodeSplats& out)
+  NodeWindow(const BlockWindow& in, const NodeBox& box, const NodeSplatCorrections& corrections,
+             NodeScratch& scratch, NodeSplats& out)
       : in_(in),
         corrections_(corrections),
         lines_(in, box, corrections.fit(), scratch),
@@ -91,7 +91,7 @@ class Window {
   size_t count_ = 0;
 };
 
-void Window::addRow(uint64_t j, uint64_t k) {
+void NodeWindow::addRow(uint64_t j, uint64_t k) {
   const GridBlock& block = in_.block;
   const ptrdiff_t row = lines_.elementOfRow(j, k);
   first_node_of_row_ = in_.first_node + (k * block.nj + j) * ni_;
@@ -163,7 +163,7 @@ void Window::addRow(uint64_t j, uint64_t k) {
 
 /// The points of the node's cell that lie in cells with a blanked node; none if all do. Along an axis with one
 /// neighbour only, both halves of the cell are towards that one.
-uint64_t Window::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const {
+uint64_t NodeWindow::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) const {
   uint64_t points = 0;
   for (size_t octant = 0; octant < kCellOctantCount; ++octant) {
     std::array<ptrdiff_t, 3> step{};
@@ -182,7 +182,7 @@ uint64_t Window::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours) con
 
 /// The weight of a node's splat, of which keepPart() takes what reaches into blanked cells. A node without any cell keeps
 /// the piece that its neighbours give it.
-double Window::weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) const {
+double NodeWindow::weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) const {
   const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
   const uint32_t there = corrections_.dual_cells ? cellsAt(at, i) : 0;
   if (there == 0) return of_neighbours;
@@ -193,8 +193,8 @@ double Window::weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) const {
 constexpr double kCollapsed = 1e-9;  // of the distance to the nearest neighbour that is elsewhere
 
 /// Finds the piece of the last node, whose cell has collapsed. False if its piece has no volume either.
-bool Window::takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
-                       const std::array<double, 3>& inwards) {
+bool NodeWindow::takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
+                           const std::array<double, 3>& inwards) {
   if (!corrections_.dual_cells || (in_.covered && in_.covered[at] != 0)) return false;
   double shortest = std::numeric_limits<double>::infinity();  // of the columns: thin cells have not collapsed
   for (int axis = 0; axis < 3; ++axis)
@@ -216,7 +216,7 @@ bool Window::takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
 }
 
 /// The nodes from i0 to i1 of a row without blanks around it. `row`: the element of its first node.
-void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours) {
+void NodeWindow::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours) {
   const uint64_t in_part = i0 - i0_, count = i1 - i0;
   const ptrdiff_t at = row + static_cast<ptrdiff_t>(i0);
   InnerRow nodes;
@@ -258,8 +258,8 @@ void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighb
 }
 
 /// Number `n` of `splats` as the splat of node `i` of the row.
-void Window::takeInnerNode(const InnerSplats& splats, const InnerGrowthCodes& growth, size_t n, uint64_t i,
-                           ptrdiff_t at) {
+void NodeWindow::takeInnerNode(const InnerSplats& splats, const InnerGrowthCodes& growth, size_t n,
+                               uint64_t i, ptrdiff_t at) {
   const auto of = [n](const InnerSplats::Row(&rows)[3]) {
     return glm::dvec3(rows[0][n], rows[1][n], rows[2][n]);
   };
@@ -320,8 +320,8 @@ void fitToVolume(double volume, double of_columns, const std::array<double, 3>& 
   }
 }
 
-inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face,
-                            const Layers& layers) {
+inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face,
+                                const Layers& layers) {
   const uint64_t in_part = i - i0_;
   glm::dvec3 stretch(scratch_.stretch[0][in_part], scratch_.stretch[1][in_part],
                      scratch_.stretch[2][in_part]);
@@ -471,7 +471,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
 }
 
 /// Cuts a node at one face that it is behind: along j before k before i.
-void Window::cutBehindOne(const NodeBehind& behind, NodeSplat& node) const {
+void NodeWindow::cutBehindOne(const NodeBehind& behind, NodeSplat& node) const {
   const int axis = behind.layers[1] != 0 ? 1 : behind.layers[2] != 0 ? 2 : 0;
   const std::optional<CutBehindFace> cut = faces_.cutAtOne(behind, axis, node.splat);
   if (!cut) return;
@@ -482,14 +482,14 @@ void Window::cutBehindOne(const NodeBehind& behind, NodeSplat& node) const {
 }
 
 /// Cuts the last node.
-void Window::cutBehindSeveral(const CutBehindFaces& cut) {
+void NodeWindow::cutBehindSeveral(const CutBehindFaces& cut) {
   if (cut.count == 0) return;
   for (size_t n = 0; n < cut.count; ++n) out_.probes.push_back({count_, cut.probes[n]});
   out_.splats[count_].border_code = cut.border.code;
   out_.splats[count_].layers = cut.border.layers;
 }
 
-double Window::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
+double NodeWindow::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
   const glm::dvec3 here = glm::abs(lattice_.position(at));
   for (const double length : {lattice_.spacing(at, neighbours), std::max({here.x, here.y, here.z})})
     if (length > 0) return std::max(kAxisFloor * length, std::numeric_limits<double>::min());
@@ -526,7 +526,7 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& s
   out.probes.clear();
   out.degenerate = out.right_handed = out.left_handed = 0;
 
-  Window rows(in, box, corrections, scratch, out);
+  NodeWindow rows(in, box, corrections, scratch, out);
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

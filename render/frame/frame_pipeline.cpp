@@ -129,10 +129,10 @@ bool FramePipeline::setAside(uint64_t bytes, size_t waiting_splats, const FrameO
 
 Image FramePipeline::drawBy(PaintingBackend& painter, const FramePlan& plan, const FrameOptions& options,
                             FrameStatistics& statistics, Progress* progress) {
-  struct Returned {
+  struct PainterReset {
     FramePipeline& pipeline;
-    ~Returned() { pipeline.painting_ = pipeline.backend_.get(); }
-  } const returned{*this};
+    ~PainterReset() { pipeline.painting_ = pipeline.backend_.get(); }
+  } const reset{*this};
   painting_ = &painter;
   return draw(plan, options, statistics, progress);
 }

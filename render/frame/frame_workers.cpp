@@ -245,7 +245,7 @@ void FrameWorkers::sample(Worker& worker, const SamplingWork& work) {
 std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t sequence,
                                                        const BrickPart& part, bool keep_going) {
   try {
-    return source_.take(sequence, worker.scratch);
+    return source_.fetch(sequence, worker.scratch);
   } catch (const DamagedBrick& error) {
     if (!keep_going) throw;
     worker.statistics.bricks_unreadable.push_back({part.brick, error.what()});

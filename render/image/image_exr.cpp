@@ -62,7 +62,7 @@ class Cursor {
   Cursor(std::span<const std::byte> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
   template <typename T>
-  T take() {
+  T read() {
     T value;
     std::memcpy(&value, takeBytes(sizeof value).data(), sizeof value);
     return value;
@@ -91,9 +91,9 @@ class Cursor {
 std::vector<ExrChannel> takeChannels(Cursor list, const std::string& name) {
   std::vector<ExrChannel> channels;
   for (std::string channel = list.takeString(); !channel.empty(); channel = list.takeString()) {
-    const auto type = list.take<int32_t>();
+    const auto type = list.read<int32_t>();
     list.takeBytes(4);  // pLinear and reserved
-    const auto x_sampling = list.take<int32_t>(), y_sampling = list.take<int32_t>();
+    const auto x_sampling = list.read<int32_t>(), y_sampling = list.read<int32_t>();
     if (type != TINYEXR_PIXELTYPE_HALF && type != TINYEXR_PIXELTYPE_FLOAT)
       throw Error("{}: EXR channel {} has pixel type {}, expected half or float", name, channel, type);
     if (x_sampling != 1 || y_sampling != 1)
@@ -111,15 +111,15 @@ void takeAttribute(const std::string& attribute, std::span<const std::byte> data
   if (attribute == "channels") {
     layout.channels = takeChannels(value, name);
   } else if (attribute == "compression") {
-    layout.compression = value.take<uint8_t>();
+    layout.compression = value.read<uint8_t>();
     if (layout.compression > TINYEXR_COMPRESSIONTYPE_ZIP)
       throw Error("{}: EXR compression {} is not supported; expected none, RLE, ZIPS or ZIP (0 to 3)", name,
                   layout.compression);
   } else if (attribute == "dataWindow") {
     for (int32_t* side : {&layout.min_x, &layout.min_y, &layout.max_x, &layout.max_y})
-      *side = value.take<int32_t>();
+      *side = value.read<int32_t>();
   } else if (attribute == "lineOrder") {
-    if (value.take<uint8_t>() != 0)
+    if (value.read<uint8_t>() != 0)
       throw Error("{}: EXR lines must be stored from the top down; other orders are not supported", name);
   } else if (attribute == "tiles" || attribute == "chunkCount") {
     throw Error("{}: has the attribute {}; only single-part scan-line EXR files are supported", name,
@@ -128,8 +128,8 @@ void takeAttribute(const std::string& attribute, std::span<const std::byte> data
 }
 
 ExrLayout takeHeader(Cursor& file, const std::string& name) {
-  file.take<uint32_t>();  // the magic number, which selected this decoder
-  const auto version = file.take<uint32_t>();
+  file.read<uint32_t>();  // the magic number, which selected this decoder
+  const auto version = file.read<uint32_t>();
   if ((version & ~kLongNames) != 2)
     throw Error(
         "{}: has EXR version and flags {:#x}; only version 2, single-part, in scan lines, is supported", name,
@@ -138,7 +138,7 @@ ExrLayout takeHeader(Cursor& file, const std::string& name) {
   std::map<std::string, uint32_t> found;
   for (std::string attribute = file.takeString(); !attribute.empty(); attribute = file.takeString()) {
     const std::string type = file.takeString();
-    const auto size = file.take<uint32_t>();
+    const auto size = file.read<uint32_t>();
     if ((size == 0 && type != "string") || !found.emplace(attribute, size).second ||
         found.size() > kMaxAttributes)
       throw Error("{}: the EXR attribute {} is empty or repeated, or there are too many attributes", name,
@@ -162,12 +162,12 @@ void requireChunks(Cursor& file, const ExrLayout& layout, std::span<const std::b
   const int64_t chunks = (layout.height() + layout.linesPerChunk() - 1) / layout.linesPerChunk();
   Cursor table(file.takeBytes(8 * static_cast<size_t>(chunks)), name);
   for (int64_t c = 0; c < chunks; ++c) {
-    const auto offset = table.take<uint64_t>();
+    const auto offset = table.read<uint64_t>();
     if (offset < file.at() || offset > bytes.size())
       throw Error("{}: EXR chunk {} has offset {}, outside of the file's pixel data", name, c, offset);
     Cursor chunk(bytes.subspan(offset), name);
-    const auto line = chunk.take<int32_t>();
-    const auto size = chunk.take<uint32_t>();
+    const auto line = chunk.read<int32_t>();
+    const auto size = chunk.read<uint32_t>();
     chunk.takeBytes(size);
     const int64_t first = c * layout.linesPerChunk();
     const auto lines = static_cast<uint64_t>(std::min(layout.linesPerChunk(), layout.height() - first));

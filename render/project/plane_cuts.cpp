@@ -147,13 +147,13 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
   // edges.
   constexpr float kLowAngle = 0.5f;
   // Those that take most, where there are more than a ScreenCut holds.
-  struct Taking {
+  struct NearestFace {
     float nearest;  // deviations from the middle, over the footprint
     std::array<float, 3> at;
     bool far_side;
     float along_ray;  // how much of the face's deviation is along the ray
   };
-  std::array<Taking, ScreenCut::kFaces> taking;
+  std::array<NearestFace, ScreenCut::kFaces> taking;
   size_t count = 0;
   for (const CutFace& face : piece.faces) {
     const RayFrame::Field field = ray.fieldOf(face.inward);
@@ -166,17 +166,17 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
     const float spread = kSupport * std::sqrt(by0 * by0 + by1 * by1);
     if (a + spread <= -ScreenCut::kReach) return Remains::kNothing;
     if (a - spread >= ScreenCut::kReach) continue;
-    const Taking found{a - spread,
-                       {a, by0, by1},
-                       field.along > 0,
-                       std::abs(field.along) / (std::sqrt(ray.determinant) * deviation)};
+    const NearestFace found{a - spread,
+                            {a, by0, by1},
+                            field.along > 0,
+                            std::abs(field.along) / (std::sqrt(ray.determinant) * deviation)};
     if (count < taking.size()) {
       taking[count++] = found;
       continue;
     }
-    Taking& least =
-        *std::max_element(taking.begin(), taking.end(),
-                          [](const Taking& one, const Taking& other) { return one.nearest < other.nearest; });
+    NearestFace& least = *std::max_element(
+        taking.begin(), taking.end(),
+        [](const NearestFace& one, const NearestFace& other) { return one.nearest < other.nearest; });
     if (found.nearest < least.nearest) least = found;
   }
   float steepest = 0;

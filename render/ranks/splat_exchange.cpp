@@ -251,7 +251,7 @@ bool SplatExchange::step(const std::function<bool(uint64_t sequence)>& unneeded)
     arrived_[n].cancelled = true;
     cancelled.push_back(needed_[n]);
   }
-  const uint64_t left = take(ranks_.exchange(offers(cancelled)));
+  const uint64_t left = receive(ranks_.exchange(offers(cancelled)));
   if (left == 0) return false;
 
   std::vector<uint32_t> granted;
@@ -288,7 +288,7 @@ std::vector<Ranks::Bytes> SplatExchange::offers(const std::vector<uint32_t>& can
 }
 
 /// Returns how many parts all ranks together still wait for.
-uint64_t SplatExchange::take(const std::vector<Ranks::Bytes>& offered) {
+uint64_t SplatExchange::receive(const std::vector<Ranks::Bytes>& offered) {
   uint64_t left = 0;
   for (uint32_t rank = 0; rank < offered.size(); ++rank) {
     size_t at = 0;

@@ -141,7 +141,7 @@ class SplatExchange {
   void findReceivers(Prepared& part, std::span<const ScreenSplat> splats) const;
   TileBox tilesOf(const ScreenBox& box) const;
   std::vector<Ranks::Bytes> offers(const std::vector<uint32_t>& cancelled);
-  uint64_t take(const std::vector<Ranks::Bytes>& offered);
+  uint64_t receive(const std::vector<Ranks::Bytes>& offered);
   void cancel(uint32_t part, uint32_t rank);
   std::vector<Ranks::Bytes> grants();
   void send(const std::vector<uint32_t>& granted);

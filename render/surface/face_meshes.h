@@ -37,12 +37,12 @@ class FaceMeshes {
   static uint64_t bytes(const SurfaceScene& scene, uint64_t pixels);
 
  private:
-  struct Kept {
+  struct SurfaceMesh {
     GridSurface surface;
     ChosenPatches chosen;
     std::shared_ptr<const TriangleMesh> mesh;
   };
-  std::vector<Kept> kept_;  // [grid surface]
+  std::vector<SurfaceMesh> kept_;  // [grid surface]
 };
 
 }  // namespace curvisplat

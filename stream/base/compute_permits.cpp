@@ -10,7 +10,7 @@ thread_local Computing* this_thread = nullptr;
 }  // namespace
 
 /// A thread that is not urgent takes a permit only if more are free than urgent threads wait for.
-bool ComputePermits::take(Urgency urgency, const Unneeded& unneeded) {
+bool ComputePermits::acquire(Urgency urgency, const Unneeded& unneeded) {
   MutexLock lock(mutex_);
   const bool is_urgent = urgency == Urgency::kUrgent;
   const auto isThere = [&](unsigned free) { return free > (is_urgent ? 0 : urgent_.load()); };
@@ -50,7 +50,7 @@ void ComputePermits::recheck() {
 Computing::Computing(ComputePermits* permits, Urgency urgency, const std::function<bool()>& unneeded)
     : urgency_(urgency) {
   if (!permits || this_thread) return;
-  granted_ = permits->take(urgency, unneeded);
+  granted_ = permits->acquire(urgency, unneeded);
   if (!granted_) return;
   permits_ = permits;
   this_thread = this;
@@ -78,7 +78,7 @@ GivenBackPermit::GivenBackPermit() : of_(this_thread) {
 
 GivenBackPermit::~GivenBackPermit() {
   if (!of_) return;
-  of_->permits_->take(of_->urgency_);
+  of_->permits_->acquire(of_->urgency_);
   this_thread = of_;
 }
 

@@ -48,7 +48,7 @@ class ComputePermits {
   friend class GivenBackPermit;
 
   using Unneeded = std::function<bool()>;
-  bool take(Urgency urgency, const Unneeded& unneeded = {});
+  bool acquire(Urgency urgency, const Unneeded& unneeded = {});
   void giveBack();
   void wakeNext() REQUIRES(mutex_);
 

@@ -76,7 +76,7 @@ class TableBytes {
   explicit TableBytes(std::span<const std::byte> bytes) : rest_(bytes) {}
 
   template <typename Record>
-  std::vector<Record> take(size_t count) {
+  std::vector<Record> read(size_t count) {
     std::vector<Record> records(count);
     if (count > 0) std::memcpy(records.data(), rest_.data(), count * sizeof(Record));
     rest_ = rest_.subspan(count * sizeof(Record));
@@ -270,11 +270,11 @@ FacesReader::FacesReader(const std::filesystem::path& path, const FileInfo& info
       throw Error("{}: its box is not finite; the file is damaged: convert again", path.string());
   }
   TableBytes table(bytes);
-  variables_ = table.take<uint32_t>(header.variables);
-  for (const FaceRecord& r : table.take<FaceRecord>(header.faces))
+  variables_ = table.read<uint32_t>(header.variables);
+  for (const FaceRecord& r : table.read<FaceRecord>(header.faces))
     faces_.push_back(
         {r.block, r.axis, static_cast<FaceSide>(r.side), r.index, {r.nodes[0], r.nodes[1]}, r.root});
-  for (const PatchRecord& r : table.take<PatchRecord>(header.patches))
+  for (const PatchRecord& r : table.read<PatchRecord>(header.patches))
     patches_.push_back({r.face,
                         {r.first[0], r.first[1]},
                         {r.stride[0], r.stride[1]},
@@ -285,7 +285,7 @@ FacesReader::FacesReader(const std::filesystem::path& path, const FileInfo& info
                         {r.lower[0], r.lower[1], r.lower[2]},
                         {r.upper[0], r.upper[1], r.upper[2]},
                         {r.offset, r.length, r.checksum}});
-  for (const RegionRecord& r : table.take<RegionRecord>(header.regions))
+  for (const RegionRecord& r : table.read<RegionRecord>(header.regions))
     regions_.push_back(
         {r.face, {r.first[0], r.first[1]}, {r.last[0], r.last[1]}, unpadded(r.name), unpadded(r.type)});
   const FacesChecker checker(path, faces_, patches_);

@@ -321,7 +321,7 @@ void put(const T& value, std::vector<std::byte>& out) {
 }
 
 template <typename T>
-T take(const std::byte*& at) {
+T read(const std::byte*& at) {
   T value;
   std::memcpy(&value, at, sizeof value);
   at += sizeof value;
@@ -344,11 +344,11 @@ void forEachLogged(const std::filesystem::path& folder, size_t variables,
       const auto entry = std::span<const std::byte>(buffer).subspan(begin, entry_bytes);
       const std::byte* at = entry.data();
       AppendedBrick brick;
-      brick.brick = brickOf(take<BrickRecord>(at));
-      brick.weight = take<double>(at);
+      brick.brick = brickOf(read<BrickRecord>(at));
+      brick.weight = read<double>(at);
       for (size_t v = 0; v < variables; ++v)
-        brick.variables.push_back(brickVariableOf(take<VariableRecord>(at)));
-      if (take<uint64_t>(at) != checksumOf(entry.first(entry_bytes - sizeof(uint64_t)))) return;
+        brick.variables.push_back(brickVariableOf(read<VariableRecord>(at)));
+      if (read<uint64_t>(at) != checksumOf(entry.first(entry_bytes - sizeof(uint64_t)))) return;
       if (!use(std::move(brick))) return;
     }
   }

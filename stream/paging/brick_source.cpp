@@ -67,7 +67,7 @@ void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded u
   pager_.start(std::move(to_read), std::move(unneeded));
 }
 
-std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch& scratch) {
+std::optional<BrickSource::Splats> BrickSource::fetch(uint64_t sequence, Scratch& scratch) {
   CURVISPLAT_CHECK_OP(sequence, <, parts_.size());
   const BrickPart& part = parts_[sequence];
   if (pins_[sequence]) {
@@ -78,7 +78,7 @@ std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch&
 }
 
 void BrickSource::pass(uint64_t sequence) {
-  if (!std::exchange(pins_[sequence], {})) pager_.take(misses_[sequence]);
+  if (!std::exchange(pins_[sequence], {})) pager_.fetch(misses_[sequence]);
 }
 
 std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint64_t miss, Scratch& scratch) {
@@ -161,7 +161,7 @@ BrickSource::Splats BrickSource::splatsOf(const Scratch& scratch, const BrickPar
 
 std::optional<PagedBrick> BrickSource::await(uint64_t miss, Scratch& scratch) {
   const WaitTimer timer(scratch.waited_s, "wait for a brick");
-  return pager_.take(miss);
+  return pager_.fetch(miss);
 }
 
 void BrickSource::decode(uint32_t brick, const PagedBrick& bytes, const BrickCache::Slot& slot,

@@ -2,7 +2,7 @@
 // if they are in it, otherwise from the disk through the pager.
 //
 //   start(parts)         cache: pin the bricks it has    pager: read the others ahead
-//   take(n)  workers     the pin, or: wait for the bytes, verify, decode (into the cache if it has space)
+//   fetch(n) workers     the pin, or: wait for the bytes, verify, decode (into the cache if it has space)
 //
 // A second variable, if there is one, is read and kept like the first.
 //
@@ -68,30 +68,30 @@ class BrickSource {
     std::optional<VariableArrays<const float>> second = std::nullopt;  // where there is a second variable
   };
 
-  /// Begins a frame of at most one part of each brick. No thread may be in take(). `unneeded`: see
+  /// Begins a frame of at most one part of each brick. No thread may be in fetch(). `unneeded`: see
   /// BrickPager.
   void start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded = {});
   /// The splats of the `sequence`-th part; once for each part, on any thread. nullopt after stop(). No splats if
   /// `unneeded` returned true for the brick. Throws as CacheReader does, DamagedBrick or Error, and Error if
   /// the pager failed.
-  std::optional<Splats> take(uint64_t sequence, Scratch& scratch);
-  /// Instead of take(), for a part whose brick `unneeded` returns true for: gives up its pin or bytes.
+  std::optional<Splats> fetch(uint64_t sequence, Scratch& scratch);
+  /// Instead of fetch(), for a part whose brick `unneeded` returns true for: gives up its pin or bytes.
   void pass(uint64_t sequence);
   /// Replaces a damaged part by the splats that its nearest undamaged ancestor has in the same space. No splats if
   /// all ancestors are damaged. Throws Error if the disk fails.
   Splats standIn(const BrickPart& part, Scratch& scratch) const;
 
   /// The cache is at another step of the same geometry. The geometry of decoded bricks is kept; their values are
-  /// decoded anew when they are taken. Nobody may be in take() or prefetchNext() any more. Throws Error.
+  /// decoded anew when they are taken. Nobody may be in fetch() or prefetchNext() any more. Throws Error.
   void stepChanged();
 
   /// Begins to fill the cache with the bricks of `parts`, in their order, as far as they fit.
   void startPrefetch(std::span<const BrickPart> parts);
   /// Takes the next brick of the prefetch. False if none is left, if the cache is full, or after stop().
-  /// Throws as take() does.
+  /// Throws as fetch() does.
   bool prefetchNext(Scratch& scratch);
 
-  /// Wakes the threads that wait in take() or prefetchNext(). Call it from any thread.
+  /// Wakes the threads that wait in fetch() or prefetchNext(). Call it from any thread.
   void stop();
   /// Ends the frame: gives up what was not taken, and adds what the frame cost to `statistics`, except the
   /// workers' sums.

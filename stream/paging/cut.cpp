@@ -221,7 +221,7 @@ class CutWalk {
       ++cut_.transparent;
       visitOctants(id, refined, false);
     } else if (refined == 0) {
-      take({id, kAllOctants});
+      add({id, kAllOctants});
     } else {
       visitOctants(id, refined, true);
     }
@@ -244,10 +244,10 @@ class CutWalk {
       }
     }
     if (pending == 0) return;
-    take({id, pending});
+    add({id, pending});
   }
 
-  void take(const BrickPart& part) {
+  void add(const BrickPart& part) {
     cut_.parts.push_back(part);
     const Brick& brick = view_.brick(part.brick);
     cut_.splats += SplatRanges(brick, part.octants).splats();

@@ -132,7 +132,7 @@ void BrickPager::awaitIdle(MutexLock& lock) {
   CURVISPLAT_CHECK_OP(lent_, ==, 0u);
 }
 
-std::optional<PagedBrick> BrickPager::take(uint64_t sequence) {
+std::optional<PagedBrick> BrickPager::fetch(uint64_t sequence) {
   MutexLock lock(mutex_);
   CURVISPLAT_CHECK(state_ != State::kReading || sequence < extents_.size());
   while (state_ == State::kReading && !hasArrived(sequence)) arrived_.wait(lock);

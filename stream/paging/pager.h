@@ -1,7 +1,7 @@
 // Reads the bytes of a frame's bricks ahead of those who decode them, in the frame's order, with several
 // reads under way at once.
 //
-//   start(bricks) ; workers: take(n) -> bytes of the n-th brick -> give them back, by dropping them ; stop()
+//   start(bricks) ; workers: fetch(n) -> bytes of the n-th brick -> give them back, by dropping them ; stop()
 //
 // The bytes lie in one buffer of fixed size, which is used as a ring of batches (read_batch.h): space is
 // granted to batches in order and freed in order, so that the brick that is needed next can always be read.
@@ -17,7 +17,7 @@
 //       ^                        |
 //       '--------- stop() -------'          nothing is submitted or handed out; reads under way may still end
 //
-//   each of these --the way of reading fails--> kBroken    take() and start() throw the failure; the thread has ended
+//   each of these --the way of reading fails--> kBroken    fetch() and start() throw the failure; the thread has ended
 //   every state   --destructor----------------> kEnding    the thread ends
 #pragma once
 
@@ -139,7 +139,7 @@ class BrickPager {
   void stepChanged();
   /// Waits for the `sequence`-th of the bricks. Each may be taken once, by any thread. nullopt once stopped.
   /// Throws Error where reading broke off altogether.
-  std::optional<PagedBrick> take(uint64_t sequence);
+  std::optional<PagedBrick> fetch(uint64_t sequence);
   /// Wakes all who wait: nothing is handed out until the next start(). Any thread, any number of times.
   void stop();
 

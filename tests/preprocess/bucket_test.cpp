@@ -191,7 +191,7 @@ TEST(BucketLoader, GroupsAllRecordsByCellsForAnyNumberOfReaders) {
     SCOPED_TRACE(readers);
     BucketLoader loader(buckets.tree, *buckets.file, 1, {0, buckets.file->buckets()}, 1 << 30, readers);
     std::map<uint32_t, std::multiset<uint64_t>> found;
-    while (LoadedBucket* const loaded = loader.take()) {
+    while (LoadedBucket* const loaded = loader.acquire()) {
       size_t placed = 0;
       for (size_t n = 0; n < loaded->parts.size(); ++n) {
         const LoadedBucket::Part& part = loaded->parts[n];
@@ -234,7 +234,7 @@ TEST(BucketLoader, ReportsDamageWhicheverReaderFindsIt) {
     foreign.leave();
     change();
     BucketLoader loader(buckets.tree, foreign, 1, {0, foreign.buckets()}, 1 << 30, 4);
-    EXPECT_THROW(while (loader.take()) loader.giveBack(), LostBuckets);
+    EXPECT_THROW(while (loader.acquire()) loader.giveBack(), LostBuckets);
     change();
   }
 }

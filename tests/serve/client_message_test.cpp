@@ -179,13 +179,13 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
 /// A page sends two messages in each frame of a screen of 240 Hz.
 TEST(MessageRate, AllowsTheFastestScreensPaceAndRefusesAFlood) {
   MessageRate page;
-  for (int n = 0; n < 20'000; ++n) ASSERT_TRUE(page.take(n / 480.0)) << n;
+  for (int n = 0; n < 20'000; ++n) ASSERT_TRUE(page.admits(n / 480.0)) << n;
   MessageRate flood;
   int passed = 0;
-  while (flood.take(5 + passed * 1e-5)) ++passed;
+  while (flood.admits(5 + passed * 1e-5)) ++passed;
   EXPECT_NEAR(passed, 1200, 10);
-  EXPECT_FALSE(flood.take(5 + passed * 1e-5));
-  EXPECT_TRUE(flood.take(7)) << "after a while it may go on";
+  EXPECT_FALSE(flood.admits(5 + passed * 1e-5));
+  EXPECT_TRUE(flood.admits(7)) << "after a while it may go on";
 }
 
 }  // namespace

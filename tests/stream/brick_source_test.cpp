@@ -81,7 +81,7 @@ class BrickSourceTest : public ::testing::Test {
       BrickSource::Scratch scratch;
       try {
         for (size_t n; (n = next++) < order.size();) {
-          const auto splats = source.take(n, scratch);
+          const auto splats = source.fetch(n, scratch);
           if (!splats) return;
           good += isBrick(order[n], *splats);
         }
@@ -147,7 +147,7 @@ TEST_F(BrickSourceTest, APartHasTheSplatsOfItsOctants) {
   uint32_t splats = 0;
   for (const uint8_t octants : {0x0f, 0xf0}) {
     source.start(std::vector<BrickPart>{{inner, octants}});
-    splats += source.take(0, scratch)->ranges.splats();
+    splats += source.fetch(0, scratch)->ranges.splats();
   }
   EXPECT_EQ(splats, cache_->bricks()[inner].splats);
 }
@@ -310,7 +310,7 @@ TEST_F(BrickSourceTest, CanBeStoppedAtAnyMoment) {
       BrickSource::Scratch scratch;
       for (size_t n; (n = next++) < order.size();) {
         if (n == stop_at) source.stop();
-        const auto splats = source.take(n, scratch);
+        const auto splats = source.fetch(n, scratch);
         if (!splats) return;
         wrong += splats->geometry.size() != geometry_[order[n]].size();
       }
@@ -341,7 +341,7 @@ TEST_F(BrickSourceTest, PassesOverWhatIsNotNeeded) {
           source.pass(n);
           continue;
         }
-        const auto splats = source.take(n, scratch);
+        const auto splats = source.fetch(n, scratch);
         ASSERT_TRUE(splats);
         if (splats->geometry.size() == 0) {
           EXPECT_TRUE(unneeded);

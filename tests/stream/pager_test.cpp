@@ -101,7 +101,7 @@ class PagerTest : public ::testing::Test {
     std::atomic<size_t> next = 0, good = 0;
     const auto work = [&] {
       for (size_t n; (n = next++) < order.size();) {
-        const auto bytes = pager.take(n);
+        const auto bytes = pager.fetch(n);
         good += bytes && areOf(cache, order[n], *bytes);
       }
     };
@@ -338,18 +338,18 @@ TEST_F(PagerTest, StoppingWakesAllWhoWaitAndStartingBeginsAnew) {
       const size_t taken = random() % order.size();
       std::thread other([&] {
         // Never gets its turn: the buffer is too small for all that come before.
-        EXPECT_FALSE(pager.take(order.size() - 1));
+        EXPECT_FALSE(pager.fetch(order.size() - 1));
       });
       {
         std::vector<PagedBrick> held;
         for (size_t n = 0; n < taken / 8; ++n) {
-          const auto bytes = pager.take(n);
+          const auto bytes = pager.fetch(n);
           ASSERT_TRUE(bytes && areOf(*cache_, order[n], *bytes)) << n;
         }
       }
       pager.stop();
       other.join();
-      EXPECT_FALSE(pager.take(0));
+      EXPECT_FALSE(pager.fetch(0));
     }
     EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks());
   }
@@ -371,7 +371,7 @@ TEST_F(PagerTest, AFileThatShrinksMarksWhatIsGone) {
     pager.start(order);
     for (size_t n = 0; n < order.size(); ++n) {
       const Extent& extent = cache_->bricks()[order[n]].geometry;
-      const auto bytes = pager.take(n);
+      const auto bytes = pager.fetch(n);
       ASSERT_TRUE(bytes);
       if (extent.offset + extent.length > size / 2) {
         EXPECT_FALSE(bytes->readable()) << n;
@@ -394,7 +394,7 @@ TEST_F(PagerTest, LeavesOutWhatIsNotNeeded) {
       pager.start(order, unneeded);
       uint64_t left_out = 0, bytes = 0;
       for (const uint32_t brick : order) {
-        const std::optional<PagedBrick> paged = pager.take(brick);
+        const std::optional<PagedBrick> paged = pager.fetch(brick);
         ASSERT_TRUE(paged);
         EXPECT_EQ(paged->isLeftOut(), unneeded(brick)) << brick;
         EXPECT_EQ(areOf(*cache_, brick, *paged), !unneeded(brick)) << brick;
@@ -405,9 +405,9 @@ TEST_F(PagerTest, LeavesOutWhatIsNotNeeded) {
       EXPECT_EQ(pager.statistics().bricks_left_out, left_out);
       EXPECT_EQ(pager.statistics().bytes_left_out, bytes);
       pager.start(order, [](uint32_t) { return true; });
-      for (const uint32_t brick : order) EXPECT_TRUE(pager.take(brick)->isLeftOut());
+      for (const uint32_t brick : order) EXPECT_TRUE(pager.fetch(brick)->isLeftOut());
       pager.start(order);  // and it is forgotten
-      for (const uint32_t brick : order) EXPECT_TRUE(areOf(*cache_, brick, *pager.take(brick)));
+      for (const uint32_t brick : order) EXPECT_TRUE(areOf(*cache_, brick, *pager.fetch(brick)));
     }
 }
 

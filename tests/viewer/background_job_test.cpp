@@ -57,7 +57,7 @@ Threads threadsOfAJob() {
       },
       nobody);
   EXPECT_TRUE(eventually([&] { return job.isDone(); }));
-  EXPECT_EQ(job.take(), "done");
+  EXPECT_EQ(job.get(), "done");
   return threads;
 }
 
@@ -144,7 +144,7 @@ TEST_F(BackgroundJobTest, ThrowsWhatItsWorkThrows) {
       },
       nobody);
   EXPECT_TRUE(eventually([&] { return job.isDone(); }));
-  EXPECT_THROW(job.take(), std::runtime_error);
+  EXPECT_THROW(job.get(), std::runtime_error);
 }
 
 TEST_F(BackgroundJobTest, EndsWhenItIsStopped) {
@@ -186,7 +186,7 @@ TEST_F(BackgroundJobTest, AnOpeningHandsOnWhatItIsTold) {
   EXPECT_EQ(opening.takeMessages(), std::vector<std::string>{"a note"});
   EXPECT_EQ(opening.takePreview().value().what, "every 2nd index plane");
   EXPECT_FALSE(opening.takePreview());
-  EXPECT_EQ(opening.take(), "a.splats");
+  EXPECT_EQ(opening.get(), "a.splats");
 }
 
 }  // namespace

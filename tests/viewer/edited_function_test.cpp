@@ -111,7 +111,7 @@ class FunctionChooserTest : public testing::Test {
   static std::vector<FunctionChooser::Question> answersOf(FunctionChooser& chooser) {
     std::vector<FunctionChooser::Question> answers;
     while (chooser.busy()) {
-      if (const auto answer = chooser.take()) answers.push_back(answer->question);
+      if (const auto answer = chooser.poll()) answers.push_back(answer->question);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return answers;
@@ -145,7 +145,7 @@ TEST_F(FunctionChooserTest, WhatIsDroppedIsNotAnswered) {
   chooser_.ask({For::kScalar, scalar_});
   chooser_.drop();
   EXPECT_FALSE(chooser_.busy());
-  EXPECT_FALSE(chooser_.take());
+  EXPECT_FALSE(chooser_.poll());
 }
 
 TEST_F(FunctionChooserTest, AnErrorEndsItsQuestionOnly) {

@@ -59,7 +59,7 @@ class FrameLoopTest : public testing::Test {
     std::vector<ShownFrame> frames;
     while (true) {
       const bool busy = loop.busy();
-      while (auto frame = loop.take()) frames.push_back(std::move(*frame));
+      while (auto frame = loop.poll()) frames.push_back(std::move(*frame));
       if (!busy) return frames;
       wait();
     }
@@ -188,7 +188,7 @@ TEST_F(FrameLoopTest, OneAtATimeDrawsTheSamePictures) {
     std::optional<ShownFrame> shown;
     while (!shown || !shown->is_final) {
       wait();
-      if (auto frame = loop.take()) {
+      if (auto frame = loop.poll()) {
         shown = std::move(frame);
         EXPECT_TRUE(loop.busy()) << "it waits for the picture's memory";
         loop.giveBack();
@@ -289,7 +289,7 @@ TEST_F(FrameLoopTest, ADamagedCacheEndsTheLoop) {
   loop.request(requestOf());
   EXPECT_THROW(all(loop), Error);
   EXPECT_FALSE(loop.busy());
-  EXPECT_THROW(loop.take(), Error);
+  EXPECT_THROW(loop.poll(), Error);
 }
 
 TEST_F(FrameLoopTest, EndsInTheMiddleOfAPicture) {

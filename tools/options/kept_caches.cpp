@@ -360,12 +360,12 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
 }
 
 void limitKeptCaches(const fs::path& folder, uint64_t limit, const fs::path& kept) {
-  struct Kept {
+  struct CacheEntry {
     fs::path place;
     fs::file_time_type used;
     uint64_t bytes;
   };
-  std::vector<Kept> all;
+  std::vector<CacheEntry> all;
   uint64_t total = 0;
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
@@ -375,8 +375,8 @@ void limitKeptCaches(const fs::path& folder, uint64_t limit, const fs::path& kep
     all.push_back({at->path(), used, bytesIn(at->path())});
     total += all.back().bytes;
   }
-  std::sort(all.begin(), all.end(), [](const Kept& a, const Kept& b) { return a.used < b.used; });
-  for (const Kept& one : all) {
+  std::sort(all.begin(), all.end(), [](const CacheEntry& a, const CacheEntry& b) { return a.used < b.used; });
+  for (const CacheEntry& one : all) {
     if (total <= limit) return;
     if (one.place == kept || isBeingMade(one.place / "used")) continue;
     fs::remove_all(one.place, error);

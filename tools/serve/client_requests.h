@@ -117,7 +117,7 @@ class MessageRate {
   static constexpr double kPerSecond = 600, kAtOnce = 1200;
 
   /// A message came in at `now_s`. Returns whether the page may go on.
-  bool take(double now_s) {
+  bool admits(double now_s) {
     if (last_s_ >= 0) left_ = std::min(kAtOnce, left_ + (now_s - last_s_) * kPerSecond);
     last_s_ = now_s;
     left_ -= 1;

@@ -146,7 +146,7 @@ void Connection::openViewer() {
   socket_.next_layer().socket().set_option(boost::asio::ip::tcp::no_delay(true), ignored);
   // Pings count as messages do.
   socket_.control_callback([this](websocket::frame_type, beast::string_view) {
-    if (!rate_.take(clockSeconds())) drop();
+    if (!rate_.admits(clockSeconds())) drop();
   });
   viewer_ = host_.newViewer(shared_from_this());
   if (!viewer_)
@@ -161,12 +161,12 @@ void Connection::read() {
       if (self->viewer_) self->host_.endViewer(std::move(self->viewer_));
       return self->drop();
     }
-    self->take();
+    self->receive();
   });
 }
 
-void Connection::take() {
-  if (!rate_.take(clockSeconds())) return close(websocket::close_code::policy_error, "too many messages");
+void Connection::receive() {
+  if (!rate_.admits(clockSeconds())) return close(websocket::close_code::policy_error, "too many messages");
   if (!socket_.got_text()) return close(websocket::close_code::unknown_data, "expected text");
   try {
     viewer_->receive(parseClientMessage(beast::buffers_to_string(buffer_.data()), host_.caches().size()));

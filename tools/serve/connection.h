@@ -65,7 +65,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void upgrade(const Request& request);
   void openViewer();
   void read();
-  void take();
+  void receive();
   void writeNext();
   void limitWriting();
   void close(boost::beast::websocket::close_code code, const std::string& reason);

@@ -211,7 +211,7 @@ class RemoteViewer::Work {
     if (!frames_) return;
     std::optional<ShownFrame> frame;
     try {
-      frame = frames_->take();
+      frame = frames_->poll();
     } catch (const TooLittleMemory& error) {
       return reduce(error);
     } catch (const UsageError& error) {

@@ -43,7 +43,7 @@ bool isDirect(Way way) {
 }
 
 /// The part of a file that is measured.
-struct Window {
+struct FilePart {
   const DirectFile* file;
   uint64_t bytes;  // from offset 0
 };
@@ -53,12 +53,12 @@ struct Block {
   uint64_t offset;
 };
 
-/// All blocks of the windows in a shuffled but fixed order.
-std::vector<Block> blocksOf(std::span<const Window> windows, uint64_t block_bytes) {
+/// All blocks of the parts in a shuffled but fixed order.
+std::vector<Block> blocksOf(std::span<const FilePart> parts, uint64_t block_bytes) {
   std::vector<Block> blocks;
-  for (const Window& window : windows)
-    for (uint64_t offset = 0; offset < window.bytes; offset += block_bytes)
-      blocks.push_back({window.file, offset});
+  for (const FilePart& part : parts)
+    for (uint64_t offset = 0; offset < part.bytes; offset += block_bytes)
+      blocks.push_back({part.file, offset});
   std::mt19937_64 random(1);
   std::shuffle(blocks.begin(), blocks.end(), random);
   return blocks;
@@ -106,7 +106,7 @@ double readBlocks(std::span<const Block> blocks, const DiskRun& run, AsyncReads&
   return static_cast<double>(bytes) / seconds();
 }
 
-/// The two files of a cache that drawing reads, and the window of each that is measured.
+/// The two files of a cache that drawing reads, and the part of each that is measured.
 class CacheFiles {
  public:
   CacheFiles(const CacheReader& cache, size_t variable, uint64_t max_bytes)
@@ -119,28 +119,28 @@ class CacheFiles {
       files_[n] = std::make_unique<DirectFile>(paths_[n]);
       const uint64_t bytes = std::filesystem::file_size(paths_[n]);
       const auto wanted = static_cast<uint64_t>(part * static_cast<double>(bytes)) / kMaxBlock;
-      windows_.push_back({files_[n].get(), std::min(bytes, (wanted + 1) * kMaxBlock)});
+      parts_.push_back({files_[n].get(), std::min(bytes, (wanted + 1) * kMaxBlock)});
     }
   }
 
-  std::span<const Window> windows() const { return windows_; }
+  std::span<const FilePart> parts() const { return parts_; }
   bool areDirect() const {
     return std::all_of(files_.begin(), files_.end(), [](const auto& file) { return file->isDirect(); });
   }
   std::span<const std::filesystem::path> paths() const { return paths_; }
 
-  /// Reads the windows into the page cache. Returns nullopt if they are all there afterwards, else the
+  /// Reads the parts into the page cache. Returns nullopt if they are all there afterwards, else the
   /// reason.
   std::optional<std::string> makeWarm() const {
     std::vector<std::byte> piece(1 << 20);
-    for (const Window& window : windows_) {
-      const InputFile file(window.file->path());
-      for (uint64_t at = 0; at < window.bytes; at += piece.size())
-        file.readAt(at, std::span(piece).first(std::min<uint64_t>(piece.size(), window.bytes - at)));
-      const PageResidence residence = residenceOf(window.file->path(), 0, window.bytes);
+    for (const FilePart& part : parts_) {
+      const InputFile file(part.file->path());
+      for (uint64_t at = 0; at < part.bytes; at += piece.size())
+        file.readAt(at, std::span(piece).first(std::min<uint64_t>(piece.size(), part.bytes - at)));
+      const PageResidence residence = residenceOf(part.file->path(), 0, part.bytes);
       if (residence.resident < residence.pages)
         return fmt::format("only {} of {} pages of {} stay in the page cache after being read",
-                           residence.resident, residence.pages, window.file->path().filename().string());
+                           residence.resident, residence.pages, part.file->path().filename().string());
     }
     return std::nullopt;
   }
@@ -148,7 +148,7 @@ class CacheFiles {
  private:
   const std::array<std::filesystem::path, 2> paths_;
   std::array<std::unique_ptr<DirectFile>, 2> files_;
-  std::vector<Window> windows_;
+  std::vector<FilePart> parts_;
 };
 
 /// Brings the files into the state that `way` requires. Returns nullopt, or the reason if that is impossible.
@@ -165,7 +165,7 @@ void measure(const DiskRun& run, const CacheFiles& files, const DiskEffort& effo
   auto reads = run.way == Way::kDirectPread ? nullptr : makeUringReads(run.depth);
   if (!reads) reads = makeThreadReads(run.depth);
   const Buffer buffer(static_cast<std::byte*>(std::aligned_alloc(kPageBytes, run.depth * run.block_bytes)));
-  const std::vector<Block> blocks = blocksOf(files.windows(), run.block_bytes);
+  const std::vector<Block> blocks = blocksOf(files.parts(), run.block_bytes);
   std::vector<double> rates;
   try {
     for (unsigned sample = 0; sample < effort.samples; ++sample) {

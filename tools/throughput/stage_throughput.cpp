@@ -269,7 +269,7 @@ class Stages {
       const auto start = std::chrono::steady_clock::now();
       pager.start(bricks);
       for (size_t n = 0; n < bricks.size(); ++n) {
-        const auto brick = pager.take(n);
+        const auto brick = pager.fetch(n);
         if (!brick || !brick->readable())
           throw Error("{}: cannot read brick {}; `curvisplat info --verify` lists the damage",
                       scene_.cache.path().string(), bricks[n]);

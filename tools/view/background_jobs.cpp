@@ -24,9 +24,9 @@ namespace {
 constexpr int kNice = 10;  // the window and its picture come first
 
 /// Calls it at the end of its lifetime.
-struct Wake {
+struct WakeAtEnd {
   void (*call)();
-  ~Wake() { call(); }
+  ~WakeAtEnd() { call(); }
 };
 
 /// Threads of low priority for work that the window goes on beside.
@@ -116,7 +116,7 @@ BackgroundJob::BackgroundJob(std::string title, std::string phase, Work work, vo
       }) {
   made_ = std::async(std::launch::async, [this, wake, work = std::move(work)] {
     nameThisThread("job");
-    const Wake at_the_end{wake};
+    const WakeAtEnd at_the_end{wake};
     BackgroundThreads threads(kNice);
     std::filesystem::path made;
     threads.run([&] { made = work(progress_); });
@@ -220,7 +220,7 @@ void FurtherScalarList::look() {
   found_ = std::async(std::launch::async,
                       [look = services_.further_scalars, cache = cache_, files = files_, wake = wake_] {
                         nameThisThread("scalars");
-                        const Wake at_the_end{wake};
+                        const WakeAtEnd at_the_end{wake};
                         return look(cache, files);
                       });
 }

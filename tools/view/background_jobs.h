@@ -79,7 +79,7 @@ class BackgroundJob {
   float part() const;
   bool isDone() const;
   /// The path, once. Throws what the work threw; Interrupted after stopping. Only if isDone().
-  std::filesystem::path take() { return made_.get(); }
+  std::filesystem::path get() { return made_.get(); }
 
  private:
   const std::string title_;
@@ -106,7 +106,7 @@ class Opening {
   std::optional<Preview> takePreview();
   bool isDone() const { return job_.isDone(); }
   /// The cache, once. Throws Error as converting does. Only if isDone().
-  std::filesystem::path take() { return job_.take(); }
+  std::filesystem::path get() { return job_.get(); }
 
  private:
   Mutex mutex_;

@@ -71,9 +71,9 @@ void FunctionChooser::beginNext() {
   try {
     answering_ = std::async(std::launch::async, [&cache = cache_, wake = wake_, scalar = question_.scalar] {
       nameThisThread("function");
-      struct Wake {
+      struct WakeAtEnd {
         void (*call)();
-        ~Wake() { call(); }
+        ~WakeAtEnd() { call(); }
       } const at_the_end{wake};
       return automaticFunction(cache, scalar);
     });
@@ -83,7 +83,7 @@ void FunctionChooser::beginNext() {
   }
 }
 
-std::optional<FunctionChooser::Answer> FunctionChooser::take() {
+std::optional<FunctionChooser::Answer> FunctionChooser::poll() {
   if (answering_.valid() ? answering_.wait_for(std::chrono::seconds(0)) != std::future_status::ready
                          : !busy())
     return std::nullopt;

@@ -53,7 +53,7 @@ class FunctionChooser {
   void drop(For what) { wanted(what).reset(); }
   /// Each answer, once. Throws what reading throws, which ends this question only. Call it often: it also
   /// begins the next question.
-  std::optional<Answer> take();
+  std::optional<Answer> poll();
   bool busy() const;
 
  private:

@@ -127,7 +127,7 @@ uint64_t FrameLoop::request(FrameRequest request) {
   return ++newest_;
 }
 
-std::optional<ShownFrame> FrameLoop::take() {
+std::optional<ShownFrame> FrameLoop::poll() {
   const MutexLock lock(mutex_);
   if (failure_)
     std::rethrow_exception(state_ == State::kFailed ? failure_ : std::exchange(failure_, nullptr));

@@ -1,7 +1,7 @@
 // Draws the pictures of a window on a thread of its own: first a coarse one, then finer ones until the
 // requested error is reached. A new request replaces the one before.
 //
-//   window --request()--> [ frame loop's thread: FrameRenderer ] --picture, wake()--> window calls take()
+//   window --request()--> [ frame loop's thread: FrameRenderer ] --picture, wake()--> window calls poll()
 //
 // While the camera moves, each picture is as fine as its time budget allows and is always completed; the
 // next one begins when it is shown. At rest, each picture draws four times the splats of the previous one,
@@ -18,7 +18,7 @@
 //     |                                        |
 //     '--------- done, or stopped -------------'
 //
-//   each of these --an error of reading or drawing--> kFailed     take() throws it; nothing more is drawn
+//   each of these --an error of reading or drawing--> kFailed     poll() throws it; nothing more is drawn
 //   every state   --destructor----------------------> kStopping   the thread ends
 #pragma once
 
@@ -125,7 +125,7 @@ class Effort {
 /// All members are for one thread, the window's.
 class FrameLoop {
  public:
-  /// Calls `wake` on the loop's thread whenever take() has something to return. Opens the cache for itself,
+  /// Calls `wake` on the loop's thread whenever poll() has something to return. Opens the cache for itself,
   /// since it goes from step to step. If `after` is valid, it is waited for before anything is drawn: the
   /// memory of another loop.
   FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
@@ -137,10 +137,10 @@ class FrameLoop {
 
   /// Returns the request's number: 1, 2, ...
   uint64_t request(FrameRequest request);
-  /// The newest picture since the last take(), or nullopt. Throws the error of reading or drawing that ended
+  /// The newest picture since the last poll(), or nullopt. Throws the error of reading or drawing that ended
   /// the loop, or UsageError (too little memory for this size, no faces at this step), which ends only the
   /// request.
-  std::optional<ShownFrame> take();
+  std::optional<ShownFrame> poll();
   /// The memory of the last picture taken is free: for requests that want one_at_a_time. No effect otherwise.
   void giveBack();
   /// Asks for the values of the newest request's picture, once that is shown. A request ends it.

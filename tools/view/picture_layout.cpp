@@ -77,7 +77,7 @@ void PointProbe::ask(const Question& question, bool again) {
   asked_ = next_ = question;
 }
 
-std::optional<PointProbe::Answer> PointProbe::take() {
+std::optional<PointProbe::Answer> PointProbe::poll() {
   std::optional<Answer> answer;
   if (answering_.valid() && answering_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
     answer = answering_.get();

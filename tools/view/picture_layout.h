@@ -70,7 +70,7 @@ class PointProbe {
   void ask(const Question& question, bool again = false);
   /// An answer that has come since the last call. Throws what reading throws. Call it often: it also begins
   /// to answer the next question.
-  std::optional<Answer> take();
+  std::optional<Answer> poll();
   bool busy() const { return answering_.valid() || next_; }
 
  private:

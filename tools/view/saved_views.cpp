@@ -156,9 +156,9 @@ std::string number(double value) {
   return fmt::format("{}", value == 0 ? 0 : roundedTo(value, std::abs(value), kDigits));
 }
 
-class Words {
+class CommandLine {
  public:
-  explicit Words(std::string begin) : text_(std::move(begin)) {}
+  explicit CommandLine(std::string begin) : text_(std::move(begin)) {}
   void add(const std::string& option, const std::string& value) {
     text_ += ' ';
     text_ += shellOption(option, value);
@@ -170,7 +170,7 @@ class Words {
   std::string text_;
 };
 
-void addFunction(const EditedFunction& function, const std::filesystem::path& file, Words& words) {
+void addFunction(const EditedFunction& function, const std::filesystem::path& file, CommandLine& words) {
   const auto parts = function.parts(true);
   if (!parts) return words.add("--tf", file.string());
   words.add("--tf", parts->map);
@@ -178,14 +178,14 @@ void addFunction(const EditedFunction& function, const std::filesystem::path& fi
   if (parts->asinh) words.add("--asinh", fmt::format("{},{}", parts->asinh->centre, parts->asinh->width));
 }
 
-void addOpacities(const EditedFunction& function, Words& words) {
+void addOpacities(const EditedFunction& function, CommandLine& words) {
   const auto parts = function.parts(true);
   if (parts && !parts->opacities.empty()) words.add("--opacity", textOf(parts->opacities));
   words.add("--opacity-unit", number(function.opacityUnit()));
 }
 
 /// Adds the functions, in pictures of two scalars the colours of one and the opacities of the other.
-void addFunctions(const ViewState& state, const CommandOptions& options, Words& words) {
+void addFunctions(const ViewState& state, const CommandOptions& options, CommandLine& words) {
   addFunction(state.function, options.function_file, words);
   if (!state.opacity_by) return addOpacities(state.function, words);
   const auto& [variable, function] = *state.opacity_by;
@@ -200,7 +200,7 @@ void addFunctions(const ViewState& state, const CommandOptions& options, Words& 
   addOpacities(function, words);
 }
 
-void addCamera(const Camera& camera, Words& words) {
+void addCamera(const Camera& camera, CommandLine& words) {
   const bool perspective = camera.projection == Projection::kPerspective;
   const double half_height = perspective ? glm::length(camera.position - camera.focal_point) *
                                                std::tan(0.5 * glm::radians(camera.view_angle_deg))
@@ -225,7 +225,7 @@ std::string text(const SheetOpacity& opacity) {
 }
 
 /// Adds an option for each surface, if any is not opaque.
-void addSurfaceOpacities(const ViewState& state, Words& words) {
+void addSurfaceOpacities(const ViewState& state, CommandLine& words) {
   std::vector<SheetOpacity> opacities;
   for (const SurfaceFile& surface : state.surfaces) opacities.push_back({surface.opacity});
   for (const NamedFaces& named : state.faces) opacities.push_back(state.opacityOf(named));
@@ -234,7 +234,7 @@ void addSurfaceOpacities(const ViewState& state, Words& words) {
   for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
 }
 
-void addSurfaces(const ViewState& state, Words& words) {
+void addSurfaces(const ViewState& state, CommandLine& words) {
   const auto add_colour = [&](const glm::vec3& colour) {
     const glm::ivec3 rgb(255.0f * colour + 0.5f);
     words.add("--surface-colour", fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
@@ -273,7 +273,8 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   std::string files = shellWord(options.cache.string());
   for (const std::filesystem::path& file : options.solutions)
     files += fmt::format(" {}", shellWord(file.string()));
-  Words words(fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
+  CommandLine words(
+      fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
   if (options.precision != ValuePrecision::kAuto) words.add("--value-precision", wordOf(options.precision));
   const int multiple = options.turns ? 2 : 1;  // an .mp4 has an even width and height
   words.add("--size", fmt::format("{}x{}", options.size.width / multiple * multiple,

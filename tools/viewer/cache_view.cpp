@@ -169,7 +169,7 @@ void CacheView::takeFrame() {
   if (frames_failed_) return;
   std::optional<ShownFrame> frame;
   try {
-    frame = frames_->take();
+    frame = frames_->poll();
     if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
   } catch (const UsageError&) {  // of this request only
     giveUpRequest();

@@ -72,7 +72,7 @@ class CacheView {
   void showScalar(const std::string& name);
   /// An empty name: the opacities are of the same scalar.
   void chooseOpacityScalar(const std::string& name);
-  void take(const FileDialog::Chosen& chosen);
+  void use(const FileDialog::Chosen& chosen);
   void addTo(MenuFacts& facts);
   bool isEnabled(Command command) const;
   bool isChecked(Command command) const;

@@ -129,7 +129,7 @@ void CacheView::probe(const WindowLayout& layout) {
   }
   std::optional<PointProbe::Answer> answer;
   try {
-    answer = probe_.take();
+    answer = probe_.poll();
   } catch (const Error& error) {
     probed_ = fmt::format("the value here cannot be read: {}", error.what());
     if (std::exchange(marker_question_, std::nullopt)) reports_.report(error);
@@ -276,7 +276,7 @@ void CacheView::copyCommand(bool turns) {
   }
 }
 
-void CacheView::take(const FileDialog::Chosen& chosen) {
+void CacheView::use(const FileDialog::Chosen& chosen) {
   const fs::path& file = chosen.files.front();
   try {
     switch (chosen.purpose) {
@@ -428,8 +428,8 @@ void CacheView::readSurface(const fs::path& file) {
     return say(fmt::format("There are {} surfaces, and no more can be added.", kMaxSurfaces));
   reading_surface_ = std::async(std::launch::async, [file] {
     nameThisThread("surface");
-    struct Wake {
-      ~Wake() { Window::wake(); }
+    struct WakeAtEnd {
+      ~WakeAtEnd() { Window::wake(); }
     } const at_the_end;
     SurfaceFile surface{file};
     surface.mesh = std::make_shared<TriangleMesh>(readMeshFile(file));
@@ -447,7 +447,7 @@ void CacheView::takeSurface() {
 
 /// Takes the function that the chooser has found. What the user has edited meanwhile stays.
 void CacheView::takeFunction() {
-  const auto found = chooser_.take();
+  const auto found = chooser_.poll();
   if (!found) return;
   const auto& [question, function] = *found;
   switch (question.what) {

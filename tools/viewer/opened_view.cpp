@@ -190,7 +190,7 @@ void OpenedView::takeWhole() {
   const std::unique_ptr<Opening> done = std::move(opening_);
   const std::shared_ptr<Preparation> preparation = std::move(preparation_);
   try {
-    const fs::path cache = done->take();
+    const fs::path cache = done->get();
     ViewerOptions options = viewOptions();
     if (adds_to_) {
       options.grid_files = view_->gridFiles();

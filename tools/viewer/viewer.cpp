@@ -98,7 +98,7 @@ class Viewer {
       begin(std::move(*wanted));
     if (!movie_ || !movie_->isDone()) return;
     const std::unique_ptr<BackgroundJob> done = std::move(movie_);
-    reports_.attempt([&] { reports_.say("saved " + fs::absolute(done->take()).string()); });
+    reports_.attempt([&] { reports_.say("saved " + fs::absolute(done->get()).string()); });
   }
 
   /// Draws what goes on in the background.
@@ -144,7 +144,7 @@ class Viewer {
     if (chosen && chosen->purpose == FileDialog::Purpose::kOpenData)
       opened_.open(chosen->files);
     else if (chosen && opened_.view())
-      reports_.attempt([&] { opened_.view()->take(*chosen); });
+      reports_.attempt([&] { opened_.view()->use(*chosen); });
     if (const auto files = std::exchange(to_open_, std::nullopt))
       opened_.open({files->begin(), files->end()});
     if (const auto dropped = window_.takeDropped(); !dropped.empty())

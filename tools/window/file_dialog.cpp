@@ -85,7 +85,7 @@ void FileDialog::open(Purpose purpose, const std::string& name) {
   frames_to_focus_ = kFramesToFocus;
   std::error_code ignored;
   enter(folder_.empty() ? fs::current_path(ignored) : folder_);
-  take({});
+  select({});
   name_ = name;
 }
 
@@ -102,7 +102,7 @@ void FileDialog::openToSaveMovie(const std::string& name, const std::string& abo
 void FileDialog::enter(const fs::path& folder) {
   error_.clear();
   overwrites_.clear();
-  if (!lookOf(*purpose_).saves) take({});
+  if (!lookOf(*purpose_).saves) select({});
   try {
     entries_ = entriesOf(folder, lookOf(*purpose_).endings);
     folder_ = folder;
@@ -230,14 +230,14 @@ void FileDialog::drawEntries(bool& accepts) {
       names = taken_;
       if (std::erase(names, entry.name) == 0) names.push_back(entry.name);
     }
-    take(std::move(names));
+    select(std::move(names));
     accepts |= twice;
   }
   ImGui::EndChild();
   if (entered) enter(*entered);
 }
 
-void FileDialog::take(std::vector<std::string> names) {
+void FileDialog::select(std::vector<std::string> names) {
   taken_ = std::move(names);
   name_.clear();
   for (const std::string& name : taken_) name_ += (name_.empty() ? "" : " ") + name;

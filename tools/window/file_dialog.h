@@ -47,7 +47,7 @@ class FileDialog {
  private:
   void enter(const std::filesystem::path& folder);
   void drawEntries(bool& accepts);
-  void take(std::vector<std::string> names);
+  void select(std::vector<std::string> names);
   bool isTaken(const std::string& name) const;
   std::optional<Chosen> accept();
   void drawSize();

@@ -57,7 +57,7 @@ struct FoamFile::Parser final : FoamParser {
               const std::function<void(std::span<const std::byte>, size_t)>& use) {
     skipSpace();
     if (count == 0 && peek() != '(') return;
-    if (take() != '(') fail("has no opening parenthesis before its numbers; the file is damaged");
+    if (get() != '(') fail("has no opening parenthesis before its numbers; the file is damaged");
     const uint64_t begin = offset();
     if (!has_arch && !closesAfter(begin, count, width) && closesAfter(begin, count, 12 - width))
       width = 12 - width;

@@ -49,7 +49,7 @@ int FoamParser::peek() {
   return static_cast<unsigned char>(buffer_[at_]);
 }
 
-int FoamParser::take() {
+int FoamParser::get() {
   const int c = peek();
   if (c >= 0) ++at_;
   return c;
@@ -75,7 +75,7 @@ uint64_t FoamParser::enterPart() {
 }
 
 void FoamParser::skipSpace() {
-  while (isSpace(peek())) take();
+  while (isSpace(peek())) get();
 }
 
 std::string FoamParser::token() {
@@ -83,7 +83,7 @@ std::string FoamParser::token() {
     std::string word = nextToken();
     if (word.empty() || word[0] != '$') return word;
     if (word == "$" && peek() == '{')
-      for (int next = 0; next != '}' && peek() >= 0; add(word, next)) next = take();
+      for (int next = 0; next != '}' && peek() >= 0; add(word, next)) next = get();
     std::string key = word.substr(1);
     if (key.size() > 2 && key.front() == '{') key = key.substr(1, key.size() - 2);
     const auto entry = entries_.find(key);
@@ -101,15 +101,15 @@ std::string FoamParser::nextToken() {
   }
   for (;;) {
     skipSpace();
-    const int c = take();
+    const int c = get();
     if (c < 0) return "";
     if (c == '/' && peek() == '/') {
-      while (peek() >= 0 && peek() != '\n') take();
+      while (peek() >= 0 && peek() != '\n') get();
       continue;
     }
     if (c == '/' && peek() == '*') {
       for (int before = 0; peek() >= 0;) {
-        const int next = take();
+        const int next = get();
         if (before == '*' && next == '/') break;
         before = next;
       }
@@ -118,10 +118,10 @@ std::string FoamParser::nextToken() {
     std::string word(1, static_cast<char>(c));
     if (isPunctuation(c)) return word;
     if (c == '"') {
-      for (int next = take(); next >= 0 && next != '"'; next = take()) add(word, next);
+      for (int next = get(); next >= 0 && next != '"'; next = get()) add(word, next);
       return word;
     }
-    while (peek() >= 0 && !isSpace(peek()) && !isPunctuation(peek())) add(word, take());
+    while (peek() >= 0 && !isSpace(peek()) && !isPunctuation(peek())) add(word, get());
     return word;
   }
 }

@@ -31,7 +31,7 @@ class FoamParser {
 
   /// The next character; -1 at the end of the text.
   int peek();
-  int take();
+  int get();
   void skipSpace();
   /// The next token; empty at the end. "$name" and "${name}" are replaced by the tokens of the entry that they
   /// name.

@@ -23,9 +23,9 @@ constexpr const char* kTypeNames[] = {"ORDERED",       "FELINESEG", "FETRIANGLE"
                                       "FETETRAHEDRON", "FEBRICK",   "FEPOLYGON",  "FEPOLYHEDRON"};
 
 /// The file in its order, through a buffer.
-class Words {
+class BinaryReader {
  public:
-  explicit Words(std::shared_ptr<const PooledFile> file) : file_(std::move(file)) {}
+  explicit BinaryReader(std::shared_ptr<const PooledFile> file) : file_(std::move(file)) {}
 
   const std::shared_ptr<const PooledFile>& file() const { return file_; }
   std::string name() const { return file_->name(); }
@@ -40,14 +40,14 @@ class Words {
   }
 
   template <typename Value>
-  Value take() {
+  Value read() {
     need(sizeof(Value));
     if (offset_ < begin_ || offset_ + sizeof(Value) > begin_ + buffer_.size()) fill();
     const Value value = loadStored<Value>(buffer_.data() + (offset_ - begin_), swap_);
     offset_ += sizeof(Value);
     return value;
   }
-  int32_t integer() { return take<int32_t>(); }
+  int32_t integer() { return read<int32_t>(); }
   /// 0 or 1, or another number that `what` must not have.
   bool flag(const char* what) {
     const int32_t value = integer();
@@ -149,7 +149,7 @@ class Reader {
 
   void readHeader() {
     for (;;) {
-      const auto mark = words_.take<float>();
+      const auto mark = words_.read<float>();
       if (mark == kEndOfHeader) return;
       if (mark == kZone) {
         readZone();
@@ -177,7 +177,7 @@ class Reader {
     zone.name = words_.text();
     if (version_ >= 107) words_.integer();  // the parent
     const int32_t strand = words_.integer();
-    const auto time = words_.take<double>();
+    const auto time = words_.read<double>();
     // -1: static; -2: to be given a strand by whoever reads it.
     if (strand != -1 && std::isfinite(time)) zone.time = time;
     words_.integer();  // colour
@@ -250,7 +250,7 @@ class Reader {
 
   void readData(size_t number) {
     TecplotZone& zone = data_.zones[number];
-    const auto mark = words_.take<float>();
+    const auto mark = words_.read<float>();
     if (mark != kZone) words_.damaged("the mark of a zone's data", mark, "299");
     for (TecplotValues& values : zone.values) {
       const int32_t type = words_.integer();
@@ -339,19 +339,19 @@ class Reader {
     if (number + 1 == data_.zones.size()) return end == words_.size();
     if (end == kNoEnd || end > words_.size() - 4) return false;
     words_.seek(end);
-    return words_.take<float>() == kZone;
+    return words_.read<float>() == kZone;
   }
 
   /// Skips the neighbours of faces, which have no fixed size: up to the mark of the next zone.
   void skipNeighbours(uint64_t neighbours, size_t number) {
     if (neighbours == 0 || number + 1 == data_.zones.size()) return;
-    while (words_.take<float>() != kZone) continue;
+    while (words_.read<float>() != kZone) continue;
     words_.seek(words_.offset() - 4);
   }
 
   static constexpr uint64_t kNoEnd = std::numeric_limits<uint64_t>::max();
 
-  Words words_;
+  BinaryReader words_;
   int version_ = 0;
   bool has_packing_ = false;
   TecplotData data_;

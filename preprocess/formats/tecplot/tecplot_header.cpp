@@ -93,7 +93,7 @@ std::vector<TecplotToken> TecplotTokens::takeValue() {
   int depth = 0;
   do {
     if (done()) break;
-    const TecplotToken& token = take();
+    const TecplotToken& token = pop();
     const bool sign = token.kind == TecplotToken::Kind::kSign;
     if (sign && (token.text == "(" || token.text == "[")) ++depth;
     if (sign && (token.text == ")" || token.text == "]")) --depth;
@@ -117,13 +117,13 @@ std::optional<TecplotSets> tecplotSets(const std::vector<TecplotToken>& value, s
     std::vector<size_t> numbers;
     const bool bracketed = tokens.takeSign('[');
     do {
-      if (!appendRange(tokens.take().text, variables, numbers)) return std::nullopt;
+      if (!appendRange(tokens.pop().text, variables, numbers)) return std::nullopt;
       if (total + numbers.size() > kOften * variables) return std::nullopt;
     } while (tokens.takeSign(',') && !tokens.done());
     if (bracketed && !tokens.takeSign(']')) return std::nullopt;
     total += numbers.size();
     sets.emplace_back(std::move(numbers), "");
-    if (tokens.takeSign('=')) sets.back().second = tokens.take().text;
+    if (tokens.takeSign('=')) sets.back().second = tokens.pop().text;
   }
   return sets;
 }

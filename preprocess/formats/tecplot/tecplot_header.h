@@ -28,7 +28,7 @@ class TecplotTokens {
   bool done() const { return at_ >= tokens_.size(); }
   /// The next token; empty at the end.
   const TecplotToken& peek() const { return done() ? none_ : tokens_[at_]; }
-  const TecplotToken& take() {
+  const TecplotToken& pop() {
     const TecplotToken& token = peek();
     ++at_;
     return token;

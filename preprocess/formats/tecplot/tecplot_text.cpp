@@ -190,7 +190,7 @@ class Reader {
   bool readRecords(TecplotTokens& tokens) {
     bool zone = false;
     while (!tokens.done()) {
-      const TecplotToken record = tokens.take();
+      const TecplotToken record = tokens.pop();
       zone = record.text == "ZONE";
       if (zone) {
         placeEmpty();
@@ -205,7 +205,7 @@ class Reader {
               "file",
               file_->name());
       }
-      while (!tokens.done() && !tokens.atRecord()) tokens.take();
+      while (!tokens.done() && !tokens.atRecord()) tokens.pop();
     }
     return zone;
   }
@@ -216,7 +216,7 @@ class Reader {
     tokens.takeSign('=');
     while (!tokens.done() && !tokens.atRecord()) {
       if (tokens.takeSign(',')) continue;
-      data_.variables.push_back(tokens.take().raw);
+      data_.variables.push_back(tokens.pop().raw);
     }
   }
 
@@ -232,10 +232,10 @@ class Reader {
     text.shared.assign(data_.variables.size(), -1);
     while (!tokens.done() && !tokens.atRecord()) {
       if (tokens.takeSign(',')) continue;
-      const std::string key = tokens.take().text;
+      const std::string key = tokens.pop().text;
       if (key == "AUXDATA") {
-        tokens.take();
-        if (tokens.takeSign('=')) tokens.take();
+        tokens.pop();
+        if (tokens.takeSign('=')) tokens.pop();
       } else if (tokens.takeSign('=')) {
         setKey(key, tokens.takeValue(), zone, text);
       }
@@ -454,7 +454,7 @@ bool isTecplotText(const InputFile& file) {
     if (tokens.empty()) continue;
     TecplotTokens record(tokens);
     if (!record.atRecord()) return false;
-    const std::string word = record.take().text;
+    const std::string word = record.pop().text;
     if (word == "TITLE" || word == "VARIABLES" || word == "FILETYPE")
       return record.done() || record.takeSign('=');
     return word == "ZONE" && !record.done() && record.peek().kind == TecplotToken::Kind::kWord;

@@ -232,7 +232,7 @@ class Inflater {
   }
 
   /// Decompresses to `to` as far as the input allows; returns the number of bytes written.
-  size_t take(std::span<std::byte> to) {
+  size_t read(std::span<std::byte> to) {
     if (ended_) return 0;
     stream_.next_out = reinterpret_cast<Bytef*>(to.data());
     stream_.avail_out = static_cast<uInt>(to.size());
@@ -256,10 +256,10 @@ void unpackZlib(const std::string& place, uint64_t block, std::span<const std::b
                 std::span<std::byte> to) {
   Inflater inflater(place, block);
   inflater.give(packed);
-  const size_t bytes = inflater.take(to);
+  const size_t bytes = inflater.read(to);
   std::byte more;
   // zlib checks the checksum at the end of the stream only when more than the last byte is requested.
-  if (bytes != to.size() || (!inflater.ended() && inflater.take(std::span(&more, 1)) > 0) ||
+  if (bytes != to.size() || (!inflater.ended() && inflater.read(std::span(&more, 1)) > 0) ||
       !inflater.ended())
     failBlock(place, block, "its size differs from the table");
 }
@@ -299,7 +299,7 @@ void spoolZlib(const CompressedBytes::Parts& parts, uint64_t block, uint64_t off
     inflater.give(std::span(in).first(given));
     offset += given;
     packed -= given;
-    for (size_t bytes; (bytes = inflater.take(out)) > 0;) {
+    for (size_t bytes; (bytes = inflater.read(out)) > 0;) {
       if (bytes > unpacked) failBlock(parts.place, block, "it is larger than the table declares");
       sink(std::span(out).first(bytes));
       unpacked -= bytes;
