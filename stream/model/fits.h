@@ -20,7 +20,7 @@ inline constexpr float kGrowthByCurve = 0.2892f, kGrowthByFarCurve = -0.0667f;  
 inline constexpr float kGrowthByBend = 0.0676f, kGrowthByBendCurve = 0.1392f, kSteepGrowth = -0.0654f;
 /// How far a splat lies from its cell's middle, towards the larger cells, where cells grow by e^g: in cells, for g = 1.
 inline constexpr float kDrift = 0.14f;
-// What the drift has besides, in cells.
+// Further terms of the drift, in cells.
 inline constexpr float kDriftByCurve = 0.0457f, kDriftByBend = 0.0033f, kSteepDrift = 0.0189f;
 /// The slope², from which on cells grow steeply. Chosen, not fitted: e^0.42 from cell to cell.
 inline constexpr float kSteepFrom = 0.7f;
@@ -74,10 +74,10 @@ struct FittedCubic {
 inline constexpr FittedCubic kMergedDistance{-0.498f, 0.951f, -0.218f, 0.0226f},
     kMergedSize{1, 0.0203f, 0.2107f, 0.0311f}, kMergedShare{1, 0.0938f, 0.4622f, -0.0497f};
 
-/// What BorderStyle::cut changes by where cells grow from the border inwards by e^g, g from -0.25 to 0.5. Of a half cell: g
-/// times first + second min(g, 0.3).
+/// Changes of BorderStyle::cut where cells grow from the border inwards by e^g, g from -0.25 to 0.5. A half cell's cut changes
+/// by g times first + second min(g, 0.3).
 inline constexpr BorderPart kHalfCutByGrowth{0.52f, -0.63f, -0.76f}, kHalfCutByGrowth2{0.4f, -0.45f, -0.9f};
-/// Of a whole cell: g times this where cells grow and where they shrink.
+/// A whole cell's cut changes by g times this, where cells grow and where they shrink.
 inline constexpr BorderPart kWholeCutByGrowth{0.08f, 0.07f, 0}, kWholeCutByShrinking{0.02f, 0.12f, 0.065f};
 /// The share of its skew along the direction inwards that a cell keeps which is cut. Chosen, with the numbers above fitted to it.
 inline constexpr float kSkewOfCut = 0.6f;
