@@ -68,7 +68,7 @@ HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const 
     const V lost = hn::Mul(hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along)), lostByHiding(tau, near_side));
     const V narrower = hn::Sqrt(hn::Max(hn::MulSub(all, all, lost), zero));
     const V half_width = hn::IfThenElse(hides, narrower, all);
-    const V correlation = hn::Sub(hn::Neg(gather(work, offsets, 2)), hn::Set(d, 194.0f));
+    const V correlation = hn::Sub(hn::Neg(gather(work, offsets, 2)), hn::Set(d, kColourTag));
     const V slope = hn::Sqrt(hn::MulAdd(slope0, slope0, hn::Mul(slope1, slope1)));
     const V inverse = hn::Div(one, hn::Max(slope, hn::Set(d, 1e-37f)));
     store(hn::Mul(slope0, inverse), out.tp);

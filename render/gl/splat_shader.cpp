@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "render/project/record_tags.h"
+
 namespace curvisplat {
 namespace {
 
@@ -67,22 +69,22 @@ struct ColourRecord {
 // next: its ScreenCut or ScreenDepth, if its amplitude is negative; beyond: the ScreenCut of one with a ScreenDepth
 void setUp(Record splat, int packed_skew, float along_ray, ColourRecord of_colours, Record next, Record beyond) {
   faces = mat3(next.part0.xyw, next.part1.xyz, vec3(next.part1.w, next.part2));
-  cut.x = floor(-0.25 * next.part0.z);
-  cut.y = -next.part0.z - 4.0 * cut.x - 2.0;
+  cut.x = floor(-next.part0.z / kFarSidesTag);
+  cut.y = -next.part0.z - kFarSidesTag * cut.x - kCutTag;
   depth_line = vec4(0.0);
-  if (splat.part1.y < 0.0 && next.part0.z < -32.0) {
+  if (splat.part1.y < 0.0 && next.part0.z < 2.0 - kDepthTag) {
     depth_line = vec4(next.part0.xyw, next.part1.x);
-    bool has_cut = next.part0.z < -96.0;
+    bool has_cut = next.part0.z < 2.0 - kDepthOfCutTag;
     faces = has_cut ? mat3(beyond.part0.xyw, beyond.part1.xyz, vec3(beyond.part1.w, beyond.part2)) : mat3(kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0);
-    cut.x = has_cut ? floor(-0.25 * beyond.part0.z) : 0.0;
-    cut.y = -next.part0.z - (has_cut ? 98.0 : 34.0);
+    cut.x = has_cut ? floor(-beyond.part0.z / kFarSidesTag) : 0.0;
+    cut.y = -next.part0.z - (has_cut ? kDepthOfCutTag : kDepthTag);
   }
   centre = splat.part0.xy;
   u_from_d = vec3(1.0 / splat.part0.z, -splat.part0.w / (splat.part0.z * splat.part1.x), 1.0 / splat.part1.x);
   amplitude = splat.part1.y;
   scalar = vec4(splat.part1.zw, splat.part2);
   colour = vec4(of_colours.part0.xyw, of_colours.part1.x);
-  colour_correlation = -of_colours.part0.z - 194.0;
+  colour_correlation = -of_colours.part0.z - kColourTag;
   skew = skewOf(packed_skew);
   light = vec2(1.0, 0.0);
   if (lit) {  // light.h
@@ -397,11 +399,18 @@ std::string kindOf(const SplatShaderKind& kind) {
       kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kind.coloured, kind.colour_log_scale);
 }
 
+std::string recordTags() {
+  return fmt::format(
+      "const float kCutTag = {:.1f}, kFarSidesTag = {:.1f}, kDepthTag = {:.1f}, kDepthOfCutTag = {:.1f}, "
+      "kColourTag = {:.1f};\n",
+      kCutTag, kFarSidesTag, kDepthTag, kDepthOfCutTag, kColourTag);
+}
+
 }  // namespace
 
 std::string splatVertexShader() {
-  return fmt::format("#version 330 core\n#define PER_SPLAT flat out\n{}{}{}{}", kUniforms, kPerSplat, kSetUp,
-                     kVertexShader);
+  return fmt::format("#version 330 core\n#define PER_SPLAT flat out\n{}{}{}{}{}", kUniforms, kPerSplat,
+                     recordTags(), kSetUp, kVertexShader);
 }
 
 std::string splatFragmentShader(SplatShaderKind kind) {
@@ -411,8 +420,8 @@ std::string splatFragmentShader(SplatShaderKind kind) {
 
 std::string splatTileShader(SplatShaderKind kind) {
   return fmt::format(
-      "#version 430 core\n#define PER_SPLAT\n#define SMALL_TILE {}\n#define LARGE_TILE {}\n{}{}{}{}{}{}",
-      kSmallTile, kLargeTile, kindOf(kind), kUniforms, kPerSplat, kSetUp, kSeen, kTileShader);
+      "#version 430 core\n#define PER_SPLAT\n#define SMALL_TILE {}\n#define LARGE_TILE {}\n{}{}{}{}{}{}{}",
+      kSmallTile, kLargeTile, kindOf(kind), kUniforms, kPerSplat, recordTags(), kSetUp, kSeen, kTileShader);
 }
 
 }  // namespace curvisplat

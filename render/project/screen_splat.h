@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "render/project/record_tags.h"
+
 namespace curvisplat {
 
 /// One splat as the painters take it. With d the offset of a pixel's centre from (x, y) in pixels and u the
@@ -90,20 +92,20 @@ inline bool isRecord(const ScreenSplat& element) {
   return element.l11 < 0;
 }
 inline bool isColour(const ScreenSplat& element) {
-  return element.l11 < -128;
+  return hasTagFrom(element.l11, kColourTag);
 }
 inline bool isDepth(const ScreenSplat& element) {
-  return element.l11 < -32 && !isColour(element);
+  return hasTagFrom(element.l11, kDepthTag) && !isColour(element);
 }
 /// Whether a splat has a ScreenCut, a ScreenDepth, or both.
 inline bool hasCut(const ScreenSplat& splat) {
   return splat.amplitude < 0 && !isRecord(splat);
 }
 
-// l11 holds all that is not a face: -(4 far_sides + 2 + correlation).
+// l11 holds all that is not a face.
 inline ScreenSplat ScreenCut::record() const {
   const auto& f = faces;
-  return {f[0][0], f[0][1], -(4 * static_cast<float>(far_sides) + 2 + correlation),
+  return {f[0][0], f[0][1], -(kFarSidesTag * static_cast<float>(far_sides) + kCutTag + correlation),
           f[0][2], f[1][0], f[1][1],
           f[1][2], f[2][0], f[2][1],
           f[2][2], 0,       0,
@@ -113,32 +115,35 @@ inline ScreenSplat ScreenCut::record() const {
 inline ScreenCut ScreenCut::of(const ScreenSplat& r) {
   ScreenCut cut;
   cut.faces = {{{r.x, r.y, r.l21}, {r.l22, r.amplitude, r.mean}, {r.slope0, r.slope1, r.half_width}}};
-  cut.far_sides = static_cast<uint32_t>(-0.25f * r.l11);
-  cut.correlation = -r.l11 - 4 * static_cast<float>(cut.far_sides) - 2;
+  cut.far_sides = static_cast<uint32_t>(-r.l11 / kFarSidesTag);
+  cut.correlation = -r.l11 - kFarSidesTag * static_cast<float>(cut.far_sides) - kCutTag;
   return cut;
 }
 
-// The correlation is found as that of a ScreenCut, with far_sides 8 or 24.
 inline ScreenSplat ScreenDepth::record() const {
-  return {
-      middle, by[0], -(has_cut ? 98.0f : 34.0f) - correlation, by[1], per_depth, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-      0,      0};
+  return {middle, by[0],     -(has_cut ? kDepthOfCutTag : kDepthTag) - correlation,
+          by[1],  per_depth, 0,
+          0,      0,         0,
+          0,      0,         0,
+          0,      0,         0,
+          0};
 }
 inline ScreenDepth ScreenDepth::of(const ScreenSplat& r) {
   ScreenDepth depth;
   depth.middle = r.x;
   depth.by = {r.y, r.l21};
   depth.per_depth = r.l22;
-  depth.has_cut = r.l11 < -96;
-  depth.correlation = -r.l11 - (depth.has_cut ? 98.0f : 34.0f);
+  depth.has_cut = hasTagFrom(r.l11, kDepthOfCutTag);
+  depth.correlation = -r.l11 - (depth.has_cut ? kDepthOfCutTag : kDepthTag);
   return depth;
 }
 
 inline ScreenSplat ScreenColour::record() const {
-  return {mean, slope[0], -194.0f - correlation, slope[1], half_width, along, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  return {mean, slope[0], -kColourTag - correlation, slope[1], half_width, along, 0, 0, 0, 0, 0, 0, 0, 0,
+          0,    0};
 }
 inline ScreenColour ScreenColour::of(const ScreenSplat& r) {
-  return {r.x, {r.y, r.l21}, r.l22, -r.l11 - 194.0f, r.amplitude};
+  return {r.x, {r.y, r.l21}, r.l22, -r.l11 - kColourTag, r.amplitude};
 }
 
 /// A splat's records, found beside it. `step` is -1 where splats come from the nearest to the farthest, else
