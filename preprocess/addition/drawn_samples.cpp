@@ -119,6 +119,14 @@ class NoSink : public SplatSink {
 
 }  // namespace
 
+NodeSplatCorrections correctionsOf(const Manifest& manifest) {
+  NodeSplatCorrections corrections;
+  corrections.steep = manifest.isSteep();
+  corrections.octants = manifest.hasFeature(kCellOctants);
+  corrections.dual_cells = manifest.stretch == kDualCells;
+  return corrections;
+}
+
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   const bool first_version = manifest.requirements.empty();
   if (first_version) return UnlikeHalves::kMerged;
@@ -135,9 +143,7 @@ CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
 
 void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                            const std::filesystem::path& temporary_folder, Progress& progress) {
-  is_steep_ = cache.manifest().isSteep();
-  has_dual_cells_ = cache.manifest().stretch == kDualCells;
-  cuts_octants_ = cache.manifest().hasFeature(kCellOctants);
+  corrections_ = correctionsOf(cache.manifest());
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
 
@@ -147,9 +153,7 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
   SeamMerger seams(0, plan.seam_bytes, temporary_folder, unlike);
   NoSink none;
   SlabPass pass(progress);
-  pass.steep = is_steep_;
-  pass.dual_cells = has_dual_cells_;
-  pass.octants = cuts_octants_;
+  pass.corrections = corrections_;
   streamSplats(
       NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },
       seams, pass);

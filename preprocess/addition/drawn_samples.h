@@ -15,6 +15,7 @@
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/seams/joint_nodes.h"
+#include "preprocess/splats/node_splats.h"
 #include "stream/base/file.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
@@ -46,6 +47,8 @@ class DrawnNodes {
 
 /// How the conversion that made a cache treated coincident halves of unlike thickness.
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest);
+/// The corrections that the cache's splats were made with.
+NodeSplatCorrections correctionsOf(const Manifest& manifest);
 
 /// A structured grid of which nodes without a splat in the cache are blanked. With cell-centred scalars,
 /// cells without a splat in the cache have the value NaN.
@@ -80,10 +83,8 @@ class CacheGrid : public GridSource {
   const GridSource* source_;
   std::vector<uint64_t> first_nodes_;  // [block]
   std::unique_ptr<DrawnNodes> drawn_;
-  bool is_steep_ = true;        // of the cache (isSteep())
-  bool has_dual_cells_ = true;  // of the cache (kDualCells)
-  bool cuts_octants_ = true;    // of the cache (kCellOctants)
-  bool all_faces_ = false;      // while merged ones are looked for: nodes of block faces are not restricted
+  NodeSplatCorrections corrections_;  // of the cache
+  bool all_faces_ = false;  // while merged ones are looked for: nodes of block faces are not restricted
 };
 
 /// An unstructured grid of which cells, or points, without a splat in the cache are hidden. Points that are

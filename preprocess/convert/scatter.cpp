@@ -35,12 +35,9 @@ class SplatStream {
         centring_(reader.centring()),
         faces_(faces),
         sink_of_thread_(&sink_of_thread),
+        corrections_(pass.corrections),
         seams_(&seams),
         workers_([this] { return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size()), {}}; }) {
-    corrections_.steep = pass.steep;
-    corrections_.dual_cells = pass.dual_cells;
-    corrections_.octants = pass.octants;
-    corrections_.growth_codes = !pass.values_alone;
     if (pass.notes.from) before_ = *pass.notes.from;
     before_.handedness.resize(blocks_->size());
   }
@@ -172,7 +169,7 @@ class SplatStream {
   const Centring centring_;
   const AbuttingFaces* faces_;
   const SinkOfThread* sink_of_thread_;
-  NodeSplatCorrections corrections_;
+  const NodeSplatCorrections corrections_;
   ScatterState before_;  // of an interrupted run
   SeamMerger* seams_;
   tbb::enumerable_thread_specific<Worker> workers_;

@@ -18,6 +18,7 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/overset/block_owners.h"
 #include "preprocess/seams/seams.h"
+#include "preprocess/splats/node_splats.h"
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"
 #include "stream/model/octree.h"
@@ -57,10 +58,7 @@ struct SlabPass {
   BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
   Ranks* ranks = &oneRank();      // of which each makes the splats of a share; the counts are the whole's
   ScatterNotes notes;             // of a scatter() without ranks
-  bool octants = true;            // NodeSplatCorrections::octants
-  bool steep = true;              // NodeSplatCorrections::steep
-  bool dual_cells = true;         // NodeSplatCorrections::dual_cells
-  bool values_alone = false;      // are wanted: NodeSplatCorrections::growth_codes
+  NodeSplatCorrections corrections;
 };
 
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go
