@@ -61,7 +61,7 @@ std::string compressed(const std::string& bytes, Compressor compressor) {
   } else if (compressor == Compressor::kLzma) {
     size_t size = 0;
     packed.resize(lzma_stream_buffer_bound(bytes.size()));
-    lzma_easy_buffer_encode(5, LZMA_CHECK_CRC32, nullptr, reinterpret_cast<const uint8_t*>(bytes.data()),
+    lzma_easy_buffer_encode(0, LZMA_CHECK_CRC32, nullptr, reinterpret_cast<const uint8_t*>(bytes.data()),
                             bytes.size(), reinterpret_cast<uint8_t*>(packed.data()), &size, packed.size());
     packed.resize(size);
   } else {
