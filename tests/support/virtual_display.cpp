@@ -37,7 +37,7 @@ bool eventually(const std::function<bool()>& holds, double seconds) {
 }
 
 std::string VirtualDisplay::missing() {
-  for (const char* program : {"Xvfb", "xdotool", "xwd"}) {
+  for (const char* program : {"Xvfb", "xdotool"}) {
     RunningProgram which({"sh", "-c", std::string("command -v ") + program}, kEnv);
     if (which.wait().status != 0) return program;
   }
@@ -49,7 +49,8 @@ VirtualDisplay::VirtualDisplay(ImageSize size, const std::vector<std::string>& o
   while (fs::exists("/tmp/.X11-unix/X" + std::to_string(number))) ++number;
   name_ = fmt::format(":{}", number);
   const std::string screen = fmt::format("{}x{}x24", size.width, size.height);
-  std::vector<std::string> words{"Xvfb", name_, "-screen", "0", screen, "-noreset", "-nolisten", "tcp"};
+  std::vector<std::string> words{"Xvfb",         name_,       "-screen",  "0",         screen, "-fbdir",
+                                 folder_.path(), "-nocursor", "-noreset", "-nolisten", "tcp"};
   words.insert(words.end(), options.begin(), options.end());
   server_ = std::make_unique<RunningProgram>(words, kEnv);
   setenv("DISPLAY", name_.c_str(), 1);
@@ -72,11 +73,10 @@ void VirtualDisplay::act(const std::vector<std::string>& words) const {
   if (result.status != 0) throw std::runtime_error("xdotool: " + result.err);
 }
 
-// An XWD file: a header of 32-bit words, most significant byte first, a colour table, rows of pixels.
+// Xvfb keeps what it shows in an XWD file that it has mapped: a header of 32-bit words, most significant byte first, a colour table,
+// rows of pixels. A pointer would be among them.
 Image VirtualDisplay::screenshot() const {
-  const ProgramResult result = RunningProgram({"xwd", "-root", "-silent"}, kEnv).wait();
-  if (result.status != 0) throw std::runtime_error("xwd: " + result.err);
-  const std::string& bytes = result.out;
+  const std::string bytes = bytesOfFile(folder_ / "Xvfb_screen0");
   const uint32_t header = bigEndian(bytes, 0), stride = bigEndian(bytes, 12);
   const uint32_t colours = bigEndian(bytes, 19);
   Image image({static_cast<int>(bigEndian(bytes, 4)), static_cast<int>(bigEndian(bytes, 5))});

@@ -1,4 +1,4 @@
-// A display without a screen, and the hands and eyes of who sits before it: Xvfb, xdotool, xwd.
+// A display without a screen, and the hands and eyes of who sits before it: Xvfb, xdotool.
 #pragma once
 
 #include <functional>
@@ -8,6 +8,7 @@
 
 #include "render/image/image.h"
 #include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
 
@@ -27,7 +28,8 @@ class VirtualDisplay {
   Image screenshot() const;
 
  private:
-  std::string name_;  // ":1234"
+  const TemporaryFolder folder_;  // of the file that holds the screen's pixels
+  std::string name_;              // ":1234"
   std::unique_ptr<RunningProgram> server_;
 };
 
