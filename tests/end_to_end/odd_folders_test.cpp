@@ -20,7 +20,7 @@ void along(const GridNode& node, NodeValues& values) {
   values.scalars[0] = static_cast<float>(node.i);
 }
 
-TEST(OddNames, WorkEverywhere) {
+TEST(OddPaths, WorkEverywhere) {
   const TemporaryFolder folder;
   const fs::path inside = folder / "Größe ρ/two  words 'n\" %d";
   fs::create_directories(inside);
@@ -57,7 +57,7 @@ TEST(OddNames, WorkEverywhere) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "Größe ρ"), {}), 1);
 }
 
-TEST(OddNames, WorkWithoutAValidEncoding) {
+TEST(OddPaths, WorkWithoutAValidEncoding) {
   const TemporaryFolder folder;
   const fs::path prefix = folder / "lat\xfcn";
   writeCube(prefix, 8, along, "r\xfc");
