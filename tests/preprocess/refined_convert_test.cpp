@@ -177,8 +177,10 @@ void expectWithin(double most, const GridSource& grid, uint64_t sampled_nodes, c
 // A third of the grid, as eight million nodes are of one of 24 million.
 TEST(SampledNeeds, AreWithinAFactorOfOneAndAHalf) {
   constexpr SceneGridSize kSize{160, 128, 128};
-  for (const char* const name : {"o-grid", "wake"})
+  for (const char* const name : {"o-grid", "wake"}) {
+    if (!faults::isWholeSweep()) continue;  // usually the half blanked one alone
     expectWithin(1.5, SceneGridSource(makeScene(name), kSize), 800'000, name);
+  }
   const SceneGridSource annulus(makeScene("half-annulus"), kSize);
   expectWithin(1.5, HalfBlanked(annulus), 800'000, "half-annulus, half blanked");
 }

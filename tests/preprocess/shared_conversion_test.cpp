@@ -115,6 +115,7 @@ TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
   const Files expected = allFilesOf(options.output);
   fs::remove_all(options.output);
   for (const auto& [first, second] : {std::pair{3u, 1u}, {3u, 2u}, {1u, 3u}, {2u, 4u}}) {
+    if (first + second != 4 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(fmt::format("{}, then {}", first, second));
     options.output = folder_ / "again.splats";
     options.limits.bucket_splats = 20000;
