@@ -267,13 +267,15 @@ TEST_F(Surfaces, IsosurfacesAreOfOneField) {
       return compareImages(drawDirectly(source, 0, options, function.table, camera_, kSize), reference)
           .psnr_db;
     };
-    const double all = db({}), own = db({.common_field = false}), unended = db({.ended = false}),
+    const double all = db({});
+    EXPECT_GE(all, level.least_db) << level.pixels;
+    if (level.least_gain < 0 && !faults::isWholeSweep()) continue;
+    const double own = db({.common_field = false}), unended = db({.ended = false}),
                  rough = db({.smooth = false});
     fmt::print(
         "isosurface, {} pixels: {:.1f} dB; by own fields {:.1f}, without ends {:.1f}, with one ray {:.1f} "
         "dB\n",
         level.pixels, all, own, unended, rough);
-    EXPECT_GE(all, level.least_db) << level.pixels;
     for (const double without : {own, unended, rough})
       EXPECT_GE(all, without + level.least_gain) << level.pixels;
   }

@@ -79,6 +79,7 @@ TEST_F(Isosurfaces, CrossingsHaveTheirOpacityAndTheirLight) {
                   {1, true, {51.5, 51.5, 51}},
                   {0.5, true, {54, 54, 53.5}}};
   for (const auto& [opacity, volume, least_db] : pictures) {
+    if ((opacity < 1) != volume && !faults::isWholeSweep()) continue;
     const Image reference = marched(volume ? function.exact : nothing, colour, opacity);
     for (size_t n = 0; n < 3; ++n) {
       if (n == 1 && !faults::isWholeSweep()) continue;

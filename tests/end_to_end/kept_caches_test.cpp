@@ -7,6 +7,7 @@
 
 #include "stream/base/file.h"
 #include "tests/end_to_end/window_fixture.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/vts_writer.h"
 
 namespace curvisplat {
@@ -15,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST_F(KeptCaches, ProcessesMayOpenOneNewFileAtOnce) {
-  for (int round = 0; round < 10; ++round) {
+  for (int round = 0; round < (faults::isWholeSweep() ? 10 : 3); ++round) {
     fs::remove_all("kept");
     std::vector<std::unique_ptr<RunningProgram>> programs;
     for (int n = 0; n < 4; ++n)

@@ -91,9 +91,9 @@ TEST_F(LimitsTest, ConversionNamesTheLeastMemoryThatItTakes) {
 
 TEST_F(LimitsTest, LongRowsAreConvertedWithinTheMemory) {
   constexpr int kMebibytes = 160;
-  // Rows that have to be cut, of ever larger cross sections.
-  for (const char* size : {"250000x2x2", "100000x3x2", "20000x9x9"}) {
-    if (size[0] == '1' && !faults::isWholeSweep()) continue;
+  // Rows that have to be cut, of ever smaller cross sections.
+  for (const char* size : {"20000x9x9", "100000x3x2", "250000x2x2"}) {
+    if (!std::string(size).starts_with("250000") && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(size);
     run({"generate", "wake", "--size", size, "-o", file("long")});
     run({"convert", file("long.xyz"), file("long.fun"), "-o", file("long.splats"), "--overwrite", "--memory",
