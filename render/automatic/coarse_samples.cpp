@@ -13,7 +13,8 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMinSplats = 50'000;
-constexpr size_t kMinPoints = 300'000;
+// Small grids have some points for each splat, since more tell nothing new, but no fewer than kMinSamples in all.
+constexpr size_t kMinSamples = 60'000, kMaxSamples = 300'000, kSamplesPerSplat = 16;
 constexpr uint64_t kMaxSteps = 5;
 
 /// A point of the unit cube, of a sequence that fills it evenly (Kronecker's, with powers of the root of
@@ -80,6 +81,13 @@ void addSamples(const CacheReader& cache, std::span<const uint32_t> bricks, cons
   }
 }
 
+/// How many points stand for each of `splats` splats.
+size_t pointsPerSplat(size_t splats) {
+  if (splats == 0) return 1;
+  const auto reaching = [&](size_t points) { return (points + splats - 1) / splats; };
+  return std::min(reaching(kMaxSamples), std::max(kSamplesPerSplat, reaching(kMinSamples)));
+}
+
 }  // namespace
 
 std::vector<uint32_t> bricksAtALevel(const CacheReader& cache, uint64_t min_splats) {
@@ -113,7 +121,7 @@ CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm
   size_t splats = 0;
   for (const uint32_t brick : chosen) splats += steps * cache.bricks()[brick].splats;
   const VariableInfo info = variableFor(cache, variable, what);
-  const size_t points = splats > 0 ? (kMinPoints + splats - 1) / splats : 1;
+  const size_t points = pointsPerSplat(splats);
   const double stretch = scale.x * scale.y * scale.z;
   const Sampling sampling{variable,
                           scale,

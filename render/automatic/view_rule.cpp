@@ -76,15 +76,16 @@ struct Bounds {
 /// Coarse samples as seen from one side, sorted into square pixels: what areas are measured with. Borrows the samples.
 class PixelSums {
  public:
-  /// Pixels along the longer side: some 50 samples for each pixel.
-  static constexpr int kPixels = 80;
+  /// Pixels along the longer side, and about how many samples a pixel has: fewer samples are seen with larger pixels, without gaps.
+  static constexpr int kMaxPixels = 80, kSamplesPerPixel = 47;
 
   /// `view`: as Camera::named() knows it. `bounds`: of the samples, of which there are some.
   PixelSums(const CoarseSamples& samples, const Bounds& bounds, std::string_view view)
       : samples_(samples),
-        view_from_world_(
-            Camera::named(view, bounds.lower, bounds.upper, {kPixels, kPixels}, Projection::kOrthographic)
-                .viewFromWorld()) {
+        pixels_(std::min(kMaxPixels, 1 + static_cast<int>(std::sqrt(samples.size() / kSamplesPerPixel)))),
+        view_from_world_(Camera::named(view, bounds.lower, bounds.upper, {kMaxPixels, kMaxPixels},
+                                       Projection::kOrthographic)
+                             .viewFromWorld()) {
     glm::dvec2 lowest(std::numeric_limits<double>::max()), highest(-std::numeric_limits<double>::max());
     for (const glm::dvec3& position : samples.positions) {
       const glm::dvec2 place = placeOf(position);
@@ -92,19 +93,20 @@ class PixelSums {
       highest = glm::max(highest, place);
     }
     lowest_ = lowest;
-    width_ = std::max(highest.x - lowest.x, highest.y - lowest.y) / kPixels;
+    width_ = std::max(highest.x - lowest.x, highest.y - lowest.y) / pixels_;
   }
 
   /// [pixel]: the sum of weightOf(n) over its samples n. All are 0 if the samples are one point.
   template <typename WeightOf>
   std::vector<double> of(const WeightOf& weightOf) const {
-    std::vector<double> sums(size_t{kPixels} * kPixels, 0);
+    const auto pixels = static_cast<size_t>(pixels_);
+    std::vector<double> sums(pixels * pixels, 0);
     if (!(width_ > 0)) return sums;
     for (size_t n = 0; n < samples_.size(); ++n) {
       const glm::dvec2 place = (placeOf(samples_.positions[n]) - lowest_) / width_;
-      const auto column = static_cast<size_t>(std::min(kPixels - 1, static_cast<int>(place.x)));
-      const auto row = static_cast<size_t>(std::min(kPixels - 1, static_cast<int>(place.y)));
-      sums[row * kPixels + column] += weightOf(n);
+      const auto column = static_cast<size_t>(std::min(pixels_ - 1, static_cast<int>(place.x)));
+      const auto row = static_cast<size_t>(std::min(pixels_ - 1, static_cast<int>(place.y)));
+      sums[row * pixels + column] += weightOf(n);
     }
     return sums;
   }
@@ -128,6 +130,7 @@ class PixelSums {
   }
 
   const CoarseSamples& samples_;
+  const int pixels_;
   const glm::dmat4 view_from_world_;
   glm::dvec2 lowest_{0};
   double width_ = 0;

@@ -10,6 +10,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
 #include <numbers>
+#include <random>
 
 #include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
@@ -18,6 +19,8 @@
 #include "render/colour/function_parts.h"
 #include "render/image/image.h"
 #include "stream/base/error.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
 
 namespace curvisplat {
 namespace {
@@ -123,6 +126,28 @@ TEST(FirstChoice, SilhouetteIsThatOfTheSamples) {
 }
 
 /// A bright disc in a far field that is nearly clear: only the disc is seen.
+// A unit square, of fewer samples than a pixel of a picture of 80 x 80 would need.
+TEST(FirstChoice, FewSamplesLeaveNoGapsInASilhouette) {
+  CoarseSamples samples;
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int n = 0; n < 5000; ++n) {
+    add(samples, 1, 1);
+    samples.positions.back() = {unit(random), unit(random), 0};
+  }
+  EXPECT_NEAR(seenArea(samples, "+z", samples.volumes), 1, 0.02);
+}
+
+// 300,000 samples for few splats took most of the time of a small picture.
+TEST(FirstChoice, SmallGridsHaveFewerSamples) {
+  const TemporaryFolder folder;
+  writeRandomCache(folder / "a.splats", 1, 60);
+  const CacheReader cache(folder / "a.splats");
+  const size_t samples = coarseSamples(cache, 0, glm::dvec3(1)).size();
+  EXPECT_GE(samples, 60'000u);
+  EXPECT_LE(samples, 80'000u);
+}
+
 TEST(FirstChoice, WhatIsSeenMayBeASmallPartOfTheSilhouette) {
   CoarseSamples samples;
   std::vector<double> depths;
