@@ -34,7 +34,7 @@ class Form:
     scaling = ["--nodes", "1M,8M", "--repeats", "3"]
     peers = ["--sizes", "40x32x32,100x100x100", "--frames", "3", "--seconds", "15"]
     fidelity = ["--only", "^(half-annulus 2.5|o-grid|shell)$", "--quick"]
-    frames = ["--repeats", "5"]
+    frames = ["--repeats", "3", "--scenes", "^(wake|half_annulus|ocean)"]
 
 
 class SmokeForm(Form):
@@ -47,7 +47,7 @@ class SmokeForm(Form):
     scaling = ["--nodes", "4K,30K", "--repeats", "1", "--lod-pixels", "2", "--size", "64x64"]
     peers = ["--sizes", "12x10x8", "--frames", "1", "--picture", "32x32", "--resample", "16"]
     fidelity = ["--only", "^shell$", "--quick", "--pixels", "16"]
-    frames = ["--repeats", "1", "--nodes", "16x16x16"]
+    frames = ["--repeats", "1", "--frames", "2", "--sizes", "64x64", "--nodes", "16x16x16"]
 
 
 def cache_commands(paths, form):
