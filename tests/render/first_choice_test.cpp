@@ -125,7 +125,6 @@ TEST(FirstChoice, SilhouetteIsThatOfTheSamples) {
   EXPECT_NEAR(silhouette.area, 1, 0.03);
 }
 
-/// A bright disc in a far field that is nearly clear: only the disc is seen.
 // A unit square, of fewer samples than a pixel of a picture of 80 x 80 would need.
 TEST(FirstChoice, FewSamplesLeaveNoGapsInASilhouette) {
   CoarseSamples samples;
@@ -148,6 +147,7 @@ TEST(FirstChoice, SmallGridsHaveFewerSamples) {
   EXPECT_LE(samples, 80'000u);
 }
 
+/// A bright disc in a far field that is nearly clear: only the disc is seen.
 TEST(FirstChoice, WhatIsSeenMayBeASmallPartOfTheSilhouette) {
   CoarseSamples samples;
   std::vector<double> depths;
