@@ -31,8 +31,8 @@ CURVISPLAT_VECTOR_CLONES void findColumns(const EllipseRows& rows, float first, 
     const float middle = x + lean * dy;
     const float half = span * std::sqrt(std::max(reach2 - dy * dy, 0.0f));
     // The numbers of the first column, and of the one behind the last.
-    const float from = std::min(std::max(middle - half + (1 - kMargin), 0.0f), float{kTileSide});
-    const float end = std::min(std::max(middle + half + (1 + kMargin), 0.0f), float{kTileSide});
+    const float from = std::min(float{kTileSide}, std::max(0.0f, middle - half + (1 - kMargin)));
+    const float end = std::min(float{kTileSide}, std::max(0.0f, middle + half + (1 + kMargin)));
     const auto column = static_cast<int32_t>(from), column_end = static_cast<int32_t>(end);
     const int32_t tile = column / kOrderSide, tile_end = (column_end + kOrderSide - 1) / kOrderSide;
     out[n] = column < column_end ? (1u << tile_end) - (1u << tile) : 0;
@@ -47,8 +47,8 @@ OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat) {
   const EllipseRows rows{splat.x - (tile.x + 0.5f), splat.y - (tile.y + 0.5f), over * splat.l21,
                          over * splat.l22, kSupport * kSupport * s11};
   const float reach = std::sqrt(rows.reach2) + kMargin;
-  const int first = static_cast<int>(std::ceil(std::clamp(rows.y - reach, 0.0f, kTileSide + 0.0f)));
-  const int last = static_cast<int>(std::floor(std::clamp(rows.y + reach, -1.0f, kTileSide - 1.0f)));
+  const auto first = static_cast<int>(std::ceil(std::min(float{kTileSide}, std::max(0.0f, rows.y - reach))));
+  const auto last = static_cast<int>(std::floor(std::min(kTileSide - 1.0f, std::max(-1.0f, rows.y + reach))));
   OrderTileMask tiles = 0;
   for (int begin = first; begin <= last; begin += kRows) {
     uint32_t columns[kRows];
