@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "preprocess/convert/convert_options.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/gather/cell_slopes.h"
 #include "preprocess/gather/corner_gather.h"
