@@ -133,10 +133,8 @@ struct Prepared {
       fits.light(visits.diffuse, visits.specular);
   }
 
-  /// The blocks that splat n may touch; none if it can be left out.
-  HWY_INLINE BlockMask touched(size_t n) const {
-    return fits.fit.at[n] == kNothing ? 0 : blocksOf(visits, n);
-  }
+  /// Whether splat n can be left out.
+  HWY_INLINE bool isNothing(size_t n) const { return fits.fit.at[n] == kNothing; }
 
   /// Paints splat n in `blocks`, some of those touched; returns those of them that are saturated then.
   HWY_INLINE BlockMask paint(const TileWork& work, BlockMask blocks, size_t n, const float* footprint) const {
@@ -154,12 +152,15 @@ struct Prepared {
 
 BlockMask paintInOrder(const TileWork& work) {
   const float* footprint = footprintPolynomial();
+  const TileCorner corner{static_cast<float>(work.x), static_cast<float>(work.y)};
   BlockMask open = work.open;
   Prepared prepared;
   for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
     prepared.prepare(work, begin);
     for (size_t n = 0; n < prepared.count; ++n) {
-      const BlockMask blocks = prepared.touched(n) & open;
+      if (prepared.isNothing(n)) continue;
+      const ScreenSplat& splat = work.splats[static_cast<size_t>(prepared.numbers.at[n])];
+      const BlockMask blocks = open & orderTilesOf(corner, splat);
       if (blocks != 0) open &= ~prepared.paint(work, blocks, n, footprint);
     }
   }
@@ -260,7 +261,7 @@ class Listed {
         const BlockMask bit = BlockMask{1} << block;
         const Prepared& group = coloured_[place.at / kLanes];
         const size_t n = place.at % kLanes;
-        return (group.touched(n) & bit) != 0 && group.paint(*work_, bit, n, footprint_) != 0;
+        return group.paint(*work_, bit, n, footprint_) != 0;
       }
       default:
         return false;
@@ -310,7 +311,7 @@ class Listed {
     for (size_t n = 0; n < group.count; ++n) {
       const Visit visit{group.visits, group.fits, n};
       places_[begin + n] =
-          group.touched(n) == 0 ? Place{kNoWay} : make(visit, static_cast<size_t>(group.numbers.at[n]));
+          group.isNothing(n) ? Place{kNoWay} : make(visit, static_cast<size_t>(group.numbers.at[n]));
     }
   }
 

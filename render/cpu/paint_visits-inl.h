@@ -38,9 +38,7 @@ struct Visits {
   Row cell_depth;               // geometric, of their cells
   Row diffuse, specular;        // Lit, in lit pictures
   Pieces pieces;                // all of the splat that is in the tile
-  Row l11, l21, l22;
-  IntRow skew;            // ScreenSplat's
-  IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
+  IntRow skew;                  // ScreenSplat's
 
   HWY_INLINE Ellipse ellipse(size_t n) const {
     const auto packed = static_cast<uint32_t>(skew.at[n]);
@@ -116,9 +114,6 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const auto store = [&](V value, Row& row) HWY_ATTR { hn::Store(value, d, row.at + lane); };
     const auto offsets = hn::Mul(hn::Load(Ints(), numbers.at + lane), hn::Set(Ints(), kFloats));
     const V l11 = gather(work, offsets, 2), l21 = gather(work, offsets, 3), l22 = gather(work, offsets, 4);
-    store(l11, out.l11);
-    store(l21, out.l21);
-    store(l22, out.l22);
     const V x = hn::Sub(gather(work, offsets, 0), hn::Set(d, static_cast<float>(work.x) + 0.5f));
     const V y = hn::Sub(gather(work, offsets, 1), hn::Set(d, static_cast<float>(work.y) + 0.5f));
     const V a = hn::Div(one, hn::Mul(support, l11)), c = hn::Div(one, hn::Mul(support, l22));
@@ -141,18 +136,6 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const V y0 = hn::Clamp(hn::Ceil(hn::Sub(y, reach_y)), zero, hn::Set(d, kTileSide));
     const V x1 = hn::Clamp(hn::Floor(hn::Add(x, reach_x)), hn::Neg(one), last_pixel);
     const V y1 = hn::Clamp(hn::Floor(hn::Add(y, reach_y)), hn::Neg(one), last_pixel);
-    const V block = hn::Set(d, 1.0f / kBlockSide);
-    const auto storeBlocks = [&](V value, IntRow& row) HWY_ATTR {
-      hn::Store(hn::ConvertTo(Ints(), hn::Floor(hn::Mul(value, block))), Ints(), row.at + lane);
-    };
-    // A rectangle between two pixels' centres has x0 > x1, but may lie within a block.
-    const V nothing_x = hn::IfThenElseZero(hn::Gt(x0, x1), hn::Set(d, kTileSide));
-    const V nothing_y = hn::IfThenElseZero(hn::Gt(y0, y1), hn::Set(d, kTileSide));
-    storeBlocks(hn::Add(x0, nothing_x), out.x0);
-    storeBlocks(hn::Add(y0, nothing_y), out.y0);
-    storeBlocks(x1, out.x1);
-    storeBlocks(y1, out.y1);
-
     if (work.shading.lit) {
       const auto bits = hn::BitCast(Ints(), gather(work, offsets, 9));
       const auto share = [&](auto shifted, int32_t mask) HWY_ATTR {
@@ -211,54 +194,6 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     store(t.from, out.pieces.from);
     store(t.to, out.pieces.to);
   }
-}
-
-/// The blocks of a visit's rectangle that its ellipse touches, row by row: those from `from` to `to`.
-HWY_INLINE void trim(const Visits& visits, size_t n, IntRow& from_block, IntRow& to_block) {
-  const Floats d;
-  // Of pixels at dy, the ellipse covers lean dy ± span √(reach² - dy²); it goes farthest right at dy = tip.
-  const float l11 = visits.l11.at[n], l21 = visits.l21.at[n], l22 = visits.l22.at[n];
-  const float s11 = l21 * l21 + l22 * l22;
-  const V lean = hn::Set(d, l11 * l21 / s11), span = hn::Set(d, l11 * l22 / s11);
-  const V reach2 = hn::Set(d, kSupport * kSupport * s11), tip = hn::Set(d, kSupport * l21);
-  const V x = hn::Set(d, visits.x.at[n]), y = hn::Set(d, visits.y.at[n]);
-  const V block = hn::Set(d, 1.0f / kBlockSide), none = hn::Set(d, kTileBlocks);
-  for (size_t lane = 0; lane < kTileBlocks; lane += hn::Lanes(d)) {
-    const V top = hn::Sub(hn::Mul(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide)), y);
-    const V bottom = hn::Add(top, hn::Set(d, kBlockSide - 1));
-    const V right = hn::Clamp(tip, top, bottom), left = hn::Clamp(hn::Neg(tip), top, bottom);
-    const auto width = [&](V dy) HWY_ATTR {
-      return hn::Mul(span, hn::Sqrt(hn::Max(hn::NegMulAdd(dy, dy, reach2), hn::Zero(d))));
-    };
-    const V to = hn::Add(x, hn::MulAdd(lean, right, width(right)));
-    const V from = hn::Add(x, hn::MulSub(lean, left, width(left)));
-    // A hundredth of a pixel is for rounding.
-    const V last = hn::Floor(hn::Mul(hn::Add(to, hn::Set(d, 0.01f)), block));
-    const V first = hn::Ceil(hn::Mul(hn::Sub(from, hn::Set(d, kBlockSide - 1 + 0.01f)), block));
-    hn::Store(hn::ConvertTo(Ints(), hn::Clamp(first, hn::Zero(d), none)), Ints(), from_block.at + lane);
-    hn::Store(hn::ConvertTo(Ints(), hn::Clamp(last, hn::Set(d, -1.0f), none)), Ints(), to_block.at + lane);
-  }
-}
-
-/// The blocks of a row from `from` to `to`; none where from > to.
-HWY_INLINE BlockMask blocksOfRow(int from, int to) {
-  return from > to ? 0 : (BlockMask{2} << to) - (BlockMask{1} << from);
-}
-
-HWY_INLINE BlockMask blocksOf(const Visits& visits, size_t n) {
-  const int x0 = visits.x0.at[n], y0 = visits.y0.at[n], x1 = visits.x1.at[n], y1 = visits.y1.at[n];
-  BlockMask blocks = 0;
-  if (x0 > x1 || y0 > y1) return blocks;
-  if (y1 - y0 <= 1 || x0 == x1) {
-    const BlockMask row = blocksOfRow(x0, x1);
-    for (int y = y0; y <= y1; ++y) blocks |= row << y * kTileBlocks;
-    return blocks;
-  }
-  IntRow from, to;
-  trim(visits, n, from, to);
-  for (int y = y0; y <= y1; ++y)
-    blocks |= blocksOfRow(std::max(x0, from.at[y]), std::min(x1, to.at[y])) << y * kTileBlocks;
-  return blocks;
 }
 
 HWY_INLINE int takeFirst(BlockMask& blocks) {
