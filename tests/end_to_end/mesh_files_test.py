@@ -190,21 +190,25 @@ class MeshFiles(MeshCase):
                 result = self.run_program("convert", path, "-o", cache, "--overwrite", "--scalar", "c,a")
                 self.assertEqual([p["variables"][0]["name"] for p in self.info(cache)["own_blanks"]], ["a"], result.stderr)
 
+    def write_image(self, name, arrays):
+        """An image of 9x5x5 points."""
+        image = vtk.vtkImageData()
+        image.SetDimensions(9, 5, 5)
+        for of, values in arrays.items():
+            array = numpy_to_vtk(values, deep=True)
+            array.SetName(of)
+            image.GetPointData().AddArray(array)
+        writer = vtk.vtkXMLImageDataWriter()
+        writer.SetFileName(str(self.folder / name))
+        writer.SetInputData(image)
+        writer.Write()
+        return self.folder / name
+
     def test_blanks_of_a_later_step_are_counted(self):
         """A scalar that lacks values at one step alone: what the others lose there is said, with the step."""
         x = (np.arange(225) % 9).astype(float)
-        for step in range(3):
-            image = vtk.vtkImageData()
-            image.SetDimensions(9, 5, 5)
-            for name, values in (("low", np.where((x > 4) & (step == 1), np.nan, x)), ("all", x + step)):
-                array = numpy_to_vtk(values, deep=True)
-                array.SetName(name)
-                image.GetPointData().AddArray(array)
-            writer = vtk.vtkXMLImageDataWriter()
-            writer.SetFileName(str(self.folder / f"run_{step}.vti"))
-            writer.SetInputData(image)
-            writer.Write()
-        files = [self.folder / f"run_{step}.vti" for step in range(3)]
+        files = [self.write_image(f"run_{step}.vti", {"low": np.where((x > 4) & (step == 1), np.nan, x), "all": x + step})
+                 for step in range(3)]
         result = self.run_program("convert", *files, "-o", self.folder / "run.splats")
         self.assertEqual(result.returncode, 0, result.stderr)
         warnings = [line for line in result.stderr.splitlines() if "warning" in line]
@@ -214,19 +218,10 @@ class MeshFiles(MeshCase):
     def test_own_blanks_of_a_series(self):
         """Each set of scalars has the steps; one without any value at a later step ends before it."""
         x = (np.arange(225) % 9).astype(float)
-        for step in range(3):
-            image = vtk.vtkImageData()
-            image.SetDimensions(9, 5, 5)
-            for name, values in (("low", np.where(x > 4, np.nan, x + step)), ("all", x + step), ("high", x * (np.nan if step == 2 else 1))):
-                array = numpy_to_vtk(np.where((name == "high") & (x < 3), np.nan, values), deep=True)
-                array.SetName(name)
-                image.GetPointData().AddArray(array)
-            writer = vtk.vtkXMLImageDataWriter()
-            writer.SetFileName(str(self.folder / f"set_{step}.vti"))
-            writer.SetInputData(image)
-            writer.Write()
+        files = [self.write_image(f"set_{step}.vti", {"low": np.where(x > 4, np.nan, x + step), "all": x + step,
+                                                      "high": np.where((x < 3) | (step == 2), np.nan, x)}) for step in range(3)]
         cache = self.folder / "set.splats"
-        result = self.run_program("convert", *(self.folder / f"set_{step}.vti" for step in range(3)), "-o", cache)
+        result = self.run_program("convert", *files, "-o", cache)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("set_2.vti: high: no sample has a value at this step; kept up to the step before", result.stderr)
         whole = self.info(cache, "--verify", "--step", "2")

@@ -27,37 +27,26 @@ struct Parts {
   size_t lacks = 99;  // from this step on there is no s2
 };
 
-class PartsSource : public GridSource {
+class PartsSource : public FunctionStep {
  public:
   PartsSource(const Parts& parts, uint64_t step)
-      : grid_({gridBlock(10, 9, 7)}, 4,
-              [=](const GridNode& node) {
-                const auto i = static_cast<double>(node.i), j = static_cast<double>(node.j);
-                const double t = 0.1 * static_cast<double>(step);
-                const float none = std::numeric_limits<float>::quiet_NaN();
-                NodeValues values;
-                values.position = {i + 0.2 * std::sin(j), j, static_cast<double>(node.k)};
-                const bool has_s2 = step != parts.none && node.j >= (step < parts.changes ? 4u : 6u);
-                values.scalars = {static_cast<float>(std::sin(0.3 * i - t)),
-                                  node.i < 5 ? none : static_cast<float>(std::cos(0.3 * j + t)),
-                                  has_s2 ? static_cast<float>(i + j + t) : none,
-                                  static_cast<float>(std::cos(0.2 * i + t))};
-                return values;
-              }),
-        description_(grid_.description()) {
+      : FunctionStep({{gridBlock(10, 9, 7)}, 4, [=](const GridNode& node) {
+                        const auto i = static_cast<double>(node.i), j = static_cast<double>(node.j);
+                        const double t = 0.1 * static_cast<double>(step);
+                        const float none = std::numeric_limits<float>::quiet_NaN();
+                        NodeValues values;
+                        values.position = {i + 0.2 * std::sin(j), j, static_cast<double>(node.k)};
+                        const bool has_s2 = step != parts.none && node.j >= (step < parts.changes ? 4u : 6u);
+                        values.scalars = {static_cast<float>(std::sin(0.3 * i - t)),
+                                          node.i < 5 ? none : static_cast<float>(std::cos(0.3 * j + t)),
+                                          has_s2 ? static_cast<float>(i + j + t) : none,
+                                          static_cast<float>(std::cos(0.2 * i + t))};
+                        return values;
+                      }}) {
     description_.times = {static_cast<double>(step)};
     if (step >= parts.lacks) description_.scalars[2].name = "other";
     description_.files = {"step " + std::to_string(step)};
   }
-  const GridDescription& description() const override { return description_; }
-  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-            NodeArrays& out) const override {
-    grid_.read(block, box, scalars, out);
-  }
-
- private:
-  const FunctionGridSource grid_;
-  GridDescription description_;
 };
 
 /// Steps from `first` on.

@@ -26,32 +26,10 @@ struct StepKind {
   bool time_in_header = false;  // as in a Q file
 };
 
-/// Two blocks that share a face, with blanked nodes, and two scalars that move with time.
-class StepSource : public GridSource {
+/// A step of a function's grid, with a description that may differ from the grid's.
+class FunctionStep : public GridSource {
  public:
-  explicit StepSource(const StepKind& kind)
-      : grid_({gridBlock(kind.other_blocks ? 15 : 18, 12, 10), gridBlock(10, 12, 10)}, 2,
-              [kind](const GridNode& node) {
-                NodeValues values;
-                const double i = static_cast<double>(node.i) + (node.block == 1 ? 17.0 : 0.0);
-                const auto j = static_cast<double>(node.j), k = static_cast<double>(node.k);
-                values.position = {i + 0.2 * std::sin(j) + kind.shift, j + 0.1 * std::cos(k),
-                                   k + 0.002 * i * i};
-                const double t = 0.1 * kind.time;
-                values.scalars = {static_cast<float>(std::sin(0.3 * i - t) * std::cos(0.2 * j)),
-                                  static_cast<float>(10 + 0.1 * k + std::cos(0.5 * i + t))};
-                values.blank = node.block == 0 && node.i < 3 && node.j < (kind.blanks_more ? 6u : 4u);
-                return values;
-              }),
-        description_(grid_.description()) {
-    description_.times = {kind.time};
-    description_.files = {"step " + std::to_string(kind.time)};
-    if (kind.time_in_header) {
-      description_.times.clear();
-      description_.flow.emplace_back().time = kind.time;
-    }
-    if (kind.lacks_scalar) description_.scalars[1].name = "other";
-  }
+  explicit FunctionStep(const FunctionGridSource& grid) : grid_(grid), description_(grid_.description()) {}
 
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
@@ -61,7 +39,37 @@ class StepSource : public GridSource {
 
  private:
   const FunctionGridSource grid_;
+
+ protected:
   GridDescription description_;
+};
+
+/// Two blocks that share a face, with blanked nodes, and two scalars that move with time.
+class StepSource : public FunctionStep {
+ public:
+  explicit StepSource(const StepKind& kind)
+      : FunctionStep({{gridBlock(kind.other_blocks ? 15 : 18, 12, 10), gridBlock(10, 12, 10)},
+                      2,
+                      [kind](const GridNode& node) {
+                        NodeValues values;
+                        const double i = static_cast<double>(node.i) + (node.block == 1 ? 17.0 : 0.0);
+                        const auto j = static_cast<double>(node.j), k = static_cast<double>(node.k);
+                        values.position = {i + 0.2 * std::sin(j) + kind.shift, j + 0.1 * std::cos(k),
+                                           k + 0.002 * i * i};
+                        const double t = 0.1 * kind.time;
+                        values.scalars = {static_cast<float>(std::sin(0.3 * i - t) * std::cos(0.2 * j)),
+                                          static_cast<float>(10 + 0.1 * k + std::cos(0.5 * i + t))};
+                        values.blank = node.block == 0 && node.i < 3 && node.j < (kind.blanks_more ? 6u : 4u);
+                        return values;
+                      }}) {
+    description_.times = {kind.time};
+    description_.files = {"step " + std::to_string(kind.time)};
+    if (kind.time_in_header) {
+      description_.times.clear();
+      description_.flow.emplace_back().time = kind.time;
+    }
+    if (kind.lacks_scalar) description_.scalars[1].name = "other";
+  }
 };
 
 inline std::vector<StepKind> steadyGrid(size_t steps) {
