@@ -21,7 +21,7 @@ namespace curvisplat {
 /// Reads all nodes once. Memory: the slabs. Throws Error if no node is there, or if the grid is larger or
 /// smaller than single precision can say.
 ///
-/// Of several ranks each reads a share of the nodes, and all get the result; the sample is of the share. Cells are read by every
+/// Where there are several ranks, each reads a share of the nodes, and all get the result; the sample is of the share. Cells are read by every
 /// rank as a whole.
 GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const SurveyExtras& extras,
                       Progress& progress, Ranks& ranks = oneRank());

@@ -109,7 +109,7 @@ HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t
   std::fill(out + 4 * count, out + 4 * kLanes, 0.0f);
 }
 
-/// The same of the intervals with a bit in `wanted`.
+/// Integrates the intervals with a bit in `wanted` alone; the others are zero, too.
 HWY_INLINE void integrateEach(const ShadingTable& table, const Intervals& in, uint32_t wanted,
                               float* HWY_RESTRICT out) {
   const Floats d;
