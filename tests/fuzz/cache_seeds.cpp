@@ -120,6 +120,8 @@ void writeTables(const Seeds& seeds) {
   with_own_blanks.requirements.push_back(kOwnBlanks);
   with_own_blanks.own_blanks = {{{"half", "quarter"}, 1}, {{"none"}, 2}};
   seeds.write("manifest", "own_blanks", with_own_blanks.toJson());
+  with_own_blanks.requirements.insert(with_own_blanks.requirements.end(), {kOwnBlanksOfSteps, kSteps});
+  seeds.write("manifest", "own_blanks_of_steps", with_own_blanks.toJson());
   const std::string bricks = bytesOfFile(path / "bricks.bin"), values = bytesOfFile(path / "var.0.bin");
   const size_t count = (bricks.size() - sizeof(BricksHeader)) / sizeof(BrickRecord);
   const size_t table = values.size() - count * sizeof(VariableRecord);

@@ -3,13 +3,15 @@
 //    make_version_caches tests/data/caches/version_<n>
 //
 // To be run once for each version, by the program that is the first to write it; never again for an older
-// one. Caches of features that came later (octants, own_blanks, steep) are added beside the others, which stay.
+// one. Caches of features that came later (octants, own_blanks, set_steps, steep) are added beside the others, which
+// stay.
 //
 //    blocks.splats      three blocks, two of which share a face, and a hole; levels, two scalars
 //    cells.splats       a block with a scalar in its cells
 //    faces.splats       a block whose faces have levels of detail and a hole
 //    octants.splats     a block with a box of blanked nodes, at whose edges cells lose octants
 //    own_blanks.splats  two scalars of a block, and two that have no values in a part of it, each in another
+//    set_steps.splats   two steps of two scalars of which one has no values in a part of the block
 //    steep.splats       two blocks of cells that grow steeply, up to shorter last ones
 //    *.json, *.png      what a reader must get out of them (tests/support/cache_summary.h)
 #include <fmt/format.h>
@@ -27,12 +29,11 @@
 #include "stream/base/durable_file.h"
 #include "stream/cache/series.h"
 #include "tests/reference/function_grid.h"
+#include "tests/series/step_series.h"
 #include "tests/support/cache_summary.h"
 
 namespace curvisplat {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Enough nodes for several levels, with plain values that take little space, except in the small third block.
 FunctionGridSource blocks() {
@@ -54,12 +55,22 @@ FunctionGridSource blocks() {
   });
 }
 
-/// Writes what must be read from the cache, in files whose names begin with `beside`.
-void summarise(const CacheReader& reader, const std::string& beside) {
+/// Writes what must be read from a set of scalars, in files whose names begin with `beside`.
+void summariseSet(const CacheReader& reader, const std::string& beside) {
   nlohmann::json json = summaryOf(reader);
   writeFileDurably(beside + ".json", json.dump(1) + "\n");
   for (size_t variable = 0; variable < reader.manifest().variables.size(); ++variable)
     writeImage(smallPictureOf(reader, variable), fmt::format("{}.{}.png", beside, variable));
+}
+
+/// Writes what must be read from the cache at its last step, in files beside it.
+void summarise(const fs::path& cache) {
+  CacheReader reader(cache);
+  if (!reader.series().steps.empty()) reader = reader.atStep(reader.series().steps.size() - 1);
+  const std::string beside = fs::path(cache).replace_extension().string();
+  summariseSet(reader, beside);
+  for (size_t n = 0; n < reader.seriesManifest().own_blanks.size(); ++n)
+    summariseSet(reader.ownBlanks(n), fmt::format("{}.{}", beside, ownBlanksFolderName(n)));
 }
 
 void make(const GridSource& source, std::vector<uint32_t> scalars, const fs::path& cache) {
@@ -70,12 +81,35 @@ void make(const GridSource& source, std::vector<uint32_t> scalars, const fs::pat
   options.title = cache.stem().string();
   Progress progress;
   convert(source, options, progress);
+  summarise(cache);
+}
 
-  const CacheReader reader(cache);
-  const std::string beside = fs::path(cache).replace_extension().string();
-  summarise(reader, beside);
-  for (size_t n = 0; n < reader.seriesManifest().own_blanks.size(); ++n)
-    summarise(reader.ownBlanks(n), fmt::format("{}.{}", beside, ownBlanksFolderName(n)));
+/// A block whose second scalar has values in a part of it, which moves from step to step.
+class MovingPart : public FunctionStep {
+ public:
+  explicit MovingPart(uint64_t step)
+      : FunctionStep({{gridBlock(8, 7, 6)}, 2, [step](const GridNode& node) {
+                        const glm::dvec3 at(static_cast<double>(node.i) + 0.25 * static_cast<double>(node.j),
+                                            static_cast<double>(node.j), 0.5 * static_cast<double>(node.k));
+                        const auto value = static_cast<float>(at.x * at.y + static_cast<double>(step));
+                        const bool has_none = node.i < 3 + step;
+                        return NodeValues{
+                            at, {value, has_none ? std::numeric_limits<float>::quiet_NaN() : -value}, false};
+                      }}) {
+    description_.times = {static_cast<double>(step)};
+  }
+};
+
+void makeSetSteps(const fs::path& cache) {
+  SeriesInput input;
+  input.count = 2;
+  input.name = [](uint64_t step) { return fmt::format("step {}", step); };
+  input.open = [](uint64_t step) { return std::make_unique<MovingPart>(step); };
+  input.scalars = [](const GridDescription&) { return std::vector<uint32_t>{0, 1}; };
+  SeriesOptions options = optionsFor(cache);
+  options.convert.differing = DifferingScalars::kKeepApart;
+  convertQuietly(input, options);
+  summarise(cache);
 }
 
 void makeAll(const fs::path& folder) {
@@ -125,6 +159,7 @@ void makeAll(const fs::path& folder) {
     return NodeValues{at, {node.i < 3 ? none : value, value, node.k > 3 ? none : value, -value}, false};
   });
   make(parts, {0, 1, 2, 3}, folder / "own_blanks.splats");
+  makeSetSteps(folder / "set_steps.splats");
 }
 
 }  // namespace
