@@ -246,6 +246,27 @@ TEST_F(WindowPlayback, InterpolatesBetweenSteps) {
   expectDraws(commands[1], step);
 }
 
+TEST_F(WindowPlayback, AScalarWithOwnBlanksIsShownAtTheSameStep) {
+  fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/set_steps.splats", "sets.splats",
+           fs::copy_options::recursive);
+  cache_ = "sets";
+  open({"--step", "1"});
+  chooseScalar("s1");
+  placeOf("scalar shown: s1");
+  moveTo(rest_);
+  const Image last = saveAndCopy();
+  press("comma");
+  const Image first = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  for (const auto& command : commands) EXPECT_EQ(valueOf(command, "--scalar"), "s1");
+  EXPECT_EQ(valueOf(commands[0], "--step"), "1");
+  EXPECT_EQ(valueOf(commands[1], "--step"), "0");
+  EXPECT_LT(difference(first, last), 60);
+  expectDraws(commands[0], last);
+  expectDraws(commands[1], first);
+}
+
 /// A grid that moves: a shown face of it moves too, and the outline.
 TEST_F(WindowPlayback, FacesMoveWithTheGrid) {
   constexpr int kNodes[3] = {16, 12, 8};
