@@ -83,6 +83,7 @@ ConvertOptions optionsFor(const fs::path& output, const std::string& title) {
   options.title = title;
   options.temporary_folder = output.parent_path();
   options.full_disk_hint = "make room, or set XDG_CACHE_HOME to a folder on another disk";
+  options.differing = DifferingScalars::kKeepApart;
   return options;
 }
 
@@ -180,7 +181,6 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
   options.convert.precision = precision;
-  options.convert.differing = DifferingScalars::kKeepApart;
   const SeriesInput input = seriesInput(arguments, steps);
   makePreviewOfFirstStep(input, optionsFor(output, title), progress, events);
   convertSeries(input, options, progress, [&](const SeriesEvent& event) {
@@ -216,7 +216,6 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   ConvertOptions options = optionsFor(output, files.front().stem().string());
   options.precision = precision;
   options.scalars = chooseScalars(arguments, {}, source->description());
-  options.differing = DifferingScalars::kKeepApart;
   makePreview(*source, options, false, progress, events);
   sayAll(events, source->description(), convert(*source, options, progress));
 }
