@@ -241,11 +241,13 @@ void DrawnMesh::readPoints(uint32_t piece, uint64_t first, uint64_t count, std::
   if (!drawn_ || of_cells_) return;
   std::vector<uint8_t> missing(count, 0);
   drawn_->blankOthers(first_points_[piece] + first, missing);
-  for (size_t n = 0; n < count; ++n) {
-    const uint64_t number = first_points_[piece] + first + n;
-    if (missing[n] && (*numbers_)(number) != number) missing[n] = !drawn_->holds((*numbers_)(number));
-    out.hidden[n] |= missing[n];
+  if (numbers_->merged() > 0) {
+    std::vector<uint64_t> numbers(count);
+    numbers_->read(first_points_[piece] + first, numbers);
+    for (size_t n = 0; n < count; ++n)
+      if (missing[n]) missing[n] = !drawn_->holds(numbers[n]);
   }
+  for (size_t n = 0; n < count; ++n) out.hidden[n] |= missing[n];
 }
 
 void DrawnMesh::readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,

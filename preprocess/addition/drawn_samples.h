@@ -88,7 +88,7 @@ class CacheGrid : public GridSource {
 };
 
 /// An unstructured grid of which cells, or points, without a splat in the cache are hidden. Points that are
-/// the same in several pieces (PointNumbers, preprocess/gather/mesh_reader.h) are drawn together.
+/// one (PointNumbers, preprocess/gather/mesh_reader.h) are drawn together.
 class DrawnMesh final : public MeshSource {
  public:
   /// `source` must outlive it.

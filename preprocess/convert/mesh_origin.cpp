@@ -91,8 +91,11 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
   const bool cells = centring() == Centring::kCell;
   const uint64_t each = cells ? drawn_cells_ / std::max<uint64_t>(1, reader_.points()) + 1 : 1;
   const MeshReader positions(reader_.source(), {}, std::nullopt);
+  std::vector<uint64_t> numbers;
   positions.forEachPoints([&](const LoadedPoints& loaded) {
     const MeshPoints& points = loaded.points;
+    numbers.resize(points.x.size());
+    numbers_->read(loaded.range.number, numbers);
     const size_t tasks = (points.x.size() + kPointsPerTask - 1) / kPointsPerTask;
     const uint32_t level = counts.level();
     std::vector<VoxelRuns> runs(tasks, VoxelRuns(level));
@@ -100,7 +103,8 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
       const TraceScope trace("splats of cells");
       const size_t end = std::min(points.x.size(), (task + 1) * kPointsPerTask);
       for (size_t n = task * kPointsPerTask; n < end; ++n)
-        if (used_[loaded.range.number + n] && std::isfinite(points.x[n]))
+        if (const uint64_t number = loaded.range.number + n;
+            used_[number] && numbers[n] == number && std::isfinite(points.x[n]))
           runs[task].add(root.fromWorld({points.x[n], points.y[n], points.z[n]}));
     });
     for (const VoxelRuns& of_task : runs) {

@@ -118,7 +118,6 @@ size_t CornerGather::gather(const LoadedCells& loaded, size_t begin, GatheredCel
   uint64_t first_point = 0;
   for (uint32_t piece = 0; piece < loaded.range.piece; ++piece)
     first_point += reader_->pieces()[piece].points;
-  const bool one_piece = numbers_->merged() == 0;
   size_t n = begin, corners = 0;
   for (; n < cells.size(); ++n) {
     if (cells.shapes[n] == CellKind::kNone) continue;
@@ -131,8 +130,7 @@ size_t CornerGather::gather(const LoadedCells& loaded, size_t begin, GatheredCel
     out.shapes.push_back(cells.shapes[n]);
     if (out.corners.size() < corners + points.size())
       out.corners.resize(std::max(corners + points.size(), GatheredCells::kMaxCorners));
-    for (const uint64_t point : points)
-      out.corners[corners++] = one_piece ? first_point + point : (*numbers_)(first_point + point);
+    for (const uint64_t point : points) out.corners[corners++] = first_point + point;
     out.corner_begin.push_back(corners);
     out.faces.insert(out.faces.end(), faces.begin(), faces.end());
     out.face_begin.push_back(out.faces.size());
@@ -160,7 +158,7 @@ void CornerGather::dropIfBlanked(GatheredCells& cells, size_t n) {
 }
 
 void CornerGather::gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& used) {
-  PointPages pages(*reader_, corner_fields_, memory_bytes_);
+  PointPages pages(*reader_, *numbers_, corner_fields_, memory_bytes_);
   size_t done = 0;  // ranges
   reader_->forEachCellsWhile(ranges, [&](const LoadedCells& loaded) {
     progress_->throwIfStopped();
@@ -181,6 +179,7 @@ void CornerGather::gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& use
                         cells.at[at] = pages.at(cells.corners[at]);
                         std::copy_n(pages.values(cells.corners[at]), corner_fields_,
                                     cells.corner_values.data() + at * corner_fields_);
+                        cells.corners[at] = pages.number(cells.corners[at]);
                       }
                       dropIfBlanked(cells, n);
                     }
@@ -195,7 +194,9 @@ void CornerGather::gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& use
 }
 
 void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedBeside& used) {
-  const size_t point_bytes = sizeof(glm::dvec3) + corner_fields_ * sizeof(float);
+  const bool merges = numbers_->merged() > 0;
+  const size_t number_bytes = merges ? sizeof(uint64_t) : 0;
+  const size_t point_bytes = number_bytes + sizeof(glm::dvec3) + corner_fields_ * sizeof(float);
   const size_t record_bytes = sizeof(uint64_t) + point_bytes;
   const uint64_t range_points = std::max<uint64_t>(1, memory_bytes_ / 4 / point_bytes);
   const uint64_t ranges = (reader_->points() + range_points - 1) / range_points;
@@ -224,13 +225,20 @@ void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedB
   StreamsFile corners(scratch_, groups.size(), memory_bytes_ / 4);
   {
     std::vector<std::byte> points, record(record_bytes);
+    std::vector<uint64_t> numbers;
     for (uint64_t range = 0; range < ranges; ++range) {
       const uint64_t first = range * range_points, count = std::min(range_points, reader_->points() - first);
       points.resize(count * point_bytes);
       reader_->readPoints(first, count, [&](const LoadedPoints& loaded) {
         progress_->throwIfStopped();
         std::byte* to = points.data() + (loaded.range.number - first) * point_bytes;
+        if (merges) {
+          numbers.resize(loaded.points.x.size());
+          numbers_->read(loaded.range.number, numbers);
+        }
         for (size_t n = 0; n < loaded.points.x.size(); ++n) {
+          if (merges) std::memcpy(to, &numbers[n], number_bytes);
+          to += number_bytes;
           const glm::dvec3 at(loaded.points.x[n], loaded.points.y[n], loaded.points.z[n]);
           std::memcpy(to, &at, sizeof at);
           to += sizeof at;
@@ -278,6 +286,8 @@ void CornerGather::gatherByStreams(const std::vector<MeshRange>& of_cells, UsedB
         next = gather(loaded, next, gathered);
         for (size_t n = 0; n < gathered.corners.size(); ++n, ++slot) {
           const std::byte* from = slots.data() + slot * point_bytes;
+          if (merges) std::memcpy(&gathered.corners[n], from, number_bytes);
+          from += number_bytes;
           std::memcpy(static_cast<void*>(&gathered.at[n]), from, sizeof(glm::dvec3));
           if (corner_fields_ > 0)
             std::memcpy(&gathered.corner_values[n * corner_fields_], from + sizeof(glm::dvec3),

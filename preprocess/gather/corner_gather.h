@@ -28,7 +28,7 @@ struct GatheredCells {
   std::vector<uint64_t> numbers;        // [cell] in the whole mesh
   std::vector<CellKind> shapes;         // [cell]
   std::vector<size_t> corner_begin{0};  // [cell + 1], in the arrays of corners
-  std::vector<uint64_t> corners;        // PointNumbers'
+  std::vector<uint64_t> corners;        // PointNumbers' numbers; positions and values are of the file's point
   std::vector<glm::dvec3> at;           // [corner]
   std::vector<float> corner_values;     // [corner * fields + field], of node-centred scalars
   std::vector<size_t> face_begin{0};    // [cell + 1], in faces
@@ -80,8 +80,8 @@ class CornerGather {
   /// Leaves in `ranges` those of the cells that are left for streams.
   void gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& used);
   void gatherByStreams(const std::vector<MeshRange>& of_cells, UsedBeside& used);
-  /// Overwrites `out` with what is drawn of the cells from `begin` on, as many as go together, without positions and
-  /// values. Returns the first of the others.
+  /// Overwrites `out` with what is drawn of the cells from `begin` on, as many as go together, with the file's numbers of
+  /// points, without positions and values. Returns the first of the others.
   size_t gather(const LoadedCells& loaded, size_t begin, GatheredCells& out) const;
   static void dropIfBlanked(GatheredCells& cells, size_t n);
 

@@ -86,7 +86,6 @@ WaitingFaces::Counts WaitingFaces::counts() const {
 namespace {
 
 constexpr size_t kSampledChunks = 8;
-constexpr uint64_t kPointBytes = 3 * sizeof(double) + 2 * sizeof(uint64_t);  // of PointNumbers'
 
 uint64_t ceilDivided(uint64_t a, uint64_t b) {
   return (a + b - 1) / std::max<uint64_t>(1, b);
@@ -136,7 +135,8 @@ class Followed {
   Followed(const MeshReader& reader, GatherCounts& counts, uint64_t faces)
       : counts_(&counts),
         points_(reader.points()),
-        point_slots_(PointPages::slotsFor(reader.points(), counts.cornerFields(), counts.half())),
+        point_slots_(PointPages::slotsFor(reader.points(), counts.cornerFields(), counts.half(),
+                                          counts.mergesPoints())),
         sum_slots_(reader.points(), SumPages::kShift, counts.sums().pages),
         faces_(faces, counts.slopes().range_cells) {
     uint64_t points = 0;
@@ -273,11 +273,13 @@ GatherCounts::GatherCounts(const MeshReader& reader, const GatherJob& job, uint6
       all_cells_(reader.cells()),
       half_(halfBesideChunks(job.memory_bytes, chunk_bytes)),
       pieces_(reader.pieces().size()),
+      merges_points_(PointNumbers::mayMerge(reader)),
       sums_(PointSums::sharesOf(reader.cells(), job.fields, half_)),
       slopes_(CellSlopes::sharesOf(reader.cells(), job.fields, half_)) {}
 
 uint64_t GatherCounts::ofCorners() const {
-  const uint64_t point_bytes = sizeof(glm::dvec3) + cornerFields() * sizeof(float);
+  const uint64_t point_bytes =
+      sizeof(glm::dvec3) + cornerFields() * sizeof(float) + (merges_points_ ? sizeof(uint64_t) : 0);
   const uint64_t record_bytes = point_bytes + sizeof(uint64_t), memory_bytes = half_ / 4;
   const uint64_t ranges = ceilDivided(points_, memory_bytes / point_bytes);
   const uint64_t groups = streamed_corners / std::max<uint64_t>(1, memory_bytes / record_bytes) + 1;
@@ -287,9 +289,12 @@ uint64_t GatherCounts::ofCorners() const {
 
 GatherNeeds GatherCounts::needs() const {
   GatherNeeds needs = job_.centring == Centring::kNode ? needsOfPoints() : needsOfCells();
-  const uint64_t numbering_bytes = pieces_ > 1 ? points_ * kPointBytes : 0;
-  needs.before_splats =
-      std::max(needs.before_splats, StreamsFile::bytesInFile(numbering_bytes, 1, job_.memory_bytes / 8));
+  if (!merges_points_) return needs;
+  const uint64_t numbering_bytes = points_ * PointNumbers::kMostBytes;
+  const uint64_t kept_bytes = points_ * PointNumbers::kKeptBytes;
+  needs.beside_splats += kept_bytes;
+  needs.before_splats = std::max(needs.before_splats + kept_bytes,
+                                 StreamsFile::bytesInFile(numbering_bytes, 1, job_.memory_bytes / 8));
   return needs;
 }
 

@@ -113,6 +113,7 @@ class GatherCounts {
   uint64_t half() const { return half_; }
   const PointSums::Shares& sums() const { return sums_; }
   const CellSlopes::Shares& slopes() const { return slopes_; }
+  bool mergesPoints() const { return merges_points_; }
   size_t cornerFields() const { return job_.centring == Centring::kNode ? job_.fields : 0; }
 
  private:
@@ -123,6 +124,7 @@ class GatherCounts {
   GatherJob job_;
   uint64_t points_, all_cells_, half_;
   size_t pieces_;
+  bool merges_points_;
   PointSums::Shares sums_;
   CellSlopes::Shares slopes_;
 };

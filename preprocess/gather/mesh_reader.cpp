@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 #include "preprocess/gather/streams_file.h"
 #include "stream/base/checksum.h"
@@ -176,6 +178,97 @@ void MeshReader::forEachCellsWhile(const std::vector<MeshRange>& ranges,
 
 namespace {
 
+constexpr size_t kSampledChunks = 4, kSampledCells = 4096;
+// Of elements that are apart: points at the positions of others, over all of them; how many elements there are; their cells.
+constexpr double kCoincidentShare = 1.0 / 32;
+constexpr size_t kMinElements = 4, kMaxElement = 512;
+constexpr uint64_t kWidest = 16;  // numbers of a chunk's points, over the points
+
+/// A position without the last bits, in which files of one mesh differ.
+std::array<double, 3> placeOf(const MeshPoints& points, size_t n) {
+  const auto rounded = [](double x) {
+    constexpr uint64_t kLost = 12, kHalf = uint64_t{1} << (kLost - 1);
+    const uint64_t bits = std::bit_cast<uint64_t>(x + 0.0);  // no point at -0 differs from one at 0
+    return std::bit_cast<double>((bits + kHalf) >> kLost << kLost);
+  };
+  return {rounded(points.x[n]), rounded(points.y[n]), rounded(points.z[n])};
+}
+
+/// Counts of a chunk of cells: its points; those that have the position of another one; its parts that have no point in common.
+struct Places {
+  size_t cells = 0, points = 0, taken = 0, parts = 0;
+};
+
+/// The parts of a chunk that have no point in common, of the points `numbers`, rising.
+size_t partsOf(const MeshCells& cells, std::span<const uint64_t> numbers) {
+  std::vector<size_t> above(numbers.size());
+  std::iota(above.begin(), above.end(), size_t{0});
+  const auto top = [&](uint64_t number) {
+    auto n = static_cast<size_t>(std::ranges::lower_bound(numbers, number) - numbers.begin());
+    while (above[n] != n) n = above[n] = above[above[n]];
+    return n;
+  };
+  size_t parts = numbers.size();
+  for (size_t n = 0; n < cells.size(); ++n) {
+    if (cells.shapes[n] == CellKind::kNone) continue;
+    const std::span<const uint64_t> corners = cells.cornersOfCell(n);
+    for (const uint64_t corner : corners)
+      if (const size_t a = top(corners.front()), b = top(corner); a != b) {
+        above[b] = a;
+        --parts;
+      }
+  }
+  return parts;
+}
+
+Places placesOf(const MeshReader& reader, const LoadedCells& loaded) {
+  std::vector<uint64_t> numbers;
+  for (size_t n = 0; n < loaded.cells.size(); ++n)
+    if (loaded.cells.shapes[n] != CellKind::kNone)
+      for (const uint64_t corner : loaded.cells.cornersOfCell(n)) numbers.push_back(corner);
+  std::ranges::sort(numbers);
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  if (numbers.empty() || numbers.back() - numbers.front() > kWidest * numbers.size()) return {};
+  uint64_t first_point = 0;
+  for (uint32_t piece = 0; piece < loaded.range.piece; ++piece) first_point += reader.pieces()[piece].points;
+  std::vector<std::array<double, 3>> places;
+  size_t next = 0;
+  reader.readPoints(first_point + numbers.front(), numbers.back() - numbers.front() + 1,
+                    [&](const LoadedPoints& points) {
+                      const uint64_t begin = points.range.first, end = begin + points.range.count;
+                      for (; next < numbers.size() && numbers[next] < end; ++next)
+                        if (const size_t n = numbers[next] - begin; std::isfinite(points.points.x[n]))
+                          places.push_back(placeOf(points.points, n));
+                    });
+  std::ranges::sort(places);
+  const size_t all = places.size();
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  return {loaded.cells.size(), all, all - places.size(), partsOf(loaded.cells, numbers)};
+}
+
+}  // namespace
+
+bool hasElementsApart(const MeshReader& reader) {
+  const std::vector<MeshRange> chunks = reader.cellRanges();
+  std::vector<MeshRange> sample;
+  for (size_t n = 0; n < std::min(chunks.size(), kSampledChunks); ++n) {
+    sample.push_back(chunks[n * chunks.size() / std::min(chunks.size(), kSampledChunks)]);
+    sample.back().count = std::min<uint64_t>(sample.back().count, kSampledCells);
+  }
+  Places all;
+  reader.forEachCells(sample, [&](const LoadedCells& loaded) {
+    const Places places = placesOf(reader, loaded);
+    all.cells += places.cells;
+    all.points += places.points;
+    all.taken += places.taken;
+    all.parts += places.parts;
+  });
+  return all.parts >= kMinElements && all.cells <= kMaxElement * all.parts &&
+         static_cast<double>(all.taken) > kCoincidentShare * static_cast<double>(all.points);
+}
+
+namespace {
+
 struct Point {
   std::array<double, 3> at;
   uint64_t number;
@@ -183,57 +276,88 @@ struct Point {
   bool operator<(const Point& other) const { return at != other.at ? at < other.at : number < other.number; }
 };
 
+/// A point that becomes another one.
+struct Merged {
+  uint64_t number, becomes;
+};
+
+/// All records of a stream, which is forgotten.
+template <typename Record>
+void load(StreamsFile& file, size_t stream, std::vector<Record>& out) {
+  out.resize(file.bytes(stream) / sizeof(Record));
+  size_t at = 0;
+  file.forEach(stream, [&](std::span<const std::byte> records) {
+    std::memcpy(static_cast<void*>(out.data() + at), records.data(), records.size());
+    at += records.size() / sizeof(Record);
+  });
+  file.forget(stream);
+}
+
 }  // namespace
 
 PointNumbers::PointNumbers(const MeshReader& reader, uint64_t memory_bytes, const ScratchFiles& scratch,
                            const Progress& progress) {
-  if (reader.pieces().size() < 2) return;
-  const uint64_t all_bytes = reader.points() * sizeof(Point);
-  const size_t streams = std::min<uint64_t>(all_bytes / std::max<uint64_t>(1, memory_bytes / 4) + 1,
-                                            StreamsFile::mostStreams(memory_bytes / 4));
-  StreamsFile file(scratch, streams, memory_bytes / 4);
-  reader.forEachPoints([&](const LoadedPoints& loaded) {
-    progress.throwIfStopped();
-    const MeshPoints& points = loaded.points;
-    for (size_t n = 0; n < points.x.size(); ++n) {
-      if (!std::isfinite(points.x[n])) continue;
-      // No point at -0 differs from one at 0.
-      const Point point{{points.x[n] + 0.0, points.y[n] + 0.0, points.z[n] + 0.0},
-                        loaded.range.number + n,
-                        loaded.range.piece};
-      file.appendRecord(streams > 1 ? checksumOf(std::as_bytes(std::span(point.at))) % streams : 0, point);
-    }
-  });
-  file.close();
-  std::vector<Point> points;
-  for (size_t stream = 0; stream < streams; ++stream) {
-    points.resize(file.bytes(stream) / sizeof(Point));
-    size_t at = 0;
-    file.forEach(stream, [&](std::span<const std::byte> records) {
-      std::memcpy(points.data() + at, records.data(), records.size());
-      at += records.size() / sizeof(Point);
+  const bool apart = hasElementsApart(reader);
+  if (reader.pieces().size() < 2 && !apart) return;
+  const uint64_t part_bytes = std::max<uint64_t>(1, memory_bytes / 4);
+  const size_t streams = std::min<uint64_t>(reader.points() * sizeof(Point) / part_bytes + 1,
+                                            StreamsFile::mostStreams(part_bytes));
+  const uint64_t range_points = std::max<uint64_t>(kPointsPerChunk, part_bytes / sizeof(uint64_t));
+  StreamsFile merged(scratch, reader.points() / range_points + 1, part_bytes / 2);
+  {
+    StreamsFile file(scratch, streams, part_bytes);
+    reader.forEachPoints([&](const LoadedPoints& loaded) {
+      progress.throwIfStopped();
+      for (size_t n = 0; n < loaded.points.x.size(); ++n) {
+        if (!std::isfinite(loaded.points.x[n])) continue;
+        const Point point{placeOf(loaded.points, n), loaded.range.number + n, loaded.range.piece};
+        file.appendRecord(streams > 1 ? checksumOf(std::as_bytes(std::span(point.at))) % streams : 0, point);
+      }
     });
-    file.forget(stream);
-    progress.throwIfStopped();
-    tbb::parallel_sort(points.begin(), points.end());
-    for (size_t first = 0; first < points.size();) {
-      size_t end = first + 1;
-      for (; end < points.size() && points[end].at == points[first].at; ++end)
-        if (points[end].piece != points[first].piece)
-          merged_.emplace_back(points[end].number, points[first].number);
-      first = end;
+    file.close();
+    std::vector<Point> points;
+    for (size_t stream = 0; stream < streams; ++stream) {
+      load(file, stream, points);
+      progress.throwIfStopped();
+      tbb::parallel_sort(points.begin(), points.end());
+      for (size_t first = 0; first < points.size();) {
+        size_t end = first + 1;
+        for (; end < points.size() && points[end].at == points[first].at; ++end)
+          if (apart || points[end].piece != points[first].piece) {
+            merged.appendRecord(points[end].number / range_points,
+                                Merged{points[end].number, points[first].number});
+            ++merged_;
+          }
+        first = end;
+      }
     }
-    if (merged_.size() * sizeof(merged_.front()) > memory_bytes / 4)
-      throw Error("--memory: {} points are shared by pieces of the mesh, more than fit; increase --memory",
-                  merged_.size());
   }
-  tbb::parallel_sort(merged_.begin(), merged_.end());
+  merged.close();
+  if (merged_ == 0) return;
+  file_ = std::make_unique<NamelessFile>(scratch);
+  std::vector<uint64_t> numbers;
+  for (size_t range = 0; range < merged.streams(); ++range) {
+    progress.throwIfStopped();
+    const uint64_t first = range * range_points;
+    numbers.resize(std::min(range_points, reader.points() - first));
+    std::iota(numbers.begin(), numbers.end(), first);
+    merged.forEach(range, [&](std::span<const std::byte> records) {
+      for (size_t at = 0; at < records.size(); at += sizeof(Merged)) {
+        Merged point;
+        std::memcpy(&point, records.data() + at, sizeof point);
+        numbers[point.number - first] = point.becomes;
+      }
+    });
+    merged.forget(range);
+    file_->out().writeAt(first * sizeof(uint64_t), std::as_bytes(std::span(numbers)));
+  }
 }
 
-uint64_t PointNumbers::operator()(uint64_t number) const {
-  if (merged_.empty()) return number;
-  const auto found = std::lower_bound(merged_.begin(), merged_.end(), std::pair(number, uint64_t{0}));
-  return found != merged_.end() && found->first == number ? found->second : number;
+void PointNumbers::read(uint64_t first, std::span<uint64_t> out) const {
+  if (file_)
+    file_->in().readAt(first * sizeof(uint64_t), out);
+  else
+    std::iota(out.begin(), out.end(), first);
 }
 
 }  // namespace curvisplat

@@ -96,8 +96,12 @@ constexpr size_t kPointsPerTask = 4096;
 
 }  // namespace
 
-PointPages::PointPages(const MeshReader& reader, size_t fields, uint64_t memory_bytes)
-    : reader_(&reader), fields_(fields), slots_(slotsFor(reader.points(), fields, memory_bytes)) {}
+PointPages::PointPages(const MeshReader& reader, const PointNumbers& numbers, size_t fields,
+                       uint64_t memory_bytes)
+    : reader_(&reader),
+      numbers_(&numbers),
+      fields_(fields),
+      slots_(slotsFor(reader.points(), fields, memory_bytes, numbers.merged() > 0)) {}
 
 bool PointPages::hold(std::span<const uint64_t> points) {
   if (!slots_.hold(points, kMaxAgain)) return false;
@@ -115,6 +119,9 @@ bool PointPages::hold(std::span<const uint64_t> points) {
       const uint64_t count = std::min(kPoints, reader_->points() - begin);
       to.at.resize(count);
       to.values.resize(count * fields_);
+      if (numbers_->merged() == 0) continue;
+      to.numbers.resize(count);
+      numbers_->read(begin, to.numbers);
     }
     const uint64_t from = missing[first] * kPoints;
     const uint64_t to = std::min((missing[end - 1] + 1) * kPoints, reader_->points());

@@ -70,11 +70,11 @@ class PageSlots {
   uint32_t slots_made_ = 0;
 };
 
-/// Positions and values of a mesh's points, read as cells need them.
+/// Numbers, positions and values of a mesh's points, read as cells need them.
 class PointPages {
  public:
-  /// Keeps to `memory_bytes`. `fields`: values of each point. `reader` must outlive it.
-  PointPages(const MeshReader& reader, size_t fields, uint64_t memory_bytes);
+  /// Keeps to `memory_bytes`. `fields`: values of each point. `reader` and `numbers` must outlive it.
+  PointPages(const MeshReader& reader, const PointNumbers& numbers, size_t fields, uint64_t memory_bytes);
 
   /// Reads those of these points that are not in memory. Returns false, and reads nothing, if they do not
   /// fit together, or if pages were read again so often that streams are faster: cells refer to points all
@@ -86,10 +86,17 @@ class PointPages {
   const float* values(uint64_t point) const {
     return pageOf(point).values.data() + (point & (kPoints - 1)) * fields_;
   }
+  /// PointNumbers' number of it.
+  uint64_t number(uint64_t point) const {
+    return numbers_->merged() > 0 ? pageOf(point).numbers[point & (kPoints - 1)] : point;
+  }
 
-  /// Decides which pages are in memory: PageSlots::hold(points, kMaxAgain) of these.
-  static PageSlots slotsFor(uint64_t points, size_t fields, uint64_t memory_bytes) {
-    return {points, kShift, memory_bytes / (sizeof(glm::dvec3) + fields * sizeof(float)) / kPoints};
+  /// Decides which pages are in memory: PageSlots::hold(points, kMaxAgain) of these. `merges`: some points
+  /// have become others.
+  static PageSlots slotsFor(uint64_t points, size_t fields, uint64_t memory_bytes, bool merges) {
+    const uint64_t point_bytes =
+        sizeof(glm::dvec3) + fields * sizeof(float) + (merges ? sizeof(uint64_t) : 0);
+    return {points, kShift, memory_bytes / point_bytes / kPoints};
   }
   // The bound of reading pages again: with streams a reference is written and read, and its point, too.
   static constexpr double kMaxAgain = 4;
@@ -99,12 +106,14 @@ class PointPages {
   static constexpr uint64_t kPoints = uint64_t{1} << kShift;  // of a page
   struct Page {
     std::vector<glm::dvec3> at;
-    std::vector<float> values;  // [point * fields + field]
+    std::vector<float> values;      // [point * fields + field]
+    std::vector<uint64_t> numbers;  // empty: no point has become another one
   };
   const Page& pageOf(uint64_t point) const { return pages_[slots_.slotOf(point >> kShift)]; }
   void add(const LoadedPoints& loaded);
 
   const MeshReader* reader_;
+  const PointNumbers* numbers_;
   const size_t fields_;
   PageSlots slots_;
   std::vector<Page> pages_;  // [slot]

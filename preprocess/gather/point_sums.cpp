@@ -147,6 +147,21 @@ void PointSums::write(const GatheredCells& cells) {
   }
 }
 
+namespace {
+
+/// Turns moments about some values of the point into those about others.
+void rebase(std::span<double> moments, const float* from, const float* to, size_t fields) {
+  for (size_t field = 0; field < fields; ++field) {
+    const double step = static_cast<double>(from[field]) - to[field];
+    if (step == 0) continue;
+    double* const of_field = moments.data() + 10 + 5 * field;
+    of_field[4] += step * (2 * of_field[0] + step * moments[0]);
+    for (size_t n = 0; n < 4; ++n) of_field[n] += step * moments[n];
+  }
+}
+
+}  // namespace
+
 void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) {
   const size_t stride = momentCount(fields_);
   const size_t most_corners = std::max<size_t>(1, kMomentBytes / (stride * sizeof(double)));
@@ -176,11 +191,14 @@ void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) 
               point >= range.end)
             continue;
           double* const sums = sums_->sums(point);
+          const float* const own = cells.corner_values.data() + corner * fields_;
+          const std::span from(&moments_[(corner - first_corner) * stride], stride);
           if (std::isnan(sums[0])) {
             for (int axis = 0; axis < 3; ++axis) sums[axis] = cells.at[corner][axis];
-            std::copy_n(cells.corner_values.data() + corner * fields_, fields_, sums_->values(point));
+            std::copy_n(own, fields_, sums_->values(point));
+          } else {
+            rebase(from, own, sums_->values(point), fields_);  // a point that is several in the file
           }
-          const double* from = &moments_[(corner - first_corner) * stride];
           for (size_t m = 0; m < stride; ++m) sums[3 + m] += from[m];
         }
       }

@@ -127,20 +127,33 @@ class GradientMesh::Values {
     for (float& value : values) value = std::bit_cast<float>(std::bit_cast<uint32_t>(value) ^ kBits);
   }
   /// Gives points that have become another one the value of that.
-  void repeat(const PointNumbers& numbers, const Progress& progress) {
-    std::vector<float> run;
-    uint64_t first = 0;
-    for (const auto& [number, same_as] : numbers.mergedPoints()) {
-      if (!run.empty() && (first + run.size() != number || run.size() == kRunSamples)) {
-        progress.throwIfStopped();
-        put(first, std::move(run));
-        run.clear();
+  void repeat(const PointNumbers& numbers, uint64_t points, const Progress& progress) {
+    if (numbers.merged() == 0) return;
+    std::vector<uint64_t> same_as;
+    std::vector<float> run, others;
+    uint64_t others_first = 0;
+    for (uint64_t first = 0; first < points; first += kRunSamples) {
+      progress.throwIfStopped();
+      const auto count = static_cast<size_t>(std::min<uint64_t>(kRunSamples, points - first));
+      same_as.resize(count);
+      numbers.read(first, same_as);
+      run.resize(count);
+      get(first, run);
+      for (size_t n = 0; n < count; ++n) {
+        const uint64_t other = same_as[n];
+        if (other >= first) {  // itself, or one that has its value by now
+          run[n] = run[other - first];
+          continue;
+        }
+        if (other < others_first || other >= others_first + others.size()) {
+          others_first = other;
+          others.resize(std::min<uint64_t>(kRunSamples, points - other));
+          get(other, others);
+        }
+        run[n] = others[other - others_first];
       }
-      if (run.empty()) first = number;
-      run.emplace_back();
-      get(same_as, std::span(run).last(1));
+      put(first, run);
     }
-    if (!run.empty()) put(first, std::move(run));
   }
 
  private:
@@ -287,7 +300,7 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
   }
   for (Run& run : runs)
     if (!run.values.empty()) values->put(run.first, std::move(run.values));
-  if (!cells) values->repeat(numbers, progress);
+  if (!cells) values->repeat(numbers, reader.points(), progress);
   return values;
 }
 

@@ -3,7 +3,7 @@
 // GridSource. No source holds a whole mesh in memory.
 //
 // Cells refer to points by their number in the piece. Pieces may repeat one another's points (partitions
-// do): points of different pieces at the same position are one point (PointNumbers,
+// do), and elements each other's (discontinuous ones do): such points are one point (PointNumbers,
 // preprocess/gather/mesh_reader.h). Cells come in any mix of shapes:
 //
 //      tetrahedron    pyramid        wedge          hexahedron

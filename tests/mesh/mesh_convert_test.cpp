@@ -13,6 +13,8 @@
 #include <map>
 #include <numeric>
 #include <random>
+#include <set>
+#include <span>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
@@ -312,6 +314,122 @@ TEST_F(MeshConvert, PiecesShareTheirPoints) {
   EXPECT_EQ(report.splats, hexahedra_.points.size());
   EXPECT_EQ(report.nodes, hexahedra_.points.size() + report.merged_nodes);
   EXPECT_GT(report.merged_nodes, 0u);
+}
+
+/// The same mesh with points of their own for groups of cells, as discontinuous elements are written.
+ArrayPiece apart(const ArrayPiece& piece, size_t cells_of_element) {
+  ArrayPiece out;
+  out.cell_values = piece.cell_values;
+  std::map<uint64_t, uint64_t> points;
+  for (size_t n = 0; n < piece.cells.size(); ++n) {
+    if (n % cells_of_element == 0) points.clear();
+    const size_t begin = out.cells.corners.size();
+    out.cells.appendOf(piece.cells, n);
+    for (uint64_t& corner : std::span(out.cells.corners).subspan(begin)) {
+      const auto [own, is_new] = points.emplace(corner, out.points.size());
+      if (is_new) {
+        out.points.push_back(piece.points[corner]);
+        out.point_values.push_back(piece.point_values[corner]);
+      }
+      corner = own->second;
+    }
+  }
+  return out;
+}
+
+/// The splats of all leaves, in the order of their places: position, weight, mean and slope.
+std::vector<std::array<double, 8>> leavesOf(const std::filesystem::path& cache_path) {
+  const CacheReader cache(cache_path);
+  std::vector<std::array<double, 8>> splats;
+  SplatGeometry g;
+  SplatVariable v;
+  for (uint32_t number = 0; number < cache.bricks().size(); ++number) {
+    if (!cache.bricks()[number].isLeaf()) continue;
+    const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[number].cell);
+    cache.readGeometry(number, g);
+    cache.readVariable(number, 0, v);
+    for (size_t n = 0; n < g.size(); ++n)
+      splats.push_back({corner.x + g.x[n], corner.y + g.y[n], corner.z + g.z[n], g.weight[n], v.mean[n],
+                        v.slope0[n], v.slope1[n], v.slope2[n]});
+  }
+  std::ranges::sort(splats);
+  return splats;
+}
+
+TEST_F(MeshConvert, ElementsApartAreDrawnAsOneMesh) {
+  const ArrayPiece cube = mixedCube(10);
+  for (const uint32_t scalar : {0u, 1u})
+    for (const uint64_t mesh_bytes : {uint64_t{64} << 20, uint64_t{1} << 18}) {
+      SCOPED_TRACE(fmt::format("scalar {}, {} bytes", scalar, mesh_bytes));
+      if (!faults::isWholeSweep() && (scalar == 0) != (mesh_bytes < 1 << 20)) continue;
+      ConvertOptions how = options(scalar);
+      how.limits.mesh_bytes = mesh_bytes;
+      converted(ArrayMesh({cube}), how);
+      const auto whole = leavesOf(how.output);
+      for (const size_t cells : {1u, 5u}) {
+        const ArrayPiece elements = apart(cube, cells);
+        const ConvertReport report = converted(ArrayMesh({elements}), how);
+        EXPECT_EQ(report.merged_nodes, elements.points.size() - cube.points.size());
+        EXPECT_TRUE(leavesOf(how.output) == whole) << cells;
+      }
+    }
+}
+
+/// The integral of a field that is linear in each tetrahedron, and jumps between them.
+TEST_F(MeshConvert, ElementsApartKeepTheirJumps) {
+  ArrayPiece elements = apart(tetrahedra_, 1);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> jump(0, 1);
+  double integral = 0, volume = 0;
+  for (size_t n = 0; n < elements.cells.size(); ++n) {
+    const auto c = elements.cells.cornersOfCell(n);
+    const auto at = [&](size_t corner) { return elements.points[c[corner]]; };
+    const double of_cell = std::abs(glm::dot(at(1) - at(0), glm::cross(at(2) - at(0), at(3) - at(0)))) / 6;
+    const float level = jump(random);
+    for (const uint64_t corner : c) {
+      elements.point_values[corner] = level + static_cast<float>(elements.points[corner].x) + jump(random);
+      integral += of_cell / 4 * elements.point_values[corner];
+    }
+    volume += of_cell;
+  }
+  const ConvertReport report = converted(ArrayMesh({elements}), options(0));
+  EXPECT_EQ(report.splats, tetrahedra_.points.size());
+  const CacheReader cache(folder_ / "mesh.splats");
+  SplatGeometry geometry;
+  SplatVariable values;
+  double drawn = 0;
+  for (uint32_t number = 0; number < cache.bricks().size(); ++number) {
+    if (!cache.bricks()[number].isLeaf()) continue;
+    cache.readGeometry(number, geometry);
+    cache.readVariable(number, 0, values);
+    for (size_t n = 0; n < geometry.size(); ++n)
+      drawn += static_cast<double>(geometry.weight[n]) * values.mean[n];
+  }
+  EXPECT_NEAR(drawn / volume, integral / volume, 1e-3);
+}
+
+/// Cells on the two sides of a thin wall have points of their own at the same places.
+TEST_F(MeshConvert, PointsOnBothSidesOfAThinWallStayApart) {
+  ArrayPiece walled = hexahedra_;
+  const size_t half = hexahedra_.cells.size() / 2, of_first = walled.cells.corner_begin[half];
+  const std::set<uint64_t> before(walled.cells.corners.begin(),
+                                  walled.cells.corners.begin() + static_cast<ptrdiff_t>(of_first));
+  std::map<uint64_t, uint64_t> behind;
+  for (size_t n = half; n < hexahedra_.cells.size(); ++n)
+    for (size_t at = walled.cells.corner_begin[n]; at < walled.cells.corner_begin[n + 1]; ++at) {
+      uint64_t& corner = walled.cells.corners[at];
+      if (!before.contains(corner)) continue;
+      const auto [own, is_new] = behind.emplace(corner, walled.points.size());
+      if (is_new) {
+        walled.points.push_back(walled.points[corner]);
+        walled.point_values.push_back(walled.point_values[corner] + 1);
+      }
+      corner = own->second;
+    }
+  ASSERT_FALSE(behind.empty());
+  const ConvertReport report = converted(ArrayMesh({walled}), options(0));
+  EXPECT_EQ(report.merged_nodes, 0u);
+  EXPECT_EQ(report.splats, hexahedra_.points.size() + behind.size());
 }
 
 }  // namespace

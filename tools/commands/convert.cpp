@@ -132,7 +132,9 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
   note(report.degenerate,
        "samples are flat: they have no volume, or nearly none, and are as faint in volume rendering");
   note(report.inverted, "samples are inverted: their handedness differs from most of their block");
-  note(report.merged_nodes, "nodes on block faces coincide with others and were merged");
+  note(report.merged_nodes, description.pieces.empty()
+                                ? "nodes on block faces coincide with others and were merged"
+                                : "points coincide with others and were merged");
 }
 
 nlohmann::json statistics(const ConvertReport& report, const Progress& progress) {
