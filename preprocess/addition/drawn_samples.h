@@ -12,6 +12,7 @@
 
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/seams/joint_nodes.h"
@@ -88,7 +89,7 @@ class CacheGrid : public GridSource {
 };
 
 /// An unstructured grid of which cells, or points, without a splat in the cache are hidden. Points that are
-/// one (PointNumbers, preprocess/gather/mesh_reader.h) are drawn together.
+/// one (PointNumbers) are drawn together.
 class DrawnMesh final : public MeshSource {
  public:
   /// `source` must outlive it.

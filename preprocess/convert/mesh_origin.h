@@ -20,6 +20,7 @@
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/gather/gather_forecast.h"
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
 

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
 #include "preprocess/moments/cell_moments.h"
 #include "stream/base/temporary_files.h"
 

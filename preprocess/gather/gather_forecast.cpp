@@ -5,6 +5,7 @@
 
 #include "preprocess/gather/face_matcher.h"
 #include "preprocess/gather/outer_planes.h"
+#include "preprocess/gather/point_numbers.h"
 #include "preprocess/gather/point_pages.h"
 #include "preprocess/gather/streams_file.h"
 

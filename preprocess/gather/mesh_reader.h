@@ -1,12 +1,10 @@
 // Reads a mesh in chunks, one ahead, and decides for all of conversion which of its points and cells are
-// blanked: by the file, by `--blank VALUE`, or because a number is not finite. MeshReader numbers points
-// and cells through all pieces; PointNumbers finds the points that are one. Memory: a few chunks. Any thread
-// may read.
+// blanked: by the file, by `--blank VALUE`, or because a number is not finite. Points and cells are numbered
+// through all pieces. Memory: a few chunks. Any thread may read.
 #pragma once
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,7 +13,6 @@
 #include "preprocess/grid/read_ahead.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/progress.h"
-#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 
@@ -93,40 +90,6 @@ class MeshReader {
   std::optional<double> blank_value_;
   Centring centring_;
   uint64_t points_ = 0, cells_ = 0;
-};
-
-/// Whether elements, of one or some cells each, have points of their own at the places where they meet, as
-/// discontinuous finite elements are written: cells that follow one another are in many parts without a common
-/// point, and many points have the positions of others. A thin wall parts a mesh in two at most. Reads some
-/// chunks. Throws Error if the file is damaged.
-bool hasElementsApart(const MeshReader& reader);
-
-/// The numbers of points through all pieces of a mesh. Points at the same position, in the first 40 bits of
-/// each coordinate, are one point, which has the lowest of their numbers, if they are of different pieces or
-/// if the mesh hasElementsApart(): it has the splats of the whole mesh. In other meshes points of the same
-/// piece stay apart, as on the two sides of a thin wall.
-class PointNumbers {
- public:
-  /// Whether points of the mesh may be one. Otherwise PointNumbers takes no time.
-  static bool mayMerge(const MeshReader& reader) {
-    return reader.pieces().size() > 1 || hasElementsApart(reader);
-  }
-  /// Bytes of its temporary files in all, and of those that it keeps, for each point of a mesh that mayMerge().
-  static constexpr uint64_t kMostBytes = 3 * sizeof(double) + 4 * sizeof(uint64_t),
-                            kKeptBytes = sizeof(uint64_t);
-
-  /// Reads all points if the mesh mayMerge(); within `memory_bytes`. Throws Error if the disk fails.
-  PointNumbers(const MeshReader& reader, uint64_t memory_bytes, const ScratchFiles& scratch,
-               const Progress& progress);
-
-  /// The number of points that have become another one.
-  uint64_t merged() const { return merged_; }
-  /// Overwrites `out` with the numbers of the points `first` and following, piece after piece. Any thread.
-  void read(uint64_t first, std::span<uint64_t> out) const;
-
- private:
-  uint64_t merged_ = 0;
-  std::unique_ptr<NamelessFile> file_;  // the number of each point; null: no point has become another one
 };
 
 }  // namespace curvisplat

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
 #include "stream/base/temporary_files.h"
 
 namespace curvisplat {

@@ -12,6 +12,7 @@
 #include "preprocess/gather/cell_slopes.h"
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
 #include "preprocess/gather/point_sums.h"
 #include "preprocess/shape/shape.h"
 #include "stream/base/error.h"

@@ -4,7 +4,7 @@
 //
 // Cells refer to points by their number in the piece. Pieces may repeat one another's points (partitions
 // do), and elements each other's (discontinuous ones do): such points are one point (PointNumbers,
-// preprocess/gather/mesh_reader.h). Cells come in any mix of shapes:
+// preprocess/gather/point_numbers.h). Cells come in any mix of shapes:
 //
 //      tetrahedron    pyramid        wedge          hexahedron
 //           3            4             5               7-----6
