@@ -8,10 +8,10 @@
 // middle of the kinked face.
 //
 // A splat says what the scalar is at its middle and how it changes from there: a tangent. Tangents of the
-// neighbours do not meet where the scalar bends, and their weighted mean is off by half the second
-// derivative times the kernel's variance. So much is taken off beforehand: a tenth of each second difference,
-// once what bent coordinates make of a straight scalar is left out; the mean stays within the range of the
-// node and its neighbours.
+// neighbours do not meet where the scalar bends: their weighted mean lacks half the second derivative times
+// the kernel's variance. So much is added to the mean beforehand: a tenth (kBend) of each second difference,
+// less what bent coordinates make of a straight scalar. The mean stays within the range of the node and its
+// neighbours.
 //
 // A splat is longer or shorter than the cell along each axis, by a factor near 1, so that uniform data looks
 // uniform where cells of different sizes meet (stretch.h). Its weight stays the volume of the cell, its slope
