@@ -1,5 +1,5 @@
-// Which points of a mesh are one: those that partitions repeat, and those of elements that have points of their
-// own. The numbers of points are in a temporary file, and read by ranges.
+// PointNumbers finds which points of a mesh are one: those that partitions repeat, and those of elements that have
+// points of their own. Numbers of points are in a temporary file, and read by ranges.
 #pragma once
 
 #include <cstdint>
