@@ -173,7 +173,7 @@ struct Coloured {
 };
 
 /// One block. Whether it is saturated now.
-HWY_NOINLINE bool paintBlock(Coloured& splat, const Window& window, const float* HWY_RESTRICT footprint,
+HWY_NOINLINE bool paintBlock(Coloured& splat, const DepthWindow& window, const float* HWY_RESTRICT footprint,
                              float* HWY_RESTRICT block, Corner corner) {
   const Floats d;
   const Cuts cuts{splat.faces, splat.line, window};
@@ -255,7 +255,7 @@ HWY_NOINLINE BlockMask paintColoured(const TileWork& work, BlockMask blocks, con
   BlockMask saturated = 0;
   while (blocks != 0) {
     const int block = takeFirst(blocks);
-    const auto in_window = [&](float* at_block, const Window& window) HWY_ATTR {
+    const auto in_window = [&](float* at_block, const DepthWindow& window) HWY_ATTR {
       return paintBlock(splat, window, footprint, at_block, cornerOf(block));
     };
     if (windowed ? paintWindows(work, block, in_window) : in_window(work.tile + block * kBlockFloats, {}))

@@ -79,7 +79,7 @@ struct DepthLine {
 };
 
 /// A window of depth in a block: [kBlockPixels] each, or null where it has no end.
-struct Window {
+struct DepthWindow {
   const float* HWY_RESTRICT nearer = nullptr;
   const float* HWY_RESTRICT farther = nullptr;
 };
@@ -88,7 +88,7 @@ struct Window {
 struct Cuts {
   const Faces& faces;
   const DepthLine& depth;
-  Window window;
+  DepthWindow window;
 };
 
 HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t lane) {
@@ -204,7 +204,7 @@ HWY_INLINE bool paintWindows(const TileWork& work, int block, const Paint& paint
   const float* depths = windows.depths + block * kBlockPixels;
   constexpr int kPixels = kTileSide * kTileSide;
   for (int n = 0; n < open; ++n) {
-    Window window;
+    DepthWindow window;
     if (n > 0) window.nearer = depths + (n - 1) * kPixels;
     if (n < windows.layers) window.farther = depths + n * kPixels;
     float* const at = n == 0 ? work.tile : windows.behind + (n - 1) * kTileFloats;
@@ -279,7 +279,7 @@ HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float
 /// Paints one block of a splat that is not looked up, or is windowed. Returns whether it is saturated then.
 HWY_NOINLINE bool paintCutBlock(const TileWork& work, const CutSplat& cut, const float* footprint,
                                 int block) {
-  const auto in_window = [&](float* at, const Window& window) HWY_ATTR {
+  const auto in_window = [&](float* at, const DepthWindow& window) HWY_ATTR {
     const Cuts cuts{cut.faces, cut.line, window};
     const Corner corner = cornerOf(block);
     if (cut.fit == kConstant) return paintBlock<false>(cut.e, cuts, cut.shade, footprint, at, corner);

@@ -36,14 +36,14 @@ struct Remainder {
 };
 
 /// A window of depth, in the depths of layers.
-struct Window {
+struct DepthWindow {
   double nearer = -INFINITY, farther = INFINITY;
 };
 
 struct Cuts {
   std::optional<ScreenCut> cut;
   std::optional<ScreenDepth> depth;
-  Window window = {};
+  DepthWindow window = {};
   const ScreenSplat* colour = nullptr;
 
   double correlation() const { return depth ? depth->correlation : cut ? cut->correlation : 0; }
@@ -128,8 +128,8 @@ Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationT
       for (size_t window = layers.size() + 1; window-- > 0;) {
         if (window < layers.size())
           pixel = glm::dvec4(layers[window].colour) + (1 - double{layers[window].colour.w}) * pixel;
-        const Window depths{window > 0 ? double{layers[window - 1].depth} : -INFINITY,
-                            window < layers.size() ? double{layers[window].depth} : INFINITY};
+        const DepthWindow depths{window > 0 ? double{layers[window - 1].depth} : -INFINITY,
+                                 window < layers.size() ? double{layers[window].depth} : INFINITY};
         for (size_t n = 0; n < splats.size(); ++n) {
           const ScreenSplat& splat = splats[n];
           if (isRecord(splat)) continue;
