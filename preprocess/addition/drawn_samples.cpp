@@ -133,7 +133,7 @@ UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   return manifest.stretch == kDualCells ? UnlikeHalves::kApart : UnlikeHalves::kApartInCells;
 }
 
-CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
+CacheGrid::CacheGrid(const GridSource& source) : ForwardingGrid(source) {
   uint64_t node = 0;
   for (const GridBlock& block : source.description().blocks) {
     first_nodes_.push_back(node);
@@ -171,19 +171,7 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
 
 void CacheGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                      NodeArrays& out) const {
-  source_->read(block, box, scalars, out);
-  blankOthers(block, box, scalars, out);
-}
-
-void CacheGrid::readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                               NodeArrays& out) const {
-  source_->readPartOfRows(block, box, scalars, out);
-  blankOthers(block, box, scalars, out);
-}
-
-/// Blanks what has no splat in the cache.
-void CacheGrid::blankOthers(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                            NodeArrays& out) const {
+  ForwardingGrid::read(block, box, scalars, out);
   for (size_t n = 0; n < out.x.size(); ++n)
     out.blank[n] |= !(std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]));
   if (!drawn_) return;
@@ -217,7 +205,7 @@ void CacheGrid::restrict(uint32_t block_number, const NodeBox& box, std::vector<
   }
 }
 
-DrawnMesh::DrawnMesh(const MeshSource& source) : source_(&source) {
+DrawnMesh::DrawnMesh(const MeshSource& source) : ForwardingMesh(source) {
   uint64_t points = 0, cells = 0;
   for (const MeshPiece& piece : source.description().pieces) {
     first_points_.push_back(points);
@@ -230,14 +218,14 @@ DrawnMesh::DrawnMesh(const MeshSource& source) : source_(&source) {
 void DrawnMesh::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                            const std::filesystem::path& temporary_folder, Progress& progress) {
   of_cells_ = cache.manifest().cells;
-  const MeshReader reader(*source_, {}, std::nullopt);
+  const MeshReader reader(this->source(), {}, std::nullopt);
   numbers_ = std::make_unique<PointNumbers>(reader, plan.mesh_bytes / 2, temporary_folder, progress);
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
 
 void DrawnMesh::readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                            MeshPoints& out) const {
-  source_->readPoints(piece, first, count, scalars, out);
+  ForwardingMesh::readPoints(piece, first, count, scalars, out);
   if (!drawn_ || of_cells_) return;
   std::vector<uint8_t> missing(count, 0);
   drawn_->blankOthers(first_points_[piece] + first, missing);
@@ -252,7 +240,7 @@ void DrawnMesh::readPoints(uint32_t piece, uint64_t first, uint64_t count, std::
 
 void DrawnMesh::readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                           MeshCells& out) const {
-  source_->readCells(piece, first, count, scalars, out);
+  ForwardingMesh::readCells(piece, first, count, scalars, out);
   if (drawn_ && of_cells_) drawn_->blankOthers(first_cells_[piece] + first, out.hidden);
 }
 

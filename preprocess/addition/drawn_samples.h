@@ -13,7 +13,9 @@
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/gather/point_numbers.h"
+#include "preprocess/grid/box_source.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/mesh/forwarding_mesh.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/seams/joint_nodes.h"
 #include "preprocess/splats/node_splats.h"
@@ -53,7 +55,7 @@ NodeSplatCorrections correctionsOf(const Manifest& manifest);
 
 /// A structured grid of which nodes without a splat in the cache are blanked. With cell-centred scalars,
 /// cells without a splat in the cache have the value NaN.
-class CacheGrid : public GridSource {
+class CacheGrid : public ForwardingGrid {
  public:
   /// Blanks what the grid itself blanks: iblank, and coordinates that are not finite. Enough for a cache
   /// whose scalars had values everywhere else. `source` must outlive it.
@@ -67,21 +69,12 @@ class CacheGrid : public GridSource {
   void addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
                       const std::filesystem::path& temporary_folder, Progress& progress);
 
-  const GridDescription& description() const override { return source_->description(); }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override;
-  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return source_->rowsInMemory(scalars);
-  }
 
  private:
-  void blankOthers(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                   NodeArrays& out) const;
   void restrict(uint32_t block, const NodeBox& box, std::vector<uint8_t>& blank) const;
 
-  const GridSource* source_;
   std::vector<uint64_t> first_nodes_;  // [block]
   std::unique_ptr<DrawnNodes> drawn_;
   NodeSplatCorrections corrections_;  // of the cache
@@ -90,7 +83,7 @@ class CacheGrid : public GridSource {
 
 /// An unstructured grid of which cells, or points, without a splat in the cache are hidden. Points that are
 /// one (PointNumbers) are drawn together.
-class DrawnMesh final : public MeshSource {
+class DrawnMesh final : public ForwardingMesh {
  public:
   /// `source` must outlive it.
   explicit DrawnMesh(const MeshSource& source);
@@ -101,18 +94,12 @@ class DrawnMesh final : public MeshSource {
 
   bool restricted() const { return drawn_ != nullptr; }
 
-  const GridDescription& description() const override { return source_->description(); }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                  MeshCells& out) const override;
-  void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
-               const Progress& progress) const override {
-    source_->prepare(scalars, memory_bytes, progress);
-  }
 
  private:
-  const MeshSource* source_;
   std::vector<uint64_t> first_points_, first_cells_;  // [piece]
   bool of_cells_ = false;
   std::unique_ptr<PointNumbers> numbers_;

@@ -25,13 +25,12 @@ constexpr unsigned kGradients = kNeedsVelocityGradient | kNeedsPressureGradient;
 constexpr size_t kRunSamples = 8192;  // that are written at once
 
 /// A mesh with the flow as its scalars: density, velocity and pressure, those that are needed.
-class FlowMesh final : public MeshSource {
+class FlowMesh final : public ForwardingMesh {
  public:
   FlowMesh(const MeshSource& source, const FlowInputs& inputs, const PerfectGas& gas,
            std::optional<float> blank_value, unsigned needs)
-      : source_(source), inputs_(inputs), gas_(gas), blank_value_(blank_value) {
+      : ForwardingMesh(source), inputs_(inputs), gas_(gas), blank_value_(blank_value) {
     needed_ = inputs.neededFor(needs);
-    description_ = source.description();
     description_.scalars.clear();
     const auto add = [&](bool wanted, uint32_t field) {
       if (!wanted) return;
@@ -47,18 +46,15 @@ class FlowMesh final : public MeshSource {
     add((needs & (kNeedsPressure | kNeedsPressureGradient)) != 0, 4);
   }
 
-  const GridDescription& description() const override { return description_; }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override {
-    const bool here = !scalars.empty();
-    source_.readPoints(piece, first, count, here ? needed_ : std::vector<uint32_t>{}, out);
-    if (here) makeFlow(scalars, out.scalars);
+    ForwardingMesh::readPoints(piece, first, count, sourceScalars(scalars), out);
+    makeFlow(scalars, out.scalars);
   }
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                  MeshCells& out) const override {
-    const bool here = !scalars.empty();
-    source_.readCells(piece, first, count, here ? needed_ : std::vector<uint32_t>{}, out);
-    if (here) makeFlow(scalars, out.scalars);
+    ForwardingMesh::readCells(piece, first, count, sourceScalars(scalars), out);
+    makeFlow(scalars, out.scalars);
   }
 
   /// The flow and its gradients from the values and gradients of the fields.
@@ -79,7 +75,12 @@ class FlowMesh final : public MeshSource {
   }
 
  private:
+  std::vector<uint32_t> sourceScalars(std::span<const uint32_t> scalars) const override {
+    return scalars.empty() ? std::vector<uint32_t>{} : needed_;
+  }
+
   void makeFlow(std::span<const uint32_t> scalars, std::vector<std::vector<float>>& values) const {
+    if (scalars.empty()) return;
     const size_t count = values.empty() ? 0 : values[0].size();
     std::vector<std::vector<float>> flow(scalars.size(), std::vector<float>(count));
     for (size_t n = 0; n < count; ++n) {
@@ -100,12 +101,10 @@ class FlowMesh final : public MeshSource {
     values = std::move(flow);
   }
 
-  const MeshSource& source_;
   const FlowInputs& inputs_;
   const PerfectGas& gas_;
   const std::optional<float> blank_value_;
   std::vector<uint32_t> needed_, fields_;
-  GridDescription description_;
 };
 
 }  // namespace
@@ -164,7 +163,7 @@ class GradientMesh::Values {
 
 GradientMesh::GradientMesh(std::unique_ptr<MeshSource> source, const DerivedOptions& options,
                            std::filesystem::path folder)
-    : source_(std::move(source)), description_(source_->description()), scratch_(std::move(folder)) {
+    : ForwardingMesh(std::move(source)), scratch_(std::move(folder)) {
   GridDescription unchanged = description_;
   gas_ = gasOf(options, unchanged);
   if (options.blank_value) blank_value_ = static_cast<float>(*options.blank_value);
@@ -185,28 +184,28 @@ GradientMesh::GradientMesh(std::unique_ptr<MeshSource> source, const DerivedOpti
 
 GradientMesh::~GradientMesh() = default;
 
-std::vector<uint32_t> GradientMesh::storedOf(std::span<const uint32_t> scalars) const {
+std::vector<uint32_t> GradientMesh::sourceScalars(std::span<const uint32_t> scalars) const {
   std::vector<uint32_t> stored;
   for (const uint32_t scalar : scalars)
-    if (scalar < source_->description().scalars.size()) stored.push_back(scalar);
+    if (scalar < source().description().scalars.size()) stored.push_back(scalar);
   return stored;
 }
 
 void GradientMesh::readPoints(uint32_t piece, uint64_t first, uint64_t count,
                               std::span<const uint32_t> scalars, MeshPoints& out) const {
-  source_->readPoints(piece, first, count, storedOf(scalars), out);
+  source().readPoints(piece, first, count, sourceScalars(scalars), out);
   insert(scalars, first_points_[piece] + first, count, out.scalars);
 }
 
 void GradientMesh::readCells(uint32_t piece, uint64_t first, uint64_t count,
                              std::span<const uint32_t> scalars, MeshCells& out) const {
-  source_->readCells(piece, first, count, storedOf(scalars), out);
+  source().readCells(piece, first, count, sourceScalars(scalars), out);
   insert(scalars, first_cells_[piece] + first, count, out.scalars);
 }
 
 void GradientMesh::insert(std::span<const uint32_t> scalars, uint64_t first, uint64_t count,
                           std::vector<std::vector<float>>& values) const {
-  const auto stored = static_cast<uint32_t>(source_->description().scalars.size());
+  const auto stored = static_cast<uint32_t>(source().description().scalars.size());
   for (size_t s = 0; s < scalars.size(); ++s) {
     if (scalars[s] < stored) continue;
     const Values& of_mesh = valuesOf(scalars[s] - stored);
@@ -218,8 +217,8 @@ void GradientMesh::insert(std::span<const uint32_t> scalars, uint64_t first, uin
 
 void GradientMesh::prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
                            const Progress& progress) const {
-  source_->prepare(storedOf(scalars), memory_bytes, progress);
-  const auto stored = static_cast<uint32_t>(source_->description().scalars.size());
+  ForwardingMesh::prepare(scalars, memory_bytes, progress);
+  const auto stored = static_cast<uint32_t>(source().description().scalars.size());
   const MutexLock lock(mutex_);
   for (const uint32_t scalar : scalars) {
     if (scalar < stored) continue;
@@ -229,13 +228,13 @@ void GradientMesh::prepare(std::span<const uint32_t> scalars, uint64_t memory_by
 }
 
 MeshSource::Preparation GradientMesh::preparationFor(std::span<const uint32_t> scalars) const {
-  Preparation preparation = source_->preparationFor(storedOf(scalars));
+  Preparation preparation = ForwardingMesh::preparationFor(scalars);
   preparation.centring = inputs_.centring;
-  const auto stored = static_cast<uint32_t>(source_->description().scalars.size());
+  const auto stored = static_cast<uint32_t>(source().description().scalars.size());
   const MutexLock lock(mutex_);
   for (const uint32_t scalar : scalars) {
     if (scalar < stored || values_.contains(scalar - stored)) continue;
-    const FlowMesh flow_mesh(*source_, inputs_, gas_, blank_value_, quantities_.at(scalar - stored).needs);
+    const FlowMesh flow_mesh(source(), inputs_, gas_, blank_value_, quantities_.at(scalar - stored).needs);
     preparation.fields = std::max(preparation.fields, flow_mesh.description().scalars.size());
     ++preparation.values;
   }
@@ -252,7 +251,7 @@ const GradientMesh::Values& GradientMesh::valuesOf(uint32_t quantity_number) con
 std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& quantity,
                                                             uint64_t memory_bytes,
                                                             const Progress& outer_progress) const {
-  const FlowMesh flow_mesh(*source_, inputs_, gas_, blank_value_, quantity.needs);
+  const FlowMesh flow_mesh(source(), inputs_, gas_, blank_value_, quantity.needs);
   const size_t fields = flow_mesh.description().scalars.size();
   std::vector<uint32_t> all(fields);
   for (uint32_t n = 0; n < fields; ++n) all[n] = n;
@@ -287,7 +286,7 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
     if (run.values.empty()) run.first = splat.node;
     run.values.push_back(static_cast<float>(flowQuantity(quantity.quantity, flow, of_flow, gas_, 0)));
   };
-  if (!chunk_bytes_) chunk_bytes_ = MeshReader(*source_, {}, std::nullopt).largestChunk();
+  if (!chunk_bytes_) chunk_bytes_ = MeshReader(source(), {}, std::nullopt).largestChunk();
   const uint64_t half = halfBesideChunks(memory_bytes, *chunk_bytes_);
   CornerGather gather(reader, numbers, half, scratch_, progress);
   if (cells) {

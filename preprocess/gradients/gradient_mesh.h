@@ -20,13 +20,14 @@
 #include <vector>
 
 #include "preprocess/formats/derived/flow_window.h"
+#include "preprocess/mesh/forwarding_mesh.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/mutex.h"
 #include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 
-class GradientMesh final : public MeshSource {
+class GradientMesh final : public ForwardingMesh {
  public:
   /// `folder`: for temporary files, without a name once they are open. Throws UsageError if gamma or the gas
   /// constant is out of range.
@@ -34,7 +35,6 @@ class GradientMesh final : public MeshSource {
                std::filesystem::path folder);
   ~GradientMesh() override;
 
-  const GridDescription& description() const override { return description_; }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
@@ -42,14 +42,13 @@ class GradientMesh final : public MeshSource {
   /// Reads the mesh once for each of these scalars that has gradients and is not known yet.
   void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
                const Progress& progress) const override;
-
   Preparation preparationFor(std::span<const uint32_t> scalars) const override;
   uint64_t preparedBytes() const override { return scratch_.mostBytes(); }
 
  private:
   class Values;
   /// The source's scalars among `scalars`.
-  std::vector<uint32_t> storedOf(std::span<const uint32_t> scalars) const;
+  std::vector<uint32_t> sourceScalars(std::span<const uint32_t> scalars) const override;
   /// Puts the gradients' quantities where `scalars` has them; `first`: of the samples in the whole mesh.
   void insert(std::span<const uint32_t> scalars, uint64_t first, uint64_t count,
               std::vector<std::vector<float>>& values) const;
@@ -57,8 +56,6 @@ class GradientMesh final : public MeshSource {
   std::unique_ptr<Values> compute(const QuantityInfo& quantity, uint64_t memory_bytes,
                                   const Progress& progress) const REQUIRES(mutex_);
 
-  std::unique_ptr<MeshSource> source_;
-  GridDescription description_;
   PerfectGas gas_;
   FlowInputs inputs_;
   std::optional<float> blank_value_;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/grid/box_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -77,42 +78,30 @@ std::vector<SampledBox> boxesOf(const std::vector<GridBlock>& blocks, uint64_t n
   return boxes;
 }
 
-class SampleSource final : public GridSource {
+class SampleSource final : public ForwardingGrid {
  public:
   SampleSource(std::shared_ptr<const GridSource> source, uint64_t nodes)
-      : source_(std::move(source)),
-        boxes_(boxesOf(source_->description().blocks, nodes)),
-        description_(source_->description()) {
+      : ForwardingGrid(std::move(source)), boxes_(boxesOf(description_.blocks, nodes)) {
     description_.boundaries.clear();
     description_.flow.clear();
     description_.blocks.clear();
     for (const SampledBox& box : boxes_) {
-      GridBlock block = source_->description().blocks[box.block];
+      GridBlock block = this->source().description().blocks[box.block];
       block.nj = box.rows.j1 - box.rows.j0;
       block.nk = box.rows.k1 - box.rows.k0;
       description_.blocks.push_back(std::move(block));
     }
   }
 
-  const GridDescription& description() const override { return description_; }
-
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
-    readBox(*source_, boxes_[block].block, inGrid(block, box), scalars, out);
+    ForwardingGrid::read(boxes_[block].block, inGrid(block, box), scalars, out);
     for (size_t n = 0; n < scalars.size(); ++n)
       if (description_.scalars[scalars[n]].centring == Centring::kCell) cutCells(block, box, out.scalars[n]);
   }
 
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    read(block, box, scalars, out);
-  }
-  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return source_->rowsInMemory(scalars);
-  }
-
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
-    return source_->readFringe(boxes_[block].block, inGrid(block, box), out);
+    return ForwardingGrid::readFringe(boxes_[block].block, inGrid(block, box), out);
   }
 
  private:
@@ -132,9 +121,7 @@ class SampleSource final : public GridSource {
           std::fill_n(row, row_nodes, std::numeric_limits<float>::quiet_NaN());
   }
 
-  const std::shared_ptr<const GridSource> source_;
   const std::vector<SampledBox> boxes_;
-  GridDescription description_;
 };
 
 }  // namespace
@@ -258,10 +245,10 @@ std::unique_ptr<GridSource> thinned(const GridSource& source, uint64_t stride) {
 
 namespace {
 
-class ReorderedSource final : public GridSource {
+class ReorderedSource final : public ForwardingGrid {
  public:
   ReorderedSource(const GridSource& source, std::vector<uint32_t> order)
-      : source_(source), order_(std::move(order)), description_(source.description()) {
+      : ForwardingGrid(source), order_(std::move(order)) {
     const std::vector<GridBlock>& blocks = source.description().blocks;
     CURVISPLAT_CHECK_OP(order_.size(), ==, blocks.size());
     std::vector<uint32_t> places(order_.size());
@@ -273,26 +260,16 @@ class ReorderedSource final : public GridSource {
     for (FlowConditions& flow : description_.flow) flow.block = places.at(flow.block);
   }
 
-  const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
-    source_.read(order_.at(block), box, scalars, out);
-  }
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    source_.readPartOfRows(order_.at(block), box, scalars, out);
-  }
-  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return source_.rowsInMemory(scalars);
+    ForwardingGrid::read(order_.at(block), box, scalars, out);
   }
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
-    return source_.readFringe(order_.at(block), box, out);
+    return ForwardingGrid::readFringe(order_.at(block), box, out);
   }
 
  private:
-  const GridSource& source_;
   std::vector<uint32_t> order_;
-  GridDescription description_;
 };
 
 }  // namespace

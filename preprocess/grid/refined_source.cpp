@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/grid/box_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -158,10 +159,10 @@ void forEachNode(const NodeBox& box, uint64_t ni, const Take& take) {
       for (uint64_t i = box.i0; i < box.endOfRow(ni); ++i) take(std::array{i, j, k});
 }
 
-class RefinedSource final : public GridSource {
+class RefinedSource final : public ForwardingGrid {
  public:
   RefinedSource(std::unique_ptr<GridSource> source, uint32_t parts, std::optional<double> blank_value)
-      : source_(std::move(source)), parts_(parts), between_(parts), description_(source_->description()) {
+      : ForwardingGrid(std::move(source)), parts_(parts), between_(parts) {
     if (blank_value) blank_value_ = static_cast<float>(*blank_value);
     for (GridBlock& block : description_.blocks) block = refinedBlock(block, parts);
     for (GridBoundary& boundary : description_.boundaries)
@@ -173,13 +174,11 @@ class RefinedSource final : public GridSource {
     description_.format += fmt::format(", refined {0} x {0} x {0}", parts);
   }
 
-  const GridDescription& description() const override { return description_; }
-
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
     const NodesAround around = aroundOf(block, box);
     NodeArrays grid;
-    readBox(*source_, block, around.box(), scalars, grid);
+    ForwardingGrid::read(block, around.box(), scalars, grid);
     const uint64_t ni = description_.blocks[block].ni;
     const size_t count = box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0);
     for (auto* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
@@ -199,19 +198,14 @@ class RefinedSource final : public GridSource {
     fillBlanks(around, box, ni, missingOf(scalars, grid), grid.blank, out.blank);
   }
 
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    read(block, box, scalars, out);
-  }
-
   uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return (source_->rowsInMemory(scalars) + parts_ - 1) / parts_;  // the grid's rows are shorter
+    return (source().rowsInMemory(scalars) + parts_ - 1) / parts_;  // the grid's rows are shorter
   }
 
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
     const NodesAround around = aroundOf(block, box);
     std::vector<uint8_t> grid;
-    if (!source_->readFringePart(block, around.box(), grid)) return false;
+    if (!source().readFringePart(block, around.box(), grid)) return false;
     out.clear();
     forEachNode(box, description_.blocks[block].ni, [&](const std::array<uint64_t, 3>& node) {
       const PlaceBetween place = around.placeOf(node);
@@ -225,7 +219,7 @@ class RefinedSource final : public GridSource {
 
  private:
   NodesAround aroundOf(uint32_t block, const NodeBox& box) const {
-    return {source_->description().blocks.at(block), description_.blocks.at(block), box, parts_};
+    return {source().description().blocks.at(block), description_.blocks.at(block), box, parts_};
   }
 
   bool isOfCells(uint32_t scalar) const {
@@ -269,11 +263,9 @@ class RefinedSource final : public GridSource {
     });
   }
 
-  const std::unique_ptr<const GridSource> source_;
   const uint32_t parts_;
   const PartsBetween between_;
   std::optional<float> blank_value_;
-  GridDescription description_;
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/mesh/curved_cells.h"
 #include "preprocess/mesh/curved_volumes.h"
+#include "preprocess/mesh/forwarding_mesh.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/error.h"
 
@@ -61,10 +62,10 @@ class NodePlaces {
   std::vector<glm::dvec3> places_;
 };
 
-class CutSource final : public MeshSource {
+class CutSource final : public ForwardingMesh {
  public:
   CutSource(std::unique_ptr<MeshSource> whole, bool cut, const std::filesystem::path& temporary_folder)
-      : whole_(std::move(whole)), description_(whole_->description()), cut_(cut) {
+      : ForwardingMesh(std::move(whole)), cut_(cut) {
     Counts counts;
     const auto of_begins = std::make_shared<SpoolFile>(temporary_folder),
                of_volumes = std::make_shared<SpoolFile>(temporary_folder);
@@ -85,21 +86,9 @@ class CutSource final : public MeshSource {
           counts.corners, counts.solid));
   }
 
-  const GridDescription& description() const override { return description_; }
-  void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
-                  MeshPoints& out) const override {
-    whole_->readPoints(piece, first, count, scalars, out);
-  }
+  bool hasCurvedCells() const override { return false; }
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                  MeshCells& out) const override;
-  void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
-               const Progress& progress) const override {
-    whole_->prepare(scalars, memory_bytes, progress);
-  }
-  Preparation preparationFor(std::span<const uint32_t> scalars) const override {
-    return whole_->preparationFor(scalars);
-  }
-  uint64_t preparedBytes() const override { return whole_->preparedBytes(); }
 
  private:
   struct Counts {
@@ -113,15 +102,15 @@ class CutSource final : public MeshSource {
 
   uint64_t measureParts(uint32_t piece, NumberSpool<uint64_t>& begins, NumberSpool<double>& volumes,
                         Counts& counts) const {
-    const uint64_t all = whole_->description().pieces[piece].cells;
+    const uint64_t all = source().description().pieces[piece].cells;
     uint64_t parts = 0, at_once = kFewCells;
     MeshCells cells;
     std::vector<double> of_parts;
     for (uint64_t first = 0; first < all;) {
       const uint64_t count = std::min(at_once, all - first);
-      whole_->readCells(piece, first, count, {}, cells);
-      checkCells(cells, whole_->description().pieces[piece], first);
-      const NodePlaces places(*whole_, piece, cells, cut_);
+      source().readCells(piece, first, count, {}, cells);
+      checkCells(cells, source().description().pieces[piece], first);
+      const NodePlaces places(source(), piece, cells, cut_);
       auto curved = cells.curved.begin();
       for (size_t n = 0; n < count; ++n) {
         begins.add(parts);
@@ -157,8 +146,6 @@ class CutSource final : public MeshSource {
     return low;
   }
 
-  const std::unique_ptr<MeshSource> whole_;
-  GridDescription description_;
   std::vector<SpooledNumbers> begins_;   // [piece]: of each cell among the parts, and the end of the last
   std::vector<SpooledNumbers> volumes_;  // [piece]: of each part; 0: that of the flat cell
   const bool cut_;
@@ -174,7 +161,7 @@ void CutSource::readCells(uint32_t piece, uint64_t first, uint64_t count, std::s
   std::vector<uint64_t> begins(end - cell + 1);
   begins_[piece].read(cell, std::span(begins));
   MeshCells whole;
-  whole_->readCells(piece, cell, end - cell, scalars, whole);
+  source().readCells(piece, cell, end - cell, scalars, whole);
   std::vector<double> volumes(count);
   volumes_[piece].read(first, std::span(volumes));
   out.volumes.assign(volumes.begin(), volumes.end());

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "preprocess/grid/box_source.h"
+#include "preprocess/mesh/forwarding_mesh.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -18,56 +20,46 @@ auto withText(const ErrorText& text, const Read& read) {
   }
 }
 
-class DescribedGrid final : public GridSource {
+class DescribedGrid final : public ForwardingGrid {
  public:
   DescribedGrid(std::unique_ptr<GridSource> source, GridDescription description, ErrorText text)
-      : source_(std::move(source)), description_(std::move(description)), text_(std::move(text)) {}
+      : ForwardingGrid(std::move(source)), text_(std::move(text)) {
+    description_ = std::move(description);
+  }
 
-  const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
-    withText(text_, [&] { source_->read(block, box, scalars, out); });
-  }
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    withText(text_, [&] { source_->readPartOfRows(block, box, scalars, out); });
-  }
-  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return source_->rowsInMemory(scalars);
+    withText(text_, [&] { ForwardingGrid::read(block, box, scalars, out); });
   }
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
-    return withText(text_, [&] { return source_->readFringe(block, box, out); });
+    return withText(text_, [&] { return ForwardingGrid::readFringe(block, box, out); });
   }
 
  private:
-  std::unique_ptr<GridSource> source_;
-  GridDescription description_;
   ErrorText text_;
 };
 
-class DescribedMesh final : public MeshSource {
+class DescribedMesh final : public ForwardingMesh {
  public:
   DescribedMesh(std::unique_ptr<MeshSource> source, GridDescription description, ErrorText text)
-      : source_(std::move(source)), description_(std::move(description)), text_(std::move(text)) {}
+      : ForwardingMesh(std::move(source)), text_(std::move(text)) {
+    description_ = std::move(description);
+  }
 
-  const GridDescription& description() const override { return description_; }
-  bool hasCurvedCells() const override { return source_->hasCurvedCells(); }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override {
-    withText(text_, [&] { source_->readPoints(piece, first, count, scalars, out); });
+    withText(text_, [&] { ForwardingMesh::readPoints(piece, first, count, scalars, out); });
   }
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                  MeshCells& out) const override {
-    withText(text_, [&] { source_->readCells(piece, first, count, scalars, out); });
+    withText(text_, [&] { ForwardingMesh::readCells(piece, first, count, scalars, out); });
   }
   void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
                const Progress& progress) const override {
-    withText(text_, [&] { source_->prepare(scalars, memory_bytes, progress); });
+    withText(text_, [&] { ForwardingMesh::prepare(scalars, memory_bytes, progress); });
   }
 
  private:
-  std::unique_ptr<MeshSource> source_;
-  GridDescription description_;
   ErrorText text_;
 };
 

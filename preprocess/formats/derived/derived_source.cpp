@@ -40,7 +40,7 @@ std::vector<NodeBox> piecesOf(const GridBlock& block, const NodeBox& box, bool c
 }  // namespace
 
 DerivedSource::DerivedSource(std::unique_ptr<GridSource> source, const DerivedOptions& options)
-    : source_(std::move(source)), description_(source_->description()) {
+    : ForwardingGrid(std::move(source)) {
   gas_ = gasOf(options, description_);
   if (options.blank_value) blank_value_ = static_cast<float>(*options.blank_value);
   inputs_ = findFlowInputs(description_);
@@ -69,12 +69,8 @@ void DerivedSource::describe() {
   }
 }
 
-bool DerivedSource::readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const {
-  return source_->readFringe(block, box, out);
-}
-
-std::vector<uint32_t> DerivedSource::inputsOf(std::span<const uint32_t> scalars) const {
-  const size_t of_source = source_->description().scalars.size();
+std::vector<uint32_t> DerivedSource::sourceScalars(std::span<const uint32_t> scalars) const {
+  const size_t of_source = source().description().scalars.size();
   std::vector<uint32_t> inputs;
   unsigned needs = 0;
   for (const uint32_t scalar : scalars) {
@@ -88,13 +84,9 @@ std::vector<uint32_t> DerivedSource::inputsOf(std::span<const uint32_t> scalars)
   return inputs;
 }
 
-uint64_t DerivedSource::rowsInMemory(std::span<const uint32_t> scalars) const {
-  return source_->rowsInMemory(inputsOf(scalars));
-}
-
 void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                          NodeArrays& out) const {
-  const size_t of_source = source_->description().scalars.size();
+  const size_t of_source = source().description().scalars.size();
   std::vector<uint32_t> stored;
   std::vector<size_t> stored_to;
   unsigned needs = 0;
@@ -108,7 +100,7 @@ void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uin
     }
   }
   if (stored.size() == scalars.size()) {
-    readBox(*source_, block, box, scalars, out);
+    ForwardingGrid::read(block, box, scalars, out);
     return;
   }
 
@@ -118,7 +110,7 @@ void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uin
   out.blank.resize(nodes);
   out.scalars.resize(scalars.size());
   for (auto& values : out.scalars) values.resize(nodes);
-  FlowWindow window(*source_, inputs_, gas_, blank_value_, needs);
+  FlowWindow window(source(), inputs_, gas_, blank_value_, needs);
   // Each part of a row takes some whole ones of a source that reads nothing else.
   const bool cuts_rows = !box.hasWholeRows(ni) || rowsInMemory(scalars) == 0;
   for (const NodeBox& piece : piecesOf(description_.blocks[block], box, cuts_rows)) {
@@ -133,7 +125,7 @@ void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uin
 }
 
 DerivedMeshSource::DerivedMeshSource(std::unique_ptr<MeshSource> source, const DerivedOptions& options)
-    : source_(std::move(source)), description_(source_->description()) {
+    : ForwardingMesh(std::move(source)) {
   gas_ = gasOf(options, description_);
   if (options.blank_value) blank_value_ = static_cast<float>(*options.blank_value);
   inputs_ = findFlowInputs(description_);
@@ -154,9 +146,9 @@ DerivedMeshSource::DerivedMeshSource(std::unique_ptr<MeshSource> source, const D
                                              : ""));
 }
 
-std::vector<uint32_t> DerivedMeshSource::neededFor(std::span<const uint32_t> scalars) const {
+std::vector<uint32_t> DerivedMeshSource::sourceScalars(std::span<const uint32_t> scalars) const {
   if (constant_) return {};
-  const size_t stored = source_->description().scalars.size();
+  const size_t stored = source().description().scalars.size();
   std::vector<uint32_t> needed;
   const auto add = [&](uint32_t scalar) {
     if (std::find(needed.begin(), needed.end(), scalar) == needed.end()) needed.push_back(scalar);
@@ -173,7 +165,7 @@ std::vector<uint32_t> DerivedMeshSource::neededFor(std::span<const uint32_t> sca
 void DerivedMeshSource::derive(std::span<const uint32_t> scalars, const std::vector<uint32_t>& read,
                                std::vector<std::vector<float>>& values) const {
   if (values.empty()) return;
-  const size_t stored = source_->description().scalars.size();
+  const size_t stored = source().description().scalars.size();
   const auto placeOf = [&](uint32_t scalar) {
     return static_cast<size_t>(std::find(read.begin(), read.end(), scalar) - read.begin());
   };
@@ -201,15 +193,15 @@ void DerivedMeshSource::derive(std::span<const uint32_t> scalars, const std::vec
 
 void DerivedMeshSource::readPoints(uint32_t piece, uint64_t first, uint64_t count,
                                    std::span<const uint32_t> scalars, MeshPoints& out) const {
-  const std::vector<uint32_t> needed = neededFor(scalars);
-  source_->readPoints(piece, first, count, needed, out);
+  const std::vector<uint32_t> needed = sourceScalars(scalars);
+  source().readPoints(piece, first, count, needed, out);
   derive(scalars, needed, out.scalars);
 }
 
 void DerivedMeshSource::readCells(uint32_t piece, uint64_t first, uint64_t count,
                                   std::span<const uint32_t> scalars, MeshCells& out) const {
-  const std::vector<uint32_t> needed = neededFor(scalars);
-  source_->readCells(piece, first, count, needed, out);
+  const std::vector<uint32_t> needed = sourceScalars(scalars);
+  source().readCells(piece, first, count, needed, out);
   if (constant_)
     out.scalars.assign(scalars.size(), std::vector<float>(out.size(), 1));
   else

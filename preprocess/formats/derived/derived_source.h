@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "preprocess/formats/derived/flow_window.h"
-#include "preprocess/grid/grid_source.h"
-#include "preprocess/mesh/mesh_source.h"
+#include "preprocess/grid/box_source.h"
+#include "preprocess/mesh/forwarding_mesh.h"
 
 namespace curvisplat {
 
@@ -19,29 +19,19 @@ namespace curvisplat {
 ///
 /// Differences are central, and one-sided at the ends of a block and next to blanked samples. Needs memory
 /// for one piece of about 48,000 nodes for each reading thread, whatever the size of the request.
-class DerivedSource final : public GridSource {
+class DerivedSource final : public ForwardingGrid {
  public:
   /// Throws UsageError if gamma or the gas constant is out of range.
   DerivedSource(std::unique_ptr<GridSource> source, const DerivedOptions& options);
 
-  const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    read(block, box, scalars, out);
-  }
-  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override;
-  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override;
 
  private:
-  /// The scalars of the source that `scalars` are read or computed from.
-  std::vector<uint32_t> inputsOf(std::span<const uint32_t> scalars) const;
+  std::vector<uint32_t> sourceScalars(std::span<const uint32_t> scalars) const override;
   void describe();
   bool offers(const QuantityInfo& quantity) const;
 
-  std::unique_ptr<GridSource> source_;
-  GridDescription description_;
   PerfectGas gas_;
   std::optional<float> blank_value_;
   FlowInputs inputs_;
@@ -53,30 +43,23 @@ class DerivedSource final : public GridSource {
 /// Scalars of gradients need the neighbours of a cell: preprocess/gradients/gradient_mesh.h. The Jacobian
 /// and the volume of structured grids are not offered. A mesh without any scalar gets one that is 1 in all cells,
 /// and a warning; but not a mesh of SU2, whose scalars are in another file.
-class DerivedMeshSource final : public MeshSource {
+class DerivedMeshSource final : public ForwardingMesh {
  public:
   /// Throws UsageError if gamma or the gas constant is out of range.
   DerivedMeshSource(std::unique_ptr<MeshSource> source, const DerivedOptions& options);
 
-  const GridDescription& description() const override { return description_; }
   void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                  MeshCells& out) const override;
-  void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
-               const Progress& progress) const override {
-    source_->prepare(neededFor(scalars), memory_bytes, progress);
-  }
 
  private:
-  /// The source's scalars that these are made of, each once.
-  std::vector<uint32_t> neededFor(std::span<const uint32_t> scalars) const;
+  /// Each once.
+  std::vector<uint32_t> sourceScalars(std::span<const uint32_t> scalars) const override;
   /// The values of `scalars` from those of the source's scalars `read`, which they replace.
   void derive(std::span<const uint32_t> scalars, const std::vector<uint32_t>& read,
               std::vector<std::vector<float>>& values) const;
 
-  std::unique_ptr<MeshSource> source_;
-  GridDescription description_;
   PerfectGas gas_;
   std::optional<float> blank_value_;
   FlowInputs inputs_;

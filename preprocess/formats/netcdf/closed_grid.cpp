@@ -161,7 +161,7 @@ std::optional<GridClosure> closureOf(uint64_t ni, uint64_t nj, const PointsOfRow
 }
 
 ClosedGrid::ClosedGrid(std::unique_ptr<GridSource> source, const GridClosure& closure)
-    : source_(std::move(source)), closure_(closure), description_(source_->description()) {
+    : ForwardingGrid(std::move(source)), closure_(closure) {
   CURVISPLAT_CHECK_OP(description_.blocks.size(), ==, 1u);
   GridBlock& block = description_.blocks[0];
   ni_ = block.ni;
@@ -234,8 +234,9 @@ void ClosedGrid::blankHalfRow(const NodeBox& box, NodeArrays& out) const {
 
 void ClosedGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                       NodeArrays& out) const {
+  if (!box.hasWholeRows(description_.blocks[0].ni)) return readParts(block, box, scalars, out);
   const NodeBox stored{std::min(box.j0, nj_ - 1), std::min(box.j1, nj_), box.k0, box.k1};
-  source_->read(block, stored, scalars, out);
+  ForwardingGrid::read(block, stored, scalars, out);
   const uint64_t rows = stored.j1 - stored.j0;
   for (std::vector<double>* axis : {&out.x, &out.y, &out.z}) rearrange(box, rows, *axis);
   rearrange(box, rows, out.blank);
@@ -263,11 +264,11 @@ std::vector<ClosedGrid::Columns> ClosedGrid::columnsOf(uint64_t i0, uint64_t i1,
   return parts;
 }
 
-void ClosedGrid::readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                                NodeArrays& out) const {
+void ClosedGrid::readParts(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                           NodeArrays& out) const {
   const uint64_t ni = description_.blocks[0].ni, end = box.endOfRow(ni);
   if (box.j1 <= nj_ && end <= closure_.columns) {
-    readBox(*source_, block, {box.j0, box.j1, box.k0, box.k1, box.i0, end}, scalars, out);
+    ForwardingGrid::read(block, {box.j0, box.j1, box.k0, box.k1, box.i0, end}, scalars, out);
     return blankHalfRow(box, out);
   }
   const WindowStrides strides(box, ni);
@@ -283,7 +284,7 @@ void ClosedGrid::readPartOfRows(uint32_t block, const NodeBox& box, std::span<co
   };
   const auto readRow = [&](const Columns& columns, uint64_t j, uint64_t k) {
     const uint64_t stored = std::min(j, nj_ - 1);
-    readBox(*source_, block, {stored, stored + 1, k, k + 1, columns.begin, columns.end}, scalars, row);
+    ForwardingGrid::read(block, {stored, stored + 1, k, k + 1, columns.begin, columns.end}, scalars, row);
     const size_t first = strides.at(columns.to, j, k);
     copyRow(columns, first, row.x, out.x);
     copyRow(columns, first, row.y, out.y);

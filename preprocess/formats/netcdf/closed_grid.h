@@ -17,7 +17,7 @@
 #include <optional>
 #include <vector>
 
-#include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/box_source.h"
 
 namespace curvisplat {
 
@@ -39,21 +39,17 @@ using PointsOfRow = std::function<std::vector<glm::dvec3>(uint64_t j, uint64_t b
 /// Long rows are read in parts. Throws what `points` throws.
 std::optional<GridClosure> closureOf(uint64_t ni, uint64_t nj, const PointsOfRow& points);
 
-class ClosedGrid final : public GridSource {
+class ClosedGrid final : public ForwardingGrid {
  public:
   ClosedGrid(std::unique_ptr<GridSource> source, const GridClosure& closure);
 
-  const GridDescription& description() const override { return description_; }
-  /// Works in the arrays of `out`: needs no memory of its own.
+  /// Whole rows are read to the arrays of `out`, without memory of its own.
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override;
-  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return source_->rowsInMemory(scalars);
-  }
 
  private:
+  void readParts(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                 NodeArrays& out) const;
   /// Columns [begin, end) of the source, which are the nodes from `to` on along i, or, backwards, those from `to` down.
   struct Columns {
     uint64_t begin = 0, end = 0, to = 0;
@@ -64,9 +60,7 @@ class ClosedGrid final : public GridSource {
   void rearrange(const NodeBox& box, uint64_t rows_read, std::vector<Value>& values) const;
   void blankHalfRow(const NodeBox& box, NodeArrays& out) const;
 
-  std::unique_ptr<GridSource> source_;
   GridClosure closure_;
-  GridDescription description_;
   uint64_t ni_ = 0, nj_ = 0;  // of the source
 };
 

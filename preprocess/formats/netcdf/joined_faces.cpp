@@ -196,10 +196,10 @@ struct Column {
 /// The four columns of a hole, i fastest. A hole of three corners has one of them twice.
 using Hole = std::array<Column, 4>;
 
-class JoinedFaces final : public GridSource {
+class JoinedFaces final : public ForwardingGrid {
  public:
-  explicit JoinedFaces(std::unique_ptr<FaceSource> source)
-      : source_(std::move(source)), description_(source_->description()) {
+  explicit JoinedFaces(const std::shared_ptr<const FaceSource>& faces)
+      : ForwardingGrid(faces), faces_(*faces) {
     const GridBlock& first = description_.blocks[0];
     shape_ = {static_cast<uint32_t>(description_.blocks.size()), first.ni, first.nj};
     const uint64_t edge_points = 2 * shape_.faces * (shape_.ni + shape_.nj);
@@ -216,12 +216,11 @@ class JoinedFaces final : public GridSource {
     describe();
   }
 
-  const GridDescription& description() const override { return description_; }
-
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
-    if (block < shape_.faces) return source_->read(block, box, scalars, out);
+    if (block < shape_.faces) return ForwardingGrid::read(block, box, scalars, out);
     CURVISPLAT_CHECK_OP(block, <, description_.blocks.size());
+    if (!box.hasWholeRows(2)) return GridSource::readPartOfRows(block, box, scalars, out);
     const size_t added = block - shape_.faces;
     const uint64_t nodes = 2 * (box.j1 - box.j0) * (box.k1 - box.k0);
     for (std::vector<double>* axis : {&out.x, &out.y, &out.z}) axis->resize(nodes);
@@ -232,15 +231,6 @@ class JoinedFaces final : public GridSource {
       readJoint(joints_[added], box, scalars, out);
     else
       readHole(holes_[added - joints_.size()], box, scalars, out);
-  }
-
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    if (block < shape_.faces) return source_->readPartOfRows(block, box, scalars, out);
-    GridSource::readPartOfRows(block, box, scalars, out);  // two nodes a row
-  }
-  uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return source_->rowsInMemory(scalars);
   }
 
  private:
@@ -262,11 +252,11 @@ class JoinedFaces final : public GridSource {
   }
 
   std::vector<glm::dvec3> pointsOf(const FaceEdge& edge, uint64_t inwards) const {
-    return source_->pointsOf(edge.face, rangeOf(edge, inwards, 0, lengthOf(edge)));
+    return faces_.pointsOf(edge.face, rangeOf(edge, inwards, 0, lengthOf(edge)));
   }
 
   glm::dvec3 pointOf(const Column& c) const {
-    return source_->pointsOf(c.face, {{c.i, c.j, 0}, {c.i + 1, c.j + 1, 1}}).at(0);
+    return faces_.pointsOf(c.face, {{c.i, c.j, 0}, {c.i + 1, c.j + 1, 1}}).at(0);
   }
 
   /// The columns around a hole, in such an order that the block has the handedness of the first corner's
@@ -304,7 +294,8 @@ class JoinedFaces final : public GridSource {
   void copyFrom(uint32_t face, const CfRange& range, std::span<const uint32_t> scalars, const Target& target,
                 NodeArrays& out) const {
     NodeArrays part;
-    source_->readPart(face, range, scalars, part);
+    const auto& [begin, end] = range;
+    faces_.read(face, {begin[1], end[1], begin[2], end[2], begin[0], end[0]}, scalars, part);
     const uint64_t rows = (range.end[0] - range.begin[0]) * (range.end[1] - range.begin[1]);
     const auto copy = [&](const auto& from, auto& to) {
       for (size_t n = 0; n < from.size(); ++n) {
@@ -352,11 +343,10 @@ class JoinedFaces final : public GridSource {
       }
   }
 
-  std::unique_ptr<FaceSource> source_;
+  const FaceSource& faces_;  // the source
   FaceShape shape_;
   std::vector<FaceJoint> joints_;
   std::vector<Hole> holes_;
-  GridDescription description_;
 };
 
 }  // namespace

@@ -307,13 +307,9 @@ double NetcdfSource::shareOfZeros() const {
 
 void NetcdfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                         NodeArrays& out) const {
-  readPart(block, {{0, box.j0, box.k0}, {description_.blocks[0].ni, box.j1, box.k1}}, scalars, out);
-}
-
-void NetcdfSource::readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
-                            NodeArrays& out) const {
   CURVISPLAT_CHECK_OP(block, <, blocks_.size());
-  blocks_[block].read(range, scalars, out);
+  const uint64_t end = box.endOfRow(description_.blocks[block].ni);
+  blocks_[block].read({{box.i0, box.j0, box.k0}, {end, box.j1, box.k1}}, scalars, out);
 }
 
 std::vector<glm::dvec3> NetcdfSource::pointsOf(uint32_t block, const CfRange& range) const {

@@ -33,9 +33,6 @@ class NetcdfSource final : public FaceSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-
-  void readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
-                NodeArrays& out) const override;
   bool onSphere() const override { return globe_.sphere() && grid_.levels == 2; }
   std::vector<glm::dvec3> pointsOf(uint32_t block, const CfRange& range) const override;
   /// Whether longitude and latitude are given for each column of nodes.

@@ -32,8 +32,6 @@ class TileSource final : public FaceSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-  void readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
-                NodeArrays& out) const override;
   bool onSphere() const override { return tiles_.front()->onSphere(); }
   std::vector<glm::dvec3> pointsOf(uint32_t block, const CfRange& range) const override;
 
@@ -137,11 +135,6 @@ const NetcdfSource& TileSource::tileOf(uint32_t block) const {
 void TileSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                       NodeArrays& out) const {
   tileOf(block).read(0, box, scalars, out);
-}
-
-void TileSource::readPart(uint32_t block, const CfRange& range, std::span<const uint32_t> scalars,
-                          NodeArrays& out) const {
-  tileOf(block).readPart(0, range, scalars, out);
 }
 
 std::vector<glm::dvec3> TileSource::pointsOf(uint32_t block, const CfRange& range) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/grid/box_source.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
@@ -14,7 +15,7 @@ namespace curvisplat {
 /// A file belongs to the first one whose blocks have its dimensions and its nodes (the first row of each block
 /// is compared); then its scalars, or those that the other lacks, are that one's too. Else its blocks follow
 /// those before it. The grid has the scalars that all of its blocks have; warnings name the others.
-class CombinedSource final : public GridSource {
+class CombinedSource final : public BoxSource {
  public:
   /// `names`: of the files, for blocks and messages. Throws Error if a file has the nodes of an earlier one and
   /// nothing new: steps in time, perhaps.
@@ -23,10 +24,6 @@ class CombinedSource final : public GridSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    read(block, box, scalars, out);
-  }
   uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override;
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override;
 
