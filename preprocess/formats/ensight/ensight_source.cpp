@@ -5,8 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <set>
+#include <vector>
 
+#include "preprocess/formats/common/block_source.h"
+#include "preprocess/formats/common/element_source.h"
+#include "preprocess/formats/common/scalar_list.h"
+#include "preprocess/formats/ensight/ensight_case.h"
+#include "preprocess/formats/ensight/ensight_parts.h"
 #include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
@@ -16,17 +23,12 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-/// The point of a node, which the file counts from 1. Other numbers become one that is too large, which is
-/// refused.
-uint64_t pointOf(double node) {
-  return node >= 1 && node <= 0x1p53 ? static_cast<uint64_t>(node) - 1 : std::numeric_limits<uint64_t>::max();
-}
-
 std::vector<uint64_t> pointsOf(const EnsightList& nodes, uint64_t first, uint64_t count) {
   std::vector<double> stored(count);
   nodes.read(first, std::span(stored));
   std::vector<uint64_t> points(count);
-  std::transform(stored.begin(), stored.end(), points.begin(), pointOf);
+  std::transform(stored.begin(), stored.end(), points.begin(),
+                 [](double node) { return pointNumber(node, 1); });
   return points;
 }
 
@@ -55,6 +57,11 @@ void appendPolyhedra(const EnsightElements& elements, uint64_t first, uint64_t c
   }
 }
 
+void readCoordinates(const EnsightPart& part, uint64_t first, uint64_t count, const Places& to) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    part.coordinates.read(axis * part.points + first, to.span(axis, count));
+}
+
 /// `kept`: which elements stay, in their order.
 template <typename Element>
 void keepOnly(const std::vector<size_t>& kept, std::vector<Element>& all) {
@@ -64,7 +71,34 @@ void keepOnly(const std::vector<size_t>& kept, std::vector<Element>& all) {
   all = std::move(left);
 }
 
-}  // namespace
+/// The files of a case, and its parts of one kind. Any number of threads may read.
+class EnsightData {
+ public:
+  explicit EnsightData(const OpenGridOptions& options);
+
+  bool structured() const { return structured_; }
+  const std::vector<EnsightPart>& parts() const { return geometry_.parts; }
+  bool hasCurvedCells() const { return has_curved_cells_; }
+  const GridDescription& description() const { return description_; }
+  /// Values [first, first + to.size()) of a scalar in list `list` of a part. NaN where there are none.
+  void readValues(uint32_t scalar, size_t part, size_t list, uint64_t first, std::span<float> to) const;
+
+ private:
+  void chooseParts();
+  void describeParts();
+  void addScalars(const std::vector<EnsightVariable>& variables);
+  void describeUndefined(const std::string& name, const std::vector<EnsightValues>& parts);
+
+  struct Scalar {
+    size_t variable = 0;
+    int component = 0;  // or kMagnitude
+  };
+  EnsightGeometry geometry_;
+  bool structured_ = false, has_curved_cells_ = false;
+  std::vector<std::vector<EnsightValues>> values_;  // [variable][part]
+  std::vector<Scalar> scalars_;
+  GridDescription description_;
+};
 
 EnsightData::EnsightData(const OpenGridOptions& options) {
   EnsightCase found = readEnsightCase(options.grid, options.namesFolder(), options.time_step);
@@ -149,141 +183,109 @@ void EnsightData::describeUndefined(const std::string& name, const std::vector<E
 }
 
 void EnsightData::addScalars(const std::vector<EnsightVariable>& variables) {
-  std::set<std::string> taken;
+  ScalarList list(description_);
   for (size_t n = 0; n < variables.size(); ++n) {
-    const auto add = [&](std::string name, int component) {
-      if (taken.count(name) > 0) name += variables[n].centring == Centring::kCell ? ":cell" : ":node";
-      taken.insert(name);
-      GridScalar scalar;
-      scalar.name = std::move(name);
-      scalar.centring = variables[n].centring;
-      description_.scalars.push_back(std::move(scalar));
+    const EnsightVariable& variable = variables[n];
+    describeUndefined(variable.name, values_[n]);
+    const char* const place = variable.centring == Centring::kCell ? ":cell" : ":node";
+    forEachComponent(variable.components, [&](const std::string& suffix, int component) {
+      const std::string name = variable.name + suffix;
+      list.add({name, name + place}, variable.centring);
       scalars_.push_back({n, component});
-    };
-    describeUndefined(variables[n].name, values_[n]);
-    if (variables[n].components == 1) {
-      add(variables[n].name, 0);
-      continue;
-    }
-    add(variables[n].name + ":mag", -1);
-    for (int c = 0; c < 3; ++c) add(fmt::format("{}:{}", variables[n].name, "xyz"[c]), c);
+    });
   }
 }
 
-void EnsightData::readValues(uint32_t scalar_number, size_t part, size_t list, uint64_t first, uint64_t count,
+void EnsightData::readValues(uint32_t scalar_number, size_t part_number, size_t list, uint64_t first,
                              std::span<float> to) const {
   const Scalar& scalar = scalars_.at(scalar_number);
-  const EnsightValues& values = values_[scalar.variable][part];
+  const EnsightValues& values = values_[scalar.variable][part_number];
   if (list >= values.lists.size() || values.lists[list].count == 0)
     return std::fill(to.begin(), to.end(), kNaN);
-  const EnsightList& stored = values.lists[list];
-  const auto undefined = static_cast<float>(values.undefined[list]);
-  if (scalar.component >= 0) {
-    stored.read(static_cast<uint64_t>(scalar.component) * count + first, to);
-    std::replace(to.begin(), to.end(), undefined, kNaN);
-    return;
-  }
-  std::vector<double> squares(to.size(), 0.0);
-  for (uint64_t c = 0; c < 3; ++c) {
-    stored.read(c * count + first, to);
-    for (size_t n = 0; n < to.size(); ++n)
-      squares[n] += to[n] == undefined ? double{kNaN} : double{to[n]} * to[n];
-  }
-  std::transform(squares.begin(), squares.end(), to.begin(),
-                 [](double square) { return static_cast<float>(std::sqrt(square)); });
+  const EnsightPart& part = geometry_.parts[part_number];
+  const bool cells = description_.scalars[scalar_number].centring == Centring::kCell;
+  const uint64_t count = !cells ? part.points : part.structured ? part.cells : part.elements[list].count;
+  const auto read = [&](size_t component, std::span<float> of_component) {
+    values.lists[list].read(component * count + first, of_component);
+    std::replace(of_component.begin(), of_component.end(), static_cast<float>(values.undefined[list]), kNaN);
+  };
+  if (scalar.component != kMagnitude) return read(static_cast<size_t>(scalar.component), to);
+  readMagnitude(3, to, read);
 }
 
-void EnsightMeshSource::readPoints(uint32_t piece, uint64_t first, uint64_t count,
-                                   std::span<const uint32_t> scalars, MeshPoints& out) const {
-  const EnsightPart& part = data_.parts().at(piece);
-  std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    axes[axis]->resize(count);
-    part.coordinates.read(axis * part.points + first, std::span(*axes[axis]));
-  }
-  out.hidden.assign(count, 0);
-  out.scalars.resize(scalars.size());
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    out.scalars[n].resize(count);
-    data_.readValues(scalars[n], piece, 0, first, part.points, out.scalars[n]);
-  }
-}
+class EnsightGrid final : public BlockSource {
+ public:
+  explicit EnsightGrid(EnsightData data) : data_(std::move(data)) { description_ = data_.description(); }
 
-void EnsightMeshSource::readCells(uint32_t piece, uint64_t first, uint64_t count,
-                                  std::span<const uint32_t> scalars, MeshCells& out) const {
-  out.clear();
-  out.scalars.resize(scalars.size());
-  for (std::vector<float>& values : out.scalars) values.resize(count);
-  uint64_t begin = 0;
-  const std::vector<EnsightElements>& all = data_.parts().at(piece).elements;
-  for (size_t list = 0; list < all.size(); ++list) {
-    const EnsightElements& elements = all[list];
-    if (elements.kind == CellKind::kNone) continue;
-    const uint64_t from = std::max(first, begin), to = std::min(first + count, begin + elements.count);
-    if (from < to) {
+ private:
+  BlockArray<Places> nodesOf(uint32_t block) const override {
+    const EnsightPart& part = data_.parts()[block];
+    if (part.kind != EnsightPart::Kind::kCurvilinear)
+      return placesAlongAxes([&part](size_t axis, uint64_t index) { return part.axes[axis][index]; });
+    return [&part](uint64_t first, uint64_t count, const Places& to) {
+      readCoordinates(part, first, count, to);
+    };
+  }
+  BlockArray<float*> iblankOf(uint32_t block) const override {
+    return [&list = data_.parts()[block].iblank](uint64_t first, uint64_t count, float* to) {
+      list.read(first, std::span(to, count));
+    };
+  }
+  BlockArray<float*> valuesOf(uint32_t block, uint32_t scalar) const override {
+    return [this, block, scalar](uint64_t first, uint64_t count, float* to) {
+      data_.readValues(scalar, block, 0, first, std::span(to, count));
+    };
+  }
+
+  const EnsightData data_;
+};
+
+class EnsightMesh final : public ElementSource {
+ public:
+  explicit EnsightMesh(EnsightData data) : data_(std::move(data)) {
+    description_ = data_.description();
+    has_curved_cells_ = data_.hasCurvedCells();
+  }
+
+ private:
+  /// Elements that are not drawn are not counted.
+  static uint64_t countOf(const EnsightElements& elements) {
+    return elements.kind == CellKind::kNone ? 0 : elements.count;
+  }
+
+  void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override {
+    readCoordinates(data_.parts().at(piece), first, count, to);
+  }
+  void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override {
+    const std::vector<EnsightElements>& lists = data_.parts().at(piece).elements;
+    forEachPartOfLists(lists, first, count, countOf, [&](const PartOfList& part) {
+      const EnsightElements& elements = lists[part.list];
       if (elements.kind == CellKind::kPolyhedron)
-        appendPolyhedra(elements, from - begin, to - from, out);
+        appendPolyhedra(elements, part.first, part.count, out);
       else
-        appendElements(elements, from - begin, to - from, out);
+        appendElements(elements, part.first, part.count, out);
       if (elements.ghosts)
-        std::fill(out.hidden.end() - static_cast<ptrdiff_t>(to - from), out.hidden.end(), 1);
-      for (size_t n = 0; n < scalars.size(); ++n)
-        data_.readValues(scalars[n], piece, list, from - begin, elements.count,
-                         std::span(out.scalars[n]).subspan(from - first, to - from));
-    }
-    begin += elements.count;
+        std::fill(out.hidden.end() - static_cast<ptrdiff_t>(part.count), out.hidden.end(), 1);
+    });
   }
-}
+  void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override {
+    if (description_.scalars.at(scalar).centring == Centring::kNode)
+      return data_.readValues(scalar, piece, 0, first, to);
+    forEachPartOfLists(
+        data_.parts().at(piece).elements, first, to.size(), countOf, [&](const PartOfList& part) {
+          data_.readValues(scalar, piece, part.list, part.first, to.subspan(part.at, part.count));
+        });
+  }
 
-void EnsightGridSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                             NodeArrays& out) const {
-  const EnsightPart& part = data_.parts().at(block);
-  const uint64_t ni = part.nodes[0], nj = part.nodes[1], rows = box.j1 - box.j0;
-  const uint64_t row = box.rowNodes(ni), cells_end = std::min(box.endOfRow(ni), ni - 1);
-  const size_t nodes = row * rows * (box.k1 - box.k0);
-  std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
-  for (std::vector<double>* const axis : axes) axis->resize(nodes);
-  out.blank.assign(nodes, 0);
-  out.scalars.resize(scalars.size());
-  for (std::vector<float>& values : out.scalars) values.assign(nodes, kNaN);
-  // Whole rows of a plane follow one another.
-  const uint64_t rows_at_once = box.hasWholeRows(ni) ? rows : 1, count = row * rows_at_once;
-  std::vector<double> iblank(count);
-  for (uint64_t n_row = 0; n_row < rows * (box.k1 - box.k0); n_row += rows_at_once) {
-    const uint64_t j0 = box.j0 + n_row % rows, k = box.k0 + n_row / rows;
-    const uint64_t stored = ni * (j0 + nj * k) + box.i0, at = row * n_row;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      if (part.kind == EnsightPart::Kind::kCurvilinear) {
-        part.coordinates.read(axis * part.points + stored, std::span(*axes[axis]).subspan(at, count));
-        continue;
-      }
-      for (uint64_t n = 0; n < count; ++n) {
-        const uint64_t index[] = {box.i0 + n % row, j0 + n / row, k};
-        (*axes[axis])[at + n] = part.axes[axis][index[axis]];
-      }
-    }
-    if (part.iblank.count > 0) {
-      part.iblank.read(stored, std::span(iblank));
-      for (uint64_t n = 0; n < count; ++n) out.blank[at + n] = iblank[n] == 0;
-    }
-    for (size_t n = 0; n < scalars.size(); ++n) {
-      std::vector<float>& values = out.scalars[n];
-      if (data_.description().scalars[scalars[n]].centring == Centring::kNode) {
-        data_.readValues(scalars[n], block, 0, stored, part.points, std::span(values).subspan(at, count));
-        continue;
-      }
-      if (box.i0 >= cells_end || k + 1 >= part.nodes[2]) continue;
-      for (uint64_t j = j0; j < std::min(j0 + rows_at_once, nj - 1); ++j)
-        data_.readValues(scalars[n], block, 0, (ni - 1) * (j + (nj - 1) * k) + box.i0, part.cells,
-                         std::span(values).subspan(at + row * (j - j0), cells_end - box.i0));
-    }
-  }
-}
+  const EnsightData data_;
+};
+
+}  // namespace
 
 std::unique_ptr<DataSource> openEnsight(const OpenGridOptions& options) {
   EnsightData data(options);
-  if (data.structured()) return std::make_unique<EnsightGridSource>(std::move(data));
-  return std::make_unique<EnsightMeshSource>(std::move(data));
+  if (data.structured()) return std::make_unique<EnsightGrid>(std::move(data));
+  return std::make_unique<EnsightMesh>(std::move(data));
 }
 
 }  // namespace curvisplat

@@ -17,6 +17,7 @@
 #include "preprocess/formats/columns/columns_source.h"
 #include "preprocess/formats/common/cut_source.h"
 #include "preprocess/formats/common/temporary_folder.h"
+#include "preprocess/formats/ensight/ensight_case.h"
 #include "preprocess/formats/ensight/ensight_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
