@@ -8,6 +8,7 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/tecplot/tecplot_source.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
+#include "preprocess/formats/xdmf/xdmf_file.h"
 #include "preprocess/formats/xdmf/xdmf_source.h"
 #include "stream/base/error.h"
 #include "tests/fuzz/fuzz_target.h"

@@ -32,6 +32,7 @@
 #include "preprocess/formats/vtk/vtk_hdf.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
+#include "preprocess/formats/xdmf/xdmf_file.h"
 #include "preprocess/formats/xdmf/xdmf_source.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
