@@ -3,10 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
+#include <array>
+#include <memory>
+#include <optional>
 #include <set>
+#include <span>
 #include <utility>
+#include <vector>
 
+#include "preprocess/formats/common/block_source.h"
+#include "preprocess/formats/common/element_source.h"
+#include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/tecplot/tecplot_data.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
@@ -25,11 +32,26 @@ std::string nameAlone(const std::string& name) {
   return simplifiedName(name.substr(0, name.find_first_of("([", 1)));
 }
 
-}  // namespace
+/// The zones that are drawn: all ordered, or all of finite elements.
+struct TecplotGrid {
+  /// Throws Error.
+  explicit TecplotGrid(const OpenGridOptions& options);
 
-bool isTecplot(const InputFile& file) {
-  return isTecplotBinary(file) || isTecplotText(file);
-}
+  bool isMesh() const { return data.zones[0].elements > 0; }
+
+  TecplotData data;
+  GridDescription description;
+  std::array<size_t, 3> axes{};
+  std::optional<size_t> iblank;
+  std::vector<size_t> variables;  // [description.scalars]
+
+ private:
+  void chooseStep(const OpenGridOptions& options);
+  void leaveOutZones();
+  void findCoordinates();
+  void addScalars();
+  std::optional<size_t> variableNamed(std::span<const char* const> names) const;
+};
 
 TecplotGrid::TecplotGrid(const OpenGridOptions& options) {
   const auto file = std::make_shared<const PooledFile>(std::make_shared<OpenFiles>(), options.grid);
@@ -56,10 +78,9 @@ TecplotGrid::TecplotGrid(const OpenGridOptions& options) {
       description.blocks.push_back(
           {name, zone.nodes[0], zone.nodes[1], zone.nodes[2], iblank && !zone.values[*iblank].passive});
   }
-  description.format =
-      fmt::format("Tecplot, {}, {}", data.encoding,
-                  countText(data.zones.size(), data.zones[0].elements > 0 ? "zone" : "ordered zone"));
-  if (data.zones[0].elements > 0) description.format += " of finite elements";
+  description.format = fmt::format("Tecplot, {}, {}", data.encoding,
+                                   countText(data.zones.size(), isMesh() ? "zone" : "ordered zone"));
+  if (isMesh()) description.format += " of finite elements";
 }
 
 void TecplotGrid::chooseStep(const OpenGridOptions& options) {
@@ -127,12 +148,12 @@ void TecplotGrid::findCoordinates() {
   const auto of_cells = [&](const TecplotZone& zone) {
     return zone.values[*iblank].centring == Centring::kCell;
   };
-  const bool is_mesh = data.zones[0].elements > 0;
-  if (iblank && (is_mesh || std::any_of(data.zones.begin(), data.zones.end(), of_cells))) iblank.reset();
+  if (iblank && (isMesh() || std::any_of(data.zones.begin(), data.zones.end(), of_cells))) iblank.reset();
   if (iblank) description.blanking = "iblank 0";
 }
 
 void TecplotGrid::addScalars() {
+  ScalarList list(description);
   for (size_t n = 0; n < data.variables.size(); ++n) {
     if (std::find(axes.begin(), axes.end(), n) != axes.end() || n == iblank) continue;
     std::array<size_t, 2> zones{};  // of nodes, of cells
@@ -146,132 +167,98 @@ void TecplotGrid::addScalars() {
     for (const Centring centring : {Centring::kNode, Centring::kCell}) {
       const bool cells = centring == Centring::kCell;
       if (zones[cells] == 0) continue;
-      GridScalar scalar;
-      scalar.name = data.variables[n];
-      if (zones[0] > 0 && zones[1] > 0) scalar.name += cells ? ":cell" : ":node";
-      const auto taken = [&](const GridScalar& other) { return other.name == scalar.name; };
-      if (std::any_of(description.scalars.begin(), description.scalars.end(), taken))
-        scalar.name += fmt::format(":{}", n + 1);
-      scalar.aliases = {nameAlone(data.variables[n])};
-      scalar.centring = centring;
-      description.scalars.push_back(std::move(scalar));
+      std::string name = data.variables[n];
+      if (zones[0] > 0 && zones[1] > 0) name += cells ? ":cell" : ":node";
+      list.add({name, fmt::format("{}:{}", name, n + 1)}, centring).aliases = {nameAlone(data.variables[n])};
       variables.push_back(n);
     }
   }
 }
 
-std::unique_ptr<DataSource> openTecplot(const OpenGridOptions& options) {
-  TecplotGrid grid(options);
-  if (grid.data.zones[0].elements > 0) return std::make_unique<TecplotMeshSource>(std::move(grid));
-  return std::make_unique<TecplotSource>(std::move(grid));
+void readNodes(const TecplotGrid& grid, size_t zone, uint64_t first, uint64_t count, const Places& to) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    readTecplotValues(grid.data.zones.at(zone).values[grid.axes[axis]], first, to.span(axis, count));
 }
 
-TecplotMeshSource::TecplotMeshSource(TecplotGrid grid) : grid_(std::move(grid)) {}
+/// Null where the zone does not have the scalar.
+const TecplotValues* tecplotValues(const TecplotGrid& grid, size_t zone, size_t scalar) {
+  const TecplotValues& values = grid.data.zones.at(zone).values[grid.variables.at(scalar)];
+  const bool has = !values.passive && values.centring == grid.description.scalars[scalar].centring;
+  return has ? &values : nullptr;
+}
 
-void TecplotMeshSource::readScalars(const TecplotZone& zone, uint64_t first, uint64_t count,
-                                    std::span<const uint32_t> scalars,
-                                    std::vector<std::vector<float>>& out) const {
-  out.resize(scalars.size());
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    out[n].assign(count, std::numeric_limits<float>::quiet_NaN());
-    const TecplotValues& values = zone.values[grid_.variables.at(scalars[n])];
-    if (!values.passive && values.centring == grid_.description.scalars[scalars[n]].centring)
-      readTecplotValues(values, first, std::span(out[n]));
+BlockArray<float*> arrayOf(const TecplotValues& values) {
+  const auto run = [&values](uint64_t first, uint64_t count, float* to) {
+    readTecplotValues(values, first, std::span(to, count));
+  };
+  return {run, {values.row_pitch, values.columns}};
+}
+
+class TecplotBlocks final : public BlockSource {
+ public:
+  explicit TecplotBlocks(TecplotGrid grid) : grid_(std::move(grid)) {
+    description_ = grid_.description;
+    negative_is_fringe_ = true;
   }
-}
 
-void TecplotMeshSource::readPoints(uint32_t piece, uint64_t first, uint64_t count,
-                                   std::span<const uint32_t> scalars, MeshPoints& out) const {
-  const TecplotZone& zone = grid_.data.zones.at(piece);
-  std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    axes[axis]->resize(count);
-    readTecplotValues(zone.values[grid_.axes[axis]], first, std::span(*axes[axis]));
+ private:
+  BlockArray<Places> nodesOf(uint32_t block) const override {
+    return [this, block](uint64_t first, uint64_t count, const Places& to) {
+      readNodes(grid_, block, first, count, to);
+    };
   }
-  out.hidden.assign(count, 0);
-  readScalars(zone, first, count, scalars, out.scalars);
-}
+  BlockArray<float*> iblankOf(uint32_t block) const override {
+    return arrayOf(grid_.data.zones[block].values[*grid_.iblank]);
+  }
+  BlockArray<float*> valuesOf(uint32_t block, uint32_t scalar) const override {
+    const TecplotValues* const values = tecplotValues(grid_, block, scalar);
+    return values ? arrayOf(*values) : BlockArray<float*>();
+  }
+
+  const TecplotGrid grid_;
+};
+
+class TecplotMesh final : public ElementSource {
+ public:
+  explicit TecplotMesh(TecplotGrid grid) : grid_(std::move(grid)) { description_ = grid_.description; }
+
+ private:
+  void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override {
+    readNodes(grid_, piece, first, count, to);
+  }
+  void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override;
+  void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override {
+    if (const TecplotValues* const values = tecplotValues(grid_, piece, scalar))
+      readTecplotValues(*values, first, to);
+  }
+
+  const TecplotGrid grid_;
+};
 
 /// A brick whose nodes coincide is a wedge, a pyramid or a tetrahedron: a degenerate hexahedron, which has its volume.
-void TecplotMeshSource::readCells(uint32_t piece, uint64_t first, uint64_t count,
-                                  std::span<const uint32_t> scalars, MeshCells& out) const {
+void TecplotMesh::appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const {
   const TecplotZone& zone = grid_.data.zones.at(piece);
   const uint64_t each = zone.element_nodes;
   std::vector<double> numbers(count * each);
   readTecplotValues(zone.connectivity, first * each, std::span(numbers));
   std::vector<uint64_t> nodes(each);
-  out.clear();
   for (uint64_t n = 0; n < count; ++n) {
-    for (uint64_t node = 0; node < each; ++node) {
-      const double number = numbers[n * each + node] - static_cast<double>(zone.first_node);
-      nodes[node] = number >= 0 && number < 0x1p53 ? static_cast<uint64_t>(number)
-                                                   : std::numeric_limits<uint64_t>::max();
-    }
+    for (uint64_t node = 0; node < each; ++node)
+      nodes[node] = pointNumber(numbers[n * each + node], static_cast<double>(zone.first_node));
     out.append(each == 4 ? CellKind::kTetrahedron : CellKind::kHexahedron, nodes);
   }
-  readScalars(zone, first, count, scalars, out.scalars);
 }
 
-TecplotSource::TecplotSource(TecplotGrid grid) : grid_(std::move(grid)) {}
+}  // namespace
 
-/// Values of cells go to their lowest nodes; the other elements of `to` are left.
-template <typename Value>
-void TecplotSource::readBox(const TecplotZone& zone, size_t variable, const NodeBox& box,
-                            std::vector<Value>& to) const {
-  const TecplotValues& values = zone.values[variable];
-  const uint64_t less = values.centring == Centring::kCell ? 1 : 0;
-  const uint64_t ni = zone.nodes[0], row = box.rowNodes(ni), rows = box.j1 - box.j0;
-  const uint64_t end = std::min(box.endOfRow(ni), ni - less);
-  const uint64_t j1 = std::min(box.j1, zone.nodes[1] - less), k1 = std::min(box.k1, zone.nodes[2] - less);
-  if (box.j0 >= j1 || box.i0 >= end) return;
-  const uint64_t along = end - box.i0;
-  for (uint64_t k = box.k0; k < k1; ++k) {
-    const uint64_t first = values.row_pitch * (box.j0 + values.columns * k) + box.i0,
-                   at = row * rows * (k - box.k0);
-    if (along == ni && values.row_pitch == ni) {
-      readTecplotValues(values, first, std::span(to).subspan(at, ni * (j1 - box.j0)));
-      continue;
-    }
-    for (uint64_t j = 0; j < j1 - box.j0; ++j)
-      readTecplotValues(values, first + values.row_pitch * j, std::span(to).subspan(at + row * j, along));
-  }
+bool isTecplot(const InputFile& file) {
+  return isTecplotBinary(file) || isTecplotText(file);
 }
 
-void TecplotSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                         NodeArrays& out) const {
-  const TecplotZone& zone = grid_.data.zones.at(block);
-  const size_t nodes = box.rowNodes(zone.nodes[0]) * (box.j1 - box.j0) * (box.k1 - box.k0);
-  std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    axes[axis]->resize(nodes);
-    readBox(zone, grid_.axes[axis], box, *axes[axis]);
-  }
-  out.blank.assign(nodes, 0);
-  if (grid_.description.blocks[block].has_blanking) {
-    std::vector<float> iblank(nodes);
-    readBox(zone, *grid_.iblank, box, iblank);
-    std::transform(iblank.begin(), iblank.end(), out.blank.begin(),
-                   [](float value) { return static_cast<uint8_t>(value == 0); });
-  }
-  out.scalars.resize(scalars.size());
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    out.scalars[n].assign(nodes, std::numeric_limits<float>::quiet_NaN());
-    const size_t variable = grid_.variables.at(scalars[n]);
-    const TecplotValues& values = zone.values[variable];
-    if (!values.passive && values.centring == grid_.description.scalars[scalars[n]].centring)
-      readBox(zone, variable, box, out.scalars[n]);
-  }
-}
-
-bool TecplotSource::readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const {
-  if (!grid_.description.blocks.at(block).has_blanking) return false;
-  const TecplotZone& zone = grid_.data.zones[block];
-  std::vector<float> iblank(zone.nodes[0] * (box.j1 - box.j0) * (box.k1 - box.k0));
-  readBox(zone, *grid_.iblank, box, iblank);
-  out.resize(iblank.size());
-  std::transform(iblank.begin(), iblank.end(), out.begin(),
-                 [](float value) { return static_cast<uint8_t>(value < 0); });
-  return true;
+std::unique_ptr<DataSource> openTecplot(const OpenGridOptions& options) {
+  TecplotGrid grid(options);
+  if (grid.isMesh()) return std::make_unique<TecplotMesh>(std::move(grid));
+  return std::make_unique<TecplotBlocks>(std::move(grid));
 }
 
 }  // namespace curvisplat
