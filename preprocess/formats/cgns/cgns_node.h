@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/formats/common/block_source.h"
+
 namespace curvisplat {
 
 struct CgnsNode {
@@ -25,10 +27,7 @@ struct CgnsShape {
   bool number() const { return real() || type == "I4" || type == "I8"; }
 };
 
-/// A box of a three-dimensional array, and the layout of its destination in memory.
-struct CgnsBox {
-  std::array<uint64_t, 3> first{}, count{};  // in the array, from 0; count is not zero
-  std::array<uint64_t, 2> memory{};          // elements along i and j of the destination array
-};
+/// A box of a three-dimensional array, which is not empty.
+using CgnsBox = ArrayBox;
 
 }  // namespace curvisplat

@@ -4,13 +4,21 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
+#include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "preprocess/formats/cgns/cgns_cells.h"
 #include "preprocess/formats/cgns/cgns_file.h"
+#include "preprocess/formats/cgns/cgns_tree.h"
+#include "preprocess/formats/common/block_source.h"
+#include "preprocess/formats/common/element_source.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -18,6 +26,10 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kNamesListed = 3;
+
+/// The arrays of a scalar on a zone: one, or three for the magnitude of a vector. Empty: the scalar is NaN.
+/// The file's CgnsTree owns the arrays.
+using CgnsArrays = std::vector<const CgnsArray*>;
 using ArraysOfScalars = std::vector<std::vector<CgnsArrays>>;  // [scalar][zone]
 
 /// The zone's name, with its base's if there are several bases.
@@ -136,18 +148,98 @@ ArraysOfScalars describeScalars(const CgnsTree& tree, GridDescription& descripti
   return arrays_of;
 }
 
-/// Reads samples [first, first + count) of a list, without those of the rind.
-template <typename Value>
-void readRange(const CgnsFile& file, const CgnsArray& array, uint64_t first, std::vector<Value>& to) {
-  if (to.empty()) return;
-  const uint64_t count = to.size();
-  file.read(array.node, array.shape, {{array.rind[0] + first, 0, 0}, {count, 1, 1}, {count, 1}}, to.data());
+// ---- structured zones ----
+
+/// The box of an array with a rind of further samples around it.
+CgnsBox insideRind(const CgnsArray& array, CgnsBox box) {
+  for (size_t axis = 0; axis < 3; ++axis) box.first[axis] += array.rind[axis];
+  return box;
 }
 
-}  // namespace
+class CgnsBlocks final : public BlockSource {
+ public:
+  CgnsBlocks(std::shared_ptr<const CgnsFile> file, CgnsTree tree, uint32_t time_step)
+      : file_(std::move(file)), tree_(std::move(tree)) {
+    describeZones(*file_, tree_, time_step, description_);
+    for (const CgnsZone& zone : tree_.zones) {
+      for (GridBoundary boundary : zone.boundaries) {
+        boundary.block = static_cast<uint32_t>(description_.blocks.size());
+        description_.boundaries.push_back(std::move(boundary));
+      }
+      const std::string name = zoneName(tree_, description_.blocks.size());
+      description_.blocks.push_back({name, zone.nodes[0], zone.nodes[1], zone.nodes[2], !zone.holes.empty()});
+      if (!zone.holes.empty()) description_.blanking = "in overset holes of the zones";
+    }
+    arrays_ = describeScalars(tree_, description_);
+  }
 
-CgnsMeshSource::CgnsMeshSource(std::shared_ptr<const CgnsFile> file, CgnsTree tree, uint32_t time_step,
-                               const std::filesystem::path& folder)
+ private:
+  BlockArray<Places> nodesOf(uint32_t block) const override {
+    return [this, &zone = tree_.zones[block]](const ArrayBox& box, const Places& to) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const CgnsArray& array = zone.coordinates[axis];
+        file_->read(array.node, array.shape, insideRind(array, box), to.axes[axis]);
+      }
+    };
+  }
+  BlockArray<float*> valuesOf(uint32_t block, uint32_t scalar) const override {
+    std::vector<BlockArray<float*>> components;
+    for (const CgnsArray* const array : arrays_.at(scalar)[block])
+      components.push_back([this, array](const ArrayBox& box, float* to) {
+        file_->read(array->node, array->shape, insideRind(*array, box), to);
+      });
+    if (components.empty()) return {};
+    return components.size() == 1 ? components[0] : magnitudeOf(std::move(components));
+  }
+  void blankNodes(uint32_t block, const NodeBox& box, std::vector<uint8_t>& blank) const override {
+    const CgnsZone& zone = tree_.zones[block];
+    if (!zone.holes.empty()) zone.holes.blankNodes(zone.nodes, box, blank);
+  }
+  void blankCells(uint32_t block, const NodeBox& box, std::vector<float>& values) const override {
+    tree_.zones[block].holes.blankCells(tree_.zones[block].nodes, box, values);
+  }
+
+  std::shared_ptr<const CgnsFile> file_;
+  CgnsTree tree_;
+  ArraysOfScalars arrays_;
+};
+
+// ---- unstructured zones ----
+
+/// Reads samples [first, first + to.size()) of a list, without those of the rind.
+template <typename Value>
+void readRange(const CgnsFile& file, const CgnsArray& array, uint64_t first, std::span<Value> to) {
+  if (to.empty()) return;
+  const uint64_t count = to.size();
+  file.read(array.node, array.shape, {{array.rind[0] + first, 0, 0}, {count, 1, 1}, {count, 1}, {}},
+            to.data());
+}
+
+class CgnsPieces final : public ElementSource {
+ public:
+  CgnsPieces(std::shared_ptr<const CgnsFile> file, CgnsTree tree, uint32_t time_step,
+             const std::filesystem::path& folder);
+
+ private:
+  void dropFieldsOfCells(size_t zone);
+  void describeKinds();
+  void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override {
+    for (size_t axis = 0; axis < 3; ++axis)
+      readRange(*file_, tree_.zones.at(piece).coordinates[axis], first, to.span(axis, count));
+  }
+  void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override {
+    cells_.at(piece).read(first, count, out);
+  }
+  void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override;
+
+  std::shared_ptr<const CgnsFile> file_;
+  CgnsTree tree_;
+  std::vector<CgnsCells> cells_;  // [zone]
+  ArraysOfScalars arrays_;
+};
+
+CgnsPieces::CgnsPieces(std::shared_ptr<const CgnsFile> file, CgnsTree tree, uint32_t time_step,
+                       const std::filesystem::path& folder)
     : file_(std::move(file)), tree_(std::move(tree)) {
   cells_.reserve(tree_.zones.size());  // cells hold pointers to their own sections
   const ListSpools spools(folder);
@@ -157,25 +249,26 @@ CgnsMeshSource::CgnsMeshSource(std::shared_ptr<const CgnsFile> file, CgnsTree tr
   for (size_t n = 0; n < tree_.zones.size(); ++n)
     description_.pieces.push_back(
         {zoneName(tree_, n), file_->path().string(), tree_.zones[n].nodes[0], cells_[n].cells()});
-  warnOfKinds();
+  describeKinds();
   arrays_ = describeScalars(tree_, description_);
 }
 
 /// Drops the zone's fields in cells if they do not have a value for each of its cells.
-void CgnsMeshSource::dropFieldsOfCells(size_t zone_number) {
+void CgnsPieces::dropFieldsOfCells(size_t zone_number) {
   CgnsZone& zone = tree_.zones[zone_number];
-  const uint64_t cells = cells_[zone_number].cells();
-  if (cells == zone.cells) return;
+  const uint64_t count = cells_[zone_number].cells();
+  if (count == zone.cells) return;
   const size_t dropped =
       std::erase_if(zone.fields, [](const CgnsField& field) { return field.centring == Centring::kCell; });
   if (dropped > 0)
     tree_.warnings.push_back(
         fmt::format("the {} cell-centred fields of {}/{} are left out: they have {} values, but its sections "
                     "have {} elements that may be solid",
-                    dropped, zone.base, zone.name, zone.cells, cells));
+                    dropped, zone.base, zone.name, zone.cells, count));
 }
 
-void CgnsMeshSource::warnOfKinds() {
+/// Whether there are curved cells, and a warning of those that are not solid.
+void CgnsPieces::describeKinds() {
   CgnsCells::Counts all;
   for (const CgnsCells& cells : cells_) {
     all.solid += cells.counts().solid;
@@ -192,135 +285,16 @@ void CgnsMeshSource::warnOfKinds() {
         fmt::format("{} elements are nodes, lines or faces and are left out", all.others));
 }
 
-void CgnsMeshSource::readScalars(uint32_t piece, uint64_t first, uint64_t count,
-                                 std::span<const uint32_t> scalars,
-                                 std::vector<std::vector<float>>& out) const {
-  out.resize(scalars.size());
-  std::vector<float> component(count);
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    const CgnsArrays& arrays = arrays_.at(scalars[n])[piece];
-    out[n].assign(count, arrays.empty() ? std::numeric_limits<float>::quiet_NaN() : 0.0f);
-    if (arrays.size() == 1) readRange(*file_, *arrays[0], first, out[n]);
-    if (arrays.size() < 2) continue;
-    std::vector<double> squares(count, 0.0);
-    for (const CgnsArray* const array : arrays) {
-      readRange(*file_, *array, first, component);
-      for (size_t m = 0; m < count; ++m) squares[m] += double{component[m]} * component[m];
-    }
-    for (size_t m = 0; m < count; ++m) out[n][m] = static_cast<float>(std::sqrt(squares[m]));
-  }
-}
-
-void CgnsMeshSource::readPoints(uint32_t piece, uint64_t first, uint64_t count,
-                                std::span<const uint32_t> scalars, MeshPoints& out) const {
-  const CgnsZone& zone = tree_.zones.at(piece);
-  const std::array<std::vector<double>*, 3> axes{&out.x, &out.y, &out.z};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    axes[axis]->resize(count);
-    readRange(*file_, zone.coordinates[axis], first, *axes[axis]);
-  }
-  out.hidden.assign(count, 0);
-  readScalars(piece, first, count, scalars, out.scalars);
-}
-
-void CgnsMeshSource::readCells(uint32_t piece, uint64_t first, uint64_t count,
-                               std::span<const uint32_t> scalars, MeshCells& out) const {
-  cells_.at(piece).read(first, count, out);
-  readScalars(piece, first, count, scalars, out.scalars);
-}
-
-namespace {
-
-// A vector is read in groups of rows of about this many nodes.
-constexpr uint64_t kRowsOfNodes = 1 << 16;
-
-/// The part of `box` that has samples of the given centring, as a box of the array, with its destination.
-CgnsBox boxOf(const CgnsZone& zone, const NodeBox& box, const CgnsArray& array, Centring centring) {
-  const uint64_t last = centring == Centring::kCell ? 1 : 0;
-  const uint64_t j1 = std::min(box.j1, zone.nodes[1] - last), k1 = std::min(box.k1, zone.nodes[2] - last);
-  CgnsBox part;
-  const uint64_t i1 = std::min(box.i1, zone.nodes[0] - last);
-  part.first = {array.rind[0] + box.i0, array.rind[1] + box.j0, array.rind[2] + box.k0};
-  part.count = {i1 - std::min(box.i0, i1), j1 - std::min(box.j0, j1), k1 - std::min(box.k0, k1)};
-  part.memory = {box.rowNodes(zone.nodes[0]), box.j1 - box.j0};
-  return part;
-}
-
-bool empty(const CgnsBox& box) {
-  return box.count[0] == 0 || box.count[1] == 0 || box.count[2] == 0;
+void CgnsPieces::readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const {
+  const CgnsArrays& arrays = arrays_.at(scalar)[piece];
+  const auto read = [&](size_t component, std::span<float> values) {
+    readRange(*file_, *arrays[component], first, values);
+  };
+  if (arrays.size() == 1) read(0, to);
+  if (arrays.size() > 1) readMagnitude(arrays.size(), to, read);
 }
 
 }  // namespace
-
-CgnsSource::CgnsSource(std::shared_ptr<const CgnsFile> file, CgnsTree tree, uint32_t time_step)
-    : file_(std::move(file)), tree_(std::move(tree)) {
-  describeZones(*file_, tree_, time_step, description_);
-  for (const CgnsZone& zone : tree_.zones) {
-    for (GridBoundary boundary : zone.boundaries) {
-      boundary.block = static_cast<uint32_t>(description_.blocks.size());
-      description_.boundaries.push_back(std::move(boundary));
-    }
-    const std::string name = zoneName(tree_, description_.blocks.size());
-    description_.blocks.push_back({name, zone.nodes[0], zone.nodes[1], zone.nodes[2], !zone.holes.empty()});
-    if (!zone.holes.empty()) description_.blanking = "in overset holes of the zones";
-  }
-  arrays_ = describeScalars(tree_, description_);
-}
-
-void CgnsSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(block, <, tree_.zones.size());
-  const CgnsZone& zone = tree_.zones[block];
-  const size_t nodes = box.rowNodes(zone.nodes[0]) * (box.j1 - box.j0) * (box.k1 - box.k0);
-  std::vector<double>* const axes[] = {&out.x, &out.y, &out.z};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    axes[axis]->resize(nodes);
-    const CgnsArray& array = zone.coordinates[axis];
-    const CgnsBox part = boxOf(zone, box, array, Centring::kNode);
-    if (!empty(part)) file_->read(array.node, array.shape, part, axes[axis]->data());
-  }
-  out.blank.assign(nodes, 0);
-  if (!zone.holes.empty()) zone.holes.blankNodes(zone.nodes, box, out.blank);
-  out.scalars.resize(scalars.size());
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    CURVISPLAT_CHECK_OP(scalars[n], <, arrays_.size());
-    out.scalars[n].assign(nodes, std::numeric_limits<float>::quiet_NaN());
-    readScalar(zone, box, arrays_[scalars[n]][block], description_.scalars[scalars[n]].centring,
-               out.scalars[n]);
-    if (description_.scalars[scalars[n]].centring == Centring::kCell)
-      zone.holes.blankCells(zone.nodes, box, out.scalars[n]);
-  }
-}
-
-void CgnsSource::readScalar(const CgnsZone& zone, const NodeBox& box, const CgnsArrays& arrays,
-                            Centring centring, std::vector<float>& to) const {
-  if (arrays.empty()) return;
-  const CgnsBox part = boxOf(zone, box, *arrays[0], centring);
-  if (empty(part)) return;
-  if (arrays.size() == 1) return file_->read(arrays[0]->node, arrays[0]->shape, part, to.data());
-  // A few rows at a time, so that the buffers of the components stay small.
-  const uint64_t ni = part.memory[0];
-  const uint64_t rows = std::clamp<uint64_t>(kRowsOfNodes / ni, 1, part.count[1]);
-  std::vector<double> squares;
-  std::vector<float> component;
-  for (uint64_t k = 0; k < part.count[2]; ++k)
-    for (uint64_t j = 0; j < part.count[1]; j += rows) {
-      const uint64_t count = std::min(rows, part.count[1] - j);
-      squares.assign(ni * count, 0.0);
-      component.assign(ni * count, std::numeric_limits<float>::quiet_NaN());
-      for (const CgnsArray* array : arrays) {
-        CgnsBox piece = boxOf(zone, box, *array, centring);
-        piece.first = {piece.first[0], piece.first[1] + j, piece.first[2] + k};
-        piece.count = {piece.count[0], count, 1};
-        piece.memory = {ni, count};
-        file_->read(array->node, array->shape, piece, component.data());
-        for (size_t n = 0; n < component.size(); ++n) squares[n] += double{component[n]} * component[n];
-      }
-      float* const first = to.data() + ni * (j + part.memory[1] * k);
-      std::transform(squares.begin(), squares.end(), first,
-                     [](double square) { return static_cast<float>(std::sqrt(square)); });
-    }
-}
 
 std::unique_ptr<DataSource> openCgns(const OpenGridOptions& options) {
   tryAdf(options.grid);
@@ -328,8 +302,8 @@ std::unique_ptr<DataSource> openCgns(const OpenGridOptions& options) {
   const uint32_t step = options.time_step.value_or(0);
   CgnsTree tree = readCgnsTree(*file, step);
   if (tree.unstructured)
-    return std::make_unique<CgnsMeshSource>(std::move(file), std::move(tree), step, options.temporary_folder);
-  return std::make_unique<CgnsSource>(std::move(file), std::move(tree), step);
+    return std::make_unique<CgnsPieces>(std::move(file), std::move(tree), step, options.temporary_folder);
+  return std::make_unique<CgnsBlocks>(std::move(file), std::move(tree), step);
 }
 
 }  // namespace curvisplat

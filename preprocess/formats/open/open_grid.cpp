@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/cgns/cgns_file.h"
 #include "preprocess/formats/cgns/cgns_source.h"
 #include "preprocess/formats/columns/columns_source.h"
 #include "preprocess/formats/common/cut_source.h"
