@@ -65,7 +65,7 @@ void fuzzExodus(std::span<const std::byte> bytes) {
   OpenGridOptions options;
   options.grid = fuzzFile("a.exo", bytes);
   options.temporary_folder = fuzzFolder();
-  if (isExodus(InputFile(options.grid))) readMesh(ExodusSource(options));
+  if (isExodus(InputFile(options.grid))) readData(openExodus(options));
 }
 
 const RegisteredFuzzTarget exodus_target("exodus", fuzzExodus);

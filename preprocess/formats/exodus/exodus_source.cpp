@@ -3,10 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "preprocess/formats/common/element_source.h"
+#include "preprocess/formats/common/scalar_list.h"
+#include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
@@ -58,18 +67,33 @@ CellKind kindOf(std::string type) {
   return CellKind::kNone;
 }
 
-}  // namespace
+class ExodusSource final : public ElementSource {
+ public:
+  explicit ExodusSource(const OpenGridOptions& options);
 
-bool isExodus(const InputFile& file) {
-  if (!NetcdfFile::recognises(file)) return false;
-  try {
-    const NetcdfFile netcdf(file.path());
-    return lengthOf(netcdf, "num_nodes") > 0 && lengthOf(netcdf, "num_dim") > 0 &&
-           (netcdf.hasAttribute("api_version") || netcdf.hasAttribute("floating_point_word_size"));
-  } catch (const Error&) {
-    return false;  // its reader says what is wrong
-  }
-}
+ private:
+  struct Block {
+    size_t number = 0;  // from 1, in the names of variables
+    CellKind kind = CellKind::kNone;
+    uint64_t elements = 0, nodes_each = 0;
+    const NetcdfVariable* connect = nullptr;
+  };
+  static uint64_t elementsOf(const Block& block) { return block.elements; }
+
+  void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override;
+  void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override;
+  void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override;
+  void findBlocks();
+  void findScalars(const char* names, const char* values, Centring centring);
+  std::vector<std::string> namesIn(const char* variable) const;
+  void readVariable(const NetcdfVariable* variable, uint64_t first, std::span<float> to,
+                    std::optional<size_t> of_all = {}) const;
+
+  std::unique_ptr<NetcdfFile> file_;
+  std::vector<Block> blocks_;
+  std::vector<size_t> number_of_scalar_;  // [description_.scalars], from 1
+  uint64_t nodes_ = 0, elements_ = 0;
+};
 
 ExodusSource::ExodusSource(const OpenGridOptions& options)
     : file_(std::make_unique<NetcdfFile>(options.grid)), nodes_(lengthOf(*file_, "num_nodes")) {
@@ -107,7 +131,6 @@ void ExodusSource::findBlocks() {
     Block block;
     block.number = number;
     block.connect = connect;
-    block.first = elements_;
     block.elements = file_->dimension(*connect, 0).length;
     block.nodes_each = file_->dimension(*connect, 1).length;
     const std::string type = connect->text("elem_type");
@@ -150,6 +173,7 @@ std::vector<std::string> ExodusSource::namesIn(const char* variable) const {
 
 void ExodusSource::findScalars(const char* names, const char* values, Centring centring) {
   const std::vector<std::string> all = namesIn(names);
+  ScalarList list(description_);
   for (size_t n = 0; n < all.size(); ++n) {
     bool any = false;
     if (centring == Centring::kNode)
@@ -157,20 +181,15 @@ void ExodusSource::findScalars(const char* names, const char* values, Centring c
     for (const Block& block : blocks_)
       any = any || file_->find(fmt::format("{}{}eb{}", values, n + 1, block.number)) != nullptr;
     if (!any) continue;
-    GridScalar scalar;
-    scalar.name = all[n].empty() ? fmt::format("variable {}", n + 1) : all[n];
-    const auto taken = [&](const GridScalar& other) { return other.name == scalar.name; };
-    if (std::any_of(description_.scalars.begin(), description_.scalars.end(), taken))
-      scalar.name += centring == Centring::kCell ? ":cell" : fmt::format(":{}", n + 1);
-    scalar.centring = centring;
-    description_.scalars.push_back(std::move(scalar));
+    const std::string name = all[n].empty() ? fmt::format("variable {}", n + 1) : all[n];
+    list.add({name, name + (centring == Centring::kCell ? ":cell" : fmt::format(":{}", n + 1))}, centring);
     number_of_scalar_.push_back(n + 1);
   }
 }
 
 /// Values [first, ...) of the open step; NaN without a variable. `of_all`: which of all scalars, in a variable that has them together.
-void ExodusSource::readValues(const NetcdfVariable* variable, uint64_t first, std::span<float> to,
-                              std::optional<size_t> of_all) const {
+void ExodusSource::readVariable(const NetcdfVariable* variable, uint64_t first, std::span<float> to,
+                                std::optional<size_t> of_all) const {
   if (!variable) return std::fill(to.begin(), to.end(), kNaN);
   if (description_.times.empty())
     throw Error("{}: has no time step: its variables ({}) hold no values yet", file_->path().string(),
@@ -188,12 +207,9 @@ void ExodusSource::readValues(const NetcdfVariable* variable, uint64_t first, st
     file_->read(*variable, {{description_.time_step, first}, {1, to.size()}}, to);
 }
 
-void ExodusSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
-                              MeshPoints& out) const {
-  std::array<std::vector<double>*, 3> axes{&out.x, &out.y, &out.z};
+void ExodusSource::readPlaces(uint32_t, uint64_t first, uint64_t count, const Places& to) const {
   const NetcdfVariable* const all = file_->find("coord");
   for (size_t axis = 0; axis < 3; ++axis) {
-    axes[axis]->resize(count);
     const std::string name = fmt::format("coord{}", "xyz"[axis]);
     const NetcdfVariable* const one = file_->find(name);
     const NetcdfVariable* const variable = all ? all : one;
@@ -202,51 +218,56 @@ void ExodusSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::spa
         (all && file_->dimension(*all, 0).length != 3))
       throw Error("{}: has no {} of {} nodes; the file is damaged", file_->path().string(), name, nodes_);
     const NetcdfBox box = all ? NetcdfBox{{axis, first}, {1, count}} : NetcdfBox{{first}, {count}};
-    if (count > 0) file_->read(*variable, box, std::span(*axes[axis]));
-  }
-  out.hidden.assign(count, 0);
-  out.scalars.resize(scalars.size());
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    out.scalars[n].resize(count);
-    const size_t number = number_of_scalar_.at(scalars[n]);
-    if (const NetcdfVariable* const of_all = file_->find(kAllOfNodes))
-      readValues(of_all, first, out.scalars[n], number - 1);
-    else
-      readValues(file_->find(fmt::format("{}{}", kAllOfNodes, number)), first, out.scalars[n]);
+    if (count > 0) file_->read(*variable, box, to.span(axis, count));
   }
 }
 
-void ExodusSource::readCells(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
-                             MeshCells& out) const {
-  out.clear();
-  out.scalars.resize(scalars.size());
-  for (std::vector<float>& values : out.scalars) values.resize(count);
+void ExodusSource::appendCells(uint32_t, uint64_t first, uint64_t count, MeshCells& out) const {
   std::vector<double> stored;
   std::vector<uint64_t> points;
-  for (const Block& block : blocks_) {
-    const uint64_t from = std::max(first, block.first),
-                   to = std::min(first + count, block.first + block.elements);
-    if (from >= to) continue;
+  forEachPartOfLists(blocks_, first, count, elementsOf, [&](const PartOfList& part) {
+    const Block& block = blocks_[part.list];
     // Of elements that are left out nothing is read: they may have any number of nodes.
     const uint64_t nodes_each = block.kind == CellKind::kNone ? 0 : block.nodes_each;
-    stored.resize((to - from) * nodes_each);
+    stored.resize(part.count * nodes_each);
     if (!stored.empty())
-      file_->read(*block.connect, {{from - block.first, 0}, {to - from, nodes_each}}, std::span(stored));
+      file_->read(*block.connect, {{part.first, 0}, {part.count, nodes_each}}, std::span(stored));
     points.resize(nodes_each);
-    for (uint64_t element = 0; element < to - from; ++element) {
-      for (size_t n = 0; n < points.size(); ++n) {
-        // From 1; what is none of them is refused as any number that is too large.
-        const double node = stored[element * nodes_each + n];
-        points[n] = node >= 1 && node <= 0x1p53 ? static_cast<uint64_t>(node) - 1
-                                                : std::numeric_limits<uint64_t>::max();
-      }
+    for (uint64_t element = 0; element < part.count; ++element) {
+      for (size_t n = 0; n < points.size(); ++n) points[n] = pointNumber(stored[element * nodes_each + n], 1);
       appendCurvedAsExodus(block.kind, false, points, out);
     }
-    for (size_t n = 0; n < scalars.size(); ++n)
-      readValues(
-          file_->find(fmt::format("vals_elem_var{}eb{}", number_of_scalar_.at(scalars[n]), block.number)),
-          from - block.first, std::span(out.scalars[n]).subspan(from - first, to - from));
+  });
+}
+
+void ExodusSource::readValues(uint32_t, uint32_t scalar, uint64_t first, std::span<float> to) const {
+  const size_t number = number_of_scalar_.at(scalar);
+  if (description_.scalars[scalar].centring == Centring::kNode) {
+    if (const NetcdfVariable* const of_all = file_->find(kAllOfNodes))
+      return readVariable(of_all, first, to, number - 1);
+    return readVariable(file_->find(fmt::format("{}{}", kAllOfNodes, number)), first, to);
   }
+  forEachPartOfLists(blocks_, first, to.size(), elementsOf, [&](const PartOfList& part) {
+    readVariable(file_->find(fmt::format("vals_elem_var{}eb{}", number, blocks_[part.list].number)),
+                 part.first, to.subspan(part.at, part.count));
+  });
+}
+
+}  // namespace
+
+bool isExodus(const InputFile& file) {
+  if (!NetcdfFile::recognises(file)) return false;
+  try {
+    const NetcdfFile netcdf(file.path());
+    return lengthOf(netcdf, "num_nodes") > 0 && lengthOf(netcdf, "num_dim") > 0 &&
+           (netcdf.hasAttribute("api_version") || netcdf.hasAttribute("floating_point_word_size"));
+  } catch (const Error&) {
+    return false;  // its reader says what is wrong
+  }
+}
+
+std::unique_ptr<DataSource> openExodus(const OpenGridOptions& options) {
+  return std::make_unique<ExodusSource>(options);
 }
 
 }  // namespace curvisplat

@@ -80,7 +80,7 @@ constexpr GridFormat kFormats[] = {
     {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
     {isVtkHdf, openVtkHdf, MoreFiles::kCombined},            // before NetCDF, which takes all HDF5 files
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
-    {isExodus, openAs<ExodusSource>, MoreFiles::kNone},      // before NetCDF, which they are
+    {isExodus, openExodus, MoreFiles::kNone},      // before NetCDF, which they are
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
     {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
