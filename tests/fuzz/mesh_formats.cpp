@@ -41,7 +41,7 @@ void fuzzSu2(std::span<const std::byte> bytes) {
   if (!isSu2(InputFile(options.grid))) return;
   const auto restart = input.rest();
   if (!restart.empty()) options.solutions.push_back(fuzzFile("restart", restart));
-  readMesh(Su2Source(options));
+  readData(openSu2(options));
 }
 
 const RegisteredFuzzTarget su2_target("su2", fuzzSu2);

@@ -54,11 +54,6 @@ struct GridFormat {
 };
 using MoreFiles = GridFormat::MoreFiles;
 
-template <typename Source>
-std::unique_ptr<DataSource> openAs(const OpenGridOptions& options) {
-  return std::make_unique<Source>(options);
-}
-
 template <std::unique_ptr<GridSource> (*open)(const OpenGridOptions&)>
 std::unique_ptr<DataSource> openStructured(const OpenGridOptions& options) {
   return open(options);
@@ -80,10 +75,10 @@ constexpr GridFormat kFormats[] = {
     {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
     {isVtkHdf, openVtkHdf, MoreFiles::kCombined},            // before NetCDF, which takes all HDF5 files
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
-    {isExodus, openExodus, MoreFiles::kNone},      // before NetCDF, which they are
+    {isExodus, openExodus, MoreFiles::kNone},                // before NetCDF, which they are
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
-    {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
+    {isSu2, openSu2, MoreFiles::kByItself},
     {isTecplot, openTecplot, MoreFiles::kCombined},
     {isXdmf, openXdmf, MoreFiles::kCombined},
 };

@@ -14,20 +14,13 @@
 
 namespace curvisplat {
 
-void SpooledMesh::readPoints(uint64_t first, uint64_t count, MeshPoints& out) const {
+void SpooledMesh::readPoints(uint64_t first, uint64_t count, const Places& to) const {
   std::vector<double> values(3 * count);
   positions.read(3 * first, std::span(values));
-  for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
-  for (size_t n = 0; n < count; ++n) {
-    out.x[n] = values[3 * n];
-    out.y[n] = values[3 * n + 1];
-    out.z[n] = values[3 * n + 2];
-  }
-  out.hidden.assign(count, 0);
+  for (size_t n = 0; n < values.size(); ++n) to.axes[n % 3][n / 3] = values[n];
 }
 
-void SpooledMesh::readCells(uint64_t first, uint64_t count, MeshCells& out) const {
-  out.clear();
+void SpooledMesh::appendCells(uint64_t first, uint64_t count, MeshCells& out) const {
   std::vector<uint64_t> from(count + 1);
   begins.read(first, std::span(from));
   std::vector<uint64_t> of_cells(from.back() - from.front());

@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/formats/common/block_source.h"
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/mesh/mesh_source.h"
@@ -34,10 +35,9 @@ struct SpooledMesh {
 
   uint64_t points() const { return positions.count / 3; }
   uint64_t cells() const { return begins.count > 0 ? begins.count - 1 : 0; }
-  /// Positions; nothing is hidden.
-  void readPoints(uint64_t first, uint64_t count, MeshPoints& out) const;
-  /// Cells, and no scalars. Clears `out`. A polyhedron whose faces do not add up becomes kNone.
-  void readCells(uint64_t first, uint64_t count, MeshCells& out) const;
+  void readPoints(uint64_t first, uint64_t count, const Places& to) const;
+  /// Cells without scalars. A polyhedron whose faces do not add up becomes kNone.
+  void appendCells(uint64_t first, uint64_t count, MeshCells& out) const;
 };
 
 /// The spool files that the meshes of all zones share.

@@ -5,11 +5,21 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <filesystem>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/element_source.h"
+#include "preprocess/formats/common/scalar_list.h"
+#include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/su2/su2_mesh.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -38,7 +48,36 @@ std::vector<std::string_view> fieldsOf(std::string_view line) {
   return fields;
 }
 
-}  // namespace
+/// A restart or solution file: values at the points of a mesh, in their order. Any number of threads may
+/// read.
+///
+///    ASCII     "PointID","x","y","z","Density",...       one line a point; commas (.csv) or tabs (.dat)
+///    binary    int32: 535532, variables, points, ., .    names of 33 bytes; doubles, point by point
+class Su2Restart {
+ public:
+  /// An ASCII file goes to a spool file. Throws Error if it is damaged, or does not have `points` points.
+  Su2Restart(std::shared_ptr<const PooledFile> file, uint64_t points,
+             const std::shared_ptr<SpoolFile>& spool);
+
+  /// The names of the file's variables, without the point's number and position.
+  const std::vector<std::string>& names() const { return names_; }
+  bool binary() const { return binary_; }
+  /// Values of points [first, first + to.size()).
+  void read(size_t variable, uint64_t first, std::span<float> to) const;
+
+ private:
+  void openBinary(uint64_t points);
+  void readText(uint64_t points, const std::shared_ptr<SpoolFile>& spool);
+  void keepNames(const std::vector<std::string>& all);
+
+  std::shared_ptr<const PooledFile> file_;
+  bool binary_ = false, swap_ = false;
+  uint64_t data_ = 0;  // offset of the doubles of a binary file
+  size_t stride_ = 0;  // doubles a point
+  std::vector<std::string> names_;
+  std::vector<size_t> columns_;  // [names_]
+  SpooledNumbers text_;
+};
 
 Su2Restart::Su2Restart(std::shared_ptr<const PooledFile> file, uint64_t points,
                        const std::shared_ptr<SpoolFile>& spool)
@@ -140,8 +179,6 @@ void Su2Restart::read(size_t variable, uint64_t first, std::span<float> to) cons
   }
 }
 
-namespace {
-
 constexpr uint64_t kLooked = 4096;
 
 /// The first line that is neither empty nor a comment, without the white space around it; empty if the
@@ -166,20 +203,30 @@ std::optional<std::string_view> valueOf(std::string_view line, std::string_view 
   return trimmed(line.substr(1));
 }
 
-}  // namespace
+class Su2Source final : public ElementSource {
+ public:
+  explicit Su2Source(const OpenGridOptions& options);
 
-bool isSu2(const InputFile& file) {
-  const std::string line = firstLineOf(file);
-  return valueOf(line, "NDIME") || valueOf(line, "NZONE");
-}
+ private:
+  /// The restart file and its variable for each piece.
+  using Variable = std::vector<std::pair<size_t, size_t>>;
 
-uint64_t su2Zones(const InputFile& file) {
-  const std::string line = firstLineOf(file);
-  const auto value = valueOf(line, "NZONE");
-  uint64_t zones = 1;
-  if (value) std::from_chars(value->data(), value->data() + value->size(), zones);
-  return zones;
-}
+  void openRestarts(const OpenGridOptions& options);
+  void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override {
+    zones_.at(piece).mesh.readPoints(first, count, to);
+  }
+  void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override {
+    zones_.at(piece).mesh.appendCells(first, count, out);
+  }
+  void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override {
+    const auto [file, variable] = variables_.at(scalar).at(piece);
+    restarts_[file].read(variable, first, to);
+  }
+
+  std::vector<Su2Zone> zones_;
+  std::vector<Su2Restart> restarts_;
+  std::vector<Variable> variables_;  // [description_.scalars]
+};
 
 Su2Source::Su2Source(const OpenGridOptions& options) {
   const auto pool = std::make_shared<OpenFiles>();
@@ -206,6 +253,7 @@ void Su2Source::openRestarts(const OpenGridOptions& options) {
                 options.grid.string(), zones_.size(), files.size());
   const auto pool = std::make_shared<OpenFiles>();
   const auto spool = std::make_shared<SpoolFile>(options.temporary_folder);
+  ScalarList list(description_);
   for (size_t n = 0; n < files.size(); ++n) {
     const size_t piece = zones_.size() > 1 ? n : 0;
     restarts_.emplace_back(std::make_shared<const PooledFile>(pool, files[n]), zones_[piece].mesh.points(),
@@ -218,36 +266,33 @@ void Su2Source::openRestarts(const OpenGridOptions& options) {
       throw Error("{}: has other variables than {}; expected the same", files[n].string(), files[0].string());
     for (size_t v = 0; v < names.size(); ++v) {
       if (piece > 0) {
-        variables_[v].of_piece.emplace_back(n, v);
+        variables_[v].emplace_back(n, v);
         continue;
       }
-      const auto taken = [&](const GridScalar& other) { return other.name == names[v]; };
-      GridScalar scalar;
-      scalar.name = names[v];
-      if (std::any_of(description_.scalars.begin(), description_.scalars.end(), taken))
-        scalar.name += fmt::format(":{}", n + 1);
-      description_.scalars.push_back(std::move(scalar));
-      variables_.push_back({{{n, v}}});
+      list.add({names[v], fmt::format("{}:{}", names[v], n + 1)}, Centring::kNode);
+      variables_.push_back({{n, v}});
     }
   }
   description_.format += restarts_.front().binary() ? " + binary restart" : " + ASCII restart";
 }
 
-void Su2Source::readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
-                           MeshPoints& out) const {
-  zones_.at(piece).mesh.readPoints(first, count, out);
-  out.scalars.resize(scalars.size());
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    out.scalars[n].resize(count);
-    const auto [file, variable] = variables_.at(scalars[n]).of_piece.at(piece);
-    restarts_[file].read(variable, first, out.scalars[n]);
-  }
+}  // namespace
+
+bool isSu2(const InputFile& file) {
+  const std::string line = firstLineOf(file);
+  return valueOf(line, "NDIME") || valueOf(line, "NZONE");
 }
 
-void Su2Source::readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t>,
-                          MeshCells& out) const {
-  zones_.at(piece).mesh.readCells(first, count, out);
-  out.scalars.clear();
+uint64_t su2Zones(const InputFile& file) {
+  const std::string line = firstLineOf(file);
+  const auto value = valueOf(line, "NZONE");
+  uint64_t zones = 1;
+  if (value) std::from_chars(value->data(), value->data() + value->size(), zones);
+  return zones;
+}
+
+std::unique_ptr<DataSource> openSu2(const OpenGridOptions& options) {
+  return std::make_unique<Su2Source>(options);
 }
 
 }  // namespace curvisplat
