@@ -27,7 +27,7 @@ void fuzzOpenfoam(std::span<const std::byte> bytes) {
   fuzzFile("0/U", input.rest());
   OpenGridOptions options;
   options.grid = options.temporary_folder = fuzzFolder();
-  readMesh(FoamSource(options));
+  readData(openFoam(options));
 }
 
 const RegisteredFuzzTarget openfoam_target("openfoam", fuzzOpenfoam);

@@ -178,7 +178,7 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
       throw Error("{}: is an OpenFOAM case, whose fields are in its folders; leave out {}",
                   options.grid.string(), options.solutions.front().string());
     requireNoSelection(options);
-    return std::make_unique<FoamSource>(options);
+    return openFoam(options);
   }
   if (isRegularFile(options.grid)) {
     const InputFile file(options.grid);

@@ -4,12 +4,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <set>
+#include <span>
+#include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/cells_of_faces.h"
+#include "preprocess/formats/common/element_source.h"
+#include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/openfoam/foam_file.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 
@@ -85,16 +94,58 @@ void forEachLabel(const FoamList& list, const Use& use) {
   }
 }
 
-}  // namespace
+class FoamSource final : public ElementSource {
+ public:
+  explicit FoamSource(const OpenGridOptions& options);
 
-bool isFoamCase(const fs::path& path) {
-  std::error_code error;
-  const bool folder = fs::is_directory(path, error);
-  const std::string ending = path.extension().string();
-  if (!folder && ending != ".foam" && ending != ".OpenFOAM") return false;
-  const fs::path of = caseOf(path);
-  return hasMesh(of) || !processorsOf(of).empty();
-}
+ private:
+  struct Piece {
+    std::filesystem::path folder;  // the case's, a processor's, or that of several (collated)
+    uint32_t processor = 0;        // its part of the files of several
+    FoamList points;               // 3 numbers each
+    FoamFile::Faces faces;
+    CellFaces cells;
+  };
+  struct Field {
+    std::string name;
+    size_t components = 1;
+  };
+  struct Scalar {
+    size_t field = 0;
+    int component = 0;  // or kMagnitude
+  };
+
+  void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override;
+  void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override;
+  void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override;
+  void choosePieces(const std::filesystem::path& folder);
+  void findTimes(std::optional<uint32_t> asked, const std::filesystem::path& shown);
+  std::filesystem::path meshFile(const std::filesystem::path& folder, const char* name) const;
+  FoamFile open(const Piece& piece, const std::filesystem::path& path) const {
+    return FoamFile(path, spools_, temporary_folder_, piece.processor);
+  }
+  void openPiece(Piece& piece);
+  void listFacesOfCells(Piece& piece, const FoamList& owner, const FoamList& neighbour);
+  void findFields();
+  void addField(const std::string& name, size_t components);
+  const FoamList& valuesOf(uint32_t piece, size_t field, std::vector<double>& uniform) const;
+
+  ListSpools spools_;
+  std::filesystem::path temporary_folder_;
+  std::vector<std::string> time_names_;
+  std::vector<Piece> pieces_;
+  bool decomposed_ = false;
+  std::vector<Field> fields_;
+  std::vector<Scalar> scalars_;  // [description_.scalars]
+  /// The values of a field in a piece, once they have been read.
+  struct Values {
+    bool read = false;
+    FoamList list;
+    std::vector<double> uniform;
+  };
+  mutable Mutex mutex_;
+  mutable std::vector<std::vector<Values>> values_ GUARDED_BY(mutex_);  // [piece][field]
+};
 
 FoamSource::FoamSource(const OpenGridOptions& options)
     : spools_(options.temporary_folder), temporary_folder_(options.temporary_folder) {
@@ -239,18 +290,11 @@ void FoamSource::findFields() {
 }
 
 void FoamSource::addField(const std::string& name, size_t components) {
-  const auto add = [&](const std::string& scalar_name, int component) {
-    GridScalar scalar;
-    scalar.name = scalar_name;
-    scalar.centring = Centring::kCell;
-    description_.scalars.push_back(std::move(scalar));
+  ScalarList list(description_);
+  forEachComponent(components, [&](const std::string& suffix, int component) {
+    list.add({name + suffix}, Centring::kCell);
     scalars_.push_back({fields_.size(), component});
-  };
-  if (components == 1) add(name, 0);
-  if (components == 3) add(fmt::format("{}:mag", name), -1);
-  for (size_t c = 0; c < components && components > 1; ++c)
-    add(components == 3 ? fmt::format("{}:{}", name, "xyz"[c]) : fmt::format("{}:{}", name, c),
-        static_cast<int>(c));
+  });
   fields_.push_back({name, components});
   const MutexLock lock(mutex_);
   for (std::vector<Values>& of_piece : values_) of_piece.resize(fields_.size());
@@ -279,24 +323,14 @@ const FoamList& FoamSource::valuesOf(uint32_t piece_number, size_t field,
   return values.list;
 }
 
-void FoamSource::readPoints(uint32_t piece_number, uint64_t first, uint64_t count, std::span<const uint32_t>,
-                            MeshPoints& out) const {
-  for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
-  out.hidden.assign(count, 0);
-  out.scalars.clear();
+void FoamSource::readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const {
   std::vector<double> points(3 * count);
-  pieces_[piece_number].points.read(3 * first, std::span(points));
-  for (size_t n = 0; n < count; ++n) {
-    out.x[n] = points[3 * n];
-    out.y[n] = points[3 * n + 1];
-    out.z[n] = points[3 * n + 2];
-  }
+  pieces_[piece].points.read(3 * first, std::span(points));
+  for (size_t n = 0; n < points.size(); ++n) to.axes[n % 3][n / 3] = points[n];
 }
 
-void FoamSource::readCells(uint32_t piece_number, uint64_t first, uint64_t count,
-                           std::span<const uint32_t> scalars, MeshCells& out) const {
+void FoamSource::appendCells(uint32_t piece_number, uint64_t first, uint64_t count, MeshCells& out) const {
   const Piece& piece = pieces_[piece_number];
-  out.clear();
   std::vector<uint64_t> begins(count + 1);
   piece.cells.begins.read(first, std::span(begins));
   std::vector<uint64_t> faces(begins.back() - begins.front());
@@ -306,26 +340,39 @@ void FoamSource::readCells(uint32_t piece_number, uint64_t first, uint64_t count
                         [&](uint64_t from, std::span<uint64_t> to) { labels.read(from, to); },
                         face_begins.count > 0 ? face_begins.count - 1 : 0, labels.count};
   appendCellsOfFaces(lists, {begins, faces, description_.pieces[piece_number].file, first}, out);
+}
 
-  out.scalars.resize(scalars.size());
-  std::vector<double> values, uniform;
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    const Scalar& scalar = scalars_[scalars[n]];
-    const size_t components = fields_[scalar.field].components;
-    const FoamList& list = valuesOf(piece_number, scalar.field, uniform);
-    values.resize(count * components);
-    if (uniform.empty())
-      list.read(first * components, std::span(values));
-    else
-      for (size_t m = 0; m < values.size(); ++m) values[m] = uniform[m % components];
-    out.scalars[n].resize(count);
-    for (size_t cell = 0; cell < count; ++cell) {
-      const double* tuple = values.data() + cell * components;
-      out.scalars[n][cell] = convertedTo<float>(
-          scalar.component < 0 ? std::sqrt(tuple[0] * tuple[0] + tuple[1] * tuple[1] + tuple[2] * tuple[2])
+void FoamSource::readValues(uint32_t piece, uint32_t number, uint64_t first, std::span<float> to) const {
+  const Scalar& scalar = scalars_[number];
+  const size_t components = fields_[scalar.field].components;
+  std::vector<double> uniform, values(to.size() * components);
+  const FoamList& list = valuesOf(piece, scalar.field, uniform);
+  if (uniform.empty())
+    list.read(first * components, std::span(values));
+  else
+    for (size_t n = 0; n < values.size(); ++n) values[n] = uniform[n % components];
+  for (size_t cell = 0; cell < to.size(); ++cell) {
+    const double* tuple = values.data() + cell * components;
+    to[cell] =
+        convertedTo<float>(scalar.component == kMagnitude
+                               ? std::sqrt(tuple[0] * tuple[0] + tuple[1] * tuple[1] + tuple[2] * tuple[2])
                                : tuple[scalar.component]);
-    }
   }
+}
+
+}  // namespace
+
+bool isFoamCase(const fs::path& path) {
+  std::error_code error;
+  const bool folder = fs::is_directory(path, error);
+  const std::string ending = path.extension().string();
+  if (!folder && ending != ".foam" && ending != ".OpenFOAM") return false;
+  const fs::path of = caseOf(path);
+  return hasMesh(of) || !processorsOf(of).empty();
+}
+
+std::unique_ptr<DataSource> openFoam(const OpenGridOptions& options) {
+  return std::make_unique<FoamSource>(options);
 }
 
 }  // namespace curvisplat
