@@ -7,7 +7,7 @@
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/plot3d/plot3d_file.h"
-#include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/box_source.h"
 #include "stream/base/file.h"
 
 namespace curvisplat {
@@ -19,7 +19,7 @@ namespace curvisplat {
 ///   function   the names in its .nam file (in the same directory, one per line), else 1, 2, ...
 ///
 /// A name that occurs in two files becomes FILE:NAME, FILE being the stem of the file.
-class Plot3dSource final : public GridSource {
+class Plot3dSource final : public BoxSource {
  public:
   /// Detects the layout of every file. Throws Error.
   explicit Plot3dSource(const OpenGridOptions& options);
@@ -27,11 +27,6 @@ class Plot3dSource final : public GridSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    read(block, box, scalars, out);
-  }
-  uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const override { return 0; }
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override;
 
  private:

@@ -45,7 +45,7 @@ std::optional<int> componentIn(const VtkArray& array, const std::string& scalar)
   const std::string rest = scalar.substr(array.name.size());
   if (rest.empty()) return array.components == 1 ? std::optional(0) : std::nullopt;
   constexpr std::array<const char*, 3> kAxes{":x", ":y", ":z"};
-  if (array.components > 1 && rest == ":mag") return WantedComponent<double>::kMagnitude;
+  if (array.components > 1 && rest == ":mag") return kMagnitude;
   for (uint32_t c = 0; c < array.components; ++c)
     if (rest == fmt::format(":{}", c) || (c < 3 && array.components <= 3 && rest == kAxes[c]))
       return static_cast<int>(c);

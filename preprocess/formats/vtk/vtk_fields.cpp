@@ -11,8 +11,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr int kMagnitude = WantedComponent<float>::kMagnitude;
-
 const std::vector<VtkArray>& dataOf(const VtkPiece& piece, Centring centring) {
   return centring == Centring::kNode ? piece.point_data : piece.cell_data;
 }
@@ -23,9 +21,8 @@ void VtkFields::describe(const std::vector<VtkPiece>& pieces, std::span<const si
                          GridDescription& description) {
   addFields(pieces, blocks, Centring::kNode);
   addFields(pieces, blocks, Centring::kCell);
-  std::set<std::string> names;
-  for (const GridScalar& scalar : description.scalars) names.insert(scalar.name);
-  for (size_t n = 0; n < fields_.size(); ++n) addScalars(pieces, n, names, description);
+  ScalarList scalars(description);
+  for (size_t n = 0; n < fields_.size(); ++n) addScalars(pieces, n, scalars);
   for (const Field& field : fields_) {
     const auto without = std::count_if(blocks.begin(), blocks.end(),
                                        [&](size_t piece) { return field.array_of_piece[piece] < 0; });
@@ -63,9 +60,7 @@ void VtkFields::addFields(const std::vector<VtkPiece>& pieces, std::span<const s
                         [&](const Field& field) { return field.name == active; });
 }
 
-/// `names`: of all scalars; those of the field are added.
-void VtkFields::addScalars(const std::vector<VtkPiece>& pieces, size_t number, std::set<std::string>& names,
-                           GridDescription& description) {
+void VtkFields::addScalars(const std::vector<VtkPiece>& pieces, size_t number, ScalarList& scalars) {
   const Field& field = fields_[number];
   std::vector<std::string> component_names;
   for (size_t piece = 0; piece < pieces.size() && component_names.empty(); ++piece)
@@ -73,33 +68,22 @@ void VtkFields::addScalars(const std::vector<VtkPiece>& pieces, size_t number, s
       component_names =
           dataOf(pieces[piece], field.centring)[static_cast<size_t>(field.array_of_piece[piece])]
               .component_names;
-  const auto add = [&](const std::string& suffix, int component, std::vector<std::string> aliases) {
-    GridScalar scalar;
-    scalar.name = field.name + suffix;
-    scalar.centring = field.centring;
-    if (names.count(scalar.name)) {
-      if (field.centring == Centring::kCell) scalar.name = field.name + ":cell" + suffix;
-      if (names.count(scalar.name)) scalar.name += fmt::format(":{}", number);
-    }
-    names.insert(scalar.name);
-    scalar.aliases = std::move(aliases);
-    description.scalars.push_back(std::move(scalar));
-    scalars_.push_back({number, component});
-  };
-  const auto aliasesOf = [&](uint32_t component, bool has_letter) {
+  const auto aliasesOf = [&](int component) -> std::vector<std::string> {
+    const std::string name = simplifiedName(field.name);
+    if (component == kMagnitude) return {name};
     std::vector<std::string> aliases;
-    const std::string begin = simplifiedName(field.name) + ":";
-    if (has_letter) aliases.push_back(begin + std::to_string(component));
-    if (component < component_names.size() && !component_names[component].empty())
-      aliases.push_back(begin + simplifiedName(component_names[component]));
+    if (field.components == 1) return aliases;
+    if (field.components <= 3) aliases.push_back(fmt::format("{}:{}", name, component));
+    const auto c = static_cast<size_t>(component);
+    if (c < component_names.size() && !component_names[c].empty())
+      aliases.push_back(name + ":" + simplifiedName(component_names[c]));
     return aliases;
   };
-  if (field.components == 1) return add("", 0, {});
-  const bool vector = field.components <= 3;
-  if (vector) add(":mag", kMagnitude, {simplifiedName(field.name)});
-  for (uint32_t c = 0; c < field.components; ++c)
-    add(vector ? fmt::format(":{}", "xyz"[c]) : fmt::format(":{}", c), static_cast<int>(c),
-        aliasesOf(c, vector));
+  forEachComponent(field.components, [&](const std::string& suffix, int component) {
+    const auto names = namesOfComponent(field.name, suffix, field.centring, number);
+    scalars.add(names, field.centring).aliases = aliasesOf(component);
+    scalars_.push_back({number, component});
+  });
 }
 
 }  // namespace curvisplat

@@ -12,12 +12,12 @@
 #pragma once
 
 #include <algorithm>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/vtk/vtk_grid.h"
 #include "preprocess/grid/grid_source.h"
 
@@ -68,8 +68,7 @@ class VtkFields {
   };
 
   void addFields(const std::vector<VtkPiece>& pieces, std::span<const size_t> blocks, Centring centring);
-  void addScalars(const std::vector<VtkPiece>& pieces, size_t number, std::set<std::string>& names,
-                  GridDescription& description);
+  void addScalars(const std::vector<VtkPiece>& pieces, size_t number, ScalarList& scalars);
 
   std::vector<Field> fields_;
   std::vector<Scalar> scalars_;  // [description.scalars]

@@ -184,7 +184,7 @@ template <typename Stored, typename Value>
 void convertTuples(const std::byte* from, size_t count, uint32_t components, bool swap,
                    const WantedComponent<Value>& wanted, Value* to) {
   const size_t stride = components * sizeof(Stored);
-  if (wanted.component != WantedComponent<Value>::kMagnitude) {
+  if (wanted.component != kMagnitude) {
     from += static_cast<size_t>(wanted.component) * sizeof(Stored);
     for (size_t n = 0; n < count; ++n)
       to[n] = convertedTo<Value>(loadStored<Stored>(from + n * stride, swap));

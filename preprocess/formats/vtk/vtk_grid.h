@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
 
@@ -106,8 +107,7 @@ inline constexpr uint32_t kMaxComponents = 4096;
 /// A component, or the magnitude, of an array's tuples, and its destination.
 template <typename Value>
 struct WantedComponent {
-  static constexpr int kMagnitude = -1;
-  int component = 0;  // or kMagnitude: the Euclidean norm of the tuple
+  int component = 0;  // or kMagnitude (scalar_list.h): the Euclidean norm of the tuple
   Value* to = nullptr;
 };
 

@@ -3,14 +3,14 @@
 
 #include "preprocess/formats/vtk/vtk_fields.h"
 #include "preprocess/formats/vtk/vtk_grid.h"
-#include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/box_source.h"
 
 namespace curvisplat {
 
 /// Scalars: vtk_fields.h. Flat pieces are left out with a warning.
 ///
 /// A node is blanked if vtkGhostType hides it or all cells around it.
-class VtkSource final : public GridSource {
+class VtkSource final : public BoxSource {
  public:
   /// Throws Error if no block has volume.
   explicit VtkSource(VtkGrid grid);
@@ -18,11 +18,6 @@ class VtkSource final : public GridSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
-  void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-                      NodeArrays& out) const override {
-    read(block, box, scalars, out);
-  }
-  uint64_t rowsInMemory(std::span<const uint32_t> /*scalars*/) const override { return 0; }
 
  private:
   void addBlocks();
