@@ -74,7 +74,7 @@ void fuzzPlot3dMeta(std::span<const std::byte> bytes) {
   options.grid = fuzzFile("a.p3d", bytes);
   options.temporary_folder = fuzzFolder();
   if (!isPlot3dMeta(InputFile(options.grid))) return;
-  readGrid(*openPlot3dMeta(options));
+  readData(openPlot3dMeta(options));
 }
 
 const RegisteredFuzzTarget plot3d_meta_target("plot3d_meta", fuzzPlot3dMeta);

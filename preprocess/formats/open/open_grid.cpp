@@ -54,11 +54,6 @@ struct GridFormat {
 };
 using MoreFiles = GridFormat::MoreFiles;
 
-template <std::unique_ptr<GridSource> (*open)(const OpenGridOptions&)>
-std::unique_ptr<DataSource> openStructured(const OpenGridOptions& options) {
-  return open(options);
-}
-
 std::unique_ptr<DataSource> openListedFile(const OpenGridOptions& options) {
   return openFileSeries(options, openData);
 }
@@ -72,7 +67,7 @@ constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml, MoreFiles::kCombined},
     {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
     {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
-    {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
+    {isPlot3dMeta, openPlot3dMeta, MoreFiles::kNone},
     {isVtkHdf, openVtkHdf, MoreFiles::kCombined},            // before NetCDF, which takes all HDF5 files
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
     {isExodus, openExodus, MoreFiles::kNone},                // before NetCDF, which they are

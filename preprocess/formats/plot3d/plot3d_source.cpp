@@ -283,7 +283,7 @@ bool isPlot3dMeta(const InputFile& file) {
   return std::all_of(begin.begin(), begin.end(), [](char c) { return c >= ' ' || (c >= '\t' && c <= '\r'); });
 }
 
-std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
+std::unique_ptr<DataSource> openPlot3dMeta(const OpenGridOptions& options) {
   const JsonDocument document(readTextFile(options.grid, kLargest), options.grid.string(),
                               "a .p3d description, which is JSON");
   const JsonField meta = document.root();

@@ -64,6 +64,6 @@ bool isPlot3dMeta(const InputFile& file);
 ///
 /// options.force overrides the file. A Q or function file that does not exist is left out with a warning.
 /// Throws Error with the file and the key.
-std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options);
+std::unique_ptr<DataSource> openPlot3dMeta(const OpenGridOptions& options);
 
 }  // namespace curvisplat
