@@ -4,7 +4,8 @@
     bench/build_times.py build [--target curvisplat] [--define CURVISPLAT_UNITY=OFF]    a build from nothing
     bench/build_times.py headers [--top 30]      each header parsed alone, and the sources that include it
     bench/build_times.py tests [CTEST OPTIONS]   the built test suite, each test by the clock
-    bench/build_times.py each [CTEST OPTIONS]    each test alone: its processor time, with that of all processes that it leaves
+    bench/build_times.py each [CTEST OPTIONS]    each test alone: its processor time, with that of all processes that it leaves, and
+                                                 its time by the clock: far more of it tells of a test that sleeps or waits
 
 `build` configures and builds in a temporary folder, and prints the sum, the rooms and the slowest of what was compiled: several
 sources at once, unless CURVISPLAT_UNITY is off. `headers`, `tests` and `each` use build/release, which tools/build.sh makes. The machine
@@ -159,11 +160,13 @@ def each(options):
         if "command" not in test or "whole" in properties.get("LABELS", []):
             continue
         environment = dict(os.environ, **dict(one.split("=", 1) for one in properties.get("ENVIRONMENT", [])))
-        before = processor_seconds()
+        before, start = processor_seconds(), time.monotonic()
         status = subprocess.run(test["command"], cwd=properties.get("WORKING_DIRECTORY", RELEASE), env=environment, stdin=subprocess.DEVNULL,
                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
+        clock = time.monotonic() - start
         end_orphans()
-        rows.append((processor_seconds() - before, test["name"] + (f"  (exit status {status})" if status else "")))
+        failure = f"  (exit status {status})" if status else ""
+        rows.append((processor_seconds() - before, f"{clock:8.1f} s by the clock  {test['name']}{failure}"))
         print(f"{rows[-1][0]:8.1f} s  {rows[-1][1]}", flush=True)
     print_table(rows, f"{sum(seconds for seconds, _ in rows):.0f} s of processor time, {len(rows)} tests", options.top)
 
