@@ -228,7 +228,7 @@ TEST_F(OddFiles, WithoutThreadsItEndsWithOneLine) {
        {"--version", "info cube.splats", "info cube.xyz cube.fun", "convert cube.xyz cube.fun -o b.splats",
         "render cube.splats -o b.png --size 64x64 --memory 256M"}) {
     bool succeeded = false;
-    for (int mebibytes = 100; mebibytes < 700 && !succeeded; mebibytes += 20) {
+    for (int mebibytes = 100; mebibytes < 700 && !succeeded; mebibytes += faults::isWholeSweep() ? 20 : 40) {
       const ProgramResult result = runWithin(folder_, command, 1024 * mebibytes);
       if (result.status == kNotLoaded) continue;
       succeeded = result.status == 0;
@@ -253,7 +253,7 @@ TEST_F(OddFiles, AFrameWhoseBuffersJustFitEndsWithOneLine) {
     const int middle = (refused + sufficient) / 2;
     (runWithin(folder_, command, middle).status == 0 ? sufficient : refused) = middle;
   }
-  for (int n = 0; n < 16; ++n) {
+  for (int n = 0; n < 16; n += faults::isWholeSweep() ? 1 : 2) {
     const int limit = sufficient - 347 * n;
     const ProgramResult result = runWithin(folder_, command, limit);
     EXPECT_LE(result.status, 1) << limit << " KiB: " << result.err;
@@ -331,6 +331,7 @@ TEST_F(OddFiles, NamesThatAreTooLongWhileTheFilesAreWrittenAreRefusedBeforeTheWo
   const auto before = entries();
   const std::string frames = file("w_*.fun");
   for (size_t bytes = 248; bytes <= 255; ++bytes) {
+    if (bytes > 249 && bytes < 255 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(bytes);
     const std::string too_long =
         "the name is too long; choose one that is " + std::to_string(bytes - 247) + " bytes shorter";
@@ -374,7 +375,7 @@ TEST_F(OddFiles, ProgramsMayWriteTheSamePicture) {
   const Words words{"render", cache(), "-o", file("a.png"), "--size", "200x200"};
   run(words);
   const std::string expected = readTextFile(file("a.png"));
-  for (int round = 0; round < 5; ++round) {
+  for (int round = 0; round < (faults::isWholeSweep() ? 5 : 2); ++round) {
     std::vector<std::unique_ptr<RunningProgram>> programs;
     for (int n = 0; n < 4; ++n) programs.push_back(std::make_unique<RunningProgram>(words));
     for (const auto& program : programs) {

@@ -84,6 +84,7 @@ TEST_F(RanksCommand, ReportAFailureOnce) {
 TEST_F(RanksCommand, ReportADamagedStepOfASeriesOnce) {
   run({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("s")});
   for (const int damaged : {1, 3}) {  // of rank 0, and of another, which rank 0 tries again
+    if (damaged == 1 && !faults::isWholeSweep()) continue;
     const std::string name = file(fmt::format("s_{:04}.fun", damaged));
     const auto size = fs::file_size(name);
     fs::resize_file(name, size - 7);
@@ -150,24 +151,25 @@ TEST_F(RanksCommand, ThatHaveOtherOptionsAreRefused) {
                                       const std::string& told) {
     writeFileAtomically(script,
                         fmt::format("#!/bin/sh\ncd \"{}\"\n"
-                                    "[ \"$OMPI_COMM_WORLD_RANK\" = 2 ] && exec \"{}\" {}\n"
+                                    "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && exec \"{}\" {}\n"
                                     "exec \"{}\" {}\n",
                                     file(""), CURVISPLAT_PROGRAM, of_one, CURVISPLAT_PROGRAM, command));
     fs::permissions(script, fs::perms::owner_all);
-    expectRefused(runAsRanks(3, {}, script), 2,
-                  {"rank 2 of 3", told + " at rank 0; start all ranks with the same options"});
+    expectRefused(runAsRanks(2, {}, script), 2,
+                  {"rank 1 of 2", told + " at rank 0; start all ranks with the same options"});
     for (const auto& entry : fs::directory_iterator(file("")))
       EXPECT_FALSE(entry.path().filename().string().starts_with("mixed")) << entry.path();
   };
   const std::string convert = "convert g.xyz g.fun -o mixed.splats";
-  for (const auto& [option, told] :
-       {std::pair{" --value-precision fine", "--value-precision is 'fine' here and not given"},
-        {" --memory 512M", "--memory is '512M' here and not given"}})
-    expectOtherRefused(convert, convert + option, told);
+  expectOtherRefused(convert, convert + " --value-precision fine",
+                     "--value-precision is 'fine' here and not given");
   expectOtherRefused(convert + " --flat", convert, "--flat is not given here and 'true'");
   const std::string render = "render g.splats -o mixed.png --size 60x40";
-  expectOtherRefused(render, "render g.splats -o mixed.png --size 61x40",
-                     "--size is '61x40' here and '60x40'");
+  if (faults::isWholeSweep()) {
+    expectOtherRefused(convert, convert + " --memory 512M", "--memory is '512M' here and not given");
+    expectOtherRefused(render, "render g.splats -o mixed.png --size 61x40",
+                       "--size is '61x40' here and '60x40'");
+  }
   const std::string frames = "render g.splats -o mixed%d.png --size 60x40 --orbit 90 --frames ";
   expectOtherRefused(frames + "6", frames + "3", "--frames is '3' here and '6'");
   expectOtherRefused(convert, render, "--output is 'mixed.png' here and 'mixed.splats'");
