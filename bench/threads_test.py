@@ -90,7 +90,7 @@ class Threads(unittest.TestCase):
         return most
 
     def test_no_more_threads_compute_than_asked_for(self):
-        run("generate", "o-grid", "--size", "80x60x50", "-o", FOLDER / "m")
+        run("generate", "o-grid", "--size", "48x36x30", "-o", FOLDER / "m")
         for count in 1, 2:
             path = FOLDER / f"bound_{count}.json"
             shutil.rmtree(FOLDER / "m.splats", ignore_errors=True)
@@ -98,7 +98,7 @@ class Threads(unittest.TestCase):
             run("convert", FOLDER / "m.xyz", FOLDER / "m.fun", "-o", FOLDER / "m.splats", "--threads", count, "--trace", path)
             self.assertLessEqual(self.at_once(path, "read-ahead", "bucket-writer"), count)
             run("render", FOLDER / "m.splats", "-o", FOLDER / "m_%d.png", "--orbit", 30, "--frames", 3, "--backend", "cpu",
-                "--lod-pixels", 0, "--size", "600x600", "--threads", count, "--trace", path)
+                "--lod-pixels", 0, "--size", "300x300", "--threads", count, "--trace", path)
             self.assertLessEqual(self.at_once(path), count)
 
     def test_trace_is_refused(self):
