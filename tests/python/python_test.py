@@ -26,7 +26,7 @@ import numpy as np
 import curvisplat
 
 PROGRAM = None
-RENDERS, INTERRUPTS = (100, 20) if "CURVISPLAT_WHOLE" in os.environ else (20, 10)  # whose memory must not add up
+RENDERS, INTERRUPTS = (100, 20) if "CURVISPLAT_WHOLE" in os.environ else (12, 6)  # whose memory must not add up
 
 
 def command(*words):
