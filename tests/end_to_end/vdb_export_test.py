@@ -71,7 +71,7 @@ class VdbExport(unittest.TestCase):
         return text, {grid.name: grid for grid in grids}
 
     def test_has_the_values_and_the_volume_of_the_data(self):
-        for voxels in (48, 96, 200):
+        for voxels in (48, 96, 200) if "CURVISPLAT_WHOLE" in os.environ else (48, 120):
             text, grids = self.exported("--voxels", voxels)
             self.assertEqual(set(grids), {"value", "density"})
             density, value = Grid(grids["density"]), Grid(grids["value"])
@@ -128,10 +128,10 @@ class VdbExport(unittest.TestCase):
 
     def test_that_does_not_fit_on_the_disk_is_an_error_and_leaves_no_file(self):
         whole = self.folder / "whole.vdb"
-        run("export", self.folder / "ring.splats", "-o", whole, "--voxels", 100)
+        run("export", self.folder / "ring.splats", "-o", whole, "--voxels", 64)
         # Near the end, too, where a buffer is written last.
         for limit in (8192, whole.stat().st_size // 2, whole.stat().st_size - 1):
-            done = subprocess.run([PROGRAM, "export", str(self.folder / "ring.splats"), "-o", str(self.folder / "never.vdb"), "--voxels", "100"],
+            done = subprocess.run([PROGRAM, "export", str(self.folder / "ring.splats"), "-o", str(self.folder / "never.vdb"), "--voxels", "64"],
                                   capture_output=True, text=True,
                                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
             self.assertEqual(done.returncode, 1, f"{limit} bytes: {done.stdout}")
