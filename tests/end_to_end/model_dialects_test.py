@@ -113,6 +113,14 @@ class Levels(ModelFileTest):
         self.levels("radius", [5.7e6, 5.9e6, 6.1e6, 6.3e6], units="meters")
         self.expect_heights(np.array([5700, 5900, 6100, 6300]) - RADIUS)
 
+    def test_attributes_padded_with_blanks(self):
+        """As Fortran writes a character(len=8); some with zeros."""
+        for unit, positive in (("m       ", "down   "), ("  m", "down\t"), ("m\0\0\0", "down\0")):
+            self.levels("depth", [5.0, 100, 1000, 4000], units=unit, positive=positive)
+            self.expect_heights([-0.005, -0.1, -1, -4])
+        self.levels("lev", [1000, 850, 500, 300], units="hPa ", positive="down  ")
+        self.expect_heights(standard_altitude(np.array([1e5, 85000, 50000, 30000])))
+
     def test_lengths_that_nothing_calls_heights(self):
         for unit in ("m", "meters MSL", "m above sea level"):
             self.levels("lv_GPML8", [10.0, 500, 2000, 9000], units=unit)

@@ -14,7 +14,7 @@ namespace curvisplat {
 
 std::string NetcdfVariable::text(const char* attribute) const {
   const auto found = attributes.find(attribute);
-  return found == attributes.end() ? "" : found->second.text;
+  return found == attributes.end() ? "" : std::string(trimmed(found->second.text));
 }
 
 const std::vector<double>& NetcdfVariable::numbers(const char* attribute) const {

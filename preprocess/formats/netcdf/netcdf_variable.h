@@ -37,7 +37,7 @@ struct NetcdfVariable {
   std::vector<size_t> dims;  // indices into NetcdfFile::dimensions(), slowest first
   std::map<std::string, NetcdfAttribute> attributes;
 
-  /// The text of an attribute; empty if there is none.
+  /// The text of an attribute without the blanks that Fortran pads it with; empty if there is none.
   std::string text(const char* attribute) const;
   /// The numbers of an attribute; none if it is not there, or text.
   const std::vector<double>& numbers(const char* attribute) const;
