@@ -226,6 +226,20 @@ class Places(ModelFileTest):
             np.testing.assert_allclose(info["bounds"]["upper"], places.reshape(-1, 3).max(0), atol=1e-3)
             np.testing.assert_allclose(info["bounds"]["lower"], places.reshape(-1, 3).min(0), atol=1e-3)
 
+    def test_degrees_and_radians(self):
+        """DYNAMICO's and ICON's angles; x and y that only their long_name calls longitude and latitude."""
+        t = RANDOM.random((3, 8, 12)).astype("f4")
+        lon, lat = np.meshgrid(10.0 + np.arange(12), 40.0 + np.arange(8))
+        for unit, dims, standard in (("radian", 1, True), ("radians", 2, True), ("rad", 1, False), ("degrees", 1, False), ("degree", 2, False)):
+            scale = np.pi / 180 if unit.startswith("rad") else 1
+            with self.file(x=12, y=8, lev=3) as f:
+                for name, long_name, values, alone in (("x", "longitude", lon, lon[0]), ("y", "latitude", lat, lat[:, 0])):
+                    called = {"standard_name": long_name} if standard else {"long_name": long_name + " of the centre"}
+                    f.add(name if dims == 1 else "c" + name, name if dims == 1 else "y x", scale * (alone if dims == 1 else values), units=unit, **called)
+                f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                f.add("t", "lev y x", t, "f4", coordinates="x y" if dims == 1 else "cx cy")
+            self.expect(self.info(), sphere(lon, lat, np.array([0, 1, 3])[:, None, None]), t)
+
     def test_idealised_runs(self):
         """WRF: XLAT and XLONG are 0, or metres with the unit of degrees; DX and DY are the distances of the nodes."""
         x, y = np.meshgrid(2000.0 * np.arange(12), 3000.0 * np.arange(8))

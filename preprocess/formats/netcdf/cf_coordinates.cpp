@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <iterator>
 #include <limits>
+#include <numbers>
 #include <string_view>
 
 #include "stream/base/text.h"
@@ -66,6 +67,13 @@ CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
   if (isOneOf(units, {"degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn"}) ||
       isOneOf(standard_name, {"latitude", "geographic_latitude"}))
     return CfRole::kLatitude;
+  // Angles that only a long_name tells: "longitude", but not "longitude in rotated pole grid".
+  const std::string long_name = lowerCase(variable.text("long_name"));
+  if (standard_name.empty() && (degreesOf(units) != 1 || isOneOf(units, {"degrees", "degree", "deg"})) &&
+      long_name.find("rotated") == std::string::npos) {
+    if (long_name.find("longitude") != std::string::npos) return CfRole::kLongitude;
+    if (long_name.find("latitude") != std::string::npos) return CfRole::kLatitude;
+  }
   if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::kTime;
 
   const bool length = kilometresOf(units).has_value(), pressure = pascalsOf(units).has_value();
@@ -91,6 +99,10 @@ CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
 bool isUnitless(const std::string& unit) {
   return isOneOf(lowerCase(unit), {"", "1", "-", "none", "unitless", "dimensionless", "nondimensional",
                                    "non-dimensional", "nondim", "[-]"});
+}
+
+double degreesOf(const std::string& unit) {
+  return isOneOf(lowerCase(unit), {"radian", "radians", "rad"}) ? 180 / std::numbers::pi : 1;
 }
 
 std::optional<double> kilometresOf(const std::string& unit) {

@@ -218,6 +218,8 @@ class GridFinder {
       if (!longitude || !latitude) return false;
       grid.longitude = *longitude;
       grid.latitude = *latitude;
+      if (east != CfRole::kX)
+        for (CfTerm* const term : {&grid.longitude, &grid.latitude}) term->setDegrees();
       return true;
     };
     std::string implausible;

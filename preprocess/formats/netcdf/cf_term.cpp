@@ -150,6 +150,10 @@ NetcdfBox CfTerm::boxOf(const CfRange& range) const {
   return box;
 }
 
+void CfTerm::setDegrees() {
+  scale_ = degreesOf(variable_->text("units"));
+}
+
 CfValues CfTerm::read(const NetcdfFiles& file, const CfRange& range) const {
   if (index_metres_ > 0) {
     CfValues indices;
@@ -177,7 +181,7 @@ CfValues CfTerm::read(const NetcdfFiles& file, const CfRange& range) const {
   for (uint64_t k = 0; k < values.count[2]; ++k)
     for (uint64_t j = 0; j < values.count[1]; ++j)
       for (uint64_t i = 0; i < values.count[0]; ++i)
-        values.values.push_back(stored[i * strides[0] + j * strides[1] + k * strides[2]]);
+        values.values.push_back(scale_ * stored[i * strides[0] + j * strides[1] + k * strides[2]]);
   for (size_t axis = 0; axis < 3; ++axis)
     if (longer_[axis] != 0)
       values = resampled(values, axis, range.begin[axis], range.end[axis], box.start[*along_[axis]],

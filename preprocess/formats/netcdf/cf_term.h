@@ -92,10 +92,14 @@ class CfTerm {
   bool ofNodes() const;
   NetcdfBox boxOf(const CfRange& range) const;  // the stored values needed for `range`
 
+  /// Makes read() return degrees, of angles that are stored in radians.
+  void setDegrees();
+
   CfValues read(const NetcdfFiles& file, const CfRange& range) const;
 
  private:
   const NetcdfVariable* variable_ = nullptr;
+  double scale_ = 1;  // of the stored values
   std::array<std::optional<size_t>, 3> along_;  // [axis of the block]: its dimension; nullopt: independent
   std::array<int, 3> longer_{};                 // [axis]: its length minus the block's: -1, 0 or 1
   std::array<uint64_t, 3> length_{};            // [axis]: its length
