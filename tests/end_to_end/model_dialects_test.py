@@ -186,6 +186,16 @@ class Levels(ModelFileTest):
             self.levels("lev", [20.0, 100, 500, 1000], more, units="level", positive="down")
             self.expect_heights(standard_altitude(1e5 * a[:, None, None] + b[:, None, None] * ground))
 
+    def test_hybrid_terms_with_the_unit_of_a_pressure(self):
+        """GEOS-Chem: hyam is in hPa and is called a; P0 is 1000 hPa."""
+        a, b, ground = np.array([0, 10.0, 50, 100]), np.array([0.99, 0.89, 0.65, 0]), 950 + 60 * RANDOM.random((8, 12))
+        def more(f):
+            for name, dims, values in (("hyam", "lev", a), ("hybm", "lev", b), ("P0", "", 1000.0), ("PS", "lat lon", ground)):
+                f.add(name, dims, values, units="1" if name == "hybm" else "hPa")
+        self.levels("lev", [0.99, 0.9, 0.7, 0.1], more, units="level", positive="up", axis="Z",
+                    standard_name="atmosphere_hybrid_sigma_pressure_coordinate", formula_terms="a: hyam b: hybm p0: P0 ps: PS")
+        self.expect_heights(standard_altitude(100 * (a[:, None, None] + b[:, None, None] * ground)))
+
     def test_heights_and_pressures_of_nodes_beside_numbered_levels(self):
         """WRF's met_em."""
         ght = 1000 * RANDOM.random((4, 8, 12)) + np.array([0, 3000, 6000, 9000])[:, None, None]

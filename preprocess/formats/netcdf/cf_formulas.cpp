@@ -95,10 +95,8 @@ std::optional<CfVertical> CfVertical::byNamesOfTerms(const NetcdfFiles& file, co
   const std::string a = along({"hyam", "hyai", "ap", "A", "a"}), b = along({"hybm", "hybi", "b", "B"});
   if (!a.empty() && !b.empty() && standIn(file, "ps", block))
     return named(
-        ofTerms(
-            file, Kind::kHybridPressure,
-            {{pascalsOf(file.find(a)->text("units")) ? "ap" : "a", a}, {"b", b}, {"p0", "P0"}, {"ps", "PS"}},
-            block, axis, reason),
+        ofTerms(file, Kind::kHybridPressure, {{"a", a}, {"b", b}, {"p0", "P0"}, {"ps", "PS"}}, block, axis,
+                reason),
         a + " and " + b);
   return std::nullopt;
 }
@@ -247,11 +245,10 @@ bool CfVertical::setAirTerms(const NetcdfFiles& file, const Terms& terms, const 
     return std::isfinite(value) ? value * pascalsOf(term->variable().text("units")).value_or(1) : otherwise;
   };
   const bool hybrid = kind_ == Kind::kHybridPressure, height = kind_ == Kind::kHybridHeight;
-  const bool scaled = hybrid && !terms.contains("ap");
-  const char* const first = kind_ == Kind::kSigmaPressure ? "sigma"
-                            : kind_ == Kind::kLogPressure ? "lev"
-                            : hybrid && !scaled           ? "ap"
-                                                          : "a";
+  const char* const first = kind_ == Kind::kSigmaPressure        ? "sigma"
+                            : kind_ == Kind::kLogPressure        ? "lev"
+                            : hybrid && terms.contains("ap") ? "ap"
+                                                                 : "a";
   s_ = termNamed(file, terms, first, block);
   if (!s_ || !s_->varies(axis)) return lacks(first);
   if (kind_ == Kind::kLogPressure) {
@@ -273,8 +270,9 @@ bool CfVertical::setAirTerms(const NetcdfFiles& file, const Terms& terms, const 
   depth_c_ = depth_ ? pascalsOf(depth_->variable().text("units")).value_or(1) : 1;
   a_ = pressure(termNamed(file, terms, kind_ == Kind::kSigmaPressure ? "ptop" : "p0", block),
                 kind_ == Kind::kSigmaPressure ? 0 : 1e5);
-  // ap is a pressure already; a is a part of p0.
-  if (hybrid && !scaled) a_ = pascalsOf(s_->variable().text("units")).value_or(1);
+  // ap is a pressure already, and so is what GEOS-Chem calls a; else a is a part of p0.
+  const auto pascals = pascalsOf(s_->variable().text("units"));
+  if (hybrid && (pascals || terms.contains("ap"))) a_ = pascals.value_or(1);
   return true;
 }
 
