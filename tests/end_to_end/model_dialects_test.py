@@ -126,6 +126,20 @@ class Levels(ModelFileTest):
             self.levels("lv_GPML8", [10.0, 500, 2000, 9000], units=unit)
             self.expect_heights([0.01, 0.5, 2, 9])
 
+    def test_lengths_in_every_unit(self):
+        for unit, metres in (("[m]", 1), ("(km)", 1000), ("dam", 10), ("dm", 0.1), ("hm", 100), ("mm", 1e-3), ("Mm", 1e6), ("1000 m", 1000),
+                             ("1e3 m", 1000), ("100 km", 1e5), ("fathoms", 1.8288), ("decimeters", 0.1), ("hectometre", 100), ("m_above_MSL", 1)):
+            self.levels("z", np.array([10.0, 500, 2000, 9000]) / metres, units=unit, positive="up")
+            self.expect_heights([0.01, 0.5, 2, 9])
+
+    def test_units_of_no_height(self):
+        """Nobody is told to call them metres."""
+        for unit in ("K", "GHz", "nm", "um", "yyyymmdd", "m s-1", "m2", "level", "dm3"):
+            self.levels("z", [10.0, 500, 2000, 9000], units=unit, axis="Z")
+            line = self.info(fails=True)
+            self.assertIn(f"z has the unit '{unit}'; expected a length or a pressure: give heights of the levels", line)
+            self.assertNotIn("ncatted", line)
+
     def test_sigma_is_no_length(self):
         for name, unit, values in (("sigma", None, [0.02, 0.3, 0.7, 0.997]), ("eta", "1", [1, 0.7, 0.3, 0.1]), ("z", None, [-0.9, -0.6, -0.3, 0])):
             self.levels(name, values, axis="Z", **({"units": unit} if unit else {}))

@@ -370,7 +370,7 @@ class ModelFiles(ModelFileTest):
             self.air(f)
             f.add("lev", "lev", np.arange(3.0), axis="Z")
             f.add("t", "lev lat lon", np.ones((3, 8, 12)))
-        self.assertIn("lev has no unit; expected a length or a pressure: set it (ncatted -a units,lev,o,c,m FILE)", self.info(fails=True))
+        self.assertIn("lev has no unit; expected a length or a pressure: if its values are metres, say so", self.info(fails=True))
 
     def test_integers_without_a_sign(self):
         """The classic format has none: `_Unsigned` says so. netCDF4 reads the same numbers."""

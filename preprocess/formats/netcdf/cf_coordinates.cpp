@@ -1,12 +1,14 @@
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <initializer_list>
 #include <iterator>
 #include <limits>
 #include <numbers>
 #include <string_view>
+#include <utility>
 
 #include "stream/base/text.h"
 
@@ -107,15 +109,39 @@ double degreesOf(const std::string& unit) {
 
 std::optional<double> kilometresOf(const std::string& unit) {
   std::string word = lowerCase(unit);
+  if (word.size() > 2 && std::string_view("[(").find(word[0]) != std::string_view::npos)
+    word = trimmed(std::string_view(word).substr(1, word.size() - 2));
+  std::replace(word.begin(), word.end(), '_', ' ');
+  // "1000 m"
+  double factor = 1;
+  if (const auto read = std::from_chars(word.data(), word.data() + word.size(), factor);
+      read.ec == std::errc() && factor > 0)
+    word = trimmed(std::string_view(read.ptr));
+  else
+    factor = 1;
   // "meters MSL", "m above sea level"; but not "m s-1"
   if (const size_t blank = word.find(' '); blank != std::string::npos)
     if (beginsWithOneOf(std::string_view(word).substr(blank + 1),
                         {"msl", "amsl", "asl", "agl", "above ", "below "}))
       word.resize(blank);
-  if (isOneOf(word, {"m", "meter", "meters", "metre", "metres", "gpm"})) return 1e-3;
-  if (isOneOf(word, {"km", "kilometer", "kilometers", "kilometre", "kilometres"})) return 1;
-  if (isOneOf(word, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"})) return 1e-5;
-  if (isOneOf(word, {"ft", "foot", "feet"})) return 0.3048e-3;
+  if (isOneOf(word, {"ft", "foot", "feet"})) return factor * 0.3048e-3;
+  if (isOneOf(word, {"fathom", "fathoms"})) return factor * 1.8288e-3;
+  if (isOneOf(word, {"mile", "miles"})) return factor * 1.609344;
+  if (unit == "Mm") return 1e3;
+  constexpr std::pair<std::string_view, double> kPrefixes[] = {
+      {"kilo", 1},  {"hecto", 0.1}, {"deca", 1e-2}, {"deka", 1e-2}, {"deci", 1e-4}, {"centi", 1e-5}, {"milli", 1e-6},
+      {"k", 1},     {"h", 0.1},     {"da", 1e-2},   {"d", 1e-4},    {"c", 1e-5},    {"m", 1e-6},     {"", 1e-3}};
+  for (const auto& [prefix, kilometres] : kPrefixes) {
+    if (!word.starts_with(prefix)) continue;
+    const std::string_view rest = std::string_view(word).substr(prefix.size());
+    if (prefix.size() <= 2 && isOneOf(rest, {"m"})) return factor * kilometres;
+    if ((prefix.size() > 2 || prefix.empty()) && isOneOf(rest, {"meter", "meters", "metre", "metres"}))
+      return factor * kilometres;
+  }
+  // Geopotential metres
+  if (isOneOf(word, {"gpm"})) return factor * 1e-3;
+  if (isOneOf(word, {"gpdm", "gpdam", "dagpm"})) return factor * 1e-2;
+  if (isOneOf(word, {"gpkm"})) return factor;
   return std::nullopt;
 }
 

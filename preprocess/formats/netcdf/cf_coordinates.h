@@ -35,7 +35,8 @@ double degreesOf(const std::string& unit);
 /// Whether a unit says that there is none: "", "1", "-", "none", ...
 bool isUnitless(const std::string& unit);
 
-/// The length of a unit in kilometres, also of "meters MSL"; nullopt if it is not a unit of length.
+/// The length of a unit in kilometres, also of "meters MSL", "[m]" and "1000 m"; nullopt if it is not a unit of a height: not of
+/// the micrometre and what is smaller.
 std::optional<double> kilometresOf(const std::string& unit);
 
 /// A unit of pressure in pascals; nullopt if it is not a unit of pressure.

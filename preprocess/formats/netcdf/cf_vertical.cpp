@@ -42,8 +42,15 @@ bool namesSigma(const NetcdfVariable& coordinate) {
 
 std::string notALength(const NetcdfVariable& variable) {
   const std::string units = variable.text("units");
-  return fmt::format("{0} {1}; expected a length or a pressure: set it (ncatted -a units,{0},o,c,m FILE)",
-                     variable.name, units.empty() ? "has no unit" : fmt::format("has the unit '{}'", units));
+  if (units.empty())
+    return fmt::format(
+        "{0} has no unit; expected a length or a pressure: if its values are metres, say so (ncatted -a "
+        "units,{0},o,c,m FILE)",
+        variable.name);
+  return fmt::format(
+      "{} has the unit '{}'; expected a length or a pressure: give heights of the levels or of the nodes, in "
+      "this file or in one after it",
+      variable.name, units);
 }
 
 }  // namespace
