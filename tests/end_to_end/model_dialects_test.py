@@ -109,6 +109,14 @@ class Levels(ModelFileTest):
             self.levels("lev", values, units=unit, positive="down", axis="Z", **attributes)
             self.expect_heights(-1e-3 * ((1 - (5.92 + 2.625) * 1e-3) * p - 2.21e-6 * p**2))
 
+    def test_pressures_of_thin_air(self):
+        """WACCM-X: by the table of the U.S. Standard Atmosphere, 1976."""
+        self.levels("lev", [8.2130e-10, 8.4736e-7, 3.2011e-4, 1.8359e-3], units="hPa", positive="down")
+        self.expect_heights([600, 200, 100, 90])
+        # The tables of both atmospheres meet at 86 km.
+        self.levels("lev", [0.37338, 0.37339, 10, 1000], units="Pa", positive="down")
+        self.expect_heights([86, 86, standard_altitude(10.0), standard_altitude(1000.0)], near=0.05)
+
     def test_distances_from_the_centre_of_the_earth(self):
         self.levels("radius", [5.7e6, 5.9e6, 6.1e6, 6.3e6], units="meters")
         self.expect_heights(np.array([5700, 5900, 6100, 6300]) - RADIUS)

@@ -193,6 +193,27 @@ double pressureAbove(const Layer& layer, double foot, double height) {
          std::pow(1 + layer.lapse * rise / layer.temperature, -kGravity / (kGasConstant * layer.lapse));
 }
 
+/// Where the standard atmosphere ends: geometric height in kilometres, pressure in pascals.
+/// Source: U.S. Standard Atmosphere, 1976, table I.
+struct ThinAir {
+  double height, pressure;
+};
+constexpr ThinAir kThinAir[] = {
+    {86, 0.37338},     {90, 0.18359},     {95, 7.5966e-2},   {100, 3.2011e-2},  {105, 1.4477e-2},
+    {110, 7.1042e-3},  {115, 4.0096e-3},  {120, 2.5382e-3},  {130, 1.2505e-3},  {140, 7.2028e-4},
+    {150, 4.5422e-4},  {160, 3.0395e-4},  {180, 1.5271e-4},  {200, 8.4736e-5},  {250, 2.4767e-5},
+    {300, 8.7704e-6},  {400, 1.4518e-6},  {500, 3.0236e-7},  {600, 8.2130e-8},  {700, 3.1908e-8},
+    {800, 1.7036e-8},  {900, 1.0873e-8},  {1000, 7.5138e-9},
+};
+
+double heightInThinAir(double pascals) {
+  const ThinAir* above = kThinAir + 1;
+  while (above + 1 != std::end(kThinAir) && pascals < above->pressure) ++above;
+  const ThinAir& below = above[-1];
+  const double part = std::log(pascals / below.pressure) / std::log(above->pressure / below.pressure);
+  return 1e3 * (below.height + part * (above->height - below.height));
+}
+
 double heightOf(const Layer& layer, double foot, double pascals) {
   if (layer.lapse == 0)
     return layer.height - kGasConstant * layer.temperature / kGravity * std::log(pascals / foot);
@@ -204,6 +225,7 @@ double heightOf(const Layer& layer, double foot, double pascals) {
 
 double standardAltitude(double pascals) {
   if (!(pascals > 0)) return std::numeric_limits<double>::quiet_NaN();
+  if (pascals < kThinAir->pressure) return heightInThinAir(pascals);
   double foot = kSeaLevelPressure;
   const Layer* layer = kLayers;
   for (; layer + 1 != std::end(kLayers); ++layer) {

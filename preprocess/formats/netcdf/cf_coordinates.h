@@ -56,9 +56,9 @@ bool growsDownwards(const NetcdfVariable& variable);
 double depthOfSeaPressure(double decibar);
 
 /// The height of a pressure in the standard atmosphere, in metres above mean sea level; negative for more
-/// than 101,325 Pa. NaN unless `pascals` is above 0. Above 71 km the lapse rate of the topmost layer
-/// continues.
-/// Source: hydrostatic equation in the layers of the International Standard Atmosphere (ISO 2533:1975).
+/// than 101,325 Pa. NaN unless `pascals` is above 0.
+/// Source: hydrostatic equation in the layers of the International Standard Atmosphere (ISO 2533:1975); above
+/// 86 km, the U.S. Standard Atmosphere, 1976.
 double standardAltitude(double pascals);
 
 }  // namespace curvisplat
