@@ -80,6 +80,19 @@ class ModelDialects(ModelFileTest):
         self.assertIn("t: 4 dimensions besides time (expver, level, lat, lon); expected 3", line)
         self.assertEqual(line.count("\n"), 1)
 
+    def test_the_further_dimension_is_proposed(self):
+        """Not one of space, which would leave none of its levels."""
+        for values in ([1, 2, 3], None):
+            with self.file(depth=5, lat=8, lon=12, ens=3) as f:
+                self.air(f)
+                f.add("depth", "depth", np.arange(5.0), units="m", positive="down")
+                if values:
+                    f.add("ens", "ens", values, "i4", standard_name="realization")
+                f.add("t", "depth lat lon ens", RANDOM.random((5, 8, 12, 3)), "f4")
+            choice = "ens=1" if values else "ens=0"
+            self.assertIn(f"such as --select {choice}", self.info(fails=True))
+            self.info("file.nc", "--select", choice)
+
 
 class Levels(ModelFileTest):
     """Vertical coordinates as programs write them, on T(lev, lat, lon)."""

@@ -146,7 +146,17 @@ class GridFinder {
       if (file_.dimensions()[dim].length > 1 && !isTime(file_, dim, variable.dims.size()))
         names.push_back(file_.dimensions()[dim].name);
     if (names.size() <= 3) return;
-    const NetcdfVariable* const values = file_.find(names.front());
+    // The remedy chooses a member or a month, not a place: neither a coordinate's dimension nor one of longitudes.
+    const auto isOther = [&](const std::string& name) {
+      return std::ranges::none_of(file_.variables(), [&](const NetcdfVariable& other) {
+        const CfRole role = cfRole(file_, other);
+        if (role == CfRole::kNone || (role == CfRole::kTime && other.name != name)) return false;
+        return std::ranges::any_of(other.dims, [&](size_t dim) { return file_.dimensions()[dim].name == name; });
+      });
+    };
+    const auto other = std::ranges::find_if(names, isOther);
+    const std::string& chosen = other == names.end() ? names.front() : *other;
+    const NetcdfVariable* const values = file_.find(chosen);
     double first = 0;
     if (values && values->numeric && values->dims.size() == 1)
       file_.read(*values, {{0}, {1}}, std::span(&first, 1));
@@ -154,7 +164,7 @@ class GridFinder {
         {variable.name,
          fmt::format("{} dimensions besides time ({}); expected 3: choose one value of the others, such as "
                      "--select {}={:g}",
-                     names.size(), fmt::join(names, ", "), names.front(), first)});
+                     names.size(), fmt::join(names, ", "), chosen, first)});
   }
 
   /// Whether a variable with the grid's dimensions is at its points: not if its `coordinates` name another longitude (POP's
