@@ -396,6 +396,18 @@ class Fields(ModelFileTest):
         self.assertIn("tmask is 0", info["blanking"])
         self.expect(info, sphere(lon, lat, -1e-3 * depths[:, None, None]), np.where(mask, t, np.nan))
 
+    def test_sizes_of_cells_and_flags_come_last(self):
+        """CMIP's Omon files, and a region before the temperature."""
+        region = {"standard_name": "region", "flag_values": np.array([1, 2], "i4"), "flag_meanings": "atlantic pacific"}
+        for attributes in ({"standard_name": "cell_thickness", "units": "m"}, {"standard_name": "ocean_volume", "units": "m3"}, region,
+                           {"flag_masks": np.array([1, 2], "i4"), "flag_meanings": "bad good"}, {"standard_name": "sea_water_temperature status_flag"}):
+            with self.file(depth=3, lat=8, lon=12) as f:
+                self.air(f)
+                f.add("depth", "depth", [5.0, 50, 500], units="m", positive="down")
+                f.add("a", "depth lat lon", RANDOM.integers(1, 3, (3, 8, 12)), "i4", **attributes)
+                f.add("thetao", "depth lat lon", RANDOM.random((3, 8, 12)), "f4", standard_name="sea_water_potential_temperature")
+            self.assertEqual([s["name"] for s in self.info()["scalars"]], ["thetao", "a"])
+
     def test_what_heights_are_made_of_is_no_field(self):
         """WRF: PH and PHB are on more points than T."""
         z = np.linspace(0, 5000, 5)[:, None, None] + np.zeros((8, 12))

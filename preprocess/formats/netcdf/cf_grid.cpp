@@ -376,6 +376,12 @@ bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const CfGr
   const bool of_point = name.size() > 2 && std::string_view("tuvwf").find(name[2]) != std::string_view::npos;
   if (of_point && (name.starts_with("e1") || name.starts_with("e2") || name.starts_with("e3"))) return false;
   if (name.starts_with("gdep")) return false;
+  // Sizes of cells, and flags: regions, quality.
+  static const std::set<std::string> names{"cell_thickness", "cell_area", "ocean_volume", "region", "area_type"};
+  const std::string standard_name = variable.text("standard_name");
+  if (names.contains(standard_name) || standard_name.ends_with("status_flag") ||
+      variable.attributes.contains("flag_values") || variable.attributes.contains("flag_masks"))
+    return false;
   return !found.parts.contains(variable.name);
 }
 
