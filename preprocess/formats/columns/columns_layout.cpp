@@ -6,6 +6,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "preprocess/formats/columns/columns_heights.h"
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
@@ -13,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMaxSides = 64, kMaxLevels = 1 << 20;
+constexpr uint64_t kMaxSides = 64;
 
 std::optional<size_t> dimensionNamed(const NetcdfFiles& file, std::string_view name) {
   for (size_t n = 0; n < file.dimensions().size(); ++n)
@@ -94,99 +95,6 @@ ColumnsMap ugridOf(const NetcdfFiles& file, const NetcdfVariable& topology) {
   return map;
 }
 
-/// 1-D values in kilometres upwards; empty if they are no heights.
-std::vector<double> heightsOf(const NetcdfFiles& file, const NetcdfVariable& variable,
-                              const NetcdfVariable& meaning) {
-  const std::string unit = meaning.text("units").empty() ? variable.text("units") : meaning.text("units");
-  const auto length = kilometresOf(unit), pressure = pascalsOf(unit);
-  if (!length && !pressure) return {};
-  NetcdfBox box;
-  for (size_t axis = 0; axis < variable.dims.size(); ++axis) {
-    box.start.push_back(0);
-    box.count.push_back(file.dimension(variable, axis).length);
-  }
-  if (box.values() > 2 * kMaxLevels) return {};
-  std::vector<double> values(box.values());
-  file.read(variable, box, std::span(values));
-  for (double& value : values)
-    value = length ? value * *length * (growsDownwards(meaning) ? -1 : 1)
-                   : standardAltitude(value * *pressure) * 1e-3;
-  return values;
-}
-
-/// Levels around values that are in the middle of layers.
-std::vector<double> around(const std::vector<double>& middles) {
-  std::vector<double> levels;
-  if (middles.size() < 2) return levels;
-  levels.push_back(middles[0] - (middles[1] - middles[0]) / 2);
-  for (size_t n = 0; n + 1 < middles.size(); ++n) levels.push_back((middles[n] + middles[n + 1]) / 2);
-  const size_t last = middles.size() - 1;
-  levels.push_back(middles[last] + (middles[last] - middles[last - 1]) / 2);
-  return levels;
-}
-
-/// The levels around layers that are a coordinate of their own beside that of the layers: FESOM's nz beside nz1.
-/// `around`: where they lie about. Empty if there is none.
-std::vector<double> storedLevels(const NetcdfFiles& file, const std::vector<double>& around) {
-  for (const NetcdfVariable& variable : file.variables()) {
-    if (variable.dims.size() != 1 || file.dimension(variable, 0).length != around.size() ||
-        !variable.numeric || variable.text("positive").empty())
-      continue;
-    const std::vector<double> levels = heightsOf(file, variable, variable);
-    bool fits = levels.size() == around.size();
-    for (size_t n = 0; fits && n + 1 < levels.size(); ++n) {
-      const double middle = (around[n] + around[n + 1]) / 2;
-      fits = (levels[n] - middle) * (levels[n + 1] - middle) < 0;
-    }
-    if (fits) return levels;
-  }
-  return {};
-}
-
-/// The heights by the coordinate variable of the layers.
-std::vector<double> levelsOf(const NetcdfFiles& file, const NetcdfVariable& coordinate, bool between) {
-  std::vector<double> middles = heightsOf(file, coordinate, coordinate);
-  if (!between || middles.empty()) return middles;
-  const NetcdfVariable* const bounds = file.find(coordinate.text("bounds"));
-  if (bounds && bounds->dims.size() == 2 && file.dimension(*bounds, 1).length == 2) {
-    const std::vector<double> ends = heightsOf(file, *bounds, coordinate);
-    if (ends.size() == 2 * middles.size()) {
-      std::vector<double> levels;
-      for (size_t n = 0; n < middles.size(); ++n) levels.push_back(ends[2 * n]);
-      levels.push_back(ends.back());
-      return levels;
-    }
-  }
-  const std::vector<double> estimated = around(middles), stored = storedLevels(file, estimated);
-  return stored.empty() ? estimated : stored;
-}
-
-/// A variable of heights at the levels of each face: one level more than layers.
-const NetcdfVariable* heightsOfFaces(const NetcdfFiles& file, const ColumnsMap& map, uint64_t layers) {
-  for (const char* const name : {"zgrid", "z_ifc", "HHL", "z_mc_ifc"}) {
-    const NetcdfVariable* const found = file.find(name);
-    if (!found || !found->numeric || !hasDimension(*found, map.face_dim)) continue;
-    for (size_t axis = 0; axis < found->dims.size(); ++axis)
-      if (found->dims[axis] != map.face_dim && file.dimension(*found, axis).length == layers + 1)
-        return found;
-  }
-  return nullptr;
-}
-
-/// A variable of heights at the nodes and their levels, by its name: SCHISM's zCoordinates.
-const NetcdfVariable* heightsOfNodes(const NetcdfFiles& file, const ColumnsMap& map, size_t level_dim) {
-  for (const NetcdfVariable& variable : file.variables()) {
-    if (!variable.numeric || variable.dims.size() < 2 || !hasDimension(variable, map.node_dim) ||
-        !hasDimension(variable, level_dim) || !kilometresOf(variable.text("units")))
-      continue;
-    const std::string name = lowerCase(variable.name);
-    if (cfRole(file, variable) == CfRole::kVertical || name.starts_with("zcoord") ||
-        name.starts_with("zcor") || name.ends_with("_depth") || name.ends_with("_height"))
-      return &variable;
-  }
-  return nullptr;
-}
-
 /// Whether the variable is the bounds of another: corners of faces, not layers.
 bool isBounds(const NetcdfFiles& file, const NetcdfVariable& variable) {
   return std::any_of(file.variables().begin(), file.variables().end(),
@@ -238,9 +146,7 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
                                     std::vector<std::string>& warnings) {
   std::vector<ColumnsScalars> groups;
   for (const NetcdfVariable& variable : file.variables()) {
-    if (!variable.numeric || variable.name == "zgrid" || variable.name == "z_ifc" ||
-        !variable.text("cf_role").empty())
-      continue;
+    if (!variable.numeric || !variable.text("cf_role").empty()) continue;
     const bool faces = hasDimension(variable, map.face_dim);
     if (faces == hasDimension(variable, map.node_dim)) continue;
     const size_t across = faces ? map.face_dim : map.node_dim;
@@ -258,10 +164,10 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
         others.push_back(variable.dims[axis]);
     }
     if (isBounds(file, variable)) continue;
-    if (others.size() == 1 && &variable == heightsOfNodes(file, map, others[0])) continue;
+    if (isHeightsOfColumns(file, variable)) continue;
     if (others.size() == 1 && isOfMapAlone(file.dimensions()[others[0]].name)) continue;
     const uint64_t layers = others.size() == 1 ? file.dimensions()[others[0]].length : 0;
-    if (layers < 2 || layers > kMaxLevels || &variable == map.nodes_of_face) continue;
+    if (layers < 2 || layers > kMaxColumnsLevels || &variable == map.nodes_of_face) continue;
     const Centring centring = faces ? Centring::kCell : Centring::kNode;
     auto group = std::find_if(groups.begin(), groups.end(), [&](const ColumnsScalars& g) {
       return g.centring == centring && g.layer_dim == others[0] && g.time_dim == time;
@@ -275,6 +181,9 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     }
     group->variables.push_back(&variable);
   }
+  // Thicknesses come last, since they are seldom the scalar of interest.
+  for (ColumnsScalars& group : groups)
+    std::ranges::stable_partition(group.variables, [](const auto* v) { return !isThicknessOfColumns(*v); });
   // What has three dimensions but is of the map itself (edgesOnCell, ...) are integers without layers' heights.
   std::string lacking;  // the heights of the largest group
   size_t largest = 0;
@@ -304,54 +213,6 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
       warnings.push_back(fmt::format("{} is on other layers or points than {}; choose it with --scalar",
                                      group->variables[0]->name, chosen->variables[0]->name));
   return *chosen;
-}
-
-ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map,
-                                  const ColumnsScalars& scalars) {
-  const bool between = scalars.centring == Centring::kCell;
-  const uint64_t levels = scalars.layers + (between ? 1 : 0);
-  ColumnsHeights heights;
-  if (const NetcdfVariable* const of_faces = between ? heightsOfFaces(file, map, scalars.layers) : nullptr) {
-    heights.of_faces = of_faces;
-    heights.scale = kilometresOf(of_faces->text("units")).value_or(1e-3);
-    heights.words = of_faces->name;
-    return heights;
-  }
-  if (!between) heights.of_nodes = heightsOfNodes(file, map, scalars.layer_dim);
-  if (heights.of_nodes) {
-    heights.scale = kilometresOf(heights.of_nodes->text("units")).value_or(1e-3) *
-                    (growsDownwards(*heights.of_nodes) ? -1 : 1);
-    heights.words = heights.of_nodes->name;
-    return heights;
-  }
-  const std::string& name = file.dimensions()[scalars.layer_dim].name;
-  for (const NetcdfVariable& variable : file.variables()) {
-    if (variable.dims != std::vector{scalars.layer_dim} || !variable.numeric) continue;
-    if (variable.name == "refBottomDepth" && between) {
-      heights.levels = {0.0};
-      for (const double depth : heightsOf(file, variable, variable))
-        heights.levels.push_back(-std::abs(depth));
-    } else if (variable.name == name || cfRole(file, variable) == CfRole::kVertical ||
-               !variable.text("positive").empty()) {
-      heights.levels = levelsOf(file, variable, between);
-    }
-    heights.words = variable.name;
-    const bool finite = std::all_of(heights.levels.begin(), heights.levels.end(),
-                                    [](double height) { return std::isfinite(height); });
-    if (heights.levels.size() == levels && finite) return heights;
-  }
-  const NetcdfVariable* const along = file.find(name);
-  throw Error(
-      "{}: the layers of {} ({}) have no heights{}; expected {}a coordinate {} with a unit of length or "
-      "pressure",
-      file.path().string(), map.format, name,
-      !along                         ? ""
-      : along->text("units").empty() ? fmt::format(" ({} has no unit)", name)
-                                     : fmt::format(" ({} has the unit '{}')", name, along->text("units")),
-      map.format == "ICON"   ? "z_ifc (give the file that has it, too), or "
-      : map.format == "MPAS" ? "zgrid or refBottomDepth (give the file that has it, too), or "
-                             : "",
-      name);
 }
 
 ColumnsBottom findColumnsBottom(const NetcdfFiles& file, const ColumnsMap& map,

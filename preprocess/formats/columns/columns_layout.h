@@ -1,9 +1,9 @@
 // Grids of prisms in NetCDF: polygons of a map or a globe, each a column of layers. Which variables describe them:
 //
 //           polygons and their nodes                    heights of the layers
-//    UGRID  face_node_connectivity of a mesh_topology   the coordinate of the layers, with its bounds
-//    ICON   vertex_of_cell, vlon, vlat (grid file)      z_ifc, or the coordinate of the layers
-//    MPAS   verticesOnCell, nEdgesOnCell, lonVertex     zgrid, or refBottomDepth
+//    UGRID  face_node_connectivity of a mesh_topology   heights of faces or nodes, a formula, or the layers' coordinate
+//    ICON   vertex_of_cell, vlon, vlat (grid file)      z_ifc, z_mc, or the coordinate of the layers
+//    MPAS   verticesOnCell, nEdgesOnCell, lonVertex     zgrid, zMid, refBottomDepth, or layerThickness
 #pragma once
 
 #include <cstdint>
@@ -30,6 +30,9 @@ struct ColumnsMap {
 /// nullopt if the files are of none of these. Throws Error if they are incomplete.
 std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file);
 
+/// Files with more levels are not read.
+inline constexpr uint64_t kMaxColumnsLevels = 1 << 20;
+
 /// Scalars in the faces, or at the nodes, of one dimension of layers.
 struct ColumnsScalars {
   Centring centring = Centring::kCell;
@@ -44,20 +47,6 @@ struct ColumnsScalars {
 ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& map,
                                     const std::vector<std::string>& wanted,
                                     std::vector<std::string>& warnings);
-
-/// Heights of a column's levels in kilometres, upwards positive.
-struct ColumnsHeights {
-  std::vector<double> levels;                // everywhere the same; empty:
-  const NetcdfVariable* of_faces = nullptr;  // at the levels of each face
-  const NetcdfVariable* of_nodes = nullptr;  // or of each node
-  double scale = 1;                          // of these
-  std::string words;                         // "by the variable zgrid"
-};
-
-/// Finds the levels of the heights: for scalars in cells those between which their layers lie; for scalars at
-/// nodes those of the values. Throws Error if the layers have no heights.
-ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map,
-                                  const ColumnsScalars& scalars);
 
 /// How many layers each column has data in, from the top: below it there is ground.
 struct ColumnsBottom {

@@ -165,37 +165,29 @@ std::vector<int64_t> ColumnsSource::nodesOf(uint64_t first, uint64_t count) cons
 }
 
 void ColumnsSource::spoolHeights(const std::filesystem::path& folder) {
-  if (heights_.of_nodes) return spoolHeightsOfNodes(folder);
-  size_t level_dim = map_.face_dim;
-  for (const size_t dim : heights_.of_faces->dims)
-    if (dim != map_.face_dim && file_.dimensions()[dim].length == levels()) level_dim = dim;
-  const ColumnsReader reader(file_, *heights_.of_faces, map_.face_dim, level_dim, description_.time_step);
+  heights_ = findColumnsHeights(file_, map_, scalars_, description_.time_step);
+  ColumnsHeightsReader reader(file_, heights_);
   NumberSpool<double> spool(std::make_shared<SpoolFile>(folder));
+  const uint64_t columns = heights_.of_nodes ? map_.nodes : map_.faces;
   for (uint64_t level = 0; level < levels(); ++level) {
     std::vector<double> sums(map_.nodes, 0.0);
     std::vector<uint32_t> counts(map_.nodes, 0);
-    for (uint64_t first = 0; first < map_.faces; first += kFacesAtOnce) {
-      const uint64_t count = std::min(kFacesAtOnce, map_.faces - first);
-      const auto heights = reader.read<double>(first, count, level, 1);
+    for (uint64_t first = 0; first < columns; first += kFacesAtOnce) {
+      const uint64_t count = std::min(kFacesAtOnce, columns - first);
+      const std::vector<double> heights = reader.read(first, count, level);
+      if (heights_.of_nodes) {
+        for (const double height : heights) spool.add(height);
+        continue;
+      }
       const std::vector<int64_t> nodes = nodesOf(first, count);
       for (size_t n = 0; n < nodes.size(); ++n) {
-        if (nodes[n] < 0) continue;
-        sums[static_cast<size_t>(nodes[n])] += heights.value(n / map_.most_sides, 0);
+        const double height = heights[n / map_.most_sides];
+        if (nodes[n] < 0 || !std::isfinite(height)) continue;
+        sums[static_cast<size_t>(nodes[n])] += height;
         ++counts[static_cast<size_t>(nodes[n])];
       }
     }
-    for (size_t n = 0; n < sums.size(); ++n) spool.add(sums[n] / counts[n] * heights_.scale);
-  }
-  node_heights_ = spool.finish();
-}
-
-void ColumnsSource::spoolHeightsOfNodes(const std::filesystem::path& folder) {
-  const ColumnsReader reader(file_, *heights_.of_nodes, map_.node_dim, scalars_.layer_dim,
-                             description_.time_step);
-  NumberSpool<double> spool(std::make_shared<SpoolFile>(folder));
-  for (uint64_t level = 0; level < levels(); ++level) {
-    const auto heights = reader.read<double>(0, map_.nodes, level, 1);
-    for (uint64_t node = 0; node < map_.nodes; ++node) spool.add(heights.value(node, 0) * heights_.scale);
+    for (size_t n = 0; n < sums.size() && !heights_.of_nodes; ++n) spool.add(sums[n] / counts[n]);
   }
   node_heights_ = spool.finish();
 }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "preprocess/formats/columns/columns_heights.h"
 #include "preprocess/formats/columns/columns_layout.h"
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/common/spool_file.h"
@@ -41,7 +42,6 @@ class ColumnsSource final : public MeshSource {
   void describe(const OpenGridOptions& options);
   void findTimes(const OpenGridOptions& options);
   void spoolHeights(const std::filesystem::path& folder);
-  void spoolHeightsOfNodes(const std::filesystem::path& folder);
   void readScalars(uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                    std::vector<std::vector<float>>& out) const;
   std::vector<double> readAngles(const NetcdfVariable& variable, uint64_t first, uint64_t count) const;

@@ -129,8 +129,9 @@ std::optional<double> kilometresOf(const std::string& unit) {
   if (isOneOf(word, {"mile", "miles"})) return factor * 1.609344;
   if (unit == "Mm") return 1e3;
   constexpr std::pair<std::string_view, double> kPrefixes[] = {
-      {"kilo", 1},  {"hecto", 0.1}, {"deca", 1e-2}, {"deka", 1e-2}, {"deci", 1e-4}, {"centi", 1e-5}, {"milli", 1e-6},
-      {"k", 1},     {"h", 0.1},     {"da", 1e-2},   {"d", 1e-4},    {"c", 1e-5},    {"m", 1e-6},     {"", 1e-3}};
+      {"kilo", 1},     {"hecto", 0.1},  {"deca", 1e-2}, {"deka", 1e-2}, {"deci", 1e-4},
+      {"centi", 1e-5}, {"milli", 1e-6}, {"k", 1},       {"h", 0.1},     {"da", 1e-2},
+      {"d", 1e-4},     {"c", 1e-5},     {"m", 1e-6},    {"", 1e-3}};
   for (const auto& [prefix, kilometres] : kPrefixes) {
     if (!word.starts_with(prefix)) continue;
     const std::string_view rest = std::string_view(word).substr(prefix.size());
@@ -199,11 +200,11 @@ struct ThinAir {
   double height, pressure;
 };
 constexpr ThinAir kThinAir[] = {
-    {86, 0.37338},     {90, 0.18359},     {95, 7.5966e-2},   {100, 3.2011e-2},  {105, 1.4477e-2},
-    {110, 7.1042e-3},  {115, 4.0096e-3},  {120, 2.5382e-3},  {130, 1.2505e-3},  {140, 7.2028e-4},
-    {150, 4.5422e-4},  {160, 3.0395e-4},  {180, 1.5271e-4},  {200, 8.4736e-5},  {250, 2.4767e-5},
-    {300, 8.7704e-6},  {400, 1.4518e-6},  {500, 3.0236e-7},  {600, 8.2130e-8},  {700, 3.1908e-8},
-    {800, 1.7036e-8},  {900, 1.0873e-8},  {1000, 7.5138e-9},
+    {86, 0.37338},    {90, 0.18359},    {95, 7.5966e-2},   {100, 3.2011e-2}, {105, 1.4477e-2},
+    {110, 7.1042e-3}, {115, 4.0096e-3}, {120, 2.5382e-3},  {130, 1.2505e-3}, {140, 7.2028e-4},
+    {150, 4.5422e-4}, {160, 3.0395e-4}, {180, 1.5271e-4},  {200, 8.4736e-5}, {250, 2.4767e-5},
+    {300, 8.7704e-6}, {400, 1.4518e-6}, {500, 3.0236e-7},  {600, 8.2130e-8}, {700, 3.1908e-8},
+    {800, 1.7036e-8}, {900, 1.0873e-8}, {1000, 7.5138e-9},
 };
 
 double heightInThinAir(double pascals) {

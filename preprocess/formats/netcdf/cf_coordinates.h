@@ -47,6 +47,9 @@ inline bool isOnEarth(double longitude, double latitude) {
   return std::abs(latitude) <= 91 && std::abs(longitude) <= 1080;
 }
 
+/// No height is larger, in kilometres: it is a fill value.
+inline constexpr double kMaxHeight = 1e10;
+
 /// Whether the values of a vertical coordinate increase downwards: by its attribute `positive`, else by its
 /// names.
 bool growsDownwards(const NetcdfVariable& variable);

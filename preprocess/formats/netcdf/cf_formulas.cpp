@@ -94,10 +94,9 @@ std::optional<CfVertical> CfVertical::byNamesOfTerms(const NetcdfFiles& file, co
         s);
   const std::string a = along({"hyam", "hyai", "ap", "A", "a"}), b = along({"hybm", "hybi", "b", "B"});
   if (!a.empty() && !b.empty() && standIn(file, "ps", block))
-    return named(
-        ofTerms(file, Kind::kHybridPressure, {{"a", a}, {"b", b}, {"p0", "P0"}, {"ps", "PS"}}, block, axis,
-                reason),
-        a + " and " + b);
+    return named(ofTerms(file, Kind::kHybridPressure, {{"a", a}, {"b", b}, {"p0", "P0"}, {"ps", "PS"}}, block,
+                         axis, reason),
+                 a + " and " + b);
   return std::nullopt;
 }
 
@@ -245,10 +244,10 @@ bool CfVertical::setAirTerms(const NetcdfFiles& file, const Terms& terms, const 
     return std::isfinite(value) ? value * pascalsOf(term->variable().text("units")).value_or(1) : otherwise;
   };
   const bool hybrid = kind_ == Kind::kHybridPressure, height = kind_ == Kind::kHybridHeight;
-  const char* const first = kind_ == Kind::kSigmaPressure        ? "sigma"
-                            : kind_ == Kind::kLogPressure        ? "lev"
+  const char* const first = kind_ == Kind::kSigmaPressure    ? "sigma"
+                            : kind_ == Kind::kLogPressure    ? "lev"
                             : hybrid && terms.contains("ap") ? "ap"
-                                                                 : "a";
+                                                             : "a";
   s_ = termNamed(file, terms, first, block);
   if (!s_ || !s_->varies(axis)) return lacks(first);
   if (kind_ == Kind::kLogPressure) {

@@ -151,7 +151,8 @@ class GridFinder {
       return std::ranges::none_of(file_.variables(), [&](const NetcdfVariable& other) {
         const CfRole role = cfRole(file_, other);
         if (role == CfRole::kNone || (role == CfRole::kTime && other.name != name)) return false;
-        return std::ranges::any_of(other.dims, [&](size_t dim) { return file_.dimensions()[dim].name == name; });
+        return std::ranges::any_of(other.dims,
+                                   [&](size_t dim) { return file_.dimensions()[dim].name == name; });
       });
     };
     const auto other = std::ranges::find_if(names, isOther);
@@ -377,7 +378,8 @@ bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const CfGr
   if (of_point && (name.starts_with("e1") || name.starts_with("e2") || name.starts_with("e3"))) return false;
   if (name.starts_with("gdep")) return false;
   // Sizes of cells, and flags: regions, quality.
-  static const std::set<std::string> names{"cell_thickness", "cell_area", "ocean_volume", "region", "area_type"};
+  static const std::set<std::string> names{"cell_thickness", "cell_area", "ocean_volume", "region",
+                                           "area_type"};
   const std::string standard_name = variable.text("standard_name");
   if (names.contains(standard_name) || standard_name.ends_with("status_flag") ||
       variable.attributes.contains("flag_values") || variable.attributes.contains("flag_masks"))

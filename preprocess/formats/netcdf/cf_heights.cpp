@@ -64,6 +64,14 @@ void CfVertical::setFace(uint64_t face) {
     if (*term) (*term)->setFace(face);
 }
 
+bool CfVertical::varies(size_t axis) const {
+  const auto does = [&](const CfTerm& term) { return term.varies(axis); };
+  const std::optional<CfTerm>* const terms[] = {&s_, &c_, &eta_, &depth_, &c2_, &depth2_};
+  return std::any_of(terms_.begin(), terms_.end(), does) ||
+         std::any_of(std::begin(terms), std::end(terms),
+                     [&](const auto* term) { return *term && does(**term); });
+}
+
 bool CfVertical::uses(const NetcdfVariable& variable) const {
   const auto is = [&](const CfTerm& term) { return &term.variable() == &variable; };
   const std::optional<CfTerm>* const terms[] = {&s_, &c_, &eta_, &depth_, &c2_, &depth2_};

@@ -64,7 +64,9 @@ std::optional<CfTerm> CfTerm::of(const NetcdfFiles& file, const NetcdfVariable& 
   CfTerm term;
   term.variable_ = &variable;
   term.start_.assign(variable.dims.size(), 0);
-  const auto lengthOf = [&](size_t dim) { return file.dimensions()[dim].length; };
+  const auto lengthOf = [&](size_t dim) {
+    return dim == CfDimensions::kNoDimension ? 0 : file.dimensions()[dim].length;
+  };
   std::vector<size_t> unknown;
   for (size_t d = 0; d < variable.dims.size(); ++d) {
     const size_t dim = variable.dims[d];

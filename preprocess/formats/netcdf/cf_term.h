@@ -36,6 +36,7 @@ struct CfValues {
 
 /// The block's dimensions in the file: along i, j, k, of time, and of the faces of a grid that has several.
 struct CfDimensions {
+  static constexpr size_t kNoDimension = SIZE_MAX;  // of an axis with a single node
   std::array<size_t, 3> axes{};
   std::optional<size_t> time, face;
   size_t time_step = 0;
@@ -99,7 +100,7 @@ class CfTerm {
 
  private:
   const NetcdfVariable* variable_ = nullptr;
-  double scale_ = 1;  // of the stored values
+  double scale_ = 1;                            // of the stored values
   std::array<std::optional<size_t>, 3> along_;  // [axis of the block]: its dimension; nullopt: independent
   std::array<int, 3> longer_{};                 // [axis]: its length minus the block's: -1, 0 or 1
   std::array<uint64_t, 3> length_{};            // [axis]: its length

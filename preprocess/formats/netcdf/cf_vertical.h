@@ -34,6 +34,10 @@ class CfVertical {
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& block, size_t axis);
 
+  /// By the formula_terms of a coordinate along `axis`; or nullopt and a reason.
+  static std::optional<CfVertical> byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,
+                                             const CfDimensions& block, size_t axis, std::string& reason);
+
   /// The index along `axis` in kilometres.
   static CfVertical ofIndex(size_t axis);
 
@@ -59,6 +63,9 @@ class CfVertical {
 
   /// Whether the heights are made of this variable.
   bool uses(const NetcdfVariable& variable) const;
+
+  /// Whether the heights vary along an axis.
+  bool varies(size_t axis) const;
 
   /// Whether name and unit tell that the variable can serve as heights or pressures of the nodes: met_em's GHT and PRES.
   static bool isNamedForNodes(const NetcdfVariable& variable);
@@ -93,8 +100,6 @@ class CfVertical {
   static std::optional<CfVertical> byCandidates(const NetcdfFiles& file, const Candidates& candidates,
                                                 const NetcdfVariable& variable, const CfDimensions& block,
                                                 const Wanted& wanted, std::string& reason);
-  static std::optional<CfVertical> byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,
-                                             const CfDimensions& block, size_t axis, std::string& reason);
   static std::optional<CfVertical> ofTerms(const NetcdfFiles& file, Kind kind, const Terms& terms,
                                            const CfDimensions& block, size_t axis, std::string& lacking);
   static std::optional<CfVertical> byNamesOfTerms(const NetcdfFiles& file, const CfDimensions& block,

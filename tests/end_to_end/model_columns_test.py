@@ -1,0 +1,124 @@
+#!/usr/bin/python3
+"""model_columns_test.py CURVISPLAT
+
+Heights of the layers of unstructured maps, as Delft3D FM, SCHISM, ICON and MPAS' ocean write them: volumes and bounds against the numbers
+of this script. model_files.py says how. Exit status 77 (skipped) without python3-netcdf4.
+"""
+import json
+import subprocess
+import unittest
+
+from model_files import PROGRAM, File, ModelFileTest, np
+
+X, Y = np.array([0, 1000, 2000, 0, 1000, 2000, 3000.0]), np.array([0, 0, 0, 1000, 1000, 1000, 500.0])
+FACES = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [2, 6, 5, -1]])  # 2.5 km2
+SIZES = {"node": 7, "face": 3, "corner": 4, "layer": 4, "interface": 5, "time": None}
+BOTTOM = -20.0
+LEVELS = np.array([BOTTOM, -12, -7, -3, 0])
+MIDDLES = (LEVELS[1:] + LEVELS[:-1]) / 2
+
+
+class Columns(ModelFileTest):
+    def mesh(self, name="file.nc", at="face", layers="layer"):
+        f = File(self.folder / name, SIZES)
+        f.add("mesh", "", 0, "i4", cf_role="mesh_topology", topology_dimension=np.int32(2), node_coordinates="x y", face_node_connectivity="faces")
+        for name, values in (("x", X), ("y", Y)):
+            f.add(name, "node", values, units="m", standard_name=f"projection_{name}_coordinate")
+        f.add("faces", "face corner", FACES, "i4", -1, cf_role="face_node_connectivity")
+        if at:
+            self.field(f, at, layers)
+        return f
+
+    def field(self, f, at, layers):
+        n = SIZES[layers]
+        f.add("t", f"time {at} {layers}", np.broadcast_to(np.arange(float(n)), (1, SIZES[at], n)), "f4", mesh="mesh", location=at)
+
+    def expect(self, words, *files, bottom=BOTTOM, near=1e-6):
+        info = self.info(*files)
+        self.assertEqual([s["name"] for s in info["scalars"]], ["t"])
+        self.assertIn(f"heights of {words}", info["format"])
+        np.testing.assert_allclose(info["bounds"]["lower"], [0, 0, bottom / 1000], atol=near)
+        np.testing.assert_allclose(info["bounds"]["upper"], [3, 1, 0], atol=near)
+        cache = self.folder / "a.splats"
+        paths = [self.folder / name for name in files or ("file.nc",)]
+        subprocess.run([PROGRAM, "convert", *paths, "-o", cache, "--overwrite"], check=True, capture_output=True)
+        self.assertAlmostEqual(json.loads((cache / "manifest.json").read_text())["volume"], -2.5 * bottom / 1000, delta=1e-5)
+
+    def test_sigma_of_delft3d(self):
+        """With and without the sigma of the interfaces; at nodes, the values' own."""
+        for interfaces, at in ((True, "face"), (False, "face"), (True, "node")):
+            with self.mesh(at=at, layers="layer" if at == "face" else "interface") as f:
+                for name, dim, sigma in (("layer_sigma", "layer", MIDDLES / 20), ("interface_sigma", "interface", LEVELS / 20)):
+                    if interfaces or dim == "layer":
+                        f.add(name, dim, sigma, standard_name="ocean_sigma_coordinate", units="", formula_terms=f"sigma: {name} eta: s1 depth: bldepth")
+                f.add("s1", f"time {at}", np.zeros((1, SIZES[at])), units="m", mesh="mesh", location=at)
+                f.add("bldepth", at, [20.0] * SIZES[at], units="m", mesh="mesh", location=at)
+            # Without the interfaces, the outer layers end as far beyond their middles as their neighbours are.
+            low = MIDDLES[0] - (MIDDLES[1] - MIDDLES[0]) / 2
+            if interfaces:
+                self.expect("ocean_sigma_coordinate of interface_sigma")
+            else:
+                self.assertAlmostEqual(self.info()["bounds"]["lower"][2], low / 1000)
+
+    def test_a_formula_that_lacks_a_term_is_named(self):
+        with self.mesh() as f:
+            f.add("layer_sigma", "layer", MIDDLES / 20, standard_name="ocean_sigma_coordinate", formula_terms="sigma: layer_sigma eta: s1 depth: nowhere")
+        self.assertIn("the formula of layer_sigma has no term 'depth", self.info(fails=True))
+
+    def test_heights_in_faces(self):
+        """Of interfaces, or of the middles of layers."""
+        uniform = np.linspace(BOTTOM, 0, 5)
+        for name, dim, values, attributes in (
+                ("mesh_flowelem_zw", "interface", LEVELS, {"long_name": "Vertical coordinate of layer interfaces at pressure points"}),
+                ("mesh_flowelem_zcc", "layer", (uniform[1:] + uniform[:-1]) / 2, {}), ("z_mc", "layer", (uniform[1:] + uniform[:-1]) / 2, {}),
+                ("zMid", "layer", (uniform[1:] + uniform[:-1]) / 2, {}), ("depths", "interface", -LEVELS, {"standard_name": "depth", "positive": "down"})):
+            with self.mesh() as f:
+                f.add(name, f"time face {dim}", np.broadcast_to(values, (1, 3, len(values))), units="m", **attributes)
+            self.expect(name)
+
+    def test_layers_that_end_at_the_ground(self):
+        """Delft3D's z-layers: below the ground, values are missing; a node is as deep as the deepest face around it."""
+        heights = np.broadcast_to(LEVELS, (1, 3, 5)).copy()
+        heights[0, 2, 0] = np.nan
+        with self.mesh() as f:
+            f.add("zw_zw", "time face interface", heights, units="m")
+        self.assertAlmostEqual(self.info()["bounds"]["lower"][2], -0.02)
+
+    def test_schism_in_files_of_variables(self):
+        """Its zCoordinates have no unit."""
+        self.mesh("out2d_1.nc", at=None).close()
+        for name in ("temperature_1.nc", "zCoordinates_1.nc"):
+            with File(self.folder / name, SIZES) as f:
+                if name.startswith("z"):
+                    f.add("zCoordinates", "time node interface", np.broadcast_to(LEVELS, (1, 7, 5)), "f4", mesh="mesh", location="node")
+                else:
+                    self.field(f, "node", "interface")
+        self.expect("zCoordinates", "out2d_1.nc", "temperature_1.nc", "zCoordinates_1.nc")
+        # Values in faces between the same levels.
+        with File(self.folder / "temperature_1.nc", SIZES) as f:
+            self.field(f, "face", "layer")
+        self.expect("zCoordinates", "out2d_1.nc", "temperature_1.nc", "zCoordinates_1.nc")
+
+    def test_thicknesses_of_layers(self):
+        """MPAS' ocean: below the surface, which is not at 0; below the ground there are none."""
+        thickness = np.array([[1.0, 3, 6, 10], [1, 4, 0, 0]])
+        for surface, fill in ((None, 0), (0.5, 0), (-0.5, -1e34)):
+            with self.file(nCells=2, nVertices=6, maxEdges=6, nVertLevels=4, Time=None) as f:
+                f.on_a_sphere, f.sphere_radius = "NO", 0.0
+                for name, values in (("xVertex", [0, 1e3, 2e3, 0, 1e3, 2e3]), ("yVertex", [0, 0, 0, 1e3, 1e3, 1e3])):
+                    f.add(name, "nVertices", values, units="m")
+                f.add("nEdgesOnCell", "nCells", [4, 4], "i4")
+                f.add("verticesOnCell", "nCells maxEdges", [[1, 2, 5, 4, 0, 0], [2, 3, 6, 5, 0, 0]], "i4")
+                f.add("maxLevelCell", "nCells", [4, 2], "i4")
+                f.add("layerThickness", "Time nCells nVertLevels", np.where(thickness > 0, thickness, fill)[None], "f8", -1e34, units="m")
+                f.add("temperature", "Time nCells nVertLevels", np.ones((1, 2, 4)), "f4")
+                if surface is not None:
+                    f.add("ssh", "Time nCells", [[surface] * 2], units="m")
+            info = self.info("file.nc", "--flat")
+            np.testing.assert_allclose([info["bounds"]["lower"][2], info["bounds"]["upper"][2]], np.array([-20, 0]) / 1000 + (surface or 0) / 1000, atol=1e-9)
+            self.assertEqual([s["name"] for s in info["scalars"]], ["temperature", "layerThickness"])
+            self.assertEqual("below a surface at 0" in info["format"], surface is None)
+
+
+if __name__ == "__main__":
+    unittest.main()
