@@ -176,6 +176,58 @@ class Levels(ModelFileTest):
             self.levels(name, [5.0, 100, 1000, 4000], units="m", **attributes)
             self.expect_heights([-0.005, -0.1, -1, -4])
 
+    def test_levels_of_the_soil_and_the_sea_lie_below(self):
+        """CLM's levels of the ground, and others without `positive`, or with a wrong one."""
+        sea, soil = "sea_water_potential_temperature", "soil_temperature"
+        for name, values, field, attributes, words in (
+                ("levgrnd", [0.01, 0.1, 1, 3], None, {"long_name": "coordinate ground levels"}, None),
+                ("levsoi", [0.01, 0.1, 1, 3], None, {"long_name": "coordinate soil levels"}, None),
+                ("layer", [0.01, 0.1, 1, 3], None, {"long_name": "soil layer depth", "axis": "Z"}, None),
+                ("lev", [5, 50, 500, 5000], sea, {"long_name": "ocean depth", "axis": "Z"}, None),
+                ("lev", [5, 50, 500, 5000], sea, {"axis": "Z"}, "lev has no attribute `positive`, but is a coordinate of T, below the surface"),
+                ("lev", [0.01, 0.1, 1, 3], soil, {"positive": "up"}, "lev is positive up, but is a coordinate of T, below the surface"),
+                ("depth", [0, 10, 20, 40], sea, {"positive": "up", "standard_name": "depth"}, "depth is positive up, but is a depth")):
+            self.levels(name, values, lambda f: field and f["T"].setncattr("standard_name", field), units="m", **attributes)
+            info = self.expect_heights(-1e-3 * np.array(values))
+            self.assertEqual(len(info["warnings"]), words is not None)
+            self.assertIn(words or "", "".join(info["warnings"]))
+        for attributes in ({"long_name": "height above ground level"}, {"standard_name": "height"}, {"long_name": "height above the bottom"}):
+            self.levels("lev", [5, 50, 500, 5000], lambda f: f["T"].setncattr("standard_name", sea), units="m", **attributes)
+            self.expect_heights([0.005, 0.05, 0.5, 5])
+
+    def test_lengths_that_are_no_heights(self):
+        for name, values, attributes in (
+                ("wavelength", [4e-7, 5e-7, 6e-7, 7e-7], {"standard_name": "radiation_wavelength"}), ("size", [1e-6, 2e-6, 4e-6, 8e-6], {"long_name": "drop"}),
+                ("band", [1, 2, 4, 8], {"long_name": "wavelength of the band"}), ("d", [0.01, 0.02, 0.03, 0.04], {"long_name": "hail diameter"}),
+                ("radius", [1e-6, 2e-6, 4e-6, 8e-6], {}), ("rad", [1, 2, 4, 8], {})):
+            self.levels(name, values, units="m", **attributes)
+            self.assertIn(f"{name} is {values[0]:g} .. {values[-1]:g} m, which are no heights", self.info(fails=True))
+
+    def test_levels_that_cannot_be(self):
+        for name, values, attributes, words in (
+                ("depth", [0, 10, 20, 1e20], {"units": "m", "positive": "down"}, "depth is 1e+20 at level 3, counted from 0, which is no height"),
+                ("depth", [0, 10, 20, -9999], {"units": "m", "positive": "down"}, "depth is -9999 at level 3, counted from 0, but levels only rise or only fall"),
+                ("lev", [-999, 850, 500, 300], {"units": "hPa"}, "lev is 500 at level 2, counted from 0, but levels only rise or only fall"),
+                ("lev", [1e5, 85000, 50000, 30000], {"units": "hPa"}, "lev is 30000 .. 100000 hPa, more than the pressure of any air on the Earth"),
+                ("depth", [0, 1, 2, 7e6], {"units": "m", "positive": "down"}, "depth is 0 .. 7e+06 m, below the Earth's centre")):
+            self.levels(name, values, **attributes)
+            self.assertIn(words, self.info(fails=True))
+        # Of the nodes, some may have none.
+        z = 1000 * np.arange(4.0)[:, None, None] + np.zeros((8, 12))
+        self.levels("lev", None, lambda f: f.add("height", "lev lat lon", np.where(self.LON > 20, 1e20, z), units="m"))
+        self.assertEqual(self.info()["blanked"]["not_finite"], 4 * 8 * (self.LON > 20).sum())
+
+    def test_numbers_of_levels_come_after_metres(self):
+        """ECCO's k beside Z(k); CDO's generalized height is no length."""
+        z = [-5.0, -15, -25, -45]
+        def more(f):
+            f.add("Z", "k", z, units="m", positive="up", standard_name="depth")
+        self.levels("k", np.arange(4), more, axis="Z", standard_name="z_grid_index", long_name="z-dimension of the t grid")
+        self.assertEqual(self.expect_heights(1e-3 * np.array(z))["warnings"], [])
+        for name, attributes in (("k", {"axis": "Z", "standard_name": "z_grid_index"}), ("height", {"standard_name": "height", "long_name": "generalized_height", "axis": "Z"})):
+            self.levels(name, np.arange(4), **attributes)
+            self.assertIn(f"{name} numbers the levels; expected a length or a pressure: give heights", self.info(fails=True))
+
     def test_a_formula_of_a_coordinate_beside_the_numbers_of_levels(self):
         """As iris writes the hybrid heights of the Unified Model; the ground may be in another file under another name."""
         z, sigma, ground = np.array([20.0, 1000, 5000, 20000]), np.array([0.99, 0.8, 0.3, 0]), 2000 * RANDOM.random((8, 12))

@@ -24,6 +24,11 @@ bool beginsWithOneOf(std::string_view text, std::initializer_list<std::string_vi
                      [&](std::string_view word) { return text.starts_with(word); });
 }
 
+bool hasOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
+  return std::any_of(words.begin(), words.end(),
+                     [&](std::string_view word) { return text.find(word) != std::string_view::npos; });
+}
+
 bool isVerticalName(std::string_view standard_name) {
   return isOneOf(standard_name, {"depth", "height", "altitude", "geopotential_height", "model_level_number",
                                  "depth_below_geoid", "air_pressure", "hybrid_sigma_pressure",
@@ -157,14 +162,25 @@ std::optional<double> pascalsOf(const std::string& unit) {
   return std::nullopt;
 }
 
-bool growsDownwards(const NetcdfVariable& variable) {
-  const std::string positive = lowerCase(variable.text("positive"));
-  if (!positive.empty()) return positive == "down";
+bool namesHeight(const NetcdfVariable& variable) {
   const std::string standard_name = lowerCase(variable.text("standard_name")),
-                    name = lowerCase(variable.name);
+                    long_name = lowerCase(variable.text("long_name"));
+  return beginsWithOneOf(standard_name, {"height", "altitude", "geopotential_height"}) ||
+         hasOneOf(long_name, {"above", "height", "altitude", "elevation"});
+}
+
+bool namesDepth(const NetcdfVariable& variable) {
+  const std::string standard_name = lowerCase(variable.text("standard_name")),
+                    long_name = lowerCase(variable.text("long_name")), name = lowerCase(variable.name);
   if (!standard_name.empty()) return standard_name.starts_with("depth");
   return beginsWithOneOf(name, {"dep", "gdep", "nav_lev"}) || name.ends_with("_depth") ||
-         lowerCase(variable.text("long_name")).starts_with("depth");
+         (!namesHeight(variable) && (beginsWithOneOf(name, {"levgrnd", "levsoi", "levlak", "soil"}) ||
+                                     hasOneOf(long_name, {"depth", "ground level", "soil l"})));
+}
+
+bool growsDownwards(const NetcdfVariable& variable) {
+  const std::string positive = lowerCase(variable.text("positive"));
+  return positive.empty() ? namesDepth(variable) : positive == "down";
 }
 
 double depthOfSeaPressure(double decibar) {

@@ -50,8 +50,11 @@ inline bool isOnEarth(double longitude, double latitude) {
 /// No height is larger, in kilometres: it is a fill value.
 inline constexpr double kMaxHeight = 1e10;
 
-/// Whether the values of a vertical coordinate increase downwards: by its attribute `positive`, else by its
-/// names.
+/// Whether names and descriptions call a vertical coordinate a height above something, or a depth below it.
+bool namesHeight(const NetcdfVariable& variable);
+bool namesDepth(const NetcdfVariable& variable);
+
+/// Whether the values of a vertical coordinate increase downwards: by its attribute `positive`, else by namesDepth().
 bool growsDownwards(const NetcdfVariable& variable);
 
 /// The depth in metres at which sea water has a pressure, at 45 degrees of latitude.

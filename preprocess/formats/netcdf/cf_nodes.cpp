@@ -165,7 +165,9 @@ void CfNodes::readPlaces(const CfRange& range, NodeArrays& out) const {
       for (uint64_t j = 0; j < lengthOf(piece, 1); ++j)
         for (uint64_t i = 0; i < lengthOf(piece, 0); ++i, ++n, ++column) {
           if (column == columns.size()) column = 0;
-          const GlobePlace place = globe_.place(columns[column], read ? out.z[n] : height.at(i, j, k));
+          const double own = read ? out.z[n] : height.at(i, j, k);
+          const GlobePlace place =
+              globe_.place(columns[column], std::abs(own) <= kMaxHeight ? own : std::nan(""));
           out.x[n] = place.x;
           out.y[n] = place.y;
           out.z[n] = place.z;

@@ -17,9 +17,12 @@ namespace {
 
 constexpr double kWrfGravity = 9.81;
 constexpr double kStandardGravity = 9.80665;
-constexpr double kEarthRadius = 6371;  // kilometres
-constexpr std::array<const char*, 5> kHeightsOfNodes{"GHT", "ght", "gh", "zg", "height"};
-constexpr std::array<const char*, 3> kPressuresOfNodes{"PRES", "pres", "pressure"};
+constexpr double kMaxAirPressure = 2e5;  // pascals
+// In kilometres. Longer distances may be those from a planet's centre; levels up to kMaxTide may be those of the sea above
+// the mean; shorter ranges are no heights.
+constexpr double kEarthRadius = 6371, kMinRadius = 1000, kMaxTide = 0.02, kMinExtent = 1e-6;
+constexpr std::array kHeightsOfNodes{"GHT", "ght", "gh", "zg", "height", "zc", "z_mc"};
+constexpr std::array kPressuresOfNodes{"PRES", "pres", "pressure"};
 
 /// Whether any variable is a longitude: then lengths are those of the Earth's.
 bool isGeographic(const NetcdfFiles& file) {
@@ -40,8 +43,53 @@ bool namesSigma(const NetcdfVariable& coordinate) {
   return false;
 }
 
+/// Coordinates that number the levels.
+bool namesNumbers(const NetcdfVariable& coordinate) {
+  const std::string standard_name = coordinate.text("standard_name");
+  return standard_name == "model_level_number" || standard_name.ends_with("_index") ||
+         lowerCase(coordinate.text("long_name")).starts_with("generalized");
+}
+
+/// Lengths that are no heights.
+bool namesSize(const NetcdfVariable& coordinate) {
+  const std::string words = lowerCase(fmt::format(
+      "{} {} {}", coordinate.name, coordinate.text("standard_name"), coordinate.text("long_name")));
+  return std::ranges::any_of(std::array{"wavelength", "wave length", "diameter", "particle", "drop radius"},
+                             [&](const char* word) { return words.find(word) != std::string::npos; });
+}
+
+/// Whether a field is of the sea or the soil, which levels up to so many kilometres above the surface cannot be.
+bool liesBelow(const NetcdfVariable& variable, double kilometres) {
+  const std::string name = variable.text("standard_name");
+  return (kilometres > kMaxTide && name.find("sea_water") != std::string::npos) ||
+         name.find("soil") != std::string::npos;
+}
+
+/// Describes a level that has no place among the others: it is a fill value.
+std::string wrongLevel(const NetcdfVariable& coordinate, const std::vector<double>& values,
+                       double kilometres) {
+  double before = 0;
+  for (size_t n = 0; n < values.size(); ++n) {
+    const bool far = std::abs(values[n]) * kilometres > kMaxHeight;
+    const double step = n > 0 ? values[n] - values[n - 1] : 0;
+    if (far || step * before < 0)
+      return fmt::format(
+          "{0} is {1:g} at level {2}, counted from 0, {3}: leave such levels out (ncks -d {0},FIRST,LAST "
+          "FILE "
+          "OUT)",
+          coordinate.name, values[n], n, far ? "which is no height" : "but levels only rise or only fall");
+    if (step != 0 && !std::isnan(step)) before = step;
+  }
+  return "";
+}
+
 std::string notALength(const NetcdfVariable& variable) {
   const std::string units = variable.text("units");
+  if (units.empty() && namesNumbers(variable))
+    return fmt::format(
+        "{} numbers the levels; expected a length or a pressure: give heights of the levels or of the nodes, "
+        "in this file or in one after it",
+        variable.name);
   if (units.empty())
     return fmt::format(
         "{0} has no unit; expected a length or a pressure: if its values are metres, say so (ncatted -a "
@@ -104,23 +152,25 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
   if (auto found = byNamesOfFields(file, block, axis)) return {std::move(found), ""};
   if (along && along->numeric && kilometresOf(along->text("units")))
     if (const auto term = CfTerm::of(file, *along, block); term && term->axes() == 1)
-      if (auto found = byLevels(file, *along, *term, axis, reason)) return {std::move(found), ""};
+      if (auto found = byLevels(file, *along, variable, *term, axis, reason)) return {std::move(found), ""};
   return {std::nullopt, reason};
 }
 
 std::optional<CfVertical> CfVertical::byCandidates(const NetcdfFiles& file, const Candidates& candidates,
                                                    const NetcdfVariable& variable, const CfDimensions& block,
                                                    const Wanted& wanted, std::string& reason) {
-  for (const bool exact : {true, false})
+  for (const auto& [exact, unit] : {std::pair(true, true), {true, false}, {false, true}, {false, false}})
     for (const NetcdfVariable* candidate : candidates) {
       if (cfRole(file, *candidate) != CfRole::kVertical) continue;
+      // Numbers of levels, too, come after metres.
+      if (isUnitless(candidate->text("units")) == unit) continue;
       if (pascalsOf(candidate->text("units")).has_value() != wanted.pressure) continue;
       const auto term = CfTerm::of(file, *candidate, block);
       // Dimensions of other names count in other files only: a file of masks names its levels as it likes.
       if (!term || !term->onNodes() || term->exact() != exact) continue;
       if ((!exact && candidate->file == variable.file) || !term->varies(wanted.axis)) continue;
       if ((term->axes() > 1) != wanted.of_nodes) continue;
-      if (auto found = byLevels(file, *candidate, *term, wanted.axis, reason)) return found;
+      if (auto found = byLevels(file, *candidate, variable, *term, wanted.axis, reason)) return found;
     }
   return std::nullopt;
 }
@@ -134,7 +184,8 @@ CfVertical CfVertical::ofIndex(size_t axis) {
 }
 
 std::optional<CfVertical> CfVertical::byLevels(const NetcdfFiles& file, const NetcdfVariable& coordinate,
-                                               const CfTerm& term, size_t axis, std::string& reason) {
+                                               const NetcdfVariable& variable, const CfTerm& term,
+                                               size_t axis, std::string& reason) {
   const std::string units = coordinate.text("units");
   const auto kilometres = kilometresOf(units), pascals = pascalsOf(units);
   CfVertical vertical;
@@ -152,38 +203,49 @@ std::optional<CfVertical> CfVertical::byLevels(const NetcdfFiles& file, const Ne
     vertical.scale_ = *pascals / (of_sea ? 1e4 : 1);
     vertical.description_ +=
         of_sea ? " (pressure of sea water)" : " (pressure, at heights of the standard atmosphere)";
-    warnOfFormula("pressures");
-    return vertical;
+  } else {
+    const bool vague = lowerCase(coordinate.name).starts_with("lev") || namesNumbers(coordinate);
+    if (!kilometres && (!isUnitless(units) || formula || vague)) {
+      if (!formula) reason = notALength(coordinate);  // else what the formula lacks
+      return std::nullopt;
+    }
+    vertical.scale_ = kilometres.value_or(1e-3) * (growsDownwards(coordinate) ? -1 : 1);
   }
-  const bool vague = lowerCase(coordinate.name).starts_with("lev") ||
-                     coordinate.text("standard_name") == "model_level_number";
-  if (!kilometres && (!isUnitless(units) || formula || vague)) {
-    reason = notALength(coordinate);
-    return std::nullopt;
-  }
-  vertical.scale_ = kilometres.value_or(1e-3) * (growsDownwards(coordinate) ? -1 : 1);
   if (term.axes() == 1)
-    if (std::string wrong = vertical.setPlausible(file, coordinate, axis); !wrong.empty()) {
+    if (std::string wrong = vertical.setPlausible(file, coordinate, variable, axis); !wrong.empty()) {
       reason = std::move(wrong);
       return std::nullopt;
     }
-  if (!kilometres)
+  if (!pascals && !kilometres)
     vertical.warnings_.push_back(fmt::format("{} has no units; metres are assumed", coordinate.name));
-  warnOfFormula("heights");
+  warnOfFormula(pascals ? "pressures" : "heights");
   return vertical;
 }
 
-/// Looks at the levels: distances from the Earth's centre become heights, and so do depths that are all negative. Returns
-/// why the values are no lengths, or nothing.
-std::string CfVertical::setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate, size_t axis) {
+/// Looks at the levels of `variable`: distances from the Earth's centre become heights, and so do depths that are all
+/// negative; what has the levels of the sea or the soil lies below the surface. Returns why the values are no levels, or nothing.
+std::string CfVertical::setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate,
+                                     const NetcdfVariable& variable, size_t axis) {
   const CfTerm& term = terms_[0];
   CfRange all{{0, 0, 0}, {1, 1, 1}};
   all.end[axis] = file.dimension(coordinate, term.dimensionOf(axis)).length;
   const std::vector<double> values = term.read(file, all).values;
+  if (std::string wrong = wrongLevel(coordinate, values, std::abs(scale_)); !wrong.empty()) return wrong;
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
-  const std::string name = lowerCase(coordinate.name);
-  if (!kilometresOf(coordinate.text("units")) &&
-      (namesSigma(coordinate) || (std::abs(*least) <= 1 && std::abs(*most) <= 1 && isGeographic(file))))
+  const std::string name = lowerCase(coordinate.name), positive = lowerCase(coordinate.text("positive")),
+                    unit = coordinate.text("units");
+  const std::string range = fmt::format("{} is {:g} .. {:g} {}", coordinate.name, *least, *most, unit);
+  if (kind_ == Kind::kPressure) {
+    if (scale_ * *most < kMaxAirPressure) return "";
+    return fmt::format(
+        "{}, more than the pressure of any air on the Earth: correct its unit (ncatted -a units,{},o,c,Pa "
+        "FILE), or give pressures of sea water the standard_name sea_water_pressure",
+        range, coordinate.name);
+  }
+  if (kind_ == Kind::kSeaPressure) return "";
+  const bool geographic = isGeographic(file);
+  if (!kilometresOf(unit) &&
+      (namesSigma(coordinate) || (std::abs(*least) <= 1 && std::abs(*most) <= 1 && geographic)))
     return fmt::format(
         "{} has no unit, and its values from {:g} to {:g} are no lengths, but those of a sigma or hybrid "
         "coordinate; "
@@ -192,15 +254,29 @@ std::string CfVertical::setPlausible(const NetcdfFiles& file, const NetcdfVariab
   if (scale_ < 0 && *most <= 0) {
     // Depths that fall from 0 are heights, whatever their name.
     scale_ = -scale_;
-    if (!coordinate.text("positive").empty())
+    if (!positive.empty())
       warnings_.push_back(fmt::format(
           "{} is positive down, but its values are from {:g} to {:g}; they are taken for heights, "
           "below the surface",
           coordinate.name, *least, *most));
+  } else if (scale_ > 0 && *least >= 0 && !namesHeight(coordinate) &&
+             (namesDepth(coordinate) || liesBelow(variable, scale_ * *most))) {
+    scale_ = -scale_;
+    warnings_.push_back(fmt::format(
+        "{} {}, but is {}; its values from {:g} to {:g} are taken for depths", coordinate.name,
+        positive.empty() ? "has no attribute `positive`" : "is positive up",
+        namesDepth(coordinate) ? "a depth" : "a coordinate of " + variable.name + ", below the surface",
+        *least, *most));
   }
-  if (scale_ > 0 && name.starts_with("rad") && scale_ * *least > 0 && isGeographic(file)) {
+  const bool radius = name.starts_with("rad"), from_centre = radius && scale_ * *least > kMinRadius;
+  if (geographic && scale_ > 0 && from_centre) {
     offset_ = -kEarthRadius;
     description_ += " (from the Earth's centre)";
+  } else if (geographic && positive.empty() &&
+             (radius || namesSize(coordinate) || std::abs(scale_) * (*most - *least) < kMinExtent)) {
+    return fmt::format("{}, which are no heights", range);
+  } else if (geographic && std::min(scale_ * *least, scale_ * *most) < -kEarthRadius) {
+    return fmt::format("{}, below the Earth's centre", range);
   }
   return "";
 }

@@ -106,7 +106,8 @@ class CfVertical {
                                                   size_t axis);
   static std::optional<CfVertical> byNamesOfFields(const NetcdfFiles& file, const CfDimensions& block,
                                                    size_t axis);
-  std::string setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate, size_t axis);
+  std::string setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate,
+                           const NetcdfVariable& variable, size_t axis);
   static std::optional<CfVertical> byNodeGeopotential(const NetcdfFiles& file, const CfDimensions& block);
   static std::optional<CfVertical> byGeopotential(const NetcdfFiles& file, const CfDimensions& block);
   static std::optional<CfVertical> byInterfaces(const NetcdfFiles& file, const CfDimensions& block,
@@ -114,7 +115,8 @@ class CfVertical {
   static std::optional<CfVertical> byThickness(const NetcdfFiles& file, const CfDimensions& block,
                                                size_t axis);
   static std::optional<CfVertical> byLevels(const NetcdfFiles& file, const NetcdfVariable& coordinate,
-                                            const CfTerm& term, size_t axis, std::string& reason);
+                                            const NetcdfVariable& variable, const CfTerm& term, size_t axis,
+                                            std::string& reason);
   bool setOceanTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block, size_t axis,
                      const char*& lacking);
   bool setAirTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block, size_t axis,
