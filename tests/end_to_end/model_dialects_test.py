@@ -273,6 +273,41 @@ class Levels(ModelFileTest):
             self.levels("lev", [20.0, 100, 500, 1000], more, units="level", positive="down")
             self.expect_heights(standard_altitude(1e5 * a[:, None, None] + b[:, None, None] * ground))
 
+    def test_hybrid_terms_between_the_levels(self):
+        """GFDL: pk and bk are those of half levels; FV3's ak and bk are attributes of the file."""
+        a, b, ground = np.array([5e3, 2e4, 1.5e4, 1e3, 0]), np.array([0, 0.1, 0.5, 0.8, 1]), 70000 + 30000 * RANDOM.random((8, 12))
+        middle = [((x[1:] + x[:-1]) / 2)[:, None, None] for x in (a, b)]
+        for form in ("variables", "attributes"):
+            def more(f):
+                if form == "variables":
+                    f.createDimension("phalf", 5)
+                    f.add("pk", "phalf", a, units="pascal")
+                    f.add("bk", "phalf", b)
+                    f.add("phalf", "phalf", [50.0, 300, 600, 850, 1000], units="mb")
+                else:
+                    f.ak, f.bk = a, b
+                f.add("ps", "lat lon", ground, units="Pa")
+            self.levels("pfull", [100.0, 400, 700, 900], more, units="mb", positive="down", edges="phalf")
+            info = self.expect_heights(standard_altitude(middle[0] + middle[1] * ground))
+            self.assertIn("formula of", info["format"])
+
+    def test_terms_that_are_attributes_of_the_file(self):
+        """CROCO's sc_r, Cs_r and hc. What a formula lacks is named, not a unit that makes metres of it."""
+        h, zeta, hc, s = 100 + 900 * RANDOM.random((8, 12)), RANDOM.random((8, 12)), 50.0, np.linspace(-0.9, -0.1, 4)
+        for name in ("ocean_s_coordinate_g2", "ocean_s_coordinate"):
+            def more(f):
+                f.sc_r, f.Cs_r, f.hc, f.VertCoordType = s, s**3, hc, "NEW"
+                f.add("h", "lat lon", h, units="meter")
+                f.add("zeta", "lat lon", zeta, units="meter")
+            attributes = {"axis": "Z", "positive": "up", "standard_name": name, "formula_terms": "s: sc_r C: Cs_r eta: zeta depth: h depth_c: hc"}
+            self.levels("s_rho", s, more, **attributes)
+            S = s[:, None, None]
+            self.expect_heights(1e-3 * (zeta + (zeta + h) * (hc * S + h * S**3) / (hc + h)))
+        self.levels("s_rho", s, **attributes)
+        line = self.info(fails=True)
+        self.assertIn("the formula of s_rho has no term 's' on these dimensions", line)
+        self.assertNotIn("ncatted", line)
+
     def test_hybrid_terms_with_the_unit_of_a_pressure(self):
         """GEOS-Chem: hyam is in hPa and is called a; P0 is 1000 hPa."""
         a, b, ground = np.array([0, 10.0, 50, 100]), np.array([0.99, 0.89, 0.65, 0]), 950 + 60 * RANDOM.random((8, 12))

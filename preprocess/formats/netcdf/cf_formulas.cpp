@@ -30,7 +30,7 @@ struct TermNames {
   std::initializer_list<const char*> names;
 };
 const TermNames kTermNames[] = {
-    {"ps", "surface_air_pressure", {"PS", "ps", "aps", "PSFC", "sp"}},
+    {"ps", "surface_air_pressure", {"PS", "ps", "aps", "PSFC", "sp", "pressfc"}},
     {"orog", "surface_altitude", {"orog", "surface_altitude", "HSURF", "topo"}},
     {"depth", "sea_floor_depth_below_geoid", {"h", "bathymetry", "deptho"}},
     {"eta", "sea_surface_height_above_geoid", {"zeta", "ssh", "zos"}},
@@ -57,6 +57,9 @@ std::optional<CfTerm> termNamed(const NetcdfFiles& file, const std::map<std::str
   const auto name = terms.find(key);
   if (name == terms.end()) return std::nullopt;
   const NetcdfVariable* variable = file.find(name->second);
+  // CROCO's sc_r, Cs_r and hc are attributes of the file.
+  if (!variable)
+    if (auto term = CfTerm::ofNumbers(file, file.numbers(name->second.c_str()), block)) return term;
   if (!variable) variable = standIn(file, key, block);
   if (!variable || !variable->numeric) return std::nullopt;
   return CfTerm::of(file, *variable, block);
@@ -74,11 +77,16 @@ double constant(const NetcdfFiles& file, const std::optional<CfTerm>& term) {
 std::optional<CfVertical> CfVertical::byNamesOfTerms(const NetcdfFiles& file, const CfDimensions& block,
                                                      size_t axis) {
   const auto along = [&](std::initializer_list<const char*> names) -> std::string {
-    for (const char* const name : names) {
-      const NetcdfVariable* const variable = file.find(name);
-      const auto term = variable && variable->numeric ? CfTerm::of(file, *variable, block) : std::nullopt;
-      if (term && term->exact() && term->axes() == 1 && term->varies(axis)) return name;
-    }
+    // What is between levels serves, too: GFDL has pk and bk of half levels alone.
+    for (const bool exact : {true, false})
+      for (const char* const name : names) {
+        const NetcdfVariable* const variable = file.find(name);
+        const auto term = variable && variable->numeric ? CfTerm::of(file, *variable, block)
+                                                        : CfTerm::ofNumbers(file, file.numbers(name), block);
+        if (term && (exact ? term->exact() : term->surrounds(axis)) && term->axes() == 1 &&
+            term->varies(axis))
+          return name;
+      }
     return "";
   };
   const auto named = [](std::optional<CfVertical> found, const std::string& terms) {
@@ -87,12 +95,13 @@ std::optional<CfVertical> CfVertical::byNamesOfTerms(const NetcdfFiles& file, co
   };
   std::string reason;
   const std::string s = along({"s_rho", "s_w", "sc_r", "sc_w"}), c = along({"Cs_r", "Cs_w"});
-  if (!s.empty() && !c.empty() && file.find("hc") && standIn(file, "depth", block))
+  if (!s.empty() && !c.empty() && (file.find("hc") || file.number("hc")) && standIn(file, "depth", block))
     return named(
         ofTerms(file, Kind::kS, {{"s", s}, {"C", c}, {"eta", "zeta"}, {"depth", "h"}, {"depth_c", "hc"}},
                 block, axis, reason),
         s);
-  const std::string a = along({"hyam", "hyai", "ap", "A", "a"}), b = along({"hybm", "hybi", "b", "B"});
+  const std::string a = along({"hyam", "hyai", "ap", "A", "a", "pk", "ak"}),
+                    b = along({"hybm", "hybi", "b", "B", "bk"});
   if (!a.empty() && !b.empty() && standIn(file, "ps", block))
     return named(ofTerms(file, Kind::kHybridPressure, {{"a", a}, {"b", b}, {"p0", "P0"}, {"ps", "PS"}}, block,
                          axis, reason),
@@ -140,7 +149,8 @@ std::optional<CfVertical> CfVertical::ofTerms(const NetcdfFiles& file, Kind kind
   if (vertical.kind_ == Kind::kS && terms.contains("C") && !terms.contains("a")) {
     const NetcdfVariable* const transform = file.find("Vtransform");
     const bool second =
-        transform && transform->numeric && constant(file, CfTerm::of(file, *transform, block)) == 2;
+        file.text("VertCoordType") == "NEW" ||
+        (transform && transform->numeric && constant(file, CfTerm::of(file, *transform, block)) == 2);
     vertical.kind_ = second ? Kind::kSG2 : Kind::kSG1;
   }
   const bool air = vertical.kind_ == Kind::kHybridHeight || vertical.ofPressure();
@@ -269,8 +279,11 @@ bool CfVertical::setAirTerms(const NetcdfFiles& file, const Terms& terms, const 
   depth_c_ = depth_ ? pascalsOf(depth_->variable().text("units")).value_or(1) : 1;
   a_ = pressure(termNamed(file, terms, kind_ == Kind::kSigmaPressure ? "ptop" : "p0", block),
                 kind_ == Kind::kSigmaPressure ? 0 : 1e5);
-  // ap is a pressure already, and so is what GEOS-Chem calls a; else a is a part of p0.
-  const auto pascals = pascalsOf(s_->variable().text("units"));
+  // ap is a pressure already, and so is what GEOS-Chem calls a, and numbers beyond 10; else a is a part of p0.
+  auto pascals = pascalsOf(s_->variable().text("units"));
+  CfRange all{{0, 0, 0}, {1, 1, 1}};
+  all.end[axis] = file.dimensions()[block.axes[axis]].length;
+  if (hybrid && !pascals && std::ranges::max(s_->read(file, all).values) > 10) pascals = 1;
   if (hybrid && (pascals || terms.contains("ap"))) a_ = pascals.value_or(1);
   return true;
 }

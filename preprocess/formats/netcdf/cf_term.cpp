@@ -87,7 +87,9 @@ std::optional<CfTerm> CfTerm::of(const NetcdfFiles& file, const NetcdfVariable& 
   term.exact_ = unknown.empty();
   // Matched from the last dimension (i) to the first, as in the block, skipping axes that are taken.
   for (auto d = unknown.rbegin(); d != unknown.rend(); ++d) {
-    const size_t axis = variable.dims.size() - 1 - *d - (term.face_ && *term.face_ > *d ? 1 : 0);
+    const bool alone = block.levels && unknown.size() == 1 && term.axes() == 0;
+    const size_t axis =
+        alone ? *block.levels : variable.dims.size() - 1 - *d - (term.face_ && *term.face_ > *d ? 1 : 0);
     if (axis > 2 || term.along_[axis]) return std::nullopt;
     const uint64_t length = lengthOf(variable.dims[*d]), wanted = lengthOf(block.axes[axis]);
     if (length + 1 < wanted || length > wanted + 1) return std::nullopt;
@@ -117,7 +119,9 @@ std::optional<CfTerm> CfTerm::ofSupergrid(const NetcdfFiles& file, const NetcdfV
   return term;
 }
 
-CfTerm CfTerm::ofIndex(size_t axis, double metres) {
+namespace {
+
+const NetcdfVariable& noVariable() {
   static const NetcdfVariable index = [] {
     NetcdfVariable variable;
     variable.name = "index";
@@ -125,15 +129,39 @@ CfTerm CfTerm::ofIndex(size_t axis, double metres) {
     variable.attributes["units"].text.push_back('m');
     return variable;
   }();
+  return index;
+}
+
+}  // namespace
+
+CfTerm CfTerm::ofIndex(size_t axis, double metres) {
   CfTerm term;
-  term.variable_ = &index;
+  term.variable_ = &noVariable();
   term.along_[axis] = 0;
   term.index_metres_ = metres;
   return term;
 }
 
+std::optional<CfTerm> CfTerm::ofNumbers(const NetcdfFiles& file, std::vector<double> numbers,
+                                        const CfDimensions& block) {
+  CfTerm term;
+  term.variable_ = &noVariable();
+  if (numbers.size() > 1) {
+    if (!block.levels) return std::nullopt;
+    const uint64_t levels = file.dimensions()[block.axes[*block.levels]].length;
+    if (numbers.size() != levels && numbers.size() != levels + 1) return std::nullopt;
+    if (numbers.size() > levels)
+      for (size_t n = 0; n < levels; ++n) numbers[n] = (numbers[n] + numbers[n + 1]) / 2;
+    term.along_[*block.levels] = 0;
+  }
+  if (numbers.empty()) return std::nullopt;
+  term.numbers_ = std::move(numbers);
+  return term;
+}
+
 bool CfTerm::ofNodes() const {
-  return index_metres_ == 0 && exact_ && axes() == 3 && *along_[2] < *along_[1] && *along_[1] < *along_[0];
+  return index_metres_ == 0 && numbers_.empty() && exact_ && axes() == 3 && *along_[2] < *along_[1] &&
+         *along_[1] < *along_[0];
 }
 
 NetcdfBox CfTerm::boxOf(const CfRange& range) const {
@@ -157,13 +185,14 @@ void CfTerm::setDegrees() {
 }
 
 CfValues CfTerm::read(const NetcdfFiles& file, const CfRange& range) const {
-  if (index_metres_ > 0) {
+  if (!numbers_.empty() && axes() == 0) return {{1, 1, 1}, numbers_};
+  if (index_metres_ > 0 || !numbers_.empty()) {
     CfValues indices;
     for (size_t axis = 0; axis < 3; ++axis) {
       if (!along_[axis]) continue;
       indices.count[axis] = range.end[axis] - range.begin[axis];
       for (uint64_t n = range.begin[axis]; n < range.end[axis]; ++n)
-        indices.values.push_back(index_metres_ * static_cast<double>(n));
+        indices.values.push_back(numbers_.empty() ? index_metres_ * static_cast<double>(n) : numbers_[n]);
     }
     return indices;
   }

@@ -39,6 +39,7 @@ struct CfDimensions {
   static constexpr size_t kNoDimension = SIZE_MAX;  // of an axis with a single node
   std::array<size_t, 3> axes{};
   std::optional<size_t> time, face;
+  std::optional<size_t> levels;  // the axis of the levels, if it is known
   size_t time_step = 0;
 };
 
@@ -53,6 +54,7 @@ class CfTerm {
   ///   one shorter    its points are half-way between the block's nodes; the outer nodes are extrapolated
   ///   1              ignored
   ///
+  /// The only dimension of a variable is matched with the levels instead, if the block names them: GFDL's pk along phalf.
   /// nullopt if a dimension does not match.
   static std::optional<CfTerm> of(const NetcdfFiles& file, const NetcdfVariable& variable,
                                   const CfDimensions& block);
@@ -66,6 +68,11 @@ class CfTerm {
   /// The index along an axis times `metres`: for dimensions without a coordinate. Its variable is called
   /// "index".
   static CfTerm ofIndex(size_t axis, double metres);
+
+  /// Numbers that are no variable's: one, or one for each of the block's levels or of the interfaces around them. Its
+  /// variable is called "index". nullopt if there are fewer or more.
+  static std::optional<CfTerm> ofNumbers(const NetcdfFiles& file, std::vector<double> numbers,
+                                         const CfDimensions& block);
 
   const NetcdfVariable& variable() const { return *variable_; }
   bool varies(size_t axis) const { return along_[axis].has_value(); }
@@ -106,8 +113,9 @@ class CfTerm {
   std::array<uint64_t, 3> length_{};            // [axis]: its length
   std::array<uint64_t, 3> first_{}, step_{1, 1, 1};  // [axis]: of the points that are nodes, of a supergrid
   bool exact_ = true;
-  double index_metres_ = 0;     // above 0: there is no variable, see ofIndex()
-  std::optional<size_t> face_;  // its dimension of the faces
+  double index_metres_ = 0;      // above 0: there is no variable, see ofIndex()
+  std::vector<double> numbers_;  // if there are any: see ofNumbers()
+  std::optional<size_t> face_;   // its dimension of the faces
   std::vector<size_t>
       start_;  // [dimension]: the time step for that of time, the face for that of faces, else 0
 };

@@ -105,7 +105,9 @@ std::string notALength(const NetcdfVariable& variable) {
 
 std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFiles& file,
                                                                  const NetcdfVariable& variable,
-                                                                 const CfDimensions& block, size_t axis) {
+                                                                 const CfDimensions& given, size_t axis) {
+  CfDimensions block = given;
+  block.levels = axis;
   const std::string& levels = file.dimensions()[block.axes[axis]].name;
   std::string reason = fmt::format("no depth, height or pressure along {}", levels);
   if (auto found = byNodeGeopotential(file, block)) return {std::move(found), ""};

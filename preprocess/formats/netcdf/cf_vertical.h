@@ -32,7 +32,7 @@ class CfVertical {
   /// heights and pressures of nodes by name (met_em's GHT), and lengths of levels that nothing calls heights.
   static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFiles& file,
                                                               const NetcdfVariable& variable,
-                                                              const CfDimensions& block, size_t axis);
+                                                              const CfDimensions& given, size_t axis);
 
   /// By the formula_terms of a coordinate along `axis`; or nullopt and a reason.
   static std::optional<CfVertical> byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,

@@ -190,6 +190,12 @@ std::optional<double> NetcdfFiles::number(const char* attribute) const {
   return std::nullopt;
 }
 
+std::vector<double> NetcdfFiles::numbers(const char* attribute) const {
+  for (const auto& file : files_)
+    if (std::vector<double> numbers = file.front().numbers(attribute); !numbers.empty()) return numbers;
+  return {};
+}
+
 std::string NetcdfFiles::missingValues(const NetcdfVariable& variable) const {
   return files_.at(variable.file).front().missingValues(variable);
 }

@@ -48,6 +48,7 @@ class NetcdfFiles {
   std::string text(const char* attribute) const;
   bool hasAttribute(const char* attribute) const;
   std::optional<double> number(const char* attribute) const;
+  std::vector<double> numbers(const char* attribute) const;
   /// The groups of the first file, as NetcdfFile::groups() returns them.
   const std::vector<std::string>& groups() const { return files_.front().front().groups(); }
   bool plainHdf5() const { return files_.front().front().plainHdf5(); }
