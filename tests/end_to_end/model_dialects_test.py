@@ -325,6 +325,14 @@ class Levels(ModelFileTest):
         self.expect_heights(1e-3 * ght)
         self.levels("num_metgrid_levels", None, lambda f: f.add("PRES", "num_metgrid_levels lat lon", 1e5 - 8 * ght, units="Pa"))
         self.expect_heights(standard_altitude(1e5 - 8 * ght))
+        # GETM's, and WRF's pressure of which the geopotential was not written.
+        self.levels("level", [1, 2, 3, 4], lambda f: f.add("zc", "level lat lon", -ght[::-1], units="m", long_name="z-coordinate at layer centers"), units="level")
+        self.expect_heights(-1e-3 * ght[::-1])
+        def more(f):
+            for name, values in (("P", 100 - ght), ("PB", 1e5 - 7 * ght)):
+                f.add(name, "bottom_top lat lon", values, units="Pa")
+        self.levels("bottom_top", None, more)
+        self.expect_heights(standard_altitude(100100 - 8 * ght))
         # Both come before the fields in the file, and after them in the list.
         with self.file(lon=12, lat=8, time=None, num_metgrid_levels=4) as f:
             self.air(f)

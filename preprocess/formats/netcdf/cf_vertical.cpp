@@ -143,10 +143,9 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
   for (const bool pressure : {false, true}) {
     if (auto found = byCandidates(file, candidates, variable, block, {axis, true, pressure}, reason))
       return {std::move(found), ""};
-    if (!pressure) {
-      if (auto found = byGeopotential(file, block)) return {std::move(found), ""};
+    if (auto found = bySums(file, block, pressure)) return {std::move(found), ""};
+    if (!pressure)
       if (auto found = byInterfaces(file, block, axis)) return {std::move(found), ""};
-    }
     if (auto found = byCandidates(file, candidates, variable, block, {axis, false, pressure}, reason))
       return {std::move(found), ""};
   }
@@ -286,7 +285,10 @@ std::string CfVertical::setPlausible(const NetcdfFiles& file, const NetcdfVariab
 bool CfVertical::isNamedForNodes(const NetcdfVariable& variable) {
   const auto is = [&](const char* name) { return variable.name == name; };
   const std::string unit = variable.text("units");
-  return (std::ranges::any_of(kHeightsOfNodes, is) && kilometresOf(unit)) ||
+  // GETM: "z-coordinate at layer centers"
+  const std::string words = lowerCase(variable.text("long_name"));
+  const bool called = words.starts_with("z-coordinate") || words.starts_with("vertical coordinate");
+  return ((called || std::ranges::any_of(kHeightsOfNodes, is)) && kilometresOf(unit)) ||
          (std::ranges::any_of(kPressuresOfNodes, is) && pascalsOf(unit));
 }
 
@@ -294,19 +296,17 @@ bool CfVertical::isNamedForNodes(const NetcdfVariable& variable) {
 std::optional<CfVertical> CfVertical::byNamesOfFields(const NetcdfFiles& file, const CfDimensions& block,
                                                       size_t axis) {
   for (const bool pressure : {false, true})
-    for (const char* const name :
-         pressure ? std::span<const char* const>(kPressuresOfNodes) : kHeightsOfNodes) {
-      const NetcdfVariable* const variable = file.find(name);
-      if (!variable || !variable->numeric || !isNamedForNodes(*variable)) continue;
-      const std::string unit = variable->text("units");
-      const auto kilometres = kilometresOf(unit), pascals = pascalsOf(unit);
-      const auto term = CfTerm::of(file, *variable, block);
+    for (const NetcdfVariable& variable : file.variables()) {
+      const std::string unit = variable.text("units");
+      const auto scale = pressure ? pascalsOf(unit) : kilometresOf(unit);
+      if (!variable.numeric || !scale || !isNamedForNodes(variable)) continue;
+      const auto term = CfTerm::of(file, variable, block);
       if (!term || !term->exact() || term->axes() != 3 || !term->varies(axis)) continue;
       CfVertical vertical;
       vertical.terms_.push_back(*term);
       vertical.kind_ = pressure ? Kind::kPressure : Kind::kLevels;
-      vertical.scale_ = pressure ? *pascals : *kilometres;
-      vertical.description_ = name;
+      vertical.scale_ = *scale * (!pressure && growsDownwards(variable) ? -1 : 1);
+      vertical.description_ = variable.name;
       if (pressure) vertical.description_ += " (pressure, at heights of the standard atmosphere)";
       return vertical;
     }
@@ -373,18 +373,21 @@ std::optional<CfVertical> CfVertical::byThickness(const NetcdfFiles& file, const
   return std::nullopt;
 }
 
-std::optional<CfVertical> CfVertical::byGeopotential(const NetcdfFiles& file, const CfDimensions& block) {
+/// WRF's geopotential, or its pressure: a base state and what departs from it.
+std::optional<CfVertical> CfVertical::bySums(const NetcdfFiles& file, const CfDimensions& block,
+                                             bool pressure) {
   CfVertical vertical;
-  for (const char* name : {"PHB", "PH"}) {
+  for (const char* name : pressure ? std::array{"PB", "P"} : std::array{"PHB", "PH"}) {
     const NetcdfVariable* const variable = file.find(name);
-    if (!variable || variable->text("units") != "m2 s-2") return std::nullopt;
+    if (!variable || variable->text("units") != (pressure ? "Pa" : "m2 s-2")) return std::nullopt;
     const auto term = CfTerm::of(file, *variable, block);
     if (!term || term->axes() != 3) return std::nullopt;
     vertical.terms_.push_back(*term);
   }
-  vertical.kind_ = Kind::kGeopotential;
-  vertical.scale_ = 1e-3 / kWrfGravity;
-  vertical.description_ = "geopotential PH + PHB";
+  vertical.kind_ = pressure ? Kind::kPressure : Kind::kGeopotential;
+  vertical.scale_ = pressure ? 1 : 1e-3 / kWrfGravity;
+  vertical.description_ =
+      pressure ? "P + PB (pressure, at heights of the standard atmosphere)" : "geopotential PH + PHB";
   return vertical;
 }
 

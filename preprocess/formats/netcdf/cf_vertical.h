@@ -28,7 +28,7 @@ class CfVertical {
   ///
   /// Tried in this order: the geopotential of every node; a formula of a coordinate along the axis, or one whose
   /// terms have the names that models give them; the height or pressure of every node; WRF's geopotential (PH and
-  /// PHB); the height of the layers' interfaces; the height or pressure of every level; the thickness of the layers;
+  /// PHB) or pressure; the height of the layers' interfaces; the height or pressure of every level; the thickness of the layers;
   /// heights and pressures of nodes by name (met_em's GHT), and lengths of levels that nothing calls heights.
   static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFiles& file,
                                                               const NetcdfVariable& variable,
@@ -109,7 +109,7 @@ class CfVertical {
   std::string setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate,
                            const NetcdfVariable& variable, size_t axis);
   static std::optional<CfVertical> byNodeGeopotential(const NetcdfFiles& file, const CfDimensions& block);
-  static std::optional<CfVertical> byGeopotential(const NetcdfFiles& file, const CfDimensions& block);
+  static std::optional<CfVertical> bySums(const NetcdfFiles& file, const CfDimensions& block, bool pressure);
   static std::optional<CfVertical> byInterfaces(const NetcdfFiles& file, const CfDimensions& block,
                                                 size_t axis);
   static std::optional<CfVertical> byThickness(const NetcdfFiles& file, const CfDimensions& block,
