@@ -366,6 +366,34 @@ class Places(ModelFileTest):
             np.testing.assert_allclose(info["bounds"]["upper"], places.reshape(-1, 3).max(0), atol=1e-3)
             np.testing.assert_allclose(info["bounds"]["lower"], places.reshape(-1, 3).min(0), atol=1e-3)
 
+    def test_many_nodes_at_one_place(self):
+        """NEMO: 0, 0 where a processor would have had land alone."""
+        lon, lat = np.meshgrid(10.0 + np.arange(16), 40.0 + np.arange(10))
+        hole = (np.arange(16) >= 8) & (np.arange(10)[:, None] < 4)
+        t = RANDOM.random((3, 10, 16)).astype("f4")
+        for place in (0, -1):
+            with self.file(x=16, y=10, deptht=3) as f:
+                f.add("nav_lon", "y x", np.where(hole, place, lon), units="degrees_east")
+                f.add("nav_lat", "y x", np.where(hole, place, lat), units="degrees_north")
+                f.add("deptht", "deptht", [5, 50, 500], units="m", positive="down")
+                f.add("thetao", "deptht y x", np.where(hole, 0, t), "f4", coordinates="nav_lon nav_lat")
+            info = self.info()
+            self.assertEqual(info["blanked"]["not_finite"], 3 * hole.sum())
+            self.assertEqual((info["cells"]["degenerate"], info["cells"]["inverted"]), (0, 0))
+            self.assertIn(f"nav_lon and nav_lat are {place} and {place} at neighbouring nodes", info["warnings"][0])
+            places = sphere(lon, lat, -np.array([0.005, 0.05, 0.5])[:, None, None])[:, ~hole].reshape(-1, 3)
+            np.testing.assert_allclose(info["bounds"]["upper"], places.max(0), atol=1e-3)
+            np.testing.assert_allclose(info["bounds"]["lower"], places.min(0), atol=1e-3)
+
+    def test_degrees_from_a_pole(self):
+        for rows in (8, 30):
+            with self.file(lon=12, lat=rows, lev=3) as f:
+                f.add("lon", "lon", 30.0 * np.arange(12), units="degrees_east")
+                f.add("lat", "lat", np.linspace(5, 175, rows), units="degrees_north")
+                f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                f.add("t", "lev lat lon", np.ones((3, rows, 12)), "f4")
+            self.assertIn("lat is 5 .. 175, which are degrees from a pole; expected degrees_north", self.info(fails=True))
+
     def test_degrees_and_radians(self):
         """DYNAMICO's and ICON's angles; x and y that only their long_name calls longitude and latitude."""
         t = RANDOM.random((3, 8, 12)).astype("f4")

@@ -216,6 +216,7 @@ class GridFinder {
       return std::nullopt;
     }
     grid.vertical = *vertical;
+    setNowhere(grid);
     grid.surface_first = beginsWithSurface(file_, grid);
     grid.mask = CfMask::of(file_, variable, dims, grid.levels, isOcean(file_, grid));
     return grid;
@@ -233,12 +234,11 @@ class GridFinder {
         for (CfTerm* const term : {&grid.longitude, &grid.latitude}) term->setDegrees();
       return true;
     };
-    std::string implausible;
-    bool usable_indices = true;
+    Implausible implausible;
     if (set(CfRole::kLongitude, CfRole::kLatitude)) {
       if (stacksFaces(grid, reason)) return false;
-      implausible = implausibleDegrees(grid, usable_indices);
-      if (implausible.empty()) return true;
+      implausible = implausibleDegrees(grid);
+      if (implausible.words.empty()) return true;
     }
     auto [projection, words] = MapProjection::of(file_, variable);
     if (set(CfRole::kGridLongitude, CfRole::kGridLatitude)) {
@@ -256,33 +256,38 @@ class GridFinder {
       if (projection && !projection->degrees()) grid.projection = std::move(projection);
       return true;
     }
-    reason = implausible.empty()
+    reason = implausible.words.empty()
                  ? fmt::format("no longitude and latitude, or x and y, on its dimensions {}",
                                describe(file_, grid.dims))
-                 : implausible +
-                       ": lengths need a unit of length and the standard_name projection_x_coordinate (or y)";
-    if (!by_index_ || grid.dims.face || !usable_indices) return false;
+                 : implausible.words + implausible.remedy;
+    if (!by_index_ || grid.dims.face || !implausible.usable_indices) return false;
     for (size_t axis = 0; axis < 2; ++axis)
       if (file_.find(file_.dimensions()[grid.dims.axes[axis]].name)) return false;
     grid.degrees = false;
     grid.indices = true;
-    grid.implausible = implausible;
+    grid.implausible = implausible.words;
     grid.unused = horizontalOfNodes(grid.dims);
     grid.longitude = CfTerm::ofIndex(0, indexSpacing(file_, 0));
     grid.latitude = CfTerm::ofIndex(1, indexSpacing(file_, 1));
     return true;
   }
 
+  /// `usable_indices`: false if the numbers are positions in another unit, and the files do not state the
+  /// distance of nodes either.
+  struct Implausible {
+    std::string words, remedy;
+    bool usable_indices = true;
+  };
+
   /// Describes what is implausible about longitude and latitude: values that no place on the Earth has at
-  /// most of the nodes, or all nodes alike, as idealised runs of WRF write them; empty if nothing is. Looks
-  /// at five rows. `usable_indices`: false if the numbers are positions in another unit, and the files do not
-  /// state the distance of nodes either.
-  std::string implausibleDegrees(const CfGrid& grid, bool& usable_indices) const {
+  /// most of the nodes, or all nodes alike, as idealised runs of WRF write them, or latitudes counted from a
+  /// pole; no words if nothing is. Looks at five rows.
+  Implausible implausibleDegrees(const CfGrid& grid) const {
     CfRange row{{0, 0, 0}, {1, 1, 1}};
     std::vector<size_t> varying;
     for (size_t axis = 0; axis < 3; ++axis)
       if (grid.longitude.varies(axis) || grid.latitude.varies(axis)) varying.push_back(axis);
-    if (varying.size() != 2) return "";
+    if (varying.size() != 2) return {};
     const auto lengthAlong = [&](size_t axis) { return file_.dimensions()[grid.dims.axes[axis]].length; };
     row.end[varying[0]] = lengthAlong(varying[0]);
     std::array<std::vector<double>, 2> values;  // longitudes, latitudes
@@ -305,7 +310,7 @@ class GridFinder {
         ++all;
       }
     }
-    if (all < 2 || missing > all) return "";
+    if (all < 2 || missing > all) return {};
     const auto describeRange = [&](const CfTerm& term, const std::vector<double>& of) {
       const auto [least, most] = std::minmax_element(of.begin(), of.end());
       return fmt::format("{} is {:g} .. {:g}", term.variable().name, *least, *most);
@@ -314,10 +319,49 @@ class GridFinder {
       return std::all_of(of.begin(), of.end(), [&](double value) { return value == of[0]; });
     };
     const bool constant = isConstant(values[0]) && isConstant(values[1]);
-    if (!constant && 2 * wrong <= all) return "";
-    usable_indices = constant || file_.number("DX");
-    return fmt::format("{} and {}, which are no longitudes and latitudes of a grid in degrees",
-                       describeRange(grid.longitude, values[0]), describeRange(grid.latitude, values[1]));
+    const auto [south, north] = std::minmax_element(values[1].begin(), values[1].end());
+    if (*south >= 0 && *north > 91 && *north <= 181)
+      return {describeRange(grid.latitude, values[1]) + ", which are degrees from a pole",
+              fmt::format("; expected degrees_north: write them (ncap2 -s '{0}=90-{0}' FILE OUT)",
+                          grid.latitude.variable().name),
+              false};
+    if (!constant && 2 * wrong <= all) return {};
+    return {fmt::format("{} and {}, which are no longitudes and latitudes of a grid in degrees",
+                        describeRange(grid.longitude, values[0]), describeRange(grid.latitude, values[1])),
+            ": lengths need a unit of length and the standard_name projection_x_coordinate (or y)",
+            constant || file_.number("DX")};
+  }
+
+  /// Finds a place at which four neighbours lie, as nodes do that a model did not compute: NEMO's at 0, 0 where
+  /// a processor would have had land alone.
+  void setNowhere(CfGrid& grid) const {
+    if (!grid.degrees || grid.projection || grid.dims.face || grid.longitude.axes() != 2) return;
+    constexpr uint64_t kNodesAtOnce = 1 << 18;
+    std::array<size_t, 2> axes{grid.levels == 0 ? size_t{1} : 0, grid.levels == 2 ? size_t{1} : 2};
+    const auto lengthOf = [&](size_t axis) { return file_.dimensions()[grid.dims.axes[axis]].length; };
+    const uint64_t row = lengthOf(axes[0]), rows = lengthOf(axes[1]);
+    const uint64_t rows_at_once = std::max<uint64_t>(kNodesAtOnce / row, 1);
+    CfRange range{{0, 0, 0}, {1, 1, 1}};
+    range.end[axes[0]] = row;
+    for (uint64_t first = 0; first + 1 < rows; first += rows_at_once) {
+      range.begin[axes[1]] = first;
+      range.end[axes[1]] = std::min(first + rows_at_once + 1, rows);
+      const std::vector<double> east = grid.longitude.read(file_, range).values,
+                                north = grid.latitude.read(file_, range).values;
+      if (east.size() != north.size()) return;
+      for (size_t n = 0; n + row + 1 < east.size(); ++n) {
+        const auto same = [&](size_t other) { return east[n] == east[other] && north[n] == north[other]; };
+        if (n % row + 1 == row || !same(n + 1) || !same(n + row) || !same(n + row + 1)) continue;
+        if (!isOnEarth(east[n], north[n])) continue;
+        grid.nowhere = {east[n], north[n]};
+        grid.vertical.addWarning(
+            fmt::format("{} and {} are {:g} and {:g} at neighbouring nodes, as where nothing is computed; "
+                        "nodes there are "
+                        "left out",
+                        grid.longitude.variable().name, grid.latitude.variable().name, east[n], north[n]));
+        return;
+      }
+    }
   }
 
   /// Names of horizontal coordinates that differ from level to level.

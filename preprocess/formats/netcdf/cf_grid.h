@@ -3,6 +3,7 @@
 // dimension may number the faces of a grid: of a cubed sphere (GEOS' nf), of the "lat-lon-cap" (MITgcm's face, ECCO's tile).
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <set>
@@ -26,7 +27,8 @@ struct CfGrid {
   std::vector<std::string> unused;          // variables of x and y that are not read: of three dimensions
   std::string implausible;                  // why longitude and latitude are not read, if they are there
   CfVertical vertical;
-  size_t levels = 2;  // the axis along which longitude and latitude do not vary
+  std::optional<std::array<double, 2>> nowhere;  // longitude and latitude of nodes that are left out
+  size_t levels = 2;                             // the axis along which longitude and latitude do not vary
   std::optional<CfMask> mask;
   bool surface_first = false;  // the first level is the ground's, above others: its nodes are blanked
   std::string steps_of;        // the dimension whose values are the steps, if it is not one of time: "month"

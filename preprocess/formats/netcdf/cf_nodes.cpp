@@ -107,7 +107,8 @@ void CfNodes::readColumns(const CfRange& range, std::vector<GlobeColumn>& column
     for (uint64_t j = 0; j < lengthOf(range, 1); ++j)
       for (uint64_t i = 0; i < lengthOf(range, 0); ++i) {
         const double longitude = east.at(i, j, k), latitude = north.at(i, j, k);
-        const bool nowhere = grid_.degrees && !grid_.projection && !isOnEarth(longitude, latitude);
+        const bool nowhere = (grid_.degrees && !grid_.projection && !isOnEarth(longitude, latitude)) ||
+                             grid_.nowhere == std::array{longitude, latitude};
         x.push_back(nowhere ? std::nan("") : scale * longitude);
         y.push_back(nowhere ? std::nan("") : scale * latitude);
       }

@@ -60,6 +60,7 @@ class CfVertical {
     return description_;
   }  // "depth", "ocean_s_coordinate_g2 of s_rho"
   const std::vector<std::string>& warnings() const { return warnings_; }
+  void addWarning(std::string text) { warnings_.push_back(std::move(text)); }
 
   /// Whether the heights are made of this variable.
   bool uses(const NetcdfVariable& variable) const;
