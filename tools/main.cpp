@@ -2,7 +2,6 @@
 // exceptions into messages and exit statuses. No other file of the program catches errors to end it.
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <pthread.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 
@@ -27,6 +26,7 @@
 #include "stream/base/text.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/manual.h"
+#include "tools/early_start.h"
 #include "tools/output/command_run.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/start_checks.h"
@@ -52,19 +52,15 @@ bool finishStandardOutput() {
   return false;
 }
 
-// The stack of threads that are started while libraries are loaded. If the machine has no threads left
-// (ulimit -u, ulimit -v), the program ends with one line and exit status 1, wherever that shows: libraries
-// start threads before main() and in places where no exception may leave.
-constexpr size_t kLoadingStackBytes = 256 << 10;
-size_t stack_bytes = 0;  // the system's
-
 void print(std::string_view text) {
   // Nothing that allocates, and nothing of the C++ library, which may not be ready yet.
   [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
 }
 
 /// Ends the program after an exception that nobody can catch: a library threw it before main(), or in a
-/// thread of its own.
+/// thread of its own. If the machine has no threads left (ulimit -u, ulimit -v), the program ends with one line
+/// and exit status 1, wherever that shows: libraries start threads before main() and in places where no
+/// exception may leave.
 [[noreturn]] void onTerminate() {
   try {
     if (std::current_exception()) throw;
@@ -87,28 +83,13 @@ void print(std::string_view text) {
   std::abort();
 }
 
-void prepare(int, char**, char**) {
+}  // namespace
+
+void beforeLibraries() {
   std::set_terminate(onTerminate);
-  pthread_attr_t attributes;
-  if (pthread_getattr_default_np(&attributes) != 0) return;
-  pthread_attr_getstacksize(&attributes, &stack_bytes);
-  pthread_attr_setstacksize(&attributes, kLoadingStackBytes);
-  pthread_setattr_default_np(&attributes);
-  pthread_attr_destroy(&attributes);
 }
 
-// Called before the initialisers of all libraries.
-__attribute__((section(".preinit_array"), used)) void (*const kPrepare)(int, char**, char**) = prepare;
-
-/// Gives threads the system's stack size again. Until main() calls this, stacks are small, so that libraries
-/// that start threads when they are loaded (log4cplus, which OpenVDB needs) take little of a small limit.
-void endLoadingOfLibraries() {
-  pthread_attr_t attributes;
-  if (stack_bytes == 0 || pthread_getattr_default_np(&attributes) != 0) return;
-  pthread_attr_setstacksize(&attributes, stack_bytes);
-  pthread_setattr_default_np(&attributes);
-  pthread_attr_destroy(&attributes);
-}
+namespace {
 
 std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;

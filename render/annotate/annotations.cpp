@@ -1,7 +1,6 @@
 #include "render/annotate/annotations.h"
 
 #include <cairo/cairo.h>
-#include <sys/mman.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
@@ -19,6 +18,7 @@
 #include "render/annotate/axes_grid.h"
 #include "render/annotate/canvas.h"
 #include "stream/base/error.h"
+#include "stream/base/os.h"
 
 namespace curvisplat {
 namespace {
@@ -299,7 +299,7 @@ Image widened(Image data, ImageSize size) {
     const size_t copied = static_cast<size_t>(y + 1) * row * sizeof(float);
     if (copied < given_back + kAtOnce) continue;
     const size_t bytes = (copied - given_back) / kPage * kPage;
-    ::madvise(begin + given_back, bytes, MADV_DONTNEED);
+    os::discardPages(begin + given_back, bytes);
     given_back += bytes;
   }
   return wide;

@@ -4,8 +4,6 @@
 
 #include <GL/osmesa.h>
 #include <dlfcn.h>
-#include <fcntl.h>
-#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -16,6 +14,7 @@
 #include <utility>
 
 #include "stream/base/error.h"
+#include "stream/base/os.h"
 #include "stream/base/threads.h"
 
 namespace curvisplat {
@@ -144,18 +143,11 @@ std::filesystem::path folderOfMesasCache() {
 
 /// True if that cannot be tried.
 bool hasRoomForMesasCache() {
-  constexpr off_t kBytes = off_t{4} << 20;  // its index takes 1.3 MB
+  constexpr uint64_t kBytes = uint64_t{4} << 20;  // its index takes 1.3 MB
   std::filesystem::path folder = folderOfMesasCache();
-  int file = -1;
-  do {
-    file = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
-    if (file >= 0 || errno != ENOENT) break;
-    folder = folder.parent_path();
-  } while (folder.has_relative_path());
-  if (file < 0) return errno != ENOSPC && errno != EDQUOT;
-  const int error = ::posix_fallocate(file, 0, kBytes);
-  ::close(file);
-  return error != ENOSPC && error != EDQUOT;
+  std::error_code error;
+  while (folder.has_relative_path() && !std::filesystem::exists(folder, error)) folder = folder.parent_path();
+  return os::hasRoom(folder, kBytes);
 }
 
 }  // namespace

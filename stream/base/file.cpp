@@ -14,6 +14,7 @@
 
 #include "stream/base/disk_space.h"
 #include "stream/base/error.h"
+#include "stream/base/os.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -29,10 +30,10 @@ std::string reason() {
   return std::strerror(errno);
 }
 
-/// openRetrying() with O_DIRECT for Caching::kDirect, and without it where the file system refuses the flag.
+/// openRetrying() with the flag for direct transfers for Caching::kDirect, and without it where the file system refuses the flag.
 int openWith(Caching caching, const std::filesystem::path& path, int flags, unsigned mode) {
   if (caching == Caching::kDirect) {
-    const int fd = openRetrying(path, flags | O_DIRECT, mode);
+    const int fd = openRetrying(path, flags | os::directFlag(), mode);
     if (fd >= 0 || errno != EINVAL) return fd;
   }
   return openRetrying(path, flags, mode);
@@ -43,7 +44,8 @@ int openWith(Caching caching, const std::filesystem::path& path, int flags, unsi
 bool stoppedBeingDirect(int fd) {
   if (errno != EINVAL) return false;
   const int flags = ::fcntl(fd, F_GETFL);
-  return flags >= 0 && (flags & O_DIRECT) != 0 && ::fcntl(fd, F_SETFL, flags & ~O_DIRECT) == 0;
+  return flags >= 0 && (flags & os::directFlag()) != 0 &&
+         ::fcntl(fd, F_SETFL, flags & ~os::directFlag()) == 0;
 }
 
 /// Throws the error of `file` for a value of errno: DiskFull if there is no space for `what`, otherwise an
@@ -121,7 +123,7 @@ int SystemCalls::rename(const char* from, const char* to) {
   return std::rename(from, to);
 }
 int SystemCalls::exchange(const char* a, const char* b) {
-  return ::renameat2(AT_FDCWD, a, AT_FDCWD, b, RENAME_EXCHANGE);
+  return os::exchangeNames(a, b);
 }
 int SystemCalls::mkdir(const char* path, unsigned mode) {
   return ::mkdir(path, mode);

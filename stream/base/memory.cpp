@@ -1,11 +1,12 @@
 #include "stream/base/memory.h"
 
-#include <malloc.h>
 #include <sys/mman.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <new>
+
+#include "stream/base/os.h"
 
 namespace curvisplat {
 
@@ -15,16 +16,16 @@ void preferHugePages(void* begin, size_t bytes) {
   const uintptr_t first = (from + kHugePage - 1) / kHugePage * kHugePage,
                   end = (from + bytes) / kHugePage * kHugePage;
   if (first >= end) return;
-  madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
+  os::adviseHugePages(reinterpret_cast<void*>(first), end - first);
 }
 
 void returnFreedMemory(size_t large) {
-  mallopt(M_MMAP_THRESHOLD, static_cast<int>(large));
-  malloc_trim(0);
+  os::returnBlocksFrom(large);
+  os::trimHeap();
 }
 
 void limitHeaps(int most) {
-  mallopt(M_ARENA_MAX, most);
+  os::limitHeaps(most);
 }
 
 void requireSpareMemory() {

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 
+#include "stream/base/os.h"
+
 namespace curvisplat {
 namespace {
 
@@ -14,10 +16,10 @@ fs::path thisFile() {
   Dl_info info{};
   std::error_code error;
   if (::dladdr(reinterpret_cast<const void*>(&openPlugin), &info) == 0 || !info.dli_fname) return {};
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path program = os::programFile();
   // Of a program, dladdr() gives the name that it was called by.
   const fs::path file = fs::canonical(info.dli_fname, error);
-  return file.extension() == ".so" ? file : program;
+  return file.extension() == ".so" || program.empty() ? file : program;
 }
 
 }  // namespace

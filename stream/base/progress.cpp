@@ -2,19 +2,12 @@
 
 #include <time.h>
 
-#include <fstream>
 #include <string>
+
+#include "stream/base/os.h"
 
 namespace curvisplat {
 namespace {
-
-/// The number after `key` in a file of lines "key: number"; 0 if the key is missing.
-uint64_t numberIn(const char* path, const std::string& key) {
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);)
-    if (line.starts_with(key)) return std::stoull(line.substr(key.size()));
-  return 0;
-}
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -27,10 +20,11 @@ ProcessUsage ProcessUsage::now() {
   ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
   ProcessUsage usage;
   usage.cpu_seconds = static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-  usage.bytes_read = numberIn("/proc/self/io", "rchar:");
-  usage.bytes_written = numberIn("/proc/self/io", "wchar:");
-  usage.memory_bytes = 1024 * numberIn("/proc/self/status", "VmRSS:");
-  usage.peak_memory_bytes = 1024 * numberIn("/proc/self/status", "VmHWM:");
+  const os::ProcessNumbers numbers = os::processNumbers();
+  usage.bytes_read = numbers.bytes_read;
+  usage.bytes_written = numbers.bytes_written;
+  usage.memory_bytes = numbers.memory_bytes;
+  usage.peak_memory_bytes = numbers.peak_memory_bytes;
   return usage;
 }
 

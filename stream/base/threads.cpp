@@ -1,15 +1,14 @@
 #include "stream/base/threads.h"
 
-#include <pthread.h>
-
 #include <utility>
 
 #include "stream/base/error.h"
+#include "stream/base/os.h"
 
 namespace curvisplat {
 
 void nameThisThread(const char* name) {
-  pthread_setname_np(pthread_self(), name);
+  os::nameThread(name);
 }
 
 WorkerTeam::WorkerTeam(unsigned count, const char* name) {

@@ -1,8 +1,7 @@
 #include "stream/base/trace.h"
 
 #include <fmt/format.h>
-#include <pthread.h>
-#include <unistd.h>
+#include <time.h>
 
 #include <algorithm>
 #include <array>
@@ -18,6 +17,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
+#include "stream/base/os.h"
 
 namespace curvisplat {
 namespace {
@@ -40,11 +40,9 @@ int64_t now(clockid_t clock) {
 
 /// TBB's threads have no name of their own: they have the program's.
 std::string nameOfThisThread() {
-  if (gettid() == getpid()) return "main";
-  std::array<char, 16> name{};
-  pthread_getname_np(pthread_self(), name.data(), name.size());
-  const std::string found = name.data();
-  return found == "curvisplat" ? "tbb" : found;
+  if (os::isMainThread()) return "main";
+  const std::string found = os::threadName();
+  return found == "curvisplat" || found.empty() ? "tbb" : found;
 }
 
 std::string argumentsOf(const TraceNumbers& numbers) {
@@ -166,7 +164,7 @@ class ThreadEvents {
   }
 
  private:
-  const int thread_ = gettid();
+  const int thread_ = os::threadNumber();
   const std::string name_ = nameOfThisThread();
   Mutex mutex_;
   std::vector<Event> events_ GUARDED_BY(mutex_);

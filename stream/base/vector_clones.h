@@ -4,7 +4,7 @@
 #pragma once
 
 // The choice is made while the program is loaded, when the runtimes of sanitizers are not there yet.
-#if defined(CURVISPLAT_SANITIZED) || !defined(__x86_64__)
+#if defined(CURVISPLAT_SANITIZED) || !defined(__x86_64__) || !defined(__ELF__)
 #define CURVISPLAT_VECTOR_CLONES
 #else
 #define CURVISPLAT_VECTOR_CLONES [[gnu::target_clones("avx2", "default")]]

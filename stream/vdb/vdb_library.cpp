@@ -9,6 +9,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
+#include "stream/base/os.h"
 #include "stream/base/plugin.h"
 
 namespace curvisplat {
@@ -46,17 +47,19 @@ void requireThreadsOfLibrary() {
 
 // The library has 70,000 symbols to look up, of which most are its own. Found there first, and not in each of the program's 80 libraries,
 // they take half the time: 35 ms instead of 75. Sanitizers do not allow it.
+int ownSymbolsFirst() {
 #ifdef CURVISPLAT_SANITIZED
-constexpr int kOwnSymbolsFirst = 0;
+  return 0;
 #else
-constexpr int kOwnSymbolsFirst = RTLD_DEEPBIND;
+  return os::ownSymbolsFirst();
 #endif
+}
 
 const VdbFunctions& loadFunctions() {
   requireThreadsOfLibrary();
   constexpr const char* kName = "curvisplat-vdb.so";
   std::string why_not;
-  void* const module = openPlugin(kName, RTLD_NOW | RTLD_LOCAL | kOwnSymbolsFirst, why_not);
+  void* const module = openPlugin(kName, RTLD_NOW | RTLD_LOCAL | ownSymbolsFirst(), why_not);
   using Entry = const VdbFunctions* (*)(const char*);
   const auto entry = module ? reinterpret_cast<Entry>(::dlsym(module, "curvisplatVdb")) : nullptr;
   const VdbFunctions* const functions = entry ? entry(CURVISPLAT_VERSION) : nullptr;

@@ -18,6 +18,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/partial_folder.h"
 #include "tools/commands/conversion_report.h"
+#include "tools/commands/folder_events.h"
 #include "tools/commands/written_files.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/frame_sequence.h"

@@ -1,6 +1,5 @@
 // Follows the files of a running simulation (`convert --follow`): WrittenFiles finds the steps that have
-// been written and are not converted yet, and FolderEvents waits until files appear or change. Each look
-// lists the folders. One thread at a time may use an object.
+// been written and are not converted yet. Each look lists the folders. One thread at a time may use an object.
 #pragma once
 
 #include <chrono>
@@ -52,28 +51,6 @@ class WrittenFiles {
   std::set<std::string> done_;   // names of steps
   bool begins_at_last_ = false;  // of those that are done
   std::chrono::milliseconds until_next_{0};
-};
-
-/// Waits for files to appear or change in folders, by inotify. Where the system does not report changes
-/// (network file systems, too few watches, a folder that does not exist yet), wait() returns after a quarter
-/// of a second.
-class FolderEvents {
- public:
-  explicit FolderEvents(std::vector<std::filesystem::path> folders);
-  ~FolderEvents();
-  FolderEvents(const FolderEvents&) = delete;
-  FolderEvents& operator=(const FolderEvents&) = delete;
-
-  /// Waits for a change that no earlier call has seen, or for `longest`. It may return without a change.
-  /// Throws Interrupted after progress.stop().
-  void wait(std::chrono::milliseconds longest, const Progress& progress);
-
- private:
-  void watch();
-  void close();
-
-  const std::vector<std::filesystem::path> folders_;
-  int queue_ = -1;  // of inotify; -1: look from time to time
 };
 
 }  // namespace curvisplat

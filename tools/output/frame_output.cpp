@@ -21,6 +21,7 @@
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/os.h"
 #include "stream/base/trace.h"
 #include "tools/output/picture_page.h"
 
@@ -93,9 +94,9 @@ bool isGifName(const std::filesystem::path& path) {
 MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s)
     : unfinished_(writableTarget(path)), size_(size), pixels_(3 * size.pixels()) {
   // Sockets instead of a pipe: writing to a process that has ended is then an error, not SIGPIPE.
-  int ends[2] = {-1, -1};
-  errors_ = memfd_create("ffmpeg", MFD_CLOEXEC);
-  if (errors_ < 0 || socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
+  std::array<int, 2> ends{-1, -1};
+  errors_ = os::openInMemory("ffmpeg");
+  if (errors_ < 0 || os::connectSockets(ends) != 0) {
     const int error = errno;
     if (errors_ >= 0) close(errors_);
     failToStart(path, error);
@@ -170,7 +171,7 @@ void MovieWriter::append(const Image& image) {
   for (size_t n = 0; n < size_.pixels(); ++n)
     for (size_t c = 0; c < 3; ++c) pixels_[3 * n + c] = toByte(image.rgba[4 * n + c]);
   for (size_t sent = 0; sent < pixels_.size();) {
-    const ssize_t count = send(input_, pixels_.data() + sent, pixels_.size() - sent, MSG_NOSIGNAL);
+    const ssize_t count = os::sendQuietly(input_, pixels_.data() + sent, pixels_.size() - sent);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) fail(wait());
     sent += static_cast<size_t>(count);

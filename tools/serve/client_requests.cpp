@@ -1,7 +1,6 @@
 #include "tools/serve/client_requests.h"
 
 #include <fmt/format.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <boost/asio/ip/address.hpp>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/json_document.h"
+#include "stream/base/os.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -43,7 +43,7 @@ std::string_view hostIn(std::string_view host) {
 
 std::string newToken() {
   std::array<unsigned char, 16> bytes{};
-  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+  if (!os::fillRandom(bytes))
     throw Error("the kernel gave no random numbers for a token; give one with --token-file");
   return fmt::format("{:02x}", fmt::join(bytes, ""));
 }

@@ -1,7 +1,5 @@
 #include "tools/serve/server.h"
 
-#include <malloc.h>
-
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -14,6 +12,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
+#include "stream/base/os.h"
 #include "stream/base/threads.h"
 #include "tools/serve/connection.h"
 
@@ -64,7 +63,7 @@ class ViewerCloser {
       viewers_.pop_front();
       lock.unlock();
       viewer.reset();
-      malloc_trim(0);  // what it has freed is the system's again
+      os::trimHeap();  // what it has freed is the system's again
       ended_();
       lock.lock();
     }

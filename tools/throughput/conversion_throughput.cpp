@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -14,6 +13,7 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "stream/base/error.h"
+#include "stream/base/os.h"
 #include "stream/base/progress.h"
 #include "tools/throughput/machine.h"
 #include "tools/throughput/measurements.h"
@@ -63,14 +63,6 @@ void checkSpace(const fs::path& folder, uint64_t nodes) {
         folder.string(), nodes, space.available >> 20, needed >> 20);
 }
 
-/// Resets the peak memory of this process. False where the system does not allow it.
-bool resetPeakMemory() {
-  std::ofstream file("/proc/self/clear_refs");
-  file << "5\n";
-  file.close();
-  return !file.fail();
-}
-
 struct Run {
   double seconds = 0;
   std::vector<Progress::Phase> phases;
@@ -108,7 +100,7 @@ void addRuns(const std::vector<Run>& runs, const ConversionReport& report, Measu
   if (report.peak_memory_bytes > 0)
     to.add(prefix + "peak_memory", "B", std::move(peaks));
   else
-    to.leaveOut(prefix + "peak_memory", "the peak memory cannot be reset through /proc/self/clear_refs");
+    to.leaveOut(prefix + "peak_memory", "the peak memory cannot be reset on this system");
   to.add(prefix + "temporary", "B", {static_cast<double>(report.last.temporary_bytes)});
   double cache_bytes = 0;
   for (const FileReport& file : report.last.files) cache_bytes += static_cast<double>(file.bytes);
@@ -160,7 +152,7 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
       if (report.cold) to.leaveOut("conversion/cold", *reason);
       report.cold = false;
     }
-    peaks = resetPeakMemory() && peaks;
+    peaks = os::resetPeakMemory() && peaks;
     runs.push_back(convertOnce(*source, options, progress, report.last));
     spent_s += runs.back().seconds;
   }

@@ -131,7 +131,7 @@ class CacheFiles {
 
   /// Reads the parts into the page cache. Returns nullopt if they are all there afterwards, else the
   /// reason.
-  std::optional<std::string> makeWarm() const {
+  std::optional<std::string> makeWarm() const try {
     std::vector<std::byte> piece(1 << 20);
     for (const FilePart& part : parts_) {
       const InputFile file(part.file->path());
@@ -143,6 +143,8 @@ class CacheFiles {
                            residence.resident, residence.pages, part.file->path().filename().string());
     }
     return std::nullopt;
+  } catch (const ResidenceUnknown& error) {
+    return error.what();
   }
 
  private:

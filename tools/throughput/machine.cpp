@@ -1,8 +1,6 @@
 #include "tools/throughput/machine.h"
 
-#include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/statfs.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 #include <nlohmann/json.hpp>
@@ -10,42 +8,22 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/os.h"
 #include "stream/paging/async_reads.h"
 
 namespace curvisplat {
-namespace {
-
-/// The value of the first line "key : value" of a file of /proc; empty if there is none.
-std::string valueIn(const char* path, const std::string& key) {
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
-    if (!line.starts_with(key)) continue;
-    const size_t colon = line.find(':');
-    const size_t begin = line.find_first_not_of(" \t", colon + 1);
-    if (colon != std::string::npos && begin != std::string::npos) return line.substr(begin);
-  }
-  return {};
-}
-
-uint64_t kibibytesIn(const std::string& key) {
-  const std::string value = valueIn("/proc/meminfo", key);
-  return value.empty() ? 0 : 1024 * std::stoull(value);
-}
-
-}  // namespace
-
 Machine Machine::here(const std::filesystem::path& folder) {
   Machine machine;
-  machine.processor = valueIn("/proc/cpuinfo", "model name");
+  machine.processor = os::processorName();
   machine.cores = std::max(1u, std::thread::hardware_concurrency());
-  machine.memory_bytes = kibibytesIn("MemTotal");
+  machine.memory_bytes = machineMemory();
   utsname name{};
   if (::uname(&name) == 0) machine.system = std::string(name.sysname) + " " + name.release;
   machine.file_system = fileSystemOf(folder);
@@ -61,7 +39,7 @@ nlohmann::ordered_json Machine::toJson() const {
 }
 
 uint64_t availableMemory() {
-  return kibibytesIn("MemAvailable");
+  return os::availableMemory();
 }
 
 namespace {
@@ -101,25 +79,24 @@ PageResidence residenceOf(const std::filesystem::path& path, uint64_t offset, ui
   CURVISPLAT_CHECK_OP(offset % page, ==, 0u);
   const DirectFile file(path, false);
   const Mapping mapping(file, offset, bytes);
-  std::vector<unsigned char> resident((bytes + page - 1) / page);
-  if (::mincore(mapping.at(), bytes, resident.data()) != 0)
-    throw Error("{}: mincore failed: {}", path.string(), std::strerror(errno));
-  const auto in_memory =
-      std::count_if(resident.begin(), resident.end(), [](unsigned char flags) { return flags & 1; });
-  return {resident.size(), static_cast<uint64_t>(in_memory)};
+  const std::optional<uint64_t> resident = os::residentPages(mapping.at(), bytes);
+  if (!resident)
+    throw ResidenceUnknown("{}: the system does not tell which pages are in memory: {}", path.string(),
+                           std::strerror(errno));
+  return {(bytes + page - 1) / page, *resident};
 }
 
 PageResidence residenceOf(const std::filesystem::path& path) {
   return residenceOf(path, 0, std::filesystem::file_size(path));
 }
 
-std::optional<std::string> dropPages(std::span<const std::filesystem::path> files) {
+std::optional<std::string> dropPages(std::span<const std::filesystem::path> files) try {
   for (const std::filesystem::path& path : files) {
     {
       const DirectFile file(path, false);
       // Unwritten pages cannot be evicted, hence the sync. mincore shows below whether both calls worked.
       SystemCalls::current().fsync(file.bufferedFd());
-      ::posix_fadvise(file.bufferedFd(), 0, 0, POSIX_FADV_DONTNEED);
+      os::evictPages(file.bufferedFd());
     }
     const PageResidence left = residenceOf(path);
     if (left.resident == 0) continue;
@@ -130,16 +107,16 @@ std::optional<std::string> dropPages(std::span<const std::filesystem::path> file
                                                : "another program uses them, or another user owns the file");
   }
   return std::nullopt;
+} catch (const ResidenceUnknown& error) {
+  return error.what();
 }
 
 std::string fileSystemOf(const std::filesystem::path& path) {
-  struct statfs status {};
-  if (::statfs(path.c_str(), &status) != 0)
-    throw Error("{}: cannot determine its file system: {}", path.string(), std::strerror(errno));
-  const auto magic = static_cast<uint64_t>(status.f_type) & 0xFFFFFFFF;
+  const int64_t found = os::fileSystemNumber(path.c_str());
+  if (found < 0) throw Error("{}: cannot determine its file system: {}", path.string(), std::strerror(errno));
   for (const auto& [number, name] : kFileSystems)
-    if (number == magic) return name;
-  return fmt::format("file system {:#x}", magic);
+    if (number == static_cast<uint64_t>(found)) return name;
+  return fmt::format("file system {:#x}", found);
 }
 
 bool isInMemory(const std::string& file_system) {

@@ -24,8 +24,14 @@ struct Machine {
   nlohmann::ordered_json toJson() const;
 };
 
-/// MemAvailable of /proc/meminfo in bytes; 0 if unknown.
+/// Memory that programs can have without swapping, in bytes; 0 if unknown.
 uint64_t availableMemory();
+
+/// The system does not tell which pages of a file are in the page cache.
+class ResidenceUnknown : public Error {
+ public:
+  using Error::Error;
+};
 
 /// How many of a file's pages are in the page cache.
 struct PageResidence {

@@ -1,6 +1,5 @@
 #include "tools/view/background_jobs.h"
 
-#include <sys/resource.h>
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "stream/base/mutex.h"
+#include "stream/base/os.h"
 #include "stream/base/threads.h"
 
 namespace curvisplat {
@@ -59,11 +59,6 @@ class BackgroundThreads {
   std::vector<std::thread> threads_;
 };
 
-/// Lowers the priority of the calling thread and of those that it starts: on Linux each thread has its own.
-void lowerPriority(int nice) {
-  setpriority(PRIO_PROCESS, 0, nice);
-}
-
 // All places are reserved for threads that call execute(), so that none is left for TBB's own.
 BackgroundThreads::BackgroundThreads(int nice)
     : nice_(nice),
@@ -75,7 +70,7 @@ BackgroundThreads::BackgroundThreads(int nice)
     for (tbb::task_group& its_end : ends_)
       threads_.emplace_back([this, &its_end] {
         nameThisThread("background");
-        lowerPriority(nice_);
+        os::lowerThreadPriority(nice_);
         arena_.execute([&its_end] { its_end.wait(); });
       });
   } catch (...) {  // there is no thread to be had
@@ -95,7 +90,7 @@ void BackgroundThreads::end() {
 }
 
 void BackgroundThreads::run(const std::function<void()>& work) {
-  lowerPriority(nice_);
+  os::lowerThreadPriority(nice_);
   arena_.execute(work);
 }
 

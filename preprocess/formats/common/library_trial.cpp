@@ -1,8 +1,6 @@
 #include "preprocess/formats/common/library_trial.h"
 
 #include <fcntl.h>
-#include <malloc.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -14,7 +12,6 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <set>
@@ -26,6 +23,7 @@
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "stream/base/error.h"
+#include "stream/base/os.h"
 
 namespace curvisplat {
 namespace {
@@ -336,10 +334,9 @@ constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
 /// Lets this process allocate `bytes` more: a damaged file may state a chunk of gigabytes.
 void limitFurtherMemory([[maybe_unused]] rlim_t bytes) {
 #ifndef CURVISPLAT_SANITIZED
-  rlim_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  if (pages == 0) return;
-  const rlim_t most = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + bytes;
+  const rlim_t used = os::addressSpaceBytes();
+  if (used == 0) return;
+  const rlim_t most = used + bytes;
   const rlimit limit{most, most};
   ::setrlimit(RLIMIT_AS, &limit);
 #endif
@@ -353,7 +350,7 @@ struct TrialLimits {
 /// A process that has nobody's handlers, prints nothing, and ends with its parent.
 [[noreturn]] void runTrial(const std::function<void()>& work, TrialLimits limits, pid_t parent) {
   in_trial = true;
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  os::endWithParent();
   if (::getppid() != parent) ::_exit(0);
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGPIPE})
     std::signal(signal, SIG_DFL);
@@ -365,7 +362,7 @@ struct TrialLimits {
   ::setrlimit(RLIMIT_CPU, &seconds);
   limitFurtherMemory(limits.bytes);
   // What is freed or used without having been set is junk: it crashes here rather than later.
-  mallopt(M_PERTURB, 0xa5);
+  os::junkFreedMemory();
   try {
     work();
   } catch (const std::exception&) {
