@@ -14,6 +14,7 @@
 
 #include "stream/base/disk_space.h"
 #include "stream/base/error.h"
+#include "stream/base/mirror.h"
 #include "stream/base/os.h"
 #include "stream/base/text.h"
 
@@ -102,12 +103,23 @@ std::filesystem::path writableTarget(const std::filesystem::path& path) {
 }
 
 int SystemCalls::open(const char* path, int flags, unsigned mode) {
-  return ::open(path, flags, mode);
+  if (const int error = MirrorCalls::prepare(path, flags)) {
+    errno = error;
+    return -1;
+  }
+  const int fd = ::open(path, flags, mode);
+  if (fd >= 0) MirrorCalls::opened(fd, path, flags);
+  return fd;
 }
 int SystemCalls::close(int fd) {
+  MirrorCalls::closed(fd);
   return ::close(fd);
 }
 ssize_t SystemCalls::pread(int fd, void* to, size_t count, int64_t offset) {
+  if (const int error = MirrorCalls::read(fd, static_cast<uint64_t>(offset), count)) {
+    errno = error;
+    return -1;
+  }
   return ::pread(fd, to, count, offset);
 }
 ssize_t SystemCalls::pwrite(int fd, const void* from, size_t count, int64_t offset) {

@@ -8,6 +8,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/memory.h"
+#include "stream/base/mirror.h"
 #include "stream/cache/cache_format.h"
 
 namespace curvisplat {
@@ -267,6 +268,7 @@ fs::path cacheFile(const fs::path& cache, const std::string& name) {
 
 fs::path cacheFolder(const fs::path& cache, const std::string& name) {
   fs::path path = cache / name;
+  expectMirroredFolder(path);
   std::error_code error;
   if (!fs::is_directory(fs::symlink_status(path, error)))
     throw Error("{}: is not a directory of the cache's own; the cache is damaged: convert again",

@@ -11,6 +11,7 @@
 
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/mirror.h"
 #include "stream/base/text.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/partial_folder.h"
@@ -277,6 +278,7 @@ std::vector<std::string> cachesBeside(const fs::path& cache) {
 }  // namespace
 
 Manifest readManifest(const fs::path& cache) {
+  expectMirroredFile(cache / "manifest.json");
   if (!fs::exists(cache)) {
     if (hasUnfinished(cache))
       throw Error("{}: its conversion is unfinished; repeat the convert command with --resume to continue it",

@@ -13,6 +13,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/mirror.h"
 #include "stream/base/mutex.h"
 #include "stream/base/os.h"
 #include "stream/base/threads.h"
@@ -25,7 +26,8 @@ DirectFile::DirectFile(std::filesystem::path path, bool direct) : path_(std::mov
   if (buffered_fd_ < 0)
     throw Error("{}: cannot be opened for reading: {}", path_.string(), std::strerror(errno));
   os::expectRandomReads(buffered_fd_);
-  if (direct && os::directFlag() != 0) direct_fd_ = openRetrying(path_, O_RDONLY | os::directFlag());
+  if (direct && os::directFlag() != 0 && !isMirrored(path_))
+    direct_fd_ = openRetrying(path_, O_RDONLY | os::directFlag());
 }
 
 DirectFile::~DirectFile() {

@@ -7,6 +7,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/mirror.h"
 #include "stream/base/threads.h"
 #include "stream/cache/cache_format.h"
 
@@ -24,10 +25,12 @@ BrickExtents extentsOf(const CacheReader& cache, const ReadVariables& variables,
           variables.second ? cache.brickVariables(*variables.second)[brick].values : Extent{}};
 }
 
-std::unique_ptr<AsyncReads> makeReads(const PagerOptions& options) {
+/// `file`: one of those to be read.
+std::unique_ptr<AsyncReads> makeReads(const PagerOptions& options, const std::filesystem::path& file) {
   using Way = PagerOptions::Way;
   if (options.reads) return options.reads(options.queue_depth);
-  if (options.way != Way::kThreads && (SystemCalls::areReal() || options.way == Way::kIoUring)) {
+  if (options.way != Way::kThreads && !isMirrored(file) &&
+      (SystemCalls::areReal() || options.way == Way::kIoUring)) {
     if (auto reads = makeUringReads(options.queue_depth)) return reads;
     if (options.way == Way::kIoUring) throw Error("this system refuses io_uring");
   }
@@ -63,7 +66,7 @@ BrickPager::BrickPager(const CacheReader& cache, const ReadVariables& variables,
                  ? std::make_unique<DirectFile>(cache.valuesPath(*variables.second), options.direct)
                  : nullptr},
       buffer_(static_cast<std::byte*>(std::aligned_alloc(kPageBytes, capacity_))),
-      reads_(makeReads(options)),
+      reads_(makeReads(options, cache.geometryPath())),
       under_way_(depth_) {
   CURVISPLAT_CHECK_OP(depth_, >=, 1u);
   if (!buffer_) throw std::bad_alloc();

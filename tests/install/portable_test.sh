@@ -43,7 +43,7 @@ for each in "$program" "$portable"; do
   name=$([[ $each == "$program" ]] && echo own || echo portable)
   mkdir "$folder/$name"
   quietly "$each" generate half-annulus --size 40x24x24 --output "$folder/$name/grid"
-  quietly "$each" convert "$folder/$name/grid.xyz" --output "$folder/$name/cache.splats"
+  quietly "$each" convert "$folder/$name/grid.xyz" "$folder/$name/grid.fun" --output "$folder/$name/cache.splats"
   quietly "$each" render "$folder/$name/cache.splats" --size 200x150 -o "$folder/$name/picture.png"
   quietly "$each" info "$folder/$name/cache.splats" --verify
 done

@@ -171,6 +171,7 @@ py::tuple probedArrays(const std::vector<const CacheReader*>& sets,
   std::vector<std::string> names;
   PointSource from;
   const PointSource* const exact = source ? &from : nullptr;
+  std::optional<py::gil_scoped_release> unlocked(std::in_place);
   if (source) setSource(*sets.front(), *source, from.grid);
   std::vector<CacheReader> at_step;
   at_step.reserve(sets.size());
@@ -185,6 +186,7 @@ py::tuple probedArrays(const std::vector<const CacheReader*>& sets,
     for (const VariableInfo& variable : set->manifest().variables) names.push_back(variable.name);
   }
   const auto found = sets.size() == 1 ? std::move(of_sets.front().found) : joinedValues(of_sets);
+  unlocked.reset();
   const auto count = static_cast<py::ssize_t>(at.size());
   py::array_t<uint32_t> block(count);
   py::array_t<uint64_t> index({count, py::ssize_t{3}});

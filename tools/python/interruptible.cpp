@@ -87,6 +87,21 @@ void visitPython(const py::object& report, LatestState& latest) {
     report(state->phase, state->done + state->skipped, state->total, state->unit);
 }
 
+/// Never destroyed: the interpreter may have ended before static objects are.
+py::object& interruptHook() {
+  static py::object& hook = *new py::object;
+  return hook;
+}
+
+void callInterruptHook() {
+  if (!interruptHook()) return;
+  try {
+    interruptHook()();
+  } catch (py::error_already_set&) {
+    // What has stopped the work is reported.
+  }
+}
+
 void run(const py::object& report, const std::function<void(Progress&)>& work) {
   LatestState latest;
   Progress progress([&](const Progress::State* state) { latest.set(state); });
@@ -105,13 +120,14 @@ void run(const py::object& report, const std::function<void(Progress&)>& work) {
       visitPython(report, latest);
     } catch (py::error_already_set& error) {
       raised.emplace(error);
+      callInterruptHook();
       progress.stop(SIGINT);
     }
   }
   try {
     done.get();
-  } catch (const Interrupted&) {
-    if (!raised) throw;
+  } catch (const std::exception&) {
+    if (!raised) throw;  // else it was stopped
   }
   if (raised) throw *raised;
 }
@@ -124,6 +140,10 @@ CountedWork::CountedWork(Progress* progress) : progress_(progress) {
 
 CountedWork::~CountedWork() {
   allWork().remove(progress_);
+}
+
+void setInterruptHook(py::object hook) {
+  interruptHook() = std::move(hook);
 }
 
 void endAllWork() {

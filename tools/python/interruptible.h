@@ -20,6 +20,9 @@ void runInterruptibly(const pybind11::object& report, const std::function<void(P
 /// thread that asked for the lock later would be ended by Python within a function of ours, which C++ takes for an error.
 void endAllWork();
 
+/// Called in the thread of work that Python stops, so that it need not wait for others.
+void setInterruptHook(pybind11::object hook);
+
 /// Work of the calling thread, as endAllWork() counts it.
 class CountedWork {
  public:

@@ -31,6 +31,7 @@
 #include "tools/python/cache_arrays.h"
 #include "tools/python/interruptible.h"
 #include "tools/python/open_cache.h"
+#include "tools/python/remote_folder.h"
 
 namespace py = pybind11;
 
@@ -55,11 +56,24 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
   return out;
 }
 
+/// OpenCache::withScalar(), which may read files, without the interpreter's lock.
+OpenCache& withScalar(OpenCache& cache, const std::string& name) {
+  const py::gil_scoped_release unlocked;
+  return cache.withScalar(name);
+}
+
+/// Opens the caches of scalars with blanks of their own.
+void openOwnBlanks(OpenCache& cache) {
+  const py::gil_scoped_release unlocked;
+  for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n) cache.ownBlanks(n);
+}
+
 /// `function`, `camera`, `frame`: text by option; `others`: lists, flags and numbers.
 py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
                  const py::dict& others, const py::object& progress) {
   const PictureArguments arguments = pictureArguments(function, camera, frame, others);
-  const DrawnPicture picture = cache.withScalar(arguments.scalar.scalar).render(arguments, progress);
+  OpenCache& drawn = withScalar(cache, arguments.scalar.scalar);
+  const DrawnPicture picture = drawn.render(arguments, progress);
   return py::make_tuple(picture.rgba, picture.chosen, picture.notes, picture.warnings, picture.channels,
                         statisticsOf(picture.statistics));
 }
@@ -70,6 +84,7 @@ py::list scalarsOf(OpenCache& cache) {
     for (const VariableInfo& variable : manifest.variables)
       out.append(py::make_tuple(variable.name, variable.unit, variable.min, variable.max));
   };
+  openOwnBlanks(cache);
   add(cache.reader().manifest());
   for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n)
     add(cache.ownBlanks(n).reader().manifest());
@@ -80,6 +95,11 @@ std::array<double, 3> arrayOf(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
 }
 
+std::unique_ptr<OpenCache> opened(const std::filesystem::path& path, std::shared_ptr<void> mirror) {
+  const py::gil_scoped_release unlocked;
+  return std::make_unique<OpenCache>(CacheReader(path), std::move(mirror));
+}
+
 std::vector<double> timesOf(const OpenCache& cache) {
   std::vector<double> times;
   for (const SeriesStep& step : cache.reader().series().steps) times.push_back(step.time);
@@ -88,7 +108,7 @@ std::vector<double> timesOf(const OpenCache& cache) {
 
 std::vector<double> histogramOfCache(OpenCache& whole, const std::string& scalar,
                                      const std::pair<double, double>& range, bool log, size_t bins) {
-  OpenCache& cache = whole.withScalar(scalar);
+  OpenCache& cache = withScalar(whole, scalar);
   const auto busy = cache.use();
   const CountedWork counted(nullptr);
   const py::gil_scoped_release released;
@@ -130,6 +150,7 @@ py::tuple orbitedCamera(const std::array<double, 3>& position, const std::array<
 py::tuple probeAt(OpenCache& cache, const std::vector<std::array<double, 3>>& points,
                   const std::optional<std::vector<std::filesystem::path>>& source) {
   const auto busy = cache.use();
+  openOwnBlanks(cache);
   std::vector<const CacheReader*> sets{&cache.reader()};
   for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n)
     sets.push_back(&cache.ownBlanks(n).reader());
@@ -139,12 +160,12 @@ py::tuple probeAt(OpenCache& cache, const std::vector<std::array<double, 3>>& po
 py::tuple sample(OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,
                  const py::object& progress) {
   const auto busy = cache.use();
-  return sampledArrays(cache.withScalar(choice.scalar).reader(), choice, size, progress);
+  return sampledArrays(withScalar(cache, choice.scalar).reader(), choice, size, progress);
 }
 
 py::tuple points(OpenCache& cache, const DataChoice& choice, const py::object& progress) {
   const auto busy = cache.use();
-  return pointArrays(cache.withScalar(choice.scalar).reader(), choice, progress);
+  return pointArrays(withScalar(cache, choice.scalar).reader(), choice, progress);
 }
 
 /// 1 where it is not given.
@@ -388,9 +409,15 @@ PYBIND11_MODULE(_core, module) {
                        const std::array<double, 3>& upper, std::optional<uint32_t> level, uint64_t step) {
         return DataChoice{scalar, lower, upper, level, step};
       }));
+  module.def("set_interrupt_hook", &setInterruptHook);
+  py::class_<RemoteFolder, std::shared_ptr<RemoteFolder>>(module, "RemoteFolder")
+      .def(py::init<const std::filesystem::path&, py::object>())
+      .def_property_readonly("path", [](const RemoteFolder& folder) { return folder.path().string(); })
+      .def_property_readonly("fetched_bytes", &RemoteFolder::fetchedBytes);
   py::class_<OpenCache>(module, "OpenCache")
+      .def(py::init([](const std::filesystem::path& path) { return opened(path, nullptr); }))
       .def(py::init(
-          [](const std::filesystem::path& path) { return std::make_unique<OpenCache>(CacheReader(path)); }))
+          [](const std::shared_ptr<RemoteFolder>& folder) { return opened(folder->path(), folder); }))
       .def("render", &render)
       .def("release", &OpenCache::release)
       .def("probe", &probeAt)

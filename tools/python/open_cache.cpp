@@ -174,7 +174,16 @@ std::vector<std::string> warningsOf(const PictureArguments& arguments, const Ima
 
 }  // namespace
 
-OpenCache::OpenCache(CacheReader reader) : process_(::getpid()), reader_(std::move(reader)) {}
+OpenCache::OpenCache(CacheReader reader, std::shared_ptr<void> mirror)
+    : mirror_(std::move(mirror)), process_(::getpid()), reader_(std::move(reader)) {}
+
+/// Gives up the interpreter's lock meanwhile: threads that still read may need it (Mirror).
+void OpenCache::endPlayer() {
+  if (!player_) return;
+  std::optional<py::gil_scoped_release> unlocked;
+  if (PyGILState_Check() != 0) unlocked.emplace();
+  player_.reset();
+}
 
 OpenCache& OpenCache::ownBlanks(size_t set) {
   std::unique_ptr<OpenCache>& cache = own_blanks_[set];
@@ -189,7 +198,10 @@ OpenCache& OpenCache::withScalar(const std::string& name) {
 
 OpenCache::~OpenCache() {
   // The player would wait for threads that only its own process has.
-  if (::getpid() != process_) player_.release();
+  if (::getpid() != process_)
+    player_.release();
+  else
+    endPlayer();
 }
 
 OpenCache::Use OpenCache::use() {
@@ -207,7 +219,7 @@ FrameRenderer& OpenCache::rendererOf(const DrawnScalars& scalars, Backend backen
     player_->setTransferFunction(scalars.opacity.function);
     return player_->renderer();
   }
-  player_.reset();  // its memory is given back before the next one takes some
+  endPlayer();  // its memory is given back before the next one takes some
   player_ = std::make_unique<StepPlayer>(reader_, scalars, backend);
   two_scalars_ = scalars.colour.has_value();
   variable_ = variable;
@@ -314,7 +326,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
 void OpenCache::release() {
   const Use in_use = use();
   for (const auto& [set, cache] : own_blanks_) cache->release();
-  player_.reset();
+  endPlayer();
 }
 
 }  // namespace curvisplat::python

@@ -69,7 +69,8 @@ struct HistogramArguments {
 /// which lacks the threads.
 class OpenCache {
  public:
-  explicit OpenCache(CacheReader reader);
+  /// `mirror`: kept as long as the cache, if its files come from elsewhere.
+  explicit OpenCache(CacheReader reader, std::shared_ptr<void> mirror = nullptr);
   ~OpenCache();
   OpenCache(const OpenCache&) = delete;
   OpenCache& operator=(const OpenCache&) = delete;
@@ -102,8 +103,10 @@ class OpenCache {
 
  private:
   void goTo(const StepPosition& position);
+  void endPlayer();
   FrameRenderer& rendererOf(const DrawnScalars& scalars, Backend backend);
 
+  const std::shared_ptr<void> mirror_;                       // first: it goes last
   std::map<size_t, std::unique_ptr<OpenCache>> own_blanks_;  // by their number in the manifest
   const pid_t process_;
   CacheReader reader_;

@@ -6,11 +6,11 @@ import os
 import pathlib
 import tempfile
 import warnings
-from typing import Any, Callable, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from . import _arguments, _core
+from . import _arguments, _core, _remote
 from ._camera import Camera
 from ._function import TransferFunction
 from ._view import View
@@ -140,8 +140,14 @@ def _level(level: Optional[int]) -> Optional[int]:
 class Cache:
     """A splat cache, open for drawing. One thread may draw at a time; `close()` or `with` gives its memory back."""
 
-    def __init__(self, path: Union[str, os.PathLike]):
-        self._core = _core.OpenCache(_arguments.path(path))
+    def __init__(self, path: Union[str, os.PathLike], *, headers: Optional[Mapping[str, str]] = None,
+                 folder: Union[str, os.PathLike, None] = None):
+        if _remote.is_address(path):
+            self._core = _remote.opened(_arguments.path(path), headers, folder)
+        elif headers is not None or folder is not None:
+            raise _core.UsageError("headers and folder are for caches on a server, http://... or https://...")
+        else:
+            self._core = _core.OpenCache(_arguments.path(path))
 
     def __enter__(self) -> "Cache":
         return self
@@ -159,7 +165,7 @@ class Cache:
 
     @property
     def path(self) -> str:
-        """The directory."""
+        """The directory, or the address on a server."""
         return self._core.path
 
     @property
@@ -230,6 +236,8 @@ class Cache:
     def view(self, *, height: int = 600, program: Optional[str] = None) -> View:
         """The cache in a browser or a notebook, to move in: `curvisplat serve` on this machine. A notebook shows the result; its
         `url` is for a browser on this machine. It ends by `close()` or with the interpreter."""
+        if _remote.is_address(self.path):
+            raise _core.UsageError("view: the cache is on a server; copy it to this machine, or run curvisplat serve there")
         return View(self.path, height, program)
 
     @_arguments.in_one_line
@@ -444,6 +452,12 @@ class Cache:
         return picture
 
 
-def open(path: Union[str, os.PathLike]) -> Cache:
-    """Opens a splat cache, a directory NAME.splats. Raises Error if it is none or damaged."""
-    return Cache(path)
+def open(path: Union[str, os.PathLike], *, headers: Optional[Mapping[str, str]] = None,
+         folder: Union[str, os.PathLike, None] = None) -> Cache:
+    """Opens a splat cache, a directory NAME.splats, or its address on a web server that sends parts of files: http://... or https://....
+    Raises Error if it is none or damaged.
+
+    Of a cache on a server, those parts are read that are drawn. They are kept in a temporary directory in `folder` (default: the
+    system's) until the cache is no longer used. headers: sent with each request, such as {"Authorization": "Bearer ..."}.
+    """
+    return Cache(path, headers=headers, folder=folder)

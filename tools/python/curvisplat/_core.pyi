@@ -10,6 +10,13 @@ class UsageError(Error, ValueError): ...
 class DataChoice:
     def __init__(self, scalar: str, lower: Sequence[float], upper: Sequence[float], level: Optional[int], step: int) -> None: ...
 
+def set_interrupt_hook(hook: Callable[[], None]) -> None: ...
+
+class RemoteFolder:
+    path: str
+    fetched_bytes: int
+    def __init__(self, parent: str, fetch: Callable[[str, int, int], Tuple[int, int, bytes]]) -> None: ...
+
 class OpenCache:
     path: str
     title: str
