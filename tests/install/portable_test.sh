@@ -47,7 +47,7 @@ for each in "$program" "$portable"; do
   quietly "$each" render "$folder/$name/cache.splats" --size 200x150 -o "$folder/$name/picture.png"
   quietly "$each" info "$folder/$name/cache.splats" --verify
 done
-for file in cache.splats/bricks.bin cache.splats/index.bin picture.png; do
+for file in cache.splats/{bricks,geometry,var.0,faces}.bin picture.png; do
   cmp "$folder/own/$file" "$folder/portable/$file" || { echo "FAILED: $file differs"; exit 1; }
 done
 echo "converts and draws the same bits without Linux's own calls"

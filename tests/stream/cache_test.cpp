@@ -11,6 +11,7 @@
 #include "stream/cache/partial_folder.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/swapped_names.h"
 #include "tests/support/test_caches.h"
 
 namespace curvisplat {
@@ -345,6 +346,8 @@ TEST(Cache, AnUnwritableOutputIsAnError) {
 
 /// Each write, sync and rename fails in turn: an Error, the old cache as it was, and nothing left behind.
 TEST(Cache, AFullDiskLosesNothing) {
+  if (!namesCanBeSwapped())
+    GTEST_SKIP() << "this build swaps no names: a failure may come too late to be undone";
   const TemporaryFolder folder;
   const fs::path path = folder / "a.splats";
   SmallCache().write(path);

@@ -16,6 +16,7 @@
 #include "stream/base/file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/swapped_names.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -64,6 +65,8 @@ TEST_F(DurableFile, ReplacesWhatIsThereAndFollowsLinks) {
 }
 
 TEST_F(DurableFile, AFailedReplacementKeepsTheOldFile) {
+  if (!namesCanBeSwapped())
+    GTEST_SKIP() << "this build swaps no names: a failure may come too late to be undone";
   constexpr int64_t FaultySystemCalls::*kFaults[] = {&FaultySystemCalls::fail_write_at,
                                                      &FaultySystemCalls::fail_sync_at,
                                                      &FaultySystemCalls::fail_rename_at};

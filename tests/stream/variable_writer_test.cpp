@@ -16,6 +16,7 @@
 #include "stream/cache/value_histogram.h"
 #include "stream/cache/values_writer.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/swapped_names.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
 
@@ -89,6 +90,8 @@ TEST_F(AddedVariable, IsSeenByNobodyBeforeItIsWhole) {
 }
 
 TEST_F(AddedVariable, IsNotThereIfAnySyncFails) {
+  if (!namesCanBeSwapped())
+    GTEST_SKIP() << "this build swaps no names: a failure may come too late to be undone";
   const std::string manifest = bytesOfFile(path / "manifest.json");
   const size_t files = filesInCache();
   for (int64_t sync = 0;; ++sync) {
