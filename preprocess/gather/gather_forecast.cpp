@@ -291,7 +291,7 @@ uint64_t GatherCounts::ofCorners() const {
 GatherNeeds GatherCounts::needs() const {
   GatherNeeds needs = job_.centring == Centring::kNode ? needsOfPoints() : needsOfCells();
   if (!merges_points_) return needs;
-  const uint64_t numbering_bytes = points_ * PointNumbers::kMostBytes;
+  const uint64_t numbering_bytes = points_ * PointNumbers::kMaxBytes;
   const uint64_t kept_bytes = points_ * PointNumbers::kKeptBytes;
   needs.beside_splats += kept_bytes;
   needs.before_splats = std::max(needs.before_splats + kept_bytes,

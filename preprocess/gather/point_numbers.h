@@ -29,7 +29,7 @@ class PointNumbers {
     return reader.pieces().size() > 1 || hasElementsApart(reader);
   }
   /// Bytes of its temporary files in all, and of those that it keeps, for each point of a mesh that mayMerge().
-  static constexpr uint64_t kMostBytes = 3 * sizeof(double) + 4 * sizeof(uint64_t),
+  static constexpr uint64_t kMaxBytes = 3 * sizeof(double) + 4 * sizeof(uint64_t),
                             kKeptBytes = sizeof(uint64_t);
 
   /// Reads all points if the mesh mayMerge(); within `memory_bytes`. Throws Error if the disk fails.

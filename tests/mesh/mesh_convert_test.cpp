@@ -370,7 +370,13 @@ TEST_F(MeshConvert, ElementsApartAreDrawnAsOneMesh) {
         const ArrayPiece elements = apart(cube, cells);
         const ConvertReport report = converted(ArrayMesh({elements}), how);
         EXPECT_EQ(report.merged_nodes, elements.points.size() - cube.points.size());
-        EXPECT_TRUE(leavesOf(how.output) == whole) << cells;
+        const auto parts = leavesOf(how.output);
+        ASSERT_EQ(parts.size(), whole.size());
+        // The order of outer faces, which follows the numbers of points, counts in the last bits: a step of a code.
+        for (size_t n = 0; n < whole.size(); ++n)
+          for (size_t part = 0; part < whole[n].size(); ++part)
+            ASSERT_NEAR(parts[n][part], whole[n][part], 2e-3 * std::abs(whole[n][part]))
+                << cells << " " << part;
       }
     }
 }
