@@ -171,17 +171,17 @@ TEST(AddScalar, MergesSeamsAsConversionDid) {
 }
 
 TEST(AddScalar, TakesManyBlocks) {
-  // 6 x 5 x 4 blocks of 12³ nodes that share their faces.
-  const std::vector<GridBlock> blocks(120, gridBlock(12, 12, 12));
+  // 5 x 4 x 3 blocks of 12³ nodes that share their faces.
+  const std::vector<GridBlock> blocks(60, gridBlock(12, 12, 12));
   expectAsAtOnce(FunctionGridSource(blocks, 3, [](const GridNode& node) {
-    const glm::dvec3 at(11 * (node.block % 6) + node.i, 11 * (node.block / 6 % 5) + node.j,
-                        11 * (node.block / 30) + node.k);
+    const glm::dvec3 at(11 * (node.block % 5) + node.i, 11 * (node.block / 5 % 4) + node.j,
+                        11 * (node.block / 20) + node.k);
     return NodeValues{at, scalarsAt(0.1 * at), false};
   }));
 }
 
 TEST(AddScalar, TakesCoincidentNodes) {
-  const GridBlock block = gridBlock(60, 50, 60);
+  const GridBlock block = gridBlock(50, 40, 50);
   // All in one place: a root of several bricks.
   expectAsAtOnce(FunctionGridSource({block}, 3, [](const GridNode& node) {
     const auto at = static_cast<float>(node.i + 2 * node.j);
@@ -190,7 +190,7 @@ TEST(AddScalar, TakesCoincidentNodes) {
   // A cluster in a grid: several bricks of one cell, below others.
   expectAsAtOnce(FunctionGridSource({block}, 3, [&](const GridNode& node) {
     NodeValues values = bentBox(node, block);
-    if (node.k >= 10 && node.k < 50) values.position = glm::dvec3(0.5);
+    if (node.k >= 5 && node.k < 45) values.position = glm::dvec3(0.5);
     return values;
   }));
 }
@@ -264,7 +264,7 @@ TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
     if (here && node.k % 3 == 0) values.scalars[1] = kNotANumber;
     return values;
   };
-  const GridBlock box = gridBlock(50, 40, 40), o_grid = gridBlock(65, 40, 30);
+  const GridBlock box = gridBlock(40, 30, 30), o_grid = gridBlock(45, 30, 20);
   // Without seams, and with one where only the older scalar and the cache know which nodes are there.
   expectAsAtOnce(
       FunctionGridSource({box}, 3, [=](const GridNode& node) { return blanked(node, bentBox(node, box)); }));

@@ -19,6 +19,7 @@
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 
 namespace curvisplat {
 namespace {
@@ -171,6 +172,7 @@ TEST(BlockOverlap, IsTheSameWithLittleMemory) {
                                                 {30'000, 500'000},
                                                 {kSlabBytes, 2'000'000},
                                                 {30'000, 8'000'000}}) {
+    if (point_bytes >= 2'000'000 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(point_bytes);
     expectSame(overlapsIn(source, slab_bytes, point_bytes), all);
   }

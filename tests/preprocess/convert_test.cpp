@@ -109,7 +109,7 @@ TEST(Convert, KeepsEveryNodeAndItsVolume) {
 
 TEST(Convert, GivesTheSameBytesForAnyThreadsAndMemory) {
   const TemporaryFolder folder;
-  const SceneGridSource source(makeScene("wake"), {110, 90, 50});
+  const SceneGridSource source(makeScene("wake"), {80, 70, 40});
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.title = "the same";
   options.threads = 2;
@@ -118,7 +118,7 @@ TEST(Convert, GivesTheSameBytesForAnyThreadsAndMemory) {
   const ConvertReport report = expectSameCaches(source, options,
                                                 {{.threads = 1},
                                                  {.threads = 1, .memory_bytes = least},
-                                                 {.memory_bytes = least, .bucket_splats = 100000},
+                                                 {.memory_bytes = least, .bucket_splats = 80000},
                                                  {.memory_bytes = least, .bucket_splats = 20000},
                                                  {.memory_bytes = least, .bucket_splats = 500}});
   EXPECT_GT(report.merged_nodes, 0u);  // the O-grid closes on itself
