@@ -98,16 +98,18 @@ void closeRun(const Run& run) {
   if (run.process_ended >= 0) close(run.process_ended);
 }
 
-/// Loads OpenVDB as stream/vdb/vdb_library.cpp does when it is first needed.
-void loadOpenVdb(const char* program) {
-  std::string plugin(program);
-  plugin.resize(plugin.rfind('/') + 1);
-  dlopen((plugin + "curvisplat-vdb.so").c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
+/// Loads OpenVDB as stream/vdb/vdb_library.cpp, and the libraries of formats as preprocess/formats/common/data_libraries.cpp does when they
+/// are first needed.
+void loadPlugins(const char* program) {
+  std::string folder(program);
+  folder.resize(folder.rfind('/') + 1);
+  dlopen((folder + "curvisplat-vdb.so").c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
+  dlopen((folder + "curvisplat-formats.so").c_str(), RTLD_LAZY | RTLD_LOCAL);
 }
 
 int serveRuns(int, char** argv, char**) {
   constexpr int kIdleMilliseconds = 5000;
-  loadOpenVdb(argv[0]);
+  loadPlugins(argv[0]);
   const SocketAddress address(std::getenv(kSocketVariable));
   signal(SIGPIPE, SIG_IGN);
   const int listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);

@@ -58,7 +58,7 @@ fi
 objects=("$program/bin/curvisplat" "$modules"/*.so)
 if [[ $wheel ]]; then
   package=$(find "$work/installed/python" -name curvisplat -path '*-packages/*')
-  rm "$package/curvisplat-vdb.so"  # the same as the program's
+  rm "$package"/curvisplat-{vdb,formats}.so  # the same as the program's
   objects+=("$package"/_core.*.so)
 fi
 

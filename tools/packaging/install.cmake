@@ -21,7 +21,7 @@ install(FILES
   DESTINATION ${package_dir} COMPONENT development)
 
 install(TARGETS curvisplat RUNTIME COMPONENT program)
-install(TARGETS curvisplat_vdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/curvisplat COMPONENT program)
+install(TARGETS curvisplat_vdb curvisplat_formats LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/curvisplat COMPONENT program)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/tools/manual/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program
   FILES_MATCHING PATTERN *.1)
 install(FILES ${PROJECT_BINARY_DIR}/tools/manual/curvisplat.bash RENAME curvisplat

@@ -18,6 +18,25 @@
 #include "stream/base/file.h"
 
 namespace curvisplat {
+
+CURVISPLAT_LIBRARY_FUNCTION(cgio_children_ids)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_close_file)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_error_message)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_get_data_type)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_get_dimensions)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_get_label)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_get_link)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_get_name)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_get_node_id)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_get_root_id)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_is_link)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_link_size)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_number_children)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_open_file)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_read_all_data)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_read_data)
+CURVISPLAT_LIBRARY_FUNCTION(cgio_release_id)
+
 namespace {
 
 constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";

@@ -6,8 +6,6 @@
 // the other. Closing a handle is such a call, too.
 #pragma once
 
-#include <hdf5.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -15,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/common/hdf5_library.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {
@@ -23,7 +22,7 @@ namespace curvisplat {
 Mutex& dataLibraryMutex();
 
 /// An identifier that HDF5 returned, which is closed with the handle; false if the call failed.
-template <herr_t (*kClose)(hid_t)>
+template <const LibraryFunction<herr_t(hid_t)>& kClose>
 class Hdf5Handle {
  public:
   explicit Hdf5Handle(hid_t id = H5I_INVALID_HID) : id_(id) {}

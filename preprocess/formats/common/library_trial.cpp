@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/data_libraries.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "stream/base/error.h"
 #include "stream/base/os.h"
@@ -402,6 +403,7 @@ class TriedFiles {
 };
 
 pid_t forkTrial() {
+  loadDataLibraries();  // once, and not in each of the processes
   // HDF5's own state is that of no call, since all calls hold the lock; both processes give it back.
   const MutexLock lock(dataLibraryMutex());
   return ::fork();

@@ -9,9 +9,21 @@
 #include <sstream>
 #include <vector>
 
+#include "preprocess/formats/common/data_libraries.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {
+
+CURVISPLAT_LIBRARY_FUNCTION(proj_context_create)
+CURVISPLAT_LIBRARY_FUNCTION(proj_context_destroy)
+CURVISPLAT_LIBRARY_FUNCTION(proj_context_set_enable_network)
+CURVISPLAT_LIBRARY_FUNCTION(proj_coord)
+CURVISPLAT_LIBRARY_FUNCTION(proj_create)
+CURVISPLAT_LIBRARY_FUNCTION(proj_destroy)
+CURVISPLAT_LIBRARY_FUNCTION(proj_log_func)
+CURVISPLAT_LIBRARY_FUNCTION(proj_log_level)
+CURVISPLAT_LIBRARY_FUNCTION(proj_trans)
+
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;

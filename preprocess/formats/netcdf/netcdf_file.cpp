@@ -1,7 +1,6 @@
 #include "preprocess/formats/netcdf/netcdf_file.h"
 
 #include <fmt/format.h>
-#include <netcdf.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/netcdf/netcdf_library.h"
 #include "preprocess/formats/netcdf/netcdf_structure.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"

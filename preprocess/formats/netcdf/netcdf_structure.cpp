@@ -1,7 +1,6 @@
 #include "preprocess/formats/netcdf/netcdf_structure.h"
 
 #include <fmt/format.h>
-#include <netcdf.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/netcdf/netcdf_library.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {

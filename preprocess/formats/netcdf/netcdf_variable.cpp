@@ -1,13 +1,13 @@
 #include "preprocess/formats/netcdf/netcdf_variable.h"
 
 #include <fmt/format.h>
-#include <netcdf.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "preprocess/formats/netcdf/netcdf_library.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {

@@ -1,0 +1,36 @@
+// The functions of NetCDF that this program calls.
+#pragma once
+
+#include <netcdf.h>
+
+#include "preprocess/formats/common/data_libraries.h"
+
+namespace curvisplat {
+
+CURVISPLAT_LIBRARY_FUNCTION(nc_close)
+CURVISPLAT_LIBRARY_FUNCTION(nc_free_string)
+CURVISPLAT_LIBRARY_FUNCTION(nc_get_att_double)
+CURVISPLAT_LIBRARY_FUNCTION(nc_get_att_string)
+CURVISPLAT_LIBRARY_FUNCTION(nc_get_att_text)
+CURVISPLAT_LIBRARY_FUNCTION(nc_get_vara_double)
+CURVISPLAT_LIBRARY_FUNCTION(nc_get_vara_float)
+CURVISPLAT_LIBRARY_FUNCTION(nc_get_vara_string)
+CURVISPLAT_LIBRARY_FUNCTION(nc_get_vara_text)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_att)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_attid)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_attname)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_dim)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_dimids)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_format)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_grpname)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_grps)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_nvars)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_var)
+CURVISPLAT_LIBRARY_FUNCTION(nc_inq_vardimid)
+CURVISPLAT_LIBRARY_FUNCTION(nc_open)
+CURVISPLAT_LIBRARY_FUNCTION(nc_set_chunk_cache)
+CURVISPLAT_LIBRARY_FUNCTION(nc_set_var_chunk_cache)
+CURVISPLAT_LIBRARY_FUNCTION(nc_strerror)
+
+}  // namespace curvisplat
