@@ -93,48 +93,48 @@ BlockArray<float*> magnitudeOf(std::vector<BlockArray<float*>> components) {
 
 /// Calls use(number of the node in the box, its iblank), a plane at a time.
 template <typename Use>
-void BlockSource::forEachIblank(uint32_t number, const NodeBox& box, const Use& use) const {
-  const GridBlock& block = description_.blocks[number];
-  if (!block.has_blanking) return;
-  const BlockArray<float*> iblank = iblankOf(number);
+void BlockSource::forEachIblank(uint32_t block, const NodeBox& box, const Use& use) const {
+  const GridBlock& shape = description_.blocks[block];
+  if (!shape.has_blanking) return;
+  const BlockArray<float*> iblank = iblankOf(block);
   if (!iblank) return;
-  std::vector<float> plane(static_cast<size_t>(box.rowNodes(block.ni) * (box.j1 - box.j0)));
+  std::vector<float> plane(static_cast<size_t>(box.rowNodes(shape.ni) * (box.j1 - box.j0)));
   NodeBox part = box;
   size_t node = 0;
   for (part.k0 = box.k0; part.k0 < box.k1; ++part.k0) {
     part.k1 = part.k0 + 1;
-    iblank.read(partWithSamples(block, part, Centring::kNode), plane.data());
+    iblank.read(partWithSamples(shape, part, Centring::kNode), plane.data());
     for (const float value : plane) use(node++, value);
   }
 }
 
-void BlockSource::read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,
+void BlockSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                        NodeArrays& out) const {
-  const GridBlock& block = description_.blocks.at(number);
-  const auto nodes = static_cast<size_t>(box.rowNodes(block.ni) * rowsOf(box));
+  const GridBlock& shape = description_.blocks.at(block);
+  const auto nodes = static_cast<size_t>(box.rowNodes(shape.ni) * rowsOf(box));
   for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->resize(nodes);
-  const ArrayBox all = partWithSamples(block, box, Centring::kNode);
-  if (!all.empty()) nodesOf(number).read(all, {{out.x.data(), out.y.data(), out.z.data()}});
+  const ArrayBox all = partWithSamples(shape, box, Centring::kNode);
+  if (!all.empty()) nodesOf(block).read(all, {{out.x.data(), out.y.data(), out.z.data()}});
   out.blank.assign(nodes, 0);
-  forEachIblank(number, box, [&](size_t n, float value) { out.blank[n] = value == 0; });
-  blankNodes(number, box, out.blank);
+  forEachIblank(block, box, [&](size_t n, float value) { out.blank[n] = value == 0; });
+  blankNodes(block, box, out.blank);
   out.scalars.resize(scalars.size());
   for (size_t n = 0; n < scalars.size(); ++n) {
     const Centring centring = description_.scalars.at(scalars[n]).centring;
-    const ArrayBox part = partWithSamples(block, box, centring);
+    const ArrayBox part = partWithSamples(shape, box, centring);
     out.scalars[n].assign(nodes, std::numeric_limits<float>::quiet_NaN());
     if (part.empty()) continue;
-    if (const BlockArray<float*> values = valuesOf(number, scalars[n]))
+    if (const BlockArray<float*> values = valuesOf(block, scalars[n]))
       values.read(part, out.scalars[n].data());
-    if (centring == Centring::kCell) blankCells(number, box, out.scalars[n]);
+    if (centring == Centring::kCell) blankCells(block, box, out.scalars[n]);
   }
 }
 
-bool BlockSource::readFringe(uint32_t number, const NodeBox& box, std::vector<uint8_t>& out) const {
-  const GridBlock& block = description_.blocks.at(number);
-  if (!negative_is_fringe_ || !block.has_blanking) return false;
-  out.assign(static_cast<size_t>(box.rowNodes(block.ni) * rowsOf(box)), 0);
-  forEachIblank(number, box, [&](size_t n, float value) { out[n] = value < 0; });
+bool BlockSource::readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const {
+  const GridBlock& shape = description_.blocks.at(block);
+  if (!negative_is_fringe_ || !shape.has_blanking) return false;
+  out.assign(static_cast<size_t>(box.rowNodes(shape.ni) * rowsOf(box)), 0);
+  forEachIblank(block, box, [&](size_t n, float value) { out[n] = value < 0; });
   return true;
 }
 

@@ -342,21 +342,20 @@ void FoamSource::appendCells(uint32_t piece_number, uint64_t first, uint64_t cou
   appendCellsOfFaces(lists, {begins, faces, description_.pieces[piece_number].file, first}, out);
 }
 
-void FoamSource::readValues(uint32_t piece, uint32_t number, uint64_t first, std::span<float> to) const {
-  const Scalar& scalar = scalars_[number];
-  const size_t components = fields_[scalar.field].components;
+void FoamSource::readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const {
+  const auto [field, component] = scalars_[scalar];
+  const size_t components = fields_[field].components;
   std::vector<double> uniform, values(to.size() * components);
-  const FoamList& list = valuesOf(piece, scalar.field, uniform);
+  const FoamList& list = valuesOf(piece, field, uniform);
   if (uniform.empty())
     list.read(first * components, std::span(values));
   else
     for (size_t n = 0; n < values.size(); ++n) values[n] = uniform[n % components];
   for (size_t cell = 0; cell < to.size(); ++cell) {
     const double* tuple = values.data() + cell * components;
-    to[cell] =
-        convertedTo<float>(scalar.component == kMagnitude
-                               ? std::sqrt(tuple[0] * tuple[0] + tuple[1] * tuple[1] + tuple[2] * tuple[2])
-                               : tuple[scalar.component]);
+    to[cell] = convertedTo<float>(
+        component == kMagnitude ? std::sqrt(tuple[0] * tuple[0] + tuple[1] * tuple[1] + tuple[2] * tuple[2])
+                                : tuple[component]);
   }
 }
 
