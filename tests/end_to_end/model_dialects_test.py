@@ -212,6 +212,13 @@ class Levels(ModelFileTest):
                 ("depth", [0, 1, 2, 7e6], {"units": "m", "positive": "down"}, "depth is 0 .. 7e+06 m, below the Earth's centre")):
             self.levels(name, values, **attributes)
             self.assertIn(words, self.info(fails=True))
+        # A formula's: ap in Pa that is called hPa.
+        def more(f):
+            f.add("ap", "lev", [0, 1e4, 2e4, 0], units="hPa")
+            f.add("b", "lev", [1, 0.7, 0.3, 0.1])
+            f.add("ps", "lat lon", np.full((8, 12), 1e5), units="Pa")
+        self.levels("lev", [4.0, 3, 2, 1], more, units="level")
+        self.assertIn("the pressures of formula of ap and b (pressure, at heights of the standard atmosphere) are more than those of any air", self.info(fails=True))
         # Of the nodes, some may have none.
         z = 1000 * np.arange(4.0)[:, None, None] + np.zeros((8, 12))
         self.levels("lev", None, lambda f: f.add("height", "lev lat lon", np.where(self.LON > 20, 1e20, z), units="m"))

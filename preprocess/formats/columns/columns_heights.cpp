@@ -208,7 +208,7 @@ ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map
     }
     heights.words = variable.name;
     const bool finite = std::all_of(heights.levels.begin(), heights.levels.end(),
-                                    [](double height) { return std::isfinite(height); });
+                                    [](double height) { return std::abs(height) <= kMaxHeight; });
     if (heights.levels.size() == levels && finite) return heights;
   }
   if (between)

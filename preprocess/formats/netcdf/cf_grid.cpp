@@ -87,6 +87,29 @@ bool beginsWithSurface(const NetcdfFiles& file, const CfGrid& grid) {
   return false;
 }
 
+/// In kilometres: 2,000 hPa in the standard atmosphere.
+constexpr double kLowestAir = -6;
+
+/// The lowest and the highest node of a column, or of the surface if all are missing. Looks half, a quarter and three
+/// quarters along: some columns may be land, without a depth.
+std::vector<double> columnOf(const NetcdfFiles& file, const CfGrid& grid) {
+  for (const uint64_t part : {2, 1, 3}) {
+    CfRange column;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const uint64_t length = file.dimensions()[grid.dims.axes[axis]].length;
+      column.begin[axis] = axis == grid.levels ? 0 : length * part / 4;
+      column.end[axis] = axis == grid.levels ? length : column.begin[axis] + 1;
+    }
+    double lowest = 0, highest = 0;
+    for (const double height : grid.vertical.heights(file, column).values) {
+      lowest = std::fmin(lowest, height);
+      highest = std::fmax(highest, height);
+    }
+    if (lowest != highest) return {lowest, highest};
+  }
+  return {0, 0};
+}
+
 class GridFinder {
  public:
   GridFinder(const NetcdfFiles& file, size_t time_step) : file_(file), time_step_(time_step) {}
@@ -216,6 +239,12 @@ class GridFinder {
       return std::nullopt;
     }
     grid.vertical = *vertical;
+    if (grid.vertical.ofPressure() && std::ranges::min(columnOf(file_, grid)) < kLowestAir) {
+      reason = fmt::format(
+          "the pressures of {} are more than those of any air on the Earth: correct the units of its terms",
+          grid.vertical.description());
+      return std::nullopt;
+    }
     setNowhere(grid);
     grid.surface_first = beginsWithSurface(file_, grid);
     grid.mask = CfMask::of(file_, variable, dims, grid.levels, isOcean(file_, grid));
@@ -445,22 +474,8 @@ CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step) {
 }
 
 bool isOcean(const NetcdfFiles& file, const CfGrid& grid) {
-  // A quarter, half and three quarters along: some columns may be land, without a depth.
-  for (const uint64_t part : {2, 1, 3}) {
-    CfRange column;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const uint64_t length = file.dimensions()[grid.dims.axes[axis]].length;
-      column.begin[axis] = axis == grid.levels ? 0 : length * part / 4;
-      column.end[axis] = axis == grid.levels ? length : column.begin[axis] + 1;
-    }
-    double lowest = 0, highest = 0;
-    for (const double height : grid.vertical.heights(file, column).values) {
-      lowest = std::fmin(lowest, height);
-      highest = std::fmax(highest, height);
-    }
-    if (lowest != highest) return lowest + highest < 0;
-  }
-  return false;
+  const std::vector<double> column = columnOf(file, grid);
+  return column.front() + column.back() < 0;
 }
 
 CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {

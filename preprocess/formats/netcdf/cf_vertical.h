@@ -65,6 +65,9 @@ class CfVertical {
   /// Whether the heights are made of this variable.
   bool uses(const NetcdfVariable& variable) const;
 
+  /// Whether the heights are those of pressures in the standard atmosphere.
+  bool ofPressure() const { return kind_ >= Kind::kPressure && kind_ <= Kind::kHybridPressure; }
+
   /// Whether the heights vary along an axis.
   bool varies(size_t axis) const;
 
@@ -122,7 +125,6 @@ class CfVertical {
                      const char*& lacking);
   bool setAirTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block, size_t axis,
                    const char*& lacking);
-  bool ofPressure() const { return kind_ >= Kind::kPressure && kind_ <= Kind::kHybridPressure; }
   CfValues thicknessHeights(const NetcdfFiles& file, const CfRange& range) const;
   CfValues formulaHeights(const NetcdfFiles& file, const CfRange& range) const;
   bool setSleveTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block, size_t axis,
