@@ -75,11 +75,11 @@ CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
       isOneOf(standard_name, {"latitude", "geographic_latitude"}))
     return CfRole::kLatitude;
   // Angles that only a long_name tells: "longitude", but not "longitude in rotated pole grid".
-  const std::string long_name = lowerCase(variable.text("long_name"));
-  if (standard_name.empty() && (degreesOf(units) != 1 || isOneOf(units, {"degrees", "degree", "deg"})) &&
-      long_name.find("rotated") == std::string::npos) {
-    if (long_name.find("longitude") != std::string::npos) return CfRole::kLongitude;
-    if (long_name.find("latitude") != std::string::npos) return CfRole::kLatitude;
+  if (standard_name.empty() && (degreesOf(units) != 1 || isOneOf(units, {"degrees", "degree", "deg"}))) {
+    const std::string long_name = lowerCase(variable.text("long_name"));
+    const bool rotated = hasOneOf(long_name, {"rotated"});
+    if (!rotated && hasOneOf(long_name, {"longitude"})) return CfRole::kLongitude;
+    if (!rotated && hasOneOf(long_name, {"latitude"})) return CfRole::kLatitude;
   }
   if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::kTime;
 

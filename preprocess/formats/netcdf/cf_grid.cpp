@@ -169,16 +169,9 @@ class GridFinder {
       if (file_.dimensions()[dim].length > 1 && !isTime(file_, dim, variable.dims.size()))
         names.push_back(file_.dimensions()[dim].name);
     if (names.size() <= 3) return;
-    // The remedy chooses a member or a month, not a place: neither a coordinate's dimension nor one of longitudes.
-    const auto isOther = [&](const std::string& name) {
-      return std::ranges::none_of(file_.variables(), [&](const NetcdfVariable& other) {
-        const CfRole role = cfRole(file_, other);
-        if (role == CfRole::kNone || (role == CfRole::kTime && other.name != name)) return false;
-        return std::ranges::any_of(other.dims,
-                                   [&](size_t dim) { return file_.dimensions()[dim].name == name; });
-      });
-    };
-    const auto other = std::ranges::find_if(names, isOther);
+    // The remedy chooses a member or a month, not a place.
+    const auto other = std::ranges::find_if_not(
+        names, [&](const std::string& name) { return dimensionsOfPlaces().contains(name); });
     const std::string& chosen = other == names.end() ? names.front() : *other;
     const NetcdfVariable* const values = file_.find(chosen);
     double first = 0;
@@ -189,6 +182,15 @@ class GridFinder {
          fmt::format("{} dimensions besides time ({}); expected 3: choose one value of the others, such as "
                      "--select {}={:g}",
                      names.size(), fmt::join(names, ", "), chosen, first)});
+  }
+
+  /// Names of the dimensions on which there are coordinates of space.
+  const std::set<std::string>& dimensionsOfPlaces() {
+    if (dimensions_of_places_.empty())
+      for (const NetcdfVariable& variable : file_.variables())
+        if (const CfRole role = cfRole(file_, variable); role != CfRole::kNone && role != CfRole::kTime)
+          for (const size_t dim : variable.dims) dimensions_of_places_.insert(file_.dimensions()[dim].name);
+    return dimensions_of_places_;
   }
 
   /// Whether a variable with the grid's dimensions is at its points: not if its `coordinates` name another longitude (POP's
@@ -426,6 +428,7 @@ class GridFinder {
   const NetcdfFiles& file_;
   size_t time_step_;
   bool by_index_ = false;
+  std::set<std::string> dimensions_of_places_;
   CfGrids found_;
 };
 
