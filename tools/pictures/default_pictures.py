@@ -83,9 +83,12 @@ def write_png(path, width, height, rows):
     def chunk(name, data):
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
-    raw = b"".join(b"\0" + bytes(row) for row in rows)
+    def difference(row):
+        return b"\1" + bytes([*row[:3], *((a - b) & 255 for a, b in zip(row[3:], row))])
+
+    raw = b"".join(map(difference, rows))
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
-                     chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b""))
+                     chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b""))
 
 
 def read_ppm(path):
