@@ -13,9 +13,11 @@
 
 namespace curvisplat {
 
-/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three
-/// times, and once more for surfaces. The bytes of the cache depend on source, scalars and blank value
-/// alone. The peak memory of the process, everything included, is options.memory_bytes.
+/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). A structured grid is read at
+/// least twice, by scan and scatter, and once more for surfaces; overlapping blocks, and a sample of the
+/// positions that does not fit in memory, add passes. The bytes of the cache depend on the source and on
+/// options that say what the cache holds, not on threads, memory or ranks. The process, everything included,
+/// takes at most options.memory_bytes.
 ///
 /// Throws Error (and UsageError) if input, disk or options are at fault. Then no temporary file and no
 /// partial cache is left, and an existing output is unchanged.
@@ -26,15 +28,15 @@ namespace curvisplat {
 /// `resume` is set, or `overwrite`, which starts anew. An interruption before there is anything worth
 /// resuming removes all files.
 ///
-/// Several ranks share the work of all passes; scratch folder and output must be on a file system that they
-/// share. Rank 0's report is of the whole. Each rank keeps to options.memory_bytes. When a rank throws, the
-/// others do not end by themselves: whoever started them has to end them; what rank 0 leaves is as described
-/// above. Unstructured grids are converted by one rank only.
+/// Several ranks share the work of all passes; only the splats of an unstructured grid are made by rank 0
+/// alone. Scratch folder and output must be on a file system that all ranks share. Rank 0 returns the report
+/// of the whole. Each rank keeps to options.memory_bytes. When a rank throws, the others do not end by
+/// themselves: whoever started them has to end them. What rank 0 leaves is as described above.
 ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress);
 
-/// Nodes of a sample for sampledNeeds() and `--dry-run`. Smaller samples have too few bricks of coarser
-/// levels, which take a third of the bytes of a large grid's cache: estimates from one million nodes of 27
-/// were 0.57 to 0.84 of what was taken.
+/// The number of nodes of a sample, for sampledNeeds() and `--dry-run`. Smaller samples have too few bricks
+/// of coarser levels, which take a third of the bytes of a large grid's cache: from 1 of 27 million nodes the
+/// estimates were 0.57 to 0.84 of the true sizes.
 inline constexpr uint64_t kSampledNodes = 8'000'000;
 
 /// Estimates what convert() will take on disk from a sample of about `nodes` nodes, which is converted within
@@ -49,7 +51,7 @@ uint64_t times(uint64_t count, double factor);
 
 /// How much larger a structured grid is than its sample: for sampledNeeds(), and for `convert --dry-run`.
 struct SampleScale {
-  double volume = 1, faces = 1;
+  double volume = 1, faces = 1;  // ratios of the numbers of nodes, and of the bytes of faces
 
   /// `options`: those of the whole grid.
   static SampleScale of(const GridDescription& whole, const GridDescription& sample,

@@ -20,10 +20,12 @@
 
 namespace curvisplat {
 
-/// How scalars are treated that have values at different samples.
+/// The treatment of scalars that do not have values at the same samples.
 enum class DifferingScalars {
   kBlankAll,  // a sample is blanked where any of them has no value
-  kKeepApart  // each set of scalars that agree but the largest becomes a cache in the folder of the cache (Manifest::own_blanks)
+  // Scalars with values at the same samples form a set. The largest set becomes the cache; each other set
+  // becomes a cache of its own in the cache's folder (Manifest::own_blanks).
+  kKeepApart
 };
 
 /// The options of convert(). Only `output` has to be set.
@@ -32,40 +34,42 @@ struct ConvertOptions {
   bool check_disk_space = true;   // before the work
   bool overwrite = false;         // an existing cache is replaced once the new one is complete
   bool resume = false;            // continue an interrupted conversion, if there is one
-  bool keep_interrupted = true;   // leave finished work to be resumed; otherwise nothing
+  bool keep_interrupted = true;   // an interruption leaves finished work for `resume`; false: no files
   std::vector<uint32_t> scalars;  // positions in the source's description; the cache's variables
   DifferingScalars differing = DifferingScalars::kBlankAll;
   std::optional<double> blank_value;                 // samples with this value of any scalar are blanked
   uint64_t memory_bytes = 0;                         // 0: defaultMemory()
   unsigned threads = 0;                              // 0: as many as the machine has
   std::filesystem::path temporary_folder;            // empty: the folder of the output
-  std::string full_disk_hint;                        // advice about one; empty: as for `convert`
-  std::vector<std::filesystem::path> given_folders;  // the user's, if those above are temporary
+  std::string full_disk_hint;                        // advice where the disk is full; empty: `convert`'s
+  std::vector<std::filesystem::path> given_folders;  // folders that a message of a full disk may name
   std::string title;                                 // empty: the output's name
-  std::optional<double> time;                        // of the step; otherwise the source's, or 0
-  std::optional<TimeUnit> time_unit;                 // of `time`; otherwise the source's
+  std::optional<double> time;                        // of the step; nullopt: the source's, or 0
+  std::optional<TimeUnit> time_unit;                 // of `time`; nullopt: the source's
   ValuePrecision precision = ValuePrecision::kAuto;  // of the samples' values
   bool surfaces = true;                              // store the grid's outer faces in the cache
-  std::vector<IndexPlane> planes;                    // and these index planes
-  Overlap overlap = Overlap::kOwner;                 // of blocks
+  std::vector<IndexPlane> planes;                    // index planes to store besides, with `surfaces`
+  Overlap overlap = Overlap::kOwner;                 // what is drawn where blocks overlap
 
-  /// Processes that convert together: each has the same source and options, and calls convert(). Null: this process alone.
+  /// The processes that convert together. Each calls convert() with the same source and options. Borrowed;
+  /// null: this process converts alone.
   Ranks* ranks = nullptr;
 
-  TestLimits limits;
+  TestLimits limits;  // for tests
 };
 
-/// Thrown where no sample is drawn.
+/// Thrown if no sample of the grid can be drawn.
 class NothingToDraw final : public Error {
  public:
   using Error::Error;
 };
 
-/// Thrown once the grid has been read, unless all scalars are blanked alike: a cache has the same samples for all of its own
-/// scalars, so that each of them would lose values where another has none.
+/// Thrown once the grid has been read, if the scalars do not have values at the same samples: with kBlankAll
+/// only if no sample is left that has all of them. The scalars of a cache share its samples, so each would
+/// lose values where another has none. With kKeepApart convert() catches it and makes several caches.
 class DifferingBlanks final : public Error {
  public:
-  /// `lost`: as in BlankCounts. `is_any_drawn`: whether all scalars have values at some sample.
+  /// `lost`: BlankCounts::lost. `is_any_drawn`: whether there is a sample at which all scalars have values.
   DifferingBlanks(std::vector<BlankCounts::Lost> lost, bool is_any_drawn)
       : Error(
             "at no sample do all scalars have a value; convert each to a cache of its own, with --scalar "
@@ -101,8 +105,8 @@ struct ConvertReport {
   uint64_t merged_nodes = 0;  // nodes on block faces that were merged into the splat of another node
   uint64_t splats = 0, bricks = 0;
   uint32_t levels = 0;
-  double volume = 0;
-  uint64_t temporary_bytes = 0;  // the most in temporary files at a time
+  double volume = 0;             // sum of the finest splats' weights, in cubed world units
+  uint64_t temporary_bytes = 0;  // the most bytes in temporary files at a time
   bool resumed = false;          // an interrupted conversion was continued
   uint64_t resumed_bricks = 0;   // bricks that the interrupted one had made
   unsigned threads = 0;          // in use: memory may allow fewer than asked for

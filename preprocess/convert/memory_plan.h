@@ -22,7 +22,7 @@
 
 namespace curvisplat {
 
-/// Test seam: less than memory would allow, so that small grids are processed like large ones.
+/// Limits that tests set below what memory would allow, so that small grids are processed like large ones.
 struct TestLimits {
   std::optional<uint64_t> bucket_splats, slab_bytes, owner_bytes, mesh_bytes;  // MemoryPlan's
   std::optional<uint32_t> most_buckets;
@@ -31,14 +31,14 @@ struct TestLimits {
 
 struct MemoryPlan {
   uint64_t cap_bytes = 0;       // limit of the process
-  uint64_t slab_bytes = 0;      // each of two; and a row of a source that reads rows as a whole
+  uint64_t slab_bytes = 0;      // each of two slabs; also a row, where a source reads whole rows
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
   uint64_t overlap_bytes = 0;       // the points by which overlaps of blocks are found
   uint64_t owner_bytes = 0;         // the cells of overlapping blocks, while splats are made
   uint64_t mesh_bytes = 0;          // of an unstructured grid, instead of slabs and seams
   uint64_t chunk_buffer_bytes = 0;  // the write buffers of all buckets
-  uint32_t most_buckets = 0;        // of one temporary file, so that buffers stay large enough to write well
+  uint32_t most_buckets = 0;        // in a temporary file; with more, write buffers would be too small
   uint64_t bucket_splats = 0;       // larger buckets are divided before they are built
   uint64_t bucket_bytes = 0;        // the records of such a bucket
   unsigned threads = 0;             // working at once, each with scratch memory
@@ -46,14 +46,15 @@ struct MemoryPlan {
   /// `threads` is what the user grants. Throws Error if `cap_bytes` is less than leastMemory().
   static MemoryPlan of(uint64_t cap_bytes, size_t variables, unsigned threads);
 
-  /// The same for unparsed options: 0 stands for defaultMemory(), or for as many threads as the machine has.
+  /// Makes the plan as of() does, but 0 stands for defaultMemory(), or for as many threads as the machine
+  /// has.
   static MemoryPlan ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads);
 
-  /// The limit at which seams get this much.
+  /// The cap_bytes from which on a plan's seam_bytes is at least this.
   static uint64_t capForSeams(uint64_t seam_bytes);
-  /// The limit at which the search for overlaps gets this much.
+  /// The cap_bytes from which on a plan's overlap_bytes is at least this.
   static uint64_t capForOverlaps(uint64_t overlap_bytes);
-  /// The limit at which a mesh gets this much.
+  /// The cap_bytes from which on a plan's mesh_bytes is at least this.
   static uint64_t capForMesh(uint64_t mesh_bytes);
 
   /// The memory that the search for overlaps may take.
@@ -66,33 +67,35 @@ struct MemoryPlan {
   /// Throws Error that names a sufficient limit if cutting the grid's faces into patches takes more than there is.
   void requireFaces(uint64_t bytes) const;
 
-  /// Makes slabs and buckets no larger than serves a grid of `samples`: then one is read while another is worked on, and
-  /// memory is used again instead of being asked for, which costs a page fault every 4 KiB. And leaves memory for
-  /// the index of very many samples: throws Error that names a sufficient limit if there is none.
+  /// Makes slabs and buckets no larger than a grid of `samples` needs. Then one is read while another is
+  /// worked on, and memory is used again instead of being taken from the system, at a page fault for every 4
+  /// KiB. Also leaves memory for the index of very many samples. Throws Error that names a sufficient limit
+  /// if there is none left.
   void suit(uint64_t samples, size_t variables);
   void limitTo(const TestLimits& limits, size_t variables);
-  /// Makes buckets smaller than they could be.
+  /// Limits the size of a bucket to `splats`, if it is larger.
   void limitBuckets(uint64_t splats, size_t variables);
   /// The size of a bucket's write buffer in a file of `buckets`.
   size_t chunkBytes(uint32_t buckets) const;
-  /// The approximate peak memory of a conversion of `splats`: often less than the limit.
+  /// The approximate peak memory, in bytes, of a conversion of `splats`. It is often less than the limit.
   uint64_t expectedPeak(uint64_t splats, size_t variables) const;
   /// The size that buckets are planned for, with a reserve for splats that the count of nodes misses.
   uint64_t plannedBucketSplats() const { return bucket_splats - bucket_splats / 5; }
-  /// Threads that read a bucket. Reading and grouping take a seventh of what building takes, in processor time.
+  /// The number of threads that read a bucket: few, since reading and grouping take a seventh of the
+  /// processor time of building.
   unsigned bucketReaders() const;
 
  private:
   void leaveIndex(uint64_t samples, size_t variables);
 };
 
-/// The smallest limit within which `variables` can be converted.
+/// The smallest limit, in bytes, within which this many variables can be converted.
 uint64_t leastMemory(size_t variables);
 
-/// Memory of the machine.
+/// The machine's memory in bytes.
 uint64_t machineMemory();
 
-/// 2 GiB or a quarter of the machine's memory, the smaller.
+/// The limit where the user gives none: 2 GiB, or a quarter of the machine's memory if that is less.
 uint64_t defaultMemory();
 
 }  // namespace curvisplat

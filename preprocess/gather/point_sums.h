@@ -1,7 +1,7 @@
-// Sums what cells give to their corners, in the order of the cells, and makes a splat of each point: the
-// mesh's node-centred splats. The sums of all points (148 bytes a point with one field) need not fit in
-// memory (point_pages.h). Where cells refer to points all over the mesh, they wait on disk, once for each
-// range of points that they have corners in.
+// PointSums adds up the moments that cells give to their corners, in the order of the cells, and makes a
+// splat of each point, for node-centred scalars (fields). The sums of all points (148 bytes a point with one
+// field) need not fit in memory (point_pages.h). Where cells refer to points all over the mesh, cells wait on
+// disk, with a copy for each range of points that they have corners in.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +17,13 @@
 
 namespace curvisplat {
 
-/// Takes a splat and its values, in any thread.
+/// Takes a splat and its values, one for each field. Several threads call it at once.
 using TakeSplat = std::function<void(const NodeSplat&, std::span<const SplatScalar>)>;
 
 class PointSums {
  public:
-  /// `points`: how many points there are; their numbers are below it. `cells`: about how many cells will be
-  /// added.
+  /// `points`: how many points there are; their numbers are less. `cells`: about how many cells will be
+  /// added. `fields`: how many scalars the points have.
   PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
             const ScratchFiles& scratch);
   ~PointSums();
@@ -31,22 +31,23 @@ class PointSums {
   /// How a pass shares its memory.
   struct Shares {
     uint64_t border_bytes, sum_bytes;
-    uint64_t pages;                                        // of sums, in memory
-    uint64_t range_points;                                 // that become splats together
-    uint64_t cell_bytes() const { return sum_bytes / 4; }  // of streams of cells that wait
+    uint64_t pages;                                        // pages of sums that are in memory
+    uint64_t range_points;                                 // points that become splats together
+    uint64_t cell_bytes() const { return sum_bytes / 4; }  // buffers of the streams in which cells wait
   };
   static Shares sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes);
-  /// The bytes of a cell that waits for the sums of a range.
+  /// The bytes on disk of a cell that waits for a range. `face_words`: its elements in GatheredCells::faces.
   static uint64_t bytesOfWaiting(uint64_t corners, uint64_t face_words, size_t fields);
 
-  /// Cells in the mesh's order.
+  /// Adds cells, which come in the mesh's order. One thread calls. Throws Error if the disk fails.
   void add(const GatheredCells& cells);
 
   struct Counts {
     uint64_t splats = 0;
     uint64_t degenerate = 0;  // points whose cells have no volume: their splats have no weight
   };
-  /// Makes the splats. Once, after all cells.
+  /// Makes the splats and passes each to `take`. Call it once, after all cells have been added. Throws Error
+  /// if the disk fails, Interrupted once `progress` is stopped.
   Counts finish(const TakeSplat& take, const Progress& progress);
 
  private:

@@ -12,9 +12,9 @@
 
 namespace curvisplat {
 
-/// A grid whose read() takes boxes of parts of rows, too: `out` gets box.rowNodes() nodes of each row. It
-/// holds no whole rows beside them. Readers of files are such sources. (A source that is a GridSource itself
-/// need only read whole rows, from which parts are then cut.)
+/// A grid whose read() also takes boxes of parts of rows: `out` gets box.rowNodes() nodes of each row, and no
+/// whole rows are held in memory. Readers of files are such sources. (A class that derives from GridSource
+/// directly need only read whole rows; readPartOfRows() cuts the parts out of them.)
 class BoxSource : public GridSource {
  public:
   void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
@@ -29,7 +29,7 @@ class BoxSource : public GridSource {
 class ForwardingGrid : public BoxSource {
  public:
   const GridDescription& description() const override { return description_; }
-  /// Any box, whether or not the source reads parts of rows.
+  /// Reads any box, even if the source reads only whole rows.
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
     readBox(*source_, block, box, scalars, out);
@@ -48,7 +48,7 @@ class ForwardingGrid : public BoxSource {
   explicit ForwardingGrid(const GridSource& source)
       : ForwardingGrid(std::shared_ptr<const GridSource>(std::shared_ptr<const void>(), &source)) {}
 
-  /// The scalars of the source that these are read or computed from.
+  /// The indices of the source's scalars that `scalars` (indices in description()) are read or computed from.
   virtual std::vector<uint32_t> sourceScalars(std::span<const uint32_t> scalars) const {
     return {scalars.begin(), scalars.end()};
   }

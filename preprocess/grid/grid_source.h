@@ -92,9 +92,9 @@ struct GridDescription {
   std::vector<double> times;         // of every time step; empty: the files have none
   uint32_t time_step = 0;            // index of the open one
   std::string time_unit, calendar;   // of the times, by the CF conventions; may be empty
-  uint32_t refined = 1;              // parts of a cell of the files' grid, along an axis
+  uint32_t refined = 1;              // parts that a cell of the files is cut into along each axis; 1: not cut
   std::string blanking;              // the files' rule for blanking in words; empty: iblank or the like
-  std::string undefined;  // values that stand for none and are read as NaN: "T = -999"; may be empty
+  std::string undefined;             // fill values, which are read as NaN: "T = -999"; may be empty
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
   std::vector<std::string> notes;     // what the files say besides: "boundaries BCWall 3, BCInflow 1"
 };
@@ -124,8 +124,8 @@ class GridSource : public DataSource {
   /// read concurrently. Throws Error with the file and the offset.
   virtual void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                     NodeArrays& out) const = 0;
-  /// The same for parts of rows: `out` gets box.rowNodes() nodes of each. The default reads whole rows, one
-  /// after the other.
+  /// Reads as read() does, but parts of rows: `out` gets box.rowNodes() nodes of each row. The default reads
+  /// whole rows, one after the other.
   virtual void readPartOfRows(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                               NodeArrays& out) const;
   /// The number of whole rows that readPartOfRows() holds in memory beside `out`: 0 if it reads the parts
@@ -137,7 +137,7 @@ class GridSource : public DataSource {
   virtual bool readFringe(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<uint8_t>& /*out*/) const {
     return false;
   }
-  /// The same for parts of rows; reads whole rows, one after the other.
+  /// Reads as readFringe() does, but parts of rows. It reads whole rows, one after the other.
   bool readFringePart(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const;
 };
 

@@ -37,7 +37,7 @@ struct DrawnScalar {
 /// of slices and surfaces.
 struct DrawnScalars {
   DrawnScalar opacity;
-  std::optional<DrawnScalar> colour = std::nullopt;  // none: also the opacity's
+  std::optional<DrawnScalar> colour = std::nullopt;  // none: `opacity` gives the colours, too
 
   DrawnScalars(size_t variable, const TransferFunction& function) : opacity{variable, function} {}
   DrawnScalars(DrawnScalar of_opacity, DrawnScalar of_colour)
@@ -53,18 +53,19 @@ enum class Classification { kPixel, kFlat };  // flat: one colour and extinction
 struct FrameOptions {
   ImageSize size;
   Classification classification = Classification::kPixel;
-  double lod_pixels = 1;               // screen-space error allowed (errorWeight()); 0 is the finest level
+  double lod_pixels = 1;               // pixels of error allowed, by weight (errorWeight()); 0: finest level
   std::optional<uint64_t> max_splats;  // splat limit; the largest screen error is refined first
-  glm::dvec3 scale{1.0};               // stretches the data about the world's origin: D S Dᵀ, V det D
+  glm::dvec3 scale{1.0};               // factors of x, y and z about the world's origin
   std::optional<WorldBox> clip_box;    // nothing outside it is drawn
   std::vector<ClipPlane> clip_planes;  // nothing on their outer sides is drawn
   std::optional<Light> light;          // none: unlit, the colours of the transfer function
-  // Factors of the extinction over the share of the volume whose gradient is less steep; empty: none.
+  // Factors of the extinction (OpacityPoint::opacity) by how steep the gradient is: OpacityPoint::x is the
+  // share of the volume, 0 to 1, where it is less steep. Empty: none.
   std::vector<OpacityPoint> gradient_opacity;
   std::shared_ptr<const SurfaceScene> scene;  // surfaces and slices; null: none
   glm::vec4 background{1, 1, 1, 1};           // premultiplied
-  double low_pass_px2 = kLowPass;             // added to the diagonal of S2, pixels squared
-  unsigned threads = 0;                       // that compute at a time; 0: one per core
+  double low_pass_px2 = kLowPass;  // λ: added to the diagonal of S₂ (DESIGN.md, "Projection"), px²
+  unsigned threads = 0;            // that compute at a time; 0: one per core
   uint64_t memory_bytes = 512 << 20;
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them

@@ -2,7 +2,8 @@
 //
 //   begin -> draw, draw, ... (nearest first) -> end
 //
-// Colours are premultiplied. One frame at a time, on the thread of the painter's backend.
+// Colours are premultiplied. A painter draws one frame at a time. All calls but hides() are on the thread of
+// its backend.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +22,7 @@
 
 namespace curvisplat {
 
-/// The resources that a painter may use for a frame. They do not bind OpenGL's driver.
+/// The resources that a painter may use for a frame. OpenGL's driver does not keep to them.
 struct PaintResources {
   unsigned threads = 0;           // 0: one per core
   size_t batch_splats = 65536;    // the most splats that may be collected and drawn together
@@ -29,7 +30,7 @@ struct PaintResources {
   std::stop_token stop =
       {};  // once it is requested, the rest may be left out: nobody wants the picture any more
   ComputePermits* permits =
-      nullptr;  // held by threads that compute; outlive the frame. Null: there is no further bound
+      nullptr;  // threads hold one while they compute; must outlive the frame. Null: no further bound
 
   /// The bytes that all threads together may keep of splats that they have prepared, and need again.
   uint64_t preparedBytes() const { return kPreparedBytesASplat * waiting_splats; }
@@ -40,10 +41,10 @@ struct PaintResources {
 struct PixelShading {
   bool per_pixel = true;  // from the splat's slope and width; false: one colour and extinction per splat
   bool lit = false;       // splats carry light (light.h)
-  const PixelLayers* layers = nullptr;  // of the picture's size, in it; outlive the frame
-  /// The colours of pictures of two scalars, with extinction 1, of the scalar of the splats' ScreenColours,
-  /// which all of them have then. Of the other table's values the extinctions alone count. Outlives the
-  /// frame; null: none.
+  const PixelLayers* layers = nullptr;  // of all pixels of the picture; must outlive the frame; null: none
+  /// The table that gives the colours in a picture of two scalars, with extinction 1. It is for the scalar in
+  /// the splats' ScreenColours, which all splats have then; the table of begin() gives only the extinctions.
+  /// Must outlive the frame; null: the picture has one scalar.
   const ClassificationTable* colours = nullptr;
   float low_pass_px2 = static_cast<float>(kLowPass);  // ScreenView's
 };
@@ -54,8 +55,8 @@ struct CardWork {
   double draw_s = 0;  // all of it
   double list_s = 0, sort_s = 0, paint_s = 0;
   uint64_t entries = 0;        // splats in tiles, each once in every tile
-  uint64_t moved_entries = 0;  // by sorting: once a digit
-  uint64_t bytes = 0;          // the most that was taken of its memory so far
+  uint64_t moved_entries = 0;  // entries moved by sorting, counted once for each digit
+  uint64_t bytes = 0;          // the most memory that OpenGL's objects have taken so far
 };
 
 /// Draws the splats of a frame. One frame at a time.
@@ -67,16 +68,16 @@ class Painter {
   /// larger than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      PixelShading shading, const PaintResources& resources = {}) = 0;
-  /// Draws only `tiles` from now on, which fill their box. Call it after begin(). No two calls name pixels of
-  /// the same square of kTileSide, and all splats of one are drawn before the next; what no call has named
-  /// shows nothing that matters.
+  /// Restricts drawing to `tiles`, which fill their bounding box, until the next call. Call it after begin().
+  /// No two calls of a frame may share a square of kTileSide pixels, and all splats of one call's tiles are
+  /// drawn before the next call. Pixels in no call's tiles have no meaningful value.
   virtual void drawOnly(const TileSet& tiles) = 0;
   /// Blends `splats` into the frame, behind all splats drawn so far and each behind those before it. Only
-  /// splats that lean are blended in an order of each tile's own (tile_key.h). The memory may be used again
-  /// when the call returns.
+  /// splats whose depth differs between tiles (leans(), tile_key.h) are blended in each tile's own order. The
+  /// memory may be used again when the call returns.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
   /// Whether all splats drawn from now on whose footprints lie in `box` would be hidden. The picture's bits
-  /// do not depend on whether they are drawn. Any thread, between begin() and end().
+  /// do not depend on whether they are drawn. Any thread may ask between begin() and end().
   virtual bool hides(const ScreenBox&) const { return false; }
   /// Waits until everything is drawn and returns the picture.
   virtual Image end() = 0;

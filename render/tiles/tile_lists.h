@@ -1,4 +1,5 @@
-// Lists for the order tiles of a tile: which of its splats touch each, in the order of their keys there (tile_key.h).
+// TileLists sorts the splats of a painter's tile (32x32 pixels) for each of its order tiles (4x4 pixels):
+// those that touch the order tile, in the order of their keys there (tile_key.h).
 #pragma once
 
 #include <array>
@@ -14,31 +15,34 @@
 
 namespace curvisplat {
 
-/// Order tiles along a painter's tile, and in it; row by row.
+/// The number of order tiles along a side of a painter's tile, and in all of it. They are counted row by row.
 inline constexpr int kOrderTilesAlong = kTileSide / kOrderSide;
 inline constexpr size_t kOrderTiles = size_t{kOrderTilesAlong} * kOrderTilesAlong;
 /// Bit n: order tile n of a tile.
 using OrderTileMask = uint64_t;
 static_assert(kOrderTiles == 64);
 
-/// A painter's tile, by the pixels of its corner.
+/// The corner of a painter's tile with the smallest coordinates, in pixels.
 struct TileCorner {
   float x, y;
 };
 
-/// The order tiles that have the centre of a pixel in the splat's ellipse, or within a hundredth of a pixel
-/// of it.
+/// The order tiles in which the centre of a pixel lies in the splat's ellipse, or within a hundredth of a
+/// pixel of it.
 OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat);
 
-/// The splats of an order tile, in the order in which they are to be painted. From the top bit: the order tile, 6 bits; the
-/// key, 32; the number in TileLists::order(), 26.
+/// The splats of an order tile, in the order in which they are to be painted. Each is an item of three
+/// fields, from the top bit: the order tile (6 bits), the splat's key there (32), its index in
+/// TileLists::order() (26).
 using OrderList = std::span<const uint64_t>;
 
 inline constexpr int kItemNumberBits = 26, kItemKeyBits = 32;
+/// The index in TileLists::order() of an item of an OrderList.
 inline uint32_t numberOf(uint64_t item) {
   return item & ((1u << kItemNumberBits) - 1);
 }
 
+/// The key of an item of an OrderList.
 inline uint32_t keyOf(uint64_t item) {
   return static_cast<uint32_t>(item >> kItemNumberBits);
 }
@@ -49,14 +53,16 @@ class TileLists {
   TileLists();
   ~TileLists();
 
+  /// Begins the lists of a tile, and forgets those of the tile before.
   void begin(const TileCorner& tile);
-  /// Lists a splat in those of `tiles` where its key lies up to `front`; returns the others. Splats with equal keys come
-  /// in the order of the calls. `number`: what order() is to have.
+  /// Lists a splat in those of `tiles` where its key is at most `front`; returns the others. Splats with
+  /// equal keys come in the order of the calls. `number`: the caller's number of the splat, which order()
+  /// returns.
   OrderTileMask add(const ScreenSplat& splat, uint32_t number, OrderTileMask tiles, uint32_t front);
-  /// Sorts the lists.
+  /// Sorts the lists. order() and lists() may be used from then until the next begin().
   void end();
 
-  /// The numbers of the splats that are in any list.
+  /// The numbers of the splats that are in at least one list, as add() got them and in that order.
   std::span<const uint32_t> order() const { return order_; }
   const std::array<OrderList, kOrderTiles>& lists() const { return lists_; }
 

@@ -1,8 +1,9 @@
 // Folders whose files come from elsewhere, such as a web server, block by block, as they are read.
 //
 // A Mirror makes a local folder look like the one that its source has: opening a file there for reading makes
-// an empty file of the right size, and a read first fetches those blocks of it that are missing. The calls of
-// SystemCalls (file.h) ask for that; reads that bypass them must not be of mirrored files (isMirrored).
+// an empty file of the right size, and a read first fetches those blocks of it that are missing. SystemCalls
+// (file.h) has that done; code that bypasses it must not read mirrored files (isMirrored()). Any thread may
+// read.
 //
 //   open, pread, close of SystemCalls --> mirrors::  --> Mirror --> Fetch
 //                                                          |
@@ -22,16 +23,16 @@ namespace curvisplat {
 
 /// The answer of a source.
 struct Fetched {
-  int error = 0;                 // errno: nothing was sent
+  int error = 0;                 // an errno if nothing was sent, else 0
   uint64_t file_bytes = 0;       // size of the whole file
   std::vector<std::byte> bytes;  // fewer than asked for only at the file's end
 };
 
-/// Asks for `count` bytes of the file `name` at an offset. Several threads call it at once.
+/// Gets `count` bytes at `offset` of the file `name`, a path in the folder. Several threads call it at once.
 using Fetch = std::function<Fetched(const std::string& name, uint64_t offset, uint64_t count)>;
 
-/// Mirrors what `fetch` has into an existing folder of this process' own, from its construction to its destruction. Files that were
-/// opened meanwhile must be closed before.
+/// Mirrors the files that `fetch` gives in `folder`, which exists and belongs to this process alone, as long
+/// as the Mirror lives. Files that were opened there must be closed before it is destroyed.
 class Mirror {
  public:
   Mirror(std::filesystem::path folder, Fetch fetch);
@@ -51,9 +52,11 @@ class Mirror {
 
 /// Whether a path lies in a mirrored folder.
 bool isMirrored(const std::filesystem::path& path);
-/// Makes a folder of a mirrored folder, which may be there or not; without effect on other paths. Its files say whether it is.
+/// Makes a folder within a mirrored folder, although the source may lack it: only a read of its files tells.
+/// Does nothing with other paths.
 void expectMirroredFolder(const std::filesystem::path& path);
-/// Makes a file known that may be there or not, for those who look for it before they open it; without effect on other paths.
+/// Makes a file of a mirrored folder visible if the source has it, for callers that look for it before they
+/// open it. Does nothing with other paths.
 void expectMirroredFile(const std::filesystem::path& path);
 
 /// SystemCalls calls these functions for every file that it opens, reads and closes.

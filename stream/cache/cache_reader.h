@@ -1,6 +1,6 @@
-// Opens a splat cache at a time step and reads bricks. An open reader looks like one of a cache of that step
-// alone; one between two steps, like that of a cache of blended samples (series_values.h). Opening reads the
-// manifest and the tables, and checks every size against the real files and every link of the octree. It
+// CacheReader opens a splat cache at a time step and reads bricks. It shows the cache as if it had that step
+// alone, or, between two steps, as if it were made of the blended samples (series_values.h). Opening reads
+// the manifest and the tables, and checks every size against the real files and every link of the octree. It
 // never reads payloads (streams). An open CacheReader is immutable: any number of threads may read.
 #pragma once
 
@@ -23,7 +23,7 @@
 
 namespace curvisplat {
 
-/// Time spent reading bricks, by step. Reads add to it.
+/// Seconds spent on reading bricks, by stage. Each read adds to them.
 struct ReadTimes {
   double read_s = 0;  // reading the file
   double verify_s = 0, decode_s = 0;
@@ -43,14 +43,16 @@ class CacheReader {
   /// Opens the cache at a step, the first unless told otherwise. Throws an Error that names the file, what
   /// was found and what was expected.
   explicit CacheReader(const std::filesystem::path& cache, uint64_t step = 0);
-  /// Opens the cache with the scalar `name`, at the first step: the one in the folder `cache`, unless the scalar has values at
-  /// samples of its own (Manifest::own_blanks). A name that neither has, or none, opens the former. Throws Error as the
-  /// constructor.
+  /// Opens the cache with the scalar `name`, at its first step: `cache`, or the cache inside it if the scalar
+  /// has values at samples of its own (Manifest::own_blanks). If `name` is empty or unknown it opens `cache`.
+  /// Throws Error as the constructor does.
   static CacheReader ofScalar(const std::filesystem::path& cache, std::string_view name);
-  /// The set of seriesManifest().own_blanks that has the scalar `name`, which its unit may follow; nullopt for all other names.
+  /// The index in seriesManifest().own_blanks of the set with the scalar `name`, which its unit may follow
+  /// ("T [K]"); nullopt if no set has it.
   std::optional<size_t> ownBlanksOf(std::string_view name) const;
-  /// Opens the cache of the scalars in seriesManifest().own_blanks[set], with those of its steps that this cache has, at this
-  /// reader's position; at its last step if the set ends before (AddStepReport). Throws Error as the constructor.
+  /// Opens the cache of the scalars in seriesManifest().own_blanks[set] at this reader's position, or at its
+  /// last step if the set ends earlier (addStep()). It shows no steps that this cache lacks. Throws Error as
+  /// the constructor does.
   CacheReader ownBlanks(size_t set) const;
   /// The names of all scalars: of the cache's own, then of each set of seriesManifest().own_blanks.
   std::vector<std::string> allScalars() const;
@@ -69,15 +71,15 @@ class CacheReader {
   const Series& series() const;
   /// The folder of the cache that this one was opened from by ofScalar() or ownBlanks(); cachePath() otherwise.
   const std::filesystem::path& wholePath() const;
-  /// The step; of a reader between two steps the earlier.
+  /// The number of the step; between two steps, that of the earlier one.
   uint64_t step() const { return position().step; }
   const StepPosition& position() const;
   double time() const { return series().timeAt(position()); }
-  /// The same cache at another step. Shares the tables of the geometry if that is the same. Throws Error as
-  /// the constructor.
+  /// Opens the same cache at another step. Shares the geometry's tables if both steps have the same geometry.
+  /// Throws Error as the constructor does.
   CacheReader atStep(uint64_t step) const { return at({step}); }
-  /// The same, or between two steps, with the extents and streams of the earlier one. Throws Error if the
-  /// two have different geometries.
+  /// Opens the same cache at a step, or between two: then extents and streams are those of the earlier one.
+  /// Throws Error as the constructor does, and if the two steps have different geometries.
   CacheReader at(const StepPosition& position) const;
   /// Whether the bricks and geometry streams of both are the same ones.
   bool sharesGeometryWith(const CacheReader& other) const;
@@ -96,16 +98,18 @@ class CacheReader {
   /// early or the stream does not decode, and Error if the disk fails; both name the brick and the file.
   void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr,
                     ReadTimes* times = nullptr) const;
-  /// `kept`: values of this cache's steps, which are used where they help, and added to.
+  /// Reads the values of a brick in the same way. `kept`: decoded values of this cache's steps, which are
+  /// used where they help, and added to; null: none.
   void readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times = nullptr,
                     KeptValues* kept = nullptr) const;
 
   /// The payload files, for callers that read streams themselves.
   const std::filesystem::path& geometryPath() const;
   const std::filesystem::path& valuesPath(size_t variable) const;
-  /// Verify and decode a stream that the caller has read: the bytes at bricks()[brick].geometry, or those at
-  /// the variable's `values`. The arrays in `out` have one element per splat of the brick. Values that are
-  /// predicted from earlier steps are read there, by this thread. Throw as the reading functions.
+  /// Verifies and decodes a stream that the caller has read: the bytes at bricks()[brick].geometry, or those
+  /// at brickVariables(variable)[brick].values. The arrays in `out` have one element for each splat of the
+  /// brick. Values of earlier steps, from which these are predicted, are read by the calling thread. Throws
+  /// as readGeometry() does.
   void decode(uint32_t brick, std::span<const std::byte> geometry, const GeometryArrays<float>& out,
               ReadTimes& times) const;
   void decode(uint32_t brick, size_t variable, std::span<const std::byte> values,
@@ -117,9 +121,10 @@ class CacheReader {
   std::unique_ptr<State> state_;
 };
 
-/// How far the stored means and slopes of a scalar's samples are from what they were, in its unit, at the reader's step: at
-/// most, and typically (the root mean square for values near the centre of its spread). Rounding to a float comes on top. Reads
-/// 40 bytes of each leaf.
+/// The errors of the stored means and slopes of a scalar at the reader's step, in the scalar's unit: the
+/// largest, and the typical one (the root mean square for values near the centre of its spread). Rounding to
+/// a float adds to them. Reads 40 bytes of each leaf. Throws DamagedBrick if they cannot be decoded, Error if
+/// the disk fails.
 StreamErrors storedErrors(const CacheReader& reader, size_t variable);
 
 }  // namespace curvisplat

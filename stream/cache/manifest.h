@@ -30,9 +30,9 @@ struct VariableInfo {
 
 /// One time step. A manifest lists the first; a series has the others in steps.bin (series.h).
 struct StepInfo {
-  double time = 0;
+  double time = 0;  // in Manifest::time_unit
   std::string geometry = "geometry.bin";
-  std::vector<uint32_t> variables;  // numbers
+  std::vector<uint32_t> variables;  // VariableInfo::number of each
 };
 
 /// Scalars that have values at other samples than the cache's own variables. They form a cache of their own,
@@ -70,7 +70,7 @@ inline constexpr const char* kCellGrowth = "cell-growth";    // kernels are skew
 inline constexpr const char* kMergedBorders =
     "merged-borders";  // merged splats are cut at faces (border_code.h), and have an even blur
 inline constexpr const char* kFaceLayers =
-    "face-layers";  // cells are cut at more faces that they are behind (border_code.h)
+    "face-layers";  // cells in the layer behind a face are cut at it, too (border_code.h)
 inline constexpr const char* kPlates =
     "plates";  // merged splats between two faces are drawn as thin (border_code.h)
 inline constexpr const char* kBorderPairs =
@@ -83,7 +83,8 @@ inline constexpr const char* kCellOctants = "cell-octants";
 /// Some scalars have values at other samples: Manifest::own_blanks. A program that does not know the feature
 /// would miss them.
 inline constexpr const char* kOwnBlanks = "own-blanks";
-/// These scalars' caches have time steps, too: the cache's own, unless a set ends before, and perhaps one that is being added.
+/// The caches of kOwnBlanks have time steps, too: those of the cache that they lie in, unless a set ends
+/// earlier. While a step is being added, a set may have one more.
 inline constexpr const char* kOwnBlanksOfSteps = "own-blanks-steps";
 
 // Values of Manifest::overlap.
@@ -105,7 +106,7 @@ struct Manifest {
   std::vector<std::string> sources;  // the input files, as given
   std::string reader;                // the input's layout and options, as text
   RootCube root;
-  glm::dvec3 lower{0.0}, upper{0.0};  // bounding box of the grid's nodes
+  glm::dvec3 lower{0.0}, upper{0.0};  // bounding box of the grid's nodes, world units
   std::vector<BlockInfo> blocks;
   bool cells = false;    // samples are the grid's cells, not its nodes; runs name a cell by its lowest node
   uint32_t refined = 1;  // each cell of the files' grid is this many along each axis
@@ -128,10 +129,11 @@ struct Manifest {
   std::vector<VariableInfo> variables;
   std::vector<StepInfo> steps;
   std::vector<OwnBlanks> own_blanks;  // empty without kOwnBlanks
-  std::vector<FileInfo> files;        // all files of the cache except the manifest, and without folders'
+  std::vector<FileInfo> files;        // all files of the cache's folder but the manifest; none of subfolders
 
   bool hasFeature(const char* feature) const;
-  /// Whether records have slopes from before kEarlierSlopes (border_code.h).
+  /// Whether the slopes in the records of bricks are those of earlier programs, which drawn ones may exceed
+  /// by the factor kEarlierSlopes (border_code.h).
   bool hasEarlierSlopes() const { return hasFeature(kBorderFaces) && !hasFeature(kMergedBorders); }
 
   std::string toJson() const;
@@ -141,8 +143,9 @@ struct Manifest {
   static Manifest fromJson(const std::string& text, const std::filesystem::path& path);
 };
 
-/// The precision of its values, also of those that are added later (stream/codec/values_codec.h).
+/// How finely values are stored (stream/codec/values_codec.h).
 enum class ValuePrecision;
+/// The precision of the cache's values, including those that are added later.
 ValuePrecision precisionOf(const Manifest& manifest);
 
 /// How the cells at the borders of a cache are drawn, by its centring and its features.

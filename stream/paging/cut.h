@@ -1,17 +1,18 @@
-// Chooses the bricks that one view needs: a pure function, apart from reading and drawing them.
-// DESIGN.md, "The pipeline".
+// chooseCut() chooses the bricks that one view needs. It is a pure function, which neither reads nor draws
+// them. DESIGN.md, "The pipeline".
 //
-// The cut starts at the root and goes down until a brick's error counts little enough on the screen, or it
-// is a leaf; what is outside the image or transparent is left out with all that lies below it. The result's
-// cells are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree
-// node the child farther along every axis comes first), so that bricks which are needed about the same time
-// are listed near one another. Splats are drawn in an order of their own (render/sweep/sweep_buffer.h).
+// The cut starts at the root and goes down until a brick's error on the screen, by its weight, is small
+// enough, or it is a leaf; what is outside the image or transparent is left out with all that lies below it.
+// The result's cells are disjoint, and the cell of a whole brick comes after every cell that it can hide (at
+// each octree node the child farther along every axis comes first), so that bricks which are needed about the
+// same time are listed near one another. Splats are drawn in an order of their own
+// (render/sweep/sweep_buffer.h).
 //
 // Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant
 // by octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
 // larger limit gives a refinement of the same cut. At most one brick is drawn in part: the last one.
 //
-// Costs about 35 ns a brick looked at, under a limit 70 to 150 (bench/cut_bench.cpp).
+// It costs about 35 ns for each brick that it looks at, or 70 to 150 ns under a limit (bench/cut_bench.cpp).
 #pragma once
 
 #include <cstdint>
@@ -37,7 +38,7 @@ struct CutView {
   glm::dvec3 scale{1.0};               // > 0
   glm::dvec3 eye{0.0};                 // perspective; stretched
   glm::dvec3 towards_viewer{0, 0, 1};  // orthographic; stretched
-  double pixels = 1;                   // to a stretched unit; perspective: at distance 1
+  double pixels = 1;                   // pixels in a stretched unit; perspective: at distance 1
   std::vector<Plane> planes;
 };
 
@@ -48,8 +49,8 @@ struct ValueBounds {
   float largest_deviation = 0;  // of √r
 };
 
-/// [brick] the bounds of the brick and all bricks below it: an inner brick's means are averages, so its own
-/// bounds promise nothing about its children.
+/// Returns [brick] the bounds of each brick and all bricks below it. An inner brick's means are averages, so
+/// its own bounds promise nothing about its children.
 std::vector<ValueBounds> subtreeBounds(std::span<const Brick> bricks,
                                        std::span<const BrickVariable> variables);
 
@@ -67,7 +68,7 @@ struct CutOptions {
 
   double lod_pixels = 1;  // error allowed on the screen; at 0 only leaves are taken
   /// The factor, 0 to 1, of a brick's error when it is compared with lod_pixels; the order of refinement does
-  /// not depend on it. Null: all errors count whole.
+  /// not depend on it. Null: the factor is 1 for all bricks.
   std::function<double(uint32_t brick)> error_weight = nullptr;
   /// Limits of the splats in the cut, and of the bytes of its bricks' streams on disk. The root is drawn even
   /// if it alone exceeds them.
@@ -81,8 +82,8 @@ struct Cut {
   uint64_t bytes = 0;  // of the parts' bricks
   uint32_t deepest_level = 0;
   bool complete = true;  // false: a limit keeps some of it coarser than lod_pixels asks for
-  /// The largest error on the screen of what is drawn, capped at lod_pixels where a brick's weight makes it
-  /// fine enough. Infinite around a perspective eye.
+  /// The largest error of what is drawn, in pixels on the screen. A brick that is fine enough by its weight
+  /// counts with lod_pixels at most. Infinite for a brick around the eye, in perspective.
   double largest_error_px = 0;
   uint64_t out_of_image = 0;  // bricks left out, each standing for all below it
   uint64_t transparent = 0;

@@ -7,17 +7,17 @@
 // granted to batches in order and freed in order, so that the brick that is needed next can always be read.
 // Whoever holds a brick's bytes must not wait for a later brick meanwhile. Reads end in any order.
 //
-// Reads are direct and by io_uring where the system allows it, else through the page cache, else by pread on
-// threads; by SystemCalls::pread whenever a test has put a double in place of the system's calls. A read that
-// fails, ends early or is put off for ever marks its bricks unreadable: whether one of them can be read
-// alone, and what is wrong if not, is for CacheReader to say.
+// Reads are direct where the file system allows it, else through the page cache; by io_uring where the kernel
+// allows it, else by pread on threads. While a test replaces system calls they are by SystemCalls::pread. A
+// read that fails, ends early or is put off again and again (EINTR, EAGAIN) marks its bricks unreadable.
+// CacheReader then reads such a brick alone, or says what is wrong.
 //
 //                start()
 //   kStopped ---------------> kReading      bricks are planned, read and handed out
 //       ^                        |
 //       '--------- stop() -------'          nothing is submitted or handed out; reads under way may still end
 //
-//   each of these --the way of reading fails--> kBroken    fetch() and start() throw the failure; the thread has ended
+//   each of these --reading itself fails--> kBroken    fetch() and start() throw the failure; the thread ends
 //   every state   --destructor----------------> kEnding    the thread ends
 #pragma once
 
@@ -48,15 +48,15 @@ struct PagerOptions {
 
   uint64_t buffer_bytes = 16 << 20;  // at least BrickPager::leastBufferBytes()
   unsigned queue_depth = 8;
-  Way way = Way::kAutomatic;  // io_uring: Error where the kernel refuses it
+  Way way = Way::kAutomatic;  // kIoUring: throws Error where the kernel refuses it
   bool direct = true;         // false: through the page cache
-  /// Test seam: makes what replaces every reading method, at most `depth` reads at once.
+  /// Makes the AsyncReads that replaces every other method in a test, for at most `depth` reads at once.
   std::function<std::unique_ptr<AsyncReads>(unsigned depth)> reads;
 };
 
 /// Counts of what was read since the pager was made.
 struct PagerStatistics {
-  double reading_s = 0;            // with a read under way
+  double reading_s = 0;            // time with at least one read under way
   uint64_t bytes = 0;              // from the files, with what lies between streams
   uint64_t requests = 0;           // to the kernel
   double depth_s = 0;              // requests under way, times seconds: over reading_s it is the mean depth
@@ -103,7 +103,7 @@ class PagedBrick {
   Streams streams_;
 };
 
-/// One variable of a cache, or two that the splats have.
+/// The variables that are read for each splat, by their positions in the manifest: one, or two.
 struct ReadVariables {
   size_t first = 0;
   std::optional<size_t> second = std::nullopt;
@@ -115,32 +115,34 @@ struct ReadVariables {
 /// Reads a frame's bricks ahead, on a thread of its own.
 class BrickPager {
  public:
-  /// Opens the files of `cache`, which outlives it, and starts the thread "pager". Throws
-  /// Error.
+  /// Opens the files of `cache`, which must outlive the pager, and starts the thread "pager". Throws Error if
+  /// a file cannot be opened, or if the kernel refuses the way of reading that was asked for.
   BrickPager(const CacheReader& cache, const ReadVariables& variables, const PagerOptions& options);
   /// Stops, and waits for the reads under way.
   ~BrickPager();
   BrickPager(const BrickPager&) = delete;
   BrickPager& operator=(const BrickPager&) = delete;
 
-  /// The bytes of the smallest buffer: with the space of the largest brick, bricks can be read one after the
-  /// other.
+  /// The size of the smallest buffer, in bytes: it holds the largest brick, so that bricks can be read one
+  /// after the other.
   static uint64_t leastBufferBytes(const CacheReader& cache, const ReadVariables& variables);
 
   /// Returns whether nobody needs a brick any more. Once true, it stays so.
   using Unneeded = std::function<bool(uint32_t brick)>;
 
-  /// Begins to read `bricks`. Stops what was begun before, all of which must have been given back.
-  /// `unneeded`, if there is one, is asked on the pager's thread, just before a brick would be read, and not
-  /// after stop().
+  /// Begins to read `bricks`, after stopping what was begun before; all bricks that were handed out must have
+  /// been given back. `unneeded`, if there is one, is asked on the pager's thread, just before a brick would
+  /// be read, and not after stop(). Throws the failure if the pager is kBroken.
   void start(std::vector<uint32_t> bricks, Unneeded unneeded = {});
-  /// Declares that the cache is at another step of the same geometry, whose values are read from the next
-  /// start() on. Stops what was begun before, all of which must have been given back. Throws Error.
+  /// Opens the files of values anew, after the cache was put at another step of the same geometry; they are
+  /// read from the next start() on. Stops what was begun before; all bricks must have been given back. Throws
+  /// Error if a file cannot be opened.
   void stepChanged();
-  /// Waits for the `sequence`-th of the bricks. Each may be taken once, by any thread. nullopt once stopped.
-  /// Throws Error where reading broke off altogether.
+  /// Waits for bricks[sequence] of start(). Each may be taken once, by any thread. Returns nullopt once
+  /// stopped. Throws the failure if the pager is kBroken.
   std::optional<PagedBrick> fetch(uint64_t sequence);
-  /// Wakes all who wait: nothing is handed out until the next start(). Any thread, any number of times.
+  /// Wakes all who wait: nothing is handed out until the next start(). Any thread may call it, any number of
+  /// times.
   void stop();
 
   PagerStatistics statistics() const;

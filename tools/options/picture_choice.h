@@ -1,7 +1,7 @@
 // Options that choose a scalar and its transfer function, shared by the subcommands that draw, and
-// PictureChoice, which takes from the data what they and the options of the camera leave out
-// (render/automatic). Everything that was chosen is collected as options that draw the same picture. Looking
-// at the data reads the cache, once for each PictureChoice, which one thread at a time may use.
+// PictureChoice, which chooses from the data (render/automatic) what these options and those of the camera
+// leave open. It collects what it has chosen as options that draw the same picture. It reads the cache once,
+// when it first needs the data. One thread at a time may use it.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -43,14 +43,14 @@ void checkFunctionArguments(const ScalarArguments& arguments);
 /// Chooses the transfer function and the camera of a picture, and collects what it has chosen.
 class PictureChoice {
  public:
-  /// `cache` must outlive this; `scale` as in FrameOptions; `what` is drawn with one function, in one of
-  /// `maps` where no colour map is given. Reads nothing.
+  /// `cache` must outlive this. `scale`: FrameOptions::scale. `what`: the step, or the whole series, that one
+  /// function is chosen for. `maps`: it has one of these colour maps if none is given. Reads nothing.
   PictureChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
                 ChosenFor what = ChosenFor::kStep, const DefaultMaps& maps = kMapsOnDark)
       : cache_(cache), variable_(variable), scale_(scale), what_(what), maps_(maps) {}
 
-  /// Fills in the options that are not given. Throws UsageError, or Error if reading fails or a file does
-  /// not hold a transfer function.
+  /// The transfer function by the options, with those that are not given chosen from the data. Throws
+  /// UsageError if an option is wrong, Error if reading fails or a file does not hold a transfer function.
   TransferFunction function(const ScalarArguments& arguments);
   /// The functions of a picture of two scalars: of the one that gives the colours, and of the one that gives
   /// the opacities.
@@ -59,13 +59,13 @@ class PictureChoice {
   struct Framing {
     ShownBox box;
     ImageSize size;
-    bool whole = false;  // shows all of the box: never a part of the data
+    bool whole = false;  // frame the whole box, not only the part of it that the function makes visible
   };
-  /// The arguments, with a position if they do not place the camera. `function`: that of the picture.
+  /// The arguments, with a camera chosen from the data if they do not place one. `function`: the picture's.
   CameraArguments camera(CameraArguments arguments, const TransferFunction& function, const Framing& framing);
 
-  /// Frees what it has read of the data, some 15 MiB that no frame's budget knows of; the next choice reads
-  /// again. To be called before frames are drawn.
+  /// Frees what it has read of the data: some 15 MiB, which no frame's budget counts. Call it before frames
+  /// are drawn. The next choice reads the data again.
   void release() { data_.reset(); }
 
   /// The options that were filled in, for a shell: "--tf viridis --range 0,1"; empty if nothing was.

@@ -1,6 +1,7 @@
-// BlockSource, the base of readers of structured formats. A reader says where the numbers of a block are in
-// its files; BlockSource reads boxes and parts of rows, blanking and fringes, and puts the values of cells at
-// their lowest nodes.
+// BlockSource, the base of readers of structured formats. A reader fills description_ in its constructor and
+// says how to read the arrays of a block. BlockSource reads boxes and parts of rows from these arrays, blanks
+// nodes by iblank, finds fringe nodes (GridSource::readFringe()) and puts the value of a cell at its lowest
+// node.
 //
 //   class MySource final : public BlockSource {
 //     BlockArray<Places> nodesOf(uint32_t block) const override {
@@ -9,7 +10,8 @@
 //     BlockArray<float*> valuesOf(uint32_t block, uint32_t scalar) const override { ... }
 //   };
 //
-// Any number of threads read at once. Errors name the file.
+// Any number of threads may call read() and readFringe() at once, so the functions that a reader overrides,
+// and what they return, must allow it too. They throw Error with the name of the file.
 #pragma once
 
 #include <array>
@@ -30,17 +32,17 @@ namespace curvisplat {
 /// A box of an array of values along i, j and k, and the layout of its destination.
 struct ArrayBox {
   std::array<uint64_t, 3> first{}, count{};
-  std::array<uint64_t, 2> memory{};  // values from one row to the next, and rows from one plane to the next
-  std::array<uint64_t, 2> whole{};   // values of a row, and rows of a plane, of the whole array
+  std::array<uint64_t, 2> memory{};  // in the destination: values from row to row, rows from plane to plane
+  std::array<uint64_t, 2> whole{};   // of the whole array: values of a row, rows of a plane
 
   bool empty() const { return count[0] == 0 || count[1] == 0 || count[2] == 0; }
 };
 
-/// The part of a box of a block that has samples, nodes or cells, as a box of an array of all of them. A cell
-/// has the place of its lowest node.
+/// The part of `box` in which the block has samples, as a box of the array of all its nodes (ni x nj x nk) or
+/// of all its cells (one fewer along each axis). A cell has the indices of its lowest node.
 ArrayBox partWithSamples(const GridBlock& block, const NodeBox& box, Centring centring);
 
-/// The destination of positions.
+/// The destination of positions: an array of doubles for each axis, in world units.
 struct Places {
   std::array<double*, 3> axes{};  // x, y, z
 
@@ -53,18 +55,20 @@ struct Places {
 template <typename To>
 class BlockArray {
  public:
-  /// The block has no such values.
+  /// An empty array: the block has no such values.
   BlockArray() = default;
-  /// `run` reads the values [first, first + count) to `to`. `along`: the values of a row and the rows of a
-  /// plane in the file, if these are more than the block has.
+  /// An array that is read by runs: run(first, count, to) writes the values [first, first + count) to `to`.
+  /// `first` counts the values of the whole array in the order of the file. `along`: how many values a row
+  /// has in the file, and how many rows a plane, if that is more than in the block; {0, 0}: as in the block.
   template <std::invocable<uint64_t, uint64_t, const To&> Run>
   BlockArray(Run run, std::array<uint64_t, 2> along = {}) : run_(std::move(run)), along_(along) {}
-  /// `box` reads a box, for files that read boxes faster than rows. Leaves other elements as they are.
+  /// An array that is read by boxes, for files where that is faster than rows: box(box, to) writes the box to
+  /// `to` in the layout of ArrayBox::memory, and leaves what lies between its rows as it is.
   template <std::invocable<const ArrayBox&, const To&> Box>
   BlockArray(Box box) : box_(std::move(box)) {}
 
   explicit operator bool() const { return run_ || box_; }
-  /// Runs are as long as the file allows: a plane of whole rows, or a part of a row.
+  /// Reads a box. Its runs are as long as the file allows: whole rows of a plane, or a part of one row.
   void read(const ArrayBox& box, const To& to) const;
 
  private:
@@ -76,10 +80,12 @@ class BlockArray {
 extern template class BlockArray<Places>;
 extern template class BlockArray<float*>;
 
-/// Nodes whose x depends on i alone, y on j and z on k: place(axis, index).
+/// Makes nodes whose x depends on i alone, y on j and z on k. place(axis, index): the coordinate, in world
+/// units; any thread calls it.
 BlockArray<Places> placesAlongAxes(std::function<double(size_t axis, uint64_t index)> place);
 
-/// Reads the magnitudes of vectors: read(component, values) reads one of their components.
+/// Overwrites `to` with the magnitudes of vectors. read(component, values) overwrites `values`, a span as
+/// long as `to`, with one of their components.
 template <typename Read>
 void readMagnitude(size_t components, std::span<float> to, const Read& read) {
   std::vector<double> squares(to.size(), 0.0);
@@ -90,7 +96,8 @@ void readMagnitude(size_t components, std::span<float> to, const Read& read) {
   for (size_t n = 0; n < to.size(); ++n) to[n] = static_cast<float>(std::sqrt(squares[n]));
 }
 
-/// The magnitude of a vector. Needs buffers of 65,536 values, or of a row.
+/// The magnitude of the vector with these components. Each read allocates buffers of at most 65,536 values,
+/// or of one row if that is longer.
 BlockArray<float*> magnitudeOf(std::vector<BlockArray<float*>> components);
 
 class BlockSource : public BoxSource {
@@ -101,19 +108,23 @@ class BlockSource : public BoxSource {
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const final;
 
  protected:
+  /// The positions of all nodes of a block. Called by each read().
   virtual BlockArray<Places> nodesOf(uint32_t block) const = 0;
-  /// Values that a block does not have are NaN.
+  /// The values of description_.scalars[scalar] in a block, at its nodes or in its cells. Returns an empty
+  /// array if the block has none: they are NaN then.
   virtual BlockArray<float*> valuesOf(uint32_t block, uint32_t scalar) const = 0;
-  /// A node is blanked where this is 0. Only blocks that have blanking are asked.
+  /// The iblank of a block's nodes: a node is blanked where it is 0. Called only for blocks with
+  /// GridBlock::has_blanking.
   virtual BlockArray<float*> iblankOf(uint32_t /*block*/) const { return {}; }
-  /// Blanks nodes of a box by other means.
+  /// Blanks nodes that the file marks in another way than by iblank: sets blank[node of the box] to 1.
   virtual void blankNodes(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<uint8_t>& /*blank*/) const {
   }
-  /// Makes values NaN in cells of a box.
+  /// Makes the values of blanked cells NaN. `values` has one for each node of the box, a cell's at its
+  /// lowest.
   virtual void blankCells(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<float>& /*values*/) const {}
 
   GridDescription description_;      // with all blocks and scalars
-  bool negative_is_fringe_ = false;  // of iblank
+  bool negative_is_fringe_ = false;  // a negative iblank marks a fringe node (readFringe())
 
  private:
   template <typename Use>

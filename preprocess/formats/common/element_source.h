@@ -1,7 +1,8 @@
-// ElementSource, the base of readers of unstructured formats, which say how points, cells and values of a
-// piece are read. (Structured formats: block_source.h.)
+// ElementSource, the base of readers of unstructured formats. A reader fills description_ in its constructor
+// and says how the points, cells and values of a piece are read. (Structured formats: block_source.h.)
 //
-// Any number of threads read at once. Errors name the file.
+// Any number of threads may read at once, so the functions that a reader overrides must allow it. They throw
+// Error with the name of the file.
 #pragma once
 
 #include <algorithm>
@@ -28,10 +29,11 @@ class ElementSource : public MeshSource {
  protected:
   /// Reads the positions of points [first, first + count).
   virtual void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const = 0;
-  /// Appends cells [first, first + count), without values, to `out`, which is empty.
+  /// Appends cells [first, first + count), without values, to `out`, which is empty. Their corners are
+  /// numbers of points in the piece, from 0.
   virtual void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const = 0;
-  /// Reads values of a scalar, at points or in cells, from number `first` on. `to` is NaN before, and stays so
-  /// where the piece has none.
+  /// Reads the values of a scalar at the points, or in the cells, [first, first + to.size()) of a piece. `to`
+  /// is filled with NaN before; leave it so where the piece has no values.
   virtual void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const = 0;
 
   GridDescription description_;  // with all pieces and scalars
@@ -42,18 +44,18 @@ class ElementSource : public MeshSource {
                std::vector<std::vector<float>>& out) const;
 };
 
-/// The point that a file counts from `first` under this number. What is no number of a point becomes one that is too large, which
-/// checkCells() refuses.
+/// The index, from 0, of the point with this number in a file that counts points from `first`. What cannot be
+/// an index (negative, NaN, above 2^53) becomes the largest uint64_t, which checkCells() refuses.
 inline uint64_t pointNumber(double number, double first = 0) {
   const double point = number - first;
   return point >= 0 && point <= 0x1p53 ? static_cast<uint64_t>(point) : std::numeric_limits<uint64_t>::max();
 }
 
-/// Elements of a list, which is one of several that follow one another in a piece.
+/// A range of the elements of one list, where a piece has several lists one after another.
 struct PartOfList {
-  size_t list = 0;                // its number
+  size_t list = 0;                // index of the list
   uint64_t first = 0, count = 0;  // in the list
-  uint64_t at = 0;                // of the first, among the elements that are asked for
+  uint64_t at = 0;                // index of the first element, from the first one that is asked for
 };
 
 /// Calls use(PartOfList) for each of `lists` that has some of the elements [first, first + count) of a piece.

@@ -1,4 +1,5 @@
-// Scalars of a file and their names: an array of several components gives several, and no two have the same name.
+// ScalarList gives the scalars of a file names that differ, where the reader offers enough names. An array of
+// several components gives several scalars. For one thread: readers use it in their constructors.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,18 +14,18 @@
 
 namespace curvisplat {
 
-/// The place of a vector's magnitude among its components.
+/// The number that stands for a vector's magnitude where a component is asked for.
 inline constexpr int kMagnitude = -1;
 
-/// Adds scalars to a description that outlives it.
+/// Adds scalars to a description, which must outlive the list.
 class ScalarList {
  public:
   explicit ScalarList(GridDescription& description) : description_(description) {
     for (const GridScalar& scalar : description.scalars) taken_.insert(scalar.name);
   }
 
-  /// Adds a scalar under the first of these names that no other has, or under the last. The result is valid
-  /// until the next one is added.
+  /// Adds a scalar under the first of `names` that no other scalar has, or under the last of them, even if
+  /// that is taken. The result is valid until the next call.
   GridScalar& add(const std::vector<std::string>& names, Centring centring) {
     size_t n = 0;
     while (n + 1 < names.size() && taken_.count(names[n]) > 0) ++n;
@@ -40,8 +41,8 @@ class ScalarList {
   std::set<std::string> taken_;
 };
 
-/// The names that ScalarList::add() may choose from for a component of an array: NAME SUFFIX; if it is in
-/// cells NAME:cell SUFFIX; and the last of them with `number`.
+/// Names for a component of an array, from which ScalarList::add() chooses: `name` and `suffix` joined; in
+/// cells also with ":cell" between them; and the last of these with ":" and `number` behind it.
 inline std::vector<std::string> namesOfComponent(const std::string& name, const std::string& suffix,
                                                  Centring centring, size_t number) {
   std::vector<std::string> names{name + suffix};
@@ -50,8 +51,8 @@ inline std::vector<std::string> namesOfComponent(const std::string& name, const 
   return names;
 }
 
-/// Calls use(suffix, component) for the scalars that an array gives: of one component ""; of two or three
-/// ":mag" (component kMagnitude), ":x", ":y", ":z"; of more ":0", ":1", ...
+/// Calls use(suffix, component) for each scalar that an array gives. One component gives the suffix ""; two
+/// or three give ":mag" (component kMagnitude), then ":x", ":y", ":z"; more give ":0", ":1", ...
 template <typename Use>
 void forEachComponent(uint64_t components, const Use& use) {
   if (components == 1) return use(std::string(), 0);
