@@ -1,6 +1,6 @@
 // The contents of a Tecplot file: variables, and zones with the position of each variable's values. It is the
 // result of both readers, of text (tecplot_text.cpp) and of binary files (tecplot_binary.cpp), and the input
-// of TecplotSource. Memory grows with the number of zones and variables, which are limited. One thread reads
+// of tecplot_source.cpp. Memory grows with the number of zones and variables, which are limited. One thread reads
 // a file; any number may then read values.
 #pragma once
 

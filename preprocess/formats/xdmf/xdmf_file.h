@@ -1,4 +1,4 @@
-// An XDMF file: grids in XML, whose arrays are in other files. The result of reading it, and the input of XdmfSource.
+// An XDMF file: grids in XML, whose arrays are in other files. The result of reading it, and the input of xdmf_source.cpp.
 //
 //   <Xdmf><Domain><Grid GridType="Collection" CollectionType="Temporal">
 //     <Grid> <Time Value="0.5"/>
