@@ -34,7 +34,7 @@ class WindowTest : public ProgramSuite<WindowTest> {
     std::filesystem::current_path(folder_->path());  // where pictures are saved
     setenv("XDG_CONFIG_HOME", file("config").c_str(), 1);
     setenv("CURVISPLAT_WIDGETS", file("widgets").c_str(), 1);
-    run({"generate", "half-annulus", "--size", "48x24x24", "-o", "a"});
+    run({"generate", "half-annulus", "--size", "28x14x12", "-o", "a"});
     run({"convert", "a.xyz", "a.fun", "-o", "a.splats", "--scalar", "f", "--scalar", "volume"});
   }
   static void TearDownTestSuite() {
@@ -55,8 +55,6 @@ class WindowTest : public ProgramSuite<WindowTest> {
   }
 
   void open(const Words& options = {}, ImageSize size = kWindow) {
-    saved_ = 0;
-    while (std::filesystem::exists(picture(saved_ + 1, cache_))) ++saved_;
     std::filesystem::remove("widgets");
     window_ = std::make_unique<RunningProgram>(
         Words{"view", cache_ + ".splats", "--size", fmt::format("{}x{}", size.width, size.height)} + options);
@@ -129,7 +127,9 @@ class WindowTest : public ProgramSuite<WindowTest> {
   }
   /// The final picture, as saved by Ctrl+S: all that was done before is in it.
   Image save() {
-    const std::string name = picture(++saved_, cache_);
+    int number = 1;  // the window, too, takes the first that is free
+    while (std::filesystem::exists(picture(number, cache_))) ++number;
+    const std::string name = picture(number, cache_);
     EXPECT_TRUE(eventually([&] {
       if (!std::filesystem::exists(name)) press("ctrl+s");  // a key may come before the window hears
       return eventually([&] { return std::filesystem::exists(name); }, 5);
@@ -234,7 +234,6 @@ class WindowTest : public ProgramSuite<WindowTest> {
 
  private:
   static inline std::filesystem::path old_folder_;
-  int saved_ = 0;
 };
 
 /// Caches of grids that were opened without `convert`, in a folder of the test's own.
