@@ -1,15 +1,16 @@
 // Decides which block draws the data where several overlap: every point of space has one owner.
 //
-// The owner of a point is, of the blocks with a cell that holds it, the one whose node next to the point is
-// no fringe (GridSource::readFringe), and of several such the one with the smallest cell (cell_tree.h), and
-// of those of one size the first. That depends on the grid alone. A sample's cell is looked at in 64 points
-// (shape/covered_part.h), but only where owners change: every sample is located once in each block that its
-// own one overlaps, and where it and all of its neighbours lie inside, nothing more is asked.
+// The owner of a point is one of the blocks with a cell that holds it. Blocks whose node next to the point is
+// no fringe (GridSource::readFringe) come before others; then the one with the smallest cell there
+// (cell_tree.h) owns the point, and of those of one size the first. That depends on the grid alone. A
+// sample's cell is looked at in 64 points (preprocess/shape/covered_part.h), but only where owners change:
+// every sample is located once in each block that its own one overlaps, and where it and all of its
+// neighbours lie inside, nothing more is asked.
 //
 //    slab of block A --samples--> CellTree of a part of block B --> covered points of A's samples
 //                                 (tiles: the parts in memory)
 //
-// Cells are those of which all corners are there. Only pairs of blocks that findOverlaps() has found are
+// Only cells whose corners are all there count. Only pairs of blocks that findOverlaps() has found are
 // compared, so that blocks that abut lose nothing to one another.
 #pragma once
 
@@ -29,22 +30,23 @@
 
 namespace curvisplat {
 
-/// How the data is drawn where blocks overlap.
+/// The blocks that draw the data where several overlap.
 enum class Overlap {
-  kOwner,  // once
-  kAll,    // by every block
+  kOwner,  // the owner of each point alone
+  kAll,    // every block
 };
 
 /// Finds the owners of samples. One thread calls; the functions are parallel loops.
 class BlockOwners {
  public:
-  /// Reads the blocks that overlap once. `reader` gives the samples that are there. Memory: `memory_bytes`,
-  /// but at least for some rows. Throws Error if a file cannot be read.
+  /// Reads, once, each block that overlaps another. `reader` gives the samples that are there. Memory:
+  /// `memory_bytes`, but at least for some rows. Throws Error if a file cannot be read.
   BlockOwners(NodeReader reader, const std::vector<BlockOverlap>& overlaps, uint64_t memory_bytes);
 
-  /// Sets covered[n], of sample n of the slab's window, for the samples of its box: the points that another
-  /// block owns (shape/covered_part.h). Empty if there are none. The window has a halo of at least a sample
-  /// before and after (two for cells). Throws Error if a file cannot be read.
+  /// Sets covered[n] for each sample of the slab's box, where n is its number in the slab's window: a bit for
+  /// each of its 64 points that another block owns (preprocess/shape/covered_part.h). Empty if there are
+  /// none. The window has a halo of at least a sample before and after (two for cells). Throws Error if a
+  /// file cannot be read.
   void cover(const LoadedSlab& loaded, std::vector<uint64_t>& covered);
 
  private:

@@ -1,8 +1,8 @@
 // The nodes of block faces that coincide at one point, and what becomes of them. Two halves give back the
-// whole cell, which is stretched and skewed by what both blocks have there (joint_sides.h); so are the
-// splats one away from the face. Where one half is more than 2.5 times as thick as the other, they stay
-// apart, each cut at the face between them: one splat for both would reach too far on the thin side and not
-// far enough on the thick one.
+// whole cell, which is stretched and skewed by the lengths of both blocks' cells there (joint_sides.h); so
+// are the splats of the nodes next to the face. Where one half is more than 2.5 times as thick as the other,
+// they stay apart, each cut at the face between them: one splat for both would reach too far on the thin side
+// and not far enough on the thick one.
 //
 //    block A      |  block B                          alike                     unlike
 //    o     o     o|o     o     o                  o--[  o  ]--o              o----[o|o]-o-o
@@ -30,8 +30,8 @@
 
 namespace curvisplat {
 
-/// Whether the border that `splat` lies behind is one of those of the splat `face` that are faces to be cut
-/// at.
+/// Whether the splat `behind` lies behind one of the borders of `face` that are faces to be cut at.
+/// `border_code`: that of `face`.
 bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind);
 
 /// The borders of a node's cell that are still open once the parts that coincide there are merged: two halves
@@ -55,7 +55,7 @@ class OpenBorders {
     glm::dvec3 face{0.0};    // a point of it
     uint8_t axis = 0;        // LayerAxis'
   };
-  /// The same with such faces, but for those across directions in which any of the parts ends.
+  /// The same with such faces, apart from those across a direction in which one of the parts ends.
   LayeredBorder of(const Splat& merged, std::span<const Layer> layers) const;
 
  private:
@@ -69,10 +69,10 @@ class OpenBorders {
   size_t parts_ = 0;
 };
 
-/// Corrects the means of a cell that is merged of its parts for how the scalars bend from one part to
-/// another. A half cell knows no second difference along its short axis (node_splats.h), and its parts'
-/// means make an eighth of it where a tenth is right; the rest is taken off, and so is the variance that is
-/// this bend's alone. The node is then as if its block had never been cut.
+/// Corrects the means of a cell that was merged from its parts, since scalars bend from one part to the next.
+/// A half cell knows no second difference along its short axis (node_splats.h), and its parts' means make an
+/// eighth of it where a tenth is right; the rest is taken off, and so is the variance that is this bend's
+/// alone. The node is then as if its block had never been cut.
 class BendOfParts {
  public:
   explicit BendOfParts(size_t variables) : sums_(variables) {}
@@ -98,19 +98,19 @@ class BendOfParts {
 
 /// How coincident halves of unlike thickness are treated.
 enum class UnlikeHalves {
-  kApart,
-  kApartInCells,  // the same, by JointFrames::kCells
-  kMerged,        // caches of version 1; in their frames, too
+  kApart,         // they stay two splats; directions are compared by JointFrames::kRows
+  kApartInCells,  // the same, but compared by JointFrames::kCells
+  kMerged,        // they become one splat, as in caches of version 1; compared by JointFrames::kCells
 };
 
-/// How directions are compared.
+/// The frames in which directions are compared.
 inline JointFrames framesOf(UnlikeHalves unlike) {
   return unlike == UnlikeHalves::kApart ? JointFrames::kRows : JointFrames::kCells;
 }
 
 /// Halves are unlike if one is more than this many times as thick as the other.
 inline constexpr double kMaxJointRatio = 2.5;
-/// The same where grid lines have a kink at the joint: one splat of two such halves bulges out of both.
+/// The same limit where grid lines have a kink at the joint: one splat of two such halves bulges out of both.
 inline constexpr double kMaxKinkedRatio = 1.3;
 
 /// A splat with its values.
@@ -150,7 +150,8 @@ class MergedParts {
   MergedParts(size_t variables, JointFrames frames)
       : frames_(frames), merger_(variables), bend_(variables), rows_(variables) {}
 
-  /// Forgets what it had. `sides`: those of the part.
+  /// Forgets the parts before, and begins with `first`. `sides`: the part's. `values` has one element a
+  /// variable.
   void begin(const NodeSplat& first, std::span<const SplatScalar> values, std::span<const JointSide> sides);
   void add(const NodeSplat& part, std::span<const SplatScalar> values, std::span<const JointSide> sides);
   /// The merged splat. Its node (and node_position) is the lowest of the parts; regular is false unless there
@@ -184,7 +185,7 @@ class JointNodes {
   /// is closed.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
 
-  /// Gets a splat and the nodes that it is merged of; none of the layer behind.
+  /// Gets a splat, and the nodes that it was merged from; a splat of the layer behind has no such nodes.
   using Sink =
       std::function<void(const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes)>;
   /// Gives the merged splats to `sink`, then forgets the nodes.

@@ -2,8 +2,8 @@
 // splat also ends at faces: the planes that the splats of its voxel end at, averaged.
 //
 // Sums are kept about the first splat added, so that a cluster far from the origin loses no digits. They
-// depend, in their last bits, on the order of the calls. A cluster of any size takes 228 bytes and 80 a
-// variable, and 88 for each face. Nothing here is for several threads at once.
+// depend, in their last bits, on the order of the calls. A cluster of any size takes 228 bytes, 80 for each
+// variable and 80 for each face. Nothing here is for several threads at once.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -32,8 +32,8 @@ struct VoxelPlanes {
   size_t count = 0;
 };
 
-/// Whether a splat that ends at all these planes is not cut at this one: another one faces it, or it is too
-/// uneven.
+/// Whether a splat that ends at all these planes is not cut at `plane`: another one faces it, or it is no
+/// face to be cut at (VoxelPlanes::Plane::face).
 bool isClosed(const VoxelPlanes::Plane& plane, std::span<const VoxelPlanes::Plane> all);
 
 /// The faces that merged splats end at: gathered from border codes (stream/model/border_code.h) while
@@ -72,22 +72,23 @@ class MergedFaces {
   std::vector<Sums> sums_;
 };
 
-/// The border code of a merged splat. `voxel_size`: how long the splats behind it are, at the least.
+/// The border code of a merged splat. `position`: as in VoxelMerger::add(). `voxel_size`: the least length of
+/// the splats behind it, in world units.
 uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged,
                           double voxel_size);
 
 /// Many clusters side by side, in a few flat arrays: the voxels of an inner brick.
 class VoxelMerger {
  public:
-  /// `spread`: what the covariance of the centres counts in a merged shape. 12 makes n³ unit cells one of
+  /// `spread`: the factor of the centres' covariance in a merged shape. 12 makes n³ unit cells one of
   /// shape n² I; other values are for tests.
   VoxelMerger(size_t variables, size_t voxels, double spread = 12);
-  /// Empties every voxel. Costs 12 bytes of writing a voxel. `voxel_size`: the length of the voxels' edges,
-  /// in world units, where they are a lattice's, whose splats are to tile space (finish()); 0: they are not.
+  /// Empties every voxel. Writes 12 bytes for each. `voxel_size`: the length of the voxels' edges in world
+  /// units, if the voxels form a lattice whose splats are to tile space (finish()); 0 if they do not.
   void clear(double voxel_size = 0);
 
-  /// Adds a splat to cluster `voxel`. `position` goes before splat.position: world units from any origin
-  /// that is common to the voxel's splats. `values` has one element a variable.
+  /// Adds a splat to cluster `voxel`. `position` is used in place of splat.position: world units from any
+  /// origin that is common to the voxel's splats. `values` has one element a variable.
   void add(size_t voxel, const glm::dvec3& position, const Splat& splat, std::span<const SplatScalar> values,
            const SplatCodes& codes = {});
 
@@ -97,17 +98,16 @@ class VoxelMerger {
 
   /// Overwrites `splat` (position from the same origin) and `values`, and returns the codes. A single splat
   /// comes back as it went in, to the bit. If all weights are zero the average is unweighted and the weight
-  /// is zero. Degenerate axes are floored as in shape.h. Of a lattice's voxels a splat that is merged has
-  /// the moments of a cell with the blur that belongs to the lattice, and ends at the faces that its splats
-  /// end at.
+  /// is zero. Degenerate axes are floored as in shape.h. In a lattice, a splat merged from
+  /// several also gets the blur that belongs to the lattice, and ends at the faces that its splats end at.
   SplatCodes finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
 
   /// The values alone.
   void finishValues(size_t voxel, std::span<SplatScalar> values) const;
 
   /// World units: the square root of the largest eigenvalue of 12 x the covariance of the merged centres (n³
-  /// unit cells: √(n² - 1)). 0 for a single splat. What Brick::error is the largest of. Or `least`, if that
-  /// is more, which most often is known from a bound.
+  /// unit cells: √(n² - 1)). 0 for a single splat. Brick::error is the largest of these. Returns `least`
+  /// if that is more: often a bound shows it, and nothing has to be computed.
   double detail(size_t voxel, double least = 0) const;
 
  private:

@@ -9,14 +9,14 @@
 //
 // A splat says what the scalar is at its middle and how it changes from there: a tangent. Tangents of the
 // neighbours do not meet where the scalar bends: their weighted mean lacks half the second derivative times
-// the kernel's variance. So much is added to the mean beforehand: a tenth (kBend) of each second difference,
-// less what bent coordinates make of a straight scalar. The mean stays within the range of the node and its
-// neighbours.
+// the kernel's variance. This is added to the mean beforehand: a tenth (kBend) of each second difference,
+// less the second difference that a linear scalar has where the coordinates bend. The mean stays within the
+// range of the node and its neighbours.
 //
 // A splat is longer or shorter than the cell along each axis, by a factor near 1, so that uniform data looks
 // uniform where cells of different sizes meet (stretch.h). Its weight stays the volume of the cell, its slope
-// stays the scalar's gradient, and its middle stays; that of a half cell moves with the stretch, since its
-// border stays, and it is stretched by less (JointLine, stretch.h).
+// stays the scalar's gradient, and its middle stays where it is. A half cell is stretched by less (JointLine,
+// stretch.h), and its border stays where it is, so that its middle moves.
 //
 // Where cells grow steadily along an axis the kernel is skewed (stream/model/growth_code.h).
 //
@@ -53,7 +53,7 @@ namespace curvisplat {
 /// Half the variance of the kernel along an axis.
 inline constexpr double kBend = 0.5 * kKernelSigma * kKernelSigma;
 
-/// The code of where a cell ends, as stream/border_code.h has it. `inwards`: along i, j, k, 1 or -1 from a
+/// The code of where a cell ends, as in stream/model/border_code.h. `inwards`: along i, j, k, 1 or -1 from a
 /// border; `faces`: whether the borders are faces to be cut at; `rotate` gives Q's image of a vector.
 template <typename Rotate>
 uint32_t borderCode(const std::array<double, 3>& inwards, bool faces, const Rotate& rotate) {
@@ -94,9 +94,11 @@ struct NodeSplat {
   // tolerance. Set only where SeamMerger is asked; 0 elsewhere.
   double spacing = 0;
 
-  // The lines of the lattice's axes: across faces of the block that the node is on, or one away from.
+  // [axis of the lattice]: the line of nodes along it, where it crosses a face of the block that the node is
+  // on, or one away from.
   std::array<JointLine, 3> lines{};
-  // LayeredBorder's: layers behind faces that SeamMerger may find to be closed, where the code has several directions.
+  // The layers, as in LayeredBorder: those behind faces that SeamMerger may find to be closed, where the code
+  // has several directions.
   uint8_t layers = 0;
   StretchFit fit = StretchFit::kSteep;  // what the stretch was found by
   bool fits_layers = false;             // it was made to fit where it is cut (face_layers.h)
@@ -127,7 +129,7 @@ struct NodeSplats {
   };
   std::vector<Probe> probes;  // of the splats that have layers, in their order
   uint64_t degenerate = 0;    // splats with a floored axis
-  uint64_t right_handed = 0;  // of the others: det J > 0
+  uint64_t right_handed = 0;  // those of the others with det J > 0
   uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
 };
 
@@ -135,16 +137,16 @@ struct NodeSplats {
 /// single ones off to measure what they are worth.
 struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
-  bool faces = true;         // to be cut at; else cells at borders are drawn in parts
+  bool faces = true;         // borders are faces to be cut at; else cells at borders are drawn in parts
   // Cuts behind several faces; otherwise nodes on a face are cut there alone, others at one face behind them.
   bool layers = true;
   bool middles = true;  // else splats sit at nodes, but for half cells
-  bool bends = true;    // of the scalar
+  bool bends = true;    // means are corrected where the scalar bends (kBend)
   bool stretch = true;  // else splats are as long as their cells
-  bool growth = true;   // else kernels are symmetric; takes stretch
-  bool lines = true;    // else cells at joints know their own block alone; takes growth and stretch
+  bool growth = true;   // else kernels are symmetric; needs `stretch`
+  bool lines = true;    // else cells at joints know their own block alone; needs `growth` and `stretch`
   bool steep = true;    // else stretches are StretchFit::kGentle (kSteepStretch)
-  bool octants = true;  // else cells keep those that reach into blanked cells (kCellOctants)
+  bool octants = true;  // else cells keep the octants that reach into blanked cells (kCellOctants)
   // Weights and scalars of dual cells (dual_cell.h); otherwise weights are |det J|, and the scalars of bent
   // layers follow their slopes however far (kMaxBend).
   bool dual_cells = true;

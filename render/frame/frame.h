@@ -52,16 +52,16 @@ class FrameRenderer {
 
   /// Draws one frame. Throws UsageError for an invalid view, and for too little memory or too small a
   /// max_splats (the message says how much is needed); Error if reading or drawing fails; Interrupted once
-  /// options.stop or `progress` are stopped, at the latest when each worker has finished its brick and the
-  /// painter its segment. The renderer can be used again after each of them. `statistics` is overwritten.
-  /// With options.ranks, all ranks have to call it: rank 0 returns the picture, bit for bit that of one
-  /// process; the others return only their tiles. Statistics are each rank's own.
+  /// options.stop or `progress` asks for a stop, at the latest when each worker has finished its brick and
+  /// the painter its segment. The renderer can be used again after each of these exceptions. `statistics` is
+  /// overwritten. With options.ranks, all ranks have to call it: rank 0 returns the picture, bit for bit that
+  /// of one process; the others return only their tiles. Statistics are each rank's own.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
 
-  /// Draws one frame as render() does, and finds what lies where the picture's pixels have half of their
-  /// opacity. Takes about three times as long: the splats are drawn again, by the processor. Of several
-  /// ranks the first gets the values.
+  /// Draws one frame as render() does, and finds for each pixel the depth where it has half of its opacity,
+  /// and what lies there. Takes about three times as long: the splats are drawn again, by the processor. Of
+  /// several ranks the first gets the values.
   Image renderWithValues(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                          PixelValues& values, Progress* progress = nullptr);
 
@@ -102,7 +102,7 @@ class FrameRenderer {
   /// frame.
   ComputePermits* permits() const;
 
-  /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  /// Name of the backend: "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;
   /// Whether the processor draws, either directly or through a software OpenGL.
   bool drawsInSoftware() const;
@@ -112,8 +112,8 @@ class FrameRenderer {
   std::unique_ptr<State> state_;
 };
 
-/// Draws the time steps of a cache: one renderer as long as the geometry stays, so that decoded geometry is
-/// kept while values change.
+/// Draws the time steps of a cache, with one renderer as long as the geometry stays: decoded geometry is kept
+/// while values change. One caller at a time.
 class StepPlayer {
  public:
   /// `cache` must outlive the player; it is at the step that is drawn. Throws Error as FrameRenderer.

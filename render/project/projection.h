@@ -50,7 +50,7 @@ struct ProjectionSettings {
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
   std::vector<ClipPlane> clip_planes = {};
   std::optional<Light> light = std::nullopt;
-  double light_g0 = 1;                   // LocalLight's
+  double light_g0 = 1;                   // LocalLight's threshold: the scalar's unit per stretched unit
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
   const PixelLayers* layers = nullptr;   // surfaces and slices in the picture, which splats are cut at
   std::shared_ptr<const GradientOpacity> gradient = nullptr;  // factor of extinctions; null: 1
@@ -77,13 +77,13 @@ class BrickProjector {
  public:
   /// A brick gives at most kMaxBrickSplats splats, each with a ScreenColour in pictures of two scalars, plus
   /// this many records of pieces. If borders and perspective would make more, cells at borders are drawn as
-  /// one splat instead of two; if that is too many as well, like any cell, clip planes keep or drop whole
-  /// splats instead of cutting them, and perspective cuts more coarsely and drops more of the splats that
-  /// are close to the eye.
+  /// one splat instead of two. If that is too many as well, they are drawn like any other cell, clip planes
+  /// keep or drop whole splats instead of cutting them, and perspective cuts more coarsely and drops more of
+  /// the splats that are close to the eye.
   static constexpr size_t kMaxPieces = 65536;
   static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;
 
-  /// Allocates all memory that project() will need, but for what kMaxBrickSplats ScreenColours take.
+  /// Allocates all memory that project() will need, apart from the ScreenColours of pictures of two scalars.
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
@@ -106,9 +106,9 @@ class BrickProjector {
   /// Their keys are not known yet: until DepthKeys::setKeys() their slopes are pixels of depth a pixel.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
   std::span<ScreenSplat> mutableSplats() { return splats_; }
-  /// [splats()], larger is farther: orthographic, the distance along the view from the brick's origin;
-  /// perspective, with z that distance from the eye, 1 / b - 1 / z, where b is ScreenView::orderBase(). On
-  /// the screen both are linear over a plane.
+  /// Depths of splats(), one each; larger is farther. In orthographic views, the distance along the view from
+  /// the brick's origin; in perspective, 1 / b - 1 / z, where z is the distance along the view from the eye
+  /// and b is ScreenView::orderBase(). On the screen both are linear over a plane.
   const std::vector<float>& depths() const { return depths_; }
   const ProjectionCounts& counts() const { return counts_; }
 
@@ -119,8 +119,8 @@ class BrickProjector {
 };
 
 /// How far, in multiples of the largest slope (BrickVariable), a mean can reach over the footprints of a
-/// splat and of its parts at a border, under `low_pass_px2`; where it is cut the mean moves by up to
-/// ScreenCut::kReach deviations more.
+/// splat and of its parts at a border, with a low-pass filter of variance `low_pass_px2`; where it is cut the
+/// mean moves by up to ScreenCut::kReach deviations more.
 double largestReach(double low_pass_px2);
 
 }  // namespace curvisplat

@@ -7,9 +7,10 @@
 //
 //   key in a tile = key + slope · (the tile's middle - the splat's centre), no less than `first`
 //
-// Keys are integers below 2^31 that increase in drawing order (depth_sort.h). Splats with equal keys in a tile come by
-// `first`, then by brick, then by number: in the order in which the sweep releases them, which is that of
-// `first`. All that a tile's order depends on is the splats themselves.
+// Keys are integers below 2^31 that increase in drawing order (depth_sort.h). A splat's `first` is about the
+// least key that it has in a tile, never more (setFirst()); the sweep releases splats by it. Splats with
+// equal keys in a tile come by `first`, then by brick, then by number, as the sweep releases them. So a
+// tile's order depends on nothing but the splats themselves.
 #pragma once
 
 #include <algorithm>
@@ -26,8 +27,8 @@ namespace curvisplat {
 inline constexpr int kOrderSide = 4;
 static_assert(kTileSide % kOrderSide == 0 && kSharedTileSide % kOrderSide == 0);
 
-/// Pixels of depth a pixel: planes that are steeper are taken for this steep, some 80 degrees. It bounds how
-/// far before its centre a splat may come.
+/// The steepest slope of a splat's plane, in pixels of depth a pixel, some 80 degrees; steeper ones count as
+/// this. It bounds how far before its centre a splat may come.
 inline constexpr float kSteepest = 6;
 
 /// Whether a splat comes at different depths in different tiles.
@@ -35,7 +36,7 @@ inline bool leans(const ScreenSplat& splat) {
   return splat.key_slope0 != 0 || splat.key_slope1 != 0;
 }
 
-/// Keys that a tile may lie from a splat's own, at the most: all there are (DepthKeys).
+/// How far the key in a tile may lie from the splat's own, in keys, at the most: all there are (DepthKeys).
 inline constexpr float kMaxSteps = 0x1p30f;
 
 /// The splat's key in the tile with its middle at (x, y).
@@ -46,7 +47,8 @@ inline uint32_t keyAt(const ScreenSplat& splat, float x, float y) {
   return static_cast<uint32_t>(std::max(key, static_cast<int32_t>(splat.first)));
 }
 
-/// The order tiles along one side that a splat's rectangle touches: numbers, the last included.
+/// The order tiles that a splat's rectangle touches along x or y: their numbers, from `first` to `last`,
+/// which is included.
 struct OrderTileSpan {
   float first, last;
 
@@ -63,7 +65,7 @@ struct OrderTileSpan {
   }
 };
 
-/// How much before its centre's key a splat may come in any tile that its ellipse touches. In steps.
+/// How much less than its centre's key a splat's key may be in any tile that its ellipse touches.
 inline float mostBefore(const ScreenSplat& splat) {
   constexpr auto kSupport = static_cast<float>(kKernelSupport);
   const float across = splat.l11 * splat.key_slope0 + splat.l21 * splat.key_slope1;
@@ -72,8 +74,8 @@ inline float mostBefore(const ScreenSplat& splat) {
          0.5f * kOrderSide * (std::abs(splat.key_slope0) + std::abs(splat.key_slope1)) + 1;
 }
 
-/// Sets `first` of a splat with all other members set. One that touches a single tile does not lean: it gets the key that
-/// it has there.
+/// Sets `first` of a splat whose other members are set. A splat that touches a single tile no longer leans
+/// afterwards: it gets the key that it has there.
 inline void setFirst(ScreenSplat& splat) {
   splat.first = splat.key;
   if (!leans(splat)) return;

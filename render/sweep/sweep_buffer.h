@@ -1,5 +1,5 @@
-// Brings the splats of all bricks of a frame into one order while no more than a layer of them is in memory,
-// by a sweep along the depth.
+// Brings the splats of all bricks of a frame into one order by a sweep along the depth. No more than a layer
+// of them is in memory: those that a later brick may still precede.
 //
 //   parts, by their nearest key      |---a---|
 //                                      |-----b-----|
@@ -56,6 +56,7 @@ struct SweepPosition {
   uint32_t place = 0;  // in its brick, sorted
   auto operator<=>(const SweepPosition&) const = default;
 };
+/// The end of the sweep: behind all splats.
 inline constexpr SweepPosition kSweepEnd{~uint32_t{0}, ~uint32_t{0}, ~uint32_t{0}};
 
 /// A part of the cut with its range of keys. The sweep takes parts by their first key, then by rank.
@@ -84,6 +85,7 @@ class SweepBuffer {
 
   /// The splats of one part from the slab's beginning on: all of them, or those before the slab's end.
   class Run;
+  /// Splats [from, to) of a run.
   struct Piece {
     std::shared_ptr<Run> run;
     size_t from, to;
@@ -99,8 +101,8 @@ class SweepBuffer {
   /// Begins a frame with an empty, open buffer. No thread may use the buffer meanwhile, nor during
   /// beginSlab().
   void beginFrame();
-  /// Begins another sweep in the same frame, between slabs. `left_out` [swept]: 1 for the parts that it does
-  /// not need.
+  /// Begins the sweep of another region in the same frame, between slabs. `left_out` [swept]: 1 for the parts
+  /// that it does not need.
   void beginRegion(std::span<const uint8_t> left_out);
   /// Begins the next slab; the first begins with the first part. False if the last slab has reached the end.
   /// `swept` is borrowed and must be the same throughout the frame.
@@ -135,7 +137,9 @@ class SweepBuffer {
   bool awaitFilled(const Batch& batch);
   /// Writes the keys of a batch's splats to `items`, which can then be sorted and passed to copy().
   void itemsOf(const Batch& batch, std::span<DepthItem> items) const;
+  /// Copies the splats of `items`, as itemsOf() gives them, to `to` in the order of the items.
   void copy(std::span<const DepthItem> items, std::span<ScreenSplat> to) const;
+  /// Frees the space of a batch, once its splats have been copied.
   void giveBack(const Batch& batch);
 
   /// The number of batches handed out in this frame so far: all of the slab's once awaitNext() returns
@@ -143,6 +147,7 @@ class SweepBuffer {
   uint64_t batches() const;
   /// Slabs that were begun in this frame.
   uint64_t slabs() const;
+  /// The most splats that the buffer has held in this frame, in whole pages.
   size_t peakSplats() const;
 
   /// Wakes all waiting threads. Nothing is granted until the next frame.

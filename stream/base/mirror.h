@@ -5,10 +5,10 @@
 // (file.h) has that done; code that bypasses it must not read mirrored files (isMirrored()). Any thread may
 // read.
 //
-//   open, pread, close of SystemCalls --> mirrors::  --> Mirror --> Fetch
-//                                                          |
-//                                                          v
-//                                             sparse files in the folder
+//   open, pread, close of SystemCalls --> MirrorCalls --> Mirror --> Fetch
+//                                                           |
+//                                                           v
+//                                              sparse files in the folder
 #pragma once
 
 #include <cstddef>

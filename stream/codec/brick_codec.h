@@ -4,7 +4,7 @@
 //              most 0.05 of the smallest standard deviation in the brick (σ_K times the smallest singular
 //              value of A; σ_K = 0.447 is the kernel's standard deviation)
 //   shape      2 log axes, the log volume and 3 shears: ‖S^-½ S' S^-½ - I‖ <= 0.05 at any aspect ratio
-//   weight     relative to the decoded a0 a1 a2: error at most 2e-3, and of their sum 1e-5
+//   weight     relative to the decoded a0 a1 a2: relative error at most 2e-3, and of the brick's sum 1e-5
 //   mean       16 bits over the brick's range, or 24, or by its own scale
 //   slope      error at most 2^-11 of the brick's span; √variance: 2^-13 of it; or by their own scale (values_codec.h)
 //
@@ -34,7 +34,8 @@ struct EncodedBrick {
 };
 
 /// Encodes `brick` (1 to kMaxBrickSplats splats) and replaces its splats by the decoded ones, in double.
-/// `codings`: [variable]; empty: ValuePrecision::kNormal. Pure: any thread. Throws nothing but bad_alloc.
+/// `codings`: [variable]; empty: ValuePrecision::kNormal for all. Pure: any thread. Throws nothing but
+/// bad_alloc.
 EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick, std::span<const ValueCoding> codings = {});
 
 /// One encoded variable of a brick.
@@ -44,8 +45,9 @@ struct EncodedValues {
 };
 
 /// Encodes the values of one variable as encodeBrick() does, and replaces them by the decoded ones. The
-/// values must be finite. `runs` and `border_codes`: the brick's. `references`: its values at earlier steps, which
-/// the stream may be predicted from. Pure: any thread. Throws nothing but bad_alloc.
+/// values must be finite. `runs` and `border_codes`: the brick's. `references`: the brick's decoded values at
+/// one or two earlier time steps, from which the stream may be predicted. Pure: any thread. Throws nothing
+/// but bad_alloc.
 EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
                            std::span<SplatScalar> values, const TimeReferences& references = {},
                            const ValueCoding& coding = {});
@@ -56,11 +58,13 @@ EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
                     SplatGeometry& out, std::vector<NodeRun>* runs = nullptr);
 
-/// Decodes the values of one variable, as decodeGeometry().
+/// Decodes the values of one variable. The bytes are untrusted; throws and allocates as decodeGeometry()
+/// does. Pure: any thread.
 void decodeVariable(const Brick& brick, const BrickVariable& variable, std::span<const std::byte> bytes,
                     SplatVariable& out);
 
-/// The same two functions for arrays of brick.splats elements.
+/// The same two functions for arrays of brick.splats elements. `references`: those that stepsBackOf() names
+/// for this stream.
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
                     const GeometryArrays<float>& out);
 void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out,

@@ -1,8 +1,8 @@
-// The border code: where a cell ends at a border, or at a face that it is behind, in 32 bits; and how the
-// renderer draws such a cell: in parts, cut, or as a pair. A node at the end of its block, or beside a blank
-// one, owns half a cell along one axis, two or three; its splat remembers in which directions the data goes
-// on. So does the splat of a cell of cell-centred data, though that cell is whole. All functions are pure:
-// any thread may call them.
+// The border code says in 32 bits where a cell ends at a border, or which faces it lies in the layer behind
+// of; and so how the renderer draws it: in parts, cut, or as a pair. A node at the end of its block, or
+// beside a blank one, owns half a cell along one axis, two or three; its splat remembers in which directions
+// the data goes on. So does the splat of a cell of cell-centred data, though that cell is whole. All
+// functions are pure: any thread may call them.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -21,8 +21,9 @@ namespace curvisplat {
 // the frame of the splat's A (A q is from the border inwards, as long as the cell is in that direction) and
 // at right angles to one another, since J = A Q with Q orthogonal. They are kept as a rotation, good to
 // 0.006 (0.02 at the most) in the cell's own measure whatever its aspect ratio, and each has a bit that says
-// how the renderer is to draw it: in parts, or cut at the border's face. Bits 5-7 of directions beyond their
-// number mark other directions, which lead from faces that the cell is in the layer behind of.
+// how the renderer is to draw it: in parts, or cut at the border's face. A bit of 5-7 that is beyond the
+// number of directions marks a further column of the rotation: it leads from a face that the cell is in the
+// layer behind of.
 //
 //   bits 0-1   number of directions
 //        2     the third is opposite to the rotation's
@@ -39,9 +40,9 @@ namespace curvisplat {
 //        8-23  the direction from the face inwards: the octahedron's map, 8 bits each
 //        24-31 how far the face is from the cell's middle, in 1/128 of the cell's length in that direction
 //
-// The third form is of a merged splat that ends at one face: as the second, but with a number n from 1 to 21
-// in bits 3-7, and a distance of at most 1. The splats behind it are 3/4 2^((n - 1) / 10) times as long as
-// twice the distance, or 3 times as long as the splat, if that is less. It is drawn as the first form is,
+// The third form is of a merged splat that ends at one face. It is as the second, but with a number n from 1
+// to 21 in bits 3-7, and a distance of at most 1. The splats behind it are 3/4 2^((n - 1) / 10) times as long
+// as twice the distance, or 3 times as long as the splat, if that is less. It is drawn as the first form is,
 // fitted for this ratio: the lattice of voxels makes the layer at a face as thick as it happens to be.
 //
 // In the fourth form, a cell that ends at no border is behind two or three faces:
@@ -51,6 +52,10 @@ namespace curvisplat {
 //        5     one for three directions, zero for two
 //        6-7   3: more than any ratio of a merged splat
 //        8-31  the rotation, as in the first form; the directions are its first columns
+//
+// The fifth form is of a plate: a merged splat that stands for all that lies between two opposite faces. It
+// is as the second, but with 22 in bits 3-7 and a distance of zero; the direction leads from one face to the
+// other.
 //
 // The first version of the format has only zeros in bits 5-7 of the first form, and none of the other forms.
 
@@ -78,7 +83,7 @@ uint32_t packLayerCode(const glm::dvec3& inward, double distance);
 /// A code of the third form, of a merged splat. `distance`: as for packLayerCode(); the splats behind it are
 /// `ratio` times as long as twice the distance. kNoBorder if the distance is out of the code's range.
 uint32_t packMergedCode(const glm::dvec3& inward, double distance, double ratio);
-/// A code of the fifth form. `across`: from one face of the plate to the other.
+/// A code of the fifth form. `across`: the unit vector from one face of the plate to the other.
 uint32_t packPlateCode(const glm::dvec3& across);
 /// A code for a cell that is behind faces, at least one: of the first form if it also ends at borders,
 /// otherwise of the fourth. `inward`: two or three directions at right angles. The first `count` lead from
@@ -86,6 +91,7 @@ uint32_t packPlateCode(const glm::dvec3& across);
 /// right-handed order.
 uint32_t packLayersCode(std::span<const glm::dvec3> inward, size_t count);
 
+/// Decodes a code.
 InwardAxes inwardAxes(uint32_t border_code);
 /// The directions of the code that lead from faces which the cell is behind, in the forms of
 /// packLayersCode(): bit n stands for axis[n] of the code's InwardAxes, which is not one of its `count`.
@@ -114,21 +120,22 @@ inline bool isOfPairs(const BorderStyle& style) {
 /// which is the result for the ratios 2 (half cells) and 1 (whole cells).
 BorderPart mergedPart(const InwardAxes& inward);
 
-/// How thick a plate is drawn, of its thickness: splats are drawn wider than their cells, by kKernelSigma √12, since
-/// neighbours overlap; a plate has none across it.
+/// How thick a plate is drawn, as a part of its thickness. Other splats are drawn wider than their cells, by
+/// kKernelSigma √12, since neighbours overlap; a plate has no neighbours across it.
 inline constexpr double kPlateThickness = 0.288675 / kKernelSigma;
 
-/// How much farther than the splat itself its drawn parts reach, at most, in units of its largest axis; for
-/// a merged splat's code, in units of its length in the code's direction. kPartsReach is the inner parts'
-/// offset along three axes; kCutReach is a half cell's wide splat, without what lies behind the face.
+/// borderReach() is how much farther than the splat itself its drawn parts reach, at most, in units of its
+/// largest axis; for a merged splat's code, in units of its length in the code's direction. kPartsReach is
+/// the inner parts' offset along three axes; kCutReach is a half cell's wide splat, without what lies behind
+/// the face.
 inline constexpr double kPartsReach = 0.52, kCutReach = 1.25, kMergedReach = 2.9;
 double borderReach(uint32_t border_code);
 /// An upper bound of |w| (stream/model/splats.h) of the splat as it is drawn.
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code);
 /// The same, for the inwardAxes() of the code.
 double drawnSlope(const glm::dvec3& slope, const InwardAxes& inward);
-/// The most that half cells which shrink inwards add to the size of a cut (kHalfCutByGrowth). Caches without kMergedBorders recorded slopes without it: drawnSlope()
-/// is at most kEarlierSlopes times as large.
+/// The most that half cells which shrink inwards add to the size of a cut (kHalfCutByGrowth). Caches without
+/// kMergedBorders recorded slopes without it: drawnSlope() is at most kEarlierSlopes times as large.
 inline constexpr double kWidening = 0.13;
 inline constexpr double kEarlierSlopes = 1 + kWidening / kHalfCellStyle.cut.size;
 

@@ -11,8 +11,9 @@
 //
 //            The kernel's unit sphere maps to {A u : |u| <= 1}. √det S = a0 a1 a2. S is never inverted: A⁻¹
 //            is a forward substitution.
-//   weight   V: the volume of the piece of space that the splat stands for. |det J| for a node's cell, which
-//            is a0 a1 a2 unless the splat was stretched, an axis was floored or splats were merged.
+//   weight   V: the volume of the piece of space that the splat stands for. For a regular cell that is
+//            a0 a1 a2, but not if the splat was stretched, its cell is bent, an axis was floored or splats
+//            were merged.
 //   mean     f, the scalar at the centre
 //   slope    w = A⁻¹ h, the change of the scalar along A's columns: f(x) = f + w · A⁻¹(x - μ). So the h of
 //            DESIGN.md, "Splats", is A w, and hᵀS⁻¹h = |w|². For a node w is the computational gradient
@@ -57,7 +58,7 @@ struct Splat {
   }
 };
 
-/// One scalar of one splat, in double precision.
+/// One scalar of one splat, in double precision and the scalar's unit (the variance: squared).
 struct SplatScalar {
   double mean = 0;
   glm::dvec3 slope{0.0};
@@ -101,7 +102,7 @@ void forEachArrayOfVariable(Variable&& v, Visit&& visit) {
 inline constexpr size_t kArraysOfSplats = 17;
 
 /// The geometry's arrays, borrowed: where a decoder writes (T = float) or a projector reads (T = const
-/// float).
+/// float). Each has `count` elements.
 template <typename T>
 struct GeometryArrays {
   T *x, *y, *z;
@@ -171,9 +172,9 @@ double largestSingularValue(std::span<const Splat> splats);
 /// most 1 + `slack`. A little slack saves much time. The precision of positions depends on it. World units.
 double smallestSingularValue(std::span<const Splat> splats, double slack = 0);
 
-/// The farthest that any splat's support reaches from its centre, with those of the parts that it is drawn
-/// as at a border. At most 1e-6 too large, except for half cells. `border_codes`: as in BrickSplats. World
-/// units.
+/// The farthest that any splat's support reaches from its centre, including the supports of the parts that a
+/// cell at a border is drawn as. At most 1e-6 too large, except for half cells. `border_codes`: as in
+/// BrickSplats. World units.
 double largestReach(std::span<const Splat> splats, std::span<const uint32_t> border_codes);
 
 }  // namespace curvisplat

@@ -59,12 +59,13 @@ struct ShownBox {
 struct CameraMotion {
   uint64_t frames = 1;
   std::function<Camera(uint64_t frame)> camera;
-  /// The series' time of a frame, of a path whose key frames have times; empty otherwise.
+  /// The series' time at a frame, if the path's key frames have times; else an empty function.
   std::function<double(uint64_t frame)> series_time;
 };
 
-/// Requires that checkCameraArguments() accepted the arguments. What the arguments do not say of the camera
-/// shows the whole box. They change it in the order azimuth, elevation, orbit, roll, zoom. An orbit of 360 degrees is a loop: its last frame is one step before the first. A path's
+/// The camera of each frame. Requires that checkCameraArguments() accepted the arguments. What they leave
+/// open is chosen so that the whole box is seen. Azimuth, elevation, orbit, roll and zoom change the camera
+/// in this order. An orbit of 360 degrees is a loop: its last frame is one step before the first. A path's
 /// last frame is at its last key frame. Throws UsageError, or Error if the path file is invalid.
 CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox& box, ImageSize size);
 
@@ -88,7 +89,8 @@ void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std
 /// other or the cache has no such step.
 std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const CacheReader& cache);
 
-/// The cache with the scalar `scalar` (CacheReader::ofScalar()) at the first of its chosen steps. Throws Error as CacheReader.
+/// The cache with the scalar `scalar` (CacheReader::ofScalar()) at the first of its chosen steps. Throws
+/// Error as CacheReader, and UsageError as chosenSteps().
 CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments,
                        std::string_view scalar = {});
 
@@ -103,7 +105,8 @@ struct MotionInTime {
   std::function<StepPosition(uint64_t frame)> position;
 };
 
-/// The arguments with a frame for each of several time steps, unless --frames says how many.
+/// The arguments with a frame for each of several time steps, if the camera moves and --frames does not say
+/// how many.
 CameraArguments framesOf(const CameraArguments& arguments, const std::vector<StepPosition>& steps);
 
 /// The motion through a series, which must outlive it. A path whose key frames have times follows these.

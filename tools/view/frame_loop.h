@@ -52,14 +52,15 @@ struct FaceNames {
   bool operator==(const FaceNames&) const = default;
 };
 
-/// Finds them in the grid at the cache's step, in their order; colours and opacities' factors are not set.
-/// Called on the loop's thread; an Error ends the request only.
+/// Finds these faces in the grid at the cache's step, in the order of FaceNames::faces; does not set colours
+/// and factors of opacities. Called on the loop's thread; an Error ends the request only.
 using FacesAtStep = std::function<std::vector<GridSurface>(const CacheReader&, const FaceNames&)>;
 
 /// `faces` with the colours and opacities of `looks`, one for each.
 std::vector<GridSurface> facesWithLooks(std::vector<GridSurface> faces,
                                         const std::vector<GridSurface>& looks);
 
+/// A request for a picture.
 struct FrameRequest {
   DrawnScalars scalars;
   uint64_t function_version = 0;  // changes whenever a function changes
@@ -68,7 +69,7 @@ struct FrameRequest {
   bool moving = false;
   double target_s = 0.033;                // time budget of a picture while moving
   uint64_t step = 0;                      // time step
-  double part = 0;                        // of the way to the next one: its values, with the faces of `step`
+  double part = 0;                        // of the way to the next step: for values; faces stay at `step`
   bool wants_bytes = true;                // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
   bool one_at_a_time = false;             // nothing is drawn until a picture has been given back
   std::optional<StepPosition> next = {};  // is likely to be wanted next, with this camera: read ahead
@@ -76,6 +77,7 @@ struct FrameRequest {
   FacesAtStep faces_at = {};              // needed where there are faces
 };
 
+/// A picture for the window.
 struct ShownFrame {
   Image image;
   std::vector<uint8_t> bytes;  // the image as 8-bit RGBA, clamped; empty unless the request wants it
@@ -89,7 +91,7 @@ struct ShownFrame {
   WorldBox data;    // where the step's data lie
 };
 
-/// The values under each pixel of a picture that is shown, for the mouse. Of half as many pixels each way.
+/// The values under the pixels of a picture that is shown, for the mouse; with half as many pixels each way.
 struct ShownValues {
   PixelValues values;
   uint64_t request = 0;  // of the picture
@@ -122,12 +124,13 @@ class Effort {
   double reduction_ = 1;  // of the resolution in each direction
 };
 
-/// All members are for one thread, the window's.
+/// Draws the newest request on a thread of its own. All members are for one other thread, such as the
+/// window's.
 class FrameLoop {
  public:
   /// Calls `wake` on the loop's thread whenever poll() has something to return. Opens the cache for itself,
-  /// since it goes from step to step. If `after` is valid, it is waited for before anything is drawn: the
-  /// memory of another loop.
+  /// since it goes from step to step. If `after` is valid, nothing is drawn before it is ready: until then
+  /// another loop holds the memory.
   FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
             std::shared_future<void> after = {});
   /// Stops the picture being drawn.
@@ -141,9 +144,11 @@ class FrameLoop {
   /// the loop, or UsageError (too little memory for this size, no faces at this step), which ends only the
   /// request.
   std::optional<ShownFrame> poll();
-  /// The memory of the last picture taken is free: for requests that want one_at_a_time. No effect otherwise.
+  /// Says that the memory of the last picture taken is free, for requests that want one_at_a_time. No effect
+  /// otherwise.
   void giveBack();
-  /// Asks for the values of the newest request's picture, once that is shown. A request ends it.
+  /// Asks for the values of the newest request's picture, once that is shown. The next request() cancels
+  /// this.
   void requestValues();
   /// The values that requestValues() asked for, once.
   std::optional<ShownValues> takeValues();

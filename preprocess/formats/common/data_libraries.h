@@ -1,7 +1,9 @@
-// HDF5, NetCDF, CGNS and PROJ. A plug-in links them, curvisplat-formats.so (tools/formats), which is loaded when one of their functions is
-// first called: with the 40 libraries that they stand on they would take half the time of each start of the program.
+// HDF5, NetCDF, CGNS and PROJ. A plug-in, curvisplat-formats.so (tools/formats), links them. It is loaded
+// when one of their functions is first called: with the 40 libraries that they depend on, they would take
+// half of the time in which the program starts.
 //
-// A source declares the functions that it calls, in the namespace curvisplat, where they hide those of the library's header:
+// A source declares the functions that it calls, in the namespace curvisplat, where they hide those of the
+// library's header:
 //
 //   CURVISPLAT_LIBRARY_FUNCTION(nc_open)
 //   ... nc_open(path, NC_NOWRITE, &file) ...
@@ -14,10 +16,11 @@ namespace curvisplat {
 /// Loads the libraries, unless they are there. Throws Error if they cannot be loaded. Any thread.
 void loadDataLibraries();
 
-/// A function or variable of the libraries, which are loaded. Throws Error if there is none of this name. Any thread.
+/// The address of a function or variable of the libraries, which are loaded first if need be. Throws Error if
+/// they cannot be loaded, or have none of this name. Any thread.
 void* inDataLibraries(const char* name);
 
-/// A function that is looked up when it is first called. Any thread.
+/// A function that is looked up when it is first called. Throws as inDataLibraries() then. Any thread.
 template <typename Function>
 class LibraryFunction {
  public:
@@ -35,7 +38,7 @@ class LibraryFunction {
   mutable std::atomic<void*> found_{nullptr};
 };
 
-/// A variable that is looked up whenever its value is needed. Any thread.
+/// A variable that is looked up whenever its value is needed. Throws as inDataLibraries(). Any thread.
 template <typename Value>
 class LibraryValue {
  public:
@@ -48,7 +51,8 @@ class LibraryValue {
   const char* name_;
 };
 
-// The name is replaced first: a header may define it as that of a version of the function.
+// Two macros, so that `name` is expanded first: a header may define it as the name of one version of the
+// function.
 #define CURVISPLAT_LIBRARY_FUNCTION(name) CURVISPLAT_LIBRARY_FUNCTION_OF(name)
 #define CURVISPLAT_LIBRARY_FUNCTION_OF(name) inline const LibraryFunction<decltype(::name)> name{#name};
 #define CURVISPLAT_LIBRARY_VALUE(name) inline const LibraryValue<decltype(::name)> name{#name};

@@ -17,6 +17,7 @@
 
 namespace curvisplat {
 
+/// One grid: its variables, and what its nodes' positions are computed from.
 struct CfGrid {
   CfDimensions dims;  // i is the variables' last dimension
   std::vector<const NetcdfVariable*> variables;
@@ -24,7 +25,7 @@ struct CfGrid {
   bool degrees = true;                      // false: x and y, which are lengths
   std::optional<MapProjection> projection;  // of longitude and latitude, if these are the map's
   bool indices = false;                     // x, y and perhaps z have no coordinates but the nodes' indices
-  std::vector<std::string> unused;          // variables of x and y that are not read: of three dimensions
+  std::vector<std::string> unused;          // variables of x and y with three dimensions, which are not read
   std::string implausible;                  // why longitude and latitude are not read, if they are there
   CfVertical vertical;
   std::optional<std::array<double, 2>> nowhere;  // longitude and latitude of nodes that are left out
@@ -44,23 +45,25 @@ struct CfLeftOut {
   std::string variable, reason;
 };
 
+/// The grids that findCfGrids() finds, and the variables that are on none.
 struct CfGrids {
   std::vector<CfGrid> grids;  // in the order of their first variables
   std::vector<CfLeftOut> left_out;
   std::set<std::string, std::less<>> parts;  // variables that others name as measures, terms or ancillaries
 };
 
-/// Whether a variable is a field: not a coordinate or a mask, nor what heights, cells or maps are made of. `found`: in the
-/// files.
+/// Whether a variable is a field: not a coordinate or a mask, nor what heights, cells or maps are made of.
+/// `found`: the grids of the files.
 bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const CfGrids& found);
 
-/// `time_step`: the step at which time-dependent variables are read; not checked. `file` must outlive the
-/// result.
+/// Finds the grids of the files. `time_step`: the step at which time-dependent variables are read; not
+/// checked. `file` must outlive the result.
 CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step);
 
-/// Whether the grid lies below the surface: the middle of the heights of a column is negative.
+/// Whether the grid lies below the surface: halfway between the ends of a column the height is negative.
 bool isOcean(const NetcdfFiles& file, const CfGrid& grid);
 
+/// The times of a grid's steps.
 struct CfTimes {
   std::vector<double> values;  // empty if the grid has no time dimension
   std::string unit, calendar;  // "days since 1950-01-01"; may be empty
