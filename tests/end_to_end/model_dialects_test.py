@@ -141,6 +141,9 @@ class Levels(ModelFileTest):
             self.expect_heights([-0.005, -0.1, -1, -4])
         self.levels("lev", [1000, 850, 500, 300], units="hPa ", positive="down  ")
         self.expect_heights(standard_altitude(np.array([1e5, 85000, 50000, 30000])))
+        for unit, scale in (("[hPa]", 1), ("(mbar)", 1), ("100 Pa", 1), ("10 Pa", 10)):
+            self.levels("lev", scale * np.array([1000, 850, 500, 300]), units=unit, positive="down")
+            self.expect_heights(standard_altitude(np.array([1e5, 85000, 50000, 30000])))
 
     def test_lengths_that_nothing_calls_heights(self):
         for unit in ("m", "meters MSL", "m above sea level"):
@@ -209,7 +212,8 @@ class Levels(ModelFileTest):
                 ("depth", [0, 10, 20, -9999], {"units": "m", "positive": "down"}, "depth is -9999 at level 3, counted from 0, but levels only rise or only fall"),
                 ("lev", [-999, 850, 500, 300], {"units": "hPa"}, "lev is 500 at level 2, counted from 0, but levels only rise or only fall"),
                 ("lev", [1e5, 85000, 50000, 30000], {"units": "hPa"}, "lev is 30000 .. 100000 hPa, more than the pressure of any air on the Earth"),
-                ("depth", [0, 1, 2, 7e6], {"units": "m", "positive": "down"}, "depth is 0 .. 7e+06 m, below the Earth's centre")):
+                ("depth", [0, 1, 2, 7e6], {"units": "m", "positive": "down"}, "depth is 0 .. 7e+06 m, below the Earth's centre"),
+                ("z", [0, 0, 0, 0], {"units": "m", "axis": "Z"}, "z is 0 .. 0 m, which are no heights")):
             self.levels(name, values, **attributes)
             self.assertIn(words, self.info(fails=True))
         # A formula's: ap in Pa that is called hPa.

@@ -112,18 +112,28 @@ double degreesOf(const std::string& unit) {
   return isOneOf(lowerCase(unit), {"radian", "radians", "rad"}) ? 180 / std::numbers::pi : 1;
 }
 
-std::optional<double> kilometresOf(const std::string& unit) {
-  std::string word = lowerCase(unit);
-  if (word.size() > 2 && std::string_view("[(").find(word[0]) != std::string_view::npos)
-    word = trimmed(std::string_view(word).substr(1, word.size() - 2));
-  std::replace(word.begin(), word.end(), '_', ' ');
-  // "1000 m"
+namespace {
+
+/// A unit without capitals, brackets and the factor before it: "[hPa]", "1000 m".
+struct Unit {
+  std::string word;
   double factor = 1;
-  if (const auto read = std::from_chars(word.data(), word.data() + word.size(), factor);
-      read.ec == std::errc() && factor > 0)
-    word = trimmed(std::string_view(read.ptr));
-  else
-    factor = 1;
+};
+
+Unit unitOf(const std::string& text) {
+  std::string word = lowerCase(text);
+  if (word.size() > 2 && (word[0] == '[' || word[0] == '(')) word = word.substr(1, word.size() - 2);
+  std::replace(word.begin(), word.end(), '_', ' ');
+  double factor = 1;
+  const auto read = std::from_chars(word.data(), word.data() + word.size(), factor);
+  if (read.ec != std::errc() || !std::isfinite(factor) || factor <= 0) return {word, 1};
+  return {std::string(trimmed(read.ptr)), factor};
+}
+
+}  // namespace
+
+std::optional<double> kilometresOf(const std::string& unit) {
+  auto [word, factor] = unitOf(unit);
   // "meters MSL", "m above sea level"; but not "m s-1"
   if (const size_t blank = word.find(' '); blank != std::string::npos)
     if (beginsWithOneOf(std::string_view(word).substr(blank + 1),
@@ -152,13 +162,13 @@ std::optional<double> kilometresOf(const std::string& unit) {
 }
 
 std::optional<double> pascalsOf(const std::string& unit) {
-  const std::string word = lowerCase(unit);
-  if (isOneOf(word, {"pa", "pascal", "pascals"})) return 1;
+  const auto [word, factor] = unitOf(unit);
+  if (isOneOf(word, {"pa", "pascal", "pascals"})) return factor;
   if (isOneOf(word, {"hpa", "mb", "mbar", "millibar", "millibars", "hectopascal", "hectopascals"}))
-    return 100;
-  if (isOneOf(word, {"kpa", "cb", "centibar"})) return 1000;
-  if (isOneOf(word, {"dbar", "decibar", "decibars"})) return 1e4;
-  if (isOneOf(word, {"bar", "bars"})) return 1e5;
+    return factor * 100;
+  if (isOneOf(word, {"kpa", "cb", "centibar"})) return factor * 1000;
+  if (isOneOf(word, {"dbar", "decibar", "decibars"})) return factor * 1e4;
+  if (isOneOf(word, {"bar", "bars"})) return factor * 1e5;
   return std::nullopt;
 }
 

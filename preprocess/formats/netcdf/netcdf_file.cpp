@@ -293,7 +293,7 @@ std::string NetcdfFile::text(const char* attribute) const {
     if (stored) text = stored;
     nc_free_string(1, &stored);
   }
-  return text;
+  return std::string(trimmed(text));
 }
 
 bool NetcdfFile::hasAttribute(const char* attribute) const {
