@@ -301,6 +301,11 @@ class Levels(ModelFileTest):
             self.levels("pfull", [100.0, 400, 700, 900], more, units="mb", positive="down", edges="phalf")
             info = self.expect_heights(standard_altitude(middle[0] + middle[1] * ground))
             self.assertIn("formula of", info["format"])
+        def more(f):
+            for name, values in (("hyam", [0.02, 0.1, 0.2, 0]), ("hybm", [0, 0.05, 0.3, 1])):
+                f.add(name, "lev", values)
+        self.levels("lev", [20.0, 150, 500, 1000], more, units="hPa", positive="down")
+        self.assertEqual(self.info()["warnings"], ["there are hyam and hybm, but no surface pressure (ps); the nominal pressures are taken"])
 
     def test_terms_that_are_attributes_of_the_file(self):
         """CROCO's sc_r, Cs_r and hc. What a formula lacks is named, not a unit that makes metres of it."""

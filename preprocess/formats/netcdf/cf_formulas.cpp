@@ -73,9 +73,9 @@ double constant(const NetcdfFiles& file, const std::optional<CfTerm>& term) {
 
 }  // namespace
 
-/// Formulas without formula_terms, by the names that models give to their terms.
+/// Formulas without formula_terms, by the names that models give to their terms. `lacking`: what there is, and what is missing.
 std::optional<CfVertical> CfVertical::byNamesOfTerms(const NetcdfFiles& file, const CfDimensions& block,
-                                                     size_t axis) {
+                                                     size_t axis, std::string& lacking) {
   const auto along = [&](std::initializer_list<const char*> names) -> std::string {
     // What is between levels serves, too: GFDL has pk and bk of half levels alone.
     for (const bool exact : {true, false})
@@ -102,10 +102,12 @@ std::optional<CfVertical> CfVertical::byNamesOfTerms(const NetcdfFiles& file, co
         s);
   const std::string a = along({"hyam", "hyai", "ap", "A", "a", "pk", "ak"}),
                     b = along({"hybm", "hybi", "b", "B", "bk"});
-  if (!a.empty() && !b.empty() && standIn(file, "ps", block))
+  if (a.empty() || b.empty()) return std::nullopt;
+  if (standIn(file, "ps", block))
     return named(ofTerms(file, Kind::kHybridPressure, {{"a", a}, {"b", b}, {"p0", "P0"}, {"ps", "PS"}}, block,
                          axis, reason),
                  a + " and " + b);
+  lacking = fmt::format("there are {} and {}, but no surface pressure (ps)", a, b);
   return std::nullopt;
 }
 

@@ -123,7 +123,8 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
     if (coordinate != along && !(term && term->exact() && term->axes() == 1 && term->varies(axis))) continue;
     if (auto found = byFormula(file, *coordinate, block, axis, reason)) return {std::move(found), ""};
   }
-  if (auto found = byNamesOfTerms(file, block, axis)) return {std::move(found), ""};
+  std::string lacking;
+  if (auto found = byNamesOfTerms(file, block, axis, lacking)) return {std::move(found), ""};
 
   // Variables in its own `coordinates` attribute come first.
   Candidates candidates;
@@ -146,8 +147,11 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
     if (auto found = bySums(file, block, pressure)) return {std::move(found), ""};
     if (!pressure)
       if (auto found = byInterfaces(file, block, axis)) return {std::move(found), ""};
-    if (auto found = byCandidates(file, candidates, variable, block, {axis, false, pressure}, reason))
+    if (auto found = byCandidates(file, candidates, variable, block, {axis, false, pressure}, reason)) {
+      if (pressure && !lacking.empty() && found->warnings().empty())
+        found->addWarning(lacking + "; the nominal pressures are taken");
       return {std::move(found), ""};
+    }
   }
   if (auto found = byThickness(file, block, axis)) return {std::move(found), ""};
   if (auto found = byNamesOfFields(file, block, axis)) return {std::move(found), ""};

@@ -107,7 +107,7 @@ class CfVertical {
   static std::optional<CfVertical> ofTerms(const NetcdfFiles& file, Kind kind, const Terms& terms,
                                            const CfDimensions& block, size_t axis, std::string& lacking);
   static std::optional<CfVertical> byNamesOfTerms(const NetcdfFiles& file, const CfDimensions& block,
-                                                  size_t axis);
+                                                  size_t axis, std::string& lacking);
   static std::optional<CfVertical> byNamesOfFields(const NetcdfFiles& file, const CfDimensions& block,
                                                    size_t axis);
   std::string setPlausible(const NetcdfFiles& file, const NetcdfVariable& coordinate,
