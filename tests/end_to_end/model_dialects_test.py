@@ -538,7 +538,7 @@ class Fields(ModelFileTest):
     def test_sizes_of_cells_and_flags_come_last(self):
         """CMIP's Omon files, and a region before the temperature."""
         region = {"standard_name": "region", "flag_values": np.array([1, 2], "i4"), "flag_meanings": "atlantic pacific"}
-        for attributes in ({"standard_name": "cell_thickness", "units": "m"}, {"standard_name": "ocean_volume", "units": "m3"}, region,
+        for attributes in ({"standard_name": "cell_thickness", "units": "m"}, {"standard_name": "ocean_volume", "units": "m3"}, {"long_name": "Cell Thickness", "units": "m"}, region,
                            {"flag_masks": np.array([1, 2], "i4"), "flag_meanings": "bad good"}, {"standard_name": "sea_water_temperature status_flag"}):
             with self.file(depth=3, lat=8, lon=12) as f:
                 self.air(f)

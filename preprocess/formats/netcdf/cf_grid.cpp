@@ -457,8 +457,11 @@ bool isField(const NetcdfFiles& file, const NetcdfVariable& variable, const CfGr
   static const std::set<std::string> names{"cell_thickness", "cell_area", "ocean_volume", "region",
                                            "area_type"};
   const std::string standard_name = variable.text("standard_name");
-  if (names.contains(standard_name) || standard_name.ends_with("status_flag") ||
-      variable.attributes.contains("flag_values") || variable.attributes.contains("flag_masks"))
+  const std::string long_name = lowerCase(variable.text("long_name"));
+  if (long_name.starts_with("cell thickness") || long_name.starts_with("layer thickness") ||
+      long_name.starts_with("cell volume") || names.contains(standard_name) ||
+      standard_name.ends_with("status_flag") || variable.attributes.contains("flag_values") ||
+      variable.attributes.contains("flag_masks"))
     return false;
   return !found.parts.contains(variable.name);
 }
