@@ -6,7 +6,6 @@
 #include <cmath>
 #include <sstream>
 
-#include "preprocess/formats/columns/columns_heights.h"
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
@@ -20,10 +19,6 @@ std::optional<size_t> dimensionNamed(const NetcdfFiles& file, std::string_view n
   for (size_t n = 0; n < file.dimensions().size(); ++n)
     if (file.dimensions()[n].name == name) return n;
   return std::nullopt;
-}
-
-bool hasDimension(const NetcdfVariable& variable, size_t dim) {
-  return std::find(variable.dims.begin(), variable.dims.end(), dim) != variable.dims.end();
 }
 
 double numberIn(const NetcdfVariable& variable, const char* attribute, double otherwise) {
@@ -95,19 +90,11 @@ ColumnsMap ugridOf(const NetcdfFiles& file, const NetcdfVariable& topology) {
   return map;
 }
 
-/// Whether the variable is the bounds of another: corners of faces, not layers.
-bool isBounds(const NetcdfFiles& file, const NetcdfVariable& variable) {
-  return std::any_of(file.variables().begin(), file.variables().end(),
-                     [&](const NetcdfVariable& other) { return other.text("bounds") == variable.name; });
-}
-
-/// Sides and corners of MPAS' faces: no layers.
-bool isOfMapAlone(std::string_view dimension) {
-  constexpr std::string_view kNames[] = {"maxEdges", "maxEdges2", "vertexDegree", "TWO"};
-  return std::find(std::begin(kNames), std::end(kNames), dimension) != std::end(kNames);
-}
-
 }  // namespace
+
+bool hasDimension(const NetcdfVariable& variable, size_t dim) {
+  return std::find(variable.dims.begin(), variable.dims.end(), dim) != variable.dims.end();
+}
 
 std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file) {
   ColumnsMap map;
@@ -139,80 +126,6 @@ std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file) {
   }
   setSizes(file, map);
   return map;
-}
-
-ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& map,
-                                    const std::vector<std::string>& wanted,
-                                    std::vector<std::string>& warnings) {
-  std::vector<ColumnsScalars> groups;
-  for (const NetcdfVariable& variable : file.variables()) {
-    if (!variable.numeric || !variable.text("cf_role").empty()) continue;
-    const bool faces = hasDimension(variable, map.face_dim);
-    if (faces == hasDimension(variable, map.node_dim)) continue;
-    const size_t across = faces ? map.face_dim : map.node_dim;
-    // Besides the layers: time, and dimensions of length 1.
-    std::vector<size_t> others;
-    std::optional<size_t> time;
-    for (size_t axis = 0; axis < variable.dims.size(); ++axis) {
-      const NetcdfDimension& dimension = file.dimension(variable, axis);
-      const NetcdfVariable* const coordinate = file.find(dimension.name);
-      const bool is_time = dimension.unlimited || dimension.name == "time" || dimension.name == "Time" ||
-                           (coordinate && cfRole(file, *coordinate) == CfRole::kTime);
-      if (is_time)
-        time = variable.dims[axis];
-      else if (variable.dims[axis] != across && dimension.length != 1)
-        others.push_back(variable.dims[axis]);
-    }
-    if (isBounds(file, variable)) continue;
-    if (isHeightsOfColumns(file, variable)) continue;
-    if (others.size() == 1 && isOfMapAlone(file.dimensions()[others[0]].name)) continue;
-    const uint64_t layers = others.size() == 1 ? file.dimensions()[others[0]].length : 0;
-    if (layers < 2 || layers > kMaxColumnsLevels || &variable == map.nodes_of_face) continue;
-    const Centring centring = faces ? Centring::kCell : Centring::kNode;
-    auto group = std::find_if(groups.begin(), groups.end(), [&](const ColumnsScalars& g) {
-      return g.centring == centring && g.layer_dim == others[0] && g.time_dim == time;
-    });
-    if (group == groups.end()) {
-      const auto place = [&](size_t dim) {
-        return std::find(variable.dims.begin(), variable.dims.end(), dim);
-      };
-      groups.push_back({centring, others[0], layers, place(others[0]) > place(across), {}, time});
-      group = groups.end() - 1;
-    }
-    group->variables.push_back(&variable);
-  }
-  // Thicknesses come last, since they are seldom the scalar of interest.
-  for (ColumnsScalars& group : groups)
-    std::ranges::stable_partition(group.variables, [](const auto* v) { return !isThicknessOfColumns(*v); });
-  // What has three dimensions but is of the map itself (edgesOnCell, ...) are integers without layers' heights.
-  std::string lacking;  // the heights of the largest group
-  size_t largest = 0;
-  std::erase_if(groups, [&](const ColumnsScalars& g) {
-    try {
-      findColumnsHeights(file, map, g);
-      return false;
-    } catch (const Error& error) {
-      if (g.variables.size() > largest) lacking = error.what();
-      largest = std::max(largest, g.variables.size());
-      return true;
-    }
-  });
-  if (groups.empty() && !lacking.empty()) throw Error("{}", lacking);
-  if (groups.empty())
-    throw Error(
-        "{}: is a grid of {} without a variable of faces or nodes and layers: no part of it has a volume",
-        file.path().string(), map.format);
-  auto chosen = std::max_element(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
-    return a.variables.size() < b.variables.size();
-  });
-  for (auto group = groups.begin(); group != groups.end() && !wanted.empty(); ++group)
-    for (const NetcdfVariable* const variable : group->variables)
-      if (variable->name == wanted[0]) chosen = group;
-  for (auto group = groups.begin(); group != groups.end(); ++group)
-    if (group != chosen)
-      warnings.push_back(fmt::format("{} is on other layers or points than {}; choose it with --scalar",
-                                     group->variables[0]->name, chosen->variables[0]->name));
-  return *chosen;
 }
 
 ColumnsBottom findColumnsBottom(const NetcdfFiles& file, const ColumnsMap& map,

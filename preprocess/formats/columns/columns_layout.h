@@ -43,10 +43,7 @@ struct ColumnsScalars {
   std::optional<size_t> time_dim;
 };
 
-/// The group with the scalar that `wanted` names first, or the largest. Throws Error if there is none.
-ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& map,
-                                    const std::vector<std::string>& wanted,
-                                    std::vector<std::string>& warnings);
+bool hasDimension(const NetcdfVariable& variable, size_t dim);
 
 /// How many layers each column has data in, from the top: below it there is ground.
 struct ColumnsBottom {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "preprocess/formats/columns/columns_scalars.h"
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/cf_grid.h"
 #include "preprocess/grid/grid_source.h"

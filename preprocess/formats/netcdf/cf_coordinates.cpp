@@ -220,7 +220,7 @@ double pressureAbove(const Layer& layer, double foot, double height) {
          std::pow(1 + layer.lapse * rise / layer.temperature, -kGravity / (kGasConstant * layer.lapse));
 }
 
-/// Where the standard atmosphere ends: geometric height in kilometres, pressure in pascals.
+/// A geometric height in kilometres and its pressure in pascals, above the layers of the standard atmosphere.
 /// Source: U.S. Standard Atmosphere, 1976, table I.
 struct ThinAir {
   double height, pressure;

@@ -87,7 +87,7 @@ bool beginsWithSurface(const NetcdfFiles& file, const CfGrid& grid) {
   return false;
 }
 
-/// In kilometres: 2,000 hPa in the standard atmosphere.
+/// The standard atmosphere has 2,000 hPa here, in kilometres.
 constexpr double kLowestAir = -6;
 
 /// The lowest and the highest node of a column, or of the surface if all are missing. Looks half, a quarter and three

@@ -18,8 +18,8 @@ namespace {
 constexpr double kWrfGravity = 9.81;
 constexpr double kStandardGravity = 9.80665;
 constexpr double kMaxAirPressure = 2e5;  // pascals
-// In kilometres. Longer distances may be those from a planet's centre; levels up to kMaxTide may be those of the sea above
-// the mean; shorter ranges are no heights.
+// These are kilometres. Distances beyond kMinRadius may be those from a planet's centre, levels up to kMaxTide those of the sea
+// above the mean; ranges below kMinExtent are no heights.
 constexpr double kEarthRadius = 6371, kMinRadius = 1000, kMaxTide = 0.02, kMinExtent = 1e-6;
 constexpr std::array kHeightsOfNodes{"GHT", "ght", "gh", "zg", "height", "zc", "z_mc"};
 constexpr std::array kPressuresOfNodes{"PRES", "pres", "pressure"};

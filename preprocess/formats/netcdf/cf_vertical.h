@@ -34,7 +34,7 @@ class CfVertical {
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& given, size_t axis);
 
-  /// By the formula_terms of a coordinate along `axis`; or nullopt and a reason.
+  /// The formula of a coordinate along `axis` that has formula_terms; or nullopt and a reason.
   static std::optional<CfVertical> byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,
                                              const CfDimensions& block, size_t axis, std::string& reason);
 
