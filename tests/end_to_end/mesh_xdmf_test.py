@@ -80,6 +80,29 @@ class XdmfMeshes(MeshFormats):
         faces = [[cell[list(face)] for face in HEXAHEDRON_FACES] for cell in mesh.cells]
         self.expect_same([self.write(self.grid(mesh, self.mixed(mesh, faces=True)))], mesh.vtk(faces))
 
+    def test_numbers_of_points_from_one(self):
+        """BaseOffset, as Badlands and LifeV write it; of a polyhedron the counts stay."""
+        mesh = Mesh(2)
+        for faces in (False, True):
+            name, elements, numbers = self.mixed(mesh) if not faces else self.mixed(mesh := Mesh(2, (8,)), faces=True)
+            shifted, at = numbers.copy(), 0
+            for cell in mesh.cells:
+                if faces:
+                    at += 2
+                    for _ in range(6):
+                        shifted[at + 1:at + 5] += 1
+                        at += 5
+                else:
+                    shifted[at + 1:at + 1 + len(cell)] += 1
+                    at += 1 + len(cell)
+            text = self.grid(mesh, (name, elements, shifted)).replace("<Topology ", '<Topology BaseOffset="1" ')
+            self.expect_same([self.write(text)], mesh.vtk([[cell[list(face)] for face in HEXAHEDRON_FACES] for cell in mesh.cells] if faces else None))
+        mesh = Mesh(2, (8,))
+        text = self.grid(mesh, ("Hexahedron", 8, np.array(mesh.cells) + 1)).replace("<Topology ", '<Topology BaseOffset="1" Order="0 1 2 3 4 5 6 7" ')
+        self.expect_same([self.write(text)], mesh.vtk())
+        self.expect_line(self.write(text.replace("6 7", "7 6")), words="in the Order 0 1 2 3 4 5 7 6, which is not read")
+        self.expect_line(self.write(text.replace('BaseOffset="1"', 'BaseOffset="2"')), words="refers to point")
+
     def test_several_grids_and_times(self):
         meshes = [Mesh(2), Mesh(3)]
         grids = [self.grid(mesh, self.mixed(mesh)).replace("<Grid>", f'<Grid><Time Value="{n}"/>') for n, mesh in enumerate(meshes)]

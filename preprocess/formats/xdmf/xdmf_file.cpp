@@ -261,6 +261,9 @@ class Reader {
     if (!item) throw Error("{} has no DataItem", document_.describe(topology));
     XdmfCells& cells = grid.cells;
     cells.connectivity = items_.read(item);
+    if (const std::string base = xdmfAttribute(topology, {"BaseOffset"}); !base.empty())
+      cells.first_point = document_.numberIn(topology, base);
+    requireUsualOrder(topology);
     const std::string stated = xdmfAttribute(topology, {"NumberOfElements", "Dimensions"});
     const std::vector<uint64_t> counts =
         stated.empty() ? std::vector<uint64_t>() : document_.countsIn(topology, stated);
@@ -279,6 +282,16 @@ class Reader {
                   cells.connectivity->size(), cells.count, expected);
     for (const pugi::xml_node attribute : node.children("Attribute"))
       readAttribute(document_.resolved(attribute), grid);
+  }
+
+  /// Refuses an Order of the points of a cell other than 0 1 2 ..., which no writer that is known uses.
+  void requireUsualOrder(const pugi::xml_node& topology) const {
+    const std::string order = xdmfAttribute(topology, {"Order"});
+    const std::vector<std::string_view> points = wordsOf(order);
+    for (size_t n = 0; n < points.size(); ++n)
+      if (points[n] != std::to_string(n))
+        throw Error("{} has its points in the Order {}, which is not read; expected 0 1 2 ...",
+                    document_.describe(topology), printable(order.substr(0, 40)));
   }
 
   /// Finds where each cell begins. `only`: the type of all, which then does not stand before them.

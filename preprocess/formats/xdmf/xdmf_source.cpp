@@ -74,6 +74,20 @@ const XdmfAttribute* attributeNamed(const XdmfGrid& grid, const XdmfScalar& scal
   return same ? &*found : nullptr;
 }
 
+/// Subtracts the number of the first point from the points of a cell. A polyhedron's number of faces, and of the points of each face,
+/// stand among them.
+void countFromZero(std::span<uint64_t> words, bool polyhedron, double first_point) {
+  uint64_t left = polyhedron ? 0 : words.size();  // points before the next count
+  for (size_t n = polyhedron ? 1 : 0; n < words.size(); ++n) {
+    if (left == 0) {
+      left = words[n];
+      continue;
+    }
+    words[n] = pointNumber(static_cast<double>(words[n]), first_point);
+    --left;
+  }
+}
+
 /// Files, times, warnings and scalars. Sorts the attributes of each grid.
 std::vector<XdmfScalar> describe(XdmfFile& file, GridDescription& description) {
   description.files = file.files;
@@ -189,7 +203,8 @@ void appendMixed(const std::string& file, const XdmfGrid& grid, uint64_t first, 
       words.push_back(pointNumber(numbers[at - begins.front()]));
     const bool has_type = grid.cells.shape == CellKind::kNone;  // else all are polyhedra
     const CellKind shape = has_type ? xdmfCellType(words[0])->shape : grid.cells.shape;
-    const std::span<const uint64_t> rest = std::span<const uint64_t>(words).subspan(has_type ? 1 : 0);
+    const std::span<uint64_t> rest = std::span(words).subspan(has_type ? 1 : 0);
+    countFromZero(rest, shape == CellKind::kPolyhedron, grid.cells.first_point);
     if (shape != CellKind::kPolyhedron)
       appendCurved(shape, shape == CellKind::kNone ? std::span<const uint64_t>() : rest, out);
     else if (rest.empty() || !out.appendPolyhedron(rest[0], rest.subspan(1)))
@@ -232,7 +247,8 @@ void XdmfMesh::appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshC
   grid.cells.connectivity->read(first * each, numbers);
   std::vector<uint64_t> points(each);
   for (uint64_t n = 0; n < count; ++n) {
-    for (uint64_t node = 0; node < each; ++node) points[node] = pointNumber(numbers[n * each + node]);
+    for (uint64_t node = 0; node < each; ++node)
+      points[node] = pointNumber(numbers[n * each + node], grid.cells.first_point);
     appendCurved(grid.cells.shape, points, out);
   }
 }
