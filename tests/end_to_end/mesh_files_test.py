@@ -421,6 +421,33 @@ class MeshFiles(MeshCase):
             of_parts = self.manifest(self.folder / "a.splats")
             self.assertEqual(of_parts["splats"], of_whole["splats"])
 
+    def test_ghost_levels(self):
+        """The ghosts of VTK before 7, in files of version 0.1: VTK's own reader makes duplicates of them."""
+        points = "".join(f"{i} {j} {k}\n" for k in (0, 1) for j in (0, 1) for i in range(3))
+
+        def write(name, values, levels):
+            (self.folder / name).write_text(
+                '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid><Piece NumberOfPoints="12" NumberOfCells="2">'
+                f'<CellData><DataArray type="Float64" Name="T" format="ascii">{values}</DataArray><DataArray type="UInt8" Name="vtkGhostLevels" '
+                f'format="ascii">{levels}</DataArray></CellData><Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{points}'
+                '</DataArray></Points><Cells><DataArray type="Int32" Name="connectivity" format="ascii">0 1 4 3 6 7 10 9 1 2 5 4 7 8 11 10</DataArray>'
+                '<DataArray type="Int32" Name="offsets" format="ascii">8 16</DataArray><DataArray type="UInt8" Name="types" format="ascii">12 12'
+                '</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>')
+            return self.folder / name
+
+        write("a.vtu", "1 999", "0 2")
+        alone = write("b.vtu", "999 2", "1 0")
+        reader = vtk.vtkXMLUnstructuredGridReader()
+        reader.SetFileName(str(alone))
+        reader.Update()
+        self.assertEqual([reader.GetOutput().GetCellData().GetArray("vtkGhostType").GetTuple1(n) for n in range(2)], [1, 0])
+        both = self.folder / "p.pvtu"
+        both.write_text('<VTKFile type="PUnstructuredGrid" version="0.1"><PUnstructuredGrid GhostLevel="1"><Piece Source="a.vtu"/><Piece Source="b.vtu"/>'
+                        "</PUnstructuredGrid></VTKFile>")
+        self.assertEqual([(s["min"], s["max"]) for s in self.info(both)["scalars"]], [(1, 2)])
+        self.assertAlmostEqual(self.volume(both, "T"), 2, delta=4e-3)
+        self.assertIn("left out: 1 of 2 cells, which vtkGhostLevels marks as copies", self.info(alone)["warnings"][0])
+
     def test_series_and_collections(self):
         grid = cube(2)
         for step in range(2):

@@ -141,6 +141,7 @@ struct VtkPiece {
   std::variant<VtkPoints, VtkAxes, VtkUniformNodes> nodes;
   std::vector<VtkArray> point_data, cell_data;        // one tuple per node, per cell
   std::optional<VtkArray> point_ghosts, cell_ghosts;  // vtkGhostType
+  std::optional<VtkArray> cell_levels;                // vtkGhostLevels: above 0 another piece's
   std::optional<VtkArray> visible;                    // one value per node; 0 hides it
   std::vector<VtkExtent>
       refined;  // cells that finer patches of an AMR set cover: indices from the piece's first cell
@@ -174,8 +175,8 @@ struct VtkFiles {
   std::shared_ptr<SpoolFile> spool;
 };
 
-/// Adds an array to the piece: vtkGhostType becomes its ghosts, obsolete ghost levels are dropped, all
-/// others become data. A second array of the same name is ignored with a warning.
+/// Adds an array to the piece: vtkGhostType becomes its ghosts and vtkGhostLevels, of VTK before 7, its levels (those of points
+/// are dropped), all others become data. A second array of the same name is ignored with a warning.
 void addDataArray(VtkPiece& piece, bool of_cells, VtkArray array, std::vector<std::string>& warnings);
 
 }  // namespace curvisplat

@@ -113,14 +113,28 @@ constexpr uint64_t kMaxPoints = uint64_t{1} << 24;  // of cells that are read to
 // Numbers of points are read as doubles, which hold them up to this.
 constexpr double kLargestInteger = 0x1p53;
 
+std::vector<float> readAsFloats(const VtkArray& array, uint64_t first, uint64_t count) {
+  std::vector<float> numbers(count);
+  const WantedComponent<float> wanted{0, numbers.data()};
+  readTuples<float>(array, first, count, std::span(&wanted, 1));
+  return numbers;
+}
+
 void readFlags(const std::optional<VtkArray>& array, uint64_t first, uint64_t count, int bits,
                std::vector<uint8_t>& out) {
   out.assign(count, 0);
   if (!array) return;
-  std::vector<float> flags(count);
-  const WantedComponent<float> wanted{0, flags.data()};
-  readTuples<float>(*array, first, count, std::span(&wanted, 1));
+  const std::vector<float> flags = readAsFloats(*array, first, count);
   for (size_t n = 0; n < count; ++n) out[n] = (static_cast<int>(flags[n]) & bits) != 0;
+}
+
+/// The cells that vtkGhostType or vtkGhostLevels leaves out.
+void readHiddenCells(const VtkPiece& piece, uint64_t first, uint64_t count, int bits,
+                     std::vector<uint8_t>& out) {
+  readFlags(piece.cell_ghosts, first, count, bits, out);
+  if (piece.cell_ghosts || !piece.cell_levels) return;
+  const std::vector<float> levels = readAsFloats(*piece.cell_levels, first, count);
+  for (size_t n = 0; n < count; ++n) out[n] = levels[n] > 0;
 }
 
 /// Places where each of some cells begins, and the end of the last, in an array of `length`.
@@ -197,21 +211,20 @@ VtkMeshSource::VtkMeshSource(VtkMesh mesh) : mesh_(std::move(mesh)) {
 
 /// One of several pieces, opened alone: the cells that it shares with others are missing then.
 void VtkMeshSource::warnOfCopies() {
-  if (mesh_.pieces.size() > 1 || !mesh_.pieces.front().cell_ghosts) return;
+  const VtkPiece& piece = mesh_.pieces.front();
+  if (mesh_.pieces.size() > 1 || !(piece.cell_ghosts || piece.cell_levels)) return;
   const uint64_t cells = mesh_.cells.front().types.tuples;
   uint64_t copies = 0;
   std::vector<uint8_t> flags;
   for (uint64_t first = 0; first < cells; first += kChunk) {
-    readFlags(mesh_.pieces.front().cell_ghosts, first, std::min(kChunk, cells - first), kDuplicateCell,
-              flags);
+    readHiddenCells(piece, first, std::min(kChunk, cells - first), kDuplicateCell, flags);
     copies += static_cast<uint64_t>(std::count(flags.begin(), flags.end(), 1));
   }
   if (copies > 0)
-    description_.warnings.push_back(
-        fmt::format("left out: {} of {} cells, which vtkGhostType marks as copies of other pieces'; the file "
-                    "that names all "
-                    "pieces (.pvtu) draws them",
-                    copies, cells));
+    description_.warnings.push_back(fmt::format(
+        "left out: {} of {} cells, which {} marks as copies of other pieces'; the file that names "
+        "all pieces (.pvtu) draws them",
+        copies, cells, piece.cell_ghosts ? "vtkGhostType" : "vtkGhostLevels"));
 }
 
 void VtkMeshSource::checkTypes() {
@@ -325,7 +338,7 @@ void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t co
       throw Error("{}: polyhedron {} has faces that do not add up; the file is damaged", piece.file,
                   first + n);
   }
-  readFlags(mesh_.pieces[piece_number].cell_ghosts, first, count, kHiddenCell, out.hidden);
+  readHiddenCells(mesh_.pieces[piece_number], first, count, kHiddenCell, out.hidden);
   readScalars(piece_number, first, count, scalars, out.scalars);
 }
 

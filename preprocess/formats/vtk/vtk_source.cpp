@@ -304,7 +304,10 @@ void spreadToNodes(const VtkBox& cells, const VtkBox& nodes, std::span<float> va
 }  // namespace
 
 void addDataArray(VtkPiece& piece, bool of_cells, VtkArray array, std::vector<std::string>& warnings) {
-  if (array.name == "vtkGhostLevels") return;
+  if (array.name == "vtkGhostLevels") {
+    if (of_cells && array.components == 1) piece.cell_levels = std::move(array);
+    return;
+  }
   if (array.name == "vtkGhostType" && array.components == 1 && bytesOf(array.type) == 1) {
     (of_cells ? piece.cell_ghosts : piece.point_ghosts) = std::move(array);
     return;
