@@ -200,7 +200,7 @@ class StepAddition {
     ranges_ = survey.ranges;
     const auto geometry = cache_.series().geometryOf(survey.grid_checksum);
     if (!geometry) {
-      report_.warnings = warningsOfValues(survey, source_.description(), scalars_);
+      report_.warnings = warningsOfValues(survey, source_, scalars_);
       return addGeometry();
     }
     const CacheReader cache = cache_.atStep(cache_.series().first_steps[*geometry]);

@@ -46,6 +46,7 @@ class Conversion {
   Conversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
              std::vector<ConversionFact> facts, FurtherParts parts, Progress& progress)
       : parts_(std::move(parts)),
+        source_(source),
         options_(options),
         plan_(plan),
         progress_(progress),
@@ -369,7 +370,7 @@ class Conversion {
   }
 
   void warnOfValues() {
-    for (std::string& warning : warningsOfValues(splats_.survey, origin_->description(), options_.scalars))
+    for (std::string& warning : warningsOfValues(splats_.survey, source_, options_.scalars))
       report_.warnings.push_back(std::move(warning));
   }
 
@@ -384,6 +385,7 @@ class Conversion {
   }
 
   const FurtherParts parts_;
+  const DataSource& source_;
   const ConvertOptions& options_;
   const MemoryPlan plan_;
   Progress& progress_;

@@ -142,16 +142,16 @@ GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const 
   return survey;
 }
 
-std::vector<std::string> warningsOfValues(const GridSurvey& survey, const GridDescription& description,
+std::vector<std::string> warningsOfValues(const GridSurvey& survey, const DataSource& source,
                                           std::span<const uint32_t> scalars) {
-  std::vector<std::string> warnings = tinyValues(description, scalars, survey.ranges);
+  std::vector<std::string> warnings = warningsOfRanges(source, scalars, survey.ranges);
   const auto& lost = survey.blanked.lost;
   for (size_t n = 0; n < std::min(lost.size(), scalars.size()); ++n)
     if (lost[n].samples > 0)
       warnings.push_back(fmt::format(
           "{} of the values of {} are left out, since other scalars of the cache have none there; "
           "convert it to a cache of its own",
-          lost[n].samples, description.scalars[scalars[n]].name));
+          lost[n].samples, source.description().scalars[scalars[n]].name));
   return warnings;
 }
 

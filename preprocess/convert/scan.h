@@ -34,9 +34,9 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description);
 void checkRanges(const GridSurvey& survey, const GridDescription& description,
                  std::span<const uint32_t> scalars);
 
-/// Sentences on values that no picture shows: those that are too small, and those of samples that are left out for the sake of
+/// Sentences on values that no picture shows: those that single precision loses, and those of samples that are left out for the sake of
 /// another scalar.
-std::vector<std::string> warningsOfValues(const GridSurvey& survey, const GridDescription& description,
+std::vector<std::string> warningsOfValues(const GridSurvey& survey, const DataSource& source,
                                           std::span<const uint32_t> scalars);
 
 /// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for

@@ -9,29 +9,114 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <span>
 
+#include "preprocess/grid/float_offset.h"
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/parallel.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/mesh/mesh_source.h"
 #include "stream/base/checksum.h"
 #include "stream/base/mutex.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
 
-std::vector<std::string> tinyValues(const GridDescription& description, std::span<const uint32_t> scalars,
-                                    std::span<const ScalarRange> ranges) {
+namespace {
+
+constexpr double kFewSteps = 100;  // of single precision
+
+/// The distance of floats of this size.
+double stepOf(double size) {
+  return double{std::nextafter(static_cast<float>(size), std::numeric_limits<float>::max())} - size;
+}
+
+/// Some of a scalar's values, from all parts of the source, in the same order each time.
+std::vector<float> someValues(const DataSource& source, uint32_t scalar) {
+  constexpr uint64_t kParts = 8, kAtATime = 4096;
+  const GridDescription& description = source.description();
+  std::vector<float> values;
+  const auto add = [&](const std::vector<float>& more) {
+    values.insert(values.end(), more.begin(), more.end());
+  };
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  const auto* const mesh = dynamic_cast<const MeshSource*>(&source);
+  const uint64_t parts = grid ? description.blocks.size() : description.pieces.size();
+  NodeArrays nodes;
+  MeshPoints points;
+  MeshCells cells;
+  const bool of_cells = description.scalars[scalar].centring == Centring::kCell;
+  for (uint64_t part = 0; part < parts; part += parts / kParts + 1) {
+    const auto number = static_cast<uint32_t>(part);
+    if (grid) {
+      const GridBlock& block = description.blocks[number];
+      const uint64_t rows = block.nj * block.nk;
+      for (uint64_t row = 0; row < rows; row += rows / kParts + 1) {
+        const uint64_t j = row % block.nj, k = row / block.nj;
+        readBox(*grid, number, {j, j + 1, k, k + 1, 0, std::min(block.ni, kAtATime)}, {&scalar, 1}, nodes);
+        add(nodes.scalars[0]);
+      }
+      continue;
+    }
+    const MeshPiece& piece = description.pieces[number];
+    const uint64_t samples = of_cells ? piece.cells : piece.points;
+    for (uint64_t first = 0; first < samples; first += samples / kParts + 1) {
+      const uint64_t count = std::min(kAtATime, samples - first);
+      if (of_cells)
+        mesh->readCells(number, first, count, {&scalar, 1}, cells);
+      else
+        mesh->readPoints(number, first, count, {&scalar, 1}, points);
+      add(of_cells ? cells.scalars[0] : points.scalars[0]);
+    }
+  }
+  return values;
+}
+
+/// The range of these values of a scalar whose range is a few steps of single precision, if that loses digits of them.
+std::optional<ScalarRange> rangeThatIsLost(const DataSource& source, uint32_t scalar, double offset) {
+  const std::vector<float> rounded = someValues(source, scalar);
+  const FloatOffset subtracted(offset);
+  const std::vector<float> rest = someValues(source, scalar);
+  ScalarRange range;
+  bool lost = false;
+  for (size_t n = 0; n < std::min(rest.size(), rounded.size()); ++n) {
+    if (!std::isfinite(rest[n]) || !std::isfinite(rounded[n])) continue;
+    // Values that mark none are far away, and blanked; floats and magnitudes had nothing subtracted.
+    const double near = kFewSteps * stepOf(std::abs(offset));
+    if (std::abs(double{rounded[n]} - offset) > near || std::abs(rest[n]) > near) continue;
+    lost = lost || double{rest[n]} != double{rounded[n]} - offset;
+    range.min = std::min(range.min, offset + double{rest[n]});
+    range.max = std::max(range.max, offset + double{rest[n]});
+  }
+  if (!lost || !(range.min < range.max)) return std::nullopt;
+  return range;
+}
+
+}  // namespace
+
+std::vector<std::string> warningsOfRanges(const DataSource& source, std::span<const uint32_t> scalars,
+                                          std::span<const ScalarRange> ranges) {
   constexpr double kMinNormal = std::numeric_limits<float>::min();
   std::vector<std::string> sentences;
   for (size_t n = 0; n < scalars.size(); ++n) {
+    const GridScalar& scalar = source.description().scalars[scalars[n]];
     const double largest = std::max(std::abs(ranges[n].min), std::abs(ranges[n].max));
     if (largest > 0 && largest < kMinNormal)
       sentences.push_back(
           fmt::format("{}: its values are smaller than {:.1e} in magnitude, too small for single precision: "
-                      "pictures cannot "
-                      "show them; multiply them by a power of ten",
-                      description.scalars[scalars[n]].name, kMinNormal));
+                      "pictures cannot show them; multiply them by a power of ten",
+                      scalar.name, kMinNormal));
+    if (!(largest >= kMinNormal && ranges[n].max - ranges[n].min < kFewSteps * stepOf(largest)) ||
+        scalar.derived)
+      continue;
+    const double offset = ranges[n].min;
+    if (const auto lost = rangeThatIsLost(source, scalars[n], offset))
+      sentences.push_back(fmt::format(
+          "{}: its values differ by about {:.2g}, which single precision loses: it has steps of {:.2g} at "
+          "{:.9g}; subtract {:.9g} from them",
+          scalar.name, lost->max - lost->min, stepOf(largest), largest, offset));
   }
   return sentences;
 }

@@ -39,10 +39,10 @@ struct GridSurvey {
   uint64_t grid_checksum = 0;       // GridChecksum's
 };
 
-/// A sentence on each of these scalars of which no value but 0 is large enough for single precision, so that
-/// pictures cannot show it. `ranges`: [scalar].
-std::vector<std::string> tinyValues(const GridDescription& description, std::span<const uint32_t> scalars,
-                                    std::span<const ScalarRange> ranges);
+/// Sentences on those of these scalars that single precision cannot show: no value but 0 is large enough for it, or they differ by so
+/// little that it loses them, for which some of the values are read again. `ranges`: [scalar].
+std::vector<std::string> warningsOfRanges(const DataSource& source, std::span<const uint32_t> scalars,
+                                          std::span<const ScalarRange> ranges);
 
 /// The survey of the samples of both, which have the same scalars and no sample in common.
 GridSurvey unitedSurvey(GridSurvey a, const GridSurvey& b);

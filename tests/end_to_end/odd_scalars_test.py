@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """odd_scalars_test.py CURVISPLAT
 
-Scalars that are too small for single precision, meshes that have none, and cells that are copies of those of other pieces. VTK, netCDF4
+Scalars that are too small for single precision or differ by less than it resolves, meshes that have none, and cells that are copies of those of other pieces. VTK, netCDF4
 and h5py write the files. Exit status 77 (skipped) without python3-vtk9, python3-netcdf4 and python3-h5py.
 """
 import sys
@@ -87,6 +87,25 @@ class OddScalars(MeshCase):
             grid.GetCellData().GetArray("c").SetValue(n, 1e-60 * n)
         write_xml(grid, self.folder / "m.vtu")
         self.assertTrue(any(w.startswith("c: its values are smaller") for w in self.info(self.folder / "m.vtu")["warnings"]))
+
+    def test_differences_that_single_precision_loses(self):
+        """As a low-Mach run: 101325 Pa and some mPa. Doubles that are equal, and floats, have nothing to lose."""
+        self.values = 101325 + np.arange(60) * 8e-5
+        for path in (self.write_vtk(True), self.write_vtk(False), self.write_netcdf("NETCDF4"), self.write_netcdf("NETCDF3_CLASSIC"),
+                     self.write_xdmf(), self.write_tecplot()):
+            with self.subTest(path=path.name):
+                expected = "c: its values differ by about 0.0045, which single precision loses: it has steps of 0.0078 at 101325"
+                self.assertEqual([w[:len(expected)] for w in self.info(path)["warnings"] if w.startswith("c: ")], [expected])
+                result = self.run_program("convert", path, "-o", self.folder / "d.splats", "--overwrite")
+                self.assertIn("warning: " + expected, result.stderr)
+        for self.values in (np.full(60, 101325.1), (101325 + np.arange(60) / 64).astype("f4"), 101325 + np.arange(60) * 0.1):
+            for path in (self.write_vtk(True), self.write_netcdf("NETCDF4")):
+                self.assertEqual(self.info(path)["warnings"], [])
+        grid = cube(2, ("hexahedron",))
+        for n in range(grid.GetNumberOfCells()):
+            grid.GetCellData().GetArray("c").SetValue(n, 300 + 1e-6 * n)
+        write_xml(grid, self.folder / "m.vtu")
+        self.assertTrue(any(w.startswith("c: its values differ by about 7e-06") for w in self.info(self.folder / "m.vtu")["warnings"]))
 
     def test_zeros_and_ordinary_values_are_no_reason_to_warn(self):
         for self.values in (np.zeros(60), np.linspace(0, 1, 60), np.linspace(1e-37, 1e-36, 60)):

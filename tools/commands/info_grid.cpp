@@ -33,7 +33,8 @@ struct GridInfo {
   std::vector<BlockOverlap> overlaps;
   uint64_t nodes = 0;
   InfoEstimate estimate;  // of a conversion of the first scalar
-  std::string series;     // what the files are steps of; empty: a single one
+  std::vector<std::string> warnings;
+  std::string series;  // what the files are steps of; empty: a single one
 
   const GridScalar& scalar(uint32_t position) const { return description->scalars[position]; }
 };
@@ -48,6 +49,9 @@ GridInfo inspect(const GridSource& source) {
   Progress progress{progressBar()};
   progress.begin("reading", 2 * info.nodes, "nodes");
   info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
+  info.warnings = description.warnings;
+  for (std::string& warning : warningsOfRanges(source, info.stored, info.statistics.scalars))
+    info.warnings.push_back(std::move(warning));
   info.overlaps = findOverlaps(source, {kSlabBytes, kPointBytes}, progress);
   const bool by_cell = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
   info.estimate = InfoEstimate(
@@ -63,13 +67,6 @@ bool isEmpty(const ScalarRange& range) {
 nlohmann::ordered_json jsonOf(const ScalarRange& range, bool lower) {
   if (isEmpty(range)) return nullptr;
   return lower ? range.min : range.max;
-}
-
-std::vector<std::string> warningsOf(const GridInfo& info) {
-  std::vector<std::string> warnings = info.description->warnings;
-  const auto tiny = tinyValues(*info.description, info.stored, info.statistics.scalars);
-  warnings.insert(warnings.end(), tiny.begin(), tiny.end());
-  return warnings;
 }
 
 /// Describes what blanks nodes; empty if nothing does.
@@ -182,7 +179,7 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
          {"share_of_smaller", overlap.share}});
   json["estimate"] = info.estimate.toJson();
   json["notes"] = description.notes;
-  json["warnings"] = warningsOf(info);
+  json["warnings"] = info.warnings;
   return json;
 }
 
@@ -231,7 +228,7 @@ void printAsText(const GridInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   if (!info.series.empty()) printLine("series    {}", info.series);
-  for (const std::string& warning : warningsOf(info)) printLine("warning: {}", warning);
+  for (const std::string& warning : info.warnings) printLine("warning: {}", warning);
   if (!info.overlaps.empty()) printLine("note: {}", overlapNote(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
   printLine("nodes     {} in {}; {} blanked by the grid, {} {}", info.nodes,

@@ -57,6 +57,7 @@ struct MeshInfo {
   std::vector<ScalarRange> ranges;   // [scalar]
   std::vector<uint64_t> not_finite;  // [scalar], values
   InfoEstimate estimate;
+  std::vector<std::string> warnings;
   std::string series;
 };
 
@@ -120,6 +121,11 @@ MeshInfo inspect(const MeshSource& source) {
   info.survey = surveyMesh(reader, progress);
   measure(source, Centring::kNode, info);
   measure(source, Centring::kCell, info);
+  info.warnings = info.description->warnings;
+  std::vector<uint32_t> scalars(info.ranges.size());
+  std::iota(scalars.begin(), scalars.end(), 0);
+  for (std::string& warning : warningsOfRanges(source, scalars, info.ranges))
+    info.warnings.push_back(std::move(warning));
   const bool by_cell =
       !info.description->scalars.empty() && info.description->scalars.front().centring == Centring::kCell;
   info.estimate = by_cell ? InfoEstimate(info.survey.drawn_cells, SplatsOf::kMeshCells)
@@ -129,15 +135,6 @@ MeshInfo inspect(const MeshSource& source) {
 
 bool isEmpty(const ScalarRange& range) {
   return range.min > range.max;
-}
-
-std::vector<std::string> warningsOf(const MeshInfo& info) {
-  std::vector<std::string> warnings = info.description->warnings;
-  std::vector<uint32_t> scalars(info.ranges.size());
-  std::iota(scalars.begin(), scalars.end(), 0);
-  const auto tiny = tinyValues(*info.description, scalars, info.ranges);
-  warnings.insert(warnings.end(), tiny.begin(), tiny.end());
-  return warnings;
 }
 
 nlohmann::ordered_json asJson(const MeshInfo& info) {
@@ -174,7 +171,7 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
   json["time_step"] = description.time_step;
   json["estimate"] = info.estimate.toJson();
   json["notes"] = description.notes;
-  json["warnings"] = warningsOf(info);
+  json["warnings"] = info.warnings;
   return json;
 }
 
@@ -182,7 +179,7 @@ void printAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   if (!info.series.empty()) printLine("series    {}", info.series);
-  for (const std::string& warning : warningsOf(info)) printLine("warning: {}", warning);
+  for (const std::string& warning : info.warnings) printLine("warning: {}", warning);
   printLine("points    {} in {}; {} in no solid cell, {} blanked by the file, {} at NaN or infinity",
             info.points, countText(description.pieces.size(), "piece"), info.survey.unused_points,
             info.survey.grid.blanked.by_grid, info.survey.grid.blanked.not_finite);

@@ -25,6 +25,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "preprocess/grid/float_offset.h"
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
 
@@ -66,11 +67,13 @@ Stored loadStored(const std::byte* from, bool swap) {
 
 /// A number in the type that is asked for. A double that is too large for a float becomes infinite, which blanks
 /// its sample; one that is too small does not become 0, so that a scalar of such values can be told from one of
-/// zeros (tinyValues(), preprocess/survey).
+/// zeros (warningsOfRanges(), preprocess/survey).
 template <typename Value, typename Stored>
 Value convertedTo(Stored stored) {
+  constexpr bool kRounds = std::is_same_v<Value, float> && std::is_same_v<Stored, double>;
+  if constexpr (kRounds) stored -= FloatOffset::current();
   const auto value = static_cast<Value>(stored);
-  if constexpr (std::is_same_v<Value, float> && std::is_same_v<Stored, double>)
+  if constexpr (kRounds)
     if (value == 0 && stored != 0)
       return std::copysign(std::numeric_limits<float>::denorm_min(), static_cast<float>(stored));
   return value;
@@ -80,7 +83,9 @@ Value convertedTo(Stored stored) {
 /// read(std::span<double>), and converts them.
 template <typename Read>
 void convertIfZero(std::span<float> values, const Read& read) {
-  if (std::any_of(values.begin(), values.end(), [](float value) { return value != 0; })) return;
+  if (FloatOffset::current() == 0 &&
+      std::any_of(values.begin(), values.end(), [](float value) { return value != 0; }))
+    return;
   std::vector<double> stored(values.size());
   if (!stored.empty()) read(std::span(stored));
   for (size_t n = 0; n < values.size(); ++n) values[n] = convertedTo<float>(stored[n]);
