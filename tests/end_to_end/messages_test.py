@@ -32,6 +32,16 @@ VALUES = I + 10.0 * J + K * K
 
 
 class Messages(FormatCase):
+    def test_small_numbers_in_a_text(self):
+        """Round-off of zero in ASCII: a text has neither byte order nor precision to doubt."""
+        z = ["1.0-101"] * 12 + ["1.0"] * 12 + ["2.0"] * 12
+        k, j, i = np.meshgrid(np.arange(3), np.arange(3), np.arange(4), indexing="ij")
+        path = self.write("small.xyz", "1\n4 3 3\n" + numbers(i) + numbers(j) + " ".join(z) + "\n")
+        info = self.info(path)
+        self.assertEqual((info["nodes"], info["bounds"]["upper"]), (36, [3, 2, 2]))
+        huge = self.write("huge.xyz", "1\n4 3 3\n" + numbers(i) + numbers(j) + " ".join(["1e200"] * 36) + "\n")
+        self.assertNotIn("--byte-order", self.run_program("info", huge).stderr)
+
     def write(self, name, text):
         path = self.folder / name
         path.parent.mkdir(exist_ok=True)

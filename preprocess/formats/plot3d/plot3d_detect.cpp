@@ -47,16 +47,19 @@ std::vector<NodeBox> sampleRows(const Plot3dBlock& block, uint64_t most) {
   return boxes;
 }
 
-bool isExtreme(double value, int precision_bytes) {
+bool isExtreme(double value, const Plot3dLayout& layout) {
   const double size = std::abs(value);
-  const double noise_below = precision_bytes == 8 ? kNoiseBelowOfDoubles : kNoiseBelow;
+  // Text has neither byte order nor precision to doubt: a small number is one.
+  const double noise_below = layout.ascii                  ? 0
+                             : layout.precision_bytes == 8 ? kNoiseBelowOfDoubles
+                                                           : kNoiseBelow;
   return size != 0 && (size < noise_below || size > kNoiseAbove);
 }
 
 /// Whether numbers look like noise instead of a field.
 class NoiseTest {
  public:
-  explicit NoiseTest(int precision_bytes) : precision_bytes_(precision_bytes) {}
+  explicit NoiseTest(const Plot3dLayout& layout) : layout_(layout) {}
   /// The next number begins a row.
   void beginRow() { before_ = 0; }
   void add(std::span<const double> values) {
@@ -64,7 +67,7 @@ class NoiseTest {
       if (!std::isfinite(value)) continue;
       const double size = std::abs(value);
       ++finite_;
-      if (isExtreme(value, precision_bytes_)) {
+      if (isExtreme(value, layout_)) {
         ++extreme_;
         extreme_value_ = value;
       }
@@ -83,7 +86,7 @@ class NoiseTest {
   }
 
  private:
-  const int precision_bytes_;
+  const Plot3dLayout& layout_;
   uint64_t finite_ = 0, extreme_ = 0, jumps_ = 0;
   double largest_ = 0, before_ = 0, extreme_value_ = 0;
 };
@@ -107,7 +110,7 @@ std::optional<std::string> implausibility(const Plot3dFit& fit) {
   const Plot3dFile file(fit);
   std::vector<double> values(1);
   file.read(0, 0, {0, 1, 0, 1, 0, 1}, values);
-  if (isExtreme(values.front(), fit.layout.precision_bytes))
+  if (isExtreme(values.front(), fit.layout))
     return fmt::format("its values begin with {}, as if its header were longer", values.front());
   std::vector<int32_t> iblank;
   const std::vector<uint32_t> blocks = sampleBlocks(fit.blocks.size());
@@ -115,7 +118,7 @@ std::optional<std::string> implausibility(const Plot3dFit& fit) {
     const uint64_t ni = fit.blocks[b].ni;
     const std::vector<NodeBox> rows = sampleRows(fit.blocks[b], 64 / blocks.size());
     for (uint32_t component = 0; component < fit.components; ++component) {
-      NoiseTest noise(fit.layout.precision_bytes);
+      NoiseTest noise(fit.layout);
       for (const NodeBox& row : rows) {
         noise.beginRow();
         for (const NodeBox& piece : piecesOf(row, ni)) {
@@ -290,9 +293,9 @@ class Detection {
         kept.push_back(fit);
     }
     if (kept.empty())
-      throw Error(
-          "{}: has implausible values: {}; set the layout with --byte-order, --records and --precision",
-          path_, reason);
+      throw Error("{}: has implausible values: {}; {}", path_, reason,
+                  fits.front().layout.ascii ? "is it a PLOT3D file?"
+                                            : "set the layout with --byte-order, --records and --precision");
     fits = std::move(kept);
   }
 
