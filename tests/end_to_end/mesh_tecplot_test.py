@@ -39,6 +39,9 @@ class TecplotMeshes(MeshFormats):
             rows = [*np.column_stack([mesh.points, mesh.p, mesh.p]), *(np.array(mesh.cells) + 1)]
             self.write_text([(f"T=\"a\", N={len(mesh.points)}, E={len(mesh.cells)}, F=FEPOINT, ET={NAMES[kind][1]}", rows)])
             self.expect_same([self.path], mesh.vtk(), {"c": None})
+            # The counts as I and J, as before version 10 and as FUN3D writes them.
+            self.write_text([(f"t=\"a\", i={len(mesh.points)}, j={len(mesh.cells)}, f=fepoint, et={NAMES[kind][1].lower()}, solutiontime= 0.1250E+00, strandid=1", rows)])
+            self.expect_same([self.path], mesh.vtk(), {"c": None})
 
     def test_shared_elements(self):
         mesh, words = Mesh(2, (8,)), None

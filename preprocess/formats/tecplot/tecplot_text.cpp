@@ -11,6 +11,7 @@
 #include "preprocess/formats/tecplot/tecplot_header.h"
 #include "stream/base/disk_space.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -108,7 +109,7 @@ void spoolNumbers(const std::shared_ptr<const PooledFile>& file, uint64_t begin,
 }
 
 struct TextZone {
-  bool point = false, has_packing = false;
+  bool point = false, has_packing = false, has_j = false;
   std::vector<bool> single;  // DT: [variable], as far as it goes
   std::optional<double> time;
   std::optional<int64_t> strand;
@@ -240,6 +241,11 @@ class Reader {
         setKey(key, tokens.takeValue(), zone, text);
       }
     }
+    // Tecplot before version 10, and FUN3D, give the counts of nodes and elements as I and J.
+    if (zone.element_nodes > 0 && zone.elements == 0 && text.has_j) {
+      zone.elements = zone.nodes[1];
+      zone.nodes[1] = 1;
+    }
     if (text.time && text.strand.value_or(1) != 0) zone.time = text.time;
     checkTecplotZone(file_->name(), zone, data_.zones.size() - 1, kMaxDimension);
     zone.first_node = 1;
@@ -265,6 +271,7 @@ class Reader {
       zone.name = value.empty() ? "" : value.front().raw;
     } else if (key == "I" || key == "J" || key == "K" || key == "IMAX" || key == "JMAX" || key == "KMAX") {
       zone.nodes[static_cast<size_t>(key[0] - 'I')] = count();
+      text.has_j = text.has_j || key[0] == 'J';
     } else if (key == "F" || key == "DATAPACKING") {
       if (!word.ends_with("POINT") && !word.ends_with("BLOCK")) badValue(key, value);
       text.point = word.ends_with("POINT");
@@ -456,7 +463,9 @@ bool isTecplotText(const InputFile& file) {
     if (!record.atRecord()) return false;
     const std::string word = record.pop().text;
     if (word == "TITLE" || word == "VARIABLES" || word == "FILETYPE")
-      return record.done() || record.takeSign('=');
+      return record.takeSign('=') ||
+             (record.done() &&
+              trimmed(std::string_view(begin).substr(std::min(at, begin.size()))).starts_with('='));
     return word == "ZONE" && !record.done() && record.peek().kind == TecplotToken::Kind::kWord;
   }
   return false;
