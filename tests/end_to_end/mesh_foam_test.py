@@ -235,6 +235,72 @@ class MeshFoam(MeshCase):
             self.assertIn(f"{name} is left out", "".join(info["warnings"]))
         self.assertIn("foamDictionary -expand", "".join(info["warnings"]))
 
+    def test_scoped_macros_and_files_of_the_case(self):
+        """As the tutorials' `uniform $:Uinf;`, `$dictionary.entry` and `#include "$FOAM_CASE/system/values"`."""
+        case, _, _ = self.foam_case()
+        (case / "system").mkdir()
+        (case / "system" / "values").write_text("inlet { p 7; deep { q 8; } }\n")
+        writer = FoamCase(case)
+        head = "dimensions [0 2 -2 0 0 0 0];\n"
+        writer.write(case / "0" / "U", "volVectorField", head, "Uinf (1 2 2);\ninternalField uniform $:Uinf;\n")
+        for name, value in (("p", "$inlet.p"), ("q", "${inlet.deep.q}"), ("r", "$:inlet/deep/q")):
+            writer.write(case / "0" / name, "volScalarField", '#include "$FOAM_CASE/system/values"\n', head, f"internalField uniform {value};\n")
+        writer.write(case / "0" / "s", "volVectorField", '#include "<case>/none"\n', head, "internalField uniform $inlet.s;\n")
+        info = self.info(case)
+        scalars = {scalar["name"]: scalar["max"] for scalar in info["scalars"]}
+        self.assertEqual([scalars[name] for name in ("U:mag", "p", "q", "r")], [3, 7, 8, 8])
+        self.assertIn('has "$inlet.s" in the place of', info["warnings"][0])
+        self.assertIn('its #include "<case>/none" is not found', info["warnings"][0])
+
+    def test_fields_of_later_times(self):
+        case, p, u = self.foam_case()
+        writer = FoamCase(case)
+        for time in ("0.5", "2"):
+            writer.write_field(case / time, "yPlus", p)
+            writer.write_field(case / time, "UMean", u)
+        writer.write_field(case / "2", "k", p)
+        writer.write(case / "0" / "p", "volScalarField", "dimensions [0 2 -2 0 0 0 0];\ninternalField #calc \"1\";\n")
+        expected = ["UMean, p, yPlus are read from time 0.5 on, not at time 0: --time-step 1, or --steps 1:2 for a series",
+                    "k is read from time 2 on, not at time 0: --time-step 2, or --steps 2:2 for a series"]
+        self.assertEqual(self.info(case)["warnings"][1:], expected)
+        result = self.run_program("convert", case, "--steps", "all", "--scalar", "T", "-o", self.folder / "s.splats")
+        self.assertIn(expected[0], result.stderr)
+        result = self.run_program("convert", case, "--steps", "1:", "--scalar", "yPlus", "-o", self.folder / "s.splats", "--overwrite")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("2 steps", result.stdout)
+
+    def test_regions(self):
+        """As chtMultiRegionFoam: two cubes side by side, of which one alone has U."""
+        def write(where):
+            writer, points, cells = FoamCase(where), np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), -1)[..., ::-1].reshape(-1, 3) * 1.0, [[0, 1, 3, 2, 4, 5, 7, 6]]
+            for x, region in enumerate(("fluid", "solid")):
+                writer.write_mesh(where / "constant" / region, points + [x, 0, 0], cells)
+                writer.write_field(where / "0" / region, "T", 300 + x)
+            writer.write(where / "0" / "fluid" / "U", "volVectorField", "internalField uniform (3 0 4);\n")
+            return where
+
+        case = write(self.folder / "cht")
+        (case / "case.foam").write_text("")
+        for path in (case, case / "case.foam"):
+            info = self.info(path)
+            scalars = {scalar["name"]: (scalar["min"], scalar["max"]) for scalar in info["scalars"]}
+            self.assertEqual(([piece["name"] for piece in info["pieces"]], scalars["T"], scalars["U:mag"]), (["fluid", "solid"], (300, 301), (5, 5)))
+            self.assertIn("1 of 2 regions have no U", info["warnings"][0])
+            self.assertIn("constant/fluid gives one of them", info["notes"][0])
+            self.assertAlmostEqual(self.volume(path, "T"), 2, delta=4e-3)
+        info = self.info(case / "constant" / "solid")
+        self.assertEqual(([piece["name"] for piece in info["pieces"]], info["scalars"][0]["max"]), (["solid"], 301))
+        # A mesh outside of regions is read alone, and so are the regions of processors.
+        FoamCase(case).write_mesh(case / "constant", lattice(4), hexahedra(4))
+        info = self.info(case)
+        self.assertEqual(info["nodes"], 125)
+        self.assertIn("the regions fluid, solid have meshes of their own", info["warnings"][0])
+        write(self.folder / "split" / "processor0")
+        self.assertEqual([piece["name"] for piece in self.info(self.folder / "split")["pieces"]], ["fluid, processor0", "solid, processor0"])
+        for inside in ("0", "constant"):
+            result = self.run_program("info", case / inside)
+            self.assertIn("is a folder within an OpenFOAM case", result.stderr)
+
     def test_damaged_openfoam_cases_get_one_line(self):
         def expect_line(case, name):
             result = self.run_program("convert", case, "-o", self.folder / "d.splats", "--overwrite", "--scalar", "p")

@@ -79,6 +79,7 @@ struct FoamFile::Parser final : FoamParser {
   /// The opening of a list in text: true for `3{7}`, which has one element that counts three times.
   bool opensRepeated() {
     const std::string opening = token();
+    if (opening.starts_with('$') || opening.starts_with('#')) failValue(opening, "a list");
     if (opening != "(" && opening != "{")
       fail(fmt::format("found \"{}\"; expected \"(\"; the file is truncated or damaged",
                        opening.substr(0, 30)));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -26,6 +27,32 @@ bool isSpace(int c) {
 
 bool isPunctuation(int c) {
   return c == '(' || c == ')' || c == '{' || c == '}' || c == '[' || c == ']' || c == ';';
+}
+
+/// The tokens of the entry `key` of a dictionary, { key tokens ; ... }; none if it has no such entry.
+std::vector<std::string> entryWithin(const std::vector<std::string>& dictionary, const std::string& key) {
+  for (size_t n = 1; n < dictionary.size(); ++n) {
+    const std::string& name = dictionary[n];
+    std::vector<std::string> tokens;
+    int braces = 0;
+    for (++n; n < dictionary.size() && (braces > 0 || dictionary[n] != ";"); ++n) {
+      braces += dictionary[n] == "{" ? 1 : dictionary[n] == "}" ? -1 : 0;
+      tokens.push_back(dictionary[n]);
+      if (dictionary[n] == "}" && braces == 0) break;
+    }
+    if (name == key) return tokens;
+  }
+  return {};
+}
+
+/// The folder of the case that the file belongs to: the nearest one around it that has a folder "system", else "constant".
+std::filesystem::path caseAround(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::filesystem::path from = std::filesystem::absolute(file, error).parent_path();
+  for (const char* const has : {"system", "constant"})
+    for (std::filesystem::path folder = from; folder.has_relative_path(); folder = folder.parent_path())
+      if (std::filesystem::is_directory(folder / has, error)) return folder;
+  return from;
 }
 
 }  // namespace
@@ -86,11 +113,29 @@ std::string FoamParser::token() {
       for (int next = 0; next != '}' && peek() >= 0; add(word, next)) next = get();
     std::string key = word.substr(1);
     if (key.size() > 2 && key.front() == '{') key = key.substr(1, key.size() - 2);
-    const auto entry = entries_.find(key);
+    const std::vector<std::string> tokens = entryNamed(key);
     // Entries may name one another in a circle.
-    if (entry == entries_.end() || ++expansions_ > kMaxExpansions) return word;
-    expanded_.insert(expanded_.begin(), entry->second.begin(), entry->second.end());
+    if (tokens.empty() || ++expansions_ > kMaxExpansions) return word;
+    expanded_.insert(expanded_.begin(), tokens.begin(), tokens.end());
   }
+}
+
+/// Of "name", ":name" and "!name" (from the top), "..name" (from a dictionary around), and "a.b" or "a/b" (within a).
+std::vector<std::string> FoamParser::entryNamed(const std::string& key) const {
+  const auto whole = entries_.find(key);
+  if (whole != entries_.end()) return whole->second;
+  const size_t begin = key.find_first_not_of(":!./^");
+  if (begin == std::string::npos) return {};
+  size_t end = std::min(key.find_first_of("./", begin), key.size());
+  const auto entry = entries_.find(key.substr(begin, end - begin));
+  if (entry == entries_.end()) return {};
+  std::vector<std::string> tokens = entry->second;
+  while (end < key.size()) {
+    const size_t from = end + 1;
+    end = std::min(key.find_first_of("./", from), key.size());
+    tokens = entryWithin(tokens, key.substr(from, end - from));
+  }
+  return tokens;
 }
 
 std::string FoamParser::nextToken() {
@@ -128,17 +173,19 @@ std::string FoamParser::nextToken() {
 
 void FoamParser::expect(const char* wanted) {
   const std::string found = token();
-  if (found != wanted)
-    fail(fmt::format("found \"{}\"; expected \"{}\"; the file is truncated or damaged", found.substr(0, 30),
-                     wanted));
+  if (found == wanted) return;
+  if (found.starts_with('$') || found.starts_with('#')) failValue(found, fmt::format("\"{}\"", wanted));
+  fail(fmt::format("found \"{}\"; expected \"{}\"; the file is truncated or damaged", found.substr(0, 30),
+                   wanted));
 }
 
-void FoamParser::failValue(const std::string& word, const char* wanted) const {
+void FoamParser::failValue(const std::string& word, const std::string& wanted) const {
   if (!word.empty() && (word[0] == '$' || word[0] == '#'))
     fail(
         fmt::format("has \"{}\" in the place of {}, which only OpenFOAM can evaluate: write the values with "
-                    "foamDictionary -expand FILE",
-                    word.substr(0, 30), wanted));
+                    "foamDictionary -expand FILE{}",
+                    word.substr(0, 30), wanted,
+                    missing_.empty() ? "" : fmt::format(" (its #include \"{}\" is not found)", missing_)));
   fail(
       fmt::format("found \"{}\"; expected {}; the file is truncated or damaged", word.substr(0, 30), wanted));
 }
@@ -179,9 +226,18 @@ std::vector<std::string> FoamParser::entryTokens() {
 }
 
 void FoamParser::include(const std::filesystem::path& path, int depth) {
-  const std::filesystem::path included = std::filesystem::path(name_).parent_path() / path;
-  if (depth >= kMaxIncludes || !isRegularFile(included))
-    return;  // what it defines is missed where it is used
+  // "$FOAM_CASE/system/values", "${FOAM_CASE}/...", "<case>/...", "<system>/..."
+  std::filesystem::path included = std::filesystem::path(name_).parent_path() / path;
+  const std::string begin = path.begin()->string();
+  if (begin == "$FOAM_CASE" || begin == "${FOAM_CASE}" || (begin.starts_with('<') && begin.ends_with('>'))) {
+    included = caseAround(name_);
+    if (begin == "<system>" || begin == "<constant>") included /= begin.substr(1, begin.size() - 2);
+    for (auto part = std::next(path.begin()); part != path.end(); ++part) included /= *part;
+  }
+  if (depth >= kMaxIncludes || !isRegularFile(included)) {
+    missing_ = path.string();  // what it defines is missed where it is used
+    return;
+  }
   FoamParser other(included, included.string());
   other.findEntry("", depth + 1);
   entries_.merge(other.entries_);
@@ -192,7 +248,7 @@ bool FoamParser::findEntry(const std::string& wanted, int depth) {
     if (key == wanted) return true;
     if (key.starts_with("#include")) {
       const std::string path = token();
-      if (path.starts_with('"')) include(path.substr(1), depth);
+      if (path.starts_with('"') && path.size() > 1) include(path.substr(1), depth);
     } else if (key == "#inputMode" || key == "#remove") {
       token();
     } else if (key != ";" && key != "}") {

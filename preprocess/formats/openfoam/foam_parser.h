@@ -33,13 +33,13 @@ class FoamParser {
   int peek();
   int get();
   void skipSpace();
-  /// The next token; empty at the end. "$name" and "${name}" are replaced by the tokens of the entry that they
-  /// name.
+  /// The next token; empty at the end. "$name", "${name}", "$:name" and "$dictionary.name" are replaced by the tokens of the entry
+  /// that they name.
   std::string token();
   bool atEnd();
   void expect(const char* wanted);
   /// Throws an Error about a value that is not `wanted`.
-  [[noreturn]] void failValue(const std::string& word, const char* wanted) const;
+  [[noreturn]] void failValue(const std::string& word, const std::string& wanted) const;
   double number();
   /// A number of 0 or more.
   uint64_t label();
@@ -54,6 +54,7 @@ class FoamParser {
 
  private:
   std::string nextToken();
+  std::vector<std::string> entryNamed(const std::string& key) const;
   void add(std::string& word, int c) const;
   void include(const std::filesystem::path& path, int depth);
 
@@ -66,6 +67,7 @@ class FoamParser {
   std::map<std::string, std::vector<std::string>> entries_;  // what "$name" stands for
   std::deque<std::string> expanded_;                         // tokens of such entries, which come next
   int expansions_ = 0;
+  std::string missing_;  // a file that is included and was not found
 };
 
 }  // namespace curvisplat

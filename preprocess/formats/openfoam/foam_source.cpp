@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -29,14 +31,39 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kChunk = 65536;
 
-bool hasMesh(const fs::path& folder) {
-  return FoamFile::exists(folder / "constant" / "polyMesh" / "faces");
+bool hasMesh(const fs::path& folder, const fs::path& region) {
+  return FoamFile::exists(folder / "constant" / region / "polyMesh" / "faces");
 }
 
-fs::path caseOf(const fs::path& path) {
+/// What a user's path names: a case, and a region of it if that is CASE/constant/REGION.
+struct CasePath {
+  fs::path folder;
+  std::string region;
+};
+
+CasePath caseOf(const fs::path& path) {
   std::error_code error;
-  if (fs::is_directory(path, error)) return path;
-  return path.parent_path().empty() ? fs::path(".") : path.parent_path();
+  if (!fs::is_directory(path, error))
+    return {path.parent_path().empty() ? fs::path(".") : path.parent_path(), ""};
+  const fs::path region = path.has_filename() ? path : path.parent_path(), constant = region.parent_path();
+  if (constant.filename() == "constant" && FoamFile::exists(region / "polyMesh" / "faces"))
+    return {constant.has_parent_path() ? constant.parent_path() : fs::path("."), region.filename().string()};
+  return {path, ""};
+}
+
+/// The regions that have a mesh of their own, in the order of their names.
+std::vector<std::string> regionsIn(const fs::path& folder) {
+  std::vector<std::string> regions;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder / "constant", error))
+    if (const std::string name = entry.path().filename().string(); hasMesh(folder, name))
+      regions.push_back(name);
+  std::sort(regions.begin(), regions.end());
+  return regions;
+}
+
+bool hasMesh(const fs::path& folder) {
+  return hasMesh(folder, "") || !regionsIn(folder).empty();
 }
 
 struct Processor {
@@ -50,9 +77,11 @@ std::vector<Processor> processorsOf(const fs::path& folder) {
     processors.push_back({folder / fmt::format("processor{}", n)});
   if (!processors.empty()) return processors;
   // "processors8", "processors8_0-3", or "processors" alone
-  for (const auto& entry : fs::directory_iterator(folder)) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (!entry.path().filename().string().starts_with("processors") || !hasMesh(entry.path())) continue;
-    const uint32_t parts = FoamFile::processorsIn(entry.path() / "constant" / "polyMesh" / "faces");
+    const fs::path region = hasMesh(entry.path(), "") ? "" : regionsIn(entry.path()).front();
+    const uint32_t parts = FoamFile::processorsIn(entry.path() / "constant" / region / "polyMesh" / "faces");
     for (uint32_t part = 0; part < parts; ++part) processors.push_back({entry.path(), part});
   }
   std::sort(processors.begin(), processors.end(), [](const Processor& a, const Processor& b) {
@@ -102,6 +131,7 @@ class FoamSource final : public ElementSource {
   struct Piece {
     std::filesystem::path folder;  // the case's, a processor's, or that of several (collated)
     uint32_t processor = 0;        // its part of the files of several
+    std::string region;            // empty: the case has none
     FoamList points;               // 3 numbers each
     FoamFile::Faces faces;
     CellFaces cells;
@@ -119,14 +149,17 @@ class FoamSource final : public ElementSource {
   void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override;
   void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override;
   void choosePieces(const std::filesystem::path& folder);
+  void chooseRegions(const std::string& asked);
   void findTimes(std::optional<uint32_t> asked, const std::filesystem::path& shown);
-  std::filesystem::path meshFile(const std::filesystem::path& folder, const char* name) const;
+  std::filesystem::path meshFile(const Piece& piece, const char* name) const;
   FoamFile open(const Piece& piece, const std::filesystem::path& path) const {
     return FoamFile(path, spools_, temporary_folder_, piece.processor);
   }
   void openPiece(Piece& piece);
   void listFacesOfCells(Piece& piece, const FoamList& owner, const FoamList& neighbour);
+  std::map<std::string, std::vector<std::filesystem::path>> filesAt(const std::string& time) const;
   void findFields();
+  void warnOfLaterFields();
   void addField(const std::string& name, size_t components);
   const FoamList& valuesOf(uint32_t piece, size_t field, std::vector<double>& uniform) const;
 
@@ -149,10 +182,11 @@ class FoamSource final : public ElementSource {
 
 FoamSource::FoamSource(const OpenGridOptions& options)
     : spools_(options.temporary_folder), temporary_folder_(options.temporary_folder) {
-  choosePieces(caseOf(options.grid));
+  choosePieces(caseOf(options.grid).folder);
+  chooseRegions(caseOf(options.grid).region);
   findTimes(options.time_step, options.grid);
   for (Piece& piece : pieces_) openPiece(piece);
-  const bool binary = open(pieces_.front(), meshFile(pieces_.front().folder, "faces")).isBinary();
+  const bool binary = open(pieces_.front(), meshFile(pieces_.front(), "faces")).isBinary();
   values_.resize(pieces_.size());
   findFields();
   description_.coordinate_bytes = 8;
@@ -191,6 +225,29 @@ void FoamSource::choosePieces(const fs::path& folder) {
   }
 }
 
+/// Pieces of a region are its own; without a region of that name, those of all regions. A mesh outside of regions is read alone.
+void FoamSource::chooseRegions(const std::string& asked) {
+  const std::vector<Piece> folders = std::exchange(pieces_, {});
+  for (const Piece& of : folders) {
+    const std::vector<std::string> regions = regionsIn(of.folder);
+    const bool whole = asked.empty() && hasMesh(of.folder, "");
+    if (whole) pieces_.push_back(of);
+    for (const std::string& region : regions)
+      if (asked == region || (asked.empty() && !whole)) pieces_.emplace_back(of).region = region;
+    if (&of != &folders.front() || regions.empty()) continue;
+    const std::string how =
+        decomposed_
+            ? "reconstructPar -allRegions, and then the folder constant/REGION, gives one of them"
+            : fmt::format("{} gives one of them", (of.folder / "constant" / regions.front()).string());
+    if (whole)
+      description_.warnings.push_back(fmt::format(
+          "the regions {} have meshes of their own, which are not read: {}", fmt::join(regions, ", "), how));
+    else if (asked.empty() && regions.size() > 1)
+      description_.notes.push_back(
+          fmt::format("the regions {} are read together: {}", fmt::join(regions, ", "), how));
+  }
+}
+
 void FoamSource::findTimes(std::optional<uint32_t> asked, const fs::path& shown) {
   for (const auto& [time, name] : timesIn(pieces_.front().folder)) {
     description_.times.push_back(time);
@@ -200,24 +257,24 @@ void FoamSource::findTimes(std::optional<uint32_t> asked, const fs::path& shown)
 }
 
 /// A mesh that moves has its points, and one that changes all files, in the folder of the time.
-fs::path FoamSource::meshFile(const fs::path& folder, const char* name) const {
+fs::path FoamSource::meshFile(const Piece& piece, const char* name) const {
   for (size_t step = time_names_.empty() ? 0 : description_.time_step + size_t{1}; step-- > 0;) {
-    const fs::path moved = folder / time_names_[step] / "polyMesh" / name;
+    const fs::path moved = piece.folder / time_names_[step] / piece.region / "polyMesh" / name;
     if (FoamFile::exists(moved)) return moved;
   }
-  return folder / "constant" / "polyMesh" / name;
+  return piece.folder / "constant" / piece.region / "polyMesh" / name;
 }
 
 void FoamSource::openPiece(Piece& piece) {
   const auto openMesh = [&](const char* name) {
-    FoamFile file = open(piece, meshFile(piece.folder, name));
+    FoamFile file = open(piece, meshFile(piece, name));
     if (piece.processor == 0) description_.files.push_back(file.name());
     return file;
   };
   piece.points = openMesh("points").numbers(3);
   piece.faces = openMesh("faces").faces();
   const FoamList owner = openMesh("owner").labels(), neighbour = openMesh("neighbour").labels();
-  const std::string faces_file = meshFile(piece.folder, "faces").string();
+  const std::string faces_file = meshFile(piece, "faces").string();
   const uint64_t faces = piece.faces.begins.count > 0 ? piece.faces.begins.count - 1 : 0;
   if (owner.count != faces || neighbour.count > faces)
     throw Error("{}: has {} faces, but {} have an owner and {} a neighbour; the mesh is damaged", faces_file,
@@ -225,6 +282,7 @@ void FoamSource::openPiece(Piece& piece) {
   listFacesOfCells(piece, owner, neighbour);
   std::string name = piece.folder.filename().string();
   if (name.starts_with("processors")) name = fmt::format("{}, part {}", name, piece.processor);
+  if (!piece.region.empty()) name = decomposed_ ? fmt::format("{}, {}", piece.region, name) : piece.region;
   description_.pieces.push_back({std::move(name), faces_file, piece.points.count / 3, piece.cells.cells});
 }
 
@@ -241,7 +299,7 @@ void FoamSource::listFacesOfCells(Piece& piece, const FoamList& owner, const Foa
           throw Error(
               "{}: face {} belongs to cell {}, which is more cells than the faces can bound; the mesh is "
               "damaged",
-              meshFile(piece.folder, "owner").string(), first + n, static_cast<int64_t>(values[n]));
+              meshFile(piece, "owner").string(), first + n, static_cast<int64_t>(values[n]));
         cells = std::max(cells, values[n] + 1);
       }
     });
@@ -257,18 +315,26 @@ void FoamSource::listFacesOfCells(Piece& piece, const FoamList& owner, const Foa
       spools_);
 }
 
+/// The regions' files of a time, by the names of fields, in the order of the names.
+std::map<std::string, std::vector<fs::path>> FoamSource::filesAt(const std::string& time) const {
+  std::map<std::string, std::vector<fs::path>> files;
+  for (const Piece& piece : pieces_) {
+    if (piece.folder != pieces_.front().folder || piece.processor != pieces_.front().processor) continue;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(piece.folder / time / piece.region, error)) {
+      if (!entry.is_regular_file(error)) continue;
+      fs::path name = entry.path().filename();
+      if (name.extension() == ".gz") name = name.stem();
+      files[name.string()].push_back(piece.folder / time / piece.region / name);
+    }
+  }
+  return files;
+}
+
 void FoamSource::findFields() {
   if (time_names_.empty()) return;
-  const std::string& time = time_names_[description_.time_step];
-  std::set<std::string> names;
-  for (const auto& entry : fs::directory_iterator(pieces_.front().folder / time)) {
-    if (!entry.is_regular_file()) continue;
-    fs::path name = entry.path().filename();
-    if (name.extension() == ".gz") name = name.stem();
-    names.insert(name.string());
-  }
-  for (const std::string& name : names) {
-    const fs::path path = pieces_.front().folder / time / name;
+  for (const auto& [name, paths] : filesAt(time_names_[description_.time_step])) {
+    const fs::path& path = paths.front();
     std::optional<FoamFile> file;
     try {
       file.emplace(open(pieces_.front(), path));
@@ -286,7 +352,36 @@ void FoamSource::findFields() {
     }
     description_.files.push_back(path.string());
     addField(name, components);
+    const auto regions = static_cast<size_t>(std::ranges::count_if(pieces_, [&](const Piece& piece) {
+      return piece.folder == pieces_.front().folder && piece.processor == pieces_.front().processor;
+    }));
+    if (paths.size() < regions)
+      description_.warnings.push_back(fmt::format("{} of {} regions have no {}; they are not drawn with it",
+                                                  regions - paths.size(), regions, name));
   }
+  warnOfLaterFields();
+}
+
+/// Names the fields that are read at a later time alone: those that a run writes besides (yPlus, UMean), and those that the first time
+/// gives as expressions.
+void FoamSource::warnOfLaterFields() {
+  std::set<std::string> seen;
+  for (const Field& field : fields_) seen.insert(field.name);
+  std::map<size_t, std::vector<std::string>> later;  // [step]
+  for (size_t step = description_.time_step + size_t{1}; step < time_names_.size(); ++step)
+    for (const auto& [name, paths] : filesAt(time_names_[step])) {
+      if (!seen.insert(name).second) continue;
+      try {
+        if (componentsOf(open(pieces_.front(), paths.front()).type()) > 0) later[step].push_back(name);
+      } catch (const Error&) {
+        continue;  // Not a file of OpenFOAM.
+      }
+    }
+  for (const auto& [step, names] : later)
+    description_.warnings.push_back(fmt::format(
+        "{} {} read from time {} on, not at time {}: --time-step {}, or --steps {}:{} for a series",
+        fmt::join(names, ", "), names.size() == 1 ? "is" : "are", time_names_[step],
+        time_names_[description_.time_step], step, step, time_names_.size() - 1));
 }
 
 void FoamSource::addField(const std::string& name, size_t components) {
@@ -306,7 +401,15 @@ const FoamList& FoamSource::valuesOf(uint32_t piece_number, size_t field,
   Values& values = values_[piece_number][field];
   if (!values.read) {
     const Piece& piece = pieces_[piece_number];
-    FoamFile file = open(piece, piece.folder / time_names_[description_.time_step] / fields_[field].name);
+    const fs::path path =
+        piece.folder / time_names_[description_.time_step] / piece.region / fields_[field].name;
+    if (!piece.region.empty() && !FoamFile::exists(path)) {  // another region's
+      values.uniform.assign(fields_[field].components, std::numeric_limits<double>::quiet_NaN());
+      values.read = true;
+      uniform = values.uniform;
+      return values.list;
+    }
+    FoamFile file = open(piece, path);
     if (componentsOf(file.type()) != fields_[field].components)
       throw Error("{}: is a {}; expected the kind of field that the other processors have", file.name(),
                   file.type());
@@ -366,7 +469,7 @@ bool isFoamCase(const fs::path& path) {
   const bool folder = fs::is_directory(path, error);
   const std::string ending = path.extension().string();
   if (!folder && ending != ".foam" && ending != ".OpenFOAM") return false;
-  const fs::path of = caseOf(path);
+  const fs::path of = caseOf(path).folder;
   return hasMesh(of) || !processorsOf(of).empty();
 }
 

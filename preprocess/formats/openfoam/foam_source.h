@@ -1,6 +1,7 @@
 // OpenFOAM cases: constant/polyMesh, moving ones in the folders of times, and fields of cells; ASCII and binary,
 // compressed or not; decomposed cases (processor0, processor1, ..., or collated: processors8), which are pieces of one
-// mesh. A case that also has its mesh in its own folder is read from there, unless only the processors have the last times.
+// mesh, and so are the regions of a case (constant/fluid/polyMesh). A case that also has its mesh in its own folder is
+// read from there, unless only the processors have the last times.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +12,8 @@
 
 namespace curvisplat {
 
-/// Whether `path` is a case: its folder, or ParaView's empty file NAME.foam in it.
+/// Whether `path` is a case: its folder, ParaView's empty file NAME.foam in it, or the folder of a region,
+/// CASE/constant/REGION.
 bool isFoamCase(const std::filesystem::path& path);
 
 /// Reads the mesh and spools it: numbers of 8 bytes, and the faces of each cell. Fields are spooled when they are first
