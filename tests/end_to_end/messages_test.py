@@ -5,6 +5,7 @@ What the program prints of small faulty files and of requests that cannot be met
 what helps. And what it prints for copying can be pasted. Exit status 77 (skipped) without python3-numpy.
 """
 import gzip
+import importlib.util
 import json
 import os
 import shlex
@@ -41,6 +42,38 @@ class Messages(FormatCase):
         self.assertEqual((info["nodes"], info["bounds"]["upper"]), (36, [3, 2, 2]))
         huge = self.write("huge.xyz", "1\n4 3 3\n" + numbers(i) + numbers(j) + " ".join(["1e200"] * 36) + "\n")
         self.assertNotIn("--byte-order", self.run_program("info", huge).stderr)
+
+    def test_names_of_formats_that_are_not_read(self):
+        head = lambda n: "".join(f"{key:8}= {value:>20}".ljust(80) for key, value in n).ljust(2880)
+        files = {"a.fits": (head((("SIMPLE", "T"), ("BITPIX", "-32"), ("NAXIS", "3"))) + 2880 * "\0", "a FITS image"), "a.vdb": ("\x20BDV" + 60 * "\0", "an OpenVDB file"),
+                 "a.fvuns": ("\3\2\1\0FIELDVIEW" + 200 * "\0", "a FieldView file"), "a.tar": ("x.nc".ljust(257, "\0") + "ustar" + 300 * "\0", "a tar archive"),
+                 "a.nc": ("<!DOCTYPE html>\n<html></html>\n", "a web page"), "b.nc": ("Error {\n    code = 404;\n};\n", "an OPeNDAP server"),
+                 "c.nc": ("netcdf x {\ndimensions:\n\tlon = 4 ;\n}\n", "ncgen"), "a.mesh": ("MFEM mesh v1.0\n\ndimension\n3\n", "an MFEM mesh"),
+                 "a.dx": ("object 1 class gridpositions counts 2 2 2\n", "an OpenDX file"), "a.lammpstrj": ("ITEM: TIMESTEP\n0\n", "a dump of LAMMPS"),
+                 "a.cube": ("title\ncomment\n 1 0 0 0\n 2 1 0 0\n 2 0 1 0\n 2 0 0 1\n 1 1 0 0 0\n 1 2 3 4\n", "a cube file of Gaussian"),
+                 "CHGCAR": ("Si\n 1.0\n", "of VASP"), "d3plot": ("\1" * 300, "of LS-DYNA")}
+        for name, (text, words) in files.items():
+            with self.subTest(name):
+                result = self.run_program("info", self.write(name, text))
+                self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
+                self.assertIn(words, result.stderr)
+        for name, words in (("plt00010/Header", "a plotfile of AMReX"), ("sim.bp/md.idx", "an ADIOS2 file")):
+            (self.folder / "plt00010" / "Level_0").mkdir(parents=True, exist_ok=True)
+            self.assertIn(words, self.run_program("info", self.write(name, "x").parent).stderr)
+        self.write("a.dat", 'TITLE\n= "a"\nVARIABLES\n= "x" "y" "z" "p"\nZONE I=2 J=2 K=2 F=POINT\n'
+                   + "".join(f"{i} {j} {k} {i}\n" for k in (0, 1) for j in (0, 1) for i in (0, 1)))
+        self.assertEqual(self.info(self.folder / "a.dat")["nodes"], 8)
+
+    @unittest.skipUnless(importlib.util.find_spec("h5py"), "no h5py")
+    def test_names_of_hdf5_files_that_are_not_read(self):
+        import h5py
+        for group, words in (("ENS_MAA/mesh", "a MED file"), ("settings", "of Fluent"), ("_silolibinfo", "a Silo file"), ("sim info", "of FLASH"), ("tstt", "a MOAB mesh")):
+            with h5py.File(self.folder / "a.h5", "w") as f:
+                f.create_group(group)
+            self.assertIn(words, self.run_program("info", self.folder / "a.h5").stderr)
+        with h5py.File(self.folder / "a.h5", "w") as f:
+            f.attrs["openPMD"] = "1.1.0"
+        self.assertIn("an openPMD file", self.run_program("info", self.folder / "a.h5").stderr)
 
     def write(self, name, text):
         path = self.folder / name

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/openfoam/foam_source.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
@@ -31,6 +33,9 @@ using namespace std::string_view_literals;
 constexpr uint64_t kLooked = 16 << 10;  // more than the comments before a text file's data
 
 constexpr const char* kAvsUcd = "an AVS UCD mesh, which is not read (meshio convert FILE mesh.vtu)";
+constexpr const char* kFieldView =
+    "a FieldView file, which is not read (save it as CGNS, EnSight Gold or PLOT3D)";
+constexpr const char* kWebPage = "a web page, perhaps that of a failed download";
 constexpr const char* kUtf16 = "text in UTF-16, which is not read (iconv -f UTF-16 -t UTF-8 FILE)";
 
 constexpr Magic kMagics[] = {
@@ -69,6 +74,20 @@ constexpr Magic kMagics[] = {
     {"{"sv,
      "a JSON file, but no .p3d file that can be read (one is given alone, instead of the grid; it has no "
      "control characters)"},
+    {"SIMPLE  ="sv,
+     "a FITS image, which is not read (save it as NetCDF, or describe its array in an XDMF file)"},
+    {"\x20"
+     "BDV\0\0\0\0"sv,
+     "an OpenVDB file, which is not read"},
+    {"\x03\x02\x01\0FIELDVIEW"sv, kFieldView},
+    {"\0\x01\x02\x03"
+     "FIELDVIEW"sv,
+     kFieldView},
+    {"FIELDVIEW"sv, kFieldView},
+    {"#INRIMAGE-4"sv, "an INRIMAGE, which is not read (save it as VTK's .vti)"},
+    {"# AmiraMesh"sv, "an Amira mesh, which is not read (save it as VTK)"},
+    {"# Avizo"sv, "an Avizo mesh, which is not read (save it as VTK)"},
+    {"# OOMMF"sv, "a vector field of OOMMF (.ovf), which is not read (ovf2vtk FILE OUT.vtk)"},
     {"\x89PNG"sv, "a PNG image"},
     {"\xff\xd8\xff"sv, "a JPEG image"},
     {"%PDF"sv, "a PDF document"},
@@ -76,6 +95,8 @@ constexpr Magic kMagics[] = {
      "ELF"sv,
      "an executable"},
     {"\x1f\x8b"sv, "compressed with gzip (decompress it first)"},
+    {"\x04\x22\x4d\x18"sv, "compressed with lz4 (decompress it first)"},
+    {"\x1f\x9d"sv, "compressed with compress (decompress it first)"},
     {"BZh"sv, "compressed with bzip2 (decompress it first)"},
     {"\xfd"
      "7zXZ"sv,
@@ -221,9 +242,34 @@ constexpr Magic kFirstWords[] = {
     {"1c\r"sv, "a result of CalculiX (.frd), which is not read (ccx2paraview FILE vtu)"},
     {"filetemplate:"sv,
      "a list of Nek5000's field files, which are not read (save them as VTK with VisIt or pymech)"},
+    {"<!doctype html"sv, kWebPage},
+    {"<html"sv, kWebPage},
+    {"error {"sv, "an error message of an OPeNDAP server"},
+    {"netcdf "sv, "NetCDF's text (CDL), of which ncgen makes a NetCDF file (ncgen -o OUT.nc FILE)"},
+    {"mfem "sv, "an MFEM mesh, which is not read (save it as VTK, with VisIt)"},
+    {"object 1 class "sv, "an OpenDX file, which is not read (save it as VTK)"},
+    {"item: "sv, "a dump of LAMMPS: particles, which have no grid"},
+    {"/com,ansys"sv,
+     "a mesh of Ansys (.cdb), which is not read (save it as CGNS, or as VTK with pymapdl-reader)"},
+    {"*keyword"sv, "an input file of LS-DYNA, which is not read (meshio or LS-PrePost convert its mesh)"},
     {"ndims = "sv, "a MetaImage, which is not read (save it as VTK's .vti, with ParaView)"},
     {"objecttype = "sv, "a MetaImage, which is not read (save it as VTK's .vti, with ParaView)"},
 };
+
+/// Gaussian's cube: two lines of title; the atoms and the origin; of each axis the points and the step; the atoms.
+bool isGaussianCube(std::string_view begin) {
+  for (int line = 0; line < 6; ++line) {
+    const size_t end = std::min(begin.find('\n'), begin.size());
+    const std::vector<std::string_view> words = wordsOf(begin.substr(0, end));
+    begin.remove_prefix(std::min(end + 1, begin.size()));
+    if (line < 2) continue;
+    if (words.size() < 4 || words.size() > 5) return false;
+    const std::string_view count = words[0].substr(words[0].starts_with('-'));
+    if (!countIn(count) || words[1].find_first_not_of("+-.0123456789e") != std::string_view::npos)
+      return false;
+  }
+  return true;
+}
 
 /// The formats that are text, by the words that they begin with. `begin`: the first bytes of the file.
 std::optional<std::string> foreignText(std::string begin) {
@@ -240,8 +286,33 @@ std::optional<std::string> foreignText(std::string begin) {
     return "a file of an OpenFOAM case (give the case's folder instead)";
   if (isNastran(begin)) return "a Nastran mesh, which is not read (meshio convert FILE mesh.vtu)";
   if (isAvsUcd(begin)) return kAvsUcd;
+  if (isGaussianCube(begin)) return "a cube file of Gaussian, which is not read (save it as VTK's .vti)";
   return std::nullopt;
 }
+
+/// Names that programs give to files without a signature.
+constexpr Magic kNames[] = {
+    {"d3plot"sv, "a result of LS-DYNA (d3plot), which is not read (save it as VTK, with ParaView or lasso)"},
+    {"d3part"sv, "a result of LS-DYNA (d3part), which is not read (save it as VTK, with ParaView or lasso)"},
+    {"chgcar"sv, "a charge density of VASP, which is not read (save it as VTK's .vti, with pymatgen)"},
+    {"locpot"sv, "a potential of VASP, which is not read (save it as VTK's .vti, with pymatgen)"},
+};
+
+/// Links and attributes of the root of HDF5 files by programs that have formats of their own.
+constexpr Magic kHdf5Marks[] = {
+    {"ENS_MAA"sv, "a MED file of Salome, which is not read (meshio convert FILE mesh.vtu)"},
+    {"INFOS_GENERALES"sv, "a MED file of Salome, which is not read (meshio convert FILE mesh.vtu)"},
+    {"_silolibinfo"sv, "a Silo file (HDF5), which is not read (save it as VTK, with VisIt)"},
+    {".silo"sv, "a Silo file (HDF5), which is not read (save it as VTK, with VisIt)"},
+    {"sim info"sv, "a file of FLASH, which is not read (save it as VTK, with VisIt)"},
+    {"Chombo_global"sv, "a Chombo file, which is not read (save it as VTK, with VisIt)"},
+    {"MeshBlockSize"sv, "an Athena++ file (.athdf); give the .xdmf file that Athena++ writes beside it"},
+    {"openPMD"sv, "an openPMD file, which is not read (describe its arrays in an XDMF file)"},
+    {"tstt"sv, "a MOAB mesh (.h5m), which is not read (mbconvert FILE mesh.vtk)"},
+    {"PartType0"sv, "a snapshot of particles (GADGET), which has no grid"},
+    {"NASTRAN"sv, "a result of Nastran (HDF5), which is not read"},
+    {"settings"sv, "a case or result of Fluent (HDF5), which is not read (save it as CGNS or EnSight Gold)"},
+};
 
 /// "compressed with gzip (decompress it first)", "an XML file"; nullopt for a file that may be PLOT3D.
 std::optional<std::string> foreignFormat(const InputFile& file) {
@@ -262,6 +333,9 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
           block);
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
+  for (const Magic& name : kNames)
+    if (lowerCase(file.path().filename().string()).starts_with(name.bytes)) return name.words;
+  if (begin.size() > 262 && begin.compare(257, 5, "ustar") == 0) return "a tar archive (extract it first)";
   // NIfTI's mark is behind a header of 344 bytes.
   if (begin.size() > 348 && begin.compare(344, 3, "n+1") == 0)
     return "a NIfTI image, which is not read (save it as VTK's .vti, with ParaView)";
@@ -279,6 +353,29 @@ std::optional<std::string> foreignFolder(const std::filesystem::path& folder) {
   for (const char* mark : {".zgroup", ".zarray", ".zmetadata", "zarr.json"})
     if (std::filesystem::is_regular_file(folder / mark, error))
       return "a Zarr store, which is not read (save it as NetCDF, with xarray's to_netcdf)";
+  if (std::filesystem::is_regular_file(folder / "Header", error) &&
+      std::filesystem::is_directory(folder / "Level_0", error))
+    return "a plotfile of AMReX, which is not read (save it as VTK's .vthb, with ParaView)";
+  for (const char* mark : {"md.idx", "data.0"})
+    if (std::filesystem::is_regular_file(folder / mark, error))
+      return "an ADIOS2 file (.bp), which is not read (save it as VTK, with ParaView)";
+  const std::filesystem::path around = folderOf(folder.has_filename() ? folder : folder.parent_path());
+  const bool is_cache = std::filesystem::exists(folder / "manifest.json", error) ||
+                        folder.string().find(".splats") != std::string::npos;
+  if (!is_cache && std::filesystem::is_directory(folder, error) && isFoamCase(around))
+    return fmt::format("a folder within an OpenFOAM case (give the case's folder, {})", around.string());
+  return std::nullopt;
+}
+
+std::optional<std::string> foreignHdf5(const std::filesystem::path& path) {
+  const QuietHdf5 quiet;
+  if (H5Fis_hdf5(path.c_str()) <= 0) return std::nullopt;
+  const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  if (!file || !linksAreWhole(file.id()) || !attributesAreWhole(file.id())) return std::nullopt;
+  for (const Magic& mark : kHdf5Marks)
+    if (H5Lexists(file.id(), mark.bytes.data(), H5P_DEFAULT) > 0 ||
+        H5Aexists(file.id(), mark.bytes.data()) > 0)
+      return mark.words;
   return std::nullopt;
 }
 

@@ -59,8 +59,16 @@ std::unique_ptr<DataSource> openListedFile(const OpenGridOptions& options) {
 }
 
 std::unique_ptr<DataSource> openNetcdfGrid(const OpenGridOptions& options) {
-  if (isColumnsGrid(options)) return std::make_unique<ColumnsSource>(options);
-  return openNetcdf(options);
+  try {
+    if (isColumnsGrid(options)) return std::make_unique<ColumnsSource>(options);
+    return openNetcdf(options);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    if (const auto format = foreignHdf5(options.grid))
+      throw Error("{}: is {}", options.grid.string(), *format);
+    throw;
+  }
 }
 
 constexpr GridFormat kFormats[] = {
