@@ -448,6 +448,70 @@ class MeshFiles(MeshCase):
         self.assertAlmostEqual(self.volume(both, "T"), 2, delta=4e-3)
         self.assertIn("left out: 1 of 2 cells, which vtkGhostLevels marks as copies", self.info(alone)["warnings"][0])
 
+    def write_cube(self, path, x0=0, **values):
+        grid, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
+        for corner in lattice(1):
+            points.InsertNextPoint(corner + [x0, 0, 0])
+        grid.SetPoints(points)
+        insert(grid, vtk.VTK_HEXAHEDRON, hexahedra(1)[0])
+        for name, value in values.items():
+            array = numpy_to_vtk(np.full(8, float(value)), deep=True)
+            array.SetName(name)
+            grid.GetPointData().AddArray(array)
+        write_xml(grid, path)
+        return path
+
+    def series(self, files, *options, scalar="T"):
+        """The mean value and the volume of each step."""
+        cache = self.folder / "s.splats"
+        result = self.run_program("convert", *files, "-o", cache, "--scalar", scalar, "--overwrite", *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        steps = len(json.loads(self.run_program("info", cache, "--json").stdout)["steps"])
+        infos = [json.loads(self.run_program("info", cache, "--json", "--step", n).stdout) for n in range(steps)]
+        return [(round(i["variables"][0]["max"], 6), round(i["volume"], 2)) for i in infos]
+
+    def test_pieces_of_steps_by_their_names(self):
+        """Processors' files without a .pvtu: three steps of two pieces. One varying number is a time unless its word says otherwise."""
+        for name in ("t{}_p{}", "rank{1}.{0}", "u-part{1}-{0:03}"):
+            files = [self.write_cube(self.folder / (name.format(t, p) + ".vtu"), p, T=t) for t in range(3) for p in range(2)]
+            self.assertEqual(self.series(files[::-1]), [(0, 2), (1, 2), (2, 2)])
+        self.assertEqual(len(self.info(*files)["pieces"]), 2)
+        self.assertIn("3 steps", self.info(*files)["series"])
+        self.assertAlmostEqual(self.volume_of(files[:2]), 2, delta=4e-3)
+        alike = [self.write_cube(self.folder / f"proc{n}.vtu", 0, T=n) for n in range(2)]
+        self.expect_refused(alike, "has the points of")
+        # A day and an hour are a time, and so is a number that not all have.
+        files = [self.write_cube(self.folder / f"d{d}_h{h}.vtu", 0, T=2 * d + h) for d in range(2) for h in range(2)]
+        self.assertEqual(self.series(files), [(n, 1) for n in range(4)])
+
+    def volume_of(self, files):
+        return self.manifest(self.convert(files, "T"))["volume"]
+
+    def expect_refused(self, files, words):
+        result = self.run_program("info", *files)
+        self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
+        self.assertIn(words, result.stderr)
+
+    def test_negative_numbers_in_names(self):
+        files = [self.write_cube(self.folder / f"r{t}.vtu", 0, T=t) for t in (-5, -10, 5, 0)]
+        self.assertEqual([t for t, _ in self.series(files)], [-10, -5, 0, 5])
+        self.assertEqual([t for t, _ in self.series([self.folder / "r*.vtu"])], [-10, -5, 0, 5])
+        files = [self.write_cube(self.folder / f"run-{t}.vtu", 0, T=t) for t in (10, 9)]
+        self.assertEqual([t for t, _ in self.series(files)], [9, 10])
+
+    def test_arrays_of_later_steps(self):
+        files = [self.write_cube(self.folder / f"e{t}.vtu", 0, T=t, **({"E": 7} if t > 0 else {})) for t in range(3)]
+        note = "the last step has E, which the first one lacks"
+        self.assertIn(note, self.info(*files)["series"])
+        result = self.run_program("convert", *files, "-o", self.folder / "s.splats", "--overwrite")
+        self.assertIn("warning: " + note, result.stderr)
+        self.assertEqual(self.series(files, "--steps", "1:", scalar="E"), [(7, 1), (7, 1)])
+        collection = self.folder / "e.pvd"
+        collection.write_text('<VTKFile type="Collection"><Collection>' + "".join(f'<DataSet timestep="{t}" file="e{t}.vtu"/>' for t in range(3))
+                              + "</Collection></VTKFile>")
+        self.assertIn(note, self.info(collection)["series"])
+        self.assertNotIn("series", self.info(files[1]))
+
     def test_series_and_collections(self):
         grid = cube(2)
         for step in range(2):
@@ -543,6 +607,45 @@ class MeshFiles(MeshCase):
                     reader.Update()
                     of_hexahedra = reader.GetOutput().GetBlock(0).GetBlock(0)
                     self.assertEqual(of_hexahedra.GetNumberOfCells(), 40)
+
+    def write_run(self, name, times, n, x0=0):
+        """A row of cubes, as SEACAS writes a file of a run."""
+        import netCDF4
+        with netCDF4.Dataset(self.folder / name, "w", format="NETCDF3_64BIT_OFFSET") as f:
+            f.api_version, f.version, f.floating_point_word_size, f.file_size = np.float32(8.03), np.float32(8.03), np.int32(8), np.int32(1)
+            points = np.array([(x0 + i, j, k) for k in range(2) for j in range(2) for i in range(n + 1)], float)
+            for key, size in (("len_string", 33), ("len_name", 33), ("num_dim", 3), ("num_nodes", len(points)), ("num_elem", n), ("num_el_blk", 1),
+                              ("num_nod_var", 1), ("num_el_in_blk1", n), ("num_nod_per_el1", 8), ("time_step", None)):
+                f.createDimension(key, size)
+            f.createVariable("time_whole", "f8", ("time_step",))[:] = times
+            for axis in range(3):
+                f.createVariable("coord" + "xyz"[axis], "f8", ("num_nodes",))[:] = points[:, axis]
+            f.createVariable("eb_prop1", "i4", ("num_el_blk",))[:] = 1
+            connect, m = f.createVariable("connect1", "i4", ("num_el_in_blk1", "num_nod_per_el1")), n + 1
+            connect.elem_type = "HEX8"
+            connect[:] = [[i + 1, i + 2, i + 2 + m, i + 1 + m, i + 1 + 2 * m, i + 2 + 2 * m, i + 2 + 3 * m, i + 1 + 3 * m] for i in range(n)]
+            f.createVariable("name_nod_var", "S1", ("num_nod_var", "len_name"))[0, :] = np.frombuffer(b"T".ljust(33, b"\0"), "S1")
+            values = f.createVariable("vals_nod_var1", "f8", ("time_step", "num_nodes"))
+            for step, time in enumerate(times):
+                values[step, :] = points[:, 0] + 100 * time
+        return self.folder / name
+
+    def test_exodus_files_of_processors(self):
+        parts = [self.write_run(f"d.e.2.{n}", [0, 1], 4, 4 * n) for n in range(2)]
+        info = self.info(*parts)
+        self.assertEqual((info["cells"]["hexahedra"], info["times"], [p["name"] for p in info["pieces"]]), (8, [0, 1], ["d.e.2.0", "d.e.2.1"]))
+        self.assertEqual(info["warnings"], [])
+        self.assertAlmostEqual(self.volume_of(parts), 8, delta=0.01)
+        self.assertEqual(self.series(parts, "--steps", "all"), [(8, 8), (108, 8)])
+        self.assertIn("the part of processor 1 of 2", self.info(parts[1])["warnings"][0])
+        more = [self.write_run(f"d.e-s002.2.{n}", [2], 1, n) for n in range(2)]
+        self.assertEqual(self.series(parts + more), [(8, 8), (108, 8), (202, 2)])
+
+    def test_exodus_files_of_a_run_whose_mesh_changes(self):
+        files = [self.write_run("m.e", [0, 1], 4), self.write_run("m.e-s002", [2, 3], 6), self.write_run("m.e-s003", [4], 2)]
+        self.assertEqual(self.series(files[::-1]), [(4, 4), (104, 4), (206, 6), (306, 6), (402, 2)])
+        self.assertIn("goes on in 2 files, m.e-s002 to m.e-s003", self.info(files[0])["warnings"][0])
+        self.assertEqual(self.info(files[1])["warnings"], [])
 
     def test_exodus_variables_of_some_blocks(self):
         """By the truth table, a second variable is in the hexahedra alone: it is drawn there, and the first everywhere."""

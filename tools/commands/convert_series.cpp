@@ -92,7 +92,9 @@ SeriesOptions seriesOptions(const ConvertArguments& arguments) {
 /// Prints each step as it comes, and keeps what --stats reports.
 class StepLog {
  public:
-  explicit StepLog(Progress& progress) : progress_(progress) {}
+  /// `last`: the last of several steps that are known.
+  explicit StepLog(Progress& progress, std::optional<OpenGridOptions> last = {})
+      : progress_(progress), last_(std::move(last)) {}
 
   void add(const SeriesEvent& event) {
     const double now = secondsOf(progress_), seconds = now - before_;
@@ -105,6 +107,9 @@ class StepLog {
     if (event.source && event.converted)
       for (const auto* warnings : {&event.source->warnings, &event.converted->warnings})
         for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
+    if (event.source && event.converted && last_)
+      if (const std::string note = noteOnLaterScalars(*event.source, *last_); !note.empty())
+        printMessage("warning: {}", note);
     if (event.added)
       for (const std::string& warning : event.added->warnings)
         printMessage("warning: {}: {}", event.name, warning);
@@ -120,6 +125,7 @@ class StepLog {
 
  private:
   Progress& progress_;
+  std::optional<OpenGridOptions> last_;
   nlohmann::json steps_ = nlohmann::json::array();
   uint64_t bytes_ = 0;
   double before_ = 0;
@@ -272,7 +278,9 @@ void runConvertSeries(ConvertArguments arguments) {
   Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
   const StopRanksWith stopping_ranks(ranks, progress);
-  StepLog log(progress);
+  const bool names_scalars = !arguments.scalars.empty() || arguments.adds_steps;
+  StepLog log(progress,
+              names_scalars || steps.size() < 2 ? std::nullopt : std::optional(steps.back().options));
   const SeriesReport report =
       convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
   if (!ranks.isFirst()) return;

@@ -274,6 +274,13 @@ void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived
                          steps.back().name);
   }
   const std::unique_ptr<DataSource> source = openWithDerived(files, derived);
+  const GridDescription& description = source->description();
+  OpenGridOptions last = steps.size() > 1 ? steps.back().options : files;
+  if (steps.size() < 2 && description.times.size() > 1)
+    last.time_step = static_cast<uint32_t>(description.times.size() - 1);
+  if (steps.size() > 1 || (description.times.size() > 1 && !files.time_step))
+    if (const std::string note = noteOnLaterScalars(description, last); !note.empty())
+      series += (series.empty() ? "" : "; ") + note;
   if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get()))
     return printMeshInfo(*mesh, series, json);
   GridInfo info = inspect(dynamic_cast<const GridSource&>(*source));

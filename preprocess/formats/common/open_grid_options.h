@@ -49,6 +49,8 @@ struct OpenGridOptions {
   std::shared_ptr<FileIndex> index = {};  // of files whose steps are opened one after the other; may be null
   std::optional<std::filesystem::path> names_folder = {};  // of the files that `grid` names; nullopt: its own
 
+  bool is_part = false;  // `grid` is one of several files of a grid that are opened each by itself
+
   /// The folder that names in `grid` are relative to.
   std::filesystem::path namesFolder() const { return names_folder.value_or(grid.parent_path()); }
 };

@@ -15,6 +15,7 @@
 
 #include "preprocess/formats/common/element_source.h"
 #include "preprocess/formats/common/scalar_list.h"
+#include "preprocess/formats/exodus/exodus_names.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/curved_cells.h"
@@ -111,6 +112,8 @@ ExodusSource::ExodusSource(const OpenGridOptions& options)
   description_.format =
       fmt::format("Exodus ({}), {}", file_->kind(), countText(blocks_.size(), "element block"));
   description_.files = {name};
+  if (const std::string note = noteOnOtherExodusFiles(options.grid); !note.empty() && !options.is_part)
+    description_.warnings.push_back(note);
   description_.pieces.push_back({"piece 1", name, nodes_, elements_});
   const NetcdfVariable* const x = file_->find(file_->find("coord") ? "coord" : "coordx");
   if (!x) throw Error("{}: has no coordinates (coordx)", name);

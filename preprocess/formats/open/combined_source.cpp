@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
+#include <utility>
 
 #include "stream/base/error.h"
 
@@ -184,20 +186,144 @@ void CombinedSource::readFrom(size_t source, uint32_t block, const NodeBox& box,
     }
 }
 
-std::unique_ptr<GridSource> openCombined(
+namespace {
+
+/// Whether the meshes have the same counts and begin with the same points.
+bool haveSamePoints(const MeshSource& a, const MeshSource& b) {
+  constexpr uint64_t kCompared = 1000;
+  const auto &pieces = a.description().pieces, &others = b.description().pieces;
+  if (pieces.size() != others.size()) return false;
+  MeshPoints of_a, of_b;
+  for (uint32_t n = 0; n < pieces.size(); ++n) {
+    if (pieces[n].points != others[n].points || pieces[n].cells != others[n].cells) return false;
+    a.readPoints(n, 0, std::min(kCompared, pieces[n].points), {}, of_a);
+    b.readPoints(n, 0, std::min(kCompared, pieces[n].points), {}, of_b);
+    if (of_a.x != of_b.x || of_a.y != of_b.y || of_a.z != of_b.z) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+CombinedMeshSource::CombinedMeshSource(std::vector<std::unique_ptr<MeshSource>> sources,
+                                       const std::vector<std::string>& names)
+    : sources_(std::move(sources)) {
+  const GridDescription& first = sources_.front()->description();
+  description_.format = fmt::format("{} files: {}", sources_.size(), first.format);
+  description_.times = first.times;
+  description_.time_step = first.time_step;
+  const auto add = [](std::vector<std::string>& to, const std::vector<std::string>& more) {
+    for (const std::string& one : more)
+      if (std::find(to.begin(), to.end(), one) == to.end()) to.push_back(one);
+  };
+  std::vector<GridScalar>& scalars = description_.scalars;
+  for (size_t s = 0; s < sources_.size(); ++s) {
+    for (size_t other = 0; other < s; ++other)
+      if (haveSamePoints(*sources_[other], *sources_[s]))
+        throw Error(
+            "{}: has the points of {} and cannot be combined with it; give the file with all arrays alone, "
+            "or "
+            "convert it as another time step",
+            names[s], names[other]);
+    const GridDescription& own = sources_[s]->description();
+    add(description_.files, own.files);
+    add(description_.warnings, own.warnings);
+    add(description_.notes, own.notes);
+    description_.coordinate_bytes = std::max(description_.coordinate_bytes, own.coordinate_bytes);
+    for (uint32_t n = 0; n < own.pieces.size(); ++n) {
+      pieces_.emplace_back(s, n);
+      MeshPiece& piece = description_.pieces.emplace_back(own.pieces[n]);
+      const std::string name = std::filesystem::path(names[s]).filename().string();
+      piece.name = own.pieces.size() == 1 ? name : fmt::format("{}/{}", name, piece.name);
+    }
+    for (const GridScalar& scalar : own.scalars)
+      if (std::none_of(scalars.begin(), scalars.end(),
+                       [&](const GridScalar& known) { return isScalar(known, scalar); }))
+        scalars.push_back(scalar);
+  }
+  std::vector<size_t> without(scalars.size());
+  for (const auto& source : sources_) {
+    const std::vector<GridScalar>& own = source->description().scalars;
+    auto& places = places_.emplace_back(scalars.size());
+    for (size_t n = 0; n < scalars.size(); ++n) {
+      const auto found = std::find_if(own.begin(), own.end(),
+                                      [&](const GridScalar& scalar) { return isScalar(scalar, scalars[n]); });
+      if (found != own.end()) places[n] = static_cast<uint32_t>(found - own.begin());
+      without[n] += found == own.end();
+    }
+  }
+  for (size_t n = 0; n < scalars.size(); ++n)
+    if (without[n] > 0)
+      description_.warnings.push_back(fmt::format("{} of {} files have no {}; they are not drawn with it",
+                                                  without[n], sources_.size(), scalars[n].name));
+}
+
+bool CombinedMeshSource::hasCurvedCells() const {
+  return std::any_of(sources_.begin(), sources_.end(),
+                     [](const auto& source) { return source->hasCurvedCells(); });
+}
+
+template <typename Read>
+void CombinedMeshSource::readOwn(uint32_t piece, uint64_t count, std::span<const uint32_t> scalars,
+                                 const Read& read) const {
+  const auto [source, number] = pieces_.at(piece);
+  std::vector<uint32_t> own;
+  std::vector<size_t> to;
+  for (size_t n = 0; n < scalars.size(); ++n)
+    if (const auto place = places_[source].at(scalars[n])) {
+      own.push_back(*place);
+      to.push_back(n);
+    }
+  std::vector<std::vector<float>>& values = read(*sources_[source], number, own);
+  if (own.size() == scalars.size()) return;
+  std::vector<std::vector<float>> all(scalars.size());
+  for (size_t n = 0; n < to.size() && n < values.size(); ++n) all[to[n]] = std::move(values[n]);
+  for (std::vector<float>& one : all) one.resize(count, std::numeric_limits<float>::quiet_NaN());
+  values = std::move(all);
+}
+
+void CombinedMeshSource::readPoints(uint32_t piece, uint64_t first, uint64_t count,
+                                    std::span<const uint32_t> scalars, MeshPoints& out) const {
+  readOwn(
+      piece, count, scalars, [&](const MeshSource& source, uint32_t number, const auto& own) -> auto& {
+        source.readPoints(number, first, count, own, out);
+        return out.scalars;
+      });
+}
+
+void CombinedMeshSource::readCells(uint32_t piece, uint64_t first, uint64_t count,
+                                   std::span<const uint32_t> scalars, MeshCells& out) const {
+  readOwn(
+      piece, count, scalars, [&](const MeshSource& source, uint32_t number, const auto& own) -> auto& {
+        source.readCells(number, first, count, own, out);
+        return out.scalars;
+      });
+}
+
+std::unique_ptr<DataSource> openCombined(
     const OpenGridOptions& options,
-    const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open) {
+    const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open) {
   OpenGridOptions one = options;
   one.solutions.clear();
-  std::vector<std::unique_ptr<GridSource>> sources;
+  one.is_part = true;
   std::vector<std::string> names{options.grid.string()};
-  sources.push_back(open(one));
-  for (const std::filesystem::path& path : options.solutions) {
-    one.grid = path;
-    sources.push_back(open(one));
-    names.push_back(path.string());
+  for (const std::filesystem::path& path : options.solutions) names.push_back(path.string());
+  std::vector<std::unique_ptr<GridSource>> grids;
+  std::vector<std::unique_ptr<MeshSource>> meshes;
+  for (const std::string& name : names) {
+    one.grid = name;
+    std::unique_ptr<DataSource> source = open(one);
+    if (auto* const grid = dynamic_cast<GridSource*>(source.get()))
+      grids.emplace_back(grid);
+    else
+      meshes.emplace_back(dynamic_cast<MeshSource*>(source.get()));
+    source.release();
+    if (!grids.empty() && !meshes.empty())
+      throw Error("{}: is {} grid, and {} is not; they cannot be combined", name,
+                  grids.size() == 1 ? "a structured" : "an unstructured", names.front());
   }
-  return std::make_unique<CombinedSource>(std::move(sources), names);
+  if (grids.empty()) return std::make_unique<CombinedMeshSource>(std::move(meshes), names);
+  return std::make_unique<CombinedSource>(std::move(grids), names);
 }
 
 }  // namespace curvisplat

@@ -1,14 +1,16 @@
-// Several VTK or CGNS files of one instant as one grid: fields of the same nodes in several files, or blocks in
-// several files.
+// Several files of one instant as one grid: fields of the same nodes in several files, blocks in several files, or pieces of an
+// unstructured grid.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/grid/box_source.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
 
@@ -53,9 +55,34 @@ class CombinedSource final : public BoxSource {
   GridDescription description_;
 };
 
-/// Opens the grid file and the further files of `options` each by itself with `open`, and combines them.
-std::unique_ptr<GridSource> openCombined(
+/// Unstructured files as the pieces of one mesh: what the processors of a run write. A scalar that a file lacks is NaN there.
+class CombinedMeshSource final : public MeshSource {
+ public:
+  /// `names`: of the files, for messages. Throws Error if two have the same points.
+  CombinedMeshSource(std::vector<std::unique_ptr<MeshSource>> sources, const std::vector<std::string>& names);
+
+  const GridDescription& description() const override { return description_; }
+  bool hasCurvedCells() const override;
+  void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                  MeshPoints& out) const override;
+  void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                 MeshCells& out) const override;
+
+ private:
+  /// Calls read(source, its piece, its scalars), which returns what it has read, and sorts that into the order of `scalars`.
+  template <typename Read>
+  void readOwn(uint32_t piece, uint64_t count, std::span<const uint32_t> scalars, const Read& read) const;
+
+  std::vector<std::unique_ptr<MeshSource>> sources_;
+  std::vector<std::pair<size_t, uint32_t>> pieces_;           // [piece]: its source, and its number there
+  std::vector<std::vector<std::optional<uint32_t>>> places_;  // [source][scalar of the description]
+  GridDescription description_;
+};
+
+/// Opens the grid file and the further files of `options` each by itself with `open`, and combines them: all are structured, or all
+/// are not.
+std::unique_ptr<DataSource> openCombined(
     const OpenGridOptions& options,
-    const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open);
+    const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open);
 
 }  // namespace curvisplat

@@ -78,7 +78,7 @@ constexpr GridFormat kFormats[] = {
     {isPlot3dMeta, openPlot3dMeta, MoreFiles::kNone},
     {isVtkHdf, openVtkHdf, MoreFiles::kCombined},            // before NetCDF, which takes all HDF5 files
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
-    {isExodus, openExodus, MoreFiles::kNone},                // before NetCDF, which they are
+    {isExodus, openExodus, MoreFiles::kCombined},            // before NetCDF, which they are
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
     {isSu2, openSu2, MoreFiles::kByItself},
@@ -162,12 +162,6 @@ std::string namesIn(const GridDescription& description) {
 
 std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options);
 
-/// Opens one of several files that are to be combined.
-std::unique_ptr<GridSource> openPart(const OpenGridOptions& options) {
-  return requireGrid(openFormat(options),
-                     "cannot be combined with further files; give the file with all arrays alone");
-}
-
 /// Refuses --select for formats without dimensions to choose from.
 void requireNoSelection(const OpenGridOptions& options) {
   if (!options.select.empty())
@@ -190,7 +184,7 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
         if (format.open != openNetcdfGrid) requireNoSelection(options);
         if (options.solutions.empty() || format.more_files == MoreFiles::kByItself)
           return format.open(options);
-        if (format.more_files == MoreFiles::kCombined) return openCombined(options, openPart);
+        if (format.more_files == MoreFiles::kCombined) return openCombined(options, openFormat);
         throw Error("{}: describes its own files; leave out {}", options.grid.string(),
                     options.solutions.front().string());
       }

@@ -6,6 +6,10 @@
 //   one file              .pvd, .vtk.series and the like, .p3d, CGNS, NetCDF: its time steps
 //   several such files    the steps of one after those of the other
 //
+// Files of VTK or CGNS whose names have the number of a processor or a block as well (t0_p0.vtu t0_p1.vtu t1_p0.vtu ...) are pieces of
+// steps, and so are those that SEACAS writes for processors (mesh.e.2.0 mesh.e.2.1); mesh.e-s002 goes on from mesh.e. A minus sign
+// before a number is one where not all names have it (r-5 r0 r5).
+//
 // As many restart files as a SU2 mesh has zones are one step, and so are the tiles of a cubed sphere (a.tile1.nc to
 // a.tile6.nc): of two such sets, those of the same number are the steps.
 #pragma once
@@ -16,6 +20,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
 
@@ -52,6 +57,10 @@ std::vector<StepFiles> stepsByName(const OpenGridOptions& options);
 
 /// The steps in one of these: one that cannot be opened counts as one.
 std::vector<StepFiles> stepsIn(const StepFiles& files);
+
+/// A sentence on the scalars of a later step, which is opened, that the first one lacks: a series that begins there does not have them.
+/// Empty if there are none.
+std::string noteOnLaterScalars(const GridDescription& first, const OpenGridOptions& later);
 
 /// All steps of the files, whose patterns have been expanded. One at least. Opens files that may hold several
 /// steps. Throws Error if the first cannot be opened.
