@@ -1,10 +1,10 @@
-// What readers subtract from doubles before they become floats: nothing, unless someone looks for digits that single precision loses
-// (warningsOfRanges(), preprocess/survey).
+// Readers subtract an offset from doubles before these become floats: 0, unless someone looks for digits that single precision
+// loses (warningsOfRanges(), preprocess/survey).
 #pragma once
 
 namespace curvisplat {
 
-/// While it exists, the readers that this thread calls subtract `offset` from the doubles that they convert to floats.
+/// Makes the readers that this thread calls subtract `offset` from doubles that become floats, until it is destroyed.
 class FloatOffset {
  public:
   explicit FloatOffset(double offset) { current_ = offset; }

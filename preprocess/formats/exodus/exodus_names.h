@@ -18,7 +18,7 @@ struct ExodusName {
 
 ExodusName exodusName(const std::filesystem::path& path);
 
-/// What a user who opens this Exodus file alone should know about the others in its folder; empty if there are none.
+/// A warning to a user who opens this Exodus file alone, about the others in its folder; empty if there are none.
 std::string noteOnOtherExodusFiles(const std::filesystem::path& path);
 
 }  // namespace curvisplat

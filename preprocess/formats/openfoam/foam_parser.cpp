@@ -120,7 +120,7 @@ std::string FoamParser::token() {
   }
 }
 
-/// Of "name", ":name" and "!name" (from the top), "..name" (from a dictionary around), and "a.b" or "a/b" (within a).
+/// The tokens of "name", ":name" and "!name" (from the top), "..name" (from a dictionary around), and "a.b" or "a/b" (within a).
 std::vector<std::string> FoamParser::entryNamed(const std::string& key) const {
   const auto whole = entries_.find(key);
   if (whole != entries_.end()) return whole->second;

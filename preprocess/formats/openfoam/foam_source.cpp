@@ -35,7 +35,7 @@ bool hasMesh(const fs::path& folder, const fs::path& region) {
   return FoamFile::exists(folder / "constant" / region / "polyMesh" / "faces");
 }
 
-/// What a user's path names: a case, and a region of it if that is CASE/constant/REGION.
+/// The meaning of a user's path: a case, and a region of it if that is CASE/constant/REGION.
 struct CasePath {
   fs::path folder;
   std::string region;
