@@ -142,7 +142,8 @@ bool haveSigns(const std::vector<fs::path>& paths) {
   for (const fs::path& path : paths) {
     const std::string name = path.filename().string();
     size_t count = 0;
-    for (size_t n = 0; n < name.size(); ++n) count += hasSignAt(name, n);
+    for (size_t n = 0; n < name.size(); n = isDigit(name[n]) ? numberAt(name, n).end : n + 1)
+      count += hasSignAt(name, n);
     counts.insert(count);
   }
   return counts.size() > 1;
