@@ -69,7 +69,8 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
   }
   // Thicknesses come last, since they are seldom the scalar of interest.
   for (ColumnsScalars& group : groups)
-    std::ranges::stable_partition(group.variables, [](const auto* v) { return !isThicknessOfColumns(*v); });
+    std::stable_partition(group.variables.begin(), group.variables.end(),
+                          [](const auto* v) { return !isThicknessOfColumns(*v); });
   // What has three dimensions but is of the map itself (edgesOnCell, ...) are integers without layers' heights.
   std::string lacking;  // the heights of the largest group
   size_t largest = 0;

@@ -351,7 +351,7 @@ class GridFinder {
     };
     const bool constant = isConstant(values[0]) && isConstant(values[1]);
     const auto [south, north] = std::minmax_element(values[1].begin(), values[1].end());
-    if (*south >= 0 && *north > 91 && *north <= 181)
+    if (*south >= 0 && *north > 135 && *north <= 181)
       return {describeRange(grid.latitude, values[1]) + ", which are degrees from a pole",
               fmt::format("; expected degrees_north: write them (ncap2 -s '{0}=90-{0}' FILE OUT)",
                           grid.latitude.variable().name),

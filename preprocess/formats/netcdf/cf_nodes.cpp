@@ -167,8 +167,8 @@ void CfNodes::readPlaces(const CfRange& range, NodeArrays& out) const {
         for (uint64_t i = 0; i < lengthOf(piece, 0); ++i, ++n, ++column) {
           if (column == columns.size()) column = 0;
           const double own = read ? out.z[n] : height.at(i, j, k);
-          const GlobePlace place =
-              globe_.place(columns[column], std::abs(own) <= kMaxHeight ? own : std::nan(""));
+          const GlobePlace place = globe_.place(
+              columns[column], !globe_.degrees() || std::abs(own) <= kMaxHeight ? own : std::nan(""));
           out.x[n] = place.x;
           out.y[n] = place.y;
           out.z[n] = place.z;
