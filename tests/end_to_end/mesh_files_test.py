@@ -638,12 +638,15 @@ class MeshFiles(MeshCase):
         self.assertAlmostEqual(self.volume_of(parts), 8, delta=0.01)
         self.assertEqual(self.series(parts, "--steps", "all"), [(8, 8), (108, 8)])
         self.assertIn("the part of processor 1 of 2", self.info(parts[1])["warnings"][0])
+        some = [self.write_run(f"e.e.3.{n}", [0, 1], 4, 4 * n) for n in range(2)]
+        self.assertIn("the part of processor 0 of 3", self.info(*some)["warnings"][0])
         more = [self.write_run(f"d.e-s002.2.{n}", [2], 1, n) for n in range(2)]
         self.assertEqual(self.series(parts + more), [(8, 8), (108, 8), (202, 2)])
 
     def test_exodus_files_of_a_run_whose_mesh_changes(self):
         files = [self.write_run("m.e", [0, 1], 4), self.write_run("m.e-s002", [2, 3], 6), self.write_run("m.e-s003", [4], 2)]
         self.assertEqual(self.series(files[::-1]), [(4, 4), (104, 4), (206, 6), (306, 6), (402, 2)])
+        self.assertEqual(self.info(*files)["warnings"], [])
         self.assertIn("goes on in 2 files, m.e-s002 to m.e-s003", self.info(files[0])["warnings"][0])
         self.assertEqual(self.info(files[1])["warnings"], [])
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "preprocess/formats/exodus/exodus_names.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -305,9 +306,9 @@ std::unique_ptr<DataSource> openCombined(
     const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open) {
   OpenGridOptions one = options;
   one.solutions.clear();
-  one.is_part = true;
   std::vector<std::string> names{options.grid.string()};
   for (const std::filesystem::path& path : options.solutions) names.push_back(path.string());
+  one.is_part = exodusName(options.grid).processors <= names.size();
   std::vector<std::unique_ptr<GridSource>> grids;
   std::vector<std::unique_ptr<MeshSource>> meshes;
   for (const std::string& name : names) {

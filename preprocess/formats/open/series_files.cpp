@@ -490,6 +490,8 @@ std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
     files.grid = fileAt(groups.grids, n);
     files.solutions.clear();
     for (const auto& group : groups.solutions) files.solutions.push_back(fileAt(group, n));
+    // The others of an Exodus run are given, too; those of other processors are not.
+    files.is_part = groups.steps > 1 && !exodusName(files.grid).processor;
     const bool names_grid = groups.grids.size() > 1 || files.solutions.empty();
     std::string name = files.grid.string();
     for (size_t g = 0; !names_grid && g < groups.solutions.size(); ++g)
