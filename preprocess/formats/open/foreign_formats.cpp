@@ -256,8 +256,10 @@ constexpr Magic kFirstWords[] = {
     {"objecttype = "sv, "a MetaImage, which is not read (save it as VTK's .vti, with ParaView)"},
 };
 
-/// Gaussian's cube: two lines of title; the atoms and the origin; of each axis the points and the step; the atoms.
+/// Gaussian's cube: two lines of title, in words; the atoms and the origin; of each axis the points and the step; the atoms.
 bool isGaussianCube(std::string_view begin) {
+  if (begin.find_first_not_of(" \t\r\n+-.0123456789e") > begin.find_first_of("0123456789"))
+    return false;  // PLOT3D
   for (int line = 0; line < 6; ++line) {
     const size_t end = std::min(begin.find('\n'), begin.size());
     const std::vector<std::string_view> words = wordsOf(begin.substr(0, end));
