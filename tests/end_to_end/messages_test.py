@@ -67,7 +67,7 @@ class Messages(FormatCase):
     @unittest.skipUnless(importlib.util.find_spec("h5py"), "no h5py")
     def test_names_of_hdf5_files_that_are_not_read(self):
         import h5py
-        for group, words in (("ENS_MAA/mesh", "a MED file"), ("settings", "of Fluent"), ("_silolibinfo", "a Silo file"), ("sim info", "of FLASH"), ("tstt", "a MOAB mesh")):
+        for group, words in (("ENS_MAA/mesh", "a MED file"), ("settings", "a Fluent case"), ("_silolibinfo", "a Silo file"), ("sim info", "of FLASH"), ("tstt", "a MOAB mesh")):
             with h5py.File(self.folder / "a.h5", "w") as f:
                 f.create_group(group)
             self.assertIn(words, self.run_program("info", self.folder / "a.h5").stderr)
