@@ -22,7 +22,8 @@ constexpr size_t kSampledChunks = 4, kSampledCells = 4096;
 // so many cells: those of an element of order 8.
 constexpr double kCoincidentShare = 1.0 / 32;
 constexpr size_t kMinElements = 4, kMaxElement = 512;
-constexpr uint64_t kWidest = 16;  // numbers of a chunk's points, over the points
+constexpr uint64_t kWidest = 16;       // numbers of a chunk's points, over the points
+constexpr uint64_t kMinRange = 65536;  // points whose numbers are written together
 
 using Place = std::array<double, 3>;
 
@@ -155,7 +156,7 @@ PointNumbers::PointNumbers(const MeshReader& reader, uint64_t memory_bytes, cons
   const uint64_t part_bytes = std::max<uint64_t>(1, memory_bytes / 4);
   const size_t streams = std::min<uint64_t>(reader.points() * sizeof(Point) / part_bytes + 1,
                                             StreamsFile::mostStreams(part_bytes));
-  const uint64_t range_points = std::max<uint64_t>(kPointsPerChunk, part_bytes / sizeof(uint64_t));
+  const uint64_t range_points = std::max<uint64_t>(kMinRange, part_bytes / sizeof(uint64_t));
   StreamsFile merged(scratch, reader.points() / range_points + 1, part_bytes / 2);
   {
     StreamsFile file(scratch, streams, part_bytes);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -13,6 +14,8 @@
 
 namespace curvisplat {
 namespace {
+
+namespace fs = std::filesystem;
 
 TEST(Playback, StepsAndLoops) {
   Playback playback(3);
