@@ -171,7 +171,7 @@ py::tuple probedArrays(const std::vector<const CacheReader*>& sets,
   std::vector<std::string> names;
   PointSource from;
   const PointSource* const exact = source ? &from : nullptr;
-  std::optional<py::gil_scoped_release> unlocked(std::in_place);
+  std::optional<UnlockedWork> unlocked(std::in_place);
   if (source) setSource(*sets.front(), *source, from.grid);
   std::vector<CacheReader> at_step;
   at_step.reserve(sets.size());

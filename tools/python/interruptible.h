@@ -36,4 +36,11 @@ class CountedWork {
   Progress* const progress_;
 };
 
+/// Gives up the interpreter's lock for as long as it lives, for work in the calling thread that takes long or waits for
+/// threads that need the lock. Throws Error after endAllWork(), which waits for it.
+class UnlockedWork {
+  const CountedWork counted_{nullptr};  // first: the lock is there again when the work ends
+  const pybind11::gil_scoped_release unlocked_;
+};
+
 }  // namespace curvisplat::python

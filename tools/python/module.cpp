@@ -58,13 +58,13 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
 
 /// OpenCache::withScalar(), which may read files, without the interpreter's lock.
 OpenCache& withScalar(OpenCache& cache, const std::string& name) {
-  const py::gil_scoped_release unlocked;
+  const UnlockedWork unlocked;
   return cache.withScalar(name);
 }
 
 /// Opens the caches of scalars with blanks of their own.
 void openOwnBlanks(OpenCache& cache) {
-  const py::gil_scoped_release unlocked;
+  const UnlockedWork unlocked;
   for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n) cache.ownBlanks(n);
 }
 
@@ -96,7 +96,7 @@ std::array<double, 3> arrayOf(const glm::dvec3& v) {
 }
 
 std::unique_ptr<OpenCache> opened(const std::filesystem::path& path, std::shared_ptr<void> mirror) {
-  const py::gil_scoped_release unlocked;
+  const UnlockedWork unlocked;
   return std::make_unique<OpenCache>(CacheReader(path), std::move(mirror));
 }
 
@@ -110,8 +110,7 @@ std::vector<double> histogramOfCache(OpenCache& whole, const std::string& scalar
                                      const std::pair<double, double>& range, bool log, size_t bins) {
   OpenCache& cache = withScalar(whole, scalar);
   const auto busy = cache.use();
-  const CountedWork counted(nullptr);
-  const py::gil_scoped_release released;
+  const UnlockedWork unlocked;
   return cache.histogram({scalar, range.first, range.second, log, bins});
 }
 

@@ -177,11 +177,14 @@ std::vector<std::string> warningsOf(const PictureArguments& arguments, const Ima
 OpenCache::OpenCache(CacheReader reader, std::shared_ptr<void> mirror)
     : mirror_(std::move(mirror)), process_(::getpid()), reader_(std::move(reader)) {}
 
-/// Gives up the interpreter's lock meanwhile: threads that still read may need it (Mirror).
+/// Gives up the interpreter's lock meanwhile if the cache is remote: threads that still read need it. Where the interpreter
+/// ends, they have been stopped.
 void OpenCache::endPlayer() {
-  if (!player_) return;
-  std::optional<py::gil_scoped_release> unlocked;
-  if (PyGILState_Check() != 0) unlocked.emplace();
+  std::optional<UnlockedWork> unlocked;
+  try {
+    if (player_ && mirror_ && PyGILState_Check() != 0) unlocked.emplace();
+  } catch (const Error&) {
+  }
   player_.reset();
 }
 
