@@ -3,6 +3,7 @@
 // converted to kilometres, positive upwards.
 //
 //   pressure                  the height of that pressure in the standard atmosphere (cf_coordinates.h)
+//   pressure of sea water     the depth of that pressure, below zero
 //   formulas of a pressure    atmosphere_sigma_, atmosphere_ln_pressure_, atmosphere_hybrid_sigma_pressure_
 //                             coordinate: that pressure's height
 //   formulas of a height      atmosphere_hybrid_height_, atmosphere_sleve_, ocean_sigma_, ocean_sigma_z_,
@@ -27,9 +28,10 @@ class CfVertical {
   /// reason.
   ///
   /// Tried in this order: the geopotential of every node; a formula of a coordinate along the axis, or one whose
-  /// terms have the names that models give them; the height or pressure of every node; WRF's geopotential (PH and
-  /// PHB) or pressure; the height of the layers' interfaces; the height or pressure of every level; the thickness of the layers;
-  /// heights and pressures of nodes by name (met_em's GHT), and lengths of levels that nothing calls heights.
+  /// terms have the names that models give them. Then, of lengths first and of pressures after that: the
+  /// value of every node; WRF's sums of two fields (PH and PHB, or pressures); of lengths alone, the layers'
+  /// interfaces; the value of every level. At last the thickness of the layers; heights and pressures of
+  /// nodes by name (met_em's GHT); and lengths of levels that nothing calls heights.
   static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFiles& file,
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& given, size_t axis);
@@ -41,14 +43,16 @@ class CfVertical {
   /// The index along `axis` in kilometres.
   static CfVertical ofIndex(size_t axis);
 
-  /// A single value along the axes on which the height does not depend.
+  /// The heights of the nodes of `range`, in kilometres. Along axes on which the height does not depend they
+  /// have a single value. Throws Error if a file cannot be read.
   CfValues heights(const NetcdfFiles& file, const CfRange& range) const;
 
   /// Reads the heights to the beginning of `to`, without a buffer, and returns true if the file stores one
   /// for every node in the order of the nodes. Else returns false.
   bool readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const;
 
-  /// The globe's, which is subtracted from levels that are distances from the Earth's centre.
+  /// Sets the radius of the globe, which is subtracted from levels that are distances from the Earth's
+  /// centre.
   void setRadius(double kilometres) {
     if (offset_ != 0) offset_ = -kilometres;
   }
@@ -140,7 +144,7 @@ class CfVertical {
 
   Kind kind_ = Kind::kLevels;
   double scale_ = 1;                           // converts stored values to kilometres upwards
-  double offset_ = 0;                          // kLevels: kilometres, added then
+  double offset_ = 0;                          // kLevels: kilometres, added after that
   std::vector<CfTerm> terms_;                  // height: one; geopotential: base and perturbation
   std::optional<CfTerm> s_, c_, eta_, depth_;  // terms of a formula; of the air: a, b, -, surface
   std::optional<CfTerm> c2_, depth2_;          // kSleve: b2 and zsurf2

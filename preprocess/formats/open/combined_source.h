@@ -1,5 +1,5 @@
-// Several files of one instant as one grid: fields of the same nodes in several files, blocks in several files, or pieces of an
-// unstructured grid.
+// Several files of one instant as one grid: fields of the same nodes in several files, blocks in several
+// files, or pieces of an unstructured grid.
 #pragma once
 
 #include <functional>
@@ -14,13 +14,13 @@
 
 namespace curvisplat {
 
-/// A file belongs to the first one whose blocks have its dimensions and its nodes (the first row of each block
-/// is compared); then its scalars, or those that the other lacks, are that one's too. Else its blocks follow
-/// those before it. The grid has the scalars that all of its blocks have; warnings name the others.
+/// Structured files as one grid. A file with the same blocks as an earlier one (their dimensions and their
+/// first rows are compared) adds to these blocks the scalars that they lack. The blocks of any other file
+/// follow those before. The grid has the scalars that all of its blocks have; a warning names the others.
 class CombinedSource final : public BoxSource {
  public:
-  /// `names`: of the files, for blocks and messages. Throws Error if a file has the nodes of an earlier one and
-  /// nothing new: steps in time, perhaps.
+  /// `names`: the files', for the names of blocks and for messages. Throws Error if a file has the nodes of
+  /// an earlier one and no further scalar: it may be another time step.
   CombinedSource(std::vector<std::unique_ptr<GridSource>> sources, const std::vector<std::string>& names);
 
   const GridDescription& description() const override { return description_; }
@@ -55,10 +55,11 @@ class CombinedSource final : public BoxSource {
   GridDescription description_;
 };
 
-/// Unstructured files as the pieces of one mesh: what the processors of a run write. A scalar that a file lacks is NaN there.
+/// Unstructured files as the pieces of one mesh: what the processors of a run write. A scalar that a file
+/// lacks is NaN there.
 class CombinedMeshSource final : public MeshSource {
  public:
-  /// `names`: of the files, for messages. Throws Error if two have the same points.
+  /// `names`: the files', for messages. Throws Error if two have the same points.
   CombinedMeshSource(std::vector<std::unique_ptr<MeshSource>> sources, const std::vector<std::string>& names);
 
   const GridDescription& description() const override { return description_; }
@@ -69,7 +70,8 @@ class CombinedMeshSource final : public MeshSource {
                  MeshCells& out) const override;
 
  private:
-  /// Calls read(source, its piece, its scalars), which returns what it has read, and sorts that into the order of `scalars`.
+  /// Calls read(source, its piece, its scalars), which returns what it has read, and sorts that into the
+  /// order of `scalars`.
   template <typename Read>
   void readOwn(uint32_t piece, uint64_t count, std::span<const uint32_t> scalars, const Read& read) const;
 
@@ -79,8 +81,8 @@ class CombinedMeshSource final : public MeshSource {
   GridDescription description_;
 };
 
-/// Opens the grid file and the further files of `options` each by itself with `open`, and combines them: all are structured, or all
-/// are not.
+/// Opens the grid file and the further files of `options` each by itself with `open`, and combines them: all
+/// are structured, or all are not.
 std::unique_ptr<DataSource> openCombined(
     const OpenGridOptions& options,
     const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open);

@@ -6,9 +6,10 @@
 //   one file              .pvd, .vtk.series and the like, .p3d, CGNS, NetCDF: its time steps
 //   several such files    the steps of one after those of the other
 //
-// Files of VTK or CGNS whose names have the number of a processor or a block as well (t0_p0.vtu t0_p1.vtu t1_p0.vtu ...) are pieces of
-// steps, and so are those that SEACAS writes for processors (mesh.e.2.0 mesh.e.2.1); mesh.e-s002 goes on from mesh.e. A minus sign
-// before a number is one where not all names have it (r-5 r0 r5).
+// Files of VTK or CGNS whose names have the number of a processor or a block as well (t0_p0.vtu t0_p1.vtu
+// t1_p0.vtu ...) are pieces of steps, and so are those that SEACAS writes for processors (mesh.e.2.0
+// mesh.e.2.1); mesh.e-s002 goes on from mesh.e. A hyphen before a number is a minus sign if some of the names
+// have none there (r-5 r0 r5).
 //
 // As many restart files as a SU2 mesh has zones are one step, and so are the tiles of a cubed sphere (a.tile1.nc to
 // a.tile6.nc): of two such sets, those of the same number are the steps.
@@ -37,29 +38,31 @@ struct StepSelection {
   uint64_t stride = 1;
 };
 
-/// "all", "FIRST", "FIRST:LAST" or "FIRST:LAST:STRIDE"; both ends count, and may be left out. Throws UsageError
-/// that names `option`.
+/// Parses "all", "FIRST", "FIRST:LAST" or "FIRST:LAST:STRIDE"; both ends are included, and may be left out.
+/// Throws UsageError that names `option`.
 StepSelection parseSteps(const std::string& option, const std::string& text);
 /// The selected numbers below `count`. Throws UsageError that names `option` if there are none.
 std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelection& selection,
                                     uint64_t count);
 
-/// Replaces patterns among the grid and the solutions by the files that match, in natural order; caches do not. Throws
-/// Error if a pattern matches none. Where the grid is a pattern, the first file stays the grid and the others follow first
-/// among the solutions.
+/// Replaces patterns among the grid and the solutions by the files that match, in natural order. Caches
+/// (folders with .splats in their names) never match. Throws Error if a pattern matches none. Where the grid
+/// is a pattern, the first file becomes the grid, and the others come before the solutions.
 void expandPatterns(OpenGridOptions& options);
 
-/// Whether the names of the files make them several steps; only a SU2 mesh is opened.
+/// Whether the names of the files make them several steps. Opens nothing but a SU2 mesh.
 bool hasSeveralStepFiles(const OpenGridOptions& options);
 
-/// The steps that the names of the files tell, without opening any but a SU2 mesh: a file with several steps counts as one.
+/// The steps that the names of the files tell; a file with several steps counts as one. Opens nothing but a
+/// SU2 mesh.
 std::vector<StepFiles> stepsByName(const OpenGridOptions& options);
 
-/// The steps in one of these: one that cannot be opened counts as one.
+/// The steps within one of these. Files that cannot be opened count as one step.
 std::vector<StepFiles> stepsIn(const StepFiles& files);
 
-/// A sentence on the scalars of a later step, which is opened, that the first one lacks: a series that begins there does not have them.
-/// Empty if there are none.
+/// A sentence on the scalars of a later step that the first one lacks, and that the series therefore does not
+/// have. Opens the later step, but not of OpenFOAM and PLOT3D. Empty if there are none, or if the step cannot
+/// be opened.
 std::string noteOnLaterScalars(const GridDescription& first, const OpenGridOptions& later);
 
 /// All steps of the files, whose patterns have been expanded. One at least. Opens files that may hold several
