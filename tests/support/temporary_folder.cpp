@@ -55,11 +55,11 @@ Files allFilesOf(const fs::path& folder) {
 std::string bytesOfFile(const fs::path& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = file.tellg();
-  if (size == 0) {  // empty, or one of /proc, whose sizes are 0
-    file.seekg(0);
+  if (size < 0) {  // no such file, or one of /proc, which have no end
+    file = std::ifstream(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   }
-  std::string bytes(static_cast<size_t>(std::max<std::streamoff>(size, 0)), '\0');
+  std::string bytes(static_cast<size_t>(size), '\0');
   file.seekg(0);
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   bytes.resize(static_cast<size_t>(file.gcount()));
