@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures what bench/NUMBERS.md shows, and prints its table: ten minutes on two cores.
+"""Measures what bench/NUMBERS.md shows, and prints its table: a minute on two idle cores, ten on busy ones.
 
     bench/ten_minutes.py [FOLDER] [--program build/release/tools/curvisplat] [--size 128x128x128] [--peers 64x64x64] [--repeat 3]
 
