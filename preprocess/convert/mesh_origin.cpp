@@ -87,9 +87,10 @@ std::vector<std::string> MeshOrigin::warnings() {
 }
 
 void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
-  // Cells lie where points do, about.
+  // Cells lie where points do, about. A point that several pieces or elements have counts once.
   const bool cells = centring() == Centring::kCell;
-  const uint64_t each = cells ? drawn_cells_ / std::max<uint64_t>(1, reader_.points()) + 1 : 1;
+  const uint64_t points_counted = reader_.points() - numbers_->merged();
+  const uint64_t each = cells ? drawn_cells_ / std::max<uint64_t>(1, points_counted) + 1 : 1;
   const MeshReader positions(reader_.source(), {}, std::nullopt);
   std::vector<uint64_t> numbers;
   positions.forEachPoints([&](const LoadedPoints& loaded) {
