@@ -18,8 +18,8 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kSampledChunks = 4, kSampledCells = 4096;
-// Elements are apart where this share of the points have the positions of others, there are so many parts, and a part has at most
-// so many cells: those of an element of order 8.
+// Elements are apart if more than kCoincidentShare of the points have the position of another point, and the cells fall
+// into at least kMinElements parts of at most kMaxElement cells on the average (an element of order 8 has 8 x 8 x 8).
 constexpr double kCoincidentShare = 1.0 / 32;
 constexpr size_t kMinElements = 4, kMaxElement = 512;
 constexpr uint64_t kWidest = 16;       // numbers of a chunk's points, over the points

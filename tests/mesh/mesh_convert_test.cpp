@@ -316,7 +316,7 @@ TEST_F(MeshConvert, PiecesShareTheirPoints) {
   EXPECT_GT(report.merged_nodes, 0u);
 }
 
-/// The same mesh with points of their own for groups of cells, as discontinuous elements are written.
+/// Gives each group of cells points of its own, as discontinuous elements are written. The mesh is the same.
 ArrayPiece apart(const ArrayPiece& piece, size_t cells_of_element) {
   ArrayPiece out;
   out.cell_values = piece.cell_values;

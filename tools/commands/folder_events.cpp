@@ -24,7 +24,7 @@ constexpr milliseconds kSignalInterval{500};
 
 /// Whether others can change the folder unseen by this machine's kernel.
 bool isRemote(const std::filesystem::path& folder) {
-  // As statfs(2) lists them: AFS, CIFS, SMB, SMB2, NFS, 9P, FUSE, CEPH, LUSTRE, GPFS, OCFS2, GFS2.
+  // These numbers are listed in statfs(2): AFS, CIFS, SMB, SMB2, NFS, 9P, FUSE, CEPH, LUSTRE, GPFS, OCFS2, GFS2.
   constexpr std::array<uint32_t, 12> kRemote{0x5346414f, 0xff534d42, 0x517b,     0xfe534d42,
                                              0x6969,     0x01021997, 0x65735546, 0x00c36400,
                                              0x0bd00bd0, 0x47504653, 0x7461636f, 0x01161970};

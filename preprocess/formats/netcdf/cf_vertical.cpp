@@ -58,7 +58,8 @@ bool namesSize(const NetcdfVariable& coordinate) {
                              [&](const char* word) { return words.find(word) != std::string::npos; });
 }
 
-/// Whether a field is of the sea or the soil, which levels up to so many kilometres above the surface cannot be.
+/// Whether a variable is a field of the sea or of the soil, so that its levels lie below the surface. `kilometres`: the
+/// highest level; levels of the sea may be up to kMaxTide above the mean surface.
 bool liesBelow(const NetcdfVariable& variable, double kilometres) {
   const std::string name = variable.text("standard_name");
   return (kilometres > kMaxTide && name.find("sea_water") != std::string::npos) ||
