@@ -24,6 +24,7 @@
 #include "tools/options/frame_sequence.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
+#include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
@@ -319,37 +320,16 @@ void addBench(CLI::App& app) {
   command->add_option("--plot", arguments->plots, "Write plots (PNG) to this directory");
   command->add_flag("--quick", arguments->quick,
                     "Measure for about ten seconds only: rough figures, and a check that everything works");
-  command->add_option("--memory", arguments->memory,
-                      "Memory limit for drawing (default 512M) or, with --convert, for the conversion "
-                      "(default: see convert)");
-  command->add_option("--threads", arguments->threads, "Largest number of threads; 0: one per core")
-      ->capture_default_str();
+  addMemoryOption(*command, arguments->memory, " (default: 512M; with --convert as for convert)");
+  addThreadsOption(*command, arguments->threads);
 
   const std::string what = "Drawing";
   addScalarOption(*command, arguments->scalar);
   addFunctionOptions(*command, arguments->scalar, what);
-  command->add_option("--size", arguments->size, "Size of the picture, WIDTHxHEIGHT in pixels")
-      ->capture_default_str()
-      ->group(what);
-  command
-      ->add_option("--lod-pixels", arguments->lod_pixels,
-                   "Screen errors E,E,... in pixels, each drawn; 0 draws the finest level")
-      ->capture_default_str()
-      ->group(what);
-  command
-      ->add_option("--view", arguments->camera.view,
-                   "Side where the orbit begins: iso, +x, -x, +y, -y, +z or -z (default iso)")
-      ->group(what);
-  command
-      ->add_option("--view-angle", arguments->camera.view_angle,
-                   "Perspective with this vertical view angle, in degrees (default: orthographic)")
-      ->group(what);
-  addTurnOptions(*command, arguments->camera, what);
-  command
-      ->add_option("--backend", arguments->backend,
-                   "Drawing back end of whole frames: auto, osmesa, egl, egl-quads or cpu")
-      ->capture_default_str()
-      ->group(what);
+  addSizeOption(*command, arguments->size)->group(what);
+  addLodPixelsOption(*command, arguments->lod_pixels, ". Of several, E,E,..., each is measured")->group(what);
+  addCameraOptions(*command, arguments->camera, what, " (default: iso, where an orbit begins)");
+  addBackendOption(*command, arguments->backend)->group(what);
 
   const std::string how = "Conversion";
   CLI::Option* const convert =

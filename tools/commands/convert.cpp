@@ -32,6 +32,7 @@
 #include "tools/commands/convert_series.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/results.h"
@@ -233,10 +234,7 @@ void refuseWithoutEffect(const CLI::App& command, const ConvertArguments& argume
 
 void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
   constexpr const char* kGroup = "Time steps";
-  command
-      .add_option("--steps", arguments.steps,
-                  "Convert these time steps: all, FIRST:LAST or FIRST:LAST:STRIDE, counted from 0")
-      ->group(kGroup);
+  addStepsOption(command, arguments.steps)->group(kGroup);
   command.add_option("--every", arguments.every, "Convert every N-th time step")
       ->check(CLI::Range(uint64_t{1}, uint64_t{1'000'000}))
       ->group(kGroup);
@@ -312,14 +310,9 @@ void addConvert(CLI::App& app) {
       "Precision of stored values: normal (16 bits over the local range of values), auto (as normal, "
       "and where long tails make that coarse by the scale of each value) or fine (24 bits, as in a "
       "float). info CACHE prints the rounding errors (default: auto)");
-  command->add_option(
-      "--memory", arguments->memory,
-      "Memory limit of this process, such as 512M (default: 2G, at most 1/4 of the machine's)");
-  command
-      ->add_option("--threads", arguments->threads,
-                   "Number of threads that compute at a time, those that read included (default 0: one per "
-                   "core)")
-      ->check(CLI::Range(0u, kMaxThreads));
+  addMemoryOption(*command, arguments->memory,
+                  ", of this process (default: 2G, at most 1/4 of the machine's)");
+  addThreadsOption(*command, arguments->threads);
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");
   command->add_flag(
@@ -345,8 +338,8 @@ void addConvert(CLI::App& app) {
       "--overlap", arguments->overlap,
       "Where blocks overlap: owner draws each point once, by the block with the smallest cells "
       "there; all draws every block (default: owner)");
-  command->add_option("--stats", arguments->statistics, "Write times, bytes and counts to this JSON file");
-  command->add_option("--trace", arguments->trace, kTraceHelp);
+  addStatsOption(*command, arguments->statistics);
+  addTraceOption(*command, arguments->trace);
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);
   command->callback([arguments, command] {

@@ -24,6 +24,7 @@
 #include "tools/options/frame_sequence.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
+#include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
@@ -228,17 +229,12 @@ void addExport(CLI::App& app) {
   addScalarOption(*command, arguments->scalar);
   addFunctionOptions(*command, arguments->scalar, "Data and colours");
   addStepOptions(*command, arguments->step, "Data and colours");
-  command
-      ->add_option("--max-splats", arguments->max_splats,
-                   "Splat limit, such as 8M or 500K; the largest detail is kept first")
-      ->default_str(kDefaultSplats);
+  addMaxSplatsOption(*command, arguments->max_splats)->default_str(kDefaultSplats);
   command->add_option("--iso", arguments->iso, "Isosurface of this value, as triangles: .ply, .stl or .vtp");
   command->add_option("--voxels", arguments->voxels, ".vdb, --iso: voxels along the longest side of the data")
       ->default_str(kDefaultVoxels);
-  command
-      ->add_option("--memory", arguments->memory,
-                   "Memory limit for the grids, the isosurface, or the pictures of the comparison")
-      ->capture_default_str();
+  addMemoryOption(*command, arguments->memory,
+                  ", for the grids, the isosurface, or the pictures of the comparison");
   command->add_flag(
       "--no-comparison", arguments->no_comparison,
       "Skip drawing the exported splats from 12 directions to compare them with curvisplat's pictures");

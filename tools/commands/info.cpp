@@ -32,6 +32,7 @@
 #include "tools/commands/info_steps.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/frame_sequence.h"
+#include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
@@ -417,9 +418,7 @@ void addProbeOptions(CLI::App& info, InfoOptions& options) {
   info.add_option("-o,--output", options.probe.plot, "Draw the values along the line into this PNG file")
       ->group(kProbe)
       ->needs(line);
-  info.add_option("--steps", options.steps.steps,
-                  "Print the values of each time step: all, FIRST:LAST or FIRST:LAST:STRIDE, counted from 0")
-      ->group(kProbe);
+  addStepsOption(info, options.steps.steps, "; the values of each are printed")->group(kProbe);
 }
 
 }  // namespace

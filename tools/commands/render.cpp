@@ -29,6 +29,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scene_arguments.h"
+#include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/empty_picture.h"
 #include "tools/output/frame_output.h"
@@ -253,17 +254,14 @@ void addRender(CLI::App& app) {
           "folder")
       ->required();
   command->add_option("SOLUTION", arguments->solutions, "Further files of the grid");
-  command->add_option("--value-precision", arguments->value_precision,
-                      "Precision of the values stored when CACHE is a grid: auto, normal or fine, as for "
-                      "convert (default: auto)");
+  addValuePrecisionOption(*command, arguments->value_precision);
   command
       ->add_option(
           "-o,--output", arguments->output,
           "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, NAME.mp4 or .gif (by "
           "ffmpeg), or NAME.html, a web page with the pictures in it")
       ->required();
-  command->add_option("--size", arguments->frame.size, "Size of the picture, WIDTHxHEIGHT in pixels")
-      ->capture_default_str();
+  addSizeOption(*command, arguments->frame.size);
   addScalarOption(*command, arguments->scalar);
 
   const std::string what = "Data and colours";
@@ -275,18 +273,8 @@ void addRender(CLI::App& app) {
                    "Classification: pixel (colour varies within a splat) or flat (one colour per splat)")
       ->capture_default_str()
       ->group(what);
-  command
-      ->add_option("--lod-pixels", arguments->frame.lod_pixels,
-                   "Largest screen error of merged splats, in pixels, but up to 4 where the transfer "
-                   "function hides it; 0 "
-                   "draws the finest level, against which 1 held 50 dB in nearly every picture tried")
-      ->capture_default_str()
-      ->group(what);
-  command
-      ->add_option(
-          "--max-splats", arguments->frame.max_splats,
-          "Splat limit, such as 8M or 500K; the largest screen error is refined first (default: no limit)")
-      ->group(what);
+  addLodPixelsOption(*command, arguments->frame.lod_pixels)->group(what);
+  addMaxSplatsOption(*command, arguments->frame.max_splats, " (default: no limit)")->group(what);
   command->add_option("--scale", arguments->frame.scale, "Scale factors sx,sy,sz of the data")
       ->capture_default_str()
       ->group(what);
@@ -341,17 +329,14 @@ void addRender(CLI::App& app) {
   addSurfaceOptions(*command, arguments->surfaces, surfaces);
   const std::string when = "Time steps";
   addStepOptions(*command, arguments->steps, when);
-  addStepsOption(*command, arguments->steps, when);
+  addStepsOption(*command, arguments->steps.steps, "; a frame of each is drawn")->group(when);
   addInterpolateOption(*command, arguments->steps, when);
 
   const std::string where = "Camera";
   CameraArguments* camera = &arguments->camera;
-  command
-      ->add_option(
-          "--view", camera->view,
-          "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z; it fits the data, or what --clip-box "
-          "leaves of them (default: chosen from the data; iso for a camera that moves)")
-      ->group(where);
+  addCameraOptions(*command, *camera, where,
+                   "; it fits the data, or what --clip-box leaves of them (default: chosen from the data; "
+                   "iso for a camera that moves)");
   command
       ->add_option(
           "--position", camera->position,
@@ -368,12 +353,6 @@ void addRender(CLI::App& app) {
       ->add_option("--parallel-scale", camera->parallel_scale,
                    "Half the picture's height in world units (default: fits the data)")
       ->group(where);
-  command
-      ->add_option("--view-angle", camera->view_angle,
-                   "Perspective with this vertical view angle, in degrees (default: orthographic)")
-      ->group(where);
-  addTurnOptions(*command, *camera, where);
-
   command
       ->add_option("--orbit", camera->orbit,
                    "Orbit the focal point by this angle about the up direction, in degrees")
@@ -396,20 +375,9 @@ void addRender(CLI::App& app) {
       ->group(where);
 
   const std::string how = "Resources";
-  command
-      ->add_option("--backend", arguments->backend,
-                   "Drawing back end: auto, osmesa, egl, egl-quads or cpu; see info --system")
-      ->capture_default_str()
-      ->group(how);
-  command->add_option("--memory", arguments->frame.memory, "Memory limit for drawing, such as 512M or 2G")
-      ->capture_default_str()
-      ->group(how);
-  command
-      ->add_option("--threads", arguments->frame.threads,
-                   "Number of threads that compute at a time; 0: one per core")
-      ->check(CLI::Range(0u, kMaxThreads))
-      ->capture_default_str()
-      ->group(how);
+  addBackendOption(*command, arguments->backend)->group(how);
+  addMemoryOption(*command, arguments->frame.memory)->group(how);
+  addThreadsOption(*command, arguments->frame.threads)->group(how);
   command
       ->add_option(
           "--first-image", arguments->first_image,
@@ -419,11 +387,8 @@ void addRender(CLI::App& app) {
       ->add_flag("--keep-going", arguments->frame.keep_going,
                  "Draw damaged bricks from a coarser level and print a warning, instead of failing")
       ->group(how);
-  command
-      ->add_option("--stats", arguments->statistics,
-                   "Write times, bytes and counts of every frame to this JSON file")
-      ->group(how);
-  command->add_option("--trace", arguments->trace, kTraceHelp)->group(how);
+  addStatsOption(*command, arguments->statistics)->group(how);
+  addTraceOption(*command, arguments->trace)->group(how);
   command->callback([arguments, command] {
     requireSameOptions(*command);
     std::vector<std::filesystem::path> others = inputsOf(*arguments);

@@ -17,6 +17,7 @@
 #include "stream/base/text.h"
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/start_checks.h"
 #include "tools/serve/client_requests.h"
@@ -106,17 +107,10 @@ void addServe(CLI::App& app) {
       "File with the access token of the address, readable by its owner only (default: a new random token)");
   command->add_option("--viewer-memory", arguments->viewer_memory, "Memory limit of each viewer")
       ->capture_default_str();
-  command
-      ->add_option(
-          "--memory", arguments->memory,
-          "Memory limit of all viewers together. At most --memory / --viewer-memory viewers can connect")
-      ->capture_default_str();
-  command
-      ->add_option("--backend", arguments->backend,
-                   "Drawing back end: auto, osmesa, egl, egl-quads or cpu; see info --system")
-      ->capture_default_str();
-  command->add_option("--frame-time", arguments->frame_time,
-                      "Time budget of a picture while the camera moves, in ms (default 40)");
+  addMemoryOption(*command, arguments->memory,
+                  ", of all viewers together. At most --memory / --viewer-memory viewers can connect");
+  addBackendOption(*command, arguments->backend);
+  addFrameTimeOption(*command, arguments->frame_time, " (default: 40)");
   command->callback([arguments] { serve(*arguments); });
 }
 

@@ -25,6 +25,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/point_values.h"
 #include "tools/options/scene_arguments.h"
+#include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/start_checks.h"
@@ -165,24 +166,16 @@ void addView(CLI::App& app) {
   command->add_option("FILE", arguments->files,
                       "Splat cache, a directory NAME.splats; or a grid and its solutions, which are "
                       "converted into the user's cache folder. If none is given, the window asks for one");
-  command->add_option(
-      "--value-precision", arguments->value_precision,
-      "Precision of the values stored when FILE is a grid: auto, normal or fine, as for convert"
-      " (default: auto)");
+  addValuePrecisionOption(*command, arguments->value_precision);
   command->add_option("--size", arguments->size, "Size of the window, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
-  command->add_option("--scalar", arguments->scalar, "Name of the scalar to show (default: as last time)");
+  command->add_option("--scalar", arguments->scalar, "Name of the scalar to draw (default: as last time)");
   command->add_option(
       "--state", arguments->state,
       "Restore camera, transfer function and settings from this JSON file (default: as last time)");
-  command
-      ->add_option("--backend", arguments->backend,
-                   "Drawing back end: auto, osmesa, egl, egl-quads or cpu; see info --system")
-      ->capture_default_str();
-  command->add_option("--memory", arguments->memory,
-                      "Memory limit for drawing, such as 512M or 2G (default: as last time, initially 512M)");
-  command->add_option("--frame-time", arguments->frame_time,
-                      "Time budget of a picture while the camera moves, in ms (default 33)");
+  addBackendOption(*command, arguments->backend);
+  addMemoryOption(*command, arguments->memory, " (default: as last time, initially 512M)");
+  addFrameTimeOption(*command, arguments->frame_time, " (default: 33)");
   addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
   addStepOptions(*command, arguments->steps, "Time steps");
   command->callback([arguments] { view(*arguments); });

@@ -68,10 +68,14 @@ Camera placedCamera(const CameraArguments& arguments, const ShownBox& box, Image
 
 }  // namespace
 
-void addTurnOptions(CLI::App& command, CameraArguments& arguments, const std::string& group) {
-  const auto add = [&](const char* name, std::optional<std::string>& value, const char* help) {
+void addCameraOptions(CLI::App& command, CameraArguments& arguments, const std::string& group,
+                      const std::string& note) {
+  const auto add = [&](const char* name, std::optional<std::string>& value, const std::string& help) {
     command.add_option(name, value, help)->group(group);
   };
+  add("--view", arguments.view, "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z" + note);
+  add("--view-angle", arguments.view_angle,
+      "Perspective with this vertical view angle, in degrees (default: orthographic)");
   add("--azimuth", arguments.azimuth,
       "Turn the camera, given or chosen, by this angle about the up direction, to its right, in degrees");
   add("--elevation", arguments.elevation, "Raise it by this angle about the focal point, in degrees");
@@ -160,13 +164,6 @@ void addStepOptions(CLI::App& command, StepArguments& arguments, const std::stri
   command.add_option("--time", arguments.time, "Choose the time step nearest to this time")
       ->group(group)
       ->excludes(step);
-}
-
-void addStepsOption(CLI::App& command, StepArguments& arguments, const std::string& group) {
-  command
-      .add_option("--steps", arguments.steps,
-                  "Draw a frame of each time step: all, FIRST:LAST or FIRST:LAST:STRIDE, counted from 0")
-      ->group(group);
 }
 
 void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std::string& group) {

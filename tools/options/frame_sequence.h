@@ -44,8 +44,10 @@ struct CameraArguments {
   uint64_t frameCount() const { return frames.value_or(moves() ? kDefaultFrames : 1); }
 };
 
-/// Adds --azimuth, --elevation, --roll and --zoom under the heading `group`.
-void addTurnOptions(CLI::App& command, CameraArguments& arguments, const std::string& group);
+/// Adds --view, --view-angle, --azimuth, --elevation, --roll and --zoom under the heading `group`. `note` ends the help of
+/// --view.
+void addCameraOptions(CLI::App& command, CameraArguments& arguments, const std::string& group,
+                      const std::string& note);
 
 /// Throws UsageError if options contradict each other; needs no cache.
 void checkCameraArguments(const CameraArguments& arguments);
@@ -80,8 +82,6 @@ struct StepArguments {
 
 /// Adds --step and --time under the heading `group`.
 void addStepOptions(CLI::App& command, StepArguments& arguments, const std::string& group);
-/// Adds --steps, whose steps are drawn as frames.
-void addStepsOption(CLI::App& command, StepArguments& arguments, const std::string& group);
 /// Adds --interpolate.
 void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std::string& group);
 

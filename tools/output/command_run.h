@@ -30,11 +30,6 @@ class StopOnSignals {
 /// SIGXFSZ ends the process without a message and without removing its temporary files.
 void ignoreFileSizeSignal();
 
-inline constexpr const char* kTraceHelp =
-    "Write what each thread does, and when, to this JSON file, for Perfetto and bench/threads.py; with "
-    "several "
-    "ranks FILE.json becomes FILE.0.json, FILE.1.json, ...";
-
 /// Runs a command and traces it into the file `path` (--trace FILE), whose format stream/base/trace.h describes, unless it is
 /// empty. `others`: the files and caches that the command reads and writes. Throws Error if the trace cannot be written
 /// whole or is one of them, and what the command throws: of a command that fails what was traced until then stays,
