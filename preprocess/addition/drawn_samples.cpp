@@ -119,12 +119,12 @@ class NoSink : public SplatSink {
 
 }  // namespace
 
-NodeSplatCorrections correctionsOf(const Manifest& manifest) {
-  NodeSplatCorrections corrections;
-  corrections.steep = manifest.isSteep();
-  corrections.octants = manifest.hasFeature(kCellOctants);
-  corrections.dual_cells = manifest.stretch == kDualCells;
-  return corrections;
+SplatRules rulesOf(const Manifest& manifest) {
+  SplatRules rules;
+  rules.steep = manifest.isSteep();
+  rules.octants = manifest.hasFeature(kCellOctants);
+  rules.dual_cells = manifest.stretch == kDualCells;
+  return rules;
 }
 
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
@@ -143,7 +143,7 @@ CacheGrid::CacheGrid(const GridSource& source) : ForwardingGrid(source) {
 
 void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                            const std::filesystem::path& temporary_folder, Progress& progress) {
-  corrections_ = correctionsOf(cache.manifest());
+  rules_ = rulesOf(cache.manifest());
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
 
@@ -153,7 +153,7 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
   SeamMerger seams(0, plan.seam_bytes, temporary_folder, unlike);
   NoSink none;
   SlabPass pass(progress);
-  pass.corrections = corrections_;
+  pass.rules = rules_;
   streamSplats(
       NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },
       seams, pass);

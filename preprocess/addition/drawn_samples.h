@@ -51,7 +51,7 @@ class DrawnNodes {
 /// How the conversion that made a cache treated coincident halves of unlike thickness.
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest);
 /// The corrections that the cache's splats were made with.
-NodeSplatCorrections correctionsOf(const Manifest& manifest);
+SplatRules rulesOf(const Manifest& manifest);
 
 /// A structured grid of which nodes without a splat in the cache are blanked. With cell-centred scalars,
 /// cells without a splat in the cache have the value NaN.
@@ -77,7 +77,7 @@ class CacheGrid : public ForwardingGrid {
 
   std::vector<uint64_t> first_nodes_;  // [block]
   std::unique_ptr<DrawnNodes> drawn_;
-  NodeSplatCorrections corrections_;  // of the cache
+  SplatRules rules_;        // of the cache
   bool all_faces_ = false;  // while merged ones are looked for: nodes of block faces are not restricted
 };
 

@@ -74,8 +74,8 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
   SlabPass pass(*progress_, std::move(see));
   pass.owners = owners ? &*owners : nullptr;
   pass.ranks = ranks_;
-  pass.corrections = correctionsOf(cache_->manifest());
-  pass.corrections.growth_codes = false;
+  pass.rules = rulesOf(cache_->manifest());
+  pass.rules.growth_codes = false;
   streamSplats(
       reader, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, pass);
   for (ValueSink& sink : sinks) sink.flush();

@@ -35,7 +35,7 @@ class SplatStream {
         centring_(reader.centring()),
         faces_(faces),
         sink_of_thread_(&sink_of_thread),
-        corrections_(pass.corrections),
+        rules_(pass.rules),
         seams_(&seams),
         workers_([this] { return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size()), {}}; }) {
     if (pass.notes.from) before_ = *pass.notes.from;
@@ -60,9 +60,9 @@ class SplatStream {
       if (!covered.empty()) window.covered = covered.data();
       Worker& worker = workers_.local();
       if (centring_ == Centring::kCell)
-        computeCellSplats(window, task.box, {slab.block, faces_}, worker.cells, worker.splats, corrections_);
+        computeCellSplats(window, task.box, {slab.block, faces_}, worker.cells, worker.splats, rules_);
       else
-        computeNodeSplats(window, task.box, worker.nodes, worker.splats, corrections_);
+        computeNodeSplats(window, task.box, worker.nodes, worker.splats, rules_);
       if (what == Send::kAll) {
         worker.degenerate += worker.splats.degenerate;
         worker.handedness[slab.block].right += worker.splats.right_handed;
@@ -169,7 +169,7 @@ class SplatStream {
   const Centring centring_;
   const AbuttingFaces* faces_;
   const SinkOfThread* sink_of_thread_;
-  const NodeSplatCorrections corrections_;
+  const SplatRules rules_;
   ScatterState before_;  // of an interrupted run
   SeamMerger* seams_;
   tbb::enumerable_thread_specific<Worker> workers_;

@@ -58,7 +58,7 @@ struct SlabPass {
   BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
   Ranks* ranks = &oneRank();      // of which each makes the splats of a share; the counts are the whole's
   ScatterNotes notes;             // of a scatter() without ranks
-  NodeSplatCorrections corrections;
+  SplatRules rules;
 };
 
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go

@@ -13,6 +13,7 @@
 #include "preprocess/shape/covered_part.h"
 #include "preprocess/shape/shape.h"
 #include "stream/base/error.h"
+#include "stream/model/corrections.h"
 
 namespace curvisplat {
 namespace {
@@ -21,16 +22,16 @@ namespace {
 constexpr double kMaxVolumeRatio = 8;
 
 /// Bit `axis`: the block is one cell thick along it.
-uint32_t singleAxes(const GridBlock& block, const NodeSplatCorrections& corrections) {
-  if (!corrections.dual_cells) return 0;
+uint32_t singleAxes(const GridBlock& block, const SplatRules& rules) {
+  if (!rules.dual_cells) return 0;
   return (block.ni == 2 ? 1u : 0u) | (block.nj == 2 ? 2u : 0u) | (block.nk == 2 ? 4u : 0u);
 }
 
 /// Makes the splats of the cells of a box.
 class Cells {
  public:
-  Cells(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends,
-        const NodeSplatCorrections& corrections, CellScratch& scratch, NodeSplats& out)
+  Cells(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, const SplatRules& rules,
+        CellScratch& scratch, NodeSplats& out)
       : in_(in),
         box_(box),
         ends_(ends),
@@ -40,12 +41,11 @@ class Cells {
         known_{box.j0 - std::min<uint64_t>(box.j0, kReach), std::min(box.j1 + kReach, in.block.nj - 1),
                box.k0 - std::min<uint64_t>(box.k0, kReach), std::min(box.k1 + kReach, in.block.nk - 1)},
         cells_i_(in.block.ni - 1),
-        single_(singleAxes(in.block, corrections)),
+        single_(singleAxes(in.block, rules)),
         i0_(in.i0),
         i1_(in.endOfPart(cells_i_)),
         known_i0_(i0_ - std::min(i0_, kReach)),
         known_i1_(std::min(i1_ + kReach, cells_i_)),
-        corrections_(corrections),
         scratch_(scratch),
         out_(out) {
     scratch_.centre.resize((known_i1_ - known_i0_) * rowsOf(known_));
@@ -97,7 +97,7 @@ class Cells {
   const uint32_t single_;               // bit `axis`: the block is one cell thick along it
   const uint64_t i0_, i1_;              // its part
   const uint64_t known_i0_, known_i1_;  // with its neighbours
-  const NodeSplatCorrections corrections_;
+  const SplatCorrections corrections_ = correctionsToMake().splats;
   CellScratch& scratch_;
   NodeSplats& out_;
   size_t count_ = 0;
@@ -321,7 +321,7 @@ void Cells::addCell(const std::array<uint64_t, 3>& index, uint32_t half) {
 }  // namespace
 
 void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
-                       NodeSplats& out, const NodeSplatCorrections& corrections) {
+                       NodeSplats& out, const SplatRules& rules) {
   const GridBlock& block = in.block;
   const NodeBox& window = in.window;
   CURVISPLAT_CHECK(window.j0 <= box.j0 - std::min(box.j0, kCellSplatHalo.before) &&
@@ -340,11 +340,11 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnd
 
   const uint64_t end = in.endOfPart(block.ni - 1);
   if (in.i0 >= end) return;
-  const size_t most = (end - in.i0) * rowsOf(cells) << std::popcount(singleAxes(block, corrections));
+  const size_t most = (end - in.i0) * rowsOf(cells) << std::popcount(singleAxes(block, rules));
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);
-  Cells rows(in, cells, ends, corrections, scratch, out);
+  Cells rows(in, cells, ends, rules, scratch, out);
   for (uint64_t k = cells.k0; k < cells.k1; ++k)
     for (uint64_t j = cells.j0; j < cells.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

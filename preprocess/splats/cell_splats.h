@@ -45,10 +45,10 @@ struct CellScratch {
 /// Computes the splats of the cells whose lowest nodes are in `box`, except for cells with a blanked corner or
 /// value. A splat has the number of its cell's lowest node; the upper half of a cell, that of the next node
 /// along the axis. `in.window` is `box` with kCellSplatHalo around it inside the block; `in.nodes` are as a
-/// NodeReader of cell-centred scalars reads them. Overwrites `out` and keeps its capacity. Of the corrections
-/// only `stretch`, `growth` and `dual_cells` (halves in blocks one cell thick) apply to cells. Pure: any
-/// thread. Throws nothing but bad_alloc.
+/// NodeReader of cell-centred scalars reads them. Overwrites `out` and keeps its capacity. Of the rules
+/// only `dual_cells` (halves in blocks one cell thick) applies to cells, of the corrections `stretch` and `growth`.
+/// Pure: any thread. Throws nothing but bad_alloc.
 void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
-                       NodeSplats& out, const NodeSplatCorrections& corrections = {});
+                       NodeSplats& out, const SplatRules& rules = {});
 
 }  // namespace curvisplat

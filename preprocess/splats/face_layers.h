@@ -91,7 +91,7 @@ struct CutBehindFaces {
 /// hundredth of a cell's weight.
 class FacesBehind {
  public:
-  /// `middles`: as in NodeSplatCorrections, the face goes through the middles of its cells. The lattice
+  /// `middles`: as in SplatCorrections, the face goes through the middles of its cells. The lattice
   /// outlives it.
   FacesBehind(const NodeLattice& lattice, bool middles) : lattice_(lattice), middles_(middles) {}
 

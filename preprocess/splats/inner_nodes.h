@@ -46,7 +46,7 @@ struct alignas(64) InnerSplats {
 };
 
 /// Computes the splats of nodes `first` to first + kInnerNodesAtOnce - 1 of the row, with all corrections
-/// (NodeSplatCorrections). `values`: [node of these * scalars + scalar].
+/// (SplatCorrections). `values`: [node of these * scalars + scalar].
 void computeInnerNodes(const InnerRow& row, size_t first, InnerSplats& out, SplatScalar* values);
 
 /// Stands for a code (stream/model/growth_code.h) where the cell grows along several axes.

@@ -17,6 +17,7 @@
 #include "preprocess/splats/inner_nodes.h"
 #include "preprocess/splats/window_lines.h"
 #include "stream/base/error.h"
+#include "stream/model/corrections.h"
 #include "stream/model/fits.h"
 
 namespace curvisplat {
@@ -25,13 +26,13 @@ namespace {
 /// Makes the splats of the nodes of a box of a window.
 class NodeWindow {
  public:
-  NodeWindow(const BlockWindow& in, const NodeBox& box, const NodeSplatCorrections& corrections,
-             NodeScratch& scratch, NodeSplats& out)
+  NodeWindow(const BlockWindow& in, const NodeBox& box, const SplatRules& rules, NodeScratch& scratch,
+             NodeSplats& out)
       : in_(in),
-        corrections_(corrections),
-        lines_(in, box, corrections.fit(), scratch),
+        rules_(rules),
+        lines_(in, box, rules.fit(), scratch),
         lattice_(lines_.lattice()),
-        faces_(lattice_, corrections.middles),
+        faces_(lattice_, corrections_.middles),
         ni_(in.block.ni),
         i0_(in.i0),
         i1_(in.endOfPart(in.block.ni)),
@@ -73,11 +74,16 @@ class NodeWindow {
     if (code) node.becomePart(*code);
     return code.has_value();
   }
+  bool fitsLayers() const {
+    return rules_.steep && corrections_.layers && corrections_.faces && corrections_.growth &&
+           corrections_.lines;
+  }
   /// A length for the shape of a node without any extent: far below the grid's, and above zero.
   double smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const;
 
   const BlockWindow& in_;
-  const NodeSplatCorrections corrections_;
+  const SplatRules rules_;
+  const SplatCorrections corrections_ = correctionsToMake().splats;
   const WindowLines lines_;
   const NodeLattice& lattice_;
   const FacesBehind faces_;
@@ -116,7 +122,7 @@ void NodeWindow::addRow(uint64_t j, uint64_t k) {
   if (corrections_.stretch) lines_.stretchRow(j, k);
   // Those that are neither at a face nor behind one.
   const uint64_t inner_begin = std::max<uint64_t>(2, i0_), inner_end = ni_ < 4 ? 0 : std::min(i1_, ni_ - 2);
-  const bool at_once = !on_face && !has_layer && !in_.covered && corrections_.all() &&
+  const bool at_once = !on_face && !has_layer && !in_.covered && corrections_.all() && rules_.dual_cells &&
                        inner_end >= inner_begin + kInnerNodesAtOnce;
   if (!lines_.anyBlankAround(j, k)) {
     if (i0_ == 0) addNode(0, row, at_i(0), true, layers_at(0));
@@ -141,7 +147,7 @@ void NodeWindow::addRow(uint64_t j, uint64_t k) {
         if (lattice_.blank[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
         if (lattice_.blank[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
       }
-      if (corrections_.octants) octants_of_blanks_ = octantsOfBlanks(at, neighbours);
+      if (rules_.octants) octants_of_blanks_ = octantsOfBlanks(at, neighbours);
       addNode(i, at, neighbours, on_face || isFace(i, ni_), layers_at(i));
     }
     octants_of_blanks_ = 0;
@@ -184,7 +190,7 @@ uint64_t NodeWindow::octantsOfBlanks(ptrdiff_t at, const Neighbours& neighbours)
 /// the piece that its neighbours give it.
 double NodeWindow::weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) const {
   const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
-  const uint32_t there = corrections_.dual_cells ? cellsAt(at, i) : 0;
+  const uint32_t there = rules_.dual_cells ? cellsAt(at, i) : 0;
   if (there == 0) return of_neighbours;
   const int kept = static_cast<int>(kCellPoints) - std::popcount(octants_of_blanks_);
   return dualVolume(lattice_, at, strides, there) * static_cast<double>(kCellPoints) / kept;
@@ -195,7 +201,7 @@ constexpr double kCollapsed = 1e-9;  // of the distance to the nearest neighbour
 /// Finds the piece of the last node, whose cell has collapsed. False if its piece has no volume either.
 bool NodeWindow::takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
                            const std::array<double, 3>& inwards) {
-  if (!corrections_.dual_cells || (in_.covered && in_.covered[at] != 0)) return false;
+  if (!rules_.dual_cells || (in_.covered && in_.covered[at] != 0)) return false;
   double shortest = std::numeric_limits<double>::infinity();  // of the columns: thin cells have not collapsed
   for (int axis = 0; axis < 3; ++axis)
     shortest = std::min(shortest, glm::distance(lattice_.position(at + neighbours.after[axis]),
@@ -239,7 +245,7 @@ void NodeWindow::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Ne
     SplatScalar* values = out_.values.data() + (first + begin) * scalars;
     if (begin < done) of_last.resize(kInnerNodesAtOnce * scalars);
     computeInnerNodes(nodes, begin, splats, begin < done ? of_last.data() : values);
-    if (corrections_.growth_codes) {
+    if (rules_.growth_codes) {
       const auto of = [&](size_t axis) { return scratch_.growth[axis].data() + in_part + begin; };
       findInnerGrowth(splats, {of(0), of(1), of(2)}, growth);
     }
@@ -332,7 +338,7 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
   node.behind_face = false;
   node.layers = 0;
   node.lines = {};
-  node.fit = corrections_.fit();
+  node.fit = rules_.fit();
   node.fits_layers = false;
   if ((on_face || layers != Layers{}) && corrections_.lines && corrections_.stretch)
     node.lines = lines_.atJoints({i, row_j_, row_k_});
@@ -351,7 +357,7 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
   std::array<float, 3> growth{};
   std::array<double, 3> widths{};
-  if (corrections_.growth && corrections_.dual_cells) widths = widthGrowth(lattice_, at, neighbours);
+  if (corrections_.growth && rules_.dual_cells) widths = widthGrowth(lattice_, at, neighbours);
   double nearest = std::numeric_limits<double>::infinity();  // neighbour that is not at the node's own place
   double weight_factor = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -371,7 +377,7 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
     if (corrections_.growth) growth[axis] = scratch_.growth[axis][in_part];
     if (whole) {
       if (corrections_.growth) middle[axis] += scratch_.drift[axis][in_part];
-      if (corrections_.dual_cells) middle[axis] += kWidthDrift * width;
+      if (rules_.dual_cells) middle[axis] += kWidthDrift * width;
       continue;
     }
     if (corrections_.border_codes) {
@@ -389,7 +395,7 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
   const double of_neighbours = std::abs(glm::determinant(jacobian)) * weight_factor;
   const double weight = weightOf(at, i, of_neighbours);
   fitToVolume(weight, of_neighbours, inwards, middle, stretch);
-  if (corrections_.fitsLayers() && (on_face || layers != Layers{}))
+  if (fitsLayers() && (on_face || layers != Layers{}))
     node.fits_layers = fitToLayers({inwards, layers, node.lines}, {middle, stretch, growth});
   node.spacing = on_face && std::isfinite(nearest) ? nearest : 0.0;
   node.splat.position = node.node_position + jacobian * middle + aside;
@@ -405,7 +411,7 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
     if constexpr (kPlain) {
       const glm::dvec3 in_cells = frame.inFrame(bend), bent = glm::abs(in_cells);
       const double largest = std::max(std::max(bent.x, bent.y), bent.z);
-      const double share = corrections_.dual_cells ? kMaxBend / std::max(kMaxBend, largest) : 1.0;
+      const double share = rules_.dual_cells ? kMaxBend / std::max(kMaxBend, largest) : 1.0;
       if (correct_bends) bend_in_cells = share * in_cells;
       aside_in_cells = share * frame.inFrame(aside);
     }
@@ -436,11 +442,10 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
         if (frame.floored() && takePiece(i, at, neighbours, inwards)) return;
         const auto rotate = [&](const glm::dvec3& v) { return frame.rotate(v); };
         node.splat.weight =
-            corrections_.dual_cells ? weight : std::abs(frame.determinant()) * weight_factor * shrink;
+            rules_.dual_cells ? weight : std::abs(frame.determinant()) * weight_factor * shrink;
         node.regular = !frame.floored() && weight_factor == 1;
         node.border_code = borderCode(inwards, corrections_.faces && !frame.floored(), rotate);
-        const bool has_growth =
-            !frame.floored() && (corrections_.growth_codes || on_face || layers != Layers{});
+        const bool has_growth = !frame.floored() && (rules_.growth_codes || on_face || layers != Layers{});
         node.growth_code = has_growth ? growthCode(growth, rotate) : kNoGrowth;
         for (int axis = 0; axis < 3; ++axis) {
           if (frame.floored()) node.lines[axis] = {};
@@ -506,9 +511,9 @@ const JointLine* NodeSplat::lineAlong(const glm::dvec3& inward) const {
 }
 
 void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch, NodeSplats& out,
-                       const NodeSplatCorrections& corrections) {
+                       const SplatRules& rules) {
   const NodeBox& window = in.window;
-  const Halo halo = corrections.stretch ? kNodeSplatHalo : kNodeHalo;
+  const Halo halo = correctionsToMake().splats.stretch ? kNodeSplatHalo : kNodeHalo;
   CURVISPLAT_CHECK(window.j0 <= box.j0 - std::min(box.j0, halo.before) &&
                    window.k0 <= box.k0 - std::min(box.k0, halo.before));
   CURVISPLAT_CHECK(std::min(box.j1 + halo.after, in.block.nj) <= window.j1 &&
@@ -526,7 +531,7 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& s
   out.probes.clear();
   out.degenerate = out.right_handed = out.left_handed = 0;
 
-  NodeWindow rows(in, box, corrections, scratch, out);
+  NodeWindow rows(in, box, rules, scratch, out);
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

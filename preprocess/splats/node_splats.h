@@ -133,18 +133,9 @@ struct NodeSplats {
   uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
 };
 
-/// Corrections beyond the linear part of the mapping at the node. Conversion makes all of them; tests switch
-/// single ones off to measure what they are worth.
-struct NodeSplatCorrections {
-  bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
-  bool faces = true;         // borders are faces to be cut at; else cells at borders are drawn in parts
-  // Cuts behind several faces; otherwise nodes on a face are cut there alone, others at one face behind them.
-  bool layers = true;
-  bool middles = true;  // else splats sit at nodes, but for half cells
-  bool bends = true;    // means are corrected where the scalar bends (kBend)
-  bool stretch = true;  // else splats are as long as their cells
-  bool growth = true;   // else kernels are symmetric; needs `stretch`
-  bool lines = true;    // else cells at joints know their own block alone; needs `growth` and `stretch`
+/// How splats are made: as conversions of today make them, or as an earlier version did, to whose caches scalars and time steps
+/// are added.
+struct SplatRules {
   bool steep = true;    // else stretches are StretchFit::kGentle (kSteepStretch)
   bool octants = true;  // else cells keep the octants that reach into blanked cells (kCellOctants)
   // Weights and scalars of dual cells (dual_cell.h); otherwise weights are |det J|, and the scalars of bent
@@ -154,16 +145,12 @@ struct NodeSplatCorrections {
   // they take a sixth of the time.
   bool growth_codes = true;
 
-  bool all() const {
-    return border_codes && faces && layers && middles && bends && stretch && growth && lines && dual_cells;
-  }
   StretchFit fit() const { return steep ? StretchFit::kSteep : StretchFit::kGentle; }
-  bool fitsLayers() const { return steep && layers && faces && growth && lines; }
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.
 /// Pure: any thread. Throws nothing but bad_alloc.
 void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch, NodeSplats& out,
-                       const NodeSplatCorrections& corrections = {});
+                       const SplatRules& rules = {});
 
 }  // namespace curvisplat

@@ -72,8 +72,7 @@ struct FrameOptions {
   PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;
   /// The processes that draw the picture together, each some of its tiles; null: this process alone.
   Ranks* ranks = nullptr;
-  bool direct_reads = true;  // bypass the page cache if the file system can
-  std::stop_token stop;      // ends the drawing with Interrupted
+  std::stop_token stop;  // ends the drawing with Interrupted
 };
 
 }  // namespace curvisplat

@@ -99,9 +99,8 @@ void FramePipeline::makePools(const FrameOptions& options) {
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
   pager.way = options.read_by;
-  pager.direct = options.direct_reads;
   if (pools_ && pools_->budget == budget && pools_->pager.way == pager.way &&
-      pools_->pager.direct == pager.direct && permits_->count() == threadsOf(options))
+      permits_->count() == threadsOf(options))
     return;
   dropPools();  // before the new ones take their memory
   permits_ = std::make_unique<ComputePermits>(threadsOf(options));

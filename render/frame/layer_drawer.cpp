@@ -148,15 +148,8 @@ std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const F
   while (!left.empty()) {
     const TileRange tiles = left.back();
     left.pop_back();
-    IsoSplats splats({settings.view,
-                      options.scene->isovalues,
-                      settings.borders,
-                      settings.clip_planes,
-                      input.depth_origin,
-                      tiles,
-                      isoSplatBytes(options),
-                      {},
-                      coloured_by_.has_value()},
+    IsoSplats splats({settings.view, options.scene->isovalues, settings.borders, settings.clip_planes,
+                      input.depth_origin, tiles, isoSplatBytes(options), coloured_by_.has_value()},
                      plan.iso_parts.size());
     const auto take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& of_part) {
       const auto& values = of_colours ? *of_part.second : of_part.values;

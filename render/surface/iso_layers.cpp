@@ -17,6 +17,7 @@
 #include "render/project/tile_set.h"
 #include "render/surface/surface_shader.h"
 #include "stream/base/error.h"
+#include "stream/model/corrections.h"
 
 namespace curvisplat {
 namespace {
@@ -77,7 +78,7 @@ class IsoLayers::Tracer {
     seen_.fill({});
     for (int y = 0; y < kTileSide; y += kBlock)
       for (int x = 0; x < kTileSide; x += kBlock) trace({x, y, x + kBlock, y + kBlock});
-    if (splats_.settings().corrections.smooth) {
+    if (correctionsToMake().isosurfaces.smooth) {
       traceAround();
       for (int row = 0; row < kBlocks; ++row)
         for (int column = 0; column < kBlocks; ++column) smoothBlock(column, row);

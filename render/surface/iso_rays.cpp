@@ -120,7 +120,7 @@ void IsoRays::heaviestAt(Place& place) const {
 }
 
 void IsoRays::fieldAt(Place& place) const {
-  if (!settings_.corrections.common_field) return heaviestAt(place);
+  if (!corrections_.common_field) return heaviestAt(place);
   sumField(active_, place.z, place.field);
 }
 
@@ -190,7 +190,7 @@ float IsoRays::otherAt(size_t ray, float z, const glm::dvec3& at) const {
 
 /// Whether most of the weight at a point is behind borders' faces.
 bool IsoRays::isOutside(size_t ray, float z, const glm::dvec3& at, float weight) const {
-  if (!settings_.corrections.ended) return false;
+  if (!corrections_.ended) return false;
   float outside = 0;
   for (const IsoCrossed* crossed : active_) {
     if (crossed->splat->faces.empty()) continue;

@@ -20,6 +20,7 @@
 #include "render/colour/classification.h"
 #include "render/surface/iso_field.h"
 #include "render/surface/iso_splats.h"
+#include "stream/model/corrections.h"
 
 namespace curvisplat {
 
@@ -116,6 +117,7 @@ class IsoRays {
   unsigned openRays() const;
 
   const IsoSplats::Settings settings_;
+  const IsoCorrections corrections_ = correctionsToMake().isosurfaces;
   IsoFan fan_;
   std::vector<IsoCrossed> crossed_;
   std::vector<const IsoCrossed*> waiting_, active_;  // that begin ahead; that the last two places may touch

@@ -41,13 +41,6 @@ struct IsoSplat {
   uint32_t first_face, faces;  // of its brick's
 };
 
-/// Each can be left out, to see what it is worth.
-struct IsoCorrections {
-  bool common_field = true;  // else the field is that of the splat that weighs most
-  bool ended = true;         // else surfaces reach as far behind borders as splats do
-  bool smooth = true;        // else outlines have one ray a pixel
-};
-
 class IsoSplats {
  public:
   struct Settings {
@@ -58,7 +51,6 @@ class IsoSplats {
     double depth_origin = 0;  // PixelLayers'
     TileRange tiles;
     uint64_t most_bytes = 0;
-    IsoCorrections corrections = {};
     bool two_scalars = false;  // the picture's
   };
   /// Holds the splats of `parts` parts of bricks. What `settings` refers to outlives it.

@@ -6,6 +6,7 @@
 
 #include "render/project/footprint.h"
 #include "render/project/splat_pieces.h"
+#include "stream/model/corrections.h"
 
 namespace curvisplat {
 namespace {
@@ -76,20 +77,27 @@ bool between(double a, double b, double c, int& first, int& last) {
   return first <= last;
 }
 
+/// How much of a splat's own gradient counts, and how much of the common one.
+double ownShare(const SliceCorrections& corrections) {
+  if (!corrections.slopes) return 0;
+  return corrections.common_gradient ? kOwn : 1;
+}
+double commonShare(const SliceCorrections& corrections) {
+  return corrections.slopes && corrections.common_gradient ? 1 - kOwn : 0;
+}
+
 }  // namespace
 
 SliceSampler::SliceSampler(const ScreenView& view, const ClipPlane& plane, double low, double high,
-                           const BorderStyle& borders, const SliceCorrections& corrections)
+                           const BorderStyle& borders)
     : view_(view),
       plane_{plane.point, glm::normalize(plane.normal)},
       low_(low),
       per_range_(high > low ? 1 / (high - low) : 0),
       per_length_(perLengthOf(view, plane.point)),
       borders_(borders),
-      own_(!corrections.slopes           ? 0
-           : corrections.common_gradient ? kOwn
-                                         : 1),
-      common_(corrections.slopes && corrections.common_gradient ? 1 - kOwn : 0),
+      own_(ownShare(correctionsToMake().slices)),
+      common_(commonShare(correctionsToMake().slices)),
       sums_(view.size.pixels()) {
   const Hit middle = hitOf(0.5 * view.size.width, 0.5 * view.size.height);
   // In perspective some pixels may see a plane that the middle sees edge-on.

@@ -33,17 +33,11 @@
 
 namespace curvisplat {
 
-/// Each can be left out, to see what it is worth.
-struct SliceCorrections {
-  bool slopes = true;           // else a splat has its mean everywhere
-  bool common_gradient = true;  // else the gradient is each splat's own alone
-};
-
 class SliceSampler {
  public:
   /// `low`, `high`: the scalar's range. `borders`: how cells at borders are drawn.
   SliceSampler(const ScreenView& view, const ClipPlane& plane, double low, double high,
-               const BorderStyle& borders, const SliceCorrections& corrections = {});
+               const BorderStyle& borders);
 
   const ClipPlane& plane() const { return plane_; }
   /// Whether the plane is seen from a side: if not, no pixel has a point of it.

@@ -14,6 +14,7 @@
 #include "stream/model/border_code.h"
 #include "tests/reference/mapped_block.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/with_corrections.h"
 
 namespace curvisplat {
 namespace {
@@ -45,11 +46,13 @@ struct CellBlock : MappedBlock {
       for (const auto& values : nodes.scalars) nodes.blank[n] |= std::isnan(values[n]) ? kNoValue : 0;
   }
 
-  NodeSplats cellSplats(const BlockEnds& ends = {}, const NodeSplatCorrections& corrections = {}) {
+  NodeSplats cellSplats(const BlockEnds& ends = {}, const SplatCorrections& corrections = {},
+                        const SplatRules& rules = {}) {
+    const WithCorrections scope({corrections, {}, {}});
     mark();
     NodeSplats out;
     CellScratch scratch;
-    computeCellSplats(window(), {0, block.nj, 0, block.nk}, ends, scratch, out, corrections);
+    computeCellSplats(window(), {0, block.nj, 0, block.nk}, ends, scratch, out, rules);
     return out;
   }
 };
@@ -189,9 +192,9 @@ TEST(CellSplats, OfOneLayerEndAtBothOfItsFaces) {
     const glm::dvec3 along = splat->splat.factor() * glm::dvec3(inward.axis[0]);
     EXPECT_LT(glm::distance(along, (half == 0 ? 0.5 : -0.5) * jacobian[2]), 0.02);
   }
-  NodeSplatCorrections older;
+  SplatRules older;
   older.dual_cells = false;
-  EXPECT_EQ(grid.cellSplats({0, &faces}, older).splats.size(), 4u * 3);
+  EXPECT_EQ(grid.cellSplats({0, &faces}, {}, older).splats.size(), 4u * 3);
 }
 
 TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
@@ -210,7 +213,7 @@ TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
                                        grid.at(i, j, k), grid.block.ni, grid.block.ni * grid.block.nj)));
   EXPECT_NEAR(totalWeight(grid.cellSplats()), volume, 1e-12 * volume);
   // The density of a constant field is the same in every cell, but for what the neighbours' sizes do to it.
-  NodeSplatCorrections corrections;
+  SplatCorrections corrections;
   corrections.stretch = false;
   const NodeSplats out = grid.cellSplats({}, corrections);
   EXPECT_NEAR(totalWeight(out), volume, 1e-12 * volume);

@@ -25,7 +25,7 @@ TEST(NodeSplats, OfAnUnevenGridTileIt) {
   const std::vector<double> x{0, 1, 2.6, 3.6, 4.3, 5.4, 6.1, 6.6};
   const MappedBlock grid(
       8, 3, 3, [&](double i, double j, double k) { return glm::dvec3(x[static_cast<size_t>(i)], j, k); });
-  NodeSplatCorrections corrections;
+  SplatCorrections corrections;
   corrections.stretch = false;
   const NodeSplats out = grid.splats(corrections);
   double end = 0;
@@ -85,7 +85,7 @@ TEST(NodeSplats, OfABentGridLieInTheMiddleOfTheirKinkedCells) {
   };
   MappedBlock grid(7, 5, 6, node);
   grid.addScalar([](const glm::dvec3& p) { return p.x + 2 * p.y - p.z; });
-  NodeSplatCorrections corrections;
+  SplatCorrections corrections;
   corrections.stretch = corrections.growth = corrections.bends = false;
   const NodeSplats out = grid.splats(corrections);
   for (uint64_t k : {0, 1, 3}) {
@@ -114,9 +114,9 @@ TEST(NodeSplats, OfAnUnevenGridAreStretchedButKeepVolumeAndMiddle) {
     return glm::dvec3(x[static_cast<size_t>(i)], j + 0.2 * x[static_cast<size_t>(i)], k);
   });
   grid.addScalar([](const glm::dvec3& p) { return p.x; });
-  NodeSplatCorrections corrections;
+  SplatCorrections corrections;
   corrections.stretch = false;
-  NodeSplatCorrections even;
+  SplatCorrections even;
   even.growth = false;
   const NodeSplats plain = grid.splats(corrections), stretched = grid.splats(even);
   EXPECT_NEAR(totalWeight(stretched) / totalWeight(plain), 1, 1e-12);
@@ -148,7 +148,7 @@ TEST(NodeSplats, OfAnUnevenGridAreStretchedButKeepVolumeAndMiddle) {
 TEST(NodeSplats, OfAGrowingGridDrift) {
   MappedBlock grid(13, 5, 5, [](double i, double j, double k) { return glm::dvec3(std::pow(1.2, i), j, k); });
   grid.addScalar([](const glm::dvec3& p) { return p.x; });
-  NodeSplatCorrections even;
+  SplatCorrections even;
   even.growth = false;
   const NodeSplats without = grid.splats(even), drifted = grid.splats();
   for (uint64_t i = 0; i < 13; ++i) {
@@ -169,7 +169,7 @@ TEST(NodeSplats, BesideABlankAreStretchedAsAtTheEndOfABlock) {
   for (uint64_t j = 0; j < 8; ++j)
     for (uint64_t i = 0; i < 9; ++i) holed.nodes.blank[holed.at(i, j, 8)] = 1;
   // Cells in the layers behind several faces are fitted to where they are cut; beside a blank there is no such layer.
-  NodeSplatCorrections corrections;
+  SplatCorrections corrections;
   corrections.layers = false;
   const NodeSplats found = holed.splats(corrections),
                    expected = MappedBlock(9, 8, 8, mapping).splats(corrections);
@@ -271,8 +271,8 @@ MappedBlock withShortLastCells() {
 }
 
 /// How far beyond the upper face of i the renderer takes the face to be that the node at (8, j, k) is behind.
-double beyondFace(const MappedBlock& grid, const NodeSplatCorrections& corrections, uint64_t j, uint64_t k) {
-  const NodeSplat node = grid.splats(corrections).splats[grid.at(8, j, k)];
+double beyondFace(const MappedBlock& grid, const SplatRules& rules, uint64_t j, uint64_t k) {
+  const NodeSplat node = grid.splats({}, rules).splats[grid.at(8, j, k)];
   EXPECT_NE(layersOf(node.border_code), 0u);
   const CellGrowth growth = cellGrowth(node.growth_code);
   float inwards = 0;
@@ -284,7 +284,7 @@ double beyondFace(const MappedBlock& grid, const NodeSplatCorrections& correctio
 // Codes of cells behind several faces have no distances.
 TEST(NodeSplats, BehindSeveralFacesAreCutAtThem) {
   const MappedBlock grid = withShortLastCells();
-  NodeSplatCorrections earlier;
+  SplatRules earlier;
   earlier.steep = false;
   for (const auto& [j, k] : {std::pair<uint64_t, uint64_t>{8, 4}, {4, 1}, {4, 0}}) {
     EXPECT_GT(beyondFace(grid, earlier, j, k), 0.08) << j << " " << k;
@@ -294,9 +294,9 @@ TEST(NodeSplats, BehindSeveralFacesAreCutAtThem) {
 
 TEST(NodeSplats, BehindOneFaceAndElsewhereStayAsTheyAre) {
   const MappedBlock grid = withShortLastCells();
-  NodeSplatCorrections earlier;
+  SplatRules earlier;
   earlier.steep = false;
-  const NodeSplats before = grid.splats(earlier), after = grid.splats();
+  const NodeSplats before = grid.splats({}, earlier), after = grid.splats();
   for (const auto& [i, j] : {std::pair<uint64_t, uint64_t>{8, 4}, {9, 4}, {4, 4}, {7, 5}}) {
     const NodeSplat &a = before.splats[grid.at(i, j, 4)], &b = after.splats[grid.at(i, j, 4)];
     EXPECT_EQ(a.splat.axis, b.splat.axis) << i << " " << j;

@@ -118,9 +118,9 @@ TEST(NodeSplats, BesideBlankedNodesAreHalfCells) {
   EXPECT_TRUE(allFinite(out));
   // The eight cells around it are not there; older caches kept what is in the pieces of nodes across an edge or a corner.
   EXPECT_NEAR(totalWeight(out), 216 - 8, 1e-12);
-  NodeSplatCorrections older;
+  SplatRules older;
   older.octants = older.dual_cells = false;
-  EXPECT_NEAR(totalWeight(grid.splats(older)), 216 - 1 - 6 * 0.5, 1e-12);
+  EXPECT_NEAR(totalWeight(grid.splats({}, older)), 216 - 1 - 6 * 0.5, 1e-12);
 
   const NodeSplat& above = out.splats[grid.at(3, 3, 4) - 1];
   ASSERT_EQ(above.node, grid.at(3, 3, 4));
@@ -141,7 +141,7 @@ TEST(NodeSplats, BehindABlocksFaceKnowHowFarItIs) {
   MappedBlock grid(6, 5, 3, [&](double i, double j, double k) {
     return jacobian * glm::dvec3(i, j < 1 ? 0 : 0.5 + 0.5 * j, k);  // at 0, 1, 1.5, 2, 2.5
   });
-  NodeSplatCorrections corrections;
+  SplatCorrections corrections;
   corrections.stretch = false;  // the splats are then as long as the cells
   const NodeSplats out = grid.splats(corrections);
   const auto expectBehind = [&](size_t at, size_t face, const glm::dvec3& along, double distance) {
@@ -357,9 +357,9 @@ TEST(NodeSplats, OnAPolarAxisWereFlooredAndHadNoVolume) {
     return glm::dvec3(j * std::cos(i * M_PI / 6), j * std::sin(i * M_PI / 6), k);
   });
   grid.addScalar([](const glm::dvec3& p) { return p.x; });
-  NodeSplatCorrections older;
+  SplatRules older;
   older.dual_cells = false;
-  const NodeSplats out = grid.splats(older);
+  const NodeSplats out = grid.splats({}, older);
   EXPECT_TRUE(allFinite(out));
   EXPECT_EQ(out.degenerate, 13u * 4u);
   for (const NodeSplat& node : out.splats) {

@@ -18,6 +18,7 @@
 #include "render/project/projection.h"
 #include "render/surface/scene_layers.h"
 #include "tests/reference/splat_compositor.h"
+#include "tests/support/with_corrections.h"
 
 namespace curvisplat {
 namespace {
@@ -44,7 +45,7 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
     source.read(b, all, std::span(&scalar, 1), nodes);
     NodeScratch scratch;
     NodeSplats splats;
-    computeNodeSplats({blocks[b], first_node, all, &nodes}, all, scratch, splats, options.nodes);
+    computeNodeSplats({blocks[b], first_node, all, &nodes}, all, scratch, splats);
     for (size_t n = 0; n < splats.splats.size(); ++n) {
       if (!splats.splats[n].isForSeams() || !options.merge_seams)
         take(splats.splats[n], {&splats.values[n], 1});
@@ -104,8 +105,7 @@ PixelLayers sceneLayers(const DirectOptions& options, const ProjectionSettings& 
   std::vector<std::unique_ptr<SliceSampler>> slices;
   const SplatRange all{0, static_cast<uint32_t>(splats.geometry.size())};
   for (const ClipPlane& plane : scene.slices) {
-    slices.push_back(
-        std::make_unique<SliceSampler>(settings.view, plane, *low, *high, settings.borders, options.slices));
+    slices.push_back(std::make_unique<SliceSampler>(settings.view, plane, *low, *high, settings.borders));
     slices.back()->add(splats.origin, arraysOf(splats.geometry), arraysOf(splats.variable), {&all, 1});
   }
   const double depth_origin =
@@ -120,8 +120,7 @@ PixelLayers sceneLayers(const DirectOptions& options, const ProjectionSettings& 
                          settings.clip_planes,
                          depth_origin,
                          {0, isosurfaces->tiles()},
-                         kEnough,
-                         options.isosurfaces},
+                         kEnough},
                         1);
     of_values.add(0, splats.origin, arraysOf(splats.geometry), arraysOf(splats.variable), nullptr, {&all, 1});
     of_values.sort();
@@ -152,6 +151,7 @@ bool isBehind(const PixelLayers& layers, const ScreenSplat& splat, float depth) 
 
 Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOptions& options,
                    const TransferFunction& function, const Camera& camera, ImageSize size) {
+  const WithCorrections scope({options.nodes, options.slices, options.isosurfaces});
   ProjectionSettings settings;
   std::vector<DirectSplat> splats = splatsOf(source, scalar, options);
   double low = splats.front().value.mean, high = low;  // the data's, which merged splats do not reach

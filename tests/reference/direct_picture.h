@@ -16,14 +16,13 @@
 #include "render/project/light.h"
 #include "render/project/plane_cuts.h"
 #include "render/project/screen_view.h"
-#include "render/surface/iso_splats.h"
-#include "render/surface/slice_sampler.h"
 #include "render/surface/surface_scene.h"
+#include "stream/model/corrections.h"
 
 namespace curvisplat {
 
 struct DirectOptions {
-  NodeSplatCorrections nodes;
+  SplatCorrections nodes;
   bool merge_seams = true;  // else coincident nodes of block faces stay apart
   UnlikeHalves unlike = UnlikeHalves::kApart;
   bool border_parts = true;  // else half cells are drawn as one splat

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "tests/support/with_corrections.h"
+
 namespace curvisplat {
 
 MappedBlock::MappedBlock(uint64_t ni, uint64_t nj, uint64_t nk, const Mapping& mapping)
@@ -32,10 +34,11 @@ void MappedBlock::roundToFloat() {
     for (double& value : *values) value = static_cast<float>(value);
 }
 
-NodeSplats MappedBlock::splats(const NodeSplatCorrections& corrections) const {
+NodeSplats MappedBlock::splats(const SplatCorrections& corrections, const SplatRules& rules) const {
+  const WithCorrections scope({corrections, {}, {}});
   NodeScratch scratch;
   NodeSplats out;
-  computeNodeSplats(window(), {0, block.nj, 0, block.nk}, scratch, out, corrections);
+  computeNodeSplats(window(), {0, block.nj, 0, block.nk}, scratch, out, rules);
   return out;
 }
 

@@ -14,6 +14,7 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/block_window.h"
 #include "preprocess/splats/node_splats.h"
+#include "stream/model/corrections.h"
 
 namespace curvisplat {
 
@@ -31,7 +32,7 @@ struct MappedBlock {
   void addScalar(const std::function<double(const glm::dvec3&)>& f);
   void roundToFloat();
   BlockWindow window() const { return {block, first_node, {0, block.nj, 0, block.nk}, &nodes}; }
-  NodeSplats splats(const NodeSplatCorrections& corrections = {}) const;
+  NodeSplats splats(const SplatCorrections& corrections = {}, const SplatRules& rules = {}) const;
 };
 
 double totalWeight(const NodeSplats& splats);

@@ -19,6 +19,7 @@
 #include "tests/reference/known_pictures.h"
 #include "tests/reference/splat_compositor.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/with_corrections.h"
 
 namespace curvisplat {
 namespace {
@@ -57,12 +58,12 @@ class IsoLayersTest : public testing::Test {
   }
 
   IsoLayers drawn(std::vector<double> values, const std::vector<TileRange>& ranges, int threads = 1) {
+    const WithCorrections scope({{}, {}, corrections_});
     view_ = ScreenView::of(camera_, kSize, glm::dvec3(1), kLowPass, 1e-3);
     const ColourTable colours(KnownFunction::of("smooth").table);
     IsoLayers layers(kSize);
     for (const TileRange& tiles : ranges) {
-      IsoSplats splats({view_, values, kHalfCellStyle, planes_, 0, tiles, uint64_t{1} << 30, corrections_},
-                       kParts);
+      IsoSplats splats({view_, values, kHalfCellStyle, planes_, 0, tiles, uint64_t{1} << 30}, kParts);
       addParts(splats, threads);
       splats.sort();
       tbb::task_arena arena(threads);
