@@ -55,7 +55,8 @@ class OpenBorders {
     glm::dvec3 face{0.0};    // a point of it
     uint8_t axis = 0;        // LayerAxis'
   };
-  /// The same with such faces, apart from those across a direction in which one of the parts ends.
+  /// The half cell of `merged` as above, with the faces of `layers` but for those across a direction in which one of the
+  /// parts ends.
   LayeredBorder of(const Splat& merged, std::span<const Layer> layers) const;
 
  private:
@@ -110,7 +111,7 @@ inline JointFrames framesOf(UnlikeHalves unlike) {
 
 /// Halves are unlike if one is more than this many times as thick as the other.
 inline constexpr double kMaxJointRatio = 2.5;
-/// The same limit where grid lines have a kink at the joint: one splat of two such halves bulges out of both.
+/// This limit holds where grid lines have a kink at the joint: one splat of two such halves bulges out of both.
 inline constexpr double kMaxKinkedRatio = 1.3;
 
 /// A splat with its values.

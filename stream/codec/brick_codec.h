@@ -63,8 +63,8 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
 void decodeVariable(const Brick& brick, const BrickVariable& variable, std::span<const std::byte> bytes,
                     SplatVariable& out);
 
-/// The same two functions for arrays of brick.splats elements. `references`: those that stepsBackOf() names
-/// for this stream.
+/// Decode a stream as the two functions above do, to arrays of brick.splats elements. `references`: those that
+/// stepsBackOf() names for this stream.
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
                     const GeometryArrays<float>& out);
 void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out,
