@@ -1,5 +1,5 @@
 # A recipe for Spack: copy this file to packages/curvisplat/ of a repository of packages of your own, then in a clone of the project
-# `spack dev-build curvisplat@0.1.0`.
+# `spack dev-build curvisplat@1.0.0`.
 # Untested: no Spack is at hand where this was written. tests/structure/check_recipes.py checks its syntax, its version, and that each
 # library that the build looks for is named; a package may have another name than here.
 from spack.package import *
@@ -10,7 +10,7 @@ class Curvisplat(CMakePackage):
 
     manual_download = True  # from a clone: dev-build
     license("Apache-2.0")
-    version("0.1.0")
+    version("1.0.0")
 
     variant("window", default=True, description="The window, curvisplat view")
     variant("server", default=True, description="Pictures in a browser, curvisplat serve")
