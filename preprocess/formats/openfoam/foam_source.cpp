@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
@@ -11,7 +10,6 @@
 #include <set>
 #include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -20,6 +18,7 @@
 #include "preprocess/formats/common/element_source.h"
 #include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/openfoam/foam_case.h"
 #include "preprocess/formats/openfoam/foam_file.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
@@ -30,78 +29,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint64_t kChunk = 65536;
-
-bool hasMesh(const fs::path& folder, const fs::path& region) {
-  return FoamFile::exists(folder / "constant" / region / "polyMesh" / "faces");
-}
-
-/// The meaning of a user's path: a case, and a region of it if that is CASE/constant/REGION.
-struct CasePath {
-  fs::path folder;
-  std::string region;
-};
-
-CasePath caseOf(const fs::path& path) {
-  std::error_code error;
-  if (!fs::is_directory(path, error))
-    return {path.parent_path().empty() ? fs::path(".") : path.parent_path(), ""};
-  const fs::path region = path.has_filename() ? path : path.parent_path(), constant = region.parent_path();
-  if (constant.filename() == "constant" && FoamFile::exists(region / "polyMesh" / "faces"))
-    return {constant.has_parent_path() ? constant.parent_path() : fs::path("."), region.filename().string()};
-  return {path, ""};
-}
-
-/// The regions that have a mesh of their own, in the order of their names.
-std::vector<std::string> regionsIn(const fs::path& folder) {
-  std::vector<std::string> regions;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder / "constant", error))
-    if (const std::string name = entry.path().filename().string(); hasMesh(folder, name))
-      regions.push_back(name);
-  std::sort(regions.begin(), regions.end());
-  return regions;
-}
-
-bool hasMesh(const fs::path& folder) {
-  return hasMesh(folder, "") || !regionsIn(folder).empty();
-}
-
-struct Processor {
-  fs::path folder;
-  uint32_t part = 0;  // of collated files
-};
-
-std::vector<Processor> processorsOf(const fs::path& folder) {
-  std::vector<Processor> processors;
-  for (int n = 0; hasMesh(folder / fmt::format("processor{}", n)); ++n)
-    processors.push_back({folder / fmt::format("processor{}", n)});
-  if (!processors.empty()) return processors;
-  // "processors8", "processors8_0-3", or "processors" alone
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (!entry.path().filename().string().starts_with("processors") || !hasMesh(entry.path())) continue;
-    const fs::path region = hasMesh(entry.path(), "") ? "" : regionsIn(entry.path()).front();
-    const uint32_t parts = FoamFile::processorsIn(entry.path() / "constant" / region / "polyMesh" / "faces");
-    for (uint32_t part = 0; part < parts; ++part) processors.push_back({entry.path(), part});
-  }
-  std::sort(processors.begin(), processors.end(), [](const Processor& a, const Processor& b) {
-    return std::tie(a.folder, a.part) < std::tie(b.folder, b.part);
-  });
-  return processors;
-}
-
-/// The times that have a folder, in their order.
-std::vector<std::pair<double, std::string>> timesIn(const fs::path& folder) {
-  std::vector<std::pair<double, std::string>> times;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    double time = 0;
-    // A run that diverges may leave a folder "nan", which has no place among times.
-    if (entry.is_directory() && parseNumber(entry.path().filename().string(), time) && std::isfinite(time))
-      times.emplace_back(time, entry.path().filename().string());
-  }
-  std::sort(times.begin(), times.end());
-  return times;
-}
 
 size_t componentsOf(const std::string& type) {
   if (type == "volScalarField" || type == "volScalarField::Internal" || type == "volSphericalTensorField")
@@ -182,8 +109,8 @@ class FoamSource final : public ElementSource {
 
 FoamSource::FoamSource(const OpenGridOptions& options)
     : spools_(options.temporary_folder), temporary_folder_(options.temporary_folder) {
-  choosePieces(caseOf(options.grid).folder);
-  chooseRegions(caseOf(options.grid).region);
+  choosePieces(foamCaseOf(options.grid).folder);
+  chooseRegions(foamCaseOf(options.grid).region);
   findTimes(options.time_step, options.grid);
   for (Piece& piece : pieces_) openPiece(piece);
   const bool binary = open(pieces_.front(), meshFile(pieces_.front(), "faces")).isBinary();
@@ -197,10 +124,10 @@ FoamSource::FoamSource(const OpenGridOptions& options)
 }
 
 void FoamSource::choosePieces(const fs::path& folder) {
-  const std::vector<Processor> processors = processorsOf(folder);
-  decomposed_ = !hasMesh(folder);
+  const std::vector<FoamProcessor> processors = foamProcessorsOf(folder);
+  decomposed_ = !hasFoamMesh(folder);
   if (!decomposed_ && !processors.empty()) {
-    const auto whole = timesIn(folder), parts = timesIn(processors.front().folder);
+    const auto whole = foamTimesIn(folder), parts = foamTimesIn(processors.front().folder);
     decomposed_ = !parts.empty() && (whole.empty() || parts.back().first > whole.back().first);
     if (decomposed_)
       description_.notes.push_back(fmt::format(
@@ -218,7 +145,7 @@ void FoamSource::choosePieces(const fs::path& folder) {
     pieces_.emplace_back().folder = folder;
     return;
   }
-  for (const Processor& processor : processors) {
+  for (const FoamProcessor& processor : processors) {
     Piece& piece = pieces_.emplace_back();
     piece.folder = processor.folder;
     piece.processor = processor.part;
@@ -229,8 +156,8 @@ void FoamSource::choosePieces(const fs::path& folder) {
 void FoamSource::chooseRegions(const std::string& asked) {
   const std::vector<Piece> folders = std::exchange(pieces_, {});
   for (const Piece& of : folders) {
-    const std::vector<std::string> regions = regionsIn(of.folder);
-    const bool whole = asked.empty() && hasMesh(of.folder, "");
+    const std::vector<std::string> regions = foamRegionsIn(of.folder);
+    const bool whole = asked.empty() && hasFoamMesh(of.folder, "");
     if (whole) pieces_.push_back(of);
     for (const std::string& region : regions)
       if (asked == region || (asked.empty() && !whole)) pieces_.emplace_back(of).region = region;
@@ -249,7 +176,7 @@ void FoamSource::chooseRegions(const std::string& asked) {
 }
 
 void FoamSource::findTimes(std::optional<uint32_t> asked, const fs::path& shown) {
-  for (const auto& [time, name] : timesIn(pieces_.front().folder)) {
+  for (const auto& [time, name] : foamTimesIn(pieces_.front().folder)) {
     description_.times.push_back(time);
     time_names_.push_back(name);
   }
@@ -469,8 +396,8 @@ bool isFoamCase(const fs::path& path) {
   const bool folder = fs::is_directory(path, error);
   const std::string ending = path.extension().string();
   if (!folder && ending != ".foam" && ending != ".OpenFOAM") return false;
-  const fs::path of = caseOf(path).folder;
-  return hasMesh(of) || !processorsOf(of).empty();
+  const fs::path of = foamCaseOf(path).folder;
+  return hasFoamMesh(of) || !foamProcessorsOf(of).empty();
 }
 
 std::unique_ptr<DataSource> openFoam(const OpenGridOptions& options) {

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstring>
 
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/tecplot/tecplot_header.h"
+#include "preprocess/formats/tecplot/tecplot_numbers.h"
 #include "stream/base/disk_space.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
@@ -19,94 +19,6 @@ namespace {
 constexpr uint64_t kLooked = 2048;
 constexpr size_t kMaxHeaderTokens = 1 << 20;
 constexpr uint64_t kMaxDimension = uint64_t{1} << 40;
-
-bool beginsNumber(std::string_view word) {
-  if (word.empty()) return false;
-  if (std::strchr("+-.0123456789", word[0])) return true;
-  double value = 0;
-  return parseNumber(word.substr(0, word.find(',')), value);  // nan, inf
-}
-
-/// Numbers that a word stands for: "1.5", "3*1.5", "1,2,3". Calls add(value, times). False if it is none.
-template <typename Add>
-bool forEachNumber(std::string_view word, const Add& add) {
-  while (!word.empty()) {
-    const size_t comma = std::min(word.find(','), word.size());
-    std::string_view number = word.substr(0, comma);
-    word.remove_prefix(std::min(comma + 1, word.size()));
-    if (number.empty()) continue;
-    uint64_t times = 1;
-    if (const size_t star = number.find('*'); star != std::string_view::npos) {
-      const auto [end, error] = std::from_chars(number.data(), number.data() + star, times);
-      if (error != std::errc() || end != number.data() + star) return false;
-      number.remove_prefix(star + 1);
-    }
-    if (!add(number, times)) return false;
-  }
-  return true;
-}
-
-/// Passes over the numbers at the reader's position.
-FilePart countNumbers(TextReader& text) {
-  FilePart numbers;
-  numbers.begin = text.offset();
-  uint64_t& count = numbers.count;
-  size_t sampled = 0;
-  for (;;) {
-    const std::string_view word = text.peekWord();
-    if (word.starts_with('#')) {
-      text.line();
-      continue;
-    }
-    if (!beginsNumber(word)) {
-      numbers.end = text.offset();
-      return numbers;
-    }
-    const uint64_t before = count;
-    forEachNumber(word, [&](std::string_view number, uint64_t times) {
-      count += std::min(times, kMaxDimension);
-      if (sampled++ < kDigitSamples) numbers.digits = std::max(numbers.digits, significantDigits(number));
-      return true;
-    });
-    if (count < before || count > kMaxDimension)
-      throw Error("{}: byte {}: more numbers than a grid can have; the file is damaged", text.file().name(),
-                  text.offset());
-    text.word();
-  }
-}
-
-/// Writes `count` doubles, the numbers from byte `begin`, to `sink`.
-void spoolNumbers(const std::shared_ptr<const PooledFile>& file, uint64_t begin, uint64_t count,
-                  const SpoolFile::Sink& sink) {
-  constexpr size_t kPending = 65536;
-  TextReader text(file, begin, file->size());
-  std::vector<double> pending;
-  const auto flush = [&] {
-    sink(std::as_bytes(std::span(pending)));
-    pending.clear();
-  };
-  for (uint64_t left = count; left > 0;) {
-    const std::string_view word = text.peekWord();
-    if (word.starts_with('#')) {
-      text.line();
-      continue;
-    }
-    const bool numbers = !word.empty() && forEachNumber(word, [&](std::string_view number, uint64_t times) {
-      double value = 0;
-      if (!parseNumber(number, value)) return false;
-      for (uint64_t n = 0; n < times && left > 0; ++n, --left) {
-        pending.push_back(value);
-        if (pending.size() == kPending) flush();
-      }
-      return true;
-    });
-    if (!numbers)
-      throw Error("{}: byte {}: found \"{}\"; expected a number", file->name(), text.offset(),
-                  printable(text.peekWord().substr(0, 30)));
-    text.word();
-  }
-  if (!pending.empty()) flush();
-}
 
 struct TextZone {
   bool point = false, has_packing = false, has_j = false;
@@ -163,7 +75,7 @@ class Reader {
       passed_.push_back((*known_)[passed_.size()]);
       text_.seek(passed_.back().end);
     } else {
-      passed_.push_back(countNumbers(text_));
+      passed_.push_back(countTecplotNumbers(text_));
     }
     return passed_.back();
   }
@@ -174,7 +86,7 @@ class Reader {
     int depth = 0;
     for (;;) {
       const std::string_view word = text_.peekWord();
-      if (word.empty() || (depth <= 0 && beginsNumber(word))) return tokens;
+      if (word.empty() || (depth <= 0 && beginsTecplotNumber(word))) return tokens;
       const auto line = text_.line();
       const size_t before = tokens.size();
       if (line) tokenizeTecplot(*line, tokens);
@@ -317,7 +229,7 @@ class Reader {
       return word == "CELLCENTERED" ? Centring::kCell : Centring::kNode;
     };
     if (!value.empty() && value.front().kind == TecplotToken::Kind::kWord &&
-        !beginsNumber(value.front().text)) {
+        !beginsTecplotNumber(value.front().text)) {
       size_t n = 0;  // (NODAL, NODAL, CELLCENTERED)
       for (const TecplotToken& token : value) {
         if (token.kind == TecplotToken::Kind::kSign) continue;
@@ -408,7 +320,7 @@ class Reader {
     const auto bytes = std::make_shared<SpooledBytes>(
         spool_, 8 * count,
         [file = file_, begin = numbers.begin, count = numbers.count](const SpoolFile::Sink& sink) {
-          spoolNumbers(file, begin, count, sink);
+          spoolTecplotNumbers(file, begin, count, sink);
         });
     for (TecplotValues* const values : stored) values->bytes = bytes;
   }
