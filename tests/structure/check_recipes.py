@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the recipes of tools/packaging, which no package manager has tried: that they parse, that their version is the project's, and that
-they name each library that CMake looks for."""
+"""Checks the recipes of tools/packaging, which no package manager has tried: that they parse, and that they name each library that CMake
+looks for; and that all places that name the project's version name the same."""
 
 import ast
 import pathlib
@@ -48,9 +48,13 @@ def main():
     spack_names = {re.split(r"[@+~]", call.args[0].value)[0] for call in calls if call.func.id in ("depends_on", "extends")}
     spack_version = next(call.args[0].value for call in calls if call.func.id == "version")
 
-    for recipe, found in (("conda", conda_version), ("spack", spack_version)):
+    cited = re.search(r"^version: (\S+)", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)[1]
+    changed = re.search(r"^## \[(\d\S*)\]", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1]
+    example = re.search(r"find_package\(curvisplat (\S+)", (ROOT / "tests/install/example/CMakeLists.txt").read_text())[1]
+    for place, found in (("conda", conda_version), ("spack", spack_version), ("CITATION.cff", cited), ("CHANGELOG.md", changed),
+                         ("tests/install/example", example + version[len(example):])):
         if found != version:
-            failures.append(f"{recipe}: version {found}, CMakeLists.txt has {version}")
+            failures.append(f"{place}: version {found}, CMakeLists.txt has {version}")
     for name in sorted(looked_for()):
         if name not in PACKAGES:
             failures.append(f"CMake looks for {name}, of which PACKAGES here and the recipes know nothing")
