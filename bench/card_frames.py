@@ -101,7 +101,7 @@ def check_pictures(arguments, backends, out):
     def draw(backend, name, options):
         file = arguments.folder / f"{name}.pfm"
         results.run([arguments.program, "render", cache, "-o", file, "--backend", backend, "--size", picture, "--range", "0,1", "--view",
-                     "iso", "--background", "white", *options])
+                     "iso", "--background", "white", "--memory", "2G", *options])
         return file
 
     good = True

@@ -42,9 +42,9 @@ void CardBuffer::clear() const {
 GlTileLists::GlTileLists(const GlFunctions& gl, GlTimers& timers)
     : gl_(gl),
       timers_(timers),
-      programs_{programOf(gl, TileListStep::kCount),   programOf(gl, TileListStep::kScan),
-                programOf(gl, TileListStep::kEmit),    programOf(gl, TileListStep::kHistogram),
-                programOf(gl, TileListStep::kScatter), programOf(gl, TileListStep::kRanges)},
+      programs_{programOf(gl, TileListStep::kList), programOf(gl, TileListStep::kScan),
+                programOf(gl, TileListStep::kHistogram), programOf(gl, TileListStep::kScatter),
+                programOf(gl, TileListStep::kRanges)},
       counts_(gl),
       sums_(gl),
       totals_(gl),
@@ -66,8 +66,9 @@ void GlTileLists::dispatch(uint32_t groups) const {
 }
 
 void GlTileLists::setInputs(const GlProgram& program, const ListedSplats& splats, const CardTiles& tiles,
-                            const TileBox& box) const {
+                            const TileBox& box, bool writes) const {
   const auto set = [&](const char* name, uint32_t value) { gl_.Uniform1ui(program.uniform(name), value); };
+  gl_.Uniform1i(program.uniform("writes"), writes);
   set("first_splat", splats.first);
   set("splat_count", splats.count);
   set("waiting", splats.waiting);
@@ -99,7 +100,7 @@ uint64_t GlTileLists::count(const ListedSplats& splats, const CardTiles& tiles, 
   counts_.reserve(splats.count * sizeof(uint32_t));
   sums_.reserve(groups * sizeof(uint32_t));
   timers_.measure(kList, [&] {
-    setInputs(use(TileListStep::kCount), splats, tiles, box);
+    setInputs(use(TileListStep::kList), splats, tiles, box, false);
     dispatch(groups);
     scan(1, groups);
   });
@@ -127,7 +128,7 @@ void GlTileLists::make(const ListedSplats& splats, const CardTiles& tiles, const
 
 void GlTileLists::emit(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box) {
   sorted_ = 0;
-  setInputs(use(TileListStep::kEmit), splats, tiles, box);
+  setInputs(use(TileListStep::kList), splats, tiles, box, true);
   keys_[0].bind(4);
   numbers_[0].bind(5);
   dispatch(groupsOf(splats.count, kListThreads));

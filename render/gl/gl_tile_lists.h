@@ -79,7 +79,7 @@ class GlTileLists {
  private:
   const GlProgram& use(TileListStep step) const;
   void setInputs(const GlProgram& program, const ListedSplats& splats, const CardTiles& tiles,
-                 const TileBox& box) const;
+                 const TileBox& box, bool writes) const;
   void dispatch(uint32_t groups) const;
   void scan(uint32_t rows, uint32_t length);
   void sortDigit(uint64_t entries, uint32_t shift);
@@ -89,7 +89,7 @@ class GlTileLists {
 
   const GlFunctions& gl_;
   GlTimers& timers_;
-  const std::array<GlProgram, 6> programs_;  // [TileListStep]
+  const std::array<GlProgram, 5> programs_;  // [TileListStep]
   CardBuffer counts_, sums_, totals_, ranges_;
   std::array<CardBuffer, 2> keys_, numbers_;  // as they are, and sorted by the next digit
   size_t sorted_ = 0;

@@ -361,7 +361,8 @@ void main() {
     float rho2 = dot(u, u);
     if (rho2 >= support * support) continue;
     uvec2 tail = splats[4 * n + 2].zw;  // skew, along
-    Record next, beyond;
+    // Zeros where it has none: what the driver leaves in them is computed with, if only times 0.
+    Record next = Record(vec4(0.0), vec4(0.0), vec2(0.0)), beyond = next;
     if (splat.part1.y < 0.0) {
       next = recordOf(n - 1 - COLOURED);
       beyond = recordOf(n - 2 - COLOURED);

@@ -18,17 +18,23 @@ uint sumOf(uint a, uint b) {
   return a + b < a ? 0xffffffffu : a + b;
 }
 
+// What all threads wrote to shared variables is there for all of them.
+void meet() {
+  memoryBarrierShared();
+  barrier();
+}
+
 // The sum of the values of the threads before this one; lane_sums[THREADS - 1] is then that of all.
 uint sumBefore(uint value) {
   uint thread = gl_LocalInvocationID.x;
-  barrier();
+  meet();
   lane_sums[thread] = value;
-  barrier();
+  meet();
   for (uint step = 1u; step < THREADS; step *= 2u) {
     uint added = thread >= step ? lane_sums[thread - step] : 0u;
-    barrier();
+    meet();
     lane_sums[thread] = sumOf(lane_sums[thread], added);
-    barrier();
+    meet();
   }
   return lane_sums[thread] - value;
 }
@@ -52,16 +58,16 @@ void main() {
 }
 )";
 
-// Counts, and writes as well where EMITS is 1. Which tiles an ellipse touches: as orderTilesOf() in render/tiles/tile_lists.cpp.
+// Counts, and writes as well where `writes` says so: one program, since two might round the same ellipse differently, and
+// an entry that was not counted would lie in another splat's place. Which tiles an ellipse touches: as orderTilesOf() in render/tiles/tile_lists.cpp.
 constexpr const char* kList = R"(
 layout(std430, binding = 0) readonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
 layout(std430, binding = 1) buffer Counts { uint counts[]; };            // [splat]
 layout(std430, binding = 2) buffer Sums { uint sums[]; };                // [group]
 layout(std430, binding = 3) readonly buffer Closed { uint closed[]; };   // [tile of the picture] pixels that take no more
-#if EMITS
 layout(std430, binding = 4) writeonly buffer Keys { uvec2 keys[]; };
 layout(std430, binding = 5) writeonly buffer Numbers { uint numbers[]; };
-#endif
+uniform bool writes;
 uniform uint first_splat;  // in `splats`
 uniform uint splat_count;
 uniform uint waiting;      // of them, the first: what they have up to the key `before` was painted
@@ -87,7 +93,7 @@ bool isClosed(ivec2 tile) {
   return closed[closed_begin + tile.y * closed_columns + tile.x] == uint(pixels.x * pixels.y);
 }
 
-// Counts the splat's tiles, and writes them from `to` on.
+// Counts the splat's tiles; the entries that it writes begin at `to`.
 uint list(uint n, uint to) {
   uint at = first_splat + n;
   vec4 part0 = uintBitsToFloat(splats[4u * at]);
@@ -119,13 +125,13 @@ uint list(uint n, uint to) {
         if (key > front || n < waiting && key <= before) continue;
         key = min(max(key, least_key) - least_key, 0xffffffffu >> (32u - key_bits));
       }
-#if EMITS
-      uint tile = uint((row - box.y) * (box.z - box.x) + column - box.x);
-      keys[to + count] = key_bits == 0u    ? uvec2(tile, 0u)
-                         : key_bits == 32u ? uvec2(key, tile)
-                                           : uvec2(key | tile << key_bits, tile >> (32u - key_bits));
-      numbers[to + count] = at;
-#endif
+      if (writes) {
+        uint tile = uint((row - box.y) * (box.z - box.x) + column - box.x);
+        keys[to + count] = key_bits == 0u    ? uvec2(tile, 0u)
+                           : key_bits == 32u ? uvec2(key, tile)
+                                             : uvec2(key | tile << key_bits, tile >> (32u - key_bits));
+        numbers[to + count] = at;
+      }
       ++count;
     }
   }
@@ -134,15 +140,12 @@ uint list(uint n, uint to) {
 
 void main() {
   uint n = gl_GlobalInvocationID.x;
-#if EMITS
-  uint to = sums[gl_WorkGroupID.x] + sumBefore(n < splat_count ? counts[n] : 0u);
-  if (n < splat_count) list(n, to);
-#else
-  uint count = n < splat_count ? list(n, 0u) : 0u;
+  uint to = writes ? sums[gl_WorkGroupID.x] + sumBefore(n < splat_count ? counts[n] : 0u) : 0u;
+  uint count = n < splat_count ? list(n, to) : 0u;
+  if (writes) return;
   if (n < splat_count) counts[n] = count;
   sumBefore(count);
   if (gl_LocalInvocationID.x == 0u) sums[gl_WorkGroupID.x] = lane_sums[THREADS - 1u];
-#endif
 }
 )";
 
@@ -167,12 +170,12 @@ shared uint histogram[DIGITS];
 void main() {
   uint thread = gl_LocalInvocationID.x;
   histogram[thread] = 0u;
-  barrier();
+  meet();
   for (uint n = thread; n < SORTED_A_GROUP; n += THREADS) {
     uint entry = gl_WorkGroupID.x * SORTED_A_GROUP + n;
     if (entry < entry_count) atomicAdd(histogram[digitOf(entry)], 1u);
   }
-  barrier();
+  meet();
   sums[thread * gl_NumWorkGroups.x + gl_WorkGroupID.x] = histogram[thread];
 }
 )";
@@ -193,21 +196,21 @@ void main() {
   offsets[thread] = sumBefore(totals[thread]) + sums[thread * gl_NumWorkGroups.x + gl_WorkGroupID.x];
   for (uint n = 0u; n < SORTED_A_GROUP; n += THREADS) {
     for (uint w = 0u; w < kWords; ++w) having[thread * kWords + w] = 0u;
-    barrier();
+    meet();
     uint entry = gl_WorkGroupID.x * SORTED_A_GROUP + n + thread, digit = 0u;
     bool is_any = entry < entry_count;
     if (is_any) {
       digit = digitOf(entry);
       atomicOr(having[digit * kWords + word], 1u << bit);
     }
-    barrier();
+    meet();
     if (is_any) {
       uint place = offsets[digit] + uint(bitCount(having[digit * kWords + word] & ((1u << bit) - 1u)));
       for (uint w = 0u; w < word; ++w) place += uint(bitCount(having[digit * kWords + w]));
       sorted_keys[place] = keys[entry];
       sorted_numbers[place] = numbers[entry];
     }
-    barrier();
+    meet();
     for (uint w = 0u; w < kWords; ++w) offsets[thread] += uint(bitCount(having[thread * kWords + w]));
   }
 }
@@ -228,17 +231,18 @@ void main() {
 }  // namespace
 
 std::string tileListShader(TileListStep step) {
-  const bool lists = step == TileListStep::kCount || step == TileListStep::kEmit;
+  const bool sorts =
+      step == TileListStep::kHistogram || step == TileListStep::kScatter || step == TileListStep::kRanges;
   const char* const body = step == TileListStep::kScan        ? kScan
                            : step == TileListStep::kHistogram ? kHistogram
                            : step == TileListStep::kScatter   ? kScatter
                            : step == TileListStep::kRanges    ? kRanges
                                                               : kList;
   return fmt::format(
-      "#version 430 core\n#define THREADS {}u\n#define DIGITS {}u\n#define SORTED_A_GROUP {}u\n#define EMITS "
-      "{:d}\n#define SUPPORT {:.9g}\n#define MAX_STEPS {:.1f}\nlayout(local_size_x = {}) in;\n{}{}{}",
-      kListThreads, kDigits, kSortedAGroup, step == TileListStep::kEmit, static_cast<float>(kKernelSupport),
-      kMaxSteps, kListThreads, kCommon, lists || step == TileListStep::kScan ? "" : kEntries, body);
+      "#version 430 core\n#define THREADS {}u\n#define DIGITS {}u\n#define SORTED_A_GROUP {}u\n#define "
+      "SUPPORT {:.9g}\n#define MAX_STEPS {:.1f}\nlayout(local_size_x = {}) in;\n{}{}{}",
+      kListThreads, kDigits, kSortedAGroup, static_cast<float>(kKernelSupport), kMaxSteps, kListThreads,
+      kCommon, sorts ? kEntries : "", body);
 }
 
 }  // namespace curvisplat

@@ -9,9 +9,9 @@ namespace curvisplat {
 
 /// The steps, each a program; work groups of kListThreads threads.
 enum class TileListStep {
-  kCount,      // a splat a thread: how many tiles it is listed in, and the sum of each group
+  kList,  // a splat a thread: how many tiles it is listed in, and the sum of each group; or its entries, each a key and
+  // a number
   kScan,       // a row of sums a group: each becomes the sum of those before it
-  kEmit,       // a splat a thread: its entries, each a key and a number
   kHistogram,  // kSortedAGroup entries a group: how many have each digit
   kScatter,    // the same: moves each entry to its place by the digit, those with equal digits in their order
   kRanges      // an entry a thread: where the list of each tile begins and ends
