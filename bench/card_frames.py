@@ -26,9 +26,8 @@ them, of which medians are printed, from the program's own --stats:
     OpenGL's   by OpenGL's own clock, without waiting for splats; says little where it draws in software
     x cpu      the frame, divided by the one of the processor's painter
 
-and below a row in compute shaders, of one frame: the parts of OpenGL's time; splats in tiles (entries), how often sorting moved one, and
-the bytes of memory that these take on paper: 12 to write an entry, 32 to move it, 28 to find the tiles' lists and read them; 64 a splat to
-send it, and twice to read it. Each entry is looked at by the pixels of its tile, 16 where splats lean.
+and below a row in compute shaders, of one frame: the parts of OpenGL's time; splats in tiles (entries), and the bytes of memory that
+these take on paper: 32 an entry, which is written, sorted and read; 64 a splat to send it, and twice to read it. Each entry is looked at by the pixels of its tile, 16 where splats lean.
 
 A backend that cannot be had is left out, and so is one that draws in software, unless --software is given.
 """
@@ -153,10 +152,10 @@ def frames_of(arguments, cache, splats, picture, backend):
 
 
 def print_work(frame, median):
-    entries, moved, splats = frame["card_entries"], frame["card_moved_entries"], frame["splats_drawn"]
-    gigabytes = 1e-9 * (40 * entries + 32 * moved + 192 * splats)
+    entries, splats = frame["card_entries"], frame["splats_drawn"]
+    gigabytes = 1e-9 * (32 * entries + 192 * splats)
     parts = ", ".join(f"{name} {1e3 * median[name]:.1f} ms" for name in PARTS)
-    print(f"  {parts}; {entries} entries, moved {moved / entries:.1f} times, {results.three_digits(gigabytes)} GB on paper; "
+    print(f"  {parts}; {entries} entries, {results.three_digits(gigabytes)} GB on paper; "
           f"{frame['card_peak_bytes'] / MIB:.0f} MiB of the card", flush=True)
 
 
@@ -181,7 +180,7 @@ def measure(arguments, size, picture, backend, cpu_s, out):
     print(f"| {splats} | {picture} | {backend} | {' | '.join(times)} | {rate(splats)} | {rate(width * height)} | {factor} |", flush=True)
     if in_tiles:
         print_work(frames[-1], median)
-        for name in ("card_entries", "card_moved_entries", "card_peak_bytes"):
+        for name in ("card_entries", "card_peak_bytes"):
             out.add(f"card_frames/{name}/splats:{size}/picture:{picture}/backend:{backend}", "1", [frames[-1][name]])
     if any(frame["bricks_read"] for frame in frames):
         print("note: bricks were read again: the times of this row include it", flush=True)

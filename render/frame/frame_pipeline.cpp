@@ -381,7 +381,6 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.gl_sort_s = card.sort_s;
     statistics.gl_paint_s = card.paint_s;
     statistics.card_entries = card.entries;
-    statistics.card_moved_entries = card.moved_entries;
     statistics.card_peak_bytes = card.bytes;
   });
   return image;

@@ -63,7 +63,7 @@ constexpr Fields<PrepareStatistics, 19> kPrepare{{
     {"sweep_peak_bytes", &PrepareStatistics::sweep_peak_bytes},
 }};
 
-constexpr Fields<DrawStatistics, 14> kDraw{{
+constexpr Fields<DrawStatistics, 13> kDraw{{
     {"upload", &DrawStatistics::upload_s, Combined::kSum, kSeconds},
     {"draw", &DrawStatistics::draw_s, Combined::kSum, kSeconds},
     {"gl_draw", &DrawStatistics::gl_draw_s, Combined::kSum, kSeconds},
@@ -71,7 +71,6 @@ constexpr Fields<DrawStatistics, 14> kDraw{{
     {"gl_sort", &DrawStatistics::gl_sort_s, Combined::kSum, kSeconds},
     {"gl_paint", &DrawStatistics::gl_paint_s, Combined::kSum, kSeconds},
     {"card_entries", &DrawStatistics::card_entries},
-    {"card_moved_entries", &DrawStatistics::card_moved_entries},
     {"card_peak_bytes", &DrawStatistics::card_peak_bytes},
     {"painter_waited", &DrawStatistics::painter_waited_s, Combined::kSum, kSeconds},
     {"splats_hidden", &DrawStatistics::splats_hidden},

@@ -1,9 +1,9 @@
 // Lists of the splats of tiles on the card, each sorted by the splats' keys in the tile, in compute shaders.
 //
-//   count -> scan -> emit -> (histogram -> scan -> scatter) a digit -> ranges
+//   count the entries of each tile -> add them up -> write them, where they fall -> sort each tile's
 //
-// The sort is a stable radix sort of (tile, key in the tile); entries are written in the order of the splats. So splats with
-// equal keys come in that order, and the lists are the same from run to run. On the context's thread.
+// What is sorted is a tile's few entries, by the key and, of equal ones, the number of the splat. So the lists are the same
+// from run to run. On the context's thread.
 #pragma once
 
 #include <array>
@@ -41,8 +41,7 @@ struct ListedSplats {
   uint32_t first, count;     // in those
   uint32_t waiting;          // of them, the first: they were listed before, with their keys up to `before`
   uint32_t before, front;    // keys: those up to `front` are listed
-  uint32_t least_key;        // of those that are listed; in `key_bits` bits lie all from it on
-  uint32_t key_bits;         // 0: all splats have one order, in which they come
+  bool ordered;              // false: all splats have one order, in which they come
 };
 
 /// The picture's tiles of one size, and how many pixels of each take no more.
@@ -67,33 +66,24 @@ class GlTileLists {
   /// Makes the lists of what was counted last.
   void make(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box, uint64_t entries);
 
-  /// [entry] the number of its splat; [tile of the box] where its entries begin and end.
-  const CardBuffer& numbers() const { return numbers_[sorted_]; }
-  const CardBuffer& ranges() const { return ranges_; }
-  uint64_t cardBytes() const;
-  /// The entries listed since resetCounts(), and that number times the digits that they were sorted by.
+  /// Binds what tileRanges() reads, and at 4 the entries: [entry] the key, and the number of its splat.
+  void bind() const;
+  uint64_t cardBytes() const { return ends_.bytes() + chunks_.bytes() + total_.bytes() + entries_.bytes(); }
+  /// The entries listed since resetCounts().
   uint64_t listedEntries() const { return listed_entries_; }
-  uint64_t movedEntries() const { return moved_entries_; }
-  void resetCounts() { listed_entries_ = moved_entries_ = 0; }
+  void resetCounts() { listed_entries_ = 0; }
 
  private:
   const GlProgram& use(TileListStep step) const;
-  void setInputs(const GlProgram& program, const ListedSplats& splats, const CardTiles& tiles,
-                 const TileBox& box, bool writes) const;
-  void dispatch(uint32_t groups) const;
-  void scan(uint32_t rows, uint32_t length);
-  void sortDigit(uint64_t entries, uint32_t shift);
-
-  void emit(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box);
-  void findRanges(uint32_t key_bits, uint64_t entries);
+  void list(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box, bool writes) const;
+  void dispatch(uint32_t columns, uint32_t rows = 1) const;
+  void scan(const CardBuffer& sums, const CardBuffer& totals, uint32_t rows, uint32_t length) const;
 
   const GlFunctions& gl_;
   GlTimers& timers_;
-  const std::array<GlProgram, 5> programs_;  // [TileListStep]
-  CardBuffer counts_, sums_, totals_, ranges_;
-  std::array<CardBuffer, 2> keys_, numbers_;  // as they are, and sorted by the next digit
-  size_t sorted_ = 0;
-  uint64_t moved_entries_ = 0, listed_entries_ = 0;
+  const std::array<GlProgram, 3> programs_;  // [TileListStep]
+  CardBuffer ends_, chunks_, total_, entries_;
+  uint64_t listed_entries_ = 0;
 };
 
 }  // namespace curvisplat

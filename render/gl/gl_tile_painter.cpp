@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <map>
 #include <vector>
 
@@ -202,7 +201,7 @@ void GlTilePainter::State::paintBatch(bool last) {
     lookAtClosed();
     upload();
     const ListedSplats listed = listedSplats(last);
-    const CardTiles tiles = tilesOf(listed.key_bits > 0);
+    const CardTiles tiles = tilesOf(listed.ordered);
     if (clip.x0 < clip.x1 && clip.y0 < clip.y1) paintBox(listed, tiles, tilesOver(clip, tiles.side));
     if (last)
       batch.resize(kMaxRecords);
@@ -219,25 +218,13 @@ void GlTilePainter::State::paintBatch(bool last) {
 /// The batch, which ends with a splat.
 ListedSplats GlTilePainter::State::listedSplats(bool last) const {
   const std::span<const ScreenSplat> all = std::span(batch).subspan(kMaxRecords);
-  ListedSplats listed{&splats,
-                      kMaxRecords,
-                      static_cast<uint32_t>(all.size()),
-                      static_cast<uint32_t>(waiting),
-                      before,
-                      last ? kLastKey : all.back().first,
-                      before,
-                      0};
-  if (waiting == 0 && std::none_of(all.begin(), all.end(), leans)) return listed;
-  if (waiting == 0) listed.least_key = std::find_if_not(all.begin(), all.end(), isRecord)->first;
-  uint64_t latest = std::max(listed.front, listed.least_key);
-  if (last) {  // the front is behind all there are
-    latest = listed.least_key;
-    for (const ScreenSplat& splat : all)
-      if (!isRecord(splat)) latest = std::max(latest, lastKeyOf(splat));
-    latest = std::min<uint64_t>(latest, kLastKey);
-  }
-  listed.key_bits = std::max(1u, static_cast<uint32_t>(std::bit_width(latest - listed.least_key)));
-  return listed;
+  return {&splats,
+          kMaxRecords,
+          static_cast<uint32_t>(all.size()),
+          static_cast<uint32_t>(waiting),
+          before,
+          last ? kLastKey : all.back().first,
+          waiting > 0 || std::any_of(all.begin(), all.end(), leans)};
 }
 
 CardTiles GlTilePainter::State::tilesOf(bool small) const {
@@ -286,8 +273,7 @@ void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box
   gl.Uniform3i(painting.uniform("closed_places"), small.columns(), large.columns(),
                static_cast<GLint>(large.closed_begin));
   splats.bind(0);
-  lists.numbers().bind(1);
-  lists.ranges().bind(2);
+  lists.bind();
   closed.bind(3);
   gl.BindImageTexture(0, windows.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_RGBA32F);
   const auto groups = [&](int count) {
@@ -380,12 +366,7 @@ CardWork GlTilePainter::cardWork() const {
   const GlTimers& timers = state_->timers;
   const double list_s = timers.seconds(GlTileLists::kList), sort_s = timers.seconds(GlTileLists::kSort),
                paint_s = timers.seconds(kPaint);
-  return {list_s + sort_s + paint_s,
-          list_s,
-          sort_s,
-          paint_s,
-          state_->lists.listedEntries(),
-          state_->lists.movedEntries(),
+  return {list_s + sort_s + paint_s, list_s, sort_s, paint_s, state_->lists.listedEntries(),
           state_->most_bytes};
 }
 

@@ -21,7 +21,7 @@ namespace curvisplat {
 class GlTilePainter final : public Painter {
  public:
   /// The capacity of the painter: `splats` of a batch, in memory and on the card, and `entries` of tiles'
-  /// lists, 24 bytes each, there.
+  /// lists, 8 bytes each, there.
   struct Capacity {
     size_t splats, entries;
     /// The capacity for a card, or for OpenGL in software, which the processor's memory holds.

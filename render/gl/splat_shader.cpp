@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "render/gl/tile_list_shaders.h"
 #include "render/project/record_tags.h"
 
 namespace curvisplat {
@@ -327,8 +328,7 @@ void main() {
 constexpr const char* kTileShader = R"(
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(std430, binding = 0) readonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
-layout(std430, binding = 1) readonly buffer Numbers { uint numbers[]; };  // of splats, tile after tile
-layout(std430, binding = 2) readonly buffer Ranges { uvec2 ranges[]; };   // [tile of the box] in numbers
+layout(std430, binding = 4) readonly buffer Entries { uvec2 entries[]; };  // their numbers last, tile after tile
 layout(std430, binding = 3) buffer Closed { uint closed[]; };  // [tile of the picture] its pixels that take no more
 layout(rgba32f, binding = 0) uniform image2DArray windows;     // [window of depth]: colour and transmittance
 uniform ivec4 clip;    // pixels that may be drawn
@@ -345,7 +345,7 @@ Record recordOf(int n) {
 void main() {
   ivec2 place = ivec2(gl_GlobalInvocationID.xy), pixel = origin + place, tile = place / side;
   if (any(lessThan(pixel, clip.xy)) || any(greaterThanEqual(pixel, clip.zw))) return;
-  uvec2 range = ranges[tile.y * columns + tile.x];
+  uvec2 range = rangeOf(uint(tile.y * columns + tile.x));
   if (range.x == range.y) return;
   vec4 seen[WINDOWS];  // transmittances last
   for (int n = 0; n < WINDOWS; ++n) seen[n] = imageLoad(windows, ivec3(pixel, n));
@@ -354,7 +354,7 @@ void main() {
   vec4 depths = texelFetch(layers, pixel, 0);
 #endif
   for (uint at = range.x; at < range.y && seen[0].w >= kSaturated; ++at) {
-    int n = int(numbers[at]);
+    int n = int(entries[at].y);
     Record splat = recordOf(n);
     vec2 d = vec2(pixel) + 0.5 - splat.part0.xy;
     vec2 u = vec2(d.x / splat.part0.z, (d.y - splat.part0.w * (d.x / splat.part0.z)) / splat.part1.x);
@@ -421,8 +421,9 @@ std::string splatFragmentShader(SplatShaderKind kind) {
 
 std::string splatTileShader(SplatShaderKind kind) {
   return fmt::format(
-      "#version 430 core\n#define PER_SPLAT\n#define SMALL_TILE {}\n#define LARGE_TILE {}\n{}{}{}{}{}{}{}",
-      kSmallTile, kLargeTile, kindOf(kind), kUniforms, kPerSplat, recordTags(), kSetUp, kSeen, kTileShader);
+      "#version 430 core\n#define PER_SPLAT\n#define SMALL_TILE {}\n#define LARGE_TILE {}\n{}{}{}{}{}{}{}{}",
+      kSmallTile, kLargeTile, kindOf(kind), kUniforms, kPerSplat, recordTags(), kSetUp, kSeen, tileRanges(),
+      kTileShader);
 }
 
 }  // namespace curvisplat

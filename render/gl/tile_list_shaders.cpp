@@ -8,9 +8,10 @@
 namespace curvisplat {
 namespace {
 
-// Entries are sorted by keys of 64 bits, the high ones last: the tile's number in the box, and below it, in `key_bits`, the
-// splat's key in the tile, from `least_key` on.
-constexpr const char* kCommon = R"(
+constexpr const char* kScan = R"(
+layout(std430, binding = 0) buffer Sums { uint sums[]; };  // [row][length]
+layout(std430, binding = 1) buffer Totals { uint totals[]; };  // [row]
+uniform uint length_of_row;
 shared uint lane_sums[THREADS];
 
 // The sum, or the largest number if that is less: of more entries than can be counted, none is written.
@@ -38,12 +39,6 @@ uint sumBefore(uint value) {
   }
   return lane_sums[thread] - value;
 }
-)";
-
-constexpr const char* kScan = R"(
-layout(std430, binding = 0) buffer Sums { uint sums[]; };  // [row][length]
-layout(std430, binding = 1) buffer Totals { uint totals[]; };  // [row]
-uniform uint length_of_row;
 
 void main() {
   uint carry = 0u, begin = gl_WorkGroupID.x * length_of_row;
@@ -58,23 +53,31 @@ void main() {
 }
 )";
 
+// Where the entries of a tile lie: a chunk of tiles after the other, and in it a tile after the other.
+constexpr const char* kPlaces = R"(
+layout(std430, binding = 1) PLACES buffer Ends { uint ends[]; };  // [tile of the box] where its entries end, in its chunk
+layout(std430, binding = 2) readonly buffer Chunks { uint chunks[]; };  // [chunk] where its entries begin
+
+uvec2 rangeOf(uint tile) {
+  uint chunk = chunks[tile / CHUNK];
+  return chunk + uvec2(tile % CHUNK == 0u ? 0u : ends[tile - 1u], ends[tile]);
+}
+)";
+
 // Counts, and writes as well where `writes` says so: one program, since two might round the same ellipse differently, and
-// an entry that was not counted would lie in another splat's place. Which tiles an ellipse touches: as orderTilesOf() in render/tiles/tile_lists.cpp.
+// an entry that was not counted would lie in another tile's place. Before it writes, `ends` has where each tile's entries
+// begin. Which tiles an ellipse touches: as orderTilesOf() in render/tiles/tile_lists.cpp.
 constexpr const char* kList = R"(
 layout(std430, binding = 0) readonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
-layout(std430, binding = 1) buffer Counts { uint counts[]; };            // [splat]
-layout(std430, binding = 2) buffer Sums { uint sums[]; };                // [group]
 layout(std430, binding = 3) readonly buffer Closed { uint closed[]; };   // [tile of the picture] pixels that take no more
-layout(std430, binding = 4) writeonly buffer Keys { uvec2 keys[]; };
-layout(std430, binding = 5) writeonly buffer Numbers { uint numbers[]; };
+layout(std430, binding = 4) writeonly buffer Entries { uvec2 entries[]; };  // the key in the tile, the splat's number
 uniform bool writes;
 uniform uint first_splat;  // in `splats`
 uniform uint splat_count;
 uniform uint waiting;      // of them, the first: what they have up to the key `before` was painted
 uniform uint before;
 uniform uint front;        // up to this key
-uniform uint least_key;
-uniform uint key_bits;     // 0: one order in all tiles, that of the splats
+uniform bool ordered;      // false: one order in all tiles, that of the splats
 uniform ivec4 box;         // tiles x0, y0 .. x1 - 1, y1 - 1
 uniform int side;          // of a tile, pixels
 uniform ivec2 picture;     // pixels
@@ -93,11 +96,11 @@ bool isClosed(ivec2 tile) {
   return closed[closed_begin + tile.y * closed_columns + tile.x] == uint(pixels.x * pixels.y);
 }
 
-// Counts the splat's tiles; the entries that it writes begin at `to`.
-uint list(uint n, uint to) {
-  uint at = first_splat + n;
+void main() {
+  uint n = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * MOST_GROUPS * THREADS, at = first_splat + n;
+  if (n >= splat_count) return;
   vec4 part0 = uintBitsToFloat(splats[4u * at]);
-  if (part0.z < 0.0) return 0u;  // a record
+  if (part0.z < 0.0) return;  // a record
   float l11 = part0.z, l21 = part0.w, l22 = uintBitsToFloat(splats[4u * at + 1u].x);
   uvec4 part3 = splats[4u * at + 3u];  // key, first, key_slope0, key_slope1
   vec2 key_slope = uintBitsToFloat(part3.zw);
@@ -106,7 +109,6 @@ uint list(uint n, uint to) {
   float reach_y = SUPPORT * sqrt(s11);
   // Of pixels at dy the ellipse covers lean dy +- span sqrt(reach2 - dy dy); it goes farthest right at dy = tip.
   float lean = l11 * l21 / s11, span = l11 * l22 / s11, reach2 = SUPPORT * SUPPORT * s11, tip = SUPPORT * l21;
-  uint count = 0u;
   int last_row = lastTile(middle.y + reach_y, box.y, box.w);
   for (int row = firstTile(middle.y - reach_y, box.y, box.w); row <= last_row; ++row) {
     float top = float(row * side) - middle.y, bottom = top + float(side - 1);
@@ -117,132 +119,93 @@ uint list(uint n, uint to) {
     for (int column = firstTile(from_x, box.x, box.z); column <= last; ++column) {
       if (isClosed(ivec2(column, row))) continue;
       uint key = 0u;
-      if (key_bits > 0u) {  // keyAt() in tile_key.h
+      if (ordered) {  // keyAt() in tile_key.h
         vec2 from = vec2(ivec2(column, row) * side) + 0.5 * float(side) - part0.xy;
         precise float moved = key_slope.x * from.x + key_slope.y * from.y;
         int held = int(clamp(moved, -MAX_STEPS, MAX_STEPS));
         key = uint(max(int(part3.x) + held, int(part3.y)));
         if (key > front || n < waiting && key <= before) continue;
-        key = min(max(key, least_key) - least_key, 0xffffffffu >> (32u - key_bits));
       }
-      if (writes) {
-        uint tile = uint((row - box.y) * (box.z - box.x) + column - box.x);
-        keys[to + count] = key_bits == 0u    ? uvec2(tile, 0u)
-                           : key_bits == 32u ? uvec2(key, tile)
-                                             : uvec2(key | tile << key_bits, tile >> (32u - key_bits));
-        numbers[to + count] = at;
+      uint tile = uint((row - box.y) * (box.z - box.x) + column - box.x);
+      uint place = atomicAdd(ends[tile], 1u);
+      if (writes) entries[chunks[tile / CHUNK] + place] = uvec2(key, at);
+    }
+  }
+}
+)";
+
+// A group a tile. What lists have come to hold is in no order, but no two entries are the same: sorted, they are the same
+// from run to run.
+constexpr const char* kSort = R"(
+layout(std430, binding = 4) coherent buffer Entries { uvec2 entries[]; };
+uniform uint columns;  // of the box
+shared uvec2 few[SORTED_AT_ONCE];  // a list, if it is no longer than that
+uint begin, count;
+
+uvec2 entryAt(uint n) {
+  return count <= SORTED_AT_ONCE ? few[n] : entries[begin + n];
+}
+void setEntry(uint n, uvec2 entry) {
+  if (count <= SORTED_AT_ONCE)
+    few[n] = entry;
+  else
+    entries[begin + n] = entry;
+}
+void meet() {
+  memoryBarrierShared();
+  memoryBarrierBuffer();
+  barrier();
+}
+
+// A bitonic sort in which the smaller of two always goes to the front. So behind the last there may be any number of largest
+// ones, which never move.
+void sortEntries() {
+  uint pairs = 1u << findMSB(count - 1u);
+  for (uint span = 2u; span <= 2u * pairs; span *= 2u)
+    for (uint reach = span; reach > 1u; reach /= 2u) {
+      for (uint n = gl_LocalInvocationID.x; n < pairs; n += THREADS) {
+        uint from = n / (reach / 2u) * reach, at = n & (reach / 2u - 1u);
+        uint low = from + at, high = reach == span ? from + reach - 1u - at : low + reach / 2u;
+        if (high >= count) continue;
+        uvec2 first = entryAt(low), second = entryAt(high);
+        if (first.x < second.x || first.x == second.x && first.y < second.y) continue;
+        setEntry(low, second);
+        setEntry(high, first);
       }
-      ++count;
+      meet();
     }
-  }
-  return count;
 }
 
 void main() {
-  uint n = gl_GlobalInvocationID.x;
-  uint to = writes ? sums[gl_WorkGroupID.x] + sumBefore(n < splat_count ? counts[n] : 0u) : 0u;
-  uint count = n < splat_count ? list(n, to) : 0u;
-  if (writes) return;
-  if (n < splat_count) counts[n] = count;
-  sumBefore(count);
-  if (gl_LocalInvocationID.x == 0u) sums[gl_WorkGroupID.x] = lane_sums[THREADS - 1u];
-}
-)";
-
-constexpr const char* kEntries = R"(
-layout(std430, binding = 0) readonly buffer Keys { uvec2 keys[]; };
-layout(std430, binding = 1) readonly buffer Numbers { uint numbers[]; };
-uniform uint entry_count;
-uniform uint shift;  // of the digit, or of the tile
-
-uint bitsFrom(uvec2 key) {
-  return shift == 0u ? key.x : shift < 32u ? key.x >> shift | key.y << (32u - shift) : key.y >> (shift - 32u);
-}
-uint digitOf(uint entry) {
-  return bitsFrom(keys[entry]) & (DIGITS - 1u);
-}
-)";
-
-constexpr const char* kHistogram = R"(
-layout(std430, binding = 2) buffer Sums { uint sums[]; };  // [digit][group]
-shared uint histogram[DIGITS];
-
-void main() {
-  uint thread = gl_LocalInvocationID.x;
-  histogram[thread] = 0u;
+  uvec2 range = rangeOf(gl_WorkGroupID.y * columns + gl_WorkGroupID.x);
+  begin = range.x;
+  count = range.y - range.x;
+  if (count < 2u) return;
+  if (count <= SORTED_AT_ONCE)
+    for (uint n = gl_LocalInvocationID.x; n < count; n += THREADS) few[n] = entries[begin + n];
   meet();
-  for (uint n = thread; n < SORTED_A_GROUP; n += THREADS) {
-    uint entry = gl_WorkGroupID.x * SORTED_A_GROUP + n;
-    if (entry < entry_count) atomicAdd(histogram[digitOf(entry)], 1u);
-  }
-  meet();
-  sums[thread * gl_NumWorkGroups.x + gl_WorkGroupID.x] = histogram[thread];
-}
-)";
-
-// Finds places by sets of bits: which threads have a digit. So an entry's place follows from its number
-// alone, and threads write into the sets in any order.
-constexpr const char* kScatter = R"(
-layout(std430, binding = 2) readonly buffer Sums { uint sums[]; };
-layout(std430, binding = 3) readonly buffer Totals { uint totals[]; };  // [digit]
-layout(std430, binding = 4) writeonly buffer SortedKeys { uvec2 sorted_keys[]; };
-layout(std430, binding = 5) writeonly buffer SortedNumbers { uint sorted_numbers[]; };
-const uint kWords = THREADS / 32u;
-shared uint offsets[DIGITS];
-shared uint having[DIGITS * kWords];
-
-void main() {
-  uint thread = gl_LocalInvocationID.x, word = thread / 32u, bit = thread % 32u;
-  offsets[thread] = sumBefore(totals[thread]) + sums[thread * gl_NumWorkGroups.x + gl_WorkGroupID.x];
-  for (uint n = 0u; n < SORTED_A_GROUP; n += THREADS) {
-    for (uint w = 0u; w < kWords; ++w) having[thread * kWords + w] = 0u;
-    meet();
-    uint entry = gl_WorkGroupID.x * SORTED_A_GROUP + n + thread, digit = 0u;
-    bool is_any = entry < entry_count;
-    if (is_any) {
-      digit = digitOf(entry);
-      atomicOr(having[digit * kWords + word], 1u << bit);
-    }
-    meet();
-    if (is_any) {
-      uint place = offsets[digit] + uint(bitCount(having[digit * kWords + word] & ((1u << bit) - 1u)));
-      for (uint w = 0u; w < word; ++w) place += uint(bitCount(having[digit * kWords + w]));
-      sorted_keys[place] = keys[entry];
-      sorted_numbers[place] = numbers[entry];
-    }
-    meet();
-    for (uint w = 0u; w < kWords; ++w) offsets[thread] += uint(bitCount(having[thread * kWords + w]));
-  }
-}
-)";
-
-constexpr const char* kRanges = R"(
-layout(std430, binding = 2) buffer Ranges { uvec2 ranges[]; };  // [tile of the box]
-
-void main() {
-  uint entry = gl_GlobalInvocationID.x;
-  if (entry >= entry_count) return;
-  uint tile = bitsFrom(keys[entry]);
-  if (entry == 0u || bitsFrom(keys[entry - 1u]) != tile) ranges[tile].x = entry;
-  if (entry + 1u == entry_count || bitsFrom(keys[entry + 1u]) != tile) ranges[tile].y = entry + 1u;
+  sortEntries();
+  if (count <= SORTED_AT_ONCE)
+    for (uint n = gl_LocalInvocationID.x; n < count; n += THREADS) entries[begin + n] = few[n];
 }
 )";
 
 }  // namespace
 
+std::string tileRanges() {
+  return fmt::format("#define CHUNK {}u\n#define PLACES readonly\n{}", kTilesAChunk, kPlaces);
+}
+
 std::string tileListShader(TileListStep step) {
-  const bool sorts =
-      step == TileListStep::kHistogram || step == TileListStep::kScatter || step == TileListStep::kRanges;
-  const char* const body = step == TileListStep::kScan        ? kScan
-                           : step == TileListStep::kHistogram ? kHistogram
-                           : step == TileListStep::kScatter   ? kScatter
-                           : step == TileListStep::kRanges    ? kRanges
-                                                              : kList;
+  const bool sorts = step == TileListStep::kSort;
+  const char* const body = step == TileListStep::kScan ? kScan : sorts ? kSort : kList;
   return fmt::format(
-      "#version 430 core\n#define THREADS {}u\n#define DIGITS {}u\n#define SORTED_A_GROUP {}u\n#define "
-      "SUPPORT {:.9g}\n#define MAX_STEPS {:.1f}\nlayout(local_size_x = {}) in;\n{}{}{}",
-      kListThreads, kDigits, kSortedAGroup, static_cast<float>(kKernelSupport), kMaxSteps, kListThreads,
-      kCommon, sorts ? kEntries : "", body);
+      "#version 430 core\n#define THREADS {0}u\n#define MOST_GROUPS {1}u\n#define SORTED_AT_ONCE "
+      "{2}u\n#define CHUNK {3}u\n"
+      "#define PLACES {4}\n#define SUPPORT {5:.9g}\n#define MAX_STEPS {6:.1f}\nlayout(local_size_x = {0}) "
+      "in;\n{7}{8}",
+      sorts ? kSortThreads : kListThreads, kMostGroups, kSortedAtOnce, kTilesAChunk, sorts ? "readonly" : "",
+      static_cast<float>(kKernelSupport), kMaxSteps, step == TileListStep::kScan ? "" : kPlaces, body);
 }
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
 // The GLSL that lists the splats of tiles and sorts the lists (gl_tile_lists.h). OpenGL 4.3, without what not every
-// card has: no subgroups, no order of atomic operations that would show in a result.
+// card has: no subgroups. The order of atomic operations does not show in a result.
 #pragma once
 
 #include <cstdint>
@@ -7,22 +7,22 @@
 
 namespace curvisplat {
 
-/// The steps, each a program; work groups of kListThreads threads.
+/// The steps, each a program.
 enum class TileListStep {
-  kList,  // a splat a thread: how many tiles it is listed in, and the sum of each group; or its entries, each a key and
-  // a number
-  kScan,       // a row of sums a group: each becomes the sum of those before it
-  kHistogram,  // kSortedAGroup entries a group: how many have each digit
-  kScatter,    // the same: moves each entry to its place by the digit, those with equal digits in their order
-  kRanges      // an entry a thread: where the list of each tile begins and ends
+  kList,  // a splat a thread, kListThreads a group: counts its entries in tiles, or writes them
+  kScan,  // a row of sums a group, of kListThreads threads: each becomes the sum of those before it
+  kSort   // a tile a group, of kSortThreads threads: its entries, by key and number
 };
 
-inline constexpr uint32_t kListThreads = 256;
-inline constexpr uint32_t kDigitBits = 8;
-inline constexpr uint32_t kDigits = 1u << kDigitBits;
-inline constexpr uint32_t kSortedAGroup = 8 * kListThreads;
-static_assert(kDigits == kListThreads);  // a thread for each digit
+inline constexpr uint32_t kListThreads = 256, kSortThreads = 128;
+inline constexpr uint32_t kMostGroups = 32768;  // along x; every OpenGL has 65535
+/// Tiles whose entries are added up by one group.
+inline constexpr uint32_t kTilesAChunk = 8 * kListThreads;
+/// Entries that are sorted in shared memory; more in the card's, which takes longer.
+inline constexpr uint32_t kSortedAtOnce = 1024;
 
 std::string tileListShader(TileListStep step);
+/// For other shaders: uvec2 rangeOf(uint tile), where in the lists a tile's entries begin and end, by the buffers 1 and 2.
+std::string tileRanges();
 
 }  // namespace curvisplat

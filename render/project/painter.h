@@ -55,7 +55,6 @@ struct CardWork {
   double draw_s = 0;  // all of it
   double list_s = 0, sort_s = 0, paint_s = 0;
   uint64_t entries = 0;        // splats in tiles, each once in every tile
-  uint64_t moved_entries = 0;  // entries moved by sorting, counted once for each digit
   uint64_t bytes = 0;          // the most memory that OpenGL's objects have taken so far
 };
 
