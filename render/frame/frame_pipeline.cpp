@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <span>
 #include <utility>
@@ -31,6 +32,21 @@ constexpr size_t kLargeBlock = size_t{1} << 20;
 
 unsigned threadsOf(const FrameOptions& options) {
   return threadsOrCores(options.threads);
+}
+
+/// Adds the splats of a BrickStore to those that the workers counted.
+void add(FrameStatistics& statistics, const ProjectionCounts& counts) {
+  statistics.card_splats = counts.read;
+  statistics.splats_read += counts.read;
+  statistics.splats_off_screen += counts.off_screen;
+  statistics.splats_transparent += counts.transparent;
+  statistics.splats_drawn += counts.drawn;
+}
+
+/// A number that no cache, step or variable had before.
+uint64_t nextContent() {
+  static std::atomic<uint64_t> last = 0;
+  return ++last;
 }
 
 }  // namespace
@@ -68,7 +84,8 @@ FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scala
       planner_(planner),
       backend_(std::move(backend)),
       painting_(backend_.get()),
-      layers_(cache, scalars, planner) {}
+      layers_(cache, scalars, planner),
+      content_(nextContent()) {}
 
 FramePipeline::~FramePipeline() {
   endPrefetch();
@@ -143,6 +160,7 @@ void FramePipeline::release() {
 }
 
 void FramePipeline::stepChanged() {
+  content_ = nextContent();
   if (pools_) pools_->source.stepChanged();
 }
 
@@ -151,6 +169,70 @@ void FramePipeline::dropPools() {
   std::unique_ptr<Pools> old;  // freed after the lock is released
   const MutexLock lock(mutex_);
   old.swap(pools_);
+}
+
+/// Whether nothing of the brick is needed from the source any more. Any thread.
+bool FramePipeline::isLeftOut(uint32_t brick, const FramePlan& plan, const FrameOptions& options) const {
+  if (std::binary_search(unread_.begin(), unread_.end(), brick)) return true;
+  const bool may_hide = !options.keep_going;  // FrameWorkers::prepare() says why
+  return (may_hide && hidden_.hides(brick)) ||
+         pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
+}
+
+/// Chooses the parts that are drawn from the painter's store, if it has one, and sends what is missing there. The choice depends
+/// on nothing but the plan and the card's memory, and so do the picture's bits.
+void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options,
+                              FrameStatistics& statistics) {
+  stored_.clear();
+  left_.clear();
+  unread_.clear();
+  if (painting_ != backend_.get() || options.ranks || options.keep_going || coloured_by_ ||
+      !BrickStore::canDraw(plan.settings))
+    return;
+  std::vector<uint32_t> numbers;
+  for (uint32_t number = 0; number < plan.parts.size(); ++number) {
+    const SweptPart& part = plan.parts[number];
+    const Brick& brick = cache_.bricks()[part.part.brick];
+    if (!BrickStore::canDraw(brick, plan.settings.view)) continue;
+    numbers.push_back(number);
+    stored_.push_back({part.part.brick, brick.splats, SplatRanges(brick, part.part.octants),
+                       cache_.manifest().root.cellMin(brick.cell), part.keys});
+  }
+  std::vector<StoredPart> missing;
+  painting_->run([&](Painter& painter) {
+    BrickStore* const store = painter.store();
+    const uint64_t bytes = store ? options.card_memory_bytes.value_or(store->defaultBytes()) : 0;
+    if (bytes > 0) store->open(content_);
+    const size_t fitting = bytes > 0 ? store->makeRoom(stored_, bytes) : 0;
+    stored_.erase(stored_.begin() + static_cast<std::ptrdiff_t>(fitting), stored_.end());
+    for (const StoredPart& part : stored_)
+      if (!store->has(part.brick)) missing.push_back(part);
+  });
+  if (stored_.empty()) return;
+  if (!missing.empty()) putIntoStore(missing, options, statistics);
+  left_.assign(plan.parts.size(), LeftToWorkers::kAll);
+  painting_->run([&](Painter& painter) {
+    for (size_t n = 0; n < stored_.size(); ++n) {
+      const bool pieces = painter.store()->hasPieces(stored_[n].brick);
+      left_[numbers[n]] = pieces ? LeftToWorkers::kPieces : LeftToWorkers::kNothing;
+      if (!pieces) unread_.push_back(stored_[n].brick);
+    }
+  });
+  std::sort(unread_.begin(), unread_.end());
+}
+
+/// Has the workers fetch and decode the bricks of the parts, which go to the painter's thread one after the other.
+void FramePipeline::putIntoStore(std::span<const StoredPart> parts, const FrameOptions& options,
+                                 FrameStatistics& statistics) {
+  std::vector<BrickPart> bricks;
+  for (const StoredPart& part : parts) bricks.push_back({part.brick});
+  Mutex putting;
+  const auto put = [&](size_t part, const glm::dvec3&, const BrickSource::Splats& splats) {
+    const MutexLock lock(putting);
+    painting_->run(
+        [&](Painter& painter) { painter.store()->put(parts[part].brick, splats.geometry, splats.values); });
+  };
+  sample({cache_, bricks, put}, options, statistics);
 }
 
 /// Begins the next slab of the sweep's region. False if none is left.
@@ -175,11 +257,7 @@ bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, 
     pools_->source.start(parts, [this](uint32_t brick) { return exchange_->isUnneeded(brick); });
   } else {
     for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
-    const bool may_hide = !options.keep_going;  // FrameWorkers::prepare() says why
-    pools_->source.start(parts, [this, may_hide, &plan](uint32_t brick) {
-      return (may_hide && hidden_.hides(brick)) ||
-             pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
-    });
+    pools_->source.start(parts, [&](uint32_t brick) { return isLeftOut(brick, plan, options); });
   }
   pools_->workers.start(region ? region->tiles.get() : nullptr);
   return true;
@@ -277,8 +355,9 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
   makePools(options);
   exchange_.reset();
   if (plan.shared) beginExchange(plan, options);
-  const FrameWork work{cache_,    plan.parts, plan.settings,      planner_.table(),
-                       plan.keys, hidden_,    options.keep_going, exchange_.get()};
+  fillStore(plan, options, statistics);
+  const FrameWork work{cache_,  plan.parts, plan.settings,      planner_.table(), plan.keys,
+                       hidden_, left_,      options.keep_going, exchange_.get()};
   // With keep_going, what replaces a damaged brick may reach into any region.
   std::vector<FrameRegion> regions =
       options.keep_going && least == 1
@@ -355,6 +434,7 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
                    .stop = options.stop,
                    .permits = permits_.get()});
     if (regions.front().tiles) painter.drawOnly(*regions.front().tiles);
+    if (!stored_.empty()) painter.store()->drawStored(plan.settings, plan.keys, stored_);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
     uint64_t seen = 0;
@@ -377,11 +457,13 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.draw_s = painter.drawSeconds();
     const CardWork card = painter.cardWork();
     statistics.gl_draw_s = card.draw_s;
+    statistics.gl_project_s = card.project_s;
     statistics.gl_list_s = card.list_s;
     statistics.gl_sort_s = card.sort_s;
     statistics.gl_paint_s = card.paint_s;
     statistics.card_entries = card.entries;
     statistics.card_peak_bytes = card.bytes;
+    if (!stored_.empty()) add(statistics, painter.store()->counts());
   });
   return image;
 }

@@ -33,6 +33,7 @@
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_plan.h"
 #include "render/frame/frame_statistics.h"
+#include "render/project/brick_store.h"
 #include "render/ranks/splat_exchange.h"
 #include "render/surface/face_meshes.h"
 #include "render/surface/iso_layers.h"
@@ -46,6 +47,7 @@
 namespace curvisplat {
 
 struct SamplingWork;
+enum class LeftToWorkers : uint8_t;
 
 /// Draws what lies in the volume before the volume is drawn: surfaces, faces of the grid, slices and
 /// isosurfaces. They become layers of the plan's pixels. DESIGN.md, "Surfaces and slices" and "Isosurfaces".
@@ -146,6 +148,10 @@ class FramePipeline {
                                      FrameStatistics& statistics, Progress* progress);
   void stopStages();
   FrameBudget budgetOf(const FrameOptions& options) const;
+  void fillStore(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
+  void putIntoStore(std::span<const StoredPart> parts, const FrameOptions& options,
+                    FrameStatistics& statistics);
+  bool isLeftOut(uint32_t brick, const FramePlan& plan, const FrameOptions& options) const;
   void makePools(const FrameOptions& options);
   void dropPools();
   Image paint(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
@@ -161,6 +167,10 @@ class FramePipeline {
   size_t aside_waiting_splats_ = 0;
   HiddenBricks hidden_;
   LayerDrawer layers_;
+  uint64_t content_;                         // BrickStore::open()
+  std::vector<StoredPart> stored_;           // the parts of the plan that are drawn from the store
+  std::vector<LeftToWorkers> left_;          // [part of the plan]; empty: all to the workers
+  std::vector<uint32_t> unread_;             // bricks of which nothing is left, sorted
   std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn

@@ -63,14 +63,16 @@ constexpr Fields<PrepareStatistics, 19> kPrepare{{
     {"sweep_peak_bytes", &PrepareStatistics::sweep_peak_bytes},
 }};
 
-constexpr Fields<DrawStatistics, 13> kDraw{{
+constexpr Fields<DrawStatistics, 15> kDraw{{
     {"upload", &DrawStatistics::upload_s, Combined::kSum, kSeconds},
     {"draw", &DrawStatistics::draw_s, Combined::kSum, kSeconds},
     {"gl_draw", &DrawStatistics::gl_draw_s, Combined::kSum, kSeconds},
+    {"gl_project", &DrawStatistics::gl_project_s, Combined::kSum, kSeconds},
     {"gl_list", &DrawStatistics::gl_list_s, Combined::kSum, kSeconds},
     {"gl_sort", &DrawStatistics::gl_sort_s, Combined::kSum, kSeconds},
     {"gl_paint", &DrawStatistics::gl_paint_s, Combined::kSum, kSeconds},
     {"card_entries", &DrawStatistics::card_entries},
+    {"card_splats", &DrawStatistics::card_splats},
     {"card_peak_bytes", &DrawStatistics::card_peak_bytes},
     {"painter_waited", &DrawStatistics::painter_waited_s, Combined::kSum, kSeconds},
     {"splats_hidden", &DrawStatistics::splats_hidden},

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "stream/base/error.h"
-
 namespace curvisplat {
 namespace {
 
@@ -18,25 +16,6 @@ GlProgram programOf(const GlFunctions& gl, TileListStep step) {
 }
 
 }  // namespace
-
-void CardBuffer::reserve(uint64_t bytes) {
-  if (bytes <= bytes_) return;
-  GLint64 most = 0;
-  gl_.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
-  if (bytes > static_cast<uint64_t>(most))
-    throw Error("this OpenGL has no buffers of {} MiB (at most {}); give --backend egl-quads, or cpu",
-                bytes >> 20, most >> 20);
-  bytes_ = 0;
-  bind();
-  gl_.BufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_COPY);
-  gl_.check("splats and the lists of tiles");
-  bytes_ = bytes;
-}
-
-void CardBuffer::clear() const {
-  bind();
-  gl_.ClearBufferData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
-}
 
 GlTileLists::GlTileLists(const GlFunctions& gl, GlTimers& timers)
     : gl_(gl),
@@ -74,7 +53,6 @@ void GlTileLists::list(const ListedSplats& splats, const CardTiles& tiles, const
   const auto set = [&](const char* name, uint32_t value) { gl_.Uniform1ui(program.uniform(name), value); };
   gl_.Uniform1i(program.uniform("writes"), writes);
   gl_.Uniform1i(program.uniform("ordered"), splats.ordered);
-  set("first_splat", splats.first);
   set("splat_count", splats.count);
   set("waiting", splats.waiting);
   set("before", splats.before);

@@ -9,36 +9,17 @@
 #include <array>
 #include <cstdint>
 
+#include "render/gl/card_buffer.h"
 #include "render/gl/gl_functions.h"
 #include "render/gl/tile_list_shaders.h"
 #include "render/project/tile_set.h"
 
 namespace curvisplat {
 
-/// Memory on the card that grows as it is needed; what was in it is lost then.
-class CardBuffer {
- public:
-  explicit CardBuffer(const GlFunctions& gl) : gl_(gl), object_(makeBuffer(gl)) {}
-
-  void reserve(uint64_t bytes);
-  /// Binds the buffer for shaders, at the binding.
-  void bind(GLuint binding) const { gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, object_.name()); }
-  /// Binds the buffer for glBufferSubData and the like, at GL_SHADER_STORAGE_BUFFER.
-  void bind() const { gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, object_.name()); }
-  /// Sets it all to 0.
-  void clear() const;
-  uint64_t bytes() const { return bytes_; }
-
- private:
-  const GlFunctions& gl_;
-  GlObject object_;
-  uint64_t bytes_ = 0;
-};
-
 /// The splats to be listed.
 struct ListedSplats {
   const CardBuffer* splats;  // ScreenSplats
-  uint32_t first, count;     // in those
+  uint32_t count;            // of those, from the first on
   uint32_t waiting;          // of them, the first: they were listed before, with their keys up to `before`
   uint32_t before, front;    // keys: those up to `front` are listed
   bool ordered;              // false: all splats have one order, in which they come

@@ -1,14 +1,18 @@
 #include "render/gl/gl_tile_painter.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <functional>
 #include <map>
 #include <vector>
 
+#include "render/gl/card_bricks.h"
 #include "render/gl/gl_functions.h"
 #include "render/gl/gl_tile_lists.h"
 #include "render/gl/splat_shader.h"
 #include "render/gl/splat_tables.h"
+#include "render/project/splat_chooser.h"
 #include "render/project/tile_key.h"
 #include "stream/base/error.h"
 #include "stream/base/trace.h"
@@ -19,8 +23,27 @@ namespace {
 constexpr uint32_t kLastKey = INT32_MAX;
 // Records before a batch's first element, since records of a splat are looked for before it.
 constexpr size_t kMaxRecords = 3;
-enum : size_t { kPaint = GlTileLists::kOtherStages, kStages };
+enum : size_t { kPaint = GlTileLists::kOtherStages, kProject, kStages };
 constexpr int kGroupSide = 8;  // of splatTileShader()
+
+constexpr GLenum kFreeMemoryNvidia = 0x9049,
+                 kFreeMemoryAti = 0x87FC;  // GL_NVX_gpu_memory_info, GL_ATI_meminfo
+
+/// Three quarters of what the card has free; of 1 GiB where the driver does not tell.
+uint64_t defaultBytesOf(const GlFunctions& gl) {
+  while (gl.GetError() != GL_NO_ERROR) {
+  }
+  std::array<GLint, 4> kibibytes{};
+  for (const GLenum name : {kFreeMemoryNvidia, kFreeMemoryAti}) {
+    gl.GetIntegerv(name, kibibytes.data());
+    if (gl.GetError() == GL_NO_ERROR && kibibytes[0] > 0)
+      return uint64_t{768} * static_cast<uint64_t>(kibibytes[0]);
+  }
+  return uint64_t{768} << 20;
+}
+
+/// What fills the gap before a batch's first element: it is no splat, and no shader draws it.
+const ScreenSplat kNoSplat = ScreenDepth{}.record();
 
 /// The last key that the splat has in any tile, or a later one.
 uint64_t lastKeyOf(const ScreenSplat& splat) {
@@ -39,39 +62,62 @@ TileBox tilesOver(const TileBox& pixels, int side) {
 
 }  // namespace
 
-struct GlTilePainter::State {
-  State(const GlFunctions& functions, const Capacity& capacity_)
+struct GlTilePainter::State final : BrickStore {
+  State(const GlFunctions& functions, const Capacity& capacity_, bool software)
       : gl(functions),
         capacity(capacity_),
+        default_bytes(software ? 0 : defaultBytesOf(functions)),
         tables(gl),
         lists(gl, timers),
         splats(gl),
         closed(gl),
+        bricks(gl),
         windows(makeTexture(gl)),
         framebuffer(makeFramebuffer(gl)) {}
 
   const GlFunctions& gl;
   const Capacity capacity;
+  const uint64_t default_bytes;
   std::map<SplatShaderKind, GlProgram> programs;  // each compiled when it is first needed
   SplatTables tables;
   GlTimers timers{gl, kStages};
   GlTileLists lists;
   CardBuffer splats, closed;  // closed: pixels of each small tile, then of each large one, that take no more
+  CardBricks bricks;
+  size_t stored = 0;  // splats that were projected from bricks, in `splats`; the batch follows
+  std::function<void()> project_stored;
   GlObject windows, framebuffer;
   ImageSize size{0, 0};
   int window_count = 0;
   glm::vec4 background{0};
+  const ClassificationTable* table = nullptr;
   std::stop_token stop;
 
   TileBox clip{};                  // pixels
   std::vector<ScreenSplat> batch;  // behind kMaxRecords elements: what waits, then what is new
   size_t waiting = 0;              // elements of the batch
   size_t most_waiting = 0;
-  uint32_t before = 0;  // the front up to which was painted
+  bool painted = false;  // something of the tiles that are drawn now
+  uint32_t before = 0;   // the front up to which
   std::atomic<bool> overfull = false;
   std::unique_ptr<std::atomic<uint8_t>[]> hidden;  // [large tile]
   double upload_s = 0, draw_s = 0;
   uint64_t window_bytes = 0, most_bytes = 0;  // on the card
+
+  void open(uint64_t content) override { bricks.open(content); }
+  size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) override {
+    return bricks.makeRoom(parts, bytes);
+  }
+  uint64_t defaultBytes() const override { return default_bytes; }
+  bool has(uint32_t brick) const override { return bricks.has(brick); }
+  void put(uint32_t brick, const GeometryArrays<const float>& geometry,
+           const VariableArrays<const float>& values) override {
+    bricks.put(brick, geometry, values);
+  }
+  bool hasPieces(uint32_t brick) const override { return bricks.hasPieces(brick); }
+  void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
+                  std::span<const StoredPart> parts) override;
+  ProjectionCounts counts() const override { return stored > 0 ? bricks.counts() : ProjectionCounts{}; }
 
   const GlProgram& program();
   void allocate(ImageSize wanted, int count);
@@ -92,7 +138,7 @@ GlTilePainter::GlTilePainter(const GlContext& context)
 
 GlTilePainter::GlTilePainter(const GlContext& context, const Capacity& capacity) {
   if (const std::string why = context.functions().whyNoCompute(); !why.empty()) throw Error("{}", why);
-  state_ = std::make_unique<State>(context.functions(), capacity);
+  state_ = std::make_unique<State>(context.functions(), capacity, context.isSoftware());
   // A driver that refuses the most demanding shader is to be known of now.
   const SplatShaderKind all{true, true, true, true, true, PixelLayers::kMaxWindows};
   state_->programs.emplace(all, GlProgram(state_->gl, splatTileShader(all)));
@@ -154,7 +200,10 @@ void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const Cla
   state.background = background;
   state.stop = resources.stop;
   state.clip = {0, 0, size.width, size.height};
-  state.batch.assign(kMaxRecords, {});
+  state.batch.assign(kMaxRecords, kNoSplat);
+  state.stored = 0;
+  state.table = &table;
+  state.painted = false;
   state.waiting = 0;
   state.most_waiting = resources.waiting_splats;
   state.before = 0;
@@ -168,7 +217,26 @@ void GlTilePainter::drawOnly(const TileSet& tiles) {
   constexpr int kSide = kSharedTileSide;
   state.clip = intersectionOf({box.x0 * kSide, box.y0 * kSide, box.x1 * kSide, box.y1 * kSide},
                               {0, 0, state.size.width, state.size.height});
+  state.painted = false;
   state.before = 0;
+}
+
+BrickStore* GlTilePainter::store() {
+  return state_.get();
+}
+
+void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
+                                      std::span<const StoredPart> parts) {
+  const StageTimer timer(upload_s, "project bricks");
+  for (const StoredPart& part : parts)
+    for (const SplatRange& range : part.ranges) stored += range.size();
+  project_stored = [this, &settings, &keys, parts] {
+    timers.measure(kProject, [&] {
+      bricks.project(settings, keys, parts, tables, SplatChooser::largestScalar(*table), splats);
+    });
+  };
+  splats.reserve((stored + kMaxRecords + capacity.splats) * sizeof(ScreenSplat));
+  project_stored();
 }
 
 void GlTilePainter::draw(std::span<const ScreenSplat> splats) {
@@ -195,8 +263,8 @@ void GlTilePainter::State::paintBatch(bool last) {
     records.insert(records.begin(), batch.back());
     batch.pop_back();
   }
-  const size_t count = batch.size() - kMaxRecords;
-  if (count > 0 && !stop.stop_requested() && !overfull) {
+  const bool is_any = batch.size() > kMaxRecords || (last && stored > 0);
+  if (is_any && !stop.stop_requested() && !overfull) {
     const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
     lookAtClosed();
     upload();
@@ -208,6 +276,7 @@ void GlTilePainter::State::paintBatch(bool last) {
     else
       keepWaiting(listed.front);
     before = listed.front;
+    painted = true;
   } else {
     batch.resize(kMaxRecords);
   }
@@ -218,13 +287,13 @@ void GlTilePainter::State::paintBatch(bool last) {
 /// The batch, which ends with a splat.
 ListedSplats GlTilePainter::State::listedSplats(bool last) const {
   const std::span<const ScreenSplat> all = std::span(batch).subspan(kMaxRecords);
+  const size_t earlier = painted ? stored + kMaxRecords + waiting : 0;
   return {&splats,
-          kMaxRecords,
-          static_cast<uint32_t>(all.size()),
-          static_cast<uint32_t>(waiting),
+          static_cast<uint32_t>(stored + batch.size()),
+          static_cast<uint32_t>(earlier),
           before,
           last ? kLastKey : all.back().first,
-          waiting > 0 || std::any_of(all.begin(), all.end(), leans)};
+          stored > 0 || waiting > 0 || std::any_of(all.begin(), all.end(), leans)};
 }
 
 CardTiles GlTilePainter::State::tilesOf(bool small) const {
@@ -235,10 +304,12 @@ CardTiles GlTilePainter::State::tilesOf(bool small) const {
 void GlTilePainter::State::upload() {
   const StageTimer timer(upload_s, "upload splats");
   const std::span<const ScreenSplat> all = batch;
-  splats.reserve(std::max(all.size(), capacity.splats + kMaxRecords) * sizeof(ScreenSplat));
-  splats.bind();
-  gl.BufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(all.size_bytes()), all.data());
-  gl.check("sending splats");
+  const uint64_t bytes = (stored + std::max(all.size(), capacity.splats + kMaxRecords)) * sizeof(ScreenSplat);
+  if (bytes > splats.bytes()) {  // more wait than there was space for
+    splats.reserve(bytes);
+    if (stored > 0) project_stored();
+  }
+  splats.write(stored * sizeof(ScreenSplat), all);
 }
 
 /// Paints a box, in halves if there are more entries than there is space for.
@@ -257,7 +328,8 @@ void GlTilePainter::State::paintBox(const ListedSplats& listed, const CardTiles&
   }
   lists.make(listed, tiles, box, entries);
   timers.measure(kPaint, [&] { paintLists(tiles, box); });
-  most_bytes = std::max(most_bytes, window_bytes + splats.bytes() + closed.bytes() + lists.cardBytes());
+  most_bytes = std::max(
+      most_bytes, window_bytes + splats.bytes() + closed.bytes() + lists.cardBytes() + bricks.cardBytes());
 }
 
 void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box) {
@@ -365,9 +437,9 @@ double GlTilePainter::drawSeconds() const {
 CardWork GlTilePainter::cardWork() const {
   const GlTimers& timers = state_->timers;
   const double list_s = timers.seconds(GlTileLists::kList), sort_s = timers.seconds(GlTileLists::kSort),
-               paint_s = timers.seconds(kPaint);
-  return {list_s + sort_s + paint_s, list_s, sort_s, paint_s, state_->lists.listedEntries(),
-          state_->most_bytes};
+               paint_s = timers.seconds(kPaint), project_s = timers.seconds(kProject);
+  return {project_s + list_s + sort_s + paint_s, project_s,         list_s, sort_s, paint_s,
+          state_->lists.listedEntries(),         state_->most_bytes};
 }
 
 uint64_t GlTilePainter::bytes(ImageSize size, const PaintResources& resources, const Capacity& capacity) {

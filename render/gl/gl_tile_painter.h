@@ -6,7 +6,8 @@
 //
 // A batch is collected in memory and sent at once; splats that its front cuts through stay for the next (tile_queues.h
 // says why). Where its entries do not fit into `entries`, its tiles are drawn in several boxes. Neither how splats are
-// batched nor the boxes change a bit.
+// batched nor the boxes change a bit. Stored bricks (card_bricks.h) are projected into the buffer before the batch; each
+// batch lists what they have up to its front.
 // Lives on the context's thread, but for hides(). Not built for: more than one frame at a time.
 #pragma once
 
@@ -39,6 +40,7 @@ class GlTilePainter final : public Painter {
              PixelShading shading, const PaintResources& resources = {}) override;
   void drawOnly(const TileSet& tiles) override;
   void draw(std::span<const ScreenSplat> splats) override;
+  BrickStore* store() override;
   bool hides(const ScreenBox& box) const override;
   Image end() override;
 

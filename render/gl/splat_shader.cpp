@@ -409,6 +409,10 @@ std::string recordTags() {
 
 }  // namespace
 
+std::string splatUniforms() {
+  return kUniforms;
+}
+
 std::string splatVertexShader() {
   return fmt::format("#version 330 core\n#define PER_SPLAT flat out\n{}{}{}{}{}", kUniforms, kPerSplat,
                      recordTags(), kSetUp, kVertexShader);

@@ -27,6 +27,8 @@ struct SplatShaderKind {
 /// each order tile, and where they have one in all.
 inline constexpr int kSmallTile = kOrderSide, kLargeTile = 16;
 
+/// The uniforms that SplatTables::use() sets.
+std::string splatUniforms();
 /// The two shaders that draw a splat as a quad; OpenGL 3.3.
 std::string splatVertexShader();
 std::string splatFragmentShader(SplatShaderKind kind);

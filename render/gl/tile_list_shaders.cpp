@@ -72,7 +72,6 @@ layout(std430, binding = 0) readonly buffer Splats { uvec4 splats[]; };  // four
 layout(std430, binding = 3) readonly buffer Closed { uint closed[]; };   // [tile of the picture] pixels that take no more
 layout(std430, binding = 4) writeonly buffer Entries { uvec2 entries[]; };  // the key in the tile, the splat's number
 uniform bool writes;
-uniform uint first_splat;  // in `splats`
 uniform uint splat_count;
 uniform uint waiting;      // of them, the first: what they have up to the key `before` was painted
 uniform uint before;
@@ -97,12 +96,12 @@ bool isClosed(ivec2 tile) {
 }
 
 void main() {
-  uint n = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * MOST_GROUPS * THREADS, at = first_splat + n;
+  uint n = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * MOST_GROUPS * THREADS;
   if (n >= splat_count) return;
-  vec4 part0 = uintBitsToFloat(splats[4u * at]);
+  vec4 part0 = uintBitsToFloat(splats[4u * n]);
   if (part0.z < 0.0) return;  // a record
-  float l11 = part0.z, l21 = part0.w, l22 = uintBitsToFloat(splats[4u * at + 1u].x);
-  uvec4 part3 = splats[4u * at + 3u];  // key, first, key_slope0, key_slope1
+  float l11 = part0.z, l21 = part0.w, l22 = uintBitsToFloat(splats[4u * n + 1u].x);
+  uvec4 part3 = splats[4u * n + 3u];  // key, first, key_slope0, key_slope1
   vec2 key_slope = uintBitsToFloat(part3.zw);
   vec2 middle = part0.xy - 0.5;  // from the first pixel's
   float s11 = l21 * l21 + l22 * l22;
@@ -128,7 +127,7 @@ void main() {
       }
       uint tile = uint((row - box.y) * (box.z - box.x) + column - box.x);
       uint place = atomicAdd(ends[tile], 1u);
-      if (writes) entries[chunks[tile / CHUNK] + place] = uvec2(key, at);
+      if (writes) entries[chunks[tile / CHUNK] + place] = uvec2(key, n);
     }
   }
 }

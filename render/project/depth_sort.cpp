@@ -78,6 +78,14 @@ KeyRange DepthKeys::rangeOf(const Brick& brick) const {
   return {nearest, farthest};
 }
 
+DepthKeys::Linear DepthKeys::linear(const glm::dvec3& cell_min) const {
+  const double inverse_base = perspective() ? 1 / view_.orderBase(cell_min) : 0;
+  const double origin = perspective() ? -inverse_base : depthOf(cell_min);
+  const double base = std::clamp((origin - nearest_) * steps_, -0x1p30, 0x1p30);
+  return {static_cast<int32_t>(base), static_cast<float>(steps_), static_cast<float>(steps_ / view_.focal_px),
+          static_cast<float>(inverse_base)};
+}
+
 void DepthKeys::setKeys(std::span<ScreenSplat> splats, std::span<const float> depths,
                         const glm::dvec3& cell_min, const KeyRange& range, std::span<uint32_t> keys) const {
   CURVISPLAT_CHECK_OP(depths.size(), ==, keys.size());

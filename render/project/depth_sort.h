@@ -49,6 +49,15 @@ class DepthKeys {
   void setKeys(std::span<ScreenSplat> splats, std::span<const float> depths, const glm::dvec3& cell_min,
                const KeyRange& range, std::span<uint32_t> keys) const;
 
+  /// The key at the depth d (BrickProjector::depths()) is base + steps d. A slope of one pixel of depth a pixel is
+  /// steps_a_pixel (inverse_base - d) keys, in orthographic views steps_a_pixel.
+  struct Linear {
+    int32_t base;
+    float steps, steps_a_pixel, inverse_base;
+  };
+  /// What setKeys() computes in double precision, of a brick.
+  Linear linear(const glm::dvec3& cell_min) const;
+
  private:
   bool perspective() const { return view_.projection == Projection::kPerspective; }
   double depthOf(const glm::dvec3& data) const;

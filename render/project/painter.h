@@ -22,6 +22,8 @@
 
 namespace curvisplat {
 
+class BrickStore;
+
 /// The resources that a painter may use for a frame. OpenGL's driver does not keep to them.
 struct PaintResources {
   unsigned threads = 0;           // 0: one per core
@@ -53,9 +55,9 @@ struct PixelShading {
 /// shaders.
 struct CardWork {
   double draw_s = 0;  // all of it
-  double list_s = 0, sort_s = 0, paint_s = 0;
-  uint64_t entries = 0;        // splats in tiles, each once in every tile
-  uint64_t bytes = 0;          // the most memory that OpenGL's objects have taken so far
+  double project_s = 0, list_s = 0, sort_s = 0, paint_s = 0;
+  uint64_t entries = 0;  // splats in tiles, each once in every tile
+  uint64_t bytes = 0;    // the most memory that OpenGL's objects have taken so far
 };
 
 /// Draws the splats of a frame. One frame at a time.
@@ -75,6 +77,8 @@ class Painter {
   /// splats whose depth differs between tiles (leans(), tile_key.h) are blended in each tile's own order. The
   /// memory may be used again when the call returns.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
+  /// Where bricks may stay and be projected; null: the painter has no such place.
+  virtual BrickStore* store() { return nullptr; }
   /// Whether all splats drawn from now on whose footprints lie in `box` would be hidden. The picture's bits
   /// do not depend on whether they are drawn. Any thread may ask between begin() and end().
   virtual bool hides(const ScreenBox&) const { return false; }

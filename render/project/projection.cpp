@@ -190,6 +190,7 @@ struct BrickPass {
   const SlopeRules& rules;
   SplatChooser& chooser;
   ProjectionCounts& counts;
+  bool only_pieces;
   CutBudget left = {};
   BorderPieces parts = {},
                coloured_parts = {};  // of the splat in hand: clearing them takes as long as filling them
@@ -304,12 +305,17 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
   std::array<ClipSide, kBlock> sides{};
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
+    const uint32_t* const codes = geometry.border_code + begin;
+    const auto is_piece = [](uint32_t code) { return code != kNoBorder; };
+    if (pass.only_pieces && std::none_of(codes, codes + count, is_piece)) continue;
     computeBlock(map, geometry, variable, begin, count, block);
     computeSkews(map, geometry, begin, count, growth, block);
     computePlanes(map, geometry, begin, count, planes);
     if (!cutting.clip.empty()) cutting.clip.sidesOf(geometry, begin, count, sides);
     for (size_t n = 0; n < count; ++n) {
       const size_t i = begin + n;
+      if (pass.only_pieces && !is_piece(codes[n])) continue;
+      ++counts.read;
       SplatCutting how{cutting.borders ? geometry.border_code[i] : kNoBorder, sides[n] == ClipSide::kAcross,
                        false, planes.of(n)};
       if (how.clipped && !cutting.borders) {
@@ -401,7 +407,7 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   SplatChooser chooser(settings.view, largestReach(settings.view.low_pass_px2),
                        {settings.per_pixel, settings.lit()}, table, {splats_, depths_});
   const auto projectAll = [&](const auto& map) {
-    BrickPass pass{brick, cutting, rules, chooser, counts_};
+    BrickPass pass{brick, cutting, rules, chooser, counts_, only_pieces_};
     return std::all_of(ranges.begin(), ranges.end(),
                        [&](const SplatRange& range) { return projectRange(map, pass, range); });
   };
@@ -422,7 +428,6 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   // Beyond a few hundred it is for splats that are in no grid.
   for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= coarseness < 256 ? 2 : 16)
     complete = attempt(coarseness == 1 ? &single : nullptr, coarseness);
-  for (const SplatRange& range : ranges) counts_.read += range.size();
   counts_.pieces = splats_.size();
 }
 

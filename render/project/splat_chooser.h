@@ -74,12 +74,16 @@ class SplatChooser {
         width_(static_cast<float>(view.size.width)),
         height_(static_cast<float>(view.size.height)),
         reach_(1.001f * static_cast<float>(reach)),
-        largest_scalar_(kLargestCells /
-                        std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kMinScale)),
+        largest_scalar_(largestScalar(table)),
         per_pixel_(shading.per_pixel),
         lit_(shading.lit),
         splats_(kept.splats),
         depths_(kept.depths) {}
+
+  /// The largest scalar that painters can look up.
+  static float largestScalar(const ClassificationTable& table) {
+    return kLargestCells / std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kMinScale);
+  }
 
   /// Inline: handed over through memory, a splat that has just been put together stalls on its way into the
   /// vector, which takes as long as all the rest. `widening`: how much farther than half_width a mean can

@@ -377,6 +377,11 @@ void addRender(CLI::App& app) {
   const std::string how = "Resources";
   addBackendOption(*command, arguments->backend)->group(how);
   addMemoryOption(*command, arguments->frame.memory)->group(how);
+  command
+      ->add_option(
+          "--card-memory", arguments->frame.card_memory,
+          "Memory of a graphics card for bricks that stay there (default: three quarters of what is free)")
+      ->group(how);
   addThreadsOption(*command, arguments->frame.threads)->group(how);
   command
       ->add_option(

@@ -18,6 +18,7 @@ namespace curvisplat {
 struct FrameArguments {
   std::string size = "600x600", background = "dark";
   std::string classify = "pixel", scale = "1,1,1", memory = "512M";
+  std::optional<std::string> card_memory;
   std::string lod_pixels = "1";
   std::optional<std::string> clip_box, max_splats;
   std::vector<std::string> clip_planes;

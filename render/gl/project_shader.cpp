@@ -1,0 +1,223 @@
+#include "render/gl/project_shader.h"
+
+#include <fmt/format.h>
+
+#include "render/gl/splat_shader.h"
+#include "render/project/tile_key.h"
+#include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
+#include "stream/model/kernel.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr const char* kInputs = R"(
+layout(local_size_x = THREADS) in;
+layout(std430, binding = 0) writeonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
+layout(std430, binding = 1) readonly buffer Bricks { uint words[]; };
+layout(std430, binding = 2) readonly buffer Parts { uvec4 parts[]; };    // four a ShaderPart
+layout(std430, binding = 3) readonly buffer Groups { uvec4 groups[]; };  // ShaderGroup
+layout(std430, binding = 4) buffer Fates { uint fates[]; };              // off screen, transparent, drawn, left to others
+layout(std430, binding = 5) readonly buffer Frames { float frames[]; };  // growthFrames()
+uniform uint group_count;
+uniform bool per_pixel;
+uniform float largest_scalar;
+uniform vec2 picture;     // pixels
+uniform vec2 middle;
+uniform vec4 right;       // a row each of the map from the data: to pixels, or in perspective to the axes of the view
+uniform vec4 down;
+uniform vec4 forward;     // to depth
+uniform float focal;      // pixels
+uniform float volume;
+uniform float low_pass_px2;
+uniform float slope_low_pass_px2;
+uniform float key_steps;
+uniform float key_steps_a_pixel;
+shared uint group_fates[4];
+)";
+
+constexpr const char* kProject = R"(
+// Under these rows of a linear map, as ellipseOf() in footprint.h.
+struct Ellipse {
+  float l11, l21, l22, amplitude, slope0, slope1, half_width, along;
+};
+
+Ellipse ellipseOf(vec3 b0, vec3 b1, vec3 w, float variance, float weight) {
+  float s00 = dot(b0, b0), s01 = dot(b0, b1), s11 = dot(b1, b1);
+  vec3 n = cross(b0, b1);
+  float nn = dot(n, n);
+  float determinant = nn + low_pass_px2 * (s00 + s11 + low_pass_px2);
+  float slope_determinant = nn + slope_low_pass_px2 * (s00 + s11 + slope_low_pass_px2);
+  Ellipse e;
+  e.l11 = sqrt(s00 + low_pass_px2);
+  e.l21 = s01 / e.l11;
+  float root = sqrt(determinant);
+  e.l22 = root / e.l11;
+  e.amplitude = weight / root;
+  vec3 m = cross(n, w);
+  float h0 = dot(b0, w), h1 = dot(b1, w);
+  float g0 = (dot(b1, m) + slope_low_pass_px2 * h0) / slope_determinant;
+  float g1 = (slope_low_pass_px2 * h1 - dot(b0, m)) / slope_determinant;
+  e.slope0 = e.l11 * g0 + e.l21 * g1;
+  e.slope1 = e.l22 * g1;
+  float wn = dot(w, n);
+  float along2 = nn > 1e-8 * s00 * s11 ? wn * wn / nn : 0.0;
+  float unseen = dot(w, w) - (h0 * g0 + h1 * g1);
+  e.half_width = sqrt(3.0 * (KERNEL_VARIANCE * max(unseen, along2) + variance));
+  e.along = (wn < 0.0 ? -KERNEL_SIGMA : KERNEL_SIGMA) * sqrt(along2);
+  return e;
+}
+
+// The slope of the plane that a thin splat lies in; as PlaneBlock::fill().
+vec2 planeOf(vec3 b0, vec3 b1, vec3 q) {
+  float xx = dot(b0, b0), yy = dot(b1, b1), xy = dot(b0, b1), xz = dot(b0, q), yz = dot(b1, q), zz = dot(q, q);
+  float epsilon = 1e-6 * (xx + yy) + 1e-20;
+  vec3 n = cross(b0, b1), m = cross(n, q);
+  float inverse = 1.0 / (dot(n, n) + epsilon * (xx + yy + epsilon));
+  vec2 slope = inverse * vec2(dot(b1, m) + epsilon * xz, epsilon * yz - dot(b0, m));
+  float explained = slope.x * slope.x * xx + 2.0 * slope.x * slope.y * xy + slope.y * slope.y * yy;
+  float rest = zz - 2.0 * (slope.x * xz + slope.y * yz) + explained;
+  float steep = length(slope);
+  bool leans = explained > 2.0 * rest && steep < 1e30;
+  return leans ? min(1.0, STEEPEST / steep) * slope : vec2(0.0);
+}
+
+// As GrowthBlock::skewOf(): `a0` to `a2` are A's columns on the screen.
+uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
+  if (code == 0u) return 0u;
+  vec4 t = vec4(0.0);
+  uint frame = (code >> FRAME_SHIFT & FRAME_MASK) * 9u;
+  for (uint a = 0u; a < 3u; ++a) {
+    float growth = GROWTH_STEP * float(int(code << (32u - GROWTH_BITS * (a + 1u))) >> (32 - int(GROWTH_BITS)));
+    if (growth == 0.0) continue;
+    uint at = frame + 3u * a;
+    vec2 along = frames[at] * a0 + frames[at + 1u] * a1 + frames[at + 2u] * a2;
+    float p0 = along.x / e.l11, p1 = (along.y - e.l21 * p0) / e.l22;
+    t += SKEW_OF_GROWTH * growth * vec4(p0 * p0 * p0, p0 * p0 * p1, p0 * p1 * p1, p1 * p1 * p1);
+  }
+  ivec4 steps = ivec4(roundEven(clamp(t * 100.0, -127.0, 127.0)));
+  return uint(steps.x & 255) | uint(steps.y & 255) << 8 | uint(steps.z & 255) << 16 | uint(steps.w & 255) << 24;
+}
+
+float cellOf(float value) {
+  float v = log_scale ? log(max(value, least_logarithmic)) : value;
+  return v * cells_from_scalar.x + cells_from_scalar.y;
+}
+float extinctionTo(float x) {
+  int cell = int(clamp(x, 0.0, float(cells)));
+  return texelFetch(classes, cell).w + below.w * min(x, 0.0) + above.w * max(x - float(cells), 0.0);
+}
+// A cell more to both sides, as ClassificationTable::fullyTransparent().
+bool isTransparent(float low, float high) {
+  return extinctionTo(floor(cellOf(high)) + 2.0) - extinctionTo(floor(cellOf(low)) - 1.0) <= 0.0;
+}
+
+// The first key of any tile that the splat touches; as setFirst() in tile_key.h, which says why.
+uint firstKey(vec2 at, Ellipse e, inout uint key, inout vec2 slope) {
+  if (slope == vec2(0.0)) return key;
+  vec2 reach = SUPPORT * vec2(e.l11, length(vec2(e.l21, e.l22)));
+  vec2 from = floor((at - reach) / SIDE), to = floor((at + reach) / SIDE);
+  vec2 least = min(slope * (from * SIDE + 0.5 * SIDE - at), slope * (to * SIDE + 0.5 * SIDE - at));
+  vec2 over = vec2(e.l11 * slope.x + e.l21 * slope.y, e.l22 * slope.y);
+  float most = SUPPORT * length(over) + 0.5 * SIDE * (abs(slope.x) + abs(slope.y)) + 1.0;
+  float before = min(1.0 - (least.x + least.y), most);
+  uint first = before > 0.0 ? key - min(key, uint(min(before, 1073741824.0))) : key + uint(min(-before, 1073741824.0));
+  if (from == to) {
+    key = first;
+    slope = vec2(0.0);
+  }
+  return first;
+}
+
+// Returns which of `fates` counts it.
+uint project(uvec4 group, uint thread) {
+  uint slot = 4u * (group.w + thread), p = 4u * group.x;
+  uvec4 part0 = parts[p], part1 = parts[p + 1u];
+  splats[slot] = uvec4(0u, 0u, floatBitsToUint(-1.0), 0u);  // a record, which is not drawn
+  uint n = part0.y, at = part0.x + group.y + thread;
+  if (words[at + 10u * n] != NO_BORDER) return 3u;
+#define OF(array) uintBitsToFloat(words[at + uint(array) * n])
+  vec3 position = vec3(OF(0), OF(1), OF(2)), axis = vec3(OF(3), OF(4), OF(5)), shear = vec3(OF(6), OF(7), OF(8));
+  vec3 a0 = axis.x * vec3(1.0, shear.x, shear.y), a1 = axis.y * vec3(0.0, 1.0, shear.z), a2 = vec3(0.0, 0.0, axis.z);
+  float weight = OF(9), mean = OF(12), variance = OF(16);
+  vec3 w = vec3(OF(13), OF(14), OF(15));
+  vec3 row0 = right.xyz, row1 = down.xyz, to_depth = focal * forward.xyz;
+  vec2 pixel;
+  float depth;
+#if PERSPECTIVE
+  vec4 part2 = uintBitsToFloat(parts[p + 2u]);
+  float order_base = uintBitsToFloat(parts[p + 3u].x);
+  vec3 c = part2.xyz + vec3(dot(right.xyz, position), dot(down.xyz, position), dot(forward.xyz, position));
+  vec2 tangent = c.xy / c.z;
+  pixel = middle + focal * tangent;
+  depth = (part2.w + dot(forward.xyz, position)) / (order_base * c.z);
+  row0 = focal / c.z * (right.xyz - tangent.x * forward.xyz);
+  row1 = focal / c.z * (down.xyz - tangent.y * forward.xyz);
+  to_depth /= c.z;
+  weight *= volume * focal * focal * length(c) / (c.z * c.z * c.z);
+#else
+  pixel = uintBitsToFloat(part1.zw) + vec2(dot(row0, position), dot(row1, position));
+  depth = dot(forward.xyz, position);
+  weight *= volume;
+#endif
+  vec3 b0 = vec3(dot(row0, a0), dot(row0, a1), dot(row0, a2)), b1 = vec3(dot(row1, a0), dot(row1, a1), dot(row1, a2));
+  Ellipse e = ellipseOf(b0, b1, w, variance, weight);
+  vec2 reach = SUPPORT * vec2(e.l11, abs(e.l21) + e.l22);
+  if (!(all(greaterThan(pixel + reach, vec2(0.0))) && all(lessThan(pixel - reach, picture)))) return 0u;
+  uint skew = skewOf(words[at + 11u * n], vec2(b0.x, b1.x), vec2(b0.y, b1.y), vec2(b0.z, b1.z), e);
+  if (!per_pixel) e.slope0 = e.slope1 = e.half_width = e.along = 0.0;
+  float spread = SUPPORT * (abs(e.slope0) + abs(e.slope1)) + e.half_width;
+  if (!(abs(mean) + spread <= largest_scalar)) {
+    e.slope0 = e.slope1 = e.half_width = e.along = spread = 0.0;
+    mean = clamp(mean, -largest_scalar, largest_scalar);
+  }
+  e.amplitude = min(e.amplitude, 1e30);
+  if (!(e.amplitude > 0.0) || isTransparent(mean - spread, mean + spread)) return 1u;
+  vec2 slope = planeOf(b0, b1, vec3(dot(to_depth, a0), dot(to_depth, a1), dot(to_depth, a2)));
+#if PERSPECTIVE
+  slope *= key_steps_a_pixel * (uintBitsToFloat(part0.w) - depth);
+#else
+  slope *= key_steps_a_pixel;
+#endif
+  uint key = uint(clamp(int(part0.z) + int(depth * key_steps), 0, MOST_KEY));
+  uint first = clamp(firstKey(pixel, e, key, slope), part1.x, part1.y);
+  key = clamp(key, part1.x, part1.y);
+  splats[slot] = floatBitsToUint(vec4(pixel, e.l11, e.l21));
+  splats[slot + 1u] = floatBitsToUint(vec4(e.l22, e.amplitude, mean, e.slope0));
+  splats[slot + 2u] = uvec4(floatBitsToUint(vec2(e.slope1, e.half_width)), skew, floatBitsToUint(e.along));
+  splats[slot + 3u] = uvec4(key, first, floatBitsToUint(slope));
+  return 2u;
+}
+
+void main() {
+  uint thread = gl_LocalInvocationID.x, number = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x;
+  if (thread < 4u) group_fates[thread] = 0u;
+  memoryBarrierShared();
+  barrier();
+  uvec4 group = number < group_count ? groups[number] : uvec4(0u);
+  if (thread < group.z) atomicAdd(group_fates[project(group, thread)], 1u);
+  memoryBarrierShared();
+  barrier();
+  if (thread < 4u && group_fates[thread] > 0u) atomicAdd(fates[thread], group_fates[thread]);
+}
+)";
+
+}  // namespace
+
+std::string projectShader(bool perspective) {
+  const std::string constants = fmt::format(
+      "#define THREADS {}\n#define PERSPECTIVE {:d}\n#define KERNEL_SIGMA {:.9g}\n#define KERNEL_VARIANCE "
+      "{:.9g}\n"
+      "#define SUPPORT {:.9g}\n#define STEEPEST {:.9g}\n#define SIDE {:.1f}\n#define NO_BORDER {}u\n",
+      kProjectThreads, perspective, kKernelSigma, kKernelSigma * kKernelSigma,
+      static_cast<float>(kKernelSupport), static_cast<float>(kSteepest), static_cast<float>(kOrderSide),
+      kNoBorder);
+  const std::string growth = fmt::format(
+      "#define FRAME_SHIFT {}\n#define FRAME_MASK {}u\n#define GROWTH_BITS {}u\n#define GROWTH_STEP {:.9g}\n"
+      "#define SKEW_OF_GROWTH {:.9g}\n#define MOST_KEY {}\n",
+      kGrowthFrameShift, (1u << kGrowthFrameBits) - 1, kGrowthBits, kGrowthStep, kSkewOfGrowth,
+      INT32_MAX / 2);
+  return fmt::format("#version 430 core\n{}{}{}{}{}", constants, growth, splatUniforms(), kInputs, kProject);
+}
+
+}  // namespace curvisplat
