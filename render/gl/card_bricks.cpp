@@ -1,6 +1,7 @@
 #include "render/gl/card_bricks.h"
 
 #include <algorithm>
+#include <glm/geometric.hpp>
 #include <optional>
 
 #include "render/gl/project_shader.h"
@@ -49,6 +50,10 @@ ShaderPart shaderPart(const StoredPart& part, const ScreenView& view, const Dept
     out.origin_z = map.origin.z;
     out.from_base = map.from_base;
     out.order_base = map.order_base;
+    const glm::vec3 eye(view.eye - view.scale * part.cell_min);
+    out.eye_x = eye.x;
+    out.eye_y = eye.y;
+    out.eye_z = eye.z;
   }
   return out;
 }
@@ -183,6 +188,14 @@ void CardBricks::setView(const GlProgram& program, const ProjectionSettings& set
   gl_.Uniform2f(program.uniform("picture"), width, height);
   gl_.Uniform2f(program.uniform("middle"), 0.5f * width, 0.5f * height);
   gl_.Uniform1i(program.uniform("per_pixel"), settings.per_pixel);
+  if (!settings.light) return;
+  const Light& light = *settings.light;
+  const auto g0_squared = static_cast<float>(std::max(settings.light_g0 * settings.light_g0, 1e-30));
+  setRow("light", {light.ambient, light.diffuse, light.specular, g0_squared});
+  gl_.Uniform1i(program.uniform("light_at_viewer"), !light.towards);
+  if (light.towards) setRow("light_towards", fourOf(glm::vec3(glm::normalize(*light.towards))));
+  setRow("viewer", fourOf(glm::vec3(-view.forward)));
+  setRow("scale", fourOf(glm::vec3(view.scale)));
 }
 
 void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& keys,

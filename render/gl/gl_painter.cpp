@@ -106,6 +106,7 @@ struct GlPainter::State {
   std::vector<GlObject> colours;  // an attachment for each window of depth
   ImageSize size{0, 0};
   glm::vec4 background{0};
+  unsigned threads = 0;  // PaintResources'
   struct InFlight {
     GlFence fence;
     GlObject timer;  // a query, done when the fence is passed
@@ -211,6 +212,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   gl.Viewport(0, 0, size.width, size.height);
   gl.Scissor(0, 0, size.width, size.height);
   state_->background = background;
+  state_->threads = resources.threads;
   gl.ClearColor(0, 0, 0, 0);
   gl.Clear(GL_COLOR_BUFFER_BIT);
   gl.check("beginning a frame");
@@ -337,7 +339,7 @@ Image GlPainter::end() {
                   &drawn[4 * state.size.pixels() * n]);
   }
   gl.check("reading the picture");
-  return state.tables.composite(drawn, true, state.background);
+  return state.tables.composite(drawn, true, state.background, state.threads);
 }
 
 double GlPainter::uploadSeconds() const {

@@ -89,6 +89,8 @@ struct GlTilePainter::State final : BrickStore {
   GlObject windows, framebuffer;
   ImageSize size{0, 0};
   int window_count = 0;
+  std::unique_ptr<float[]> drawn;  // the windows, as they are read at the end
+  unsigned threads = 0;
   glm::vec4 background{0};
   const ClassificationTable* table = nullptr;
   std::stop_token stop;
@@ -169,6 +171,7 @@ void GlTilePainter::State::allocate(ImageSize wanted, int count) {
   closed.reserve((TileSet::tilesOf(wanted, kSmallTile) + TileSet::tilesOf(wanted, kLargeTile)) *
                  sizeof(uint32_t));
   gl.check("the picture");
+  drawn = std::make_unique_for_overwrite<float[]>(4 * wanted.pixels() * static_cast<size_t>(count));
   window_bytes = 4 * sizeof(float) * wanted.pixels() * static_cast<uint64_t>(count);
   hidden = std::make_unique<std::atomic<uint8_t>[]>(TileSet::tilesOf(wanted, kLargeTile));
   size = wanted;
@@ -199,6 +202,7 @@ void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const Cla
   state.openTiles();
   state.background = background;
   state.stop = resources.stop;
+  state.threads = resources.threads;
   state.clip = {0, 0, size.width, size.height};
   state.batch.assign(kMaxRecords, kNoSplat);
   state.stored = 0;
@@ -414,12 +418,12 @@ Image GlTilePainter::end() {
   State& state = *state_;
   state.paintBatch(true);
   const StageTimer timer(state.draw_s, "draw (OpenGL)");
-  std::vector<float> drawn(4 * state.size.pixels() * static_cast<size_t>(state.window_count));
+  const size_t floats = 4 * state.size.pixels() * static_cast<size_t>(state.window_count);
   state.gl.BindTexture(GL_TEXTURE_2D_ARRAY, state.windows.name());
-  state.gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, drawn.data());
+  state.gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, state.drawn.get());
   state.gl.check("reading the picture");
   state.timers.finish();
-  return state.tables.composite(drawn, false, state.background);
+  return state.tables.composite({state.drawn.get(), floats}, false, state.background, state.threads);
 }
 
 bool GlTilePainter::isOverfull() const {

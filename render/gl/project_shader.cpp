@@ -31,6 +31,11 @@ uniform float focal;      // pixels
 uniform float volume;
 uniform float low_pass_px2;
 uniform float slope_low_pass_px2;
+uniform vec4 light;       // ambient, diffuse, specular, LocalLight's g0 squared
+uniform bool light_at_viewer;
+uniform vec4 light_towards;
+uniform vec4 viewer;      // orthographic: the direction towards it
+uniform vec4 scale;
 uniform float key_steps;
 uniform float key_steps_a_pixel;
 shared uint group_fates[4];
@@ -97,6 +102,34 @@ uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
   }
   ivec4 steps = ivec4(roundEven(clamp(t * 100.0, -127.0, 127.0)));
   return uint(steps.x & 255) | uint(steps.y & 255) << 8 | uint(steps.z & 255) << 16 | uint(steps.w & 255) << 24;
+}
+
+// As LocalLight::of(): diffuse and specular. `towards_viewer` has unit length.
+vec2 litBy(vec3 w, vec3 axis, vec3 shear, vec3 towards_viewer) {
+  vec3 g;
+  g.z = w.z / axis.z;
+  g.y = w.y / axis.y - shear.z * g.z;
+  g.x = w.x / axis.x - shear.x * g.y - shear.y * g.z;
+  g /= scale.xyz;
+  float squared = dot(g, g);
+  if (!(squared > 0.0 && squared < 1e36)) return vec2(1.0, 0.0);
+  float strength = squared / (squared + light.w), inverse = inversesqrt(squared);
+  vec3 towards = light_at_viewer ? towards_viewer : light_towards.xyz;
+  float facing = min(1.0, inverse * abs(dot(g, towards))), shine = facing;
+  if (!light_at_viewer) {
+    vec3 middle_way = towards + towards_viewer;
+    float far = length(middle_way);
+    shine = far > 1e-6 ? min(1.0, inverse * abs(dot(g, middle_way)) / far) : 0.0;
+  }
+  for (int n = 0; n < 5; ++n) shine *= shine;
+  return vec2(1.0 - strength + strength * (light.x + light.y * facing), strength * light.z * shine);
+}
+
+// As packLit().
+float withLight(float half_width, vec2 by) {
+  uint bits = floatBitsToUint(max(half_width, 1.17549435e-38)) & 0xffff0000u;
+  uvec2 shares = uvec2(clamp(by, 0.0, 1.0) * vec2(511.0, 127.0) + 0.5);
+  return uintBitsToFloat(bits | shares.x << 7 | shares.y);
 }
 
 float cellOf(float value) {
@@ -173,6 +206,14 @@ uint project(uvec4 group, uint thread) {
   }
   e.amplitude = min(e.amplitude, 1e30);
   if (!(e.amplitude > 0.0) || isTransparent(mean - spread, mean + spread)) return 1u;
+  if (lit) {
+#if PERSPECTIVE
+    vec3 towards_viewer = normalize(uintBitsToFloat(parts[p + 3u].yzw) - scale.xyz * position);
+#else
+    vec3 towards_viewer = viewer.xyz;
+#endif
+    e.half_width = withLight(e.half_width, litBy(w, axis, shear, towards_viewer));
+  }
   vec2 slope = planeOf(b0, b1, vec3(dot(to_depth, a0), dot(to_depth, a1), dot(to_depth, a2)));
 #if PERSPECTIVE
   slope *= key_steps_a_pixel * (uintBitsToFloat(part0.w) - depth);

@@ -1,8 +1,13 @@
 #include "render/gl/splat_tables.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 
 #include "render/project/footprint.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
@@ -116,13 +121,13 @@ void SplatTables::use(const GlProgram& program) const {
   set("cells_from_colour", "colours_below", "colours_above", *shading_.colours);
 }
 
-Image SplatTables::composite(std::span<const float> drawn, bool opacities,
-                             const glm::vec4& background) const {
+Image SplatTables::composite(std::span<const float> drawn, bool opacities, const glm::vec4& background,
+                             unsigned threads) const {
   Image image(size_);
   const auto add = [&](PixelResult& result, const float* c) {
     result.add({c[0], c[1], c[2]}, opacities ? 1 - c[3] : c[3]);
   };
-  for (size_t pixel = 0; pixel < size_.pixels(); ++pixel) {
+  const auto finish = [&](size_t pixel) {
     const auto width = static_cast<size_t>(size_.width);
     const float* from = &drawn[4 * pixel];
     PixelResult result;
@@ -138,7 +143,13 @@ Image SplatTables::composite(std::span<const float> drawn, bool opacities,
     float* const to = &image.rgba[4 * pixel];
     for (int c = 0; c < 3; ++c) to[c] = result.colour[c] + result.through * background[c];
     to[3] = 1 - result.through * (1 - background[3]);
-  }
+  };
+  tbb::task_arena arena(static_cast<int>(threadsOrCores(threads)));
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, size_.pixels(), 1 << 16), [&](const auto& some) {
+      for (size_t pixel = some.begin(); pixel < some.end(); ++pixel) finish(pixel);
+    });
+  });
   return image;
 }
 

@@ -38,8 +38,9 @@ class SplatTables {
   void use(const GlProgram& program) const;
 
   /// The frame's picture. `drawn` [windows() pictures, one after the other]: colours, and transmittances or, by
-  /// `opacities`, one minus those.
-  Image composite(std::span<const float> drawn, bool opacities, const glm::vec4& background) const;
+  /// `opacities`, one minus those. `threads`: that share the work; 0: one per core.
+  Image composite(std::span<const float> drawn, bool opacities, const glm::vec4& background,
+                  unsigned threads) const;
 
  private:
   void loadLayers();

@@ -8,7 +8,7 @@
 namespace curvisplat {
 
 bool BrickStore::canDraw(const ProjectionSettings& settings) {
-  return !settings.light && settings.clip_planes.empty() && !settings.layers && !settings.gradient;
+  return settings.clip_planes.empty() && !settings.layers && !settings.gradient;
 }
 
 bool BrickStore::canDraw(const Brick& brick, const ScreenView& view) {

@@ -47,7 +47,7 @@ class BrickStore {
   virtual bool hasPieces(uint32_t brick) const = 0;
   /// Whether the splats of a brick of this view can be drawn from a store: perspective cuts none of them into pieces.
   static bool canDraw(const Brick& brick, const ScreenView& view);
-  /// Whether pictures with these settings can: without light, clip planes, layers and opacities by the gradient.
+  /// Whether pictures with these settings can: without clip planes, layers and opacities by the gradient.
   static bool canDraw(const ProjectionSettings& settings);
 
   /// Projects the parts, all of which are stored. Between begin() and the first draw() of the painter.
