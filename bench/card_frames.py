@@ -26,7 +26,7 @@ them, of which medians are printed, from the program's own --stats:
     OpenGL's   by OpenGL's own clock, without waiting for splats; says little where it draws in software
     x cpu      the frame, divided by the one of the processor's painter
 
-and below a row in compute shaders, of one frame: the parts of OpenGL's time; splats in tiles (entries), and the bytes of memory that
+and below a row in compute shaders, of one frame: the parts of OpenGL's time; splats of bricks that stay on the card; splats in tiles (entries), and the bytes of memory that
 these take on paper: 32 an entry, which is written, sorted and read; 64 a splat to send it, and twice to read it. Each entry is looked at by the pixels of its tile, 16 where splats lean.
 
 A backend that cannot be had is left out, and so is one that draws in software, unless --software is given.
@@ -47,7 +47,7 @@ WARM_UP = 2
 SOFTWARE = ("llvmpipe", "softpipe", "SWR", "SwiftShader", "Software")  # as render/gl/gl_context.cpp
 # What is measured, as sums of fields of --stats: of OpenGL alone, and of all backends.
 OF_GL = {"upload": ["upload"], "gl_draw": ["gl_draw"]}
-PARTS = {"list": ["gl_list"], "sort": ["gl_sort"], "paint": ["gl_paint"]}  # in compute shaders
+PARTS = {"project": ["gl_project"], "list": ["gl_list"], "sort": ["gl_sort"], "paint": ["gl_paint"]}  # in compute shaders
 OF_ALL = {"frame": ["total"], "draw": ["draw"], "workers": ["project", "sort"]}
 
 
@@ -155,7 +155,7 @@ def print_work(frame, median):
     entries, splats = frame["card_entries"], frame["splats_drawn"]
     gigabytes = 1e-9 * (32 * entries + 192 * splats)
     parts = ", ".join(f"{name} {1e3 * median[name]:.1f} ms" for name in PARTS)
-    print(f"  {parts}; {entries} entries, {results.three_digits(gigabytes)} GB on paper; "
+    print(f"  {parts}; {frame['card_splats']} splats of stored bricks, {entries} entries, {results.three_digits(gigabytes)} GB on paper; "
           f"{frame['card_peak_bytes'] / MIB:.0f} MiB of the card", flush=True)
 
 

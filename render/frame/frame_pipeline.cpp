@@ -193,7 +193,7 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
   for (uint32_t number = 0; number < plan.parts.size(); ++number) {
     const SweptPart& part = plan.parts[number];
     const Brick& brick = cache_.bricks()[part.part.brick];
-    if (!BrickStore::canDraw(brick, plan.settings.view)) continue;
+    if (!BrickStore::canDraw(brick, plan.settings)) continue;
     numbers.push_back(number);
     stored_.push_back({part.part.brick, brick.splats, SplatRanges(brick, part.part.octants),
                        cache_.manifest().root.cellMin(brick.cell), part.keys});

@@ -40,7 +40,7 @@ struct FrameWork {
   const ClassificationTable& table;
   const DepthKeys& keys;
   const HiddenBricks& hidden;
-  std::span<const LeftToWorkers> left;  // [part]; empty: all
+  std::span<const LeftToWorkers> left = {};  // [part]; empty: all
   bool keep_going = false;
   SplatExchange* exchange = nullptr;  // among the ranks that draw the picture together; null: there is one
 };

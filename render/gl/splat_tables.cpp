@@ -1,6 +1,7 @@
 #include "render/gl/splat_tables.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -144,7 +145,8 @@ Image SplatTables::composite(std::span<const float> drawn, bool opacities, const
     for (int c = 0; c < 3; ++c) to[c] = result.colour[c] + result.through * background[c];
     to[3] = 1 - result.through * (1 - background[3]);
   };
-  tbb::task_arena arena(static_cast<int>(threadsOrCores(threads)));
+  tbb::task_arena arena(
+      std::min(static_cast<int>(threadsOrCores(threads)), tbb::info::default_concurrency()));
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<size_t>(0, size_.pixels(), 1 << 16), [&](const auto& some) {
       for (size_t pixel = some.begin(); pixel < some.end(); ++pixel) finish(pixel);

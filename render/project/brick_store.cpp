@@ -8,14 +8,22 @@
 namespace curvisplat {
 
 bool BrickStore::canDraw(const ProjectionSettings& settings) {
-  return settings.clip_planes.empty() && !settings.layers && !settings.gradient;
+  return !settings.layers && !settings.gradient;
 }
 
-bool BrickStore::canDraw(const Brick& brick, const ScreenView& view) {
+bool BrickStore::canDraw(const Brick& brick, const ProjectionSettings& settings) {
+  const glm::dvec3 middle = 0.5 * (brick.lower + brick.upper), extent = 0.5 * (brick.upper - brick.lower);
+  const auto is_inside = [&](const ClipPlane& plane) {
+    const glm::dvec3 normal = glm::normalize(plane.normal);
+    return glm::dot(normal, middle - plane.point) - glm::dot(glm::abs(normal), extent) >
+           1.01 * brick.largest_radius;  // but for rounding
+  };
+  if (!std::all_of(settings.clip_planes.begin(), settings.clip_planes.end(), is_inside)) return false;
+  const ScreenView& view = settings.view;
   if (view.projection == Projection::kOrthographic) return true;
   const double radius = brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
-  const double half = 0.5 * glm::dot(glm::abs(view.forward * view.scale), brick.upper - brick.lower);
-  const double nearest = view.viewFromData(0.5 * (brick.lower + brick.upper)).z - half;
+  const double half = glm::dot(glm::abs(view.forward * view.scale), extent);
+  const double nearest = view.viewFromData(middle).z - half;
   return nearest > view.near && radius <= 0.99 * view.widest * nearest;  // but for rounding
 }
 

@@ -45,10 +45,11 @@ class BrickStore {
                    const VariableArrays<const float>& values) = 0;
   /// Whether some splats of a stored brick lie at borders, and are drawn in pieces.
   virtual bool hasPieces(uint32_t brick) const = 0;
-  /// Whether the splats of a brick of this view can be drawn from a store: perspective cuts none of them into pieces.
-  static bool canDraw(const Brick& brick, const ScreenView& view);
-  /// Whether pictures with these settings can: without clip planes, layers and opacities by the gradient.
+  /// Whether pictures with these settings can be drawn from a store: those without layers and without opacities by the
+  /// gradient.
   static bool canDraw(const ProjectionSettings& settings);
+  /// Whether a brick can, in such a picture: neither clip planes nor perspective cut its splats.
+  static bool canDraw(const Brick& brick, const ProjectionSettings& settings);
 
   /// Projects the parts, all of which are stored. Between begin() and the first draw() of the painter.
   virtual void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,

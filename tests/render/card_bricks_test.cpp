@@ -1,0 +1,130 @@
+// Bricks that stay on the card: whatever stays there, a picture is the processor's but for rounding, and its bits depend
+// on nothing but the plan and the card's memory.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "render/frame/frame.h"
+#include "stream/base/error.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_caches.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMiB = 1 << 20;
+
+class CardBricksTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    writeRandomCache(folder_ / "a.splats", 3);
+    cache_ = std::make_unique<CacheReader>(folder_ / "a.splats");
+    try {
+      egl_ = rendererBy(Backend::kEgl);
+    } catch (const Error& error) {
+      GTEST_SKIP() << error.what();
+    }
+    if (egl_->backendName().find("compute shaders") == std::string::npos) GTEST_SKIP() << egl_->backendName();
+  }
+
+  std::unique_ptr<FrameRenderer> rendererBy(Backend backend) const {
+    return std::make_unique<FrameRenderer>(*cache_, 0, TransferFunction::preset("viridis", -1, 1, 0.02),
+                                           backend);
+  }
+  static FrameOptions options(uint64_t card_memory_bytes) {
+    FrameOptions made;
+    made.size = {60, 50};
+    made.lod_pixels = 0;
+    made.memory_bytes = 256 * kMiB;
+    made.card_memory_bytes = card_memory_bytes;
+    return made;
+  }
+  Camera camera(const char* view, Projection projection = Projection::kOrthographic) const {
+    const Manifest& manifest = cache_->manifest();
+    return Camera::named(view, manifest.lower, manifest.upper, {60, 50}, projection, 30);
+  }
+  glm::dvec3 middle() const { return 0.5 * (cache_->manifest().lower + cache_->manifest().upper); }
+
+  /// Compares the picture from the card with the processor's. Returns how many splats came from stored bricks.
+  uint64_t compare(const std::string& what, const Camera& camera,
+                   const std::function<void(FrameOptions&)>& set) {
+    FrameOptions wanted = options(64 * kMiB);
+    set(wanted);
+    FrameStatistics card, cpu;
+    const Image stored = egl_->render(camera, wanted, card),
+                image = rendererBy(Backend::kCpu)->render(camera, wanted, cpu);
+    EXPECT_GE(compareImages(stored, image).psnr_db, 60) << what;
+    EXPECT_EQ(card.splats_read, cpu.splats_read) << what;
+    EXPECT_EQ(card.splats_off_screen, cpu.splats_off_screen) << what;
+    EXPECT_EQ(card.splats_clipped, cpu.splats_clipped) << what;
+    EXPECT_EQ(card.splats_drawn + card.splats_transparent, cpu.splats_drawn + cpu.splats_transparent) << what;
+    return card.card_splats;
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<CacheReader> cache_;
+  std::unique_ptr<FrameRenderer> egl_;
+};
+
+TEST_F(CardBricksTest, AreDrawnAsTheProcessorDrawsThem) {
+  const auto nothing = [](FrameOptions&) {};
+  const uint64_t all = compare("plain", camera("iso"), nothing);
+  EXPECT_GT(all, 10'000u);
+  EXPECT_EQ(compare("perspective", camera("iso", Projection::kPerspective), nothing), all);
+  EXPECT_EQ(compare("flat", camera("-x"), [](FrameOptions& o) { o.classification = Classification::kFlat; }),
+            all);
+  EXPECT_GT(compare("stretched", camera("+y"), [](FrameOptions& o) { o.scale = {1, 2, 0.5}; }), 0u);
+  EXPECT_EQ(compare("lit", camera("iso"), [](FrameOptions& o) { o.light = Light{}; }), all);
+  const auto light = [](FrameOptions& o) { o.light = Light{0.2f, 0.8f, 0.4f, glm::dvec3(1, 0.4, 0.6)}; };
+  EXPECT_EQ(compare("lit from the side", camera("iso", Projection::kPerspective), light), all);
+  EXPECT_GT(compare("coarse", camera("iso"), [](FrameOptions& o) { o.lod_pixels = 4; }), 0u);
+}
+
+TEST_F(CardBricksTest, LeaveToTheProcessorWhatIsCut) {
+  const auto half = [this](FrameOptions& o) { o.clip_planes = {{middle(), {1, 0.2, 0}}}; };
+  EXPECT_GT(compare("clip plane", camera("iso"), half), 0u);
+  Camera close = camera("iso", Projection::kPerspective);
+  close.position = middle() + 0.02 * (close.position - middle());
+  compare("from the inside", close, [](FrameOptions&) {});
+}
+
+TEST_F(CardBricksTest, GiveTheSameBitsForAnyHistoryThreadsAndMemory) {
+  for (const uint64_t card_memory : {2 * kMiB, 64 * kMiB}) {
+    FrameStatistics statistics;
+    const Image iso = egl_->render(camera("iso"), options(card_memory), statistics);
+    const uint64_t stored = statistics.card_splats;
+    EXPECT_GT(stored, 0u);
+    EXPECT_EQ(stored == statistics.splats_read, card_memory > 2 * kMiB);
+    for (const unsigned threads : {1u, 3u}) {
+      const auto fresh = rendererBy(Backend::kEgl);
+      FrameOptions wanted = options(card_memory);
+      wanted.threads = threads;
+      wanted.memory_bytes = (threads == 1 ? 96 : 512) * kMiB;
+      for (const char* view : {"+z", "-x"}) fresh->render(camera(view), wanted, statistics);
+      EXPECT_EQ(fresh->render(camera("iso"), wanted, statistics).rgba, iso.rgba) << threads;
+      EXPECT_EQ(statistics.card_splats, stored);
+    }
+  }
+}
+
+TEST_F(CardBricksTest, AreReadOnce) {
+  FrameStatistics first, second;
+  egl_->render(camera("iso"), options(64 * kMiB), first);
+  EXPECT_GT(first.bytes_read, 0u);
+  egl_->render(camera("-x"), options(64 * kMiB), second);
+  EXPECT_EQ(second.bytes_read, 0u);
+  EXPECT_EQ(second.card_splats, first.card_splats);
+}
+
+TEST_F(CardBricksTest, StayAwayWithoutMemory) {
+  FrameStatistics statistics;
+  const Image none = egl_->render(camera("iso"), options(0), statistics);
+  EXPECT_EQ(statistics.card_splats, 0u);
+  EXPECT_EQ(egl_->render(camera("iso"), options(1000), statistics).rgba, none.rgba);
+  EXPECT_EQ(statistics.card_splats, 0u);
+}
+
+}  // namespace
+}  // namespace curvisplat
