@@ -96,11 +96,13 @@ def check_pictures(arguments, backends, out):
         results.run([arguments.program, "generate", "wake", "--size", size, "-o", wake])
         results.run([arguments.program, "convert", f"{wake}.xyz", f"{wake}.fun", "-o", cache, "--overwrite", "--scalar", "f,jacobian"])
     picture = "80x60" if arguments.quick else "1920x1080"
+    # Software keeps no bricks without being asked.
+    stored = ["--card-memory", "64M"] if arguments.software else []
 
     def draw(backend, name, options):
         file = arguments.folder / f"{name}.pfm"
         results.run([arguments.program, "render", cache, "-o", file, "--backend", backend, "--size", picture, "--range", "0,1", "--view",
-                     "iso", "--background", "white", "--memory", "2G", *options])
+                     "iso", "--background", "white", "--memory", "2G", *stored, *options])
         return file
 
     good = True

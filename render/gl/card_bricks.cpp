@@ -159,6 +159,10 @@ void CardBricks::put(uint32_t brick, const GeometryArrays<const float>& geometry
   stored.filled = true;
 }
 
+void CardBricks::compile() {
+  for (const bool perspective : {false, true}) program(perspective);
+}
+
 const GlProgram& CardBricks::program(bool perspective) {
   std::optional<GlProgram>& program = programs_[perspective];
   if (!program) program.emplace(gl_, projectShader(perspective));

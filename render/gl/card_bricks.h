@@ -19,6 +19,8 @@ class CardBricks {
  public:
   explicit CardBricks(const GlFunctions& gl);
 
+  /// Compiles what is otherwise compiled when it is first needed. Throws Error where the driver refuses it.
+  void compile();
   /// As BrickStore's.
   void open(uint64_t content);
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes);

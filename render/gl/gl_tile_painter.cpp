@@ -144,6 +144,7 @@ GlTilePainter::GlTilePainter(const GlContext& context, const Capacity& capacity)
   // A driver that refuses the most demanding shader is to be known of now.
   const SplatShaderKind all{true, true, true, true, true, PixelLayers::kMaxWindows};
   state_->programs.emplace(all, GlProgram(state_->gl, splatTileShader(all)));
+  if (state_->default_bytes > 0) state_->bricks.compile();
   state_->gl.check("setting up the painter");
 }
 
