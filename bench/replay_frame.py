@@ -24,7 +24,7 @@ import heapq
 
 import threads
 
-PAINTING = {"clear tiles", "sort bins", "paint tiles", "finish tiles"}  # ranges, by any thread
+PAINTING = {"clear tiles", "sort bins", "divide tiles", "paint tiles", "finish tiles"}  # ranges, by any thread
 ALONE = {"bin splats", "sum bins", "list tiles", "make image"}  # by the frame's thread between them
 PREPARING = {"read brick", "verify brick", "decode brick", "project brick"}
 WHAT_IFS = {"longest-first": "the ranges of a batch that take longest are painted first",

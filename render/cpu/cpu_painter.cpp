@@ -65,13 +65,22 @@ Image blackImage(ImageSize size) {
 }  // namespace
 
 struct CpuPainter::State {
+  struct Touched {
+    uint32_t queue, work;  // as TileQueues::workOf()
+  };
+  struct Divided {
+    uint32_t queue, first_part;
+  };
+
   ImageSize size{0, 0};
   glm::vec4 background{0};
   size_t batch_splats = 0, waiting_splats = 0;
   uint64_t prepared_bytes = kMinPreparedBytes;  // of a thread
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
-  std::vector<uint32_t> touched;                   // tiles of a batch
+  std::vector<Touched> touched;                    // queues that a batch touches
+  std::vector<Divided> divided;                    // queues, for a batch
+  std::vector<uint32_t> range_ends;                // of `touched`, for one thread at a time
   Image image;                                     // black until end()
   WindowTiles windows;
   std::optional<SplatBins> bins;
@@ -92,9 +101,12 @@ struct CpuPainter::State {
   void paintBatch();
   void paintBorrowed(std::span<const ScreenSplat>& splats);
   void listTiles(bool last);
+  void divideHeavy(uint64_t work);
+  void listRanges(uint64_t work);
   void paintTiles(bool last);
+  void paintQueue(size_t queue, uint32_t front, bool last);
   void paintLast();
-  BlockMask paintOrdered(size_t number, const OrderedTile& ordered);
+  BlockMask paintOrdered(size_t number, BlockMask blocks, const OrderedTile& ordered);
 };
 
 CpuPainter::CpuPainter() : state_(std::make_unique<State>()) {}
@@ -215,47 +227,88 @@ void CpuPainter::State::forRanges(const char* name, size_t count, const Job& job
   loop->forAll(name, count, std::max<size_t>(1, count / (kRangesAThread * loop->threads())), job);
 }
 
-/// The tiles that have splats, or in which some wait. Those that have many come first: a thread that took one last would
+/// The queues that have splats, or in which some wait. Those that have many come first: a thread that took one last would
 /// keep all others waiting.
 void CpuPainter::State::listTiles(bool last) {
   const TraceScope trace("list tiles");
-  const auto splatsOf = [&](size_t number) { return bins->tile(static_cast<int>(number)).size(); };
   touched.clear();
-  size_t entries = 0;
-  for (size_t number = 0; number < tileCount(size); ++number) {
-    if (splatsOf(number) == 0 && !(last && queues->waits(number))) continue;
-    touched.push_back(static_cast<uint32_t>(number));
-    entries += splatsOf(number);
+  divided.clear();
+  uint64_t work = 0;
+  for (size_t queue = 0; queue < queues->size(); ++queue) {
+    const size_t number = queues->tileOf(queue);
+    const size_t of_queue = queues->workOf(queue, bins->tile(static_cast<int>(number)).size(), last);
+    if (of_queue == 0) continue;
+    touched.push_back({static_cast<uint32_t>(queue), static_cast<uint32_t>(of_queue)});
+    work += of_queue;
   }
+  if (loop->threads() > 1) divideHeavy(work);
   std::stable_partition(touched.begin(), touched.end(),
-                        [&](uint32_t number) { return splatsOf(number) * touched.size() > 2 * entries; });
+                        [&](const Touched& of) { return of.work * touched.size() > 2 * work; });
+  listRanges(work);
+}
+
+/// Divides those queues that would keep a thread busy for longer than half of the batch takes.
+void CpuPainter::State::divideHeavy(uint64_t work) {
+  constexpr uint64_t kPartsAThread = 2, kMinWork = 1024;
+  const uint64_t most = std::max(kMinWork, work / (kPartsAThread * loop->threads()));
+  for (size_t n = 0, count = touched.size(); n < count; ++n) {
+    const auto [queue, of_queue] = touched[n];
+    if (of_queue <= most || !queues->divide(queue)) continue;
+    const auto first = static_cast<uint32_t>(queues->size() - TileQueues::kParts);
+    divided.push_back({queue, first});
+    constexpr auto kParts = uint32_t{TileQueues::kParts};
+    touched[n] = {first, of_queue / kParts};
+    for (uint32_t part = first + 1; part < first + kParts; ++part)
+      touched.push_back({part, of_queue / kParts});
+  }
+}
+
+/// Neighbours that are about as much work.
+void CpuPainter::State::listRanges(uint64_t work) {
+  constexpr uint64_t kRangesAThread = 32;
+  range_ends.clear();
+  uint64_t of_range = 0;
+  for (size_t n = 0; n < touched.size(); ++n) {
+    of_range += touched[n].work;
+    if (of_range * kRangesAThread * loop->threads() < work && n + 1 < touched.size()) continue;
+    range_ends.push_back(static_cast<uint32_t>(n + 1));
+    of_range = 0;
+  }
 }
 
 /// `last`: no more splats will come for any tile.
 void CpuPainter::State::paintTiles(bool last) {
   listTiles(last);
+  loop->forAll("divide tiles", divided.size(), 1,
+               [this](size_t n) { queues->moveToParts(divided[n].queue, divided[n].first_part); });
   const uint32_t front = bins->empty() ? 0 : bins->splats().back().first;
-  forRanges("paint tiles", touched.size(), [&, this](size_t n) {
-    if (stop.stop_requested()) return;
-    const size_t number = touched[n];
-    const BlockMask before = open[number].load(std::memory_order_relaxed);
-    queues->paint(number, {bins->splats(), bins->tile(static_cast<int>(number)), front, last}, before,
-                  [&](const OrderedTile& ordered) { return paintOrdered(number, ordered); });
-    if (before != 0 && open[number].load(std::memory_order_relaxed) == 0)
-      bins->close(static_cast<int>(number));
+  loop->forAll("paint tiles", range_ends.size(), 1, [&, this](size_t range) {
+    for (size_t n = range == 0 ? 0 : range_ends[range - 1]; n < range_ends[range]; ++n)
+      if (!stop.stop_requested()) paintQueue(touched[n].queue, front, last);
   });
   bins->clear();
 }
 
-/// Returns the blocks that are still open.
-BlockMask CpuPainter::State::paintOrdered(size_t number, const OrderedTile& ordered) {
+void CpuPainter::State::paintQueue(size_t queue, uint32_t front, bool last) {
+  const size_t number = queues->tileOf(queue);
+  const BlockMask blocks = queues->orderTilesIn(queue);
+  queues->paint(queue, {bins->splats(), bins->tile(static_cast<int>(number)), front, last},
+                open[number].load(std::memory_order_relaxed),
+                [&](const OrderedTile& ordered) { return paintOrdered(number, blocks, ordered); });
+}
+
+/// Returns which of the blocks are still open. Other threads may paint other blocks of the tile.
+BlockMask CpuPainter::State::paintOrdered(size_t number, BlockMask blocks, const OrderedTile& ordered) {
   const auto columns = static_cast<size_t>(bins->columns());
-  const BlockMask left =
-      paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
-                 static_cast<int>(number / columns) * kTileSide, open[number].load(std::memory_order_relaxed),
-                 ordered.splats, ordered.order, ordered.lists, *table, colours ? &*colours : nullptr, shading,
-                 windows.tile(number), prepared_bytes});
-  open[number].store(left, std::memory_order_relaxed);
+  const BlockMask before = open[number].load(std::memory_order_relaxed) & blocks;
+  const BlockMask left = paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
+                                    static_cast<int>(number / columns) * kTileSide, before, ordered.splats,
+                                    ordered.order, ordered.lists, *table, colours ? &*colours : nullptr,
+                                    shading, windows.tile(number), prepared_bytes});
+  if (left == before) return left;
+  const BlockMask closed = before & ~left;
+  if ((open[number].fetch_and(~closed, std::memory_order_relaxed) & ~closed) == 0)
+    bins->close(static_cast<int>(number));
   return left;
 }
 
@@ -353,7 +406,8 @@ bool CpuPainter::isOverfull() const {
 }
 
 uint64_t CpuPainter::frameBytes(ImageSize size) {
-  return tileCount(size) * (kTileFloats * sizeof(float) + sizeof(std::atomic<BlockMask>) + sizeof(uint32_t));
+  return tileCount(size) *
+         (kTileFloats * sizeof(float) + sizeof(std::atomic<BlockMask>) + sizeof(State::Touched));
 }
 
 uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {

@@ -1,5 +1,6 @@
 // Draws screen splats on the processor's cores: batches of splats, sorted into the tiles that they touch;
-// every tile painted by one thread, in vectors (tile.h). DESIGN.md, "Painting".
+// every tile painted by one thread, in vectors (tile.h), or by several if it has too many of the splats. DESIGN.md,
+// "Painting".
 //
 // Splats are blended nearest first, each under those before it. Splats that change no channel by 1/4096 or
 // more are left out (tile.h). There is no painter from back to front: this order is cheaper even where

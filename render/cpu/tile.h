@@ -1,6 +1,6 @@
 // A tile of the picture, as the processor's painter keeps it in memory, and what it is painted with. A
-// picture is square tiles, row by row; each fits in a core's first-level cache and is painted by one thread
-// at a time.
+// picture is square tiles, row by row; each fits in a core's first-level cache. One thread at a time
+// paints a block, and mostly all of the tile.
 //
 //   tile    8 x 8 blocks in rows           16 KiB
 //   block   4 x 4 pixels                   256 bytes, 4 cache lines
@@ -17,7 +17,7 @@
 // unaligned, and a small splat touches few.
 //
 // A tile is painted with two tables: ShadingTable, which classifies pixels, and footprintPolynomial().
-// paintTile() may paint different tiles on any threads at a time.
+// paintTile() may paint different tiles, and different blocks of a tile, on any threads at a time.
 #pragma once
 
 #include <array>

@@ -378,6 +378,42 @@ TEST(CpuPainter, HasTheSameBitsWhateverIsKeptOfPreparedSplats) {
   EXPECT_EQ(painted(12288).rgba, painted(1 << 17).rgba);
 }
 
+// Nearly all splats lie in one tile, which many threads divide among them.
+TEST(CpuPainter, HasTheSameBitsWhenThreadsShareATile) {
+  const ImageSize size{2 * kTileSide + 9, kTileSide};
+  const auto table = lively();
+  for (const float opacity : {0.002f, 0.5f}) {  // of the latter much is hidden
+    auto splats = leaning(300, size, opacity);
+    const auto of_tile = leaning(12000, {kTileSide, kTileSide}, opacity);
+    splats.insert(splats.end(), of_tile.begin(), of_tile.end());
+    std::vector<std::vector<ScreenSplat>> placed(1);  // each behind its records
+    for (const ScreenSplat& splat : splats) {
+      placed.back().push_back(splat);
+      if (!isRecord(splat)) placed.emplace_back();
+    }
+    placed.pop_back();
+    std::stable_sort(placed.begin(), placed.end(),
+                     [](const auto& a, const auto& b) { return a.back().first < b.back().first; });
+    splats.clear();
+    for (const auto& one : placed) splats.insert(splats.end(), one.begin(), one.end());
+    const auto painted = [&](const PaintResources& resources) {
+      Image image;
+      makeBackend(Backend::kCpu)->run([&](Painter& painter) {
+        painter.begin(size, kWhite, table, {}, resources);
+        painter.draw(splats);
+        image = painter.end();
+        EXPECT_FALSE(painter.isOverfull());
+      });
+      return image;
+    };
+    const Image expected = painted({.threads = 1, .waiting_splats = 1 << 18});
+    for (const unsigned threads : {2u, 8u, 40u})
+      for (const size_t batch : {size_t{3000}, size_t{65536}})
+        EXPECT_EQ(painted({threads, batch, 1 << 18}).rgba, expected.rgba)
+            << threads << " threads, batches of " << batch << ", opacity " << opacity;
+  }
+}
+
 TEST(GlTilePainter, HasTheSameBitsInAnyBatchesAndBoxes) {
   const ImageSize size{70, 50};
   const auto table = lively();

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <random>
 #include <tuple>
@@ -64,24 +65,39 @@ void note(Orders& orders, size_t place, const ScreenSplat* splat) {
   orders[place].push_back(number);
 }
 
-Orders ordersOf(TileQueues& queues, std::span<const ScreenSplat> splats, const std::vector<size_t>& batches) {
+bool divide(TileQueues& queues, size_t queue) {
+  if (!queues.divide(queue)) return false;
+  queues.moveToParts(queue, queues.size() - TileQueues::kParts);
+  return true;
+}
+
+void divideNone(TileQueues&, size_t) {}
+
+/// `divide_some` is called before each batch, with its number.
+Orders ordersOf(TileQueues& queues, std::span<const ScreenSplat> splats, const std::vector<size_t>& batches,
+                const std::function<void(TileQueues&, size_t)>& divide_some = divideNone) {
   SplatBins bins(kSize, 4096, 4 * 4096, 2);
   PaintLoop loop(2, nullptr);
   queues.clear();
   Orders orders;
   Mutex mutex;
+  size_t batch = 0;
   const auto paint = [&](bool last) {
+    divide_some(queues, batch++);
     bins.sort(loop);
     const uint32_t front = bins.empty() ? 0 : bins.splats().back().first;
-    loop.forAll("tiles", TileSet::tilesOf(kSize), 1, [&](size_t number) {
+    loop.forAll("queues", queues.size(), 1, [&](size_t queue) {
+      const size_t number = queues.tileOf(queue);
       const auto entries = bins.tile(static_cast<int>(number));
-      if (entries.empty() && !(last && queues.waits(number))) return;
-      queues.paint(number, {bins.splats(), entries, front, last}, TileQueues::kAllOpen,
+      if (queues.workOf(queue, entries.size(), last) == 0) return;
+      queues.paint(queue, {bins.splats(), entries, front, last}, TileQueues::kAllOpen,
                    [&](const OrderedTile& tile) {
                      const MutexLock lock(mutex);
                      for (size_t of_tile = 0; of_tile < kOrderTiles; ++of_tile) {
                        const size_t place = number << 8 | of_tile;
-                       if (!tile.lists)
+                       if ((queues.orderTilesIn(queue) >> of_tile & 1) == 0)
+                         EXPECT_TRUE(!tile.lists || (*tile.lists)[of_tile].empty());
+                       else if (!tile.lists)
                          for (const uint32_t n : tile.order) note(orders, place, &tile.splats[n]);
                        else
                          for (const uint64_t item : (*tile.lists)[of_tile])
@@ -154,6 +170,57 @@ TEST(TileQueues, GiveEachTileItsOwnOrderHoweverSplatsAreBatched) {
   expectOrders(ordersOf(queues, splats, {1, 2, 3, 500, 7, 300, 300}), specified);
   EXPECT_FALSE(queues.isFull());
   EXPECT_FALSE(queues.anyWaits());
+}
+
+TEST(TileQueues, KeepEachOrderTilesOrderWhenTilesAreDivided) {
+  constexpr size_t kSplats = size_t{1} << 18;
+  auto splats = leaningSplats(1500, 3);
+  for (const bool lean : {true, false}) {
+    const Orders specified = specifiedFor(splats);
+    for (const auto& batches : {std::vector<size_t>(50, 40), std::vector<size_t>{700, 700}, {}}) {
+      TileQueues queues(kSize, kSplats, 2);
+      // At first all tiles; then every third of the parts, and those again.
+      const auto divide_some = [&](TileQueues& of, size_t batch) {
+        for (size_t queue = 0, count = of.size(); queue < count; ++queue)
+          if (batch == 0 || (queue >= TileSet::tilesOf(kSize) && (queue + batch) % 3 == 0)) divide(of, queue);
+      };
+      expectOrders(ordersOf(queues, splats, batches, divide_some), specified);
+      EXPECT_FALSE(queues.isFull());
+      EXPECT_FALSE(queues.anyWaits());
+      EXPECT_GE(queues.size(), TileSet::tilesOf(kSize) * (1 + TileQueues::kParts));
+      expectOrders(ordersOf(queues, splats, batches), specified);
+      EXPECT_EQ(queues.size(), TileSet::tilesOf(kSize)) << "after clear()";
+    }
+    for (ScreenSplat& splat : splats)
+      if (lean && !isRecord(splat)) splat.key_slope0 = splat.key_slope1 = 0, splat.key = splat.first;
+  }
+}
+
+TEST(TileQueues, DivideTilesDownToTheSmallestParts) {
+  TileQueues queues(kSize, size_t{1} << 18, 2);
+  size_t queue = 3;
+  OrderTileMask tiles = TileQueues::kAllOpen;
+  for (int side = kOrderTilesAlong; side > TileQueues::kMinPart; side /= 2) {
+    ASSERT_TRUE(divide(queues, queue));
+    EXPECT_EQ(queues.orderTilesIn(queue), 0u);
+    EXPECT_EQ(queues.workOf(queue, 100, true), 0u);
+    OrderTileMask of_parts = 0;
+    for (size_t part = queues.size() - TileQueues::kParts; part < queues.size(); ++part) {
+      EXPECT_EQ(queues.tileOf(part), 3u);
+      EXPECT_EQ(of_parts & queues.orderTilesIn(part), 0u);
+      of_parts |= queues.orderTilesIn(part);
+    }
+    EXPECT_EQ(of_parts, tiles);
+    queue = queues.size() - 2;
+    tiles = queues.orderTilesIn(queue);
+  }
+  EXPECT_FALSE(divide(queues, queue));
+}
+
+TEST(TileQueues, DivideNoTileWhereMemoryIsShort) {
+  TileQueues few(kSize, 10000, 2), of_one_thread(kSize, size_t{1} << 18, 1);
+  EXPECT_FALSE(divide(few, 0));
+  EXPECT_FALSE(divide(of_one_thread, 0));
 }
 
 TEST(TileQueues, SayWhenMoreWaitThanTheyHold) {
