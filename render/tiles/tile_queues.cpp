@@ -20,7 +20,7 @@ constexpr uint32_t kLastKey = INT32_MAX;
 constexpr uint64_t kScratchBytes = 2 << 20;
 // There are at most this many parts of tiles for each thread, if several paint.
 constexpr size_t kPartsAThread = 128;
-// An entry that is only kept costs about this part of one that is painted.
+// This many entries that are only kept cost about as much as one that is painted.
 constexpr size_t kDeferredShare = 16;
 // The least that all queues must hold for tiles to be divided, in splats: what is kept in several parts may not make a
 // picture need more memory than it was given.

@@ -66,10 +66,10 @@ class TileQueues {
   /// Divides a queue into those of four quarters, which are the last four from then on. Returns false, and changes
   /// nothing, if it is not larger than kMinPart, if there are too many parts, if there is little memory left for what
   /// waits, or if once there was too little. No other thread may use any queue meanwhile.
-  bool divide(size_t queue);
+  bool divide(size_t number);
   /// Moves what waits in a queue that was divided to its parts, from `first_part` on, before they are used. Different
   /// queues on any threads.
-  void moveToParts(size_t queue, size_t first_part);
+  void moveToParts(size_t number, size_t first_part);
   /// The order tiles along a side of the smallest part.
   static constexpr int kMinPart = 2;
   static constexpr size_t kParts = 4;
@@ -81,10 +81,10 @@ class TileQueues {
     bool last = false;  // no more will come for the tile: all is painted
   };
   /// Paints of a queue's order tiles what can be. `added`: of all of the tile. `open`: as `paint` returns it.
-  void paint(size_t queue, const New& added, uint64_t open, const Paint& paint);
+  void paint(size_t number, const New& added, uint64_t open, const Paint& paint);
   bool waits(size_t queue) const { return queues_[queue].count > 0; }
   /// An estimate of how many splats paint() would go through, with this number of entries; zero if it is not needed.
-  size_t workOf(size_t queue, size_t entries, bool last) const;
+  size_t workOf(size_t number, size_t entries, bool last) const;
   bool anyWaits() const { return free_count_.load(std::memory_order_relaxed) < chunks_; }
   /// Splats had to be left out: the picture is wrong.
   bool isFull() const { return full_.load(std::memory_order_relaxed); }
