@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """Isosurfaces against VTK's contour of the same grid.
 
-    bench/isosurfaces.py FOLDER [--curvisplat PROGRAM] [--grids GRIDS] [--only NAME] [--voxels 256]
+    bench/isosurfaces.py FOLDER [--curvisplat PROGRAM] [--grids GRIDS] [--only NAME] [--voxels 256 | --source]
 
 Grids: the blunt fin, the delta wing and the combustor of GRIDS (../shared/data beside the project; what is missing is
 left out, and said so), and a generated wake. VTK computes q_criterion, the magnitude of the vorticity and that of the
 pressure's gradient at their nodes; both programs then get the same .vts file. Of each scalar the values that 60, 80 and
 95 % of the nodes are below are contoured. Half a cell is half of what the contour's cell measures along its normal.
+
+--source: ours are contours of the grid's own cells, not of a lattice of voxels.
 
 Prints, for each: the share of VTK's surface within half a cell of ours and of ours within half a cell of VTK's, by area,
 the 99 % distance in cells, triangles, and the processor time of both. Needs VTK for Python.
@@ -190,6 +192,7 @@ def main():
     parser.add_argument("--grids", type=pathlib.Path, default=ROOT.parent / "shared/data")
     parser.add_argument("--only")
     parser.add_argument("--voxels", default="256")
+    parser.add_argument("--source", action="store_true")
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     grids = {
@@ -226,7 +229,7 @@ def compare(arguments, grid, cache, name, scalar, value):
     mesh = arguments.folder / "iso.vtp"
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     result = subprocess.run([arguments.curvisplat, "export", cache, "--scalar", scalar, f"--iso={value:.9g}", "-o", mesh,
-                             "--voxels", arguments.voxels], capture_output=True, text=True)
+                             *(["--source"] if arguments.source else ["--voxels", arguments.voxels])], capture_output=True, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     theirs, seconds = contour(grid, scalar, value)
     head = f"{name:<10}{scalar:<28}{value:>10.4g}"

@@ -321,12 +321,17 @@ class IsoMesher {
 
 }  // namespace
 
+void requireIsovalue(const CacheReader& cache, size_t variable, double value) {
+  const VariableInfo& info = cache.manifest().variables.at(variable);
+  if (!(value >= info.min && value <= info.max))
+    throw UsageError("--iso {:g}: no isosurface: the values of {} go from {:g} to {:g}", value, info.name,
+                     info.min, info.max);
+}
+
 IsoMeshReport writeIsoMesh(const CacheReader& cache, size_t variable, const IsoMeshOptions& options,
                            const std::filesystem::path& path, Progress& progress) {
   const VariableInfo& info = cache.manifest().variables.at(variable);
-  if (!(options.value >= info.min && options.value <= info.max))
-    throw UsageError("--iso {:g}: no isosurface: the values of {} go from {:g} to {:g}", options.value,
-                     info.name, info.min, info.max);
+  requireIsovalue(cache, variable, options.value);
   IsoMeshFile file(path);
   IsoMesher mesher(cache, variable, options, file, progress);
   mesher.run();

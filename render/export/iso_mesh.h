@@ -35,6 +35,9 @@ struct IsoMeshReport {
 /// Whether writeIsoMesh() knows the extension.
 bool isIsoMeshName(const std::filesystem::path& path);
 
+/// Throws UsageError if no sample of the variable has as small or as large a value.
+void requireIsovalue(const CacheReader& cache, size_t variable, double value);
+
 /// The bricks are those whose merged detail is below half a voxel. The file appears whole or not at all. Throws UsageError if the memory
 /// is too little, and Error if there is no such surface, if a file cannot be written, and as CacheReader does.
 IsoMeshReport writeIsoMesh(const CacheReader& cache, size_t variable, const IsoMeshOptions& options,

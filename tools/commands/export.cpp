@@ -12,18 +12,22 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/contour/contour.h"
 #include "render/export/gaussian_files.h"
 #include "render/export/gaussian_splats.h"
 #include "render/export/iso_mesh.h"
+#include "render/export/iso_mesh_file.h"
 #include "render/export/vdb_file.h"
 #include "render/frame/frame.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
+#include "tools/options/convert_arguments.h"
 #include "tools/options/frame_sequence.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
+#include "tools/options/point_values.h"
 #include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
@@ -38,6 +42,9 @@ struct ExportArguments {
   ScalarArguments scalar;
   std::optional<std::string> max_splats, voxels;
   std::optional<double> iso;
+  bool of_source = false;           // the isosurface is that of the grid's own cells
+  std::vector<std::string> source;  // its files; none: those that the cache names
+  PointSource grid;
   std::string memory = "512M";
   StepArguments step;
   bool no_comparison = false;
@@ -103,14 +110,65 @@ uint32_t voxelsOf(const ExportArguments& arguments) {
   return static_cast<uint32_t>(voxels);
 }
 
-void exportIsosurface(const ExportArguments& arguments) {
+/// A mesh file that a contour of cells is written into.
+class ContourFile : public TriangleSink {
+ public:
+  explicit ContourFile(IsoMeshFile& file) : file_(&file) {}
+  void addVertex(const glm::dvec3& at, const glm::vec3& normal) override { file_->addVertex(at, normal); }
+  void addTriangle(const std::array<uint32_t, 3>& corners) override { file_->addTriangle(corners); }
+
+ private:
+  IsoMeshFile* file_;
+};
+
+/// Exports the isosurface of the grid's own cells.
+void exportContour(const ExportArguments& arguments, const CacheReader& cache, size_t variable) {
+  const VariableInfo& info = cache.manifest().variables[variable];
+  if (cache.manifest().cells)
+    throw UsageError(
+        "--source: {} is cell-centred, and its cells have no isosurface of their own; leave --source out",
+        info.name);
+  const OpenSource source = openSource(cache, arguments.grid);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  ContourOptions options;
+  options.scalar = source.scalars[variable];
+  options.value = *arguments.iso;
+  options.lower = source.ranges[variable].lower;
+  options.upper = source.ranges[variable].upper;
+  options.memory_bytes = parseMemory("--memory", arguments.memory);
+  IsoMeshFile file(arguments.output);
+  ContourFile sink(file);
+  if (const auto* mesh = dynamic_cast<const MeshSource*>(source.grid.get()))
+    contourMesh(*mesh, options, ScratchFiles(writableTarget(arguments.output).parent_path()), sink, progress);
+  else
+    contourGrid(dynamic_cast<const GridSource&>(*source.grid), options, sink, progress);
+  if (file.triangles() == 0)
+    throw Error("{}: no isosurface of {} at {:g}", arguments.grid.grid.grid.string(), info.name,
+                options.value);
+  file.finish(info.name, options.value);
+  printLine("{}: isosurface of {} at {:g}: {} triangles, {} vertices, of the cells of {}, {:.1f} MiB",
+            arguments.output.string(), info.name, options.value, file.triangles(), file.vertices(),
+            arguments.grid.grid.grid.string(), mebibytesOf(arguments.output));
+}
+
+void exportIsosurface(ExportArguments& arguments) {
   IsoMeshOptions options;
   options.value = *arguments.iso;
   options.voxels = voxelsOf(arguments);
   options.memory_bytes = parseMemory("--memory", arguments.memory);
   const CacheReader cache = openAtStep(arguments.cache, arguments.step, arguments.scalar.scalar);
   const size_t variable = chooseVariable(cache, arguments.scalar);
+  requireIsovalue(cache, variable, options.value);
   requireThreads();
+  if (arguments.of_source) {
+    const std::vector<std::filesystem::path> files(arguments.source.begin(), arguments.source.end());
+    setSource(cache, files, arguments.grid.grid);
+    std::vector<std::filesystem::path> inputs = arguments.grid.grid.solutions;
+    inputs.push_back(arguments.grid.grid.grid);
+    checkOutputFile("-o", arguments.output, inputs);
+    return exportContour(arguments, cache, variable);
+  }
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const IsoMeshReport report = writeIsoMesh(cache, variable, options, arguments.output, progress);
@@ -121,8 +179,7 @@ void exportIsosurface(const ExportArguments& arguments) {
   if (report.thin_part > kThin)
     printMessage(
         "note: {:.0f} % of the cells that the isosurface may lie in are thinner than half a voxel, and it "
-        "may be missing there; give "
-        "more --voxels, or draw it (render --iso), which needs none",
+        "may be missing there; give --source for the isosurface of the grid's own cells, or more --voxels",
         100 * report.thin_part);
 }
 
@@ -155,7 +212,7 @@ void refuseOptionsOfOtherFiles(const ExportArguments& arguments, bool splats) {
                    given, arguments.output.string());
 }
 
-void exportCache(const ExportArguments& arguments) {
+void exportCache(ExportArguments& arguments) {
   const std::string extension = extensionOf(arguments.output);
   const bool vdb = extension == ".vdb";
   if (arguments.iso && !isIsoMeshName(arguments.output))
@@ -165,6 +222,10 @@ void exportCache(const ExportArguments& arguments) {
     throw UsageError("-o {}: {} files hold isosurfaces; give --iso VALUE", arguments.output.string(),
                      extension);
   if (!vdb && !arguments.iso) checkGaussianName(arguments.output);
+  if (arguments.of_source && !arguments.iso) throw UsageError("--source needs an isosurface: --iso VALUE");
+  if (arguments.of_source && arguments.voxels)
+    throw UsageError(
+        "--voxels cannot be combined with --source: the isosurface is that of the grid's own cells");
   refuseOptionsOfOtherFiles(arguments, !vdb && !arguments.iso);
   checkFunctionArguments(arguments.scalar);
   checkOutputFile("-o", arguments.output, {arguments.cache, arguments.scalar.transfer_function.value_or("")});
@@ -231,6 +292,13 @@ void addExport(CLI::App& app) {
   addStepOptions(*command, arguments->step, "Data and colours");
   addMaxSplatsOption(*command, arguments->max_splats)->default_str(kDefaultSplats);
   command->add_option("--iso", arguments->iso, "Isosurface of this value, as triangles: .ply, .stl or .vtp");
+  command
+      ->add_option("--source", arguments->source,
+                   "--iso: contour the grid's own cells, from these files, or without any from those that "
+                   "the cache names. "
+                   "Nothing is missing, however thin cells are; node-centred scalars alone")
+      ->expected(0, -1);
+  addGasOptions(*command, arguments->grid.gas);
   command->add_option("--voxels", arguments->voxels, ".vdb, --iso: voxels along the longest side of the data")
       ->default_str(kDefaultVoxels);
   addMemoryOption(*command, arguments->memory,
@@ -238,7 +306,11 @@ void addExport(CLI::App& app) {
   command->add_flag(
       "--no-comparison", arguments->no_comparison,
       "Skip drawing the exported splats from 12 directions to compare them with curvisplat's pictures");
-  command->callback([arguments] { exportCache(*arguments); });
+  command->callback([arguments, command] {
+    arguments->of_source = command->count("--source") > 0;
+    std::erase(arguments->source, "");  // what CLI11 makes of an option without values
+    exportCache(*arguments);
+  });
 }
 
 }  // namespace curvisplat

@@ -60,27 +60,16 @@ std::vector<uint32_t> scalarsLike(const CacheReader& reader, const GridDescripti
 std::vector<std::optional<SourceValues>> sourceValues(const CacheReader& reader, const PointSource& from,
                                                       std::span<const glm::dvec3> points,
                                                       std::span<const std::optional<ProbeResult>> found) {
-  const OpenGridOptions& grid = from.grid;
-  OpenGridOptions options = grid;
-  std::vector<ValueRange> ranges;
-  for (const VariableInfo& variable : reader.manifest().variables) {
-    options.scalars.push_back(variable.name);
-    ranges.push_back({variable.min, variable.max});
-  }
-  const auto source =
-      refinedBy(reader.manifest().refined, openWithDerived(options, {from.gas, std::nullopt}), std::nullopt);
-  const std::vector<uint32_t> scalars = scalarsLike(reader, source->description(), grid);
-  if (const auto* mesh = dynamic_cast<const MeshSource*>(source.get())) {
-    requireSameSamples(reader, source->description(), grid);
-    return probeMesh(*mesh, scalars, ranges, points);
-  }
-  requireSameBlocks(reader, source->description(), grid);
+  const OpenSource source = openSource(reader, from);
+  if (const auto* mesh = dynamic_cast<const MeshSource*>(source.grid.get()))
+    return probeMesh(*mesh, source.scalars, source.ranges, points);
   std::vector<std::vector<NearSample>> near(points.size());
   for (size_t p = 0; p < points.size(); ++p)
     if (found[p])
       for (const ReachingSample& sample : found[p]->near)
         near[p].push_back({sample.block, {sample.i, sample.j, sample.k}});
-  return probeGrid(dynamic_cast<const GridSource&>(*source), scalars, ranges, points, near);
+  return probeGrid(dynamic_cast<const GridSource&>(*source.grid), source.scalars, source.ranges, points,
+                   near);
 }
 
 }  // namespace
@@ -108,6 +97,24 @@ void setSource(const CacheReader& reader, const std::vector<fs::path>& files, Op
                 reader.cachePath().string());
   grid.grid = found.front();
   grid.solutions.assign(found.begin() + 1, found.end());
+}
+
+OpenSource openSource(const CacheReader& reader, const PointSource& source) {
+  OpenGridOptions options = source.grid;
+  OpenSource opened;
+  for (const VariableInfo& variable : reader.manifest().variables) {
+    options.scalars.push_back(variable.name);
+    opened.ranges.push_back({variable.min, variable.max});
+  }
+  opened.grid = refinedBy(reader.manifest().refined, openWithDerived(options, {source.gas, std::nullopt}),
+                          std::nullopt);
+  const GridDescription& description = opened.grid->description();
+  opened.scalars = scalarsLike(reader, description, source.grid);
+  if (dynamic_cast<const MeshSource*>(opened.grid.get()))
+    requireSameSamples(reader, description, source.grid);
+  else
+    requireSameBlocks(reader, description, source.grid);
+  return opened;
 }
 
 std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,

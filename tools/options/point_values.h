@@ -5,12 +5,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/probe/source_probe.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
@@ -29,6 +31,16 @@ struct PointSource {
   OpenGridOptions grid;  // with its files
   GasModel gas;
 };
+
+/// The grid that a cache was made from, opened.
+struct OpenSource {
+  std::unique_ptr<DataSource> grid;
+  std::vector<uint32_t> scalars;   // [scalar of the cache] in the grid's description
+  std::vector<ValueRange> ranges;  // [scalar of the cache] of its values: samples beyond are not in the cache
+};
+
+/// Throws Error as reading does, and if the source is not the grid of the cache.
+OpenSource openSource(const CacheReader& reader, const PointSource& source);
 
 /// The values at a point.
 struct PointValues {
