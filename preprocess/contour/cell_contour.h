@@ -36,12 +36,19 @@ class CellContour {
   };
   struct Line {
     Crossing from, to;
+    size_t face = 0;
     bool used = false;
+  };
+  struct Corner {
+    Crossing at;
+    std::array<size_t, 2> faces{};  // of the lines that meet there
   };
 
   Crossing crossingOf(const ContourCell& cell, uint32_t a, uint32_t b);
-  void addFace(const ContourCell& cell, std::span<const uint32_t> corners);
-  void addPolygons();
+  void addFace(const ContourCell& cell, size_t face);
+  static bool areFacesOutward(const ContourCell& cell);
+  void addPolygons(const ContourCell& cell);
+  bool facesDownwards() const;
   void addPolygon();
 
   const double value_;
@@ -49,7 +56,7 @@ class CellContour {
   // Scratch memory.
   std::vector<Crossing> crossings_;  // of a face
   std::vector<Line> lines_;          // of the cell
-  std::vector<Crossing> polygon_;
+  std::vector<Corner> polygon_;
 };
 
 }  // namespace curvisplat

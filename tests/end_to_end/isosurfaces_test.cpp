@@ -62,6 +62,22 @@ class Isosurfaces : public ProgramSuite<Isosurfaces> {
     return drawCache(*folder_ / "a.splats", table, halfAnnulusCamera(), options, nullptr, backend);
   }
 
+  /// How far places are from the true surface, by the closed form and its slope; the least first.
+  std::vector<double> distances(const std::vector<glm::dvec3>& places) const {
+    std::vector<double> off;
+    for (const glm::dvec3& at : places) {
+      glm::dvec3 slope;
+      for (int axis = 0; axis < 3; ++axis) {
+        glm::dvec3 step(0.0);
+        step[axis] = 1e-4;
+        slope[axis] = (annulus_->scalar(at + step) - annulus_->scalar(at - step)) / 2e-4;
+      }
+      off.push_back(std::abs(annulus_->scalar(at) - kValue) / glm::length(slope));
+    }
+    std::sort(off.begin(), off.end());
+    return off;
+  }
+
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
 };
 
@@ -109,18 +125,7 @@ TEST_F(Isosurfaces, MeshesLieOnThemWithoutGaps) {
   ply.readAt(0, std::span(bytes));
   const RawMesh mesh = parseMesh(bytes, file("a.ply"));
   ASSERT_GT(mesh.triangles.size(), 10000u);
-  // Of the true surface: by the closed form and its slope. A cell of the grid is 0.02 to 0.05 long.
-  std::vector<double> off;
-  for (const glm::dvec3& at : mesh.positions) {
-    glm::dvec3 slope;
-    for (int axis = 0; axis < 3; ++axis) {
-      glm::dvec3 step(0.0);
-      step[axis] = 1e-4;
-      slope[axis] = (annulus_->scalar(at + step) - annulus_->scalar(at - step)) / 2e-4;
-    }
-    off.push_back(std::abs(annulus_->scalar(at) - kValue) / glm::length(slope));
-  }
-  std::sort(off.begin(), off.end());
+  const std::vector<double> off = distances(mesh.positions);  // a cell of the grid is 0.02 to 0.05 long
   fmt::print("mesh: 99 % within {:.5f}, all within {:.5f}\n", off[off.size() * 99 / 100], off.back());
   EXPECT_LT(off[off.size() * 99 / 100], 0.01);
   // An edge belongs to two triangles, once in each direction, or lies at the data's border.
@@ -153,6 +158,52 @@ TEST_F(Isosurfaces, MeshesLieOnThemWithoutGaps) {
   std::vector<std::byte> more(again.size());
   again.readAt(0, std::span(more));
   EXPECT_EQ(more, bytes);
+}
+
+TEST_F(Isosurfaces, MeshesOfTheGridsOwnCellsLieOnThemToo) {
+  const std::string grid = file("own.xyz"), cache = file("own.splats");
+  run({"generate", "half-annulus", "--size", "97x49x49", "-o", file("own")});
+  run({"convert", grid, file("own.fun"), "-o", cache});
+  const std::string said = run({"export", cache, "-o", file("own.ply"), "--iso", "0.5", "--source"}).out;
+  expectSays(said, "own.ply: isosurface of f at 0.5: ");
+  expectSays(said, "of the cells of " + grid);
+  const InputFile first(file("own.ply"));
+  std::vector<std::byte> bytes(first.size());
+  first.readAt(0, std::span(bytes));
+  const RawMesh mesh = parseMesh(bytes, file("own.ply"));
+  ASSERT_GT(mesh.triangles.size(), 1000u);
+  const std::vector<double> off = distances(mesh.positions);
+  EXPECT_LT(off[off.size() * 99 / 100], 0.01);
+  // The same bytes from little memory and from files that are named.
+  run({"export", cache, "-o", file("again.ply"), "--iso", "0.5", "--memory", "32M", "--source", grid,
+       file("own.fun")});
+  const InputFile again(file("again.ply"));
+  std::vector<std::byte> more(again.size());
+  again.readAt(0, std::span(more));
+  EXPECT_EQ(more, bytes);
+  const struct {
+    Words options;
+    int status;
+    std::string words;
+  } refused[] = {
+      {{"-o", file("c.ply"), "--iso", "7", "--source"},
+       2,
+       "--iso 7: no isosurface: the values of f go from "},
+      {{"-o", file("c.ply"), "--source"}, 2, "--source needs an isosurface: --iso VALUE"},
+      {{"-o", file("c.ply"), "--iso", "0.5", "--voxels", "9", "--source"},
+       2,
+       "--voxels cannot be combined with --source"},
+      {{"-o", grid, "--iso", "0.5", "--source"}, 2, "expected a name that ends with .ply, .stl or .vtp"},
+      {{"-o", file("c.ply"), "--iso", "0.5", "--source", file("a.ply")}, 1, "a.ply"}};
+  for (const auto& [options, status, words] : refused) {
+    const ProgramResult result = runProgram(Words{"export", cache} + options);
+    EXPECT_EQ(result.status, status) << result.err;
+    expectSays(result.err, words);
+  }
+  const ProgramResult nowhere =
+      runProgram({"export", file("a.splats"), "-o", file("c.ply"), "--iso", "0.5", "--source"});
+  EXPECT_EQ(nowhere.status, 1);
+  expectSays(nowhere.err, "name them after --source");
 }
 
 TEST_F(Isosurfaces, MeshesThatCannotBeAreRefused) {
