@@ -7,7 +7,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/corner_gather.h"
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/probe/point_in_cell.h"
@@ -57,7 +57,21 @@ class NodesOfBox {
     return found;
   }
 
- private:
+  /// Calls use(lowest node, corners) for all cells of the box.
+  template <typename Use>
+  void forEachCell(Use use) const {
+    const size_t ni = end_[0] - begin_[0], plane = ni * (end_[1] - begin_[1]);
+    size_t row = 0;
+    for (uint64_t k = begin_[2]; k + 1 < end_[2]; ++k, row += ni)
+      for (uint64_t j = begin_[1]; j + 1 < end_[1]; ++j, row += ni)
+        for (uint64_t i = begin_[0]; i + 1 < end_[0]; ++i) {
+          const auto corners =
+              cornersAt(nodes_.x.data(), nodes_.y.data(), nodes_.z.data(), row + i - begin_[0], ni, plane);
+          use(std::array<uint64_t, 3>{i, j, k}, std::span<const glm::dvec3>(corners));
+        }
+  }
+
+  /// The values at the point in the cell with this lowest node, if it is there.
   std::optional<SourceValues> inCell(const glm::dvec3& point, const std::array<uint64_t, 3>& lowest) const {
     const size_t ni = end_[0] - begin_[0], plane = ni * (end_[1] - begin_[1]);
     const size_t cell =
@@ -86,6 +100,7 @@ class NodesOfBox {
     return found;
   }
 
+ private:
   uint32_t block_;
   std::array<uint64_t, 3> begin_, end_;
   bool cells_;
@@ -119,6 +134,97 @@ class PointsByX {
   std::span<const glm::dvec3> points_;
   std::vector<size_t> order_;
 };
+
+/// The box around corners, and their mean.
+struct CellBox {
+  glm::dvec3 lower, upper, middle{0.0};
+
+  explicit CellBox(std::span<const glm::dvec3> corners) : lower(corners[0]), upper(corners[0]) {
+    for (const glm::dvec3& corner : corners) {
+      lower = glm::min(lower, corner), upper = glm::max(upper, corner);
+      middle += corner / static_cast<double>(corners.size());
+    }
+  }
+};
+
+/// Looks for points in the outermost cells of the blocks: a node that coincides with another one is in the cache once, and the cell with
+/// the point may be at the other.
+class BorderCells {
+ public:
+  BorderCells(const NodeReader& reader, std::span<const ValueRange> ranges,
+              std::span<const glm::dvec3> points)
+      : reader_(reader), ranges_(ranges), points_(points), by_x_(points) {}
+
+  /// [point]
+  std::vector<std::optional<SourceValues>> find() {
+    found_.resize(points_.size());
+    const std::vector<GridBlock>& blocks = reader_.source().description().blocks;
+    for (uint32_t block = 0; block < blocks.size(); ++block) {
+      const std::array<uint64_t, 3> size{blocks[block].ni, blocks[block].nj, blocks[block].nk};
+      if (std::ranges::min(size) < 2) continue;
+      for (size_t axis = 0; axis < 3; ++axis)
+        for (const uint64_t first : {uint64_t{0}, size[axis] - 2}) {
+          std::array<uint64_t, 3> begin{}, end = size;
+          begin[axis] = first;
+          end[axis] = first + 2;
+          findInLayer(block, begin, end);
+        }
+    }
+    return std::move(found_);
+  }
+
+ private:
+  /// A layer of cells between nodes, some rows at a time.
+  void findInLayer(uint32_t block, std::array<uint64_t, 3> begin, std::array<uint64_t, 3> end) {
+    constexpr uint64_t kNodes = uint64_t{1} << 18;  // that are read at a time, if a row has fewer
+    const uint64_t row = end[0] - begin[0], j_end = end[1], k_end = end[2];
+    const uint64_t planes = std::clamp(kNodes / (row * (end[1] - begin[1])), uint64_t{2}, end[2] - begin[2]);
+    const uint64_t rows = std::clamp(kNodes / (row * planes), uint64_t{2}, end[1] - begin[1]);
+    for (uint64_t k = begin[2]; k + 1 < k_end; k += planes - 1)
+      for (uint64_t j = begin[1]; j + 1 < j_end; j += rows - 1) {
+        const NodesOfBox nodes(reader_, block, {begin[0], j, k},
+                               {end[0], std::min(j + rows, j_end), std::min(k + planes, k_end)}, ranges_);
+        nodes.forEachCell([&](const std::array<uint64_t, 3>& lowest, std::span<const glm::dvec3> corners) {
+          const CellBox box(corners);
+          by_x_.forEachIn(box.lower, box.upper, [&](size_t p) {
+            if (!found_[p]) found_[p] = nodes.inCell(points_[p], lowest);
+          });
+        });
+      }
+  }
+
+  const NodeReader& reader_;
+  const std::span<const ValueRange> ranges_;
+  const std::span<const glm::dvec3> points_;
+  const PointsByX by_x_;
+  std::vector<std::optional<SourceValues>> found_;
+};
+
+bool isOnFace(const NearSample& sample, const std::vector<GridBlock>& blocks) {
+  const GridBlock& block = blocks.at(sample.block);
+  const std::array<uint64_t, 3> size{block.ni, block.nj, block.nk};
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (sample.at[axis] == 0 || sample.at[axis] + 1 >= size[axis]) return true;
+  return false;
+}
+
+/// Answers the points that have a sample on a face of a block near them, and no cell.
+void findAcrossSeams(const NodeReader& reader, std::span<const ValueRange> ranges,
+                     std::span<const glm::dvec3> points, std::span<const std::vector<NearSample>> near,
+                     std::vector<std::optional<SourceValues>>& found) {
+  const std::vector<GridBlock>& blocks = reader.source().description().blocks;
+  std::vector<size_t> numbers;
+  std::vector<glm::dvec3> left;
+  for (size_t p = 0; p < points.size(); ++p) {
+    const auto isFace = [&](const NearSample& sample) { return isOnFace(sample, blocks); };
+    if (found[p] || std::none_of(near[p].begin(), near[p].end(), isFace)) continue;
+    numbers.push_back(p);
+    left.push_back(points[p]);
+  }
+  if (left.empty()) return;
+  auto answers = BorderCells(reader, ranges, left).find();
+  for (size_t n = 0; n < left.size(); ++n) found[numbers[n]] = std::move(answers[n]);
+}
 
 }  // namespace
 
@@ -154,65 +260,49 @@ std::vector<std::optional<SourceValues>> probeGrid(const GridSource& source,
       number[question.point] = question.number;
     }
   }
+  findAcrossSeams(reader, ranges, points, near, found);
   return found;
 }
 
 std::vector<std::optional<SourceValues>> probeMesh(const MeshSource& source,
                                                    std::span<const uint32_t> scalars,
                                                    std::span<const ValueRange> ranges,
-                                                   std::span<const glm::dvec3> points) {
+                                                   std::span<const glm::dvec3> points,
+                                                   const ScratchFiles& scratch) {
   const MeshReader reader(source, {scalars.begin(), scalars.end()}, std::nullopt);
   constexpr uint64_t kMemory = uint64_t{1} << 28;
-  reader.prepare(kMemory, Progress());
+  Progress progress;
+  reader.prepare(kMemory, progress);
+  const PointNumbers numbers(reader, kMemory, scratch, progress);
+  CornerGather gather(reader, numbers, halfBesideChunks(kMemory, reader.largestChunk()), scratch, progress);
   const bool cells = reader.centring() == Centring::kCell;
-  std::vector<glm::dvec3> places;
-  places.reserve(reader.points());
-  std::vector<std::vector<float>> at_points(scalars.size());
-  reader.forEachPoints([&](const LoadedPoints& loaded) {
-    const MeshPoints& read = loaded.points;
-    for (size_t n = 0; n < read.x.size(); ++n) places.emplace_back(read.x[n], read.y[n], read.z[n]);
-    for (size_t v = 0; v < read.scalars.size(); ++v)
-      at_points[v].insert(at_points[v].end(), read.scalars[v].begin(), read.scalars[v].end());
-  });
-  std::vector<uint64_t> first_point{0};
-  for (const MeshPiece& piece : reader.pieces()) first_point.push_back(first_point.back() + piece.points);
-
   const PointsByX by_x(points);
   std::vector<std::optional<SourceValues>> found(points.size());
-  std::vector<glm::dvec3> corners;
-  reader.forEachCells([&](const LoadedCells& loaded) {
-    const MeshCells& chunk = loaded.cells;
-    const uint32_t piece = loaded.range.piece;
-    for (size_t n = 0; n < chunk.size(); ++n) {
-      if (chunk.shapes[n] == CellKind::kNone) continue;
-      corners.clear();
-      for (const uint64_t point : chunk.cornersOfCell(n))
-        corners.push_back(places[first_point[piece] + point]);
-      glm::dvec3 lower = corners[0], upper = corners[0], middle(0.0);
-      for (const glm::dvec3& corner : corners) {
-        lower = glm::min(lower, corner), upper = glm::max(upper, corner);
-        middle += corner / static_cast<double>(corners.size());
-      }
-      by_x.forEachIn(lower, upper, [&](size_t p) {
+  gather.forEach([&](const GatheredCells& some) {
+    for (size_t n = 0; n < some.size(); ++n) {
+      if (some.shapes[n] == CellKind::kNone) continue;
+      const CellView cell = some.view(n, cells ? 0 : scalars.size());
+      const CellBox box(cell.corners);
+      by_x.forEachIn(box.lower, box.upper, [&](size_t p) {
         if (found[p]) return;
-        const auto weights = weightsInCell(chunk.shapes[n], corners, chunk.facesOfCell(n), points[p]);
+        const auto weights = weightsInCell(cell.shape, cell.corners, cell.faces, points[p]);
         if (!weights) return;
-        SourceValues values{0, {loaded.range.number + n, 0, 0}, middle, {}, {}};
+        SourceValues values{0, {some.numbers[n], 0, 0}, box.middle, {}, {}};
         if (cells) {
-          for (const auto& of_scalar : chunk.scalars) values.sample.push_back(of_scalar[n]);
+          const auto first = some.cell_values.begin() + static_cast<ptrdiff_t>(n * scalars.size());
+          values.sample.assign(first, first + static_cast<ptrdiff_t>(scalars.size()));
           values.values.assign(values.sample.begin(), values.sample.end());
         } else {
-          const auto of_cell = chunk.cornersOfCell(n);
           const auto nearest =
               static_cast<size_t>(std::max_element(weights->begin(), weights->end()) - weights->begin());
-          values.at[0] = first_point[piece] + of_cell[nearest];
-          values.place = corners[nearest];
-          for (const std::vector<float>& of_scalar : at_points) {
-            const float* const of_piece = of_scalar.data() + first_point[piece];
+          values.at[0] = some.cornersOfCell(n)[nearest];
+          values.place = cell.corners[nearest];
+          for (size_t v = 0; v < scalars.size(); ++v) {
             double value = 0;
-            for (size_t c = 0; c < of_cell.size(); ++c) value += (*weights)[c] * double{of_piece[of_cell[c]]};
+            for (size_t c = 0; c < cell.corners.size(); ++c)
+              value += (*weights)[c] * double{cell.values[c * scalars.size() + v]};
             values.values.push_back(value);
-            values.sample.push_back(of_piece[of_cell[nearest]]);
+            values.sample.push_back(cell.values[nearest * scalars.size() + v]);
           }
         }
         for (size_t v = 0; v < scalars.size(); ++v)

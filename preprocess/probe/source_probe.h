@@ -11,6 +11,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_source.h"
+#include "stream/base/temporary_files.h"
 
 namespace curvisplat {
 
@@ -36,17 +37,19 @@ struct ValueRange {
 };
 
 /// Returns for each point the values of the cell that has it: the first that is found around the samples in `near`, in their order;
-/// nullopt if there is none. `scalars`: indices into the description. Reads boxes around the samples alone. Throws Error as reading does.
+/// nullopt if there is none. `scalars`: indices into the description. Reads boxes around the samples, and for points that have no cell there
+/// the outermost cells of the blocks. Throws Error as reading does.
 std::vector<std::optional<SourceValues>> probeGrid(const GridSource& source,
                                                    std::span<const uint32_t> scalars,
                                                    std::span<const ValueRange> ranges,
                                                    std::span<const glm::dvec3> points,
                                                    std::span<const std::vector<NearSample>> near);
 
-/// Does the same for a mesh. It reads all points and cells, and keeps the points: 24 bytes each, and 4 for each scalar.
+/// Does the same for a mesh. It reads all points and cells, within 256 MiB and with temporary files in `scratch`.
 std::vector<std::optional<SourceValues>> probeMesh(const MeshSource& source,
                                                    std::span<const uint32_t> scalars,
                                                    std::span<const ValueRange> ranges,
-                                                   std::span<const glm::dvec3> points);
+                                                   std::span<const glm::dvec3> points,
+                                                   const ScratchFiles& scratch);
 
 }  // namespace curvisplat

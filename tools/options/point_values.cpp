@@ -7,6 +7,7 @@
 #include <string>
 #include <system_error>
 
+#include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/probe/source_probe.h"
 #include "stream/base/error.h"
@@ -62,7 +63,7 @@ std::vector<std::optional<SourceValues>> sourceValues(const CacheReader& reader,
                                                       std::span<const std::optional<ProbeResult>> found) {
   const OpenSource source = openSource(reader, from);
   if (const auto* mesh = dynamic_cast<const MeshSource*>(source.grid.get()))
-    return probeMesh(*mesh, source.scalars, source.ranges, points);
+    return probeMesh(*mesh, source.scalars, source.ranges, points, ScratchFiles(systemTemporaryFolder()));
   std::vector<std::vector<NearSample>> near(points.size());
   for (size_t p = 0; p < points.size(); ++p)
     if (found[p])
