@@ -4,7 +4,12 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <cmath>
 #include <filesystem>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "tests/support/program_test.h"
 #include "tests/support/test_caches.h"
@@ -126,6 +131,97 @@ TEST_F(InfoOfACache, ProbesTheFilesCells) {
   std::filesystem::remove(folder_ / "bent.vts");
   expectRefused({"info", folder_ / "bent.splats", "--probe=" + point, "--source"}, 1,
                 {"bent.splats", "name them after --source"});
+}
+
+/// An ASCII .vts of 9 x 9 x 9 nodes at whole numbers.
+std::string cubeWith(double (*value)(double x, double y, double z, int step), int step) {
+  std::string points, values;
+  for (int n = 0; n < 729; ++n) {
+    const int x = n % 9, y = n / 9 % 9, z = n / 81;
+    points += fmt::format("{} {} {}\n", x, y, z);
+    values += fmt::format("{}\n", value(x, y, z, step));
+  }
+  const std::string extent = "Extent=\"0 8 0 8 0 8\">";
+  return "<VTKFile type=\"StructuredGrid\"><StructuredGrid Whole" + extent + "<Piece " + extent +
+         "<Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">" + points +
+         "</DataArray></Points><PointData><DataArray type=\"Float64\" Name=\"f\" format=\"ascii\">" + values +
+         "</DataArray></PointData></Piece></StructuredGrid></VTKFile>";
+}
+
+/// The column of a table, without its heading; where it is empty, NaN.
+std::vector<double> columnOf(const std::string& table, const std::string& name) {
+  std::istringstream lines(table);
+  std::string line, field;
+  std::vector<double> column;
+  size_t wanted = 0;
+  for (bool heading = true; std::getline(lines, line); heading = false) {
+    std::istringstream fields(line);
+    for (size_t n = 0; std::getline(fields, field, ','); ++n) {
+      if (heading && field == name) wanted = n;
+      if (!heading && n == wanted)
+        column.push_back(field.empty() ? std::numeric_limits<double>::quiet_NaN() : std::stod(field));
+    }
+  }
+  return column;
+}
+
+TEST_F(InfoOfACache, ProbesAllStepsOfASeries) {
+  const auto linear = [](double x, double y, double z, int step) {
+    return (1 + step) * x + 10 * y - z + 100 * step;
+  };
+  Words convert{"convert"};
+  for (int step = 0; step < 4; ++step) {
+    const std::filesystem::path file = folder_ / fmt::format("run_{}.vts", step);
+    overwriteFile(file, cubeWith(linear, step));
+    convert.push_back(file);
+  }
+  run(convert + Words{"-o", folder_ / "run.splats"});
+  const auto valuesOf = [&](const Words& options) {
+    return columnOf(run(Words{"info", folder_ / "run.splats"} + options).out, "f");
+  };
+  const std::vector<double> all = valuesOf({"--probe", "3.25,4.5,2.75", "--steps", "all"});
+  ASSERT_EQ(all.size(), 4u);
+  for (int step = 0; step < 4; ++step)
+    EXPECT_NEAR(all[static_cast<size_t>(step)], linear(3.25, 4.5, 2.75, step), 0.05) << step;
+  const std::vector<double> some = valuesOf({"--probe", "3.25,4.5,2.75", "--steps", "1:3:2"});
+  EXPECT_EQ(some, (std::vector<double>{all[1], all[3]}));
+  EXPECT_EQ(valuesOf({"--probe-line", "1,1,1", "7,7,7", "5", "--steps", "2:3"}).size(), 10u);
+}
+
+/// What `info` says of errors, against what the same points have at full precision.
+TEST_F(InfoOfACache, ErrorsAreThoseOfItsValues) {
+  overwriteFile(folder_ / "f.vts",
+                cubeWith([](double x, double y, double z,
+                            int) { return 100 * std::sin(0.7 * x) * std::cos(0.4 * y) + 3 * z * z; },
+                         0));
+  nlohmann::json said;
+  std::vector<double> values[2], samples[2];
+  for (const bool fine : {false, true}) {
+    const std::filesystem::path cache = folder_ / (fine ? "fine.splats" : "normal.splats");
+    run({"convert", folder_ / "f.vts", "-o", cache, "--value-precision", fine ? "fine" : "normal"});
+    const std::string table = run({"info", cache, "--probe-line", "0.1,0.2,0.3", "7.9,7.8,7.7", "2000"}).out;
+    values[fine] = columnOf(table, "f");
+    samples[fine] = columnOf(table, "sample_f");
+    if (!fine) said = nlohmann::json::parse(run({"info", cache, "--json"}).out);
+  }
+  const auto& range = said["picture_errors"][0]["range"];
+  const double width = range[1].get<double>() - range[0].get<double>();
+  EXPECT_GT(width, 100);
+  double largest = 0, squares = 0, of_samples = 0;
+  for (size_t n = 0; n < values[0].size(); ++n) {
+    const double error = std::abs(values[0][n] - values[1][n]);
+    largest = std::max(largest, error);
+    squares += error * error / static_cast<double>(values[0].size());
+    of_samples = std::max(of_samples, std::abs(samples[0][n] - samples[1][n]));
+  }
+  EXPECT_GT(largest, 0);
+  EXPECT_LE(largest, said["picture_errors"][0]["largest"].get<double>() * width);
+  // Neighbours' errors even out in part.
+  const double typical = said["picture_errors"][0]["typical"].get<double>() * width;
+  EXPECT_LT(std::sqrt(squares), typical);
+  EXPECT_GT(std::sqrt(squares), 0.1 * typical);
+  EXPECT_LE(of_samples, 1.05 * said["stored_errors"][0]["values"]["largest"].get<double>());
+  EXPECT_GE(of_samples, 0.5 * said["stored_errors"][0]["values"]["largest"].get<double>());
 }
 
 /// A long tail, at the precision of which values between 0 and 1 are rounded to a few numbers.
