@@ -18,7 +18,7 @@ void CellContour::add(const ContourCell& cell) {
   addPolygons(cell);
 }
 
-/// Where the edge from corner a to corner b crosses the value: the same place, whichever cell asks.
+/// Returns where the edge from corner a to corner b crosses the value: the same place, whichever cell asks.
 CellContour::Crossing CellContour::crossingOf(const ContourCell& cell, uint32_t a, uint32_t b) {
   const bool enters = double{cell.values[b]} >= value_;
   const glm::dvec3 downwards = enters ? cell.at[a] - cell.at[b] : cell.at[b] - cell.at[a];

@@ -188,7 +188,7 @@ TEST_F(InfoOfACache, ProbesAllStepsOfASeries) {
   EXPECT_EQ(valuesOf({"--probe-line", "1,1,1", "7,7,7", "5", "--steps", "2:3"}).size(), 10u);
 }
 
-/// What `info` says of errors, against what the same points have at full precision.
+/// Errors that `info` states bound those of values along a line, against the same line at full precision.
 TEST_F(InfoOfACache, ErrorsAreThoseOfItsValues) {
   overwriteFile(folder_ / "f.vts",
                 cubeWith([](double x, double y, double z,
